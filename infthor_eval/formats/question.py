@@ -1,0 +1,34 @@
+"""One NIEH question, as every room of the project passes it on."""
+
+import hashlib
+from dataclasses import dataclass
+from functools import cached_property
+
+__all__ = ["Answer", "Question"]
+
+Answer = str | int | float
+
+
+@dataclass(frozen=True)
+class Question:
+    """A question on one trajectory (one row of a `qa_set*.csv`).
+
+    Attributes:
+        traj_id: the trajectory's folder under `metadata/`.
+        text: the question as put to the model.
+        clues: frame numbers (`img_idx`) that hold the evidence, in the order of the file.
+        answers: the gold answers; one, or several of which all are asked for.
+        kind: the question type where the file names one (a `question_type` column), else None.
+    """
+
+    traj_id: str
+    text: str
+    clues: tuple[int, ...]
+    answers: tuple[Answer, ...]
+    kind: str | None = None
+
+    @cached_property
+    def id(self) -> str:
+        """Name of the question, stable under reordering of the file: `<traj_id>/<12 hex digits>`."""
+        key = repr((self.text, self.clues)).encode()
+        return f"{self.traj_id}/{hashlib.blake2b(key, digest_size=6).hexdigest()}"

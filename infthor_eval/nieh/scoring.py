@@ -1,0 +1,154 @@
+"""The two scorers of NIEH answers.
+
+`reference` equals the published scorer on every pair, faults included: its numbers are what the paper reports.
+`strict` keeps its idea (normalise, compare, allow near misses and synonyms) and mends the faults:
+
+* each gold answer is matched at most once, so "mug, mug, mug" against [mug, plate] scores 0.5, not 1.5;
+* "and" separates answers only as a whole word, so "hand towel" stays one answer;
+* yes and no must be the first word said ("not sure", "none", "notebook" are not "no"; "yesterday" is not "yes"),
+  and an answer that says both counts as neither;
+* numbers must be equal: "100" is not nearly "10".
+"""
+
+import re
+from collections.abc import Callable, Sequence
+from difflib import SequenceMatcher
+from functools import cache
+from importlib import resources
+from typing import Literal
+
+import yaml
+from word2number import w2n
+
+from infthor_eval.errors import UsageError
+from infthor_eval.formats.question import Answer
+
+__all__ = ["SCORERS", "Scorer", "score"]
+
+Scorer = Literal["reference", "strict"]
+SCORERS: tuple[Scorer, ...] = ("reference", "strict")
+
+_NEAR = 80  # similarity in percent from which two normalised strings count as equal
+_YES_NO = ("yes", "no")
+
+
+def score(response: str, answers: Sequence[Answer], scorer: Scorer = "reference") -> float:
+    """Score a model's response against the gold answers.
+
+    Args:
+        response: what the model said.
+        answers: the gold answers of the question (strings or numbers); all of them are asked for.
+        scorer: "reference" (the published scorer, exactly) or "strict" (its faults mended).
+
+    Returns:
+        The share of gold answers that the response gives; 1.0 or 0.0 for a single gold answer. Only the reference
+        scorer can exceed 1.0, when one gold answer is repeated.
+
+    Raises:
+        UsageError: there is no such scorer, or no gold answer.
+    """
+    if scorer not in SCORERS:
+        raise UsageError(f"unknown scorer {scorer!r}; use one of {', '.join(SCORERS)}")
+    if not answers:
+        raise UsageError("cannot score against an empty list of gold answers; give at least one")
+    return (_reference if scorer == "reference" else _strict)(response, answers)
+
+
+def _reference(response: str, answers: Sequence[Answer]) -> float:
+    if len(answers) == 1:
+        return float(_matches_reference(response, answers[0]))
+    pieces = [piece.replace("and", "").strip() for piece in response.split(",")]
+    return sum(_matches_reference(piece, gold) for gold in answers for piece in pieces) / len(answers)
+
+
+def _strict(response: str, answers: Sequence[Answer]) -> float:
+    if len(answers) == 1:
+        return float(_matches_strict(response, answers[0]))
+    pieces = [piece for piece in re.split(r"[,;\n]|\band\b", response, flags=re.IGNORECASE) if piece.strip()]
+    return _largest_matching(answers, pieces, _matches_strict) / len(answers)
+
+
+def _largest_matching(
+    answers: Sequence[Answer], pieces: Sequence[str], match: Callable[[str, Answer], bool]
+) -> int:
+    """How many gold answers can be given a piece of their own (augmenting paths; both lists are short)."""
+    fits = [[index for index, piece in enumerate(pieces) if match(piece, gold)] for gold in answers]
+    owner: dict[int, int] = {}
+
+    def assign(gold: int, tried: set[int]) -> bool:
+        for piece in fits[gold]:
+            if piece in tried:
+                continue
+            tried.add(piece)
+            if piece not in owner or assign(owner[piece], tried):
+                owner[piece] = gold
+                return True
+        return False
+
+    return sum(assign(gold, set()) for gold in range(len(answers)))
+
+
+def _matches_reference(response: str, gold: Answer) -> bool:
+    said, wanted = _normalise(response), _normalise(gold)
+    if _near(said, wanted) or _synonymous(said, wanted):
+        return True
+    if wanted == "yes" and "yes" in said[:4]:
+        return True
+    return wanted == "no" and "no" in said[:3]
+
+
+def _matches_strict(response: str, gold: Answer) -> bool:
+    wanted = _normalise(gold)
+    if wanted in _YES_NO:
+        words = re.findall(r"\w+", response.lower())
+        other = _YES_NO[wanted == "yes"]
+        return words[:1] == [wanted] and other not in words
+    if _is_number(wanted):
+        said = _normalise(response)
+        return _is_number(said) and float(said) == float(wanted)
+    said = _plain(response.lower().strip())
+    return _near(said, wanted) or _synonymous(said, wanted)
+
+
+def _is_number(text: str) -> bool:
+    return re.fullmatch(r"-?\d+(\.\d+)?", text) is not None
+
+
+def _normalise(text: Answer) -> str:
+    """The published normal form: a number in digits where the text holds one, else plain words."""
+    if not isinstance(text, str):
+        return str(text)
+    text = text.lower().strip()
+    try:
+        return str(w2n.word_to_num(text))
+    except (ValueError, IndexError):  # the library's own ways to say "not a number" ("thousand one": IndexError)
+        return _plain(text)
+
+
+def _plain(text: str) -> str:
+    bare = re.sub(r"[^\w\s]", "", text)
+    return re.sub(r"^\w+ is ", "", bare).strip()
+
+
+def _near(said: str, wanted: str) -> bool:
+    if said == wanted:
+        return True
+    if not said or not wanted:
+        return False
+    return round(100 * SequenceMatcher(None, said, wanted).ratio()) >= _NEAR
+
+
+def _synonymous(said: str, wanted: str) -> bool:
+    return any(
+        (said == word and wanted in phrases)
+        or (wanted == word and said in phrases)
+        or (said in phrases and wanted in phrases)
+        for word, phrases in _synonyms().items()
+    )
+
+
+@cache
+def _synonyms() -> dict[str, list[str]]:
+    table = resources.files(__package__).joinpath("synonyms.yaml").read_text(encoding="utf-8")
+    rows: dict[str, list[str]] = yaml.safe_load(table)
+    return rows

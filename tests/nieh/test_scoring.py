@@ -1,0 +1,84 @@
+import gzip
+import json
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from infthor_eval.errors import UsageError
+from infthor_eval.nieh import score
+
+GOLDEN = Path(__file__).parents[3] / "shared" / "data" / "nieh_scoring" / "golden.jsonl.gz"
+names = st.from_regex(r"[a-z]{3,9}( [a-z]{3,9})?", fullmatch=True).filter(lambda name: "and" not in name.split())
+answers = st.lists(names, min_size=1, max_size=5)
+
+
+@pytest.mark.skipif(not GOLDEN.is_file(), reason=f"no golden pairs at {GOLDEN}")
+def test_reference_equals_the_published_scorer_on_every_golden_pair():
+    with gzip.open(GOLDEN, "rt") as file:
+        pairs = [json.loads(line) for line in file]
+    wrong = [p for p in pairs if score(p["response"], p["answers"]) != pytest.approx(p["score"], abs=1e-9)]
+    assert len(pairs) >= 4000
+    assert wrong == []
+
+
+@pytest.mark.parametrize(
+    ("response", "gold", "reference", "strict"),
+    [
+        ("mug, mug, mug", ["mug", "plate"], 1.5, 0.5),
+        ("candle, hand towel", ["candle", "hand towel"], 0.5, 1.0),
+        ("not sure", ["no"], 1.0, 0.0),
+        ("none", ["no"], 1.0, 0.0),
+        ("notebook", ["no"], 1.0, 0.0),
+        ("yesterday", ["yes"], 1.0, 0.0),
+        ("yes and no", ["yes"], 1.0, 0.0),
+        ("No, it is not.", ["no"], 1.0, 1.0),
+        ("100", ["10"], 1.0, 0.0),
+        ("three", ["3"], 1.0, 1.0),
+        ("three", [3], 1.0, 1.0),
+        ("refrigerator", ["Fridge"], 1.0, 1.0),
+        ("It is Sofa.", ["sofa"], 1.0, 1.0),
+        ("mug and plate", ["mug", "plate"], 0.0, 1.0),
+        ("", ["mug"], 0.0, 0.0),
+        ("", ["mug", "cup"], 0.0, 0.0),
+        ("mug, mug", ["mug", "mug"], 2.0, 1.0),
+    ],
+)
+def test_known_faults_stay_in_reference_and_are_mended_in_strict(response, gold, reference, strict):
+    assert score(response, gold, "reference") == reference
+    assert score(response, gold, scorer="strict") == strict
+
+
+@given(answers)
+def test_strict_gives_the_gold_answers_full_marks(gold):
+    assert score(", ".join(gold), gold, "strict") == 1.0
+
+
+@given(st.text(max_size=60), answers)
+def test_strict_stays_within_zero_and_one(response, gold):
+    assert 0.0 <= score(response, gold, "strict") <= 1.0
+
+
+@given(answers, st.randoms())
+def test_strict_does_not_depend_on_the_order_of_the_answers(gold, random):
+    said = list(gold)
+    random.shuffle(said)
+    assert score(", ".join(said), gold, "strict") == 1.0
+
+
+@given(st.text(max_size=40))
+def test_reference_takes_any_response(response):
+    for gold in (["mug"], ["yes"], [3], ["mug", "no"]):
+        assert score(response, gold) >= 0.0
+
+
+def test_word_to_number_failures_of_the_library_are_no_numbers():
+    assert score("thousand one", ["thousand one"]) == 1.0
+
+
+def test_unknown_scorer_and_empty_gold_are_refused():
+    with pytest.raises(UsageError, match="unknown scorer 'lenient'"):
+        score("mug", ["mug"], "lenient")
+    with pytest.raises(UsageError, match="empty list"):
+        score("mug", [])
