@@ -1,13 +1,13 @@
 """The log of a replayed trajectory: `metadata/<traj_id>/metadata.json`, one entry per frame.
 
 Three layouts are in circulation and all are read: a list of entries, a single entry, and a dict of columns.
-    Entries as published hold `img_idx`, `img_filename`, `step` and `object_log`; ours add what question rules
-    and their checker need. The added fields are optional, so published logs read as well, and readers that
-    know only the published fields can read ours.
+Entries as published hold `img_idx`, `img_filename`, `step` and `object_log`; ours add what question rules
+and their checker need. The added fields are optional, so published logs read as well, and readers that
+know only the published fields can read ours.
 
 Frames and actions: frame 0 shows the scene before the first action, frame k + 1 the outcome of low-level
-    action k. `step` is that action's index; frame 0 carries step 0, as in the published logs, and `action`
-    None.
+action k. `step` is that action's index; frame 0 carries step 0, as in the published logs, and `action`
+None.
 """
 
 from collections.abc import Iterator, Sequence

@@ -1,0 +1,309 @@
+"""Trajectory JSON: ∞-THOR's, ours, and its single-task ancestor, ALFRED's `traj_data.json`.
+
+One typed form serves all three. What a file adds beyond the known fields is tolerated and left out, so
+whoever passes a trajectory on keeps `Source.raw`. Coordinates are metres but for `PlannerAction.location`,
+whose x and z are grid cells of 0.25 m; angles are degrees.
+"""
+
+import gzip
+import hashlib
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from infthor_eval.errors import DataError
+
+__all__ = [
+    "ApiAction",
+    "DiscreteAction",
+    "HighAction",
+    "InitAction",
+    "LowAction",
+    "ObjectPose",
+    "Plan",
+    "PlannerAction",
+    "Scene",
+    "Source",
+    "SubTask",
+    "SubTrajectory",
+    "TaskInfo",
+    "Toggle",
+    "Trajectory",
+    "encode_trajectory",
+    "folder_name",
+    "iter_sources",
+    "iter_trajectories",
+]
+
+_SUFFIXES = (".json", ".jsonl", ".jsonl.gz")
+_NOT_TRAJECTORIES = {"metadata.json", "expert_log.json"}  # what a replayed set holds beside its trajectories
+_MEND = "restore the file or leave it out"
+
+
+class _Fields(msgspec.Struct, omit_defaults=True):
+    """Base of the parts; defaults are left out in writing."""
+
+
+class InitAction(_Fields, omit_defaults=False):
+    """The agent's first pose; `rotation` is a number up to AI2-THOR 2.1.0 and a vector after it."""
+
+    x: float
+    y: float
+    z: float
+    rotation: float | dict[str, float] = 0.0
+    horizon: float = 0.0
+    action: str = "TeleportFull"
+    rotate_on_teleport: bool = msgspec.field(name="rotateOnTeleport", default=True)
+
+    @property
+    def yaw(self) -> float:
+        """Rotation about the vertical axis, degrees."""
+        return self.rotation if isinstance(self.rotation, int | float) else self.rotation.get("y", 0.0)
+
+
+class ObjectPose(_Fields):
+    """Where the initial scene has one object; the name is that of the Unity object, without "(Clone)"."""
+
+    name: str = msgspec.field(name="objectName")
+    position: dict[str, float]
+    rotation: dict[str, float] = msgspec.field(default_factory=lambda: {"x": 0.0, "y": 0.0, "z": 0.0})
+
+
+class Toggle(_Fields, omit_defaults=False):
+    """Switches all objects of a type on or off in the initial scene."""
+
+    object_type: str = msgspec.field(name="objectType")
+    is_on: bool = msgspec.field(name="isOn")
+
+
+class Scene(_Fields, omit_defaults=False):
+    """What makes the initial state of a trajectory: the scene, the objects' poses and states, the agent's
+    pose."""
+
+    floor_plan: str
+    init_action: InitAction
+    scene_num: int | str = 0
+    object_poses: list[ObjectPose] = msgspec.field(default_factory=list)
+    object_toggles: list[Toggle] = msgspec.field(default_factory=list)
+    dirty_and_empty: bool = False
+    random_seed: int = 0
+
+
+class ApiAction(_Fields):
+    """One call of the simulator as recorded. Ids are those of the AI2-THOR version that recorded it."""
+
+    action: str
+    object_id: str | None = msgspec.field(name="objectId", default=None)
+    receptacle_id: str | None = msgspec.field(name="receptacleObjectId", default=None)
+    move_magnitude: float | None = msgspec.field(name="moveMagnitude", default=None)
+    degrees: float | None = None
+    force_action: bool | None = msgspec.field(name="forceAction", default=None)
+    place_stationary: bool | None = msgspec.field(name="placeStationary", default=None)
+
+
+class DiscreteAction(_Fields, omit_defaults=False):
+    """The action in words: `args` is a list of names at the upper level, a dict at the lower."""
+
+    action: str
+    args: dict[str, Any] | list[Any] = msgspec.field(default_factory=list)
+
+    @property
+    def box(self) -> tuple[int, int, int, int] | None:
+        """The recorded box [xmin, ymin, xmax, ymax] of the object acted on, in the 300x300 frame."""
+        box = self.args.get("bbox") if isinstance(self.args, dict) else None
+        return tuple(box) if isinstance(box, list) and len(box) == 4 else None
+
+
+class LowAction(_Fields):
+    """One low-level action."""
+
+    api_action: ApiAction
+    high_idx: int = 0
+    discrete_action: DiscreteAction | None = None
+    low_idx: int | None = None
+
+
+class PlannerAction(_Fields):
+    """One sub-goal as the planner made it; `location` is "loc|x|z|rotation|horizon"."""
+
+    action: str
+    location: str | None = None
+    object_id: str | None = msgspec.field(name="objectId", default=None)
+    receptacle_id: str | None = msgspec.field(name="receptacleObjectId", default=None)
+    value: int | None = None
+
+
+class HighAction(_Fields, omit_defaults=False):
+    """One sub-goal."""
+
+    high_idx: int
+    discrete_action: DiscreteAction
+    planner_action: PlannerAction
+
+
+class Plan(_Fields, omit_defaults=False):
+    """The expert's plan at both levels."""
+
+    low_actions: list[LowAction]
+    high_pddl: list[HighAction] = msgspec.field(default_factory=list)
+
+
+class TaskInfo(_Fields, omit_defaults=False):
+    """What a task is about: its type (`goal`) and the object types that fill it."""
+
+    goal: str
+    pickup: str | None = None
+    movable: str | None = None
+    receptacle: str | None = None
+    scene: str | int | None = None
+
+
+class SubTask(_Fields, omit_defaults=False):
+    """One task of a trajectory, or its final one."""
+
+    task_info: TaskInfo
+    task_desc: str = ""
+    pddl_params: dict[str, Any] = msgspec.field(default_factory=dict)
+
+
+class SubTrajectory(_Fields, omit_defaults=False):
+    """Which sub-goals and low-level actions belong to one sub-task; both ranges are [first, end)."""
+
+    sub_traj_idx: int
+    high_pddl_idx: tuple[int, int]
+    low_pddl_idx: tuple[int, int]
+    subgoal: Any = None
+
+
+class Trajectory(_Fields):
+    """One trajectory. The fields below `plan` are absent where the format has none (see the module's
+    text)."""
+
+    scene: Scene
+    plan: Plan
+    traj_id: str = ""
+    task_id: str = ""
+    task_type: str | None = None
+    pddl_params: dict[str, Any] | None = None
+    sub_tasks: list[SubTask] = msgspec.field(default_factory=list)
+    sub_trajs: list[SubTrajectory] = msgspec.field(default_factory=list)
+    long_horizon_task: SubTask | None = None
+    object_log: list[Any] = msgspec.field(default_factory=list)
+    images: list[Any] = msgspec.field(default_factory=list)
+    state_summary: dict[str, str] | None = None
+    turk_annotations: dict[str, Any] | None = None
+    gen_info: dict[str, Any] | None = None
+
+
+@dataclass(frozen=True)
+class Source:
+    """One trajectory where it lies, not yet decoded, so that a malformed one does not hide the others.
+
+    Attributes:
+        path: the file.
+        line: its line there, from 1; None where the file holds nothing else.
+        raw: the JSON text.
+    """
+
+    path: Path
+    line: int | None
+    raw: bytes
+
+    @property
+    def place(self) -> str:
+        """File and line, for messages."""
+        return str(self.path) if self.line is None else f"{self.path}:{self.line}"
+
+    def read(self) -> Trajectory:
+        """Decode and check it; `traj_id` falls back to the task's id, then to the file's name.
+
+        Raises:
+            DataError: not JSON, or not the documented form.
+        """
+        try:
+            trajectory = msgspec.json.decode(self.raw, type=Trajectory)
+        except (msgspec.DecodeError, UnicodeDecodeError) as error:
+            raise DataError(f"{self.place}: not a trajectory ({error}); {_MEND}") from error
+        trajectory.traj_id = trajectory.traj_id or trajectory.task_id or self._stem()
+        return trajectory
+
+    def _stem(self) -> str:
+        stem = self.path.name.split(".")[0]
+        return stem if self.line is None else f"{stem}-{self.line}"
+
+
+def iter_sources(path: Path) -> Iterator[Source]:
+    """Find the trajectories in a file (`.json`, `.jsonl`, `.jsonl.gz`) or a directory of such files.
+
+    Yields:
+        The trajectories, undecoded, in the order of file names and lines.
+
+    Raises:
+        DataError: nothing there, of another kind, or unreadable.
+    """
+    path = Path(path)
+    if path.is_dir():
+        files = [file for file in sorted(path.rglob("*")) if _is_trajectory_file(file)]
+        if not files:
+            raise DataError(f"{path}: no {', '.join(_SUFFIXES)} file in this directory; name another path")
+        for file in files:
+            yield from iter_sources(file)
+    elif path.name.endswith(".json"):
+        yield Source(path, None, _read(path))
+    elif path.name.endswith((".jsonl", ".jsonl.gz")):
+        yield from _lines(path)
+    else:
+        raise DataError(f"{path}: no trajectory file; name a {', '.join(_SUFFIXES)} file or a directory")
+
+
+def iter_trajectories(path: Path) -> Iterator[Trajectory]:
+    """Read the trajectories of a file or directory one after the other.
+
+    Raises:
+        DataError: as `iter_sources` and `Source.read`; the message names file and line.
+    """
+    for source in iter_sources(path):
+        yield source.read()
+
+
+def encode_trajectory(trajectory: Trajectory) -> bytes:
+    """The trajectory as indented JSON."""
+    return msgspec.json.format(msgspec.json.encode(trajectory), indent=1) + b"\n"
+
+
+def folder_name(traj_id: str) -> str:
+    """The name of a trajectory's folder: its id, made safe as one path component.
+
+    An id with other characters than letters, digits, `_`, `.`, `-` (ALFRED's have a slash) gets them replaced
+    and a hash appended, so that two ids never share a folder.
+    """
+    name = re.sub(r"[^A-Za-z0-9_.-]+", "_", traj_id).lstrip(".")[:150]
+    if name == traj_id and name:
+        return name
+    return f"{name}-{hashlib.blake2b(traj_id.encode(), digest_size=4).hexdigest()}"
+
+
+def _is_trajectory_file(path: Path) -> bool:
+    return path.is_file() and path.name.endswith(_SUFFIXES) and path.name not in _NOT_TRAJECTORIES
+
+
+def _read(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise DataError(f"{path}: cannot be read ({error.strerror}); {_MEND}") from error
+
+
+def _lines(path: Path) -> Iterator[Source]:
+    line = 0
+    try:
+        with gzip.open(path) if path.suffix == ".gz" else path.open("rb") as file:
+            for line, raw in enumerate(file, start=1):
+                if raw.strip():
+                    yield Source(path, line, raw)
+    except (OSError, EOFError) as error:
+        raise DataError(f"{path}: cannot be read after line {line} ({error}); {_MEND}") from error
