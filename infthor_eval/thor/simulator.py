@@ -1,0 +1,170 @@
+"""The simulator as the other rooms use it: scenes, actions, views, and survival of its process.
+
+Every action since the last scene change is kept. When the process dies, hangs or talks nonsense, a fresh one
+is started and the episode so far is run again, action for action; the caller sees nothing but the delay. That
+holds as far as the simulator is deterministic, so each repeated action must end as it did before.
+"""
+
+import logging
+from types import TracebackType
+from typing import Any, Self
+
+from infthor_eval.errors import SimulatorError
+from infthor_eval.thor.controller import SafeController
+from infthor_eval.thor.launch import Launch
+from infthor_eval.thor.transport import PeerFault
+from infthor_eval.thor.view import View, view_of
+
+__all__ = ["Simulator"]
+
+_LOG = logging.getLogger(__name__)
+_INITIAL = {"gridSize": 0.25, "fieldOfView": 60, "visibilityDistance": 1.5, "snapToGrid": True}
+
+
+class Simulator:
+    """One simulator process, kept alive. Use it as a context manager.
+
+    Attributes:
+        view: the world after the last action.
+        restarts: how often a fresh process had to be started so far.
+    """
+
+    def __init__(
+        self,
+        launch: Launch,
+        *,
+        width: int = 300,
+        height: int = 300,
+        instances: bool = True,
+        depth: bool = False,
+        max_restarts: int = 3,
+        **options: Any,
+    ) -> None:
+        """Describe the simulator; it starts with the first `reset`.
+
+        Args:
+            launch: what to start.
+            width: of the frames, pixels.
+            height: of the frames, pixels.
+            instances: whether views tell which object each pixel shows.
+            depth: whether views have depth.
+            max_restarts: how many failures one episode may survive.
+            options: further initialisation parameters of AI2-THOR (`fieldOfView`, `agentMode`, ...).
+        """
+        self._launch = launch
+        self._options = {
+            **_INITIAL,
+            "width": width,
+            "height": height,
+            "renderInstanceSegmentation": instances,
+            "renderDepthImage": depth,
+            **options,
+        }
+        self._max_restarts = max_restarts
+        self._controller: SafeController | None = None
+        self._scene: str | dict[str, Any] | None = None
+        self._episode: list[tuple[dict[str, Any], bool]] = []
+        self._failures = 0
+        self._view: View | None = None
+        self.restarts = 0
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    @property
+    def view(self) -> View:
+        """The world after the last action.
+
+        Raises:
+            SimulatorError: no scene is loaded.
+        """
+        if self._view is None:
+            raise SimulatorError("no scene is loaded; reset the simulator to one first")
+        return self._view
+
+    def reset(self, scene: str | dict[str, Any]) -> View:
+        """Load a scene and begin an episode.
+
+        Args:
+            scene: its name (`FloorPlan10`, `kitchen-3`), or the description of a ProcTHOR house.
+
+        Raises:
+            SimulatorError: the simulator cannot be started, or refuses the scene.
+        """
+        self._scene, self._episode, self._failures = scene, [], 0
+        while True:
+            try:
+                self._view = self._load()
+                return self._view
+            except PeerFault as fault:
+                self._recover_from(fault)
+
+    def step(self, action: str, **arguments: Any) -> View:
+        """Run one action; a refused one is told by the view's `success` and `error`.
+
+        Raises:
+            SimulatorError: the simulator failed more often than it may, or a repeated episode went another
+                way.
+        """
+        call = {"action": action, **arguments}
+        while True:
+            try:
+                if self._controller is None:
+                    self._repeat_episode()
+                view = self._call(call)
+            except PeerFault as fault:
+                self._recover_from(fault)
+            else:
+                self._episode.append((call, view.success))
+                self._view = view
+                return view
+
+    def close(self) -> None:
+        """Stop the simulator; a later `reset` starts it again."""
+        if self._controller is not None:
+            self._controller.stop()
+            self._controller = None
+
+    def _load(self) -> View:
+        """Bring the process to the start of the episode, starting one if need be."""
+        if self._scene is None:
+            raise SimulatorError("no scene is loaded; reset the simulator to one first")
+        if self._controller is None:
+            self._controller = SafeController(self._launch, self._scene, **self._options)
+            return view_of(self._controller.last_event)
+        try:
+            return view_of(self._controller.reset(self._scene))
+        except (ValueError, RuntimeError) as error:
+            message = " ".join(str(error).split())[:300]
+            raise SimulatorError(f"scene {self._scene}: {message}") from error
+
+    def _call(self, call: dict[str, Any]) -> View:
+        assert self._controller is not None
+        try:
+            return view_of(self._controller.step(dict(call)))
+        except ValueError:
+            # ai2thor raises it for unknown actions and arguments; the reply is kept and says so itself.
+            return view_of(self._controller.last_event)
+
+    def _repeat_episode(self) -> None:
+        self._load()
+        for index, (call, success) in enumerate(self._episode):
+            if self._call(call).success != success:
+                raise SimulatorError(
+                    f"after a restart action {index} ({call['action']}) of the episode in {self._scene} "
+                    "ended otherwise than before; run the episode again from its start"
+                )
+
+    def _recover_from(self, fault: PeerFault) -> None:
+        """Drop the failed process; raise where it failed too often."""
+        self.close()
+        self._failures += 1
+        if self._failures > self._max_restarts:
+            raise SimulatorError(f"{fault} (failure {self._failures} of this episode, giving up)") from fault
+        self.restarts += 1
+        _LOG.warning("%s; starting it again (%d of %d)", fault, self._failures, self._max_restarts)

@@ -1,0 +1,206 @@
+"""ai2thor's FIFO server made safe against a simulator that dies, hangs or talks nonsense.
+
+The published server opens its pipes with blocking calls and reads without looking at the child process, so a
+simulator that dies leaves the program hanging. This one opens the pipes non-blocking, watches the child while
+it waits, and turns every failure into a `PeerFault` that says which it was.
+"""
+
+import contextlib
+import fcntl
+import io
+import os
+import select
+import subprocess
+import time
+from typing import Any
+
+import msgpack
+from ai2thor.fifo_server import FieldType, FifoServer
+from ai2thor.server import DepthFormat, MultiAgentEvent
+
+from infthor_eval.errors import SimulatorError
+
+__all__ = ["PeerFault", "SafeFifoServer"]
+
+_WATCH_SECONDS = 0.1  # how often a waiting read or write looks whether the child still lives
+_PIPE_BYTES = 1 << 20  # a frame with ids and depth is 0.9 MB; the default 64 KiB costs many wake-ups
+_LARGEST_BODY = 1 << 30
+_NOT_PROTOCOL = (
+    KeyError,
+    TypeError,
+    ValueError,
+    AttributeError,
+    IndexError,
+    msgpack.exceptions.UnpackException,
+)
+
+
+class PeerFault(SimulatorError):
+    """The simulator's process failed; `kind` is "died", "hung" or "garbage"."""
+
+    def __init__(self, kind: str, message: str) -> None:
+        super().__init__(message)
+        self.kind = kind
+
+
+class SafeFifoServer(FifoServer):
+    """A drop-in FIFO server. `fault` holds the first failure; after it the server is dead for good."""
+
+    server_pipe: Any
+    client_pipe: Any
+
+    def __init__(
+        self,
+        width: int,
+        height: int,
+        timeout: float | None = 100.0,
+        depth_format: DepthFormat = DepthFormat.Meters,
+        add_depth_noise: bool = False,
+    ) -> None:
+        super().__init__(width, height, timeout, depth_format, add_depth_noise)
+        self.fault: PeerFault | None = None
+        self.doing = "starting"
+        self._deadline = float("inf")
+        self._seconds = 0.0
+        self._connected = False
+
+    def receive(self, timeout: float | None = None) -> MultiAgentEvent:
+        """Wait for one reply.
+
+        Args:
+            timeout: seconds for the whole reply; None takes the server's own.
+
+        Raises:
+            PeerFault: the simulator died, hung, or sent something that is not its protocol.
+        """
+        try:
+            return super().receive(timeout)
+        except PeerFault:
+            raise
+        except _NOT_PROTOCOL as error:
+            raise self._fail("garbage", f"sent what is not its protocol ({_one_line(error)})") from error
+
+    def send(self, action: dict[str, Any]) -> None:
+        """Send one action.
+
+        Raises:
+            PeerFault: the simulator died or does not read.
+        """
+        self.doing = str(action.get("action"))
+        super().send(action)
+
+    def stop(self) -> None:
+        """Kill the simulator, reap it, close the pipes and remove their folder. Safe to call again."""
+        process = self.unity_proc
+        if process is not None and process.poll() is None:
+            process.kill()
+            process.wait()
+        for pipe in (self.server_pipe, self.client_pipe):
+            if pipe is not None:
+                pipe.close()
+        self.raw_metadata = self.raw_files = None
+        self.tmp_dir.cleanup()
+
+    def _recv_message(self, timeout: float | None) -> tuple[Any, Any]:
+        self._start_clock(timeout)
+        if self.server_pipe is None:
+            self.server_pipe = _open_pipe(self.server_pipe_path, os.O_RDONLY)
+        return super()._recv_message(timeout)
+
+    def _send_message(self, message_type: FieldType, body: bytes) -> None:
+        self._start_clock(None)
+        if self.client_pipe is None:
+            self.client_pipe = self._open_client_pipe()
+        self._last_action_message = body
+        self._write(memoryview(self._create_header(message_type, body) + body + self.eom_header))
+
+    def _read_with_timeout(
+        self,
+        server_pipe: io.FileIO,
+        message_size: int,
+        timeout: float | None,  # noqa: ARG002 - the deadline is that of the whole reply, not of one read
+    ) -> bytearray:
+        """Read exactly `message_size` bytes."""
+        if message_size > _LARGEST_BODY:
+            raise self._fail("garbage", f"announced a message part of {message_size} bytes")
+        body = bytearray(message_size)
+        rest = memoryview(body)
+        while rest:
+            count = self._read_some(server_pipe.fileno(), rest)
+            rest = rest[count:]
+        return body
+
+    def _read_some(self, descriptor: int, into: memoryview) -> int:
+        """Read what is there, at least one byte."""
+        while True:
+            try:
+                count = os.readv(descriptor, [into])
+            except BlockingIOError:
+                count = -1
+            if count > 0:
+                self._connected = True
+                return count
+            if count == 0 and self._connected:
+                raise self._fail("died", self._exit_words())
+            # No writer yet (0) or nothing to read (-1). Without a writer select would return at once.
+            self._check()
+            if count == 0:
+                time.sleep(0.005)
+            else:
+                select.select([descriptor], [], [], _WATCH_SECONDS)
+
+    def _write(self, rest: memoryview) -> None:
+        descriptor = self.client_pipe.fileno()
+        while rest:
+            try:
+                rest = rest[os.write(descriptor, rest) :]
+            except BlockingIOError:
+                self._check()
+                select.select([], [descriptor], [], _WATCH_SECONDS)
+            except BrokenPipeError as error:
+                raise self._fail("died", self._exit_words()) from error
+
+    def _open_client_pipe(self) -> io.FileIO:
+        """Open the pipe to the simulator as soon as it has opened its end."""
+        while True:
+            try:
+                return _open_pipe(self.client_pipe_path, os.O_WRONLY)
+            except OSError:  # ENXIO: nobody reads yet
+                self._check()
+                time.sleep(0.005)
+
+    def _start_clock(self, timeout: float | None) -> None:
+        seconds = self.timeout if timeout is None else timeout
+        self._seconds = float("inf") if seconds is None else seconds
+        self._deadline = time.monotonic() + self._seconds
+
+    def _check(self) -> None:
+        """Raise where waiting on is pointless."""
+        if self.unity_proc is not None and self.unity_proc.poll() is not None:
+            raise self._fail("died", self._exit_words())
+        if time.monotonic() > self._deadline:
+            raise self._fail("hung", f"gave no answer within {self._seconds:g} s")
+
+    def _exit_words(self) -> str:
+        if self.unity_proc is None:
+            return "closed its pipe"
+        try:
+            code = self.unity_proc.wait(timeout=1.0)
+        except subprocess.TimeoutExpired:
+            return "closed its pipe while still running"
+        return f"died (exit status {code})"
+
+    def _fail(self, kind: str, words: str) -> PeerFault:
+        self.fault = PeerFault(kind, f"the simulator {words} at {self.doing}")
+        return self.fault
+
+
+def _open_pipe(path: str, mode: int) -> io.FileIO:
+    descriptor = os.open(path, mode | os.O_NONBLOCK | os.O_CLOEXEC)
+    with contextlib.suppress(OSError):  # a smaller pipe only costs time, and systems may limit its size
+        fcntl.fcntl(descriptor, fcntl.F_SETPIPE_SZ, _PIPE_BYTES)
+    return io.FileIO(descriptor, "rb" if mode == os.O_RDONLY else "wb")
+
+
+def _one_line(error: BaseException) -> str:
+    return " ".join(f"{type(error).__name__}: {error}".split())[:200]

@@ -1,0 +1,110 @@
+import os
+import shlex
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from infthor_eval.errors import SimulatorError
+from infthor_eval.thor.launch import Launch
+from infthor_eval.thor.simulator import Simulator
+
+PEER = Path(__file__).with_name("scripted_peer.py")
+
+
+def scripted(tmp_path, fault="none", action="-", number=1, timeout=1.0):
+    words = [sys.executable, str(PEER), fault, action, str(number), str(tmp_path / "marker")]
+    return Launch(shlex.join(words), timeout=timeout, start_timeout=5.0)
+
+
+def children():
+    path = Path(f"/proc/self/task/{os.getpid()}/children")
+    return path.read_text().split()
+
+
+def open_files():
+    return len(list(Path("/proc/self/fd").iterdir()))
+
+
+@pytest.fixture(autouse=True)
+def nothing_left_behind(monkeypatch, tmp_path):
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    before = children(), open_files(), threading.active_count()
+    yield
+    assert (children(), open_files(), threading.active_count()) == before
+    assert not (tmp_path / "home/.ai2thor").exists()
+
+
+def test_steps_give_views(tmp_path):
+    with Simulator(scripted(tmp_path)) as simulator:
+        simulator.reset("kitchen-1")
+        view = simulator.step("MoveAhead")
+        assert view.success and view.agent.position.x == 1
+        assert view.frame.shape == (300, 300, 3) and view.frame.flags["C_CONTIGUOUS"]
+        assert simulator.view is view
+
+
+@pytest.mark.parametrize(("action", "message"), [("Refused", "no room"), ("Unknown", "Invalid action")])
+def test_a_refusal_is_a_view(tmp_path, action, message):
+    with Simulator(scripted(tmp_path)) as simulator:
+        simulator.reset("kitchen-1")
+        view = simulator.step(action)
+        assert not view.success and message in view.error
+
+
+GARBAGE = ["type", "length", "msgpack", "empty", "fields", "sequence"]
+
+
+@pytest.mark.parametrize("fault", ["die", "hang", "close", *GARBAGE])
+def test_a_fault_in_mid_action_is_survived(tmp_path, fault):
+    with Simulator(scripted(tmp_path, fault, "MoveAhead", 3)) as simulator:
+        simulator.reset("kitchen-1")
+        positions = [simulator.step("MoveAhead").agent.position.x for _ in range(4)]
+        simulator.step("Refused")
+        assert positions == [1, 2, 3, 4]
+        assert simulator.restarts == 1
+
+
+@pytest.mark.parametrize(
+    ("fault", "words"),
+    [
+        ("die!", r"died \(exit status 3\).*last words"),
+        ("hang!", "no answer within 1 s"),
+        ("type!", "protocol"),
+    ],
+)
+def test_a_fault_that_stays_is_told(tmp_path, fault, words):
+    started = time.monotonic()
+    with Simulator(scripted(tmp_path, fault, "MoveAhead", 2), max_restarts=1) as simulator:
+        simulator.reset("kitchen-1")
+        simulator.step("MoveAhead")
+        with pytest.raises(SimulatorError, match=f"(?s){words}.*giving up") as caught:
+            simulator.step("MoveAhead")
+    assert "\n" not in str(caught.value)
+    assert "MoveAhead" in str(caught.value)
+    assert time.monotonic() - started < 10
+
+
+@pytest.mark.parametrize("fault", ["die!", "hang!"])
+def test_a_simulator_that_never_starts(tmp_path, fault):
+    launch = Launch(scripted(tmp_path, fault, "handshake").executable, timeout=1.0, start_timeout=1.0)
+    started = time.monotonic()
+    with Simulator(launch, max_restarts=1) as simulator, pytest.raises(SimulatorError, match="at starting"):
+        simulator.reset("kitchen-1")
+    assert time.monotonic() - started < 6
+
+
+def test_one_that_dies_before_the_handshake_once(tmp_path):
+    with Simulator(scripted(tmp_path, "die", "handshake")) as simulator:
+        simulator.reset("kitchen-1")
+        assert simulator.restarts == 1
+
+
+def test_no_scene_yet(tmp_path):
+    with Simulator(scripted(tmp_path)) as simulator:
+        with pytest.raises(SimulatorError, match="no scene is loaded"):
+            simulator.step("MoveAhead")
+        with pytest.raises(SimulatorError, match="no scene is loaded"):
+            _ = simulator.view
