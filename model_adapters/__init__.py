@@ -1,0 +1,26 @@
+"""Models for infthor-eval: what a model is to the harness, and one module per model family.
+
+Importing this package imports neither torch nor transformers; they come with the first model that needs them.
+"""
+
+from model_adapters.check import ContractError, check_adapter, check_bound
+from model_adapters.protocols import Adapter, Bound, Conversation, Mark, Model, Part, Reply
+from model_adapters.registry import load, names, options
+from model_adapters.transcript import Transcript
+
+__all__ = [
+    "Adapter",
+    "Bound",
+    "ContractError",
+    "Conversation",
+    "Mark",
+    "Model",
+    "Part",
+    "Reply",
+    "Transcript",
+    "check_adapter",
+    "check_bound",
+    "load",
+    "names",
+    "options",
+]

@@ -1,0 +1,1 @@
+"""The transformers back end: one KV-cached conversation for every model family."""

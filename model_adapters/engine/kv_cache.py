@@ -1,0 +1,94 @@
+"""A KV cache that is cut and refilled in place.
+
+transformers' DynamicCache concatenates, which copies the whole prefix for every decoded token and again after every
+crop. Here keys and values lie in buffers with room at the end: an update writes its own rows only, and a crop moves
+no memory at all.
+"""
+
+from typing import Any
+
+import torch
+from transformers.cache_utils import Cache, DynamicLayer
+
+__all__ = ["BufferedCache"]
+
+_STEP = 1024  # buffers end at multiples of this, so that questions of slightly different length find room
+
+
+class BufferedCache(Cache):
+    """A cache of `BufferedLayer`s that are made as the model comes to its layers."""
+
+    def __init__(self) -> None:
+        self._room = 0
+        super().__init__(layers=[])
+
+    def update(
+        self,
+        key_states: torch.Tensor,
+        value_states: torch.Tensor,
+        layer_idx: int,
+        *args: Any,
+        **kwargs: Any,
+    ) -> tuple[torch.Tensor, torch.Tensor]:
+        """Write one layer's new states behind its old ones and return all."""
+        while len(self.layers) <= layer_idx:
+            self.layers.append(BufferedLayer(self))
+        return super().update(key_states, value_states, layer_idx, *args, **kwargs)
+
+    @property
+    def room(self) -> int:
+        """Tokens that a layer which has to grow should hold."""
+        return self._room
+
+    def reserve(self, n_tokens: int) -> None:
+        """Say how long the sequence will become, so that buffers are allocated once and at the right size."""
+        self._room = -(-n_tokens // _STEP) * _STEP
+
+    def truncate(self, n_tokens: int) -> None:
+        """Keep the first `n_tokens` tokens; memory stays allocated."""
+        excess = self.get_seq_length() - n_tokens
+        if excess > 0:
+            self.crop(-excess)
+
+
+class BufferedLayer(DynamicLayer):
+    """Keys and values of one layer, `keys` and `values` being views on the used part of the buffers.
+
+    Buffers have the shape (batch, heads, room, head size).
+    """
+
+    def __init__(self, cache: BufferedCache) -> None:
+        super().__init__()
+        self._cache = cache
+        self._buffers: tuple[torch.Tensor, torch.Tensor] | None = None
+
+    def update(
+        self,
+        key_states: torch.Tensor,
+        value_states: torch.Tensor,
+        *args: Any,  # noqa: ARG002 - what other kinds of layers take
+        **kwargs: Any,  # noqa: ARG002
+    ) -> tuple[torch.Tensor, torch.Tensor]:
+        """Write the new states behind the old ones and return all."""
+        if not self.is_initialized:
+            self.lazy_initialization(key_states, value_states)
+        old = self.get_seq_length()
+        new = old + key_states.shape[-2]
+        if self._buffers is None or self._buffers[0].shape[-2] < new:
+            room = max(new, self._cache.room)
+            self._buffers = (
+                self._grown(key_states, old, room, self.keys),
+                self._grown(value_states, old, room, self.values),
+            )
+        keys, values = self._buffers
+        keys[..., old:new, :] = key_states
+        values[..., old:new, :] = value_states
+        self.keys, self.values = keys[..., :new, :], values[..., :new, :]
+        return self.keys, self.values
+
+    @staticmethod
+    def _grown(like: torch.Tensor, old: int, room: int, used: torch.Tensor | None) -> torch.Tensor:
+        buffer = like.new_empty((*like.shape[:-2], room, like.shape[-1]))
+        if used is not None and old:
+            buffer[..., :old, :] = used
+        return buffer

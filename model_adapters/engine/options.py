@@ -1,0 +1,49 @@
+"""Options that every transformers model takes."""
+
+from dataclasses import dataclass
+
+__all__ = ["CheckpointOptions", "EngineOptions"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class EngineOptions:
+    """How a model is run.
+
+    Attributes:
+        dtype: torch's name of the weights' type, or auto: as in the checkpoint.
+        device: cpu, cuda, cuda:1, ..., or auto: a GPU where there is one.
+        attn_implementation: sdpa, eager, flash_attention_2, ...
+        share_prefix: encode what two replies have in common once; false encodes everything for every reply.
+        chunk_tokens: most tokens encoded in one forward pass.
+        feature_cache_mb: memory for vision features of frames seen before, in MiB.
+        max_tokens: context limit instead of the checkpoint's; 0 for none.
+    """
+
+    dtype: str = "auto"
+    device: str = "auto"
+    attn_implementation: str = "sdpa"
+    share_prefix: bool = True
+    chunk_tokens: int = 2048
+    feature_cache_mb: int = 128
+    max_tokens: int | None = None
+
+    def __post_init__(self) -> None:
+        if self.chunk_tokens < 1 or self.feature_cache_mb < 0 or (self.max_tokens or 0) < 0:
+            raise ValueError("chunk_tokens must be positive, feature_cache_mb and max_tokens not negative")
+
+
+@dataclass(frozen=True, kw_only=True)
+class CheckpointOptions(EngineOptions):
+    """Where a checkpoint comes from.
+
+    Attributes:
+        pretrained: hub id or folder.
+        revision: branch, tag or commit on the hub; the default branch where None.
+        device_map: transformers' device map (auto, balanced, ...) instead of one device.
+        trust_remote_code: run code that comes with the checkpoint.
+    """
+
+    pretrained: str
+    revision: str | None = None
+    device_map: str | None = None
+    trust_remote_code: bool = False

@@ -1,0 +1,145 @@
+"""The sequence that a model has encoded: its KV cache, and which units lie in it.
+
+A new prompt is compared with what is there, the cache is cut behind the longest common prefix, and only the rest is
+encoded, in chunks, so that a prefix of any length needs the activations of one chunk only.
+"""
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import torch
+
+from model_adapters.engine.family import Family
+from model_adapters.engine.features import FeatureCache
+from model_adapters.engine.kv_cache import BufferedCache
+from model_adapters.engine.prompt import Frame, Unit, n_tokens
+
+__all__ = ["Prefix"]
+
+
+class Prefix:
+    """The one encoded sequence of a model.
+
+    Args:
+        model: a transformers model that takes `inputs_embeds`, `position_ids` and `past_key_values`.
+        family: its family.
+        features: where the frames' features come from.
+        chunk_tokens: most tokens in one forward pass (a frame with more makes a chunk of its own).
+    """
+
+    def __init__(self, model: Any, family: Family, features: FeatureCache, chunk_tokens: int) -> None:
+        self._model = model
+        self._family = family
+        self._features = features
+        self._chunk_tokens = chunk_tokens
+        self._embeddings = model.get_input_embeddings()
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the sequence and free its memory."""
+        self._cache = BufferedCache()
+        self._units: list[Unit] = []
+        self._ends: list[int] = []  # tokens up to and with each unit
+        self._starts: list[int] = [0]  # the position each unit starts at, and that of the next one
+
+    @property
+    def n_tokens(self) -> int:
+        """Tokens encoded at present."""
+        return self._ends[-1] if self._ends else 0
+
+    def rewind_to(self, units: Sequence[Unit]) -> int:
+        """Cut the sequence behind the units it shares with the given ones, which must have one more to be fed.
+
+        Returns:
+            How many units are shared.
+        """
+        shared = 0
+        for ours, theirs in zip(self._units, units[:-1], strict=False):
+            if ours is not theirs and ours != theirs:
+                break
+            shared += 1
+        self.cut(shared)
+        return shared
+
+    def cut(self, n_units: int) -> None:
+        """Keep the first `n_units` units."""
+        del self._units[n_units:], self._ends[n_units:], self._starts[n_units + 1 :]
+        self._cache.truncate(self.n_tokens)
+
+    def feed(self, units: Sequence[Unit], reserve: int = 0) -> torch.Tensor:
+        """Encode units behind the sequence.
+
+        Args:
+            units: at least one.
+            reserve: tokens that will be fed after them, to allocate memory for.
+
+        Returns:
+            Logits of the token that follows the last unit, (vocabulary,).
+        """
+        self._cache.reserve(self.n_tokens + n_tokens(units) + reserve)
+        logits = None
+        for chunk in self._chunks(units):
+            logits = self._forward(chunk)
+        if logits is None:
+            raise ValueError("nothing to feed")
+        return logits
+
+    def _chunks(self, units: Sequence[Unit]) -> Iterator[list[Unit]]:
+        chunk: list[Unit] = []
+        size = 0
+        for unit in units:
+            width = 1 if isinstance(unit, int) else len(unit.ids)
+            if chunk and size + width > self._chunk_tokens:
+                yield chunk
+                chunk, size = [], 0
+            chunk.append(unit)
+            size += width
+        if chunk:
+            yield chunk
+
+    @torch.inference_mode()
+    def _forward(self, chunk: list[Unit]) -> torch.Tensor:
+        frames = [unit for unit in chunk if isinstance(unit, Frame)]
+        flat: list[int] = []
+        slots: list[int] = []
+        firsts: list[int] = []
+        for unit in chunk:
+            firsts.append(len(flat))
+            if isinstance(unit, int):
+                flat.append(unit)
+            else:
+                slots.extend(len(flat) + at for at, token in enumerate(unit.ids) if token == self._family.slot_id)
+                flat.extend(unit.ids)
+        ids = torch.tensor(flat, device=self._embeddings.weight.device)
+        embeds = self._embeddings(ids)
+        if frames:
+            features = torch.cat(self._features.get(frames))
+            embeds[slots] = features.to(embeds.dtype)
+        positions = self._family.positions(ids, [frame.size for frame in frames], self._starts[-1])
+        done = False
+        try:
+            output = self._model(
+                inputs_embeds=embeds[None],
+                position_ids=positions,
+                past_key_values=self._cache,
+                use_cache=True,
+                logits_to_keep=1,
+            )
+            done = True
+        finally:
+            if not done:  # some layers have the chunk and some have not: nothing of it can be used again
+                self.reset()
+        self._note(chunk, positions, firsts)
+        return output.logits[0, -1]
+
+    def _note(self, chunk: list[Unit], positions: torch.Tensor, firsts: list[int]) -> None:
+        # A unit's first token has the same position on every axis; the next unit starts behind the largest one.
+        axis = positions.reshape(-1, positions.shape[-1])
+        starts = axis[0].tolist()
+        end = self.n_tokens
+        for unit in chunk:
+            end += 1 if isinstance(unit, int) else len(unit.ids)
+            self._units.append(unit)
+            self._ends.append(end)
+        self._starts.extend(starts[first] for first in firsts[1:])
+        self._starts.append(int(axis.max()) + 1)

@@ -1,0 +1,104 @@
+"""From the parts of a conversation to what the model is fed.
+
+The checkpoint's own chat template is rendered over the whole conversation and the result is tokenised as a whole, with
+one placeholder per frame; placeholders are expanded afterwards, id by id. So merges over the joints of parts come out
+as the checkpoint means them, and the cost per reply is that of a short text even where frames take 100,000 tokens.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from PIL import Image, UnidentifiedImageError
+
+from infthor_eval.errors import DataError, ModelError
+from infthor_eval.formats.frames import FrameRef
+from model_adapters.engine.family import Family, Size
+from model_adapters.protocols import Part
+
+__all__ = ["Frame", "Prompter", "Unit", "n_tokens"]
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A frame as a unit of a prompt; two are equal when the files' contents are.
+
+    Attributes:
+        digest: hash of the file's content.
+        size: width and height in pixels.
+        ids: what it expands to.
+        ref: where its pixels are.
+    """
+
+    digest: str
+    size: Size = field(compare=False)
+    ids: tuple[int, ...] = field(compare=False)
+    ref: FrameRef = field(compare=False)
+
+
+Unit = int | Frame  # what is encoded, compared and cut as a whole: a token of text, or a frame with all its tokens
+
+
+def n_tokens(units: Sequence[Unit]) -> int:
+    """Tokens of a prompt, frames expanded."""
+    return sum(1 if isinstance(unit, int) else len(unit.ids) for unit in units)
+
+
+class Prompter:
+    """Renders and tokenises conversations for one model.
+
+    Args:
+        tokenizer: the checkpoint's tokenizer.
+        template: the checkpoint's chat template (Jinja).
+        family: how frames are expanded.
+    """
+
+    def __init__(self, tokenizer: Any, template: str, family: Family) -> None:
+        self._tokenizer = tokenizer
+        self._template = template
+        self._family = family
+        self._frames: dict[str, Frame] = {}
+        self._ids: dict[Size, tuple[int, ...]] = {}
+
+    def units(self, parts: Sequence[Part]) -> list[Unit]:
+        """The prompt that asks for the reply to one user turn of these parts.
+
+        Raises:
+            DataError: a frame cannot be read.
+            ModelError: the tokenised template does not hold one placeholder per frame.
+        """
+        frames = [self._frame(part) for part in parts if isinstance(part, FrameRef)]
+        content = [{"type": "text", "text": part} if isinstance(part, str) else {"type": "image"} for part in parts]
+        text = self._tokenizer.apply_chat_template(
+            [{"role": "user", "content": content}],
+            chat_template=self._template,
+            tokenize=False,
+            add_generation_prompt=True,
+        )
+        ids: list[int] = self._tokenizer(text, add_special_tokens=False)["input_ids"]
+        placeholder = self._family.placeholder_id
+        if ids.count(placeholder) != len(frames):
+            raise ModelError(
+                f"the chat template gives {ids.count(placeholder)} image placeholders for {len(frames)} frames; "
+                "a text must not contain the model's image token, and the template must show every frame"
+            )
+        rest = iter(frames)
+        return [next(rest) if token == placeholder else token for token in ids]
+
+    def _frame(self, ref: FrameRef) -> Frame:
+        frame = self._frames.get(ref.digest)
+        if frame is None:
+            size = _size(ref)
+            if size not in self._ids:
+                self._ids[size] = self._family.frame_ids(size)
+            frame = self._frames[ref.digest] = Frame(ref.digest, size, self._ids[size], ref)
+        return frame
+
+
+def _size(ref: FrameRef) -> Size:
+    """Width and height from the file's header; the pixels are decoded only when the frame is encoded."""
+    try:
+        with Image.open(ref.path) as image:
+            return image.size
+    except (UnidentifiedImageError, OSError, SyntaxError) as error:
+        raise DataError(f"{ref.path}: not a readable image ({error}); restore the frame") from error

@@ -1,0 +1,1 @@
+"""One module per model family: its tokens per frame, features and positions."""

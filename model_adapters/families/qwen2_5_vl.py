@@ -1,0 +1,105 @@
+"""Qwen2.5-VL: a frame of 300x300 takes 121 tokens between two markers, with three-axis (multimodal) positions."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import torch
+from PIL import Image
+
+from model_adapters.engine.checkpoint import load_checkpoint
+from model_adapters.engine.family import Size
+from model_adapters.engine.model import TransformersModel
+from model_adapters.engine.options import CheckpointOptions
+
+__all__ = ["Qwen25VL", "Qwen25VLFamily", "Qwen25VLOptions", "pixel_limits"]
+
+
+class Qwen25VLFamily:
+    """Frames of Qwen2.5-VL.
+
+    Args:
+        model: a `Qwen2_5_VLForConditionalGeneration`.
+        image_processor: a `Qwen2VLImageProcessor`.
+    """
+
+    def __init__(self, model: Any, image_processor: Any) -> None:
+        self._model = model
+        self._image_processor = image_processor
+        self.placeholder_id: int = model.config.image_token_id
+        self.slot_id = self.placeholder_id
+        self._grids: dict[Size, tuple[int, int, int]] = {}
+
+    def frame_ids(self, size: Size) -> tuple[int, ...]:
+        """One token for each square of merged patches."""
+        return (self.slot_id,) * (math.prod(self._grid(size)) // self._image_processor.merge_size**2)
+
+    @torch.inference_mode()
+    def features(self, images: Sequence[Image.Image]) -> list[torch.Tensor]:
+        """The vision tower's merged patches, (tokens, hidden), for each image."""
+        inputs = self._image_processor(images=list(images), return_tensors="pt")
+        device = self._model.get_input_embeddings().weight.device
+        grids = inputs["image_grid_thw"].to(device)
+        output = self._model.get_image_features(inputs["pixel_values"].to(device), grids, return_dict=True)
+        return [tensor.to(device) for tensor in output.pooler_output]
+
+    def positions(self, ids: torch.Tensor, sizes: Sequence[Size], start: int) -> torch.Tensor:
+        """Temporal, height and width positions, (3, 1, tokens).
+
+        The model's own rule counts from the first token on, and every position in it moves along with the first one:
+        so a piece of the sequence that begins with a whole frame or a text token is numbered alone and shifted.
+        """
+        if not sizes:
+            return torch.arange(start, start + len(ids), device=ids.device).expand(3, 1, -1)
+        positions, _ = self._model.model.get_rope_index(
+            ids[None],
+            mm_token_type_ids=(ids == self.slot_id).int()[None],
+            image_grid_thw=torch.tensor([self._grid(size) for size in sizes]),
+        )
+        return positions + start
+
+    def _grid(self, size: Size) -> tuple[int, int, int]:
+        """Patches along time, height and width, as the image processor makes them of an image of this size."""
+        if size not in self._grids:
+            inputs = self._image_processor(images=[Image.new("RGB", size)], return_tensors="pt")
+            time, height, width = inputs["image_grid_thw"][0].tolist()
+            self._grids[size] = (time, height, width)
+        return self._grids[size]
+
+
+def pixel_limits(min_pixels: int | None, max_pixels: int | None) -> dict[str, int]:
+    """Settings that keep a frame's area (pixels) within limits, for `load_checkpoint`; empty for the checkpoint's."""
+    limits = {"min_pixels": min_pixels, "max_pixels": max_pixels}
+    return {name: value for name, value in limits.items() if value is not None}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Qwen25VLOptions(CheckpointOptions):
+    """Options of qwen2.5-vl.
+
+    Attributes:
+        min_pixels: smaller frames are enlarged to this area; the checkpoint's setting where None.
+        max_pixels: larger frames are reduced to this area; the checkpoint's setting where None.
+    """
+
+    pretrained: str = "Qwen/Qwen2.5-VL-7B-Instruct"
+    min_pixels: int | None = None
+    max_pixels: int | None = None
+
+
+class Qwen25VL:
+    """The adapter `qwen2.5-vl`."""
+
+    Options = Qwen25VLOptions
+
+    @classmethod
+    def build(cls, name: str, options: Qwen25VLOptions, seed: int) -> TransformersModel:  # noqa: ARG003
+        """Load a checkpoint; nothing in it is random.
+
+        Raises:
+            ModelError: it cannot be loaded.
+        """
+        limits = pixel_limits(options.min_pixels, options.max_pixels)
+        loaded = load_checkpoint(options, Qwen25VLFamily, model_types=("qwen2_5_vl",), image_settings=limits)
+        return TransformersModel(name, loaded, options)

@@ -1,0 +1,71 @@
+"""Options of an adapter: a dataclass with defaults, filled from the `k=v` strings of the command line."""
+
+import dataclasses
+import difflib
+import types
+import typing
+from collections.abc import Mapping
+from typing import Any
+
+from infthor_eval.errors import UsageError
+
+__all__ = ["NoOptions", "describe", "parse"]
+
+_BOOLEANS = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
+
+
+@dataclasses.dataclass(frozen=True)
+class NoOptions:
+    """Options of an adapter that has none."""
+
+
+def describe(options: type) -> str:
+    """The options with their defaults, as `a=1, b=x`; "no options" where there are none."""
+    shown = [f"{field.name}={_show(_default(field))}" for field in dataclasses.fields(options)]
+    return ", ".join(shown) or "no options"
+
+
+def parse(model: str, options: type, given: Mapping[str, str]) -> Any:
+    """Fill the dataclass from strings, by its annotations.
+
+    Args:
+        model: the model's name, for the message.
+        options: a dataclass whose fields are str, int, float, bool, or one of these or None, with defaults.
+        given: option names to values as typed.
+
+    Returns:
+        An instance of `options`.
+
+    Raises:
+        UsageError: an unknown option (the nearest is named) or a value that does not fit its type.
+    """
+    hints = typing.get_type_hints(options)
+    for name in given:
+        if name not in hints:
+            near = difflib.get_close_matches(name, hints, n=1)
+            hint = f"; did you mean {near[0]}?" if near else ";"
+            raise UsageError(f"{model} has no option {name}{hint} it takes: {describe(options)}")
+    try:
+        return options(**{name: _value(name, hints[name], text) for name, text in given.items()})
+    except ValueError as error:
+        raise UsageError(f"{model}: {error}; it takes: {describe(options)}") from error
+
+
+def _value(name: str, hint: Any, text: str) -> Any:
+    kinds = typing.get_args(hint) if isinstance(hint, types.UnionType) else (hint,)
+    if types.NoneType in kinds and text.lower() in ("none", ""):
+        return None
+    kind = next(kind for kind in kinds if kind is not types.NoneType)
+    try:
+        return _BOOLEANS[text.lower()] if kind is bool else kind(text)
+    except (KeyError, ValueError) as error:
+        wanted = "true or false" if kind is bool else kind.__name__
+        raise ValueError(f"option {name}={text} is not {wanted}") from error
+
+
+def _default(field: "dataclasses.Field[Any]") -> Any:
+    return field.default_factory() if callable(field.default_factory) else field.default
+
+
+def _show(value: Any) -> str:
+    return str(value).lower() if value is None or isinstance(value, bool) else str(value)
