@@ -15,11 +15,12 @@ from typing import Any, cast
 import PIL
 import torch
 import transformers
-from transformers.utils import cached_file
+from safetensors import SafetensorError
 
 from infthor_eval.errors import ModelError, UsageError
 from model_adapters.engine.decoding import read_generation
 from model_adapters.engine.family import Family
+from model_adapters.engine.hub import fetch
 from model_adapters.engine.loaded import Loaded
 from model_adapters.engine.options import CheckpointOptions, EngineOptions
 
@@ -46,25 +47,27 @@ def load_checkpoint(
         ModelError: the checkpoint is missing, incomplete, of another family, or cannot be had.
         UsageError: there is no such dtype.
     """
-    name = options.pretrained
-    source = {"revision": options.revision, "trust_remote_code": options.trust_remote_code}
+    folder, commit = fetch(options.pretrained, options.revision)
+    remote = {"trust_remote_code": options.trust_remote_code}
     with _one_line(options):
-        config = transformers.AutoConfig.from_pretrained(name, **source)
+        config = transformers.AutoConfig.from_pretrained(folder, **remote)
         if config.model_type not in model_types:
-            raise ModelError(f"{name} is a {config.model_type} checkpoint, not {' or '.join(model_types)}")
+            raise ModelError(
+                f"{options.pretrained} is a {config.model_type} checkpoint, not {' or '.join(model_types)}"
+            )
         image_processor = transformers.AutoImageProcessor.from_pretrained(
-            name, backend="pil", **source, **image_settings
+            folder, backend="pil", **remote, **image_settings
         )
-        tokenizer = transformers.AutoTokenizer.from_pretrained(name, **source)
-        template = _chat_template(options, tokenizer)
-        model = _load_model(options, source)
+        tokenizer = transformers.AutoTokenizer.from_pretrained(folder, **remote)
+        template = _chat_template(folder, tokenizer)
+        model = _load_model(folder, options)
     return assemble(
         model,
         tokenizer,
         image_processor,
         template=template,
         family=family(model, image_processor),
-        origin=_origin(name, options.revision, config),
+        origin=_origin(options.pretrained, folder, commit),
     )
 
 
@@ -148,33 +151,23 @@ def resolve_dtype(options: EngineOptions) -> torch.dtype | str:
 
 @contextlib.contextmanager
 def _one_line(options: CheckpointOptions) -> Iterator[None]:
-    """Turn the errors of loading into one line with the mend."""
-    name = options.pretrained
-    path = Path(name).expanduser()
-    if name.startswith((".", "/", "~")) and not path.is_dir():
-        raise ModelError(f"pretrained={name}: there is no such folder")
+    """Turn the errors of transformers' loading into one line."""
     try:
         yield
-    except (OSError, ValueError, ImportError, KeyError) as error:
+    except (OSError, ValueError, ImportError, KeyError, SafetensorError) as error:
         reason = " ".join(str(error).split())[:200]
-        if path.is_dir():
-            raise ModelError(f"the checkpoint in {name} cannot be loaded: {reason}") from error
-        where = f"{name} at revision {options.revision}" if options.revision else name
-        raise ModelError(
-            f"checkpoint {where} cannot be had from the hub ({reason}); download it elsewhere with "
-            f"`hf download {name} --local-dir DIR` and give pretrained=DIR, or log in with `hf auth login`"
-        ) from error
+        raise ModelError(f"the checkpoint {options.pretrained} cannot be loaded: {reason}") from error
 
 
-def _load_model(options: CheckpointOptions, source: Mapping[str, Any]) -> Any:
+def _load_model(folder: Path, options: CheckpointOptions) -> Any:
     device = resolve_device(options)
     model, report = cast(Any, transformers.AutoModelForImageTextToText).from_pretrained(
-        options.pretrained,
+        folder,
         dtype=resolve_dtype(options),
         attn_implementation=options.attn_implementation,
         device_map=options.device_map,
+        trust_remote_code=options.trust_remote_code,
         output_loading_info=True,
-        **source,
     )
     missing = sorted(report["missing_keys"])
     if missing:  # transformers would leave them random and only warn
@@ -182,32 +175,25 @@ def _load_model(options: CheckpointOptions, source: Mapping[str, Any]) -> Any:
     return model if options.device_map else model.to(device)
 
 
-def _chat_template(options: CheckpointOptions, tokenizer: Any) -> str:
+def _chat_template(folder: Path, tokenizer: Any) -> str:
     """The processor's template if the checkpoint has one of its own, else the tokenizer's."""
-    template = None
-    for file in ("chat_template.jinja", "chat_template.json"):
-        path = cached_file(
-            options.pretrained,
-            file,
-            revision=options.revision,
-            _raise_exceptions_for_missing_entries=False,
-        )
-        if path is not None:
-            text = Path(path).read_text(encoding="utf-8")
-            template = json.loads(text)["chat_template"] if file.endswith(".json") else text
-            break
-    template = template or tokenizer.chat_template
+    jinja, legacy = folder / "chat_template.jinja", folder / "chat_template.json"
+    if jinja.is_file():
+        return jinja.read_text(encoding="utf-8")
+    if legacy.is_file():
+        template = json.loads(legacy.read_text(encoding="utf-8")).get("chat_template")
+    else:
+        template = tokenizer.chat_template
     if not isinstance(template, str):
-        raise ModelError(f"{options.pretrained} has no chat template; add a chat_template.jinja to it")
+        raise ModelError(f"{folder} has no chat template; add a chat_template.jinja to it")
     return template
 
 
-def _origin(name: str, revision: str | None, config: Any) -> dict[str, Any]:
-    path = Path(name).expanduser()
-    if path.is_dir():
-        # The folder's name, not its place: a checkpoint that was moved is the same checkpoint.
-        return {"checkpoint": path.resolve().name, "fingerprint": _fingerprint(path)}
-    return {"checkpoint": name, "revision": config._commit_hash or revision}
+def _origin(pretrained: str, folder: Path, commit: str | None) -> dict[str, Any]:
+    if commit is not None:
+        return {"checkpoint": pretrained, "revision": commit}
+    # The folder's name, not its place: a checkpoint that was moved is the same checkpoint.
+    return {"checkpoint": folder.resolve().name, "fingerprint": _fingerprint(folder)}
 
 
 def _fingerprint(folder: Path) -> str:

@@ -66,8 +66,8 @@ class BufferedLayer(DynamicLayer):
         self,
         key_states: torch.Tensor,
         value_states: torch.Tensor,
-        *args: Any,  # noqa: ARG002 - what other kinds of layers take
-        **kwargs: Any,  # noqa: ARG002
+        *args: Any,
+        **kwargs: Any,
     ) -> tuple[torch.Tensor, torch.Tensor]:
         """Write the new states behind the old ones and return all."""
         if not self.is_initialized:

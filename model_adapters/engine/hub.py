@@ -1,0 +1,62 @@
+"""From the name of a checkpoint to a folder that holds it."""
+
+from pathlib import Path
+
+from huggingface_hub import HfApi, snapshot_download
+from huggingface_hub.errors import HfHubHTTPError, HFValidationError, HTTPError, LocalEntryNotFoundError
+
+from infthor_eval.errors import ModelError
+
+__all__ = ["fetch"]
+
+_FILES = ["*.json", "*.jinja", "*.model", "*.py", "*.safetensors", "*.txt"]
+_TIMEOUT_S = 10.0
+
+
+def fetch(pretrained: str, revision: str | None) -> tuple[Path, str | None]:
+    """Find a checkpoint, downloading it where it is not in the hub's cache.
+
+    The hub is asked once, without retries, and only for the commit; where it cannot be reached, the cache serves. So a
+    cached checkpoint needs no network, and a machine without network says so at once.
+
+    Args:
+        pretrained: a folder, or a hub id.
+        revision: branch, tag or commit on the hub; the default branch where None.
+
+    Returns:
+        The folder, and the commit it holds (None for a folder of the user's).
+
+    Raises:
+        ModelError: it is neither a folder nor to be had from hub or cache; the message has the mend.
+    """
+    path = Path(pretrained).expanduser()
+    if path.is_dir():
+        return path, None
+    if pretrained.startswith((".", "/", "~")) or pretrained.count("/") != 1:
+        raise ModelError(f"pretrained={pretrained}: there is no such folder, and hub ids have the form owner/name")
+    at = f"{pretrained} at revision {revision}" if revision else pretrained
+    try:
+        commit = HfApi().model_info(pretrained, revision=revision, timeout=_TIMEOUT_S).sha
+        folder = Path(snapshot_download(pretrained, revision=commit, allow_patterns=_FILES))
+    except (HfHubHTTPError, HFValidationError) as error:
+        raise ModelError(
+            f"the hub does not give out {at} ({_first_line(error)}); check the name, or log in with `hf auth login`"
+        ) from error
+    except (HTTPError, OSError) as error:
+        folder = _cached(pretrained, revision, at, error)
+    return folder, folder.name
+
+
+def _cached(pretrained: str, revision: str | None, at: str, reason: Exception) -> Path:
+    try:
+        return Path(snapshot_download(pretrained, revision=revision, local_files_only=True))
+    except LocalEntryNotFoundError as error:
+        raise ModelError(
+            f"{at} is not in the local cache and the hub cannot be reached ({_first_line(reason)}); download it where "
+            f"there is network with `hf download {pretrained} --local-dir DIR` and give pretrained=DIR"
+        ) from error
+
+
+def _first_line(error: Exception) -> str:
+    text = str(error).strip()
+    return (text.splitlines()[0] if text else type(error).__name__).rstrip(".")
