@@ -101,9 +101,7 @@ class SafeController(ai2thor.controller.Controller):
 
     def _build_server(self, host: str, port: int, width: int, height: int) -> None:  # noqa: ARG002
         if self.server is None:
-            self.server = SafeFifoServer(
-                width, height, self.server_timeout, self.depth_format, self.add_depth_noise
-            )
+            self.server = SafeFifoServer(width, height, self.server_timeout, self.depth_format, self.add_depth_noise)
 
     def _explained(self, fault: PeerFault) -> PeerFault:
         """The fault with the last line that the simulator logged, the simulator stopped."""

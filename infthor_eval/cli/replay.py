@@ -1,0 +1,108 @@
+"""`infthor-eval replay`: run recorded trajectories in a simulator and write frames and logs."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from infthor_eval.generation.replay_set import Selection, Summary
+
+__all__ = ["command"]
+
+_PATH = click.Path(path_type=Path)
+_SHOWN = 20  # failures and divergences printed one by one; all are in the JSON summary
+
+
+@click.command("replay")
+@click.argument("trajectories", nargs=-1, required=True, type=_PATH)
+@click.option("--out", required=True, type=_PATH, help="The set to write or to continue.")
+@click.option("--data", type=_PATH, help="Folder with recorded floor plans, for trajectories in them.")
+@click.option("--limit", type=click.IntRange(1), help="Replay at most this many trajectories.")
+@click.option("--per-floor-plan", type=click.IntRange(1), help="At most this many of one floor plan.")
+@click.option("--unity", is_flag=True, help="Use AI2-THOR's own Unity build, not the embedded simulator.")
+@click.option("--json", "as_json", is_flag=True, help="Print the summary as one JSON object.")
+@click.pass_context
+def command(
+    context: click.Context,
+    trajectories: tuple[Path, ...],
+    out: Path,
+    data: Path | None,
+    limit: int | None,
+    per_floor_plan: int | None,
+    unity: bool,
+    as_json: bool,
+) -> None:
+    """Replay trajectories (.json, .jsonl, .jsonl.gz, directories) into an NIEH set.
+
+    Writes one frame per low-level action (and the first one), the log of every frame, and the trajectory
+    itself. Trajectories that the set has already are not replayed again. A refused action is reported and the
+    replay goes on. Exit status 1 where a trajectory could not be replayed at all.
+    """
+    from rich.console import Console
+
+    from infthor_eval.generation.replay_set import select
+
+    notes = Console(stderr=True, soft_wrap=True)
+    selection = select(trajectories, limit, per_floor_plan)
+    summary = _replay(selection, out, data, unity, notes)
+    if as_json:
+        import msgspec
+
+        click.echo(msgspec.json.encode(summary.document()))
+    else:
+        _print(summary, Console(soft_wrap=True))
+    for failure in summary.failures[:_SHOWN]:
+        notes.print(f"not replayed: {failure.place}: {failure.message}", style="red", highlight=False, markup=False)
+    context.exit(1 if summary.failures else 0)
+
+
+def _replay(selection: Selection, out: Path, data: Path | None, unity: bool, notes: Console) -> Summary:
+    from rich.progress import Progress
+
+    from infthor_eval.generation.replay_set import replay_set
+    from infthor_eval.generation.supplement import write_supplement
+    from infthor_eval.thor import launch
+    from infthor_eval.thor.simulator import Simulator
+
+    with tempfile.TemporaryDirectory(prefix="infthor-") as folder:
+        supplement = Path(folder) / "supplement.json"
+        write_supplement((trajectory for _, trajectory in selection.items), supplement)
+        start = launch.unity() if unity else launch.embedded(data, supplement)
+        with Simulator(start) as simulator, Progress(console=notes, transient=True) as progress:
+            bar = progress.add_task("replay", total=len(selection.items))
+            return replay_set(selection, simulator, out, lambda: progress.advance(bar))
+
+
+def _print(summary: Summary, output: Console) -> None:
+    from rich import box
+    from rich.table import Table
+
+    document = summary.document()
+    output.print(
+        f"{document['trajectories']} trajectories on {document['floor_plans']} floor plans "
+        f"({document['resumed']} replayed earlier, {document['failed']} failed), {document['whole']} whole, "
+        f"{document['seconds']} s",
+        highlight=False,
+    )
+    actions = Table("action", "accepted", "refused", "share", box=box.SIMPLE_HEAD)
+    for name, counts in document["actions"].items():
+        share = counts["accepted"] / (counts["accepted"] + counts["refused"])
+        actions.add_row(name, str(counts["accepted"]), str(counts["refused"]), f"{share:.1%}")
+    output.print(actions)
+    if document["iou"]:
+        overlaps = Table("object type", "boxes", "median IoU", "mean IoU", box=box.SIMPLE_HEAD)
+        for kind, values in document["iou"].items():
+            overlaps.add_row(kind, str(values["count"]), f"{values['median']:.2f}", f"{values['mean']:.2f}")
+        output.print(overlaps)
+    for item in document["diverged"][:_SHOWN]:
+        line = f"diverged: {item['traj_id']}: step {item['step']}: {item['action']}: {item['error']}"
+        output.print(line, highlight=False, markup=False)
+    hidden = len(document["diverged"]) - _SHOWN
+    if hidden > 0:
+        output.print(f"and {hidden} more; --json lists all", highlight=False)

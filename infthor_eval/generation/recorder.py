@@ -1,0 +1,146 @@
+"""Frames and step log of an episode, written as it runs."""
+
+from pathlib import Path
+
+from PIL import Image
+
+from infthor_eval.errors import SimulatorError
+from infthor_eval.formats.step_log import ObjectLog, ObjectState, Pose, Seen, Step
+from infthor_eval.thor.actions import object_type_of
+from infthor_eval.thor.view import ThorObject, View
+
+__all__ = ["Recorder", "object_log", "state_of"]
+
+_PNG_LEVEL = 4  # rendered frames hardly shrink further, and higher levels take several times as long
+
+
+class Recorder:
+    """Turns views into steps, and into image files where a folder is given.
+
+    Attributes:
+        steps: one per frame so far.
+    """
+
+    def __init__(self, images: Path | None = None) -> None:
+        """Begin with no frame.
+
+        Args:
+            images: folder for the frames, which must exist; None keeps the log only.
+        """
+        self._images = images
+        self._world: dict[str, ObjectState] = {}
+        self.steps: list[Step] = []
+
+    def record(
+        self,
+        view: View,
+        *,
+        step: int = 0,
+        action: str | None = None,
+        high_idx: int | None = None,
+        target: str | None = None,
+        receptacle: str | None = None,
+    ) -> Step:
+        """Add one frame.
+
+        Args:
+            view: the world after the action.
+            step: index of the action; 0 for the first frame too.
+            action: its text; None for the first frame.
+            high_idx: the sub-goal it belongs to.
+            target: id of the object acted on.
+            receptacle: id of the receptacle acted on.
+
+        Raises:
+            SimulatorError: the view has no frame to write.
+        """
+        number = len(self.steps)
+        entry = Step(
+            img_idx=number,
+            img_filename=f"{number:09d}.png",
+            step=step,
+            object_log=object_log(view),
+            action=action,
+            success=view.success or action is None,
+            error=None if view.success or action is None else view.error,
+            high_idx=high_idx,
+            pose=_pose(view),
+            target=target,
+            receptacle=receptacle,
+            seen=_seen(view),
+            changes=self._changes(view),
+        )
+        if self._images is not None:
+            self._save(view, self._images / entry.img_filename)
+        self.steps.append(entry)
+        return entry
+
+    def _changes(self, view: View) -> dict[str, ObjectState]:
+        now = {key: state_of(item) for key, item in view.objects.items()}
+        changes = {key: state for key, state in now.items() if self._world.get(key) != state}
+        for key in self._world.keys() - now.keys():
+            changes[key] = ObjectState(self._world[key].type, exists=False)
+        self._world = now
+        return changes
+
+    @staticmethod
+    def _save(view: View, path: Path) -> None:
+        if view.frame is None:
+            raise SimulatorError(f"{path.name}: the simulator sent no frame; start it with rendering on")
+        Image.fromarray(view.frame).save(path, compress_level=_PNG_LEVEL)
+
+
+def object_log(view: View) -> ObjectLog:
+    """What the published log holds of a view: types, each once, in alphabetical order."""
+    visible = [item for item in view.objects.values() if item.visible]
+    inside: dict[str, set[str]] = {}
+    for item in visible:
+        for parent in item.parent_receptacles or ():
+            if parent in view.objects and view.objects[parent].visible:
+                inside.setdefault(view.objects[parent].object_type, set()).add(item.object_type)
+    return ObjectLog(
+        visible=_types(visible),
+        pickupable=_types([item for item in visible if item.pickupable]),
+        is_open=_types([item for item in visible if item.openable and item.is_open]),
+        inven_obj=sorted(object_type_of(key) for key in view.inventory),
+        receptacles=_types([item for item in visible if item.receptacle]),
+        recep_objs={kind: sorted(types) for kind, types in sorted(inside.items())},
+    )
+
+
+def state_of(item: ThorObject) -> ObjectState:
+    """The part of an object's metadata that the log keeps; positions to the millimetre."""
+    where = item.position
+    return ObjectState(
+        type=item.object_type,
+        parents=tuple(item.parent_receptacles or ()),
+        position=(round(where.x, 3), round(where.y, 3), round(where.z, 3)),
+        held=item.is_picked_up,
+        is_open=item.is_open if item.openable else None,
+        is_on=item.is_toggled if item.toggleable else None,
+        is_sliced=item.is_sliced,
+        is_dirty=item.is_dirty,
+        is_cooked=item.is_cooked,
+        temperature=item.temperature,
+    )
+
+
+def _types(items: list[ThorObject]) -> list[str]:
+    return sorted({item.object_type for item in items})
+
+
+def _pose(view: View) -> Pose:
+    at = view.agent.position
+    return Pose(
+        round(at.x, 4), round(at.y, 4), round(at.z, 4), round(view.agent.rotation, 2), round(view.agent.horizon, 2)
+    )
+
+
+def _seen(view: View) -> dict[str, Seen] | None:
+    if view.instances is None:
+        return None
+    return {
+        key: Seen(instance.pixels, instance.box, view.objects[key].visible)
+        for key, instance in sorted(view.instances.items())
+        if key in view.objects
+    }

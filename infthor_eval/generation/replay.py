@@ -1,0 +1,164 @@
+"""Replaying one recorded trajectory to frames and a step log.
+
+A refused action is recorded with its message and the replay goes on, as ALFRED's own does: the log tells what
+really happened, so questions made from it hold all the same. Such a trajectory counts as diverged from its
+first refused action on.
+"""
+
+from pathlib import Path
+
+import msgspec
+
+from infthor_eval.formats.step_log import write_steps
+from infthor_eval.formats.trajectory import LowAction, Trajectory
+from infthor_eval.generation.recorder import Recorder
+from infthor_eval.generation.sequence_text import sequence_text
+from infthor_eval.thor.actions import text_of
+from infthor_eval.thor.grounding import Grounding
+from infthor_eval.thor.recorded import MissingObjectError, translate
+from infthor_eval.thor.restore import restore
+from infthor_eval.thor.simulator import Simulator
+from infthor_eval.thor.view import View
+
+__all__ = ["Overlap", "Refusal", "Replayed", "box_iou", "replay"]
+
+
+class Refusal(msgspec.Struct):
+    """An action that the simulator did not carry out."""
+
+    step: int
+    action: str
+    error: str
+
+
+class Overlap(msgspec.Struct):
+    """How well the rendered box of an object meets the recorded one, at the frame in which it is acted on."""
+
+    step: int
+    type: str
+    iou: float
+
+
+class Replayed(msgspec.Struct):
+    """What came of one replay (`replay.json`).
+
+    Attributes:
+        traj_id: the trajectory.
+        digest: hash of its JSON, by which a later run knows that this is it.
+        floor_plan: its scene.
+        accepted: number of actions carried out, by name.
+        refusals: the others; the first is where the trajectory diverges.
+        restore: what of the initial scene could not be restored, in words.
+        overlaps: where the recording has boxes.
+        seconds: wall time.
+    """
+
+    traj_id: str
+    digest: str
+    floor_plan: str
+    accepted: dict[str, int] = msgspec.field(default_factory=dict)
+    refusals: list[Refusal] = msgspec.field(default_factory=list)
+    restore: list[str] = msgspec.field(default_factory=list)
+    overlaps: list[Overlap] = msgspec.field(default_factory=list)
+    seconds: float = 0.0
+
+    @property
+    def whole(self) -> bool:
+        """Whether every action was carried out."""
+        return not self.refusals
+
+
+def replay(trajectory: Trajectory, simulator: Simulator, folder: Path, digest: str) -> Replayed:
+    """Run a trajectory and write `img/`, `metadata.json`, `traj.txt` and `expert_log.json` into a folder.
+
+    Args:
+        trajectory: ALFRED's, ∞-THOR's or ours.
+        simulator: runs it; its scene is replaced.
+        folder: exists and is empty.
+        digest: of the trajectory's JSON, passed through.
+
+    Raises:
+        SimulatorError: the simulator fails or has no such scene.
+    """
+    run = _Run(simulator, Replayed(trajectory.traj_id, digest, trajectory.scene.floor_plan))
+    restored = restore(simulator, trajectory.scene)
+    run.report.restore = [f"no {name} here" for name in restored.dropped] + restored.refused
+    (folder / "img").mkdir()
+    run.begin(folder / "img")
+    for index, low in enumerate(trajectory.plan.low_actions):
+        run.act(index, low)
+    steps = run.recorder.steps
+    write_steps(folder, steps)
+    (folder / "traj.txt").write_text(sequence_text(trajectory, steps) + "\n")
+    images = [{"low_idx": step.step, "image_name": step.img_filename} for step in steps]
+    (folder / "expert_log.json").write_bytes(msgspec.json.encode({"images": images}) + b"\n")
+    return run.report
+
+
+def box_iou(one: tuple[int, int, int, int], other: tuple[int, int, int, int]) -> float:
+    """Intersection over union of two boxes [xmin, ymin, xmax, ymax], both ends inclusive."""
+    width = min(one[2], other[2]) - max(one[0], other[0]) + 1
+    height = min(one[3], other[3]) - max(one[1], other[1]) + 1
+    shared = max(width, 0) * max(height, 0)
+    return shared / (_area(one) + _area(other) - shared)
+
+
+def _area(box: tuple[int, int, int, int]) -> int:
+    return (box[2] - box[0] + 1) * (box[3] - box[1] + 1)
+
+
+class _Run:
+    """The state of one replay."""
+
+    def __init__(self, simulator: Simulator, report: Replayed) -> None:
+        self._simulator = simulator
+        self.report = report
+
+    def begin(self, images: Path) -> None:
+        """Record the first frame; the scene is restored by now."""
+        self.recorder = Recorder(images)
+        self.recorder.record(self._simulator.view)
+        self._grounding = Grounding(self._simulator.view)
+
+    def act(self, index: int, low: LowAction) -> None:
+        """Run and record one action."""
+        before, api = self._simulator.view, low.api_action
+        text = str(text_of(api.action, api.object_id, api.receptacle_id))
+        target, error = self._call(index, low, before)
+        if error is None:
+            self.report.accepted[api.action] = self.report.accepted.get(api.action, 0) + 1
+        else:
+            self.report.refusals.append(Refusal(index, text, error))
+        putting = api.action == "PutObject"
+        step = self.recorder.record(
+            self._simulator.view,
+            step=index,
+            action=text,
+            high_idx=low.high_idx,
+            target=next(iter(before.inventory), None) if putting else target,
+            receptacle=target if putting else None,
+        )
+        # An action that could not even be called has no reply of its own.
+        step.success, step.error = error is None, error
+
+    def _call(self, index: int, low: LowAction, before: View) -> tuple[str | None, str | None]:
+        """Run it; the id of the object it is about, and why it was refused."""
+        try:
+            call = translate(low, self._grounding, before)
+        except MissingObjectError as missing:
+            return None, str(missing)
+        target = call.get("objectId")
+        self._compare_box(index, low, target, before)
+        after = self._simulator.step(**call)
+        return target, None if after.success else after.error or "refused without a message"
+
+    def _compare_box(self, index: int, low: LowAction, target: str | None, before: View) -> None:
+        """Compare the recorded box of the object acted on with what the frame before the action shows of
+        it."""
+        recorded = low.discrete_action.box if low.discrete_action is not None else None
+        if recorded is None or target is None or before.instances is None:
+            return
+        shown = before.instances.get(target)
+        iou = 0.0 if shown is None else box_iou(recorded, shown.box)
+        kind = before.objects[target].object_type
+        self.report.overlaps.append(Overlap(index, kind, round(iou, 4)))

@@ -1,0 +1,210 @@
+"""Replaying many trajectories into one set, so that stopping and starting continues.
+
+Each trajectory is made in a hidden folder beside its final place and moved there when it is complete; what is
+there is complete. A folder that is there already, made from the same trajectory, is counted and not made
+again.
+"""
+
+import hashlib
+import shutil
+import statistics
+import time
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from infthor_eval.errors import DataError, InfthorError, SimulatorError
+from infthor_eval.formats.trajectory import Source, Trajectory, folder_name, iter_sources
+from infthor_eval.generation.replay import Replayed, replay
+from infthor_eval.thor.simulator import Simulator
+
+__all__ = ["Failure", "Selection", "Summary", "replay_set", "select"]
+
+_REPORT = "replay.json"
+_TRAJECTORY = "traj_data.json"
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A trajectory that could not be replayed at all."""
+
+    place: str
+    message: str
+
+
+@dataclass
+class Selection:
+    """The trajectories to replay, and those that could not even be read."""
+
+    items: list[tuple[Source, Trajectory]] = field(default_factory=list)
+    failures: list[Failure] = field(default_factory=list)
+
+
+@dataclass
+class Summary:
+    """What came of a set.
+
+    Attributes:
+        reports: one per replayed trajectory, those of earlier runs included.
+        resumed: how many of them are from earlier runs.
+        failures: the trajectories without one.
+        seconds: wall time of this run.
+    """
+
+    reports: list[Replayed] = field(default_factory=list)
+    resumed: int = 0
+    failures: list[Failure] = field(default_factory=list)
+    seconds: float = 0.0
+
+    def actions(self) -> dict[str, dict[str, int]]:
+        """Accepted and refused actions by name, the most frequent first."""
+        accepted: Counter[str] = Counter()
+        refused: Counter[str] = Counter()
+        for report in self.reports:
+            accepted.update(report.accepted)
+            refused.update(refusal.action.split()[0] for refusal in report.refusals)
+        names = sorted(accepted | refused, key=lambda name: (-(accepted[name] + refused[name]), name))
+        return {name: {"accepted": accepted[name], "refused": refused[name]} for name in names}
+
+    def overlaps(self) -> dict[str, dict[str, float]]:
+        """Number, median and mean of the box overlaps (IoU) by object type."""
+        found: defaultdict[str, list[float]] = defaultdict(list)
+        for report in self.reports:
+            for overlap in report.overlaps:
+                found[overlap.type].append(overlap.iou)
+        return {
+            kind: {
+                "count": len(values),
+                "median": round(statistics.median(values), 4),
+                "mean": round(statistics.fmean(values), 4),
+            }
+            for kind, values in sorted(found.items())
+        }
+
+    def document(self) -> dict[str, Any]:
+        """The summary as it is printed with `--json`."""
+        return {
+            "trajectories": len(self.reports),
+            "resumed": self.resumed,
+            "failed": len(self.failures),
+            "whole": sum(report.whole for report in self.reports),
+            "floor_plans": len({report.floor_plan for report in self.reports}),
+            "actions": self.actions(),
+            "iou": self.overlaps(),
+            "seconds": round(self.seconds, 2),
+            "diverged": [
+                {"traj_id": report.traj_id, **msgspec.to_builtins(report.refusals[0])}
+                for report in self.reports
+                if report.refusals
+            ],
+            "failures": [{"place": item.place, "message": item.message} for item in self.failures],
+        }
+
+
+def select(paths: Iterable[Path], limit: int | None = None, per_floor_plan: int | None = None) -> Selection:
+    """Read the trajectories to replay.
+
+    Args:
+        paths: files and directories.
+        limit: take no more than this many.
+        per_floor_plan: take no more than this many of one floor plan.
+
+    Raises:
+        DataError: a path holds no trajectory file.
+    """
+    selection = Selection()
+    taken: Counter[str] = Counter()
+    for source in _all_sources(paths):
+        if limit is not None and len(selection.items) >= limit:
+            break
+        try:
+            trajectory = source.read()
+        except DataError as error:
+            selection.failures.append(Failure(source.place, str(error)))
+            continue
+        floor_plan = trajectory.scene.floor_plan
+        if per_floor_plan is None or taken[floor_plan] < per_floor_plan:
+            taken[floor_plan] += 1
+            selection.items.append((source, trajectory))
+    return selection
+
+
+def replay_set(
+    selection: Selection,
+    simulator: Simulator,
+    out: Path,
+    progress: Callable[[], None] = lambda: None,
+) -> Summary:
+    """Replay the selected trajectories into `out/metadata/<traj_id>`.
+
+    Args:
+        selection: what to replay.
+        simulator: runs them.
+        out: the set; made where it does not exist.
+        progress: is called after each trajectory.
+
+    Returns:
+        The summary. The failure of one trajectory is in it and does not stop the others.
+    """
+    started = time.monotonic()
+    metadata = out / "metadata"
+    metadata.mkdir(parents=True, exist_ok=True)
+    summary = Summary(failures=list(selection.failures))
+    for source, trajectory in selection.items:
+        try:
+            report, new = _one(source, trajectory, simulator, metadata)
+        except InfthorError as error:
+            summary.failures.append(Failure(source.place, f"{trajectory.traj_id}: {error}"))
+        else:
+            summary.reports.append(report)
+            summary.resumed += not new
+        progress()
+    summary.seconds = time.monotonic() - started
+    return summary
+
+
+def _all_sources(paths: Iterable[Path]) -> Iterator[Source]:
+    for path in paths:
+        yield from iter_sources(path)
+
+
+def _one(source: Source, trajectory: Trajectory, simulator: Simulator, metadata: Path) -> tuple[Replayed, bool]:
+    """The report of one trajectory, and whether it was made now."""
+    digest = hashlib.blake2b(source.raw.strip(), digest_size=16).hexdigest()
+    name = folder_name(trajectory.traj_id)
+    final = metadata / name
+    if final.exists():
+        return _earlier(final, digest), False
+    partial = metadata / f".{name}.partial"
+    if partial.exists():
+        shutil.rmtree(partial)
+    partial.mkdir()
+    started = time.monotonic()
+    try:
+        report = replay(trajectory, simulator, partial, digest)
+        report.seconds = round(time.monotonic() - started, 3)
+        (partial / _TRAJECTORY).write_bytes(source.raw.strip() + b"\n")
+        (partial / _REPORT).write_bytes(msgspec.json.encode(report) + b"\n")
+        partial.rename(final)
+    except OSError as error:
+        message = f"{final}: cannot be written ({error.strerror}); make room or choose another --out"
+        raise SimulatorError(message) from error
+    finally:
+        shutil.rmtree(partial, ignore_errors=True)
+    return report, True
+
+
+def _earlier(folder: Path, digest: str) -> Replayed:
+    """The report of a trajectory that an earlier run replayed."""
+    path = folder / _REPORT
+    try:
+        report = msgspec.json.decode(path.read_bytes(), type=Replayed)
+    except (OSError, msgspec.DecodeError) as error:
+        raise DataError(f"{path}: not readable ({error}); remove the folder to replay it again") from error
+    if report.digest != digest:
+        raise DataError(f"{folder}: made from another trajectory of this name; remove it or choose another --out")
+    return report

@@ -1,0 +1,71 @@
+"""A trajectory as the text that models are trained and prompted on (`traj.txt`).
+
+Per task: `<|goal|>Your main goal: ...<|goal|>`, the frame at its start, then per sub-goal `<|plan|>Plan:
+...<|plan|>` and per action `<|act|>...<|act|><image>`.
+"""
+
+from infthor_eval.formats.step_log import Step
+from infthor_eval.formats.trajectory import HighAction, SubTask, Trajectory
+
+__all__ = ["goal_text", "plan_text", "sequence_text"]
+
+_PLANS = {
+    "GotoLocation": "go to the {0}",
+    "OpenObject": "open the {0}",
+    "CloseObject": "close the {0}",
+    "PickupObject": "pick up the {0}",
+    "PutObject": "put the {0} in the {1}",
+    "CleanObject": "wash the {0}",
+    "HeatObject": "heat the {0}",
+    "CoolObject": "cool the {0}",
+    "ToggleObject": "toggle {0}",
+    "SliceObject": "slice the {0}",
+}
+
+
+def plan_text(high: HighAction) -> str:
+    """A sub-goal in words ("put the mug in the fridge"); one without a template keeps its name."""
+    action = high.discrete_action
+    template = _PLANS.get(action.action, action.action)
+    names = [str(name) for name in action.args] if isinstance(action.args, list) else []
+    return template.format(*names) if len(names) >= template.count("{") else action.action
+
+
+def goal_text(trajectory: Trajectory, task: SubTask | None) -> str:
+    """The goal of a task; for ALFRED's trajectories the first annotator's."""
+    if task is not None:
+        return task.task_desc
+    annotations = (trajectory.turk_annotations or {}).get("anns") or [{}]
+    return str(annotations[0].get("task_desc", trajectory.task_type or ""))
+
+
+def sequence_text(trajectory: Trajectory, steps: list[Step]) -> str:
+    """The whole trajectory.
+
+    Args:
+        trajectory: for goals and sub-goals.
+        steps: the replayed log, one frame per action after the first.
+    """
+    starts: dict[int, int | None] = {item.low_pddl_idx[0]: item.sub_traj_idx for item in trajectory.sub_trajs}
+    starts = starts or {0: None}
+    plans = {high.high_idx: plan_text(high) for high in trajectory.plan.high_pddl}
+    parts: list[str] = []
+    shown: int | None = None
+    for index, step in enumerate(steps[1:]):
+        if index in starts:
+            task = _task(trajectory, starts[index])
+            parts.append(f"<|goal|>Your main goal: {goal_text(trajectory, task)}<|goal|><image>")
+        if step.high_idx is not None and step.high_idx != shown:
+            shown = step.high_idx
+            parts.append(f"<|plan|>Plan: {plans.get(shown, '')}<|plan|>")
+        parts.append(f"<|act|>{step.action}<|act|><image>")
+    return "".join(parts)
+
+
+def _task(trajectory: Trajectory, index: int | None) -> SubTask | None:
+    tasks = trajectory.sub_tasks
+    if index is None:
+        return None
+    if index < len(tasks):
+        return tasks[index]
+    return trajectory.long_horizon_task

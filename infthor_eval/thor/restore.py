@@ -1,0 +1,109 @@
+"""Bringing a scene to the recorded initial state of a trajectory.
+
+The order is ALFRED's: toggles, dirt and liquids, object poses, then the agent. Recorded poses name Unity
+objects, and those names differ between AI2-THOR versions; a name that the scene does not know is replaced by
+that of an object of the same type.
+"""
+
+from collections import defaultdict
+from dataclasses import dataclass, field
+from typing import Any
+
+from infthor_eval.formats.trajectory import ObjectPose, Scene
+from infthor_eval.thor.simulator import Simulator
+from infthor_eval.thor.view import View
+
+__all__ = ["Restored", "restore"]
+
+
+@dataclass
+class Restored:
+    """What came of it.
+
+    Attributes:
+        dropped: recorded objects that the scene has no counterpart for.
+        refused: calls that the simulator refused, with its message.
+    """
+
+    dropped: list[str] = field(default_factory=list)
+    refused: list[str] = field(default_factory=list)
+
+
+def restore(simulator: Simulator, scene: Scene) -> Restored:
+    """Load the scene of a trajectory and put everything where the recording begins.
+
+    Args:
+        simulator: is reset to the scene; its `view` then is the first frame.
+        scene: the recorded initial state.
+
+    Raises:
+        SimulatorError: the simulator has no such scene or fails.
+    """
+    view = simulator.reset(scene.floor_plan)
+    report = Restored()
+    calls = _state_calls(scene)
+    if scene.object_poses:
+        poses, report.dropped = _poses(scene.object_poses, view)
+        calls.append({"action": "SetObjectPoses", "objectPoses": poses, "placeStationary": True})
+    calls.append(_teleport(scene))
+    for call in calls:
+        view = simulator.step(**call)
+        if not view.success:
+            report.refused.append(f"{call['action']}: {view.error}")
+    return report
+
+
+def _state_calls(scene: Scene) -> list[dict[str, Any]]:
+    calls: list[dict[str, Any]] = []
+    if scene.object_toggles:
+        toggles = [{"objectType": item.object_type, "isOn": item.is_on} for item in scene.object_toggles]
+        calls.append({"action": "SetObjectToggles", "objectToggles": toggles})
+    if scene.dirty_and_empty:
+        calls.append({"action": "SetStateOfAllObjects", "StateChange": "CanBeDirty", "forceAction": True})
+        calls.append({"action": "SetStateOfAllObjects", "StateChange": "CanBeFilled", "forceAction": False})
+    return calls
+
+
+def _teleport(scene: Scene) -> dict[str, Any]:
+    start = scene.init_action
+    return {
+        "action": "TeleportFull",
+        "position": {"x": start.x, "y": start.y, "z": start.z},
+        "rotation": {"x": 0.0, "y": start.yaw, "z": 0.0},
+        "horizon": start.horizon,
+        "standing": True,
+        "forceAction": True,
+    }
+
+
+def _poses(recorded: list[ObjectPose], view: View) -> tuple[list[dict[str, Any]], list[str]]:
+    """The poses under this scene's names, and the names that nothing here answers to."""
+    known = {item.name for item in view.objects.values()}
+    spare = defaultdict(list)
+    for item in sorted(view.objects.values(), key=lambda item: item.name):
+        spare[item.object_type].append(item.name)
+    renamed: dict[str, str] = {}
+    poses, dropped = [], []
+    for pose in recorded:
+        name = pose.name.removesuffix("(Clone)")
+        if name not in known and name not in renamed:
+            names = spare[_type_of(name, spare)]
+            if names:
+                # Turn about, so that two recorded models of one type become two objects where there are two.
+                renamed[name] = names[0]
+                names.append(names.pop(0))
+        target = name if name in known else renamed.get(name)
+        if target is None:
+            dropped.append(name)
+        else:
+            poses.append({"objectName": target, "position": pose.position, "rotation": pose.rotation})
+    return poses, dropped
+
+
+_RENAMED = {"Glassbottle": "Bottle"}  # 2.1.0 to 5.x
+
+
+def _type_of(name: str, types: dict[str, list[str]]) -> str:
+    """The object type in a Unity object's name ("Mug_291e6e8a")."""
+    head = name.partition("_")[0]
+    return head if head in types else _RENAMED.get(head, head)
