@@ -1,0 +1,1 @@
+"""Reading and writing: NIEH sets, trajectories, step logs, frame references."""

@@ -30,5 +30,5 @@ class Question:
     @cached_property
     def id(self) -> str:
         """Name of the question, stable under reordering of the file: `<traj_id>/<12 hex digits>`."""
-        key = repr((self.text, self.clues)).encode()
+        key = repr((self.text, self.clues, self.answers)).encode()
         return f"{self.traj_id}/{hashlib.blake2b(key, digest_size=6).hexdigest()}"

@@ -68,9 +68,7 @@ def _strict(response: str, answers: Sequence[Answer]) -> float:
     return _largest_matching(answers, pieces, _matches_strict) / len(answers)
 
 
-def _largest_matching(
-    answers: Sequence[Answer], pieces: Sequence[str], match: Callable[[str, Answer], bool]
-) -> int:
+def _largest_matching(answers: Sequence[Answer], pieces: Sequence[str], match: Callable[[str, Answer], bool]) -> int:
     """How many gold answers can be given a piece of their own (augmenting paths; both lists are short)."""
     fits = [[index for index, piece in enumerate(pieces) if match(piece, gold)] for gold in answers]
     owner: dict[int, int] = {}
@@ -121,7 +119,10 @@ def _normalise(text: Answer) -> str:
     text = text.lower().strip()
     try:
         return str(w2n.word_to_num(text))
-    except (ValueError, IndexError):  # the library's own ways to say "not a number" ("thousand one": IndexError)
+    except (
+        ValueError,
+        IndexError,
+    ):  # the library's own ways to say "not a number" ("thousand one": IndexError)
         return _plain(text)
 
 

@@ -1,0 +1,17 @@
+"""One run: its identity, its journal, and the order of its work."""
+
+from infthor_eval.runs.catalog import Catalog
+from infthor_eval.runs.journal import Journal, UnitRecord, read_journal
+from infthor_eval.runs.run import Plan, RunOutcome, RunRequest, execute, plan
+
+__all__ = [
+    "Catalog",
+    "Journal",
+    "Plan",
+    "RunOutcome",
+    "RunRequest",
+    "UnitRecord",
+    "execute",
+    "plan",
+    "read_journal",
+]

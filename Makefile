@@ -1,0 +1,34 @@
+# make demo and make test each do all the set-up in a local virtual environment; each can be the first thing typed.
+PYTHON ?= python3
+VENV ?= .venv
+BIN := $(VENV)/bin
+INSTALLED := $(VENV)/.installed
+# lm-eval's own multimodal model insists on torchvision, which has no CPU build; one test loads its Python half from
+# here. It must stay out of the environment itself, where transformers would find it and fail.
+PEERS := $(VENV)/test-peers
+
+.PHONY: demo test lint clean
+
+demo: $(INSTALLED)
+	$(BIN)/python benchmarks/demo.py
+
+test: $(INSTALLED) $(PEERS)
+	$(BIN)/python -m pytest
+
+lint: $(INSTALLED)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+$(INSTALLED): pyproject.toml setup.py constraints.txt
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or newer is needed: make PYTHON=python3.11 ...")'
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
+	touch $@
+
+$(PEERS): $(INSTALLED)
+	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt --no-deps --upgrade --target $@ torchvision
+	touch $@
+
+clean:
+	rm -rf $(VENV) build dist *.egg-info

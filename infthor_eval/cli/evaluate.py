@@ -1,0 +1,81 @@
+"""What `run` does with its requests, and what of it people see."""
+
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import msgspec
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from infthor_eval.report import nieh_table, summarise
+from infthor_eval.runs import Plan, RunOutcome, RunRequest, UnitRecord, execute, plan
+from model_adapters import options
+
+__all__ = ["evaluate"]
+
+_notes = Console(stderr=True, soft_wrap=True)
+_output = Console(soft_wrap=True)
+
+
+def evaluate(requests: Sequence[RunRequest]) -> int:
+    """Run the requests one after another and print one table.
+
+    Returns:
+        Exit code: 1 where a question failed, else 0.
+    """
+    for request in requests:
+        options(request.model)  # an unknown model is refused before the data are read
+    plans = [plan(request) for request in requests]
+    _say_what_is_left_out(plans[0])
+    summaries, outcomes = [], []
+    for ready in plans:
+        outcome = _execute(ready)
+        summary = summarise(outcome.identity, outcome.records)
+        _write_json(outcome.folder / "results.json", summary)
+        outcomes.append(outcome)
+        summaries.append(summary)
+    _output.print(nieh_table(summaries))
+    for outcome in outcomes:
+        _output.print(f"{outcome.identity['model']['name']}: {outcome.folder}", highlight=False)
+    return int(any(_say_what_failed(outcome) for outcome in outcomes))
+
+
+def _execute(ready: Plan) -> RunOutcome:
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    found = 0
+    with Progress(*columns, console=_notes, transient=True) as progress:
+        bar = progress.add_task(ready.request.model, total=ready.n_units)
+
+        def observe(_: UnitRecord, resumed: bool) -> None:
+            nonlocal found
+            found += resumed
+            progress.advance(bar)
+
+        outcome = execute(ready, observe)
+    made = ready.n_units - found
+    _notes.print(
+        f"{ready.request.model}: {made} answered now, {found} found in the journal of an earlier run",
+        highlight=False,
+    )
+    return outcome
+
+
+def _say_what_is_left_out(ready: Plan) -> None:
+    for task in ready.tasks:
+        for reason, n in sorted(Counter(item.reason for item in task.left_out).items()):
+            _notes.print(f"{task.name}: {n} question(s) left out: {reason}", style="yellow", highlight=False)
+
+
+def _say_what_failed(outcome: RunOutcome) -> int:
+    reasons = Counter((r.task, r.failure) for r in outcome.records if r.failure is not None)
+    for (task, reason), n in sorted(reasons.items()):
+        _notes.print(f"{task}: {n} question(s) failed, counted as wrong: {reason}", style="red", highlight=False)
+    return sum(reasons.values())
+
+
+def _write_json(path: Path, value: dict[str, Any]) -> None:
+    partial = path.with_name(path.name + ".partial")
+    partial.write_bytes(msgspec.json.format(msgspec.json.encode(value, order="sorted"), indent=2) + b"\n")
+    partial.replace(path)

@@ -1,0 +1,76 @@
+"""Entry point: which commands there are, and how errors are shown."""
+
+import importlib
+import sys
+
+import click
+
+import infthor_eval
+from infthor_eval.errors import InfthorError
+
+__all__ = ["main"]
+
+# Name, and the one line that the overview shows; the module infthor_eval.cli.<name> has the command.
+_COMMANDS = {
+    "run": "Evaluate a model on tasks (the default command).",
+    "ls": "List the models or the tasks.",
+    "generate": "Make long-horizon trajectories in a scene.",
+    "replay": "Replay trajectories in the simulator into frames and metadata.",
+    "questions": "Make NIEH questions from replayed trajectories.",
+}
+_DEFAULT = "run"
+
+
+class _Commands(click.Group):
+    """Commands imported on demand; options without a command are those of `run`."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(_COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in _COMMANDS:
+            return None
+        command = importlib.import_module(f"infthor_eval.cli.{cmd_name}").command
+        assert isinstance(command, click.Command)
+        return command
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        if args and args[0].startswith("-") and args[0] not in ("--help", "-h", "--version"):
+            args = [_DEFAULT, *args]
+        return super().parse_args(ctx, args)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        # Not click's own, which would import every command for its first line of help.
+        with formatter.section("Commands"):
+            formatter.write_dl(list(_COMMANDS.items()))
+
+
+@click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"]}, no_args_is_help=True)
+@click.version_option(infthor_eval.__version__, prog_name="infthor-eval")
+def _infthor_eval() -> None:
+    """Evaluate multimodal models on long-horizon embodied tasks (∞-THOR).
+
+    Without a command: infthor-eval --model MODEL --tasks TASKS runs an evaluation.
+    """
+
+
+def main(args: list[str] | None = None) -> None:
+    """Run the command line; errors meant for people end in one line on standard error."""
+    try:
+        code = _infthor_eval.main(args, prog_name="infthor-eval", standalone_mode=False)
+    except click.exceptions.NoArgsIsHelpError as error:
+        click.echo(error.format_message())
+        sys.exit(2)
+    except click.ClickException as error:
+        _fail(error.format_message(), error.exit_code)
+    except InfthorError as error:
+        _fail(str(error), error.exit_code)
+    except (click.Abort, KeyboardInterrupt):
+        _fail("stopped; the same command goes on where it was", 130)
+    else:
+        sys.exit(code if isinstance(code, int) else 0)
+
+
+def _fail(message: str, code: int) -> None:
+    click.echo(f"infthor-eval: {' '.join(message.split())}", err=True)
+    sys.exit(code)

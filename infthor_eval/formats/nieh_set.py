@@ -1,0 +1,177 @@
+"""An NIEH set: questions about long egocentric trajectories, and the frames they are asked on.
+
+The folder form is that of the published data (hub dataset `PEARLS-Lab/infini-thor-nieh`): `qa_set*.csv` beside
+`metadata/<traj_id>/` with `img/` (or `img_768/`) and `metadata.json`.
+"""
+
+import hashlib
+import json
+from collections import Counter
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from infthor_eval.errors import DataError
+from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.qa_csv import read_questions
+from infthor_eval.formats.question import Question
+from infthor_eval.formats.step_log import read_steps
+
+__all__ = ["LeftOut", "NiehSet"]
+
+_IMAGE_FOLDERS = ("img", "img_768")
+_IMAGE_SUFFIXES = {".png", ".jpg", ".jpeg"}
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """A question that cannot be asked, and why."""
+
+    question: Question
+    reason: str
+
+
+class NiehSet:
+    """Questions and frames of one folder. Trajectories are read when first asked for, and then kept."""
+
+    def __init__(self, root: Path) -> None:
+        """Read the questions of the set in `root`.
+
+        Raises:
+            DataError: there is no such set, or a question file is not what the format says.
+        """
+        if not root.is_dir():
+            raise DataError(f"{root}: no such folder; give an NIEH set with --data")
+        self.root = root
+        self._files = sorted(root.glob("qa_set*.csv"))
+        if not self._files:
+            raise DataError(f"{root}: no qa_set*.csv in it; an NIEH set has question files beside metadata/")
+        if not (root / "metadata").is_dir():
+            raise DataError(f"{root}: no metadata/ in it; unpack the set's metadata.tar there")
+        self._read = tuple(question for file in self._files for question in read_questions(file))
+        self._frames: dict[str, dict[int, FrameRef]] = {}
+        self._whole: dict[str, tuple[FrameRef, ...]] = {}  # shared by all questions on the whole trajectory
+
+    @cached_property
+    def left_out(self) -> tuple[LeftOut, ...]:
+        """Questions that cannot be asked, in the order of the files."""
+        found, seen = [], set()
+        for question in self._read:
+            reason = "stands in the files twice" if question.id in seen else self._problem(question)
+            seen.add(question.id)
+            if reason:
+                found.append(LeftOut(question, reason))
+        return tuple(found)
+
+    @cached_property
+    def questions(self) -> tuple[Question, ...]:
+        """The questions that can be asked, in the order of the files."""
+        unusable = {id(item.question) for item in self.left_out}
+        return tuple(question for question in self._read if id(question) not in unusable)
+
+    @cached_property
+    def fingerprint(self) -> str:
+        """Hash of the questions, the step logs, and the names and sizes of the frames (hex, 32 characters).
+
+        The content of frames is not read here: each answered unit records the digests of the frames it used.
+        """
+        digest = hashlib.blake2b(digest_size=16)
+        for file in self._files:
+            digest.update(file.read_bytes())
+        for traj_id in sorted({question.traj_id for question in self.questions}):
+            digest.update((self.folder(traj_id) / "metadata.json").read_bytes())
+            for index, frame in self._trajectory(traj_id).items():
+                digest.update(f"{traj_id}/{index}:{frame.path.name}:{frame.path.stat().st_size}\n".encode())
+        return digest.hexdigest()
+
+    @cached_property
+    def simulator(self) -> str | None:
+        """What rendered the frames ("embedded", "unity"), from the set's `set.json`; None where it does not say.
+
+        Raises:
+            DataError: `set.json` is not a JSON object.
+        """
+        path = self.root / "set.json"
+        if not path.is_file():
+            return None
+        try:
+            info = json.loads(path.read_text(encoding="utf-8"))
+            return str(info["simulator"]) if "simulator" in info else None
+        except (ValueError, TypeError) as error:
+            raise DataError(f"{path}: not a JSON object ({error}); write the set again") from error
+
+    def reasons(self) -> Counter[str]:
+        """How many questions were left out, by reason."""
+        return Counter(item.reason for item in self.left_out)
+
+    def folder(self, traj_id: str) -> Path:
+        """Where the trajectory's frames and metadata lie."""
+        return self.root / "metadata" / traj_id
+
+    def frames(self, traj_id: str) -> tuple[FrameRef, ...]:
+        """Every frame of a trajectory in time order.
+
+        Raises:
+            DataError: the trajectory is not in the set, or its frames do not fit its metadata.
+        """
+        if traj_id not in self._whole:
+            self._whole[traj_id] = tuple(self._trajectory(traj_id).values())
+        return self._whole[traj_id]
+
+    def clue_frames(self, question: Question) -> tuple[FrameRef, ...]:
+        """The frames that hold a question's evidence, in the order of its clues."""
+        frames = self._trajectory(question.traj_id)
+        return tuple(frames[index] for index in question.clues)
+
+    def _problem(self, question: Question) -> str | None:
+        """Why a question cannot be asked; None where it can."""
+        if Path(question.traj_id).name != question.traj_id or question.traj_id in {"", ".", ".."}:
+            return f"trajectory {question.traj_id!r} is not a plain folder name"
+        if not self.folder(question.traj_id).is_dir():
+            return f"trajectory {question.traj_id} is not in metadata/"
+        if not question.answers:
+            return "no gold answer"
+        if not question.clues:
+            return "no clue frame"
+        frames = self._trajectory(question.traj_id)
+        outside = [index for index in question.clues if index not in frames]
+        if outside:
+            return f"clue {outside[0]} is outside trajectory {question.traj_id} ({len(frames)} frames)"
+        return next(filter(None, (frames[index].problem() for index in question.clues)), None)
+
+    def _trajectory(self, traj_id: str) -> dict[int, FrameRef]:
+        if traj_id not in self._frames:
+            self._frames[traj_id] = _read_frames(self.folder(traj_id))
+        return self._frames[traj_id]
+
+
+def _read_frames(folder: Path) -> dict[int, FrameRef]:
+    """Frames by their number (`img_idx`), in time order."""
+    steps = read_steps(folder)
+    images = _images(folder)
+    if len(images) != len(steps):
+        raise DataError(
+            f"trajectory {folder.name}: {len(images)} frames but {len(steps)} entries in metadata.json; "
+            "unpack the trajectory again"
+        )
+    steps = sorted(steps, key=lambda step: step.img_idx)
+    if all(step.img_filename for step in steps):
+        # By stem: published sets of other sizes (img_768) keep the names and change the suffix.
+        by_stem = {path.stem: path for path in images}
+        names = [step.img_filename or "" for step in steps]
+        paths = [by_stem.get(Path(name).stem, images[0].parent / Path(name).name) for name in names]
+    else:
+        paths = images
+    frames = {step.img_idx: FrameRef(path) for step, path in zip(steps, paths, strict=True)}
+    if len(frames) != len(steps):
+        raise DataError(f"trajectory {folder.name}: metadata.json numbers two frames alike (img_idx)")
+    return frames
+
+
+def _images(folder: Path) -> list[Path]:
+    for name in _IMAGE_FOLDERS:
+        if (folder / name).is_dir():
+            return sorted(
+                path for path in (folder / name).iterdir() if path.suffix.lower() in _IMAGE_SUFFIXES
+            )
+    raise DataError(f"trajectory {folder.name}: neither img/ nor img_768/ in {folder}; unpack it again")

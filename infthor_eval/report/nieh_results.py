@@ -1,0 +1,118 @@
+"""NIEH results as numbers: a pure function of a run's journal."""
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import yaml
+
+from infthor_eval.errors import DataError
+from infthor_eval.formats.packaged import packaged_folder
+from infthor_eval.nieh.prompts import last_line
+from infthor_eval.nieh.scoring import SCORERS, Scorer, score
+from infthor_eval.runs.journal import UnitRecord
+
+__all__ = ["CLUE_COLUMNS", "Accuracy", "PublishedTable", "accuracies", "published_table4", "summarise"]
+
+CLUE_COLUMNS = ("1", "2", ">=3", "total")  # the columns of the paper's Table 4
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """Mean scores of some questions.
+
+    Attributes:
+        n: questions asked; a failed one counts as wrong.
+        n_failed: questions that the model could not answer.
+        scores: mean score in [0, 1] by scorer; None where no question was asked.
+    """
+
+    n: int
+    n_failed: int
+    scores: dict[Scorer, float | None]
+
+
+@dataclass(frozen=True)
+class PublishedTable:
+    """A table of the paper: percentages by row and column, and where they stand."""
+
+    source: str
+    context: str
+    scorer: Scorer
+    columns: tuple[str, ...]
+    rows: dict[str, tuple[float, ...]]
+
+
+def clue_column(n_clues: int) -> str:
+    """The column of Table 4 that a question with so many clues belongs to."""
+    return str(n_clues) if n_clues < 3 else ">=3"
+
+
+def accuracies(records: Sequence[UnitRecord]) -> dict[str, Accuracy]:
+    """Accuracy by column of Table 4."""
+    columns = {name: [record for record in records if clue_column(record.n_clues) == name] for name in CLUE_COLUMNS}
+    return {name: _accuracy(records if name == "total" else columns[name]) for name in CLUE_COLUMNS}
+
+
+def summarise(identity: dict[str, Any], records: Iterable[UnitRecord]) -> dict[str, Any]:
+    """Everything that a run found, as JSON values; the same journal gives the same text.
+
+    Times and cache hits are not in it: they differ between a run and the same run resumed.
+    """
+    kept = sorted(records, key=lambda record: record.key)
+    return {"run": identity, "tasks": {task: _task(kept, task) for task in identity["tasks"]}}
+
+
+def _task(records: Sequence[UnitRecord], task: str) -> dict[str, Any]:
+    of_task = [record for record in records if record.task == task]
+    return {
+        "n": len(of_task),
+        "by_clues": {name: _as_json(accuracy) for name, accuracy in accuracies(of_task).items()},
+        "by_question_type": _grouped(of_task, lambda record: record.question_type or "untyped"),
+        "below_full_marks": {
+            scorer: [record.question_id for record in of_task if _score(record, scorer) < 1.0] for scorer in SCORERS
+        },
+        "failures": [
+            {"question_id": record.question_id, "reason": record.failure} for record in of_task if record.failure
+        ],
+    }
+
+
+def _grouped(records: Sequence[UnitRecord], name_of: Callable[[UnitRecord], str]) -> dict[str, Any]:
+    names = sorted({name_of(record) for record in records})
+    return {name: _as_json(_accuracy([r for r in records if name_of(r) == name])) for name in names}
+
+
+def _accuracy(records: Sequence[UnitRecord]) -> Accuracy:
+    scores: dict[Scorer, float | None] = {
+        scorer: math.fsum(_score(record, scorer) for record in records) / len(records) if records else None
+        for scorer in SCORERS
+    }
+    return Accuracy(len(records), sum(record.failure is not None for record in records), scores)
+
+
+def _score(record: UnitRecord, scorer: Scorer) -> float:
+    return score(last_line(record.reply), record.answers, scorer) if record.reply is not None else 0.0
+
+
+def _as_json(accuracy: Accuracy) -> dict[str, Any]:
+    return {"n": accuracy.n, "n_failed": accuracy.n_failed} | {
+        str(name): value for name, value in accuracy.scores.items()
+    }
+
+
+@cache
+def published_table4() -> PublishedTable:
+    """The paper's Table 4.
+
+    Raises:
+        DataError: the installation's copy is not what it should be.
+    """
+    path = packaged_folder("results") / "published" / "nieh_table4.yaml"
+    table = yaml.safe_load(path.read_text(encoding="utf-8"))
+    rows = {name: tuple(map(float, row)) for name, row in table["rows"].items()}
+    if tuple(table["columns"]) != CLUE_COLUMNS or any(len(row) != len(CLUE_COLUMNS) for row in rows.values()):
+        raise DataError(f"{path}: the columns must be {', '.join(CLUE_COLUMNS)}")
+    return PublishedTable(table["source"], table["context"], table["scorer"], CLUE_COLUMNS, rows)

@@ -1,0 +1,62 @@
+"""NIEH results as a table on the terminal."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from rich import box
+from rich.table import Table
+
+from infthor_eval.nieh.scoring import SCORERS
+from infthor_eval.report.nieh_results import CLUE_COLUMNS, published_table4
+
+__all__ = ["nieh_table"]
+
+
+def nieh_table(summaries: Sequence[dict[str, Any]]) -> Table:
+    """Accuracy in percent by number of clues: a row per run, task and scorer, then the published numbers.
+
+    Args:
+        summaries: what `infthor_eval.report.nieh_results.summarise` gave for each run.
+    """
+    table = Table(box=box.SIMPLE_HEAD, title="NIEH accuracy, % by number of clues", title_justify="left")
+    for name in ("model", "task", "scorer"):
+        table.add_column(name)
+    for name in (*CLUE_COLUMNS, "n", "failed"):
+        table.add_column(name, justify="right")
+    for summary in summaries:
+        for task, result in summary["tasks"].items():
+            for scorer in SCORERS:
+                table.add_row(summary["run"]["model"]["name"], task, scorer, *_cells(result["by_clues"], scorer))
+        table.add_section()
+    published = published_table4()
+    for name, row in published.rows.items():
+        table.add_row(
+            name,
+            f"published, {published.context}",
+            published.scorer,
+            *map("{:.2f}".format, row),
+            "",
+            "",
+            style="dim",
+        )
+    if any(_simulated(summary) for summary in summaries):
+        table.caption = (
+            "Questions on frames of the embedded simulator: not comparable with the published rows, which are on "
+            "AI2-THOR's own frames."
+        )
+        table.caption_justify = "left"
+    return table
+
+
+def _cells(by_clues: dict[str, Any], scorer: str) -> list[str]:
+    total = by_clues["total"]
+    shares = [by_clues[name][scorer] for name in CLUE_COLUMNS]
+    return [
+        *("-" if share is None else f"{100 * share:.2f}" for share in shares),
+        str(total["n"]),
+        str(total["n_failed"]),
+    ]
+
+
+def _simulated(summary: dict[str, Any]) -> bool:
+    return any(task["simulator"] == "embedded" for task in summary["run"]["tasks"].values())

@@ -1,0 +1,118 @@
+import json
+
+import pytest
+
+from infthor_eval.errors import DataError
+from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.question import Question
+
+SOUND = Question("t", "Is there a mug?", (1,), ("yes",))
+
+
+def reasons(root):
+    return [item.reason for item in NiehSet(root).left_out]
+
+
+def test_frames_come_in_time_order_and_clues_in_theirs(make_nieh_set):
+    root = make_nieh_set([Question("t", "q", (4, 1), ("yes",))])
+    data = NiehSet(root)
+    assert [frame.path.stem for frame in data.frames("t")] == [f"{index:09d}" for index in range(6)]
+    assert [frame.path.stem for frame in data.clue_frames(data.questions[0])] == ["000000004", "000000001"]
+    assert data.left_out == ()
+
+
+def test_columnar_metadata_without_file_names_is_read(make_nieh_set):
+    root = make_nieh_set([SOUND])
+    metadata = root / "metadata" / "t" / "metadata.json"
+    metadata.write_text(json.dumps({"img_idx": list(range(6)), "step": list(range(6))}))
+    assert NiehSet(root).clue_frames(SOUND)[0].path.name == "000000001.png"
+
+
+def test_the_folder_of_larger_images_serves_as_well(make_nieh_set):
+    root = make_nieh_set([SOUND])
+    folder = root / "metadata" / "t"
+    (folder / "img").rename(folder / "img_768")
+    assert NiehSet(root).clue_frames(SOUND)[0].path.parent.name == "img_768"
+
+
+@pytest.mark.parametrize(
+    ("question", "reason"),
+    [
+        (Question("t", "q", (6,), ("a",)), "clue 6 is outside trajectory t (6 frames)"),
+        (Question("t", "q", (-1,), ("a",)), "clue -1 is outside trajectory t (6 frames)"),
+        (Question("t", "q", (), ("a",)), "no clue frame"),
+        (Question("t", "q", (1,), ()), "no gold answer"),
+        (Question("../metadata/t", "q", (1,), ("a",)), "trajectory '../metadata/t' is not a plain folder name"),
+    ],
+)
+def test_a_question_that_cannot_be_asked_is_left_out_with_its_reason(make_nieh_set, question, reason):
+    root = make_nieh_set([SOUND])
+    extra = root / "qa_set_extra.csv"
+    rows = f'"{question.traj_id}",q,"{list(question.clues)}","{list(question.answers)}"\n'
+    extra.write_text("traj_id,question,gt_img_idx,answer\n" + rows)
+    assert reasons(root) == [reason]
+    assert [item.text for item in NiehSet(root).questions] == [SOUND.text]
+
+
+def test_a_trajectory_without_folder_and_a_repeated_question_are_left_out(make_nieh_set):
+    root = make_nieh_set([SOUND, SOUND])
+    (root / "qa_set_x.csv").write_text("traj_id,question,gt_img_idx,answer\nother,q,[1],['a']\n")
+    assert reasons(root) == ["stands in the files twice", "trajectory other is not in metadata/"]
+
+
+def test_a_clue_that_is_no_image_is_left_out_by_name(make_nieh_set):
+    root = make_nieh_set([SOUND])
+    frame = root / "metadata" / "t" / "img" / "000000001.png"
+    frame.write_text("not an image")
+    assert reasons(root) == [f"{frame}: not a PNG or JPEG image"]
+
+
+def test_a_clue_under_another_name_is_left_out_by_name(make_nieh_set):
+    root = make_nieh_set([SOUND])
+    frame = root / "metadata" / "t" / "img" / "000000001.png"
+    frame.rename(frame.with_name("other.png"))
+    assert reasons(root) == [f"{frame}: cannot be read (No such file or directory)"]
+
+
+def test_frame_and_entry_counts_that_differ_name_the_trajectory(make_nieh_set):
+    root = make_nieh_set([SOUND])
+    (root / "metadata" / "t" / "img" / "000000005.png").unlink()
+    with pytest.raises(DataError, match=r"trajectory t: 5 frames but 6 entries in metadata\.json"):
+        _ = NiehSet(root).questions
+
+
+def test_two_frames_with_one_number_are_refused(make_nieh_set):
+    root = make_nieh_set([SOUND])
+    metadata = root / "metadata" / "t" / "metadata.json"
+    metadata.write_text(json.dumps([{**entry, "img_idx": 0} for entry in json.loads(metadata.read_text())]))
+    with pytest.raises(DataError, match="numbers two frames alike"):
+        _ = NiehSet(root).questions
+
+
+def test_missing_parts_of_a_set_are_named(make_nieh_set, tmp_path):
+    with pytest.raises(DataError, match="no such folder"):
+        NiehSet(tmp_path / "nowhere")
+    with pytest.raises(DataError, match=r"no qa_set\*\.csv"):
+        NiehSet(tmp_path)
+    (tmp_path / "qa_set.csv").write_text("")
+    with pytest.raises(DataError, match="no metadata/"):
+        NiehSet(tmp_path)
+
+
+def test_the_fingerprint_follows_questions_logs_and_frames(make_nieh_set):
+    root = make_nieh_set([SOUND])
+    before = NiehSet(root).fingerprint
+    assert NiehSet(root).fingerprint == before
+    frame = root / "metadata" / "t" / "img" / "000000003.png"
+    frame.write_bytes(frame.read_bytes() + b"more")
+    assert NiehSet(root).fingerprint != before
+
+
+def test_the_simulator_is_what_the_set_says(make_nieh_set):
+    root = make_nieh_set([SOUND])
+    assert NiehSet(root).simulator is None
+    (root / "set.json").write_text('{"simulator": "embedded"}')
+    assert NiehSet(root).simulator == "embedded"
+    (root / "set.json").write_text("[")
+    with pytest.raises(DataError, match="not a JSON object"):
+        _ = NiehSet(root).simulator

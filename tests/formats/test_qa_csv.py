@@ -1,0 +1,65 @@
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from infthor_eval.errors import DataError
+from infthor_eval.formats.qa_csv import read_questions, write_questions
+from infthor_eval.formats.question import Question
+
+words = st.text(st.characters(exclude_categories=["C", "Z"]), min_size=1, max_size=20)
+questions = st.builds(
+    Question,
+    traj_id=words,
+    text=words,
+    clues=st.lists(st.integers(0, 3000), max_size=5).map(tuple),
+    answers=st.lists(words | st.integers(), max_size=3).map(tuple),
+    kind=words | st.none(),
+)
+
+
+@given(st.lists(questions, max_size=5))
+def test_what_is_written_is_read_back(tmp_path_factory, items):
+    path = tmp_path_factory.mktemp("csv") / "qa_set.csv"
+    write_questions(path, items)
+    assert read_questions(path) == items
+
+
+def test_the_published_columns_suffice_and_others_are_left_unread(tmp_path):
+    path = tmp_path / "qa_set_nieh_single_clue.csv"
+    path.write_text("idx,traj_id,question,gt_img_idx,answer\n0,t1,\"Is it, there?\",[12],['yes']\n")
+    assert read_questions(path) == [Question("t1", "Is it, there?", (12,), ("yes",))]
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        ("traj_id,question,answer\nt,q,['a']\n", "no column gt_img_idx"),
+        ("", "no column traj_id"),
+        ("traj_id,question,gt_img_idx,answer\nt,q,\"[1, 2\",['a']\n", "line 2: gt_img_idx is not a list"),
+        ("traj_id,question,gt_img_idx,answer\nt,q,[1],yes\n", "line 2: answer is not a list"),
+        ("traj_id,question,gt_img_idx,answer\nt,q,[1],__import__('os')\n", "line 2: answer is not a list"),
+        ("traj_id,question,gt_img_idx,answer\nt,q,['x'],['a']\n", "line 2: gt_img_idx has an entry of the wrong type"),
+        ("traj_id,question,gt_img_idx,answer\nt,q,[True],['a']\n", "wrong type"),
+        ("traj_id,question,gt_img_idx,answer\nt,,[1],['a']\n", "line 2: question is empty"),
+        ("traj_id,question,gt_img_idx,answer\nt,q\n", "line 2: gt_img_idx is empty"),
+        ("traj_id,question,gt_img_idx,answer\nt,q," + "[" * 5000 + ",['a']\n", "gt_img_idx is not a list"),
+    ],
+)
+def test_a_malformed_file_is_refused_in_one_line(tmp_path, content, said):
+    path = tmp_path / "qa_set.csv"
+    path.write_text(content)
+    with pytest.raises(DataError) as caught:
+        read_questions(path)
+    assert said in str(caught.value)
+    assert str(path) in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert len(str(caught.value)) < len(str(path)) + 200
+
+
+def test_a_file_that_is_no_text_is_refused(tmp_path):
+    path = tmp_path / "qa_set.csv"
+    path.write_bytes(b"traj_id,\xff\xfe")
+    with pytest.raises(DataError, match="not a UTF-8 CSV file"):
+        read_questions(path)
+    with pytest.raises(DataError, match="cannot be read"):
+        read_questions(tmp_path / "none.csv")

@@ -1,0 +1,40 @@
+import pytest
+
+from infthor_eval.errors import DataError, UsageError
+from infthor_eval.runs import Catalog
+
+
+def test_the_packaged_tasks_are_those_that_lm_eval_sees():
+    from lm_eval.tasks import TaskManager
+
+    catalog = Catalog.packaged()
+    manager = TaskManager(include_path=str(catalog.folder), include_defaults=False)
+    assert sorted([*catalog.tasks, *catalog.groups]) == sorted({*manager.all_tasks} - {"infthor"})
+    assert catalog.expand(["nieh"]) == ["nieh_gt", "nieh_full"]
+    assert catalog.expand(["nieh_mini_full", "nieh_mini"]) == ["nieh_mini_full", "nieh_mini_gt"]
+
+
+@pytest.mark.parametrize(("name", "near"), [("nieh_ful", "'nieh_full'"), ("neih", "'nieh'"), ("xyz", "nieh_mini_gt")])
+def test_an_unknown_name_is_answered_with_the_nearest(name, near):
+    with pytest.raises(UsageError) as caught:
+        Catalog.packaged().expand([name])
+    assert near in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        ("task: [", "not YAML"),
+        ("- a", "not a mapping"),
+        ("output_type: generate_until", "neither a task nor a group name"),
+        ("task: a\noutput_type: generate_until", "no custom_dataset, dataset_kwargs"),
+        ("group: g\ntask: a", "must be a list"),
+        ("include: none.yaml\ntask: a", "cannot be read"),
+    ],
+)
+def test_a_broken_task_file_is_named(tmp_path, content, said):
+    (tmp_path / "a.yaml").write_text(content)
+    with pytest.raises(DataError, match=said) as caught:
+        Catalog(tmp_path).expand(["a"])
+    assert "yaml" in str(caught.value)
+    assert "\n" not in str(caught.value)
