@@ -15,8 +15,9 @@ from model_adapters import options
 
 __all__ = ["evaluate"]
 
+_TABLE_WIDTH = 116  # on a narrower terminal lines wrap; cut-off numbers would be worse
 _notes = Console(stderr=True, soft_wrap=True)
-_output = Console(soft_wrap=True)
+_output = Console(soft_wrap=True, width=max(Console().width, _TABLE_WIDTH))
 
 
 def evaluate(requests: Sequence[RunRequest]) -> int:

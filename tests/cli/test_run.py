@@ -1,0 +1,167 @@
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from infthor_eval.cli import main
+from infthor_eval.formats.question import Question
+
+MANY = [
+    Question(traj_id, f"Is there a {name}?", (index,), ("yes",), "object_presence")
+    for traj_id in ("traj_a", "traj_b")
+    for index, name in enumerate(("mug", "plate", "sink", "fridge", "apple", "bread"))
+]
+
+
+def run(capfd, *arguments):
+    """The command in this process: its exit code, standard output and standard error."""
+    with pytest.raises(SystemExit) as ended:
+        main([str(argument) for argument in arguments])
+    return ended.value.code, *capfd.readouterr()
+
+
+def only(folder, pattern):
+    (path,) = folder.rglob(pattern)
+    return path
+
+
+def test_the_table_shows_every_model_task_and_scorer_beside_the_published_rows(make_nieh_set, tmp_path, capfd):
+    data = make_nieh_set(size=56)
+    code, out, _ = run(
+        capfd, "--model", "oracle,blind", "--tasks", "nieh", "--data", data, "--output", tmp_path / "out"
+    )
+    assert code == 0
+    rows = [line.split() for line in out.splitlines()]
+    assert ["oracle", "nieh_gt", "strict", "100.00", "100.00", "100.00", "100.00", "5", "0"] in rows
+    assert ["oracle", "nieh_full", "reference", "100.00", "100.00", "100.00", "100.00", "5", "0"] in rows
+    assert any(row[:2] == ["blind", "nieh_gt"] for row in rows)
+    assert "Qwen2.5-VL 7B" in out
+    assert "82.20" in out
+    for model in ("oracle", "blind"):
+        results = json.loads(only(tmp_path / "out" / model, "results.json").read_text())
+        assert results["tasks"]["nieh_gt"]["by_clues"]["total"]["n"] == 5
+
+
+def test_frames_of_the_embedded_simulator_are_labelled(make_nieh_set, tmp_path, capfd):
+    data = make_nieh_set(size=56)
+    (data / "set.json").write_text('{"simulator": "embedded"}')
+    _, out, _ = run(
+        capfd, "run", "--model", "oracle", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out"
+    )
+    assert "embedded simulator: not comparable" in " ".join(out.split())
+
+
+def test_limit_asks_only_so_many_of_each_task(make_nieh_set, tmp_path, capfd):
+    data = make_nieh_set(size=56)
+    run(capfd, "--model", "oracle", "--tasks", "nieh", "--data", data, "--output", tmp_path / "o", "--limit", 2)
+    results = json.loads(only(tmp_path / "o", "results.json").read_text())
+    assert {name: task["n"] for name, task in results["tasks"].items()} == {"nieh_gt": 2, "nieh_full": 2}
+
+
+def test_a_killed_run_goes_on_and_ends_as_an_undisturbed_one(make_nieh_set, tmp_path):
+    data = make_nieh_set(MANY)
+
+    def start(output):
+        arguments = ["--model", "qwen2.5-vl-tiny", "--tasks", "nieh", "--data", data, "--output", output]
+        code = "from infthor_eval.cli import main; main()"
+        return subprocess.Popen([sys.executable, "-c", code, *map(str, arguments)], stderr=subprocess.PIPE, text=True)
+
+    killed = start(tmp_path / "killed")
+    deadline = time.monotonic() + 120
+    while True:  # until some answers, not all, are on disk
+        journals = list((tmp_path / "killed").rglob("journal.jsonl"))
+        if journals and journals[0].read_bytes().count(b"\n") > 3:
+            break
+        assert killed.poll() is None, killed.stderr.read()
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+    os.kill(killed.pid, signal.SIGKILL)
+    killed.communicate()
+    n_before = journals[0].read_bytes().count(b"\n") - 1
+    assert 0 < n_before < 2 * len(MANY)
+
+    again = start(tmp_path / "killed")
+    _, said = again.communicate(timeout=120)
+    assert again.returncode == 0, said
+    assert f"{2 * len(MANY) - n_before} answered now, {n_before} found" in said
+    whole = start(tmp_path / "whole")
+    assert whole.communicate(timeout=120) and whole.returncode == 0
+
+    results = [only(tmp_path / name, "results.json") for name in ("killed", "whole")]
+    assert results[0].read_bytes() == results[1].read_bytes()
+    for task in ("nieh_gt", "nieh_full"):
+        samples = [only(tmp_path / name, f"samples_{task}_*.jsonl") for name in ("killed", "whole")]
+        assert samples[0].read_bytes() == samples[1].read_bytes()
+
+
+BAD = [
+    (["--model", "orcle", "--tasks", "nieh", "--data", "SET"], "did you mean oracle?"),
+    (["--model", "oracle", "--tasks", "nieh_ful", "--data", "SET"], "did you mean 'nieh_full'?"),
+    (["--model", "oracle", "--tasks", "nieh"], "give its folder with --data"),
+    (["--model", "oracle", "--tasks", "nieh", "--data", "nowhere"], "nowhere: no such folder"),
+    (["--model", "oracle", "--tasks", ",", "--data", "SET"], "--tasks is empty"),
+    (["--model", "oracle"], "Missing option '--tasks'"),
+    (["--model", "oracle", "--tasks", "nieh", "--data", "SET", "--model-args", "a"], "not of the form key=value"),
+    (["--model", "oracle", "--tasks", "nieh", "--data", "SET", "--model-args", "a=1"], "oracle has no option a"),
+    (["--model", "qwen2.5-vl-tiny", "--tasks", "nieh", "--data", "SET", "--model-args", "dtpe=x"], "mean dtype?"),
+    (["--model", "oracle", "--tasks", "nieh", "--data", "SET", "--limit", "0"], "--limit"),
+    (["--modle", "oracle"], "No such option"),
+    (["evaluate"], "No such command 'evaluate'"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "said"), BAD, ids=[said for _, said in BAD])
+def test_misuse_ends_in_one_line_and_exit_code_2(make_nieh_set, tmp_path, capfd, arguments, said):
+    data = make_nieh_set(size=56)
+    arguments = [str(data) if argument == "SET" else argument for argument in arguments]
+    code, out, err = run(capfd, *arguments, *(["--output", tmp_path / "out"] if "--model" in arguments else []))
+    assert code == 2
+    assert said in err
+    assert out == ""
+    assert len(err.strip().splitlines()) == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_bad_data_ends_in_one_line_and_exit_code_2(make_nieh_set, tmp_path, capfd):
+    data = make_nieh_set(size=56)
+    (data / "metadata" / "traj_a" / "img" / "000000005.png").unlink()
+    code, _, err = run(capfd, "--model", "oracle", "--tasks", "nieh", "--data", data, "--output", tmp_path / "out")
+    assert code == 2
+    assert "trajectory traj_a: 5 frames but 6 entries" in err
+    assert len(err.strip().splitlines()) == 1
+
+
+def test_what_is_left_out_is_counted_and_named(make_nieh_set, tmp_path, capfd):
+    data = make_nieh_set([*MANY, Question("traj_a", "Where is it?", (77,), ("Shelf",))], size=56)
+    code, _, err = run(capfd, "--model", "oracle", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out")
+    assert code == 0
+    assert "nieh_gt: 1 question(s) left out: clue 77 is outside trajectory traj_a (6 frames)" in err
+
+
+def test_a_frame_that_breaks_in_mid_run_is_counted_as_failed_and_the_exit_code_says_so(make_nieh_set, tmp_path, capfd):
+    data = make_nieh_set(size=56)
+    frame = data / "metadata" / "traj_a" / "img" / "000000001.png"
+    frame.write_bytes(frame.read_bytes()[:50])
+    arguments = ["--model", "qwen2.5-vl-tiny", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out"]
+    code, out, err = run(capfd, *arguments)
+    assert code == 1
+    assert "nieh_gt: 2 question(s) failed, counted as wrong" in err
+    assert str(frame) in err
+    assert next(line for line in out.splitlines() if "nieh_gt" in line).split()[-2:] == ["5", "2"]
+
+
+def test_help_names_the_commands_and_the_version_is_told(capfd):
+    code, out, _ = run(capfd, "--help")
+    assert code == 0
+    assert all(name in out for name in ("run", "ls", "generate", "replay", "questions"))
+    assert run(capfd, "--version")[1].startswith("infthor-eval, version ")
+    assert run(capfd, "run", "--help")[0] == 0
+
+
+def test_ls_lists_models_and_tasks(capfd):
+    assert "qwen2.5-vl-tiny" in run(capfd, "ls", "models")[1]
+    assert "nieh_mini" in run(capfd, "ls", "tasks")[1]
