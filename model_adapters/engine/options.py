@@ -23,7 +23,7 @@ class EngineOptions:
     device: str = "auto"
     attn_implementation: str = "sdpa"
     share_prefix: bool = True
-    chunk_tokens: int = 2048
+    chunk_tokens: int = 1024
     feature_cache_mb: int = 128
     max_tokens: int | None = None
 
