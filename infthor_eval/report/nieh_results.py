@@ -1,6 +1,5 @@
 """NIEH results as numbers: a pure function of a run's journal."""
 
-import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -12,6 +11,7 @@ from infthor_eval.errors import DataError
 from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.nieh.prompts import last_line
 from infthor_eval.nieh.scoring import SCORERS, Scorer, score
+from infthor_eval.nieh.statistics import Estimate, clustered_mean
 from infthor_eval.runs.journal import UnitRecord
 
 __all__ = ["CLUE_COLUMNS", "Accuracy", "PublishedTable", "accuracies", "published_table4", "summarise"]
@@ -26,12 +26,12 @@ class Accuracy:
     Attributes:
         n: questions asked; a failed one counts as wrong.
         n_failed: questions that the model could not answer.
-        scores: mean score in [0, 1] by scorer; None where no question was asked.
+        scores: mean score in [0, 1] by scorer, with its interval; empty where no question was asked.
     """
 
     n: int
     n_failed: int
-    scores: dict[Scorer, float | None]
+    scores: dict[Scorer, Estimate]
 
 
 @dataclass(frozen=True)
@@ -86,9 +86,10 @@ def _grouped(records: Sequence[UnitRecord], name_of: Callable[[UnitRecord], str]
 
 
 def _accuracy(records: Sequence[UnitRecord]) -> Accuracy:
-    scores: dict[Scorer, float | None] = {
-        scorer: math.fsum(_score(record, scorer) for record in records) / len(records) if records else None
-        for scorer in SCORERS
+    trajectories = [record.traj_id for record in records]
+    scores: dict[str, Any] = {
+        scorer: clustered_mean([_score(record, scorer) for record in records], trajectories)
+        for scorer in (SCORERS if records else ())
     }
     return Accuracy(len(records), sum(record.failure is not None for record in records), scores)
 
@@ -98,9 +99,11 @@ def _score(record: UnitRecord, scorer: Scorer) -> float:
 
 
 def _as_json(accuracy: Accuracy) -> dict[str, Any]:
-    return {"n": accuracy.n, "n_failed": accuracy.n_failed} | {
-        str(name): value for name, value in accuracy.scores.items()
+    scores: dict[str, Any] = {
+        scorer: {"mean": e.mean, "stderr": e.stderr, "low": e.low, "high": e.high, "n_trajectories": e.n_clusters}
+        for scorer, e in accuracy.scores.items()
     }
+    return {"n": accuracy.n, "n_failed": accuracy.n_failed, **scores}
 
 
 @cache

@@ -21,7 +21,7 @@ def nieh_table(summaries: Sequence[dict[str, Any]]) -> Table:
     table = Table(box=box.SIMPLE_HEAD, title="NIEH accuracy, % by number of clues", title_justify="left")
     for name in ("model", "task", "scorer"):
         table.add_column(name)
-    for name in (*CLUE_COLUMNS, "n", "failed"):
+    for name in (*CLUE_COLUMNS, "± 95 %", "n", "failed"):
         table.add_column(name, justify="right")
     for summary in summaries:
         for task, result in summary["tasks"].items():
@@ -50,12 +50,10 @@ def nieh_table(summaries: Sequence[dict[str, Any]]) -> Table:
 
 def _cells(by_clues: dict[str, Any], scorer: str) -> list[str]:
     total = by_clues["total"]
-    shares = [by_clues[name][scorer] for name in CLUE_COLUMNS]
-    return [
-        *("-" if share is None else f"{100 * share:.2f}" for share in shares),
-        str(total["n"]),
-        str(total["n_failed"]),
-    ]
+    means = [f"{100 * by_clues[name][scorer]['mean']:.2f}" if by_clues[name]["n"] else "-" for name in CLUE_COLUMNS]
+    high, mean = total[scorer]["high"], total[scorer]["mean"]
+    reach = "-" if high is None else f"{100 * (high - mean):.2f}"  # one trajectory alone tells nothing about others
+    return [*means, reach, str(total["n"]), str(total["n_failed"])]
 
 
 def _simulated(summary: dict[str, Any]) -> bool:

@@ -1,0 +1,42 @@
+"""How often the clustered 95 % interval covers the truth, on simulated data sets whose truth is known.
+
+Each data set has trajectories of differing size; a trajectory's own accuracy is drawn from a beta distribution (so
+questions on one trajectory agree more than chance), and each question is right with that probability.
+
+    python benchmarks/interval_coverage.py [--sets 2000] [--trajectories 60] [--accuracy 0.7]
+"""
+
+import argparse
+
+import numpy as np
+
+from infthor_eval.nieh.statistics import clustered_mean
+
+
+def coverage(
+    n_sets: int, n_trajectories: int, accuracy: float, spread: float = 6.0, seed: int = 0
+) -> tuple[float, float]:
+    """Share of data sets whose interval covers the true accuracy: clustered, and as if questions were independent."""
+    random = np.random.default_rng(seed)
+    clustered = independent = 0
+    for _ in range(n_sets):
+        sizes = random.integers(5, 40, size=n_trajectories)
+        own = random.beta(accuracy * spread, (1 - accuracy) * spread, size=n_trajectories)
+        scores = [float(right) for p, n in zip(own, sizes, strict=True) for right in random.random(n) < p]
+        names = np.repeat(np.arange(n_trajectories), sizes).tolist()
+        for_trajectories = clustered_mean(scores, names)
+        for_questions = clustered_mean(scores, list(range(len(scores))))
+        clustered += for_trajectories.low <= accuracy <= for_trajectories.high
+        independent += for_questions.low <= accuracy <= for_questions.high
+    return clustered / n_sets, independent / n_sets
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--sets", type=int, default=2000)
+    parser.add_argument("--trajectories", type=int, default=60)
+    parser.add_argument("--accuracy", type=float, default=0.7)
+    chosen = parser.parse_args()
+    by_trajectory, by_question = coverage(chosen.sets, chosen.trajectories, chosen.accuracy)
+    print(f"clustered by trajectory: {100 * by_trajectory:.1f} % (aim 93-97 %)")
+    print(f"as if independent:       {100 * by_question:.1f} %")

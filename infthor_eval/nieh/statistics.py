@@ -1,0 +1,125 @@
+"""How sure a mean score is, when questions on one trajectory are not independent.
+
+Questions share their trajectory's frames, scene and objects, so they are right or wrong together; the unit that
+repeats is the trajectory. Every interval here resamples or sums over trajectories, through one partition.
+"""
+
+import math
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from infthor_eval.errors import DataError
+
+__all__ = ["Difference", "Estimate", "bootstrap_interval", "clustered_mean", "paired_difference"]
+
+_LEVEL = 0.95
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A mean and how sure it is.
+
+    Attributes:
+        mean: the mean score.
+        stderr: its standard error, clustered; None with fewer than two clusters.
+        low: lower end of the 95 % interval, None as above.
+        high: upper end.
+        n: number of scores.
+        n_clusters: number of clusters.
+    """
+
+    mean: float
+    stderr: float | None
+    low: float | None
+    high: float | None
+    n: int
+    n_clusters: int
+
+
+@dataclass(frozen=True)
+class Difference:
+    """The mean difference of two runs on the same questions, and the probability of one so large by chance.
+
+    Attributes:
+        estimate: of the differences, second minus first.
+        p: two-sided, from the clustered t statistic; None with fewer than two clusters.
+    """
+
+    estimate: Estimate
+    p: float | None
+
+
+def clustered_mean(scores: Sequence[float], clusters: Sequence[Hashable]) -> Estimate:
+    """The mean with a cluster-robust standard error and a t interval (clusters minus one degrees of freedom).
+
+    Args:
+        scores: one per question.
+        clusters: the trajectory of each.
+
+    Raises:
+        DataError: there is no score, or a score without its cluster.
+    """
+    totals, sizes = _partition(scores, clusters)
+    n, n_clusters = int(sizes.sum()), len(sizes)
+    mean = float(totals.sum() / n)
+    if n_clusters < 2:
+        return Estimate(mean, None, None, None, n, n_clusters)
+    # Residual of each cluster's total: the ratio estimator's linearisation, as clusters differ in size.
+    residuals = totals - mean * sizes
+    stderr = math.sqrt(n_clusters / (n_clusters - 1) * float(residuals @ residuals)) / n
+    reach = float(stats.t.ppf(0.5 + _LEVEL / 2, n_clusters - 1)) * stderr
+    return Estimate(mean, stderr, mean - reach, mean + reach, n, n_clusters)
+
+
+def bootstrap_interval(
+    scores: Sequence[float], clusters: Sequence[Hashable], seed: int = 0, n_resamples: int = 2000
+) -> tuple[float, float]:
+    """The 95 % percentile interval of the mean over resampled clusters.
+
+    Raises:
+        DataError: as in `clustered_mean`.
+    """
+    totals, sizes = _partition(scores, clusters)
+    picks = np.random.default_rng(seed).integers(len(sizes), size=(n_resamples, len(sizes)))
+    means = totals[picks].sum(axis=1) / sizes[picks].sum(axis=1)
+    low, high = np.quantile(means, [0.5 - _LEVEL / 2, 0.5 + _LEVEL / 2])
+    return float(low), float(high)
+
+
+def paired_difference(first: Sequence[float], second: Sequence[float], clusters: Sequence[Hashable]) -> Difference:
+    """How much better the second run is on the same questions.
+
+    Args:
+        first: scores of the first run.
+        second: scores of the second run, in the same order.
+        clusters: the trajectory of each question.
+
+    Raises:
+        DataError: the runs differ in length, and as in `clustered_mean`.
+    """
+    if len(first) != len(second):
+        raise DataError(f"{len(first)} and {len(second)} scores cannot be paired; compare runs on the same questions")
+    estimate = clustered_mean([b - a for a, b in zip(first, second, strict=True)], clusters)
+    if estimate.stderr is None:
+        return Difference(estimate, None)
+    if estimate.stderr == 0:
+        return Difference(estimate, 1.0 if estimate.mean == 0 else 0.0)
+    t = abs(estimate.mean / estimate.stderr)
+    return Difference(estimate, float(2 * stats.t.sf(t, estimate.n_clusters - 1)))
+
+
+def _partition(scores: Sequence[float], clusters: Sequence[Hashable]) -> tuple[np.ndarray, np.ndarray]:
+    """Sum of scores and number of questions per cluster; everything above is computed from these alone."""
+    if not scores:
+        raise DataError("there is no score to take the mean of")
+    if len(scores) != len(clusters):
+        raise DataError(f"{len(scores)} scores but {len(clusters)} trajectories; each score needs its trajectory")
+    for index, cluster in enumerate(clusters):
+        if cluster is None or cluster == "":
+            raise DataError(f"score {index} has no trajectory; intervals cluster by it")
+    numbers = {cluster: number for number, cluster in enumerate(dict.fromkeys(clusters))}
+    of = np.array([numbers[cluster] for cluster in clusters])
+    return np.bincount(of, weights=np.asarray(scores, dtype=float)), np.bincount(of).astype(float)

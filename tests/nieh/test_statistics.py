@@ -1,0 +1,79 @@
+import importlib.util
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from infthor_eval.errors import DataError
+from infthor_eval.nieh.statistics import bootstrap_interval, clustered_mean, paired_difference
+
+scores = st.lists(st.tuples(st.sampled_from([0.0, 0.5, 1.0]), st.integers(0, 6)), min_size=2, max_size=60)
+
+
+@given(scores)
+def test_clusters_of_one_give_the_textbook_standard_error(pairs):
+    values = [value for value, _ in pairs]
+    estimate = clustered_mean(values, list(range(len(values))))
+    assert estimate.mean == pytest.approx(np.mean(values))
+    assert estimate.stderr == pytest.approx(np.std(values, ddof=1) / math.sqrt(len(values)))
+
+
+@given(scores)
+def test_repeating_every_question_of_a_trajectory_adds_no_certainty(pairs):
+    values, clusters = [v for v, _ in pairs], [c for _, c in pairs]
+    once = clustered_mean(values, clusters)
+    thrice = clustered_mean(values * 3, clusters * 3)
+    assert thrice.mean == pytest.approx(once.mean)
+    if once.stderr is not None:
+        assert thrice.stderr == pytest.approx(once.stderr)
+
+
+def test_one_trajectory_gives_no_interval():
+    estimate = clustered_mean([1.0, 0.0], ["t", "t"])
+    assert (estimate.mean, estimate.stderr, estimate.low, estimate.high) == (0.5, None, None, None)
+
+
+@pytest.mark.parametrize(
+    ("values", "clusters", "said"),
+    [([], [], "no score"), ([1.0], [], "1 scores but 0"), ([1.0, 0.0], ["t", ""], "score 1 has no trajectory")],
+)
+def test_scores_that_cannot_be_clustered_are_refused(values, clusters, said):
+    with pytest.raises(DataError, match=said):
+        clustered_mean(values, clusters)
+
+
+def test_the_bootstrap_agrees_with_the_formula_and_repeats():
+    random = np.random.default_rng(1)
+    values = random.integers(0, 2, 400).astype(float).tolist()
+    clusters = random.integers(0, 50, 400).tolist()
+    estimate = clustered_mean(values, clusters)
+    interval = bootstrap_interval(values, clusters, seed=3)
+    assert interval == pytest.approx((estimate.low, estimate.high), abs=0.015)
+    assert bootstrap_interval(values, clusters, seed=3) == interval
+
+
+def test_a_paired_difference_is_surer_than_two_separate_runs():
+    random = np.random.default_rng(2)
+    first = random.integers(0, 2, 300).astype(float)
+    second = np.where(random.random(300) < 0.1, 1.0, first)
+    clusters = random.integers(0, 30, 300).tolist()
+    difference = paired_difference(first.tolist(), second.tolist(), clusters)
+    assert difference.estimate.mean == pytest.approx(second.mean() - first.mean())
+    assert difference.p < 0.01
+    assert paired_difference(first.tolist(), first.tolist(), clusters).p == 1.0
+    assert paired_difference([0.0], [1.0], ["t"]).p is None
+    with pytest.raises(DataError, match="cannot be paired"):
+        paired_difference([0.0], [], ["t"])
+
+
+def test_the_interval_covers_the_truth_as_often_as_it_says():
+    path = Path(__file__).parents[2] / "benchmarks" / "interval_coverage.py"
+    spec = importlib.util.spec_from_file_location("interval_coverage", path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    clustered, independent = module.coverage(600, 60, 0.7)
+    assert 0.92 <= clustered <= 0.98
+    assert independent < 0.8
