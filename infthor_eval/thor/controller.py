@@ -99,7 +99,7 @@ class SafeController(ai2thor.controller.Controller):
             self.gpu_device = None
         return super().unity_command(width, height, headless)
 
-    def _build_server(self, host: str, port: int, width: int, height: int) -> None:  # noqa: ARG002
+    def _build_server(self, host: str, port: int, width: int, height: int) -> None:
         if self.server is None:
             self.server = SafeFifoServer(width, height, self.server_timeout, self.depth_format, self.add_depth_noise)
 

@@ -52,6 +52,9 @@ class Grounding:
         chosen = self._chosen.get(object_id)
         if chosen in view.objects:
             return chosen
+        if object_id in view.objects:
+            self._chosen[object_id], self.distances[object_id] = object_id, 0.0
+            return object_id
         kind = object_type_of(object_id)
         taken = set(self._chosen.values())
         fitting = [item for item in view.objects.values() if item.object_type == kind]

@@ -124,6 +124,37 @@ class Simulator:
                 self._view = view
                 return view
 
+    def query(self, action: str, **arguments: Any) -> View:
+        """Run an action that only asks (`GetReachablePositions`): it is no part of the episode, nor is its
+        view kept.
+
+        Raises:
+            SimulatorError: as `step`.
+        """
+        before, length = self._view, len(self._episode)
+        answer = self.step(action, **arguments)
+        del self._episode[length:]
+        self._view = before
+        return answer
+
+    def mark(self) -> int:
+        """Remember where the episode is now, for `rewind`."""
+        return len(self._episode)
+
+    def rewind(self, mark: int) -> View:
+        """Bring the world back to where it was at a mark of this episode.
+
+        Raises:
+            SimulatorError: as `step`.
+        """
+        if self._scene is None:
+            raise SimulatorError("no scene is loaded; reset the simulator to one first")
+        calls = [call for call, _ in self._episode[:mark]]
+        view = self.reset(self._scene)
+        for call in calls:
+            view = self.step(**call)
+        return view
+
     def close(self) -> None:
         """Stop the simulator; a later `reset` starts it again."""
         if self._controller is not None:

@@ -118,7 +118,7 @@ class SafeFifoServer(FifoServer):
         self,
         server_pipe: io.FileIO,
         message_size: int,
-        timeout: float | None,  # noqa: ARG002 - the deadline is that of the whole reply, not of one read
+        timeout: float | None,  # the deadline is that of the whole reply, not of one read
     ) -> bytearray:
         """Read exactly `message_size` bytes."""
         if message_size > _LARGEST_BODY:

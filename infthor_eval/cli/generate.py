@@ -1,0 +1,82 @@
+"""`infthor-eval generate`: make long trajectories from seeds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from infthor_eval.generation.generate_set import Generated
+
+__all__ = ["command"]
+
+_PATH = click.Path(path_type=Path)
+
+
+@click.command("generate")
+@click.option("--scene", "scenes", multiple=True, required=True, help="kitchen-3, FloorPlan10, ...; may be repeated.")
+@click.option("--min-steps", type=click.IntRange(1), default=100, show_default=True, help="Low-level actions at least.")
+@click.option("--min-subgoals", type=click.IntRange(1), default=1, show_default=True, help="Sub-goals at least.")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of the first trajectory.")
+@click.option("--count", type=click.IntRange(1), default=1, show_default=True, help="Trajectories for each scene.")
+@click.option("--out", required=True, type=_PATH, help="Directory for the trajectory files.")
+@click.option("--data", type=_PATH, help="Folder with recorded floor plans, for scenes among them.")
+@click.option("--json", "as_json", is_flag=True, help="Print the summary as one JSON object.")
+@click.pass_context
+def command(
+    context: click.Context,
+    scenes: tuple[str, ...],
+    min_steps: int,
+    min_subgoals: int,
+    seed: int,
+    count: int,
+    out: Path,
+    data: Path | None,
+    as_json: bool,
+) -> None:
+    """Generate trajectories: tasks are sampled, planned, and carried out in the embedded simulator.
+
+    Trajectories that the directory has already are not made again. Exit status 1 where one could not be made.
+    """
+    from rich.console import Console
+    from rich.progress import Progress
+
+    from infthor_eval.generation.factory import Settings
+    from infthor_eval.generation.generate_set import generate_set
+    from infthor_eval.thor.launch import embedded
+    from infthor_eval.thor.simulator import Simulator
+
+    jobs = [Settings(scene, seed + k, min_steps, min_subgoals) for scene in scenes for k in range(count)]
+    notes = Console(stderr=True, soft_wrap=True)
+    with Simulator(embedded(data)) as simulator, Progress(console=notes, transient=True) as progress:
+        bar = progress.add_task("generate", total=len(jobs))
+        result = generate_set(jobs, simulator, out, lambda: progress.advance(bar))
+    if as_json:
+        import msgspec
+
+        click.echo(msgspec.json.encode(result.document()))
+    else:
+        _print(result, out, Console(soft_wrap=True))
+    for failure in result.failures:
+        notes.print(f"not made: {failure}", style="red", highlight=False, markup=False)
+    context.exit(1 if result.failures else 0)
+
+
+def _print(result: Generated, out: Path, output: Console) -> None:
+    from rich import box
+    from rich.table import Table
+
+    document = result.document()
+    output.print(
+        f"{document['trajectories']} trajectories ({document['resumed']} made earlier), "
+        f"{document['steps']} steps: {out}",
+        highlight=False,
+    )
+    table = Table("task", "tried", "accepted", box=box.SIMPLE_HEAD)
+    for name, counts in document["tasks"].items():
+        table.add_row(name, str(counts["tried"]), str(counts["accepted"]))
+    output.print(table)

@@ -1,0 +1,54 @@
+"""`infthor-eval questions`: make NIEH questions on a replayed set."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from infthor_eval.generation.questions.make import Made
+
+__all__ = ["command"]
+
+_PATH = click.Path(path_type=Path)
+
+
+@click.command("questions")
+@click.argument("folder", metavar="SET", type=_PATH)
+@click.option("--out", required=True, type=_PATH, help="The CSV file to write.")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Makes every choice.")
+@click.option("--per-trajectory", type=click.IntRange(1), default=25, show_default=True, help="Questions at most.")
+@click.option(
+    "--min-share",
+    type=click.FloatRange(0, 1),
+    default=0.001,
+    show_default=True,
+    help="Of a frame's pixels that an object must fill to count as shown.",
+)
+@click.pass_context
+def command(context: click.Context, folder: Path, out: Path, seed: int, per_trajectory: int, min_share: float) -> None:
+    """Make questions on a replayed set. Exit status 1 where a trajectory of it could not be read."""
+    from rich.console import Console
+
+    from infthor_eval.formats.qa_csv import write_questions
+    from infthor_eval.generation.questions.make import make_questions
+
+    made = make_questions(folder, seed=seed, per_trajectory=per_trajectory, share=min_share)
+    out.parent.mkdir(parents=True, exist_ok=True)
+    write_questions(out, made.questions)
+    output = Console(soft_wrap=True)
+    output.print(_words(made, out), highlight=False, markup=False)
+    for line in made.skipped:
+        Console(stderr=True, soft_wrap=True).print(f"skipped: {line}", style="red", highlight=False, markup=False)
+    context.exit(1 if made.skipped else 0)
+
+
+def _words(made: Made, out: Path) -> str:
+    kinds = ", ".join(f"{name} {count}" for name, count in made.by_kind().items())
+    clues = ", ".join(f"{name}: {count}" for name, count in made.by_clues().items())
+    return (
+        f"{len(made.questions)} questions on {made.trajectories} trajectories: {out}\n"
+        f"by type: {kinds}\nby number of clues: {clues}"
+    )

@@ -1,0 +1,253 @@
+"""Algorithm 1: a long trajectory out of sampled, planned and simulated tasks."""
+
+import random
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import msgspec
+
+from infthor_eval import __version__
+from infthor_eval.errors import UsageError
+from infthor_eval.formats.trajectory import (
+    HighAction,
+    InitAction,
+    LowAction,
+    ObjectPose,
+    Plan,
+    Scene,
+    SubTask,
+    SubTrajectory,
+    Trajectory,
+)
+from infthor_eval.generation.affordances import goes_into
+from infthor_eval.generation.navigation import Grid
+from infthor_eval.generation.planner import plan
+from infthor_eval.generation.recorder import object_log
+from infthor_eval.generation.rollout import Rollout, RolloutError
+from infthor_eval.generation.sampling import TaskPool
+from infthor_eval.generation.symbolic import Operator, Room, room_of
+from infthor_eval.generation.tasks import Task, TaskType, sub_task
+from infthor_eval.thor.restore import restore
+from infthor_eval.thor.simulator import Simulator
+
+__all__ = ["Settings", "Statistics", "generate"]
+
+_TRIALS = 60  # tasks tried in a row without success before the scene counts as unsolvable
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What to make.
+
+    Attributes:
+        scene: name of the scene.
+        seed: makes every choice.
+        min_steps: low-level actions at least.
+        min_subgoals: sub-goals at least.
+        kinds: task types to draw from.
+    """
+
+    scene: str
+    seed: int
+    min_steps: int
+    min_subgoals: int
+    kinds: tuple[TaskType, ...] = tuple(TaskType)
+
+    @property
+    def traj_id(self) -> str:
+        """Name of the trajectory."""
+        return f"{self.scene}-seed{self.seed}"
+
+    def document(self) -> dict[str, Any]:
+        """The settings as trajectories hold them."""
+        return {
+            "scene": self.scene,
+            "seed": self.seed,
+            "min_steps": self.min_steps,
+            "min_subgoals": self.min_subgoals,
+            "task_types": [str(kind) for kind in self.kinds],
+        }
+
+
+@dataclass
+class Statistics:
+    """Tasks tried and accepted by type, and why others failed."""
+
+    tried: Counter[str] = field(default_factory=Counter)
+    accepted: Counter[str] = field(default_factory=Counter)
+    reasons: Counter[str] = field(default_factory=Counter)
+
+    def add(self, other: "Statistics") -> None:
+        """Add the numbers of another trajectory."""
+        self.tried += other.tried
+        self.accepted += other.accepted
+        self.reasons += other.reasons
+
+
+def generate(settings: Settings, simulator: Simulator) -> tuple[Trajectory, Statistics]:
+    """Make one trajectory.
+
+    Args:
+        settings: what to make.
+        simulator: where it happens; its scene is replaced.
+
+    Raises:
+        UsageError: the scene offers no task that can be carried out.
+        SimulatorError: the simulator fails or has no such scene.
+    """
+    factory = _Factory(settings, simulator)
+    factory.begin()
+    while not factory.long_enough():
+        factory.extend()
+    factory.put_down()
+    return factory.trajectory(), factory.statistics
+
+
+class _Factory:
+    """A trajectory in the making."""
+
+    def __init__(self, settings: Settings, simulator: Simulator) -> None:
+        self._settings = settings
+        self._simulator = simulator
+        self._rng = random.Random(f"{settings.scene}/{settings.seed}")
+        self._pool = TaskPool(settings.kinds, self._rng)
+        self._low: list[LowAction] = []
+        self._high: list[HighAction] = []
+        self._log: list[dict[str, Any]] = []
+        self._sub_tasks: list[SubTask] = []
+        self._sub_trajs: list[SubTrajectory] = []
+        self.statistics = Statistics()
+
+    def begin(self) -> None:
+        """Load the scene and put the agent somewhere."""
+        view = self._simulator.reset(self._settings.scene)
+        reachable = self._reachable()
+        if not reachable:
+            raise UsageError(f"scene {self._settings.scene}: the agent can stand nowhere; choose another scene")
+        x, z = self._rng.choice(reachable)
+        start = InitAction(x, view.agent.position.y, z, float(self._rng.choice([0, 90, 180, 270])), 30.0)
+        self._scene = Scene(
+            floor_plan=self._settings.scene,
+            init_action=start,
+            scene_num=_number(self._settings.scene),
+            object_poses=[
+                ObjectPose(item.name, _vector(item.position), _vector(item.rotation))
+                for item in view.objects.values()
+                if item.pickupable
+            ],
+            random_seed=self._settings.seed,
+        )
+        restore(self._simulator, self._scene)
+        self._note(0)
+
+    def long_enough(self) -> bool:
+        """Whether the asked length is reached."""
+        settings = self._settings
+        return len(self._low) >= settings.min_steps and len(self._high) >= settings.min_subgoals
+
+    def extend(self) -> None:
+        """Add one task: the first sampled one that can be planned and carried out."""
+        room = self._room()
+        kinds = {item.object_type for item in self._simulator.view.objects.values()}
+        trials = 0
+        for task in self._pool.sample(room, kinds):
+            operators = plan(task, room)
+            if not operators:
+                continue
+            trials += 1
+            if trials > _TRIALS:
+                break
+            if self._try(task, operators):
+                return
+        reasons = "; ".join(f"{reason} ({count})" for reason, count in self.statistics.reasons.most_common(3))
+        raise UsageError(
+            f"scene {self._settings.scene}, seed {self._settings.seed}: no further task works after "
+            f"{len(self._low)} steps and {trials} trials ({reasons}); choose another scene or seed"
+        )
+
+    def put_down(self) -> None:
+        """Put a held object down, as a sub-goal of its own outside any task."""
+        room = self._room()
+        held = room.start.held
+        if held is None:
+            return
+        places = [
+            place for place in sorted(room.places & room.receptacles) if goes_into(room.types[held], room.types[place])
+        ]
+        self._rng.shuffle(places)
+        for place in places:
+            if self._carry_out([Operator("PutObject", held, place)]):
+                return
+
+    def trajectory(self) -> Trajectory:
+        """What was made so far."""
+        settings = self._settings
+        return Trajectory(
+            scene=self._scene,
+            plan=Plan(self._low, self._high),
+            traj_id=settings.traj_id,
+            sub_tasks=self._sub_tasks,
+            sub_trajs=self._sub_trajs,
+            object_log=self._log,
+            gen_info={
+                "generator": f"infthor-eval {__version__}",
+                "settings": settings.document(),
+                "tried": dict(self.statistics.tried),
+                "accepted": dict(self.statistics.accepted),
+            },
+        )
+
+    def _try(self, task: Task, operators: Sequence[Operator]) -> bool:
+        name = f"{task.kind}{' sliced' if task.sliced else ''}"
+        self.statistics.tried[name] += 1
+        low, high = len(self._low), len(self._high)
+        if not self._carry_out(operators):
+            self._pool.failed(task)
+            return False
+        self.statistics.accepted[name] += 1
+        self._pool.used(task)
+        described = sub_task(task, self._settings.scene)
+        self._sub_trajs.append(
+            SubTrajectory(len(self._sub_tasks), (high, len(self._high)), (low, len(self._low)), described.task_desc)
+        )
+        self._sub_tasks.append(described)
+        return True
+
+    def _carry_out(self, operators: Sequence[Operator]) -> bool:
+        """Run operators; where that fails, the simulator is as it was before and nothing is added."""
+        mark = self._simulator.mark()
+        rollout = Rollout(self._simulator, Grid(self._reachable()), len(self._high))
+        try:
+            rollout.run(list(operators))
+        except RolloutError as error:
+            self.statistics.reasons[str(error)] += 1
+            self._simulator.rewind(mark)
+            return False
+        for acted in rollout.acted:
+            acted.low.low_idx = len(self._low)
+            self._low.append(acted.low)
+            self._note(len(self._low), acted.view)
+        self._high += rollout.high
+        return True
+
+    def _note(self, step: int, view: Any = None) -> None:
+        entry = object_log(view or self._simulator.view)
+        self._log.append({"step": step, **msgspec.to_builtins(entry)})
+
+    def _room(self) -> Room:
+        return room_of(self._simulator.view)
+
+    def _reachable(self) -> list[tuple[float, float]]:
+        positions: Iterable[dict[str, float]] = self._simulator.query("GetReachablePositions").result or ()
+        return sorted((position["x"], position["z"]) for position in positions)
+
+
+def _number(scene: str) -> int:
+    digits = "".join(letter for letter in scene if letter.isdigit())
+    return int(digits) if digits else 0
+
+
+def _vector(value: Any) -> dict[str, float]:
+    return {"x": value.x, "y": value.y, "z": value.z}

@@ -1,0 +1,88 @@
+"""Generating many trajectories into a directory, so that stopping and starting continues."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from infthor_eval.errors import InfthorError, UsageError
+from infthor_eval.formats.trajectory import encode_trajectory, iter_sources
+from infthor_eval.generation.factory import Settings, Statistics, generate
+from infthor_eval.thor.simulator import Simulator
+
+__all__ = ["Generated", "generate_set"]
+
+
+@dataclass
+class Generated:
+    """What came of it.
+
+    Attributes:
+        paths: the trajectories, those of earlier runs included.
+        resumed: how many of them are from earlier runs.
+        steps: low-level actions of all of them.
+        failures: what could not be made, one line each.
+        statistics: tasks tried and accepted in this run.
+    """
+
+    paths: list[Path] = field(default_factory=list)
+    resumed: int = 0
+    steps: int = 0
+    failures: list[str] = field(default_factory=list)
+    statistics: Statistics = field(default_factory=Statistics)
+
+    def document(self) -> dict[str, Any]:
+        """As it is printed with `--json`."""
+        tried, accepted = self.statistics.tried, self.statistics.accepted
+        return {
+            "trajectories": len(self.paths),
+            "resumed": self.resumed,
+            "steps": self.steps,
+            "tasks": {name: {"tried": tried[name], "accepted": accepted[name]} for name in sorted(tried)},
+            "refusals": dict(self.statistics.reasons.most_common()),
+            "failures": self.failures,
+        }
+
+
+def generate_set(
+    jobs: Sequence[Settings], simulator: Simulator, out: Path, progress: Callable[[], None] = lambda: None
+) -> Generated:
+    """Make the trajectories that `out` does not have yet, one file each.
+
+    Args:
+        jobs: what to make.
+        simulator: where it happens.
+        out: directory of the files; made where it does not exist.
+        progress: is called after each trajectory.
+    """
+    out.mkdir(parents=True, exist_ok=True)
+    result = Generated()
+    for job in jobs:
+        path = out / f"{job.traj_id}.json"
+        try:
+            there = path.exists()
+            result.steps += _earlier(path, job) if there else _make(path, job, simulator, result.statistics)
+        except InfthorError as error:
+            result.failures.append(str(error))
+        else:
+            result.paths.append(path)
+            result.resumed += there
+        progress()
+    return result
+
+
+def _make(path: Path, job: Settings, simulator: Simulator, totals: Statistics) -> int:
+    trajectory, statistics = generate(job, simulator)
+    totals.add(statistics)
+    partial = path.with_name(f".{path.name}.partial")
+    partial.write_bytes(encode_trajectory(trajectory))
+    partial.replace(path)
+    return len(trajectory.plan.low_actions)
+
+
+def _earlier(path: Path, job: Settings) -> int:
+    trajectory = next(iter_sources(path)).read()
+    made = trajectory.gen_info or {}
+    if made.get("settings") != job.document():
+        raise UsageError(f"{path}: made with other settings; remove it or choose another --out")
+    return len(trajectory.plan.low_actions)

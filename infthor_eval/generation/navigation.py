@@ -1,0 +1,80 @@
+"""Walking on the grid of reachable positions: shortest action sequences between poses."""
+
+from collections import deque
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+__all__ = ["GRID", "Cell", "Grid", "Stand"]
+
+GRID = 0.25  # metres
+Cell = tuple[int, int]  # (x, z) in grid units
+_AHEAD: dict[int, Cell] = {0: (0, 1), 90: (1, 0), 180: (0, -1), 270: (-1, 0)}
+
+
+@dataclass(frozen=True, order=True)
+class Stand:
+    """Where the agent stands and which way it faces (0, 90, 180 or 270 degrees)."""
+
+    cell: Cell
+    facing: int
+
+
+class Grid:
+    """The cells that the agent can reach."""
+
+    def __init__(self, positions: Iterable[tuple[float, float]]) -> None:
+        """Take positions (x, z) in metres; they lie on a grid of 0.25 m, whose offset is that of the
+        first."""
+        points = sorted(positions)
+        self._origin = (points[0][0] % GRID, points[0][1] % GRID) if points else (0.0, 0.0)
+        self.cells = frozenset(self.cell(x, z) for x, z in points)
+
+    def cell(self, x: float, z: float) -> Cell:
+        """The cell nearest to a position in metres."""
+        return round((x - self._origin[0]) / GRID), round((z - self._origin[1]) / GRID)
+
+    def position(self, cell: Cell) -> tuple[float, float]:
+        """The (x, z) position of a cell, metres."""
+        return cell[0] * GRID + self._origin[0], cell[1] * GRID + self._origin[1]
+
+    def distances(self, start: Stand) -> dict[Stand, int]:
+        """Number of actions from a stand to every stand that can be reached."""
+        return {stand: length for stand, (length, _) in self._search(start, None).items()}
+
+    def path(self, start: Stand, goal: Stand) -> list[str] | None:
+        """The shortest sequence of MoveAhead, RotateLeft, RotateRight; None where there is none."""
+        found = self._search(start, goal)
+        if goal not in found:
+            return None
+        actions: list[str] = []
+        stand = goal
+        while (step := found[stand][1]) is not None:
+            actions.append(step[0])
+            stand = step[1]
+        return actions[::-1]
+
+    def _search(self, start: Stand, goal: Stand | None) -> dict[Stand, tuple[int, tuple[str, Stand] | None]]:
+        """Breadth first: stand to its distance and the action and stand that led to it."""
+        found: dict[Stand, tuple[int, tuple[str, Stand] | None]] = {start: (0, None)}
+        queue = deque([start])
+        while queue:
+            stand = queue.popleft()
+            if stand == goal:
+                break
+            length = found[stand][0]
+            for action, following in self._moves(stand):
+                if following not in found:
+                    found[following] = (length + 1, (action, stand))
+                    queue.append(following)
+        return found
+
+    def _moves(self, stand: Stand) -> list[tuple[str, Stand]]:
+        (x, z), facing = stand.cell, stand.facing
+        dx, dz = _AHEAD[facing]
+        moves = [
+            ("RotateLeft", Stand(stand.cell, (facing - 90) % 360)),
+            ("RotateRight", Stand(stand.cell, (facing + 90) % 360)),
+        ]
+        if (x + dx, z + dz) in self.cells:
+            moves.insert(0, ("MoveAhead", Stand((x + dx, z + dz), facing)))
+        return moves

@@ -1,0 +1,75 @@
+"""Object location tracing: where something was, where it was moved, where it is now."""
+
+from collections.abc import Iterator
+
+from infthor_eval.generation.questions.candidates import Candidate, answer_of, distinct, the
+from infthor_eval.generation.questions.history import History, Move, canonical
+
+__all__ = ["KIND", "locations"]
+
+KIND = "location_tracing"
+
+
+def locations(history: History) -> Iterator[Candidate]:
+    """Questions on every object that alone of its type was handled."""
+    for kind, items in sorted(history.handled.items()):
+        moves = history.moves_of(next(iter(items))) if len(items) == 1 else ()
+        if moves:
+            yield from _origin(history, kind, moves)
+            yield from _destination(history, kind, moves)
+            yield from _now(history, kind, moves)
+            yield from _journey(history, kind, moves)
+
+
+def _origin(history: History, kind: str, moves: tuple[Move, ...]) -> Iterator[Candidate]:
+    move = moves[0]
+    if move.origin is None or not history.shows(move.before, move.item, move.origin):
+        return
+    when = "first picked it up" if len(moves) > 1 else "picked it up"
+    place = history.world(move.before)[move.origin].type
+    yield _candidate(f"Where was {the(kind)} before you {when}?", (move.before,), [place], kind)
+
+
+def _destination(history: History, kind: str, moves: tuple[Move, ...]) -> Iterator[Candidate]:
+    move = moves[0]
+    if len(moves) == 1 and _arrived(history, move):
+        place = history.world(move.after)[move.target].type
+        yield _candidate(f"Where did you move {the(kind)} to?", (move.after,), [place], kind)
+
+
+def _now(history: History, kind: str, moves: tuple[Move, ...]) -> Iterator[Candidate]:
+    move, last = moves[-1], len(history) - 1
+    alone = sum(state.type == kind for state in history.world(last).values()) == 1
+    if alone and _arrived(history, move) and history.parent(last, move.item) == move.target:
+        carried = any(other.after > move.after and other.item == move.target for other in history.moves)
+        if not carried:
+            place = history.world(last)[move.target].type
+            yield _candidate(f"Where is {the(kind)} now?", (move.after,), [place], kind)
+
+
+def _journey(history: History, kind: str, moves: tuple[Move, ...]) -> Iterator[Candidate]:
+    first = moves[0]
+    if first.origin is None or not history.shows(first.before, first.item, first.origin):
+        return
+    if not all(_arrived(history, move) for move in moves):
+        return
+    places = [history.world(first.before)[first.origin].type]
+    places += [history.world(move.after)[move.target].type for move in moves]
+    if distinct(places):
+        clues = (first.before, *(move.after for move in moves))
+        yield _candidate(f"In which places was {the(kind)}, from first to last?", clues, places, kind)
+
+
+def _arrived(history: History, move: Move) -> bool:
+    """Whether the frame after the put shows the object where it was put."""
+    shown = history.shows(move.after, move.item, move.target)
+    parent = history.parent(move.after, move.item)
+    if not shown or parent is None:
+        return False
+    world = history.world(move.after)
+    return canonical(world[parent].type) == canonical(world[move.target].type)
+
+
+def _candidate(text: str, clues: tuple[int, ...], places: list[str], kind: str) -> Candidate:
+    answers = tuple(answer_of(place) for place in places)
+    return Candidate(KIND, text, clues, answers, (kind, *places))

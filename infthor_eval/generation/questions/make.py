@@ -1,0 +1,114 @@
+"""Questions on a whole set: every rule is applied to every trajectory, and a balanced part of it is chosen."""
+
+import random
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from infthor_eval.errors import DataError
+from infthor_eval.formats.question import Question
+from infthor_eval.formats.step_log import read_steps
+from infthor_eval.generation.questions import location, presence, put_action
+from infthor_eval.generation.questions.candidates import Candidate
+from infthor_eval.generation.questions.history import DEFAULT_SHARE, History
+
+__all__ = ["Made", "make_questions"]
+
+
+@dataclass
+class Made:
+    """What came of it.
+
+    Attributes:
+        questions: in the order of trajectories, then of their first clue.
+        trajectories: how many were read.
+        skipped: those that could not be, one line each.
+    """
+
+    questions: list[Question] = field(default_factory=list)
+    trajectories: int = 0
+    skipped: list[str] = field(default_factory=list)
+
+    def by_kind(self) -> dict[str, int]:
+        """Number of questions by type."""
+        return dict(sorted(Counter(item.kind or "" for item in self.questions).items()))
+
+    def by_clues(self) -> dict[str, int]:
+        """Number of questions by number of clues: 1, 2, >=3."""
+        found = Counter(str(len(item.clues)) if len(item.clues) < 3 else ">=3" for item in self.questions)
+        return {name: found[name] for name in ("1", "2", ">=3")}
+
+
+def make_questions(folder: Path, *, seed: int = 0, per_trajectory: int = 25, share: float = DEFAULT_SHARE) -> Made:
+    """Make questions on a replayed set.
+
+    Args:
+        folder: the set, with `metadata/<traj_id>/metadata.json`.
+        seed: makes every choice.
+        per_trajectory: how many questions at most on one trajectory.
+        share: of the frame's pixels that an object must fill to count as shown.
+
+    Returns:
+        The questions; trajectories whose log cannot be read are named in it.
+
+    Raises:
+        DataError: the set has no trajectory.
+    """
+    made = Made()
+    histories = []
+    for path in _folders(folder):
+        try:
+            histories.append(History(path.name, read_steps(path), share))
+        except DataError as error:
+            made.skipped.append(str(error))
+    made.trajectories = len(histories)
+    vocabulary = frozenset[str]().union(*(history.all_kinds for history in histories))
+    chooser = _Chooser()
+    for history in histories:
+        rng = random.Random(f"{seed}/{history.traj_id}")
+        chosen = chooser.choose(_candidates(history, vocabulary, rng), per_trajectory, rng)
+        made.questions += [item.question(history.traj_id) for item in chosen]
+    return made
+
+
+def _folders(folder: Path) -> list[Path]:
+    metadata = folder / "metadata"
+    found = sorted(path for path in metadata.glob("*/") if not path.name.startswith(".")) if metadata.is_dir() else []
+    if not found:
+        raise DataError(f"{metadata}: no trajectory there; replay some into this set first")
+    return found
+
+
+def _candidates(history: History, vocabulary: frozenset[str], rng: random.Random) -> list[Candidate]:
+    found = [*location.locations(history), *put_action.puts(history)]
+    return [*found, *presence.present(history), *presence.absent(history, vocabulary, rng)]
+
+
+class _Chooser:
+    """Chooses so that question types, yes and no, and object types are even over the whole set."""
+
+    def __init__(self) -> None:
+        self._groups: Counter[str] = Counter()
+        self._subjects: Counter[tuple[str, str]] = Counter()
+
+    def choose(self, candidates: Iterable[Candidate], number: int, rng: random.Random) -> list[Candidate]:
+        left = list(candidates)
+        rng.shuffle(left)
+        chosen: list[Candidate] = []
+        while left and len(chosen) < number:
+            best = min(left, key=self._use)
+            left.remove(best)
+            chosen.append(best)
+            self._groups[_group(best)] += 1
+            self._subjects.update((_group(best), subject) for subject in best.subjects)
+        return sorted(chosen, key=lambda item: (item.clues, item.text))
+
+    def _use(self, item: Candidate) -> tuple[float, float]:
+        group = _group(item)
+        return self._groups[group], sum(self._subjects[group, subject] for subject in item.subjects)
+
+
+def _group(item: Candidate) -> str:
+    """What is to be even: question types, and yes and no within one."""
+    return f"{item.kind} {item.answers[0]}" if item.answers[0] in {"yes", "no"} else item.kind

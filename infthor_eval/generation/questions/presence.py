@@ -1,0 +1,78 @@
+"""Object presence: "Is there a mug in this place?"
+
+A no-question names a type that nowhere exists in the trajectory's scene and is not easily taken for one that does. No
+frame proves an absence, so it carries a sample of frames instead of evidence.
+"""
+
+import random
+from collections.abc import Iterator
+
+from infthor_eval.generation.questions.candidates import Candidate
+from infthor_eval.generation.questions.history import History
+from infthor_eval.generation.wording import an, noun
+
+__all__ = ["KIND", "absent", "present"]
+
+KIND = "object_presence"
+_SAMPLE = 3
+_TEMPLATE = "Did you see {item}?"
+
+# Not asked about: surroundings, parts, and what people would not call by that name.
+_UNASKED = frozenset(
+    {"Floor", "Wall", "Ceiling", "Window", "Door", "Doorway", "DoorFrame", "StoveBurner", "StoveKnob", "LightSwitch"}
+    | {"Faucet", "ShowerHead", "ShowerGlass", "ShowerDoor", "Undefined", "Shelf", "ShelvingUnit", "Stool", "Curtains"}
+    | {"Blinds", "ToiletPaperHanger", "TowelHolder", "HandTowelHolder", "TargetCircle", "Cart", "Desktop", "RoomDecor"}
+)
+_TAKEN_FOR_EACH_OTHER = (
+    {"Cup", "Mug", "Bowl", "Vase"},
+    {"Pen", "Pencil"},
+    {"Knife", "ButterKnife", "Fork", "Spoon", "Spatula", "Ladle"},
+    {"Bottle", "WineBottle", "SoapBottle", "SprayBottle", "Vase"},
+    {"Sofa", "ArmChair", "Ottoman", "Chair", "Footstool"},
+    {"Desk", "DiningTable", "CoffeeTable", "SideTable", "CounterTop", "TVStand"},
+    {"Drawer", "Dresser", "Cabinet", "Safe"},
+    {"Towel", "HandTowel", "Cloth"},
+    {"Pot", "Pan", "Kettle"},
+    {"DeskLamp", "FloorLamp"},
+    {"Apple", "Tomato", "Potato", "Egg"},
+    {"SaltShaker", "PepperShaker"},
+    {"Television", "Laptop"},
+    {"Book", "Newspaper", "Painting", "Poster", "Box"},
+    {"CellPhone", "RemoteControl", "CreditCard"},
+    {"ToiletPaper", "PaperTowelRoll", "TissueBox"},
+    {"SoapBar", "DishSponge"},
+    {"Plunger", "ScrubBrush"},
+    {"BasketBall", "Apple"},
+)
+
+
+def present(history: History) -> Iterator[Candidate]:
+    """Yes-questions, each with the frame that shows one such object best."""
+    best: dict[str, tuple[int, int]] = {}
+    for frame in range(len(history)):
+        world = history.world(frame)
+        for key, seen in history.seen(frame).items():
+            if seen.pixels >= history.least and key in world:
+                kind = world[key].type
+                if seen.pixels > best.get(kind, (0, 0))[0]:
+                    best[kind] = (seen.pixels, frame)
+    for kind, (_, frame) in sorted(best.items()):
+        if _asked(kind):
+            yield Candidate(KIND, _text(kind), (frame,), ("yes",), (kind,))
+
+
+def absent(history: History, vocabulary: frozenset[str], rng: random.Random) -> Iterator[Candidate]:
+    """No-questions on types of a vocabulary that the scene does not have."""
+    there = history.all_kinds
+    for kind in sorted(vocabulary - there):
+        if _asked(kind) and not any(kind in group and group & there for group in _TAKEN_FOR_EACH_OTHER):
+            frames = tuple(sorted(rng.sample(range(len(history)), min(_SAMPLE, len(history)))))
+            yield Candidate(KIND, _text(kind), frames, ("no",), (kind,))
+
+
+def _asked(kind: str) -> bool:
+    return kind not in _UNASKED and not kind.endswith(("Basin", "Sliced", "Cracked"))
+
+
+def _text(kind: str) -> str:
+    return _TEMPLATE.format(item=an(noun(kind)))

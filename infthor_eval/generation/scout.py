@@ -1,0 +1,129 @@
+"""Finding where to stand so that an object can be seen and acted on.
+
+Candidates come from geometry; whether one does is asked of the simulator itself, by teleporting there and
+back. That moves nothing but the agent, so it leaves no trace in a trajectory.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from infthor_eval.generation.navigation import Grid, Stand
+from infthor_eval.thor.simulator import Simulator
+from infthor_eval.thor.view import ThorObject, Vector, View
+
+__all__ = ["CAMERA_HEIGHT", "HORIZON_STEP", "Viewpoint", "find_viewpoint", "stand_of"]
+
+CAMERA_HEIGHT = 0.675  # of the camera above the agent's position, metres
+HORIZON_STEP = 30
+_HORIZONS = (-30, 0, 30, 60)
+_REACH = 1.5  # the simulator's visibility distance, metres
+_SIDEWAYS = 32.0  # degrees off the camera's axis; half the field of view is 30
+_TOO_NEAR = 0.5  # closer than this a door may hit the agent and an object fills the frame
+_TRIALS = 40
+
+
+@dataclass(frozen=True)
+class Viewpoint:
+    """A stand and the camera's horizon (degrees downwards)."""
+
+    stand: Stand
+    horizon: int
+
+
+def find_viewpoint(
+    simulator: Simulator,
+    grid: Grid,
+    shown: list[str],
+    inside: str | None = None,
+    min_pixels: int = 0,
+) -> Viewpoint | None:
+    """The viewpoint that is the fewest actions away and from which all asked objects are visible.
+
+    Args:
+        simulator: its agent is back where it was afterwards.
+        grid: the reachable cells.
+        shown: ids of the objects that must be visible; the first is what the agent faces.
+        inside: id of an object that is hidden in the first and must come into view when that is opened.
+        min_pixels: how large the first must appear in the frame.
+
+    Returns:
+        None where no candidate does.
+    """
+    here = simulator.view
+    focus = here.objects[inside or shown[0]]
+    distances = grid.distances(stand_of(here, grid))
+    found = None
+    for viewpoint in list(_candidates(here, grid, focus, distances))[:_TRIALS]:
+        there = _teleport(simulator, grid, here, viewpoint)
+        if there.success and _shows(there, shown, min_pixels):
+            found = viewpoint
+            break
+    _return(simulator, here)
+    return found
+
+
+def stand_of(view: View, grid: Grid) -> Stand:
+    """The stand at which the agent is."""
+    at = view.agent.position
+    return Stand(grid.cell(at.x, at.z), round(view.agent.rotation / 90) * 90 % 360)
+
+
+def _shows(view: View, shown: list[str], min_pixels: int) -> bool:
+    if not all(key in view.objects and view.objects[key].visible for key in shown):
+        return False
+    instances = view.instances
+    return instances is None or (shown[0] in instances and instances[shown[0]].pixels >= min_pixels)
+
+
+def _candidates(view: View, grid: Grid, focus: ThorObject, distances: dict[Stand, int]) -> Iterator[Viewpoint]:
+    """Viewpoints from which the object should be in the frame, the nearest to walk to first."""
+    target = _middle(focus)
+    eye = view.agent.position.y + CAMERA_HEIGHT
+    ranked = []
+    for stand, length in distances.items():
+        flat, aside = _bearing(grid.position(stand.cell), stand.facing, target)
+        if flat > _REACH or aside > _SIDEWAYS:
+            continue
+        down = math.degrees(math.atan2(eye - target.y, max(flat, 0.1)))
+        # Worse: standing too near, or the object at the edge of the frame.
+        penalty = 4 * (flat < _TOO_NEAR) + aside / 15
+        for horizon in sorted(_HORIZONS, key=lambda angle: abs(angle - down))[:2]:
+            off = abs(horizon - down)
+            turns = abs(horizon - view.agent.horizon) / HORIZON_STEP
+            ranked.append((length + turns + penalty + off / 10, stand, horizon))
+    for _, stand, horizon in sorted(ranked):
+        yield Viewpoint(stand, horizon)
+
+
+def _bearing(position: tuple[float, float], facing: int, target: Vector) -> tuple[float, float]:
+    """Horizontal distance to the target, and how far it is off the agent's axis, degrees."""
+    dx, dz = target.x - position[0], target.z - position[1]
+    off = (math.degrees(math.atan2(dx, dz)) - facing + 180) % 360 - 180
+    return math.hypot(dx, dz), abs(off)
+
+
+def _middle(item: ThorObject) -> Vector:
+    box = item.axis_aligned_bounding_box
+    return item.position if box is None else box.center
+
+
+def _teleport(simulator: Simulator, grid: Grid, here: View, viewpoint: Viewpoint) -> View:
+    x, z = grid.position(viewpoint.stand.cell)
+    return simulator.step(
+        "Teleport",
+        position={"x": x, "y": here.agent.position.y, "z": z},
+        rotation={"x": 0.0, "y": float(viewpoint.stand.facing), "z": 0.0},
+        horizon=float(viewpoint.horizon),
+    )
+
+
+def _return(simulator: Simulator, here: View) -> None:
+    at = here.agent.position
+    simulator.step(
+        "Teleport",
+        position={"x": at.x, "y": at.y, "z": at.z},
+        rotation={"x": 0.0, "y": here.agent.rotation, "z": 0.0},
+        horizon=here.agent.horizon,
+        forceAction=True,
+    )

@@ -1,0 +1,155 @@
+"""A room as the planner sees it: which thing is where, what was done to it, where the agent stands.
+
+A *place* is what the agent walks to: a piece of furniture, a lamp, or a thing that lies on the floor. An
+*item* is what can be carried. Slices are items of their own that come into being when the whole is sliced;
+two of them are enough for every task. Opening and closing are not modelled: the rollout adds them around what
+needs them, as ALFRED does.
+"""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+from infthor_eval.generation.affordances import SLICEABLE
+from infthor_eval.thor.view import ThorObject, View
+
+__all__ = ["ABSENT", "FLOOR", "Operator", "Room", "State", "direct_parent", "room_of", "slice_item"]
+
+ABSENT = ""  # where an item is that does not exist yet, or no longer
+FLOOR = "floor"
+_SLICES = 2
+
+
+@dataclass(frozen=True)
+class Operator:
+    """One step of a plan: ALFRED's sub-goal name, the object, and for PutObject the receptacle."""
+
+    name: str
+    item: str
+    receptacle: str | None = None
+
+
+@dataclass(frozen=True)
+class State:
+    """What operators change. `where` maps an item to the id of what it is in or on; a held item has none.
+
+    Attributes:
+        at: the place where the agent stands, or None.
+        held: the item in its hand, or None.
+        where: (item, parent id) pairs in a fixed order.
+        clean: items that were washed in this task.
+        hot: items that were heated in this task and not cooled since.
+        cold: items that were cooled in this task and not heated since.
+        lit: lamps that are on.
+    """
+
+    at: str | None
+    held: str | None
+    where: tuple[tuple[str, str], ...]
+    clean: frozenset[str] = frozenset()
+    hot: frozenset[str] = frozenset()
+    cold: frozenset[str] = frozenset()
+    lit: frozenset[str] = frozenset()
+
+
+@dataclass(frozen=True)
+class Room:
+    """What operators do not change.
+
+    Attributes:
+        types: type of every item, receptacle and lamp, by id.
+        places: ids of the furniture and lamps.
+        receptacles: ids of what things can be put into or onto, items among them.
+        start: the state now.
+        positions: where each of them was, metres.
+    """
+
+    types: dict[str, str]
+    places: frozenset[str]
+    receptacles: frozenset[str]
+    start: State
+    positions: dict[str, tuple[float, float, float]] = field(default_factory=dict)
+
+    def place_of(self, item: str, where: dict[str, str]) -> str | None:
+        """The place at which an item, or a receptacle, can be reached; None where it does not exist or is
+        held."""
+        seen = set()
+        while item not in self.places:
+            if item in seen or item not in where or where[item] == ABSENT:
+                return None
+            seen.add(item)
+            if where[item] == FLOOR:
+                return item
+            item = where[item]
+        return item
+
+
+def room_of(view: View, at: str | None = None) -> Room:
+    """Read a room from what the simulator reports.
+
+    Args:
+        view: the world now.
+        at: the place where the agent stands, if it went to one.
+    """
+    objects = {key: item for key, item in view.objects.items() if not _is_remains(item)}
+    items = {key: item for key, item in objects.items() if item.pickupable}
+    places = {key for key, item in objects.items() if _is_place(item)}
+    where = {key: _whereabouts(item, objects, places) for key, item in items.items()}
+    types = {key: item.object_type for key, item in objects.items() if key in places or key in items}
+    for key, item in items.items():
+        if item.object_type in SLICEABLE:
+            for number in range(1, _SLICES + 1):
+                where[slice_item(key, number)] = ABSENT
+                types[slice_item(key, number)] = f"{item.object_type}Sliced"
+    held = next((key for key in view.inventory if key in items), None)
+    return Room(
+        types=types,
+        places=frozenset(places),
+        receptacles=frozenset(key for key in types if key in objects and objects[key].receptacle),
+        start=State(
+            at=at if at in types else None,
+            held=held,
+            where=tuple(sorted(where.items())),
+            lit=frozenset(key for key in places if objects[key].toggleable and objects[key].is_toggled),
+        ),
+        positions={
+            key: (item.position.x, item.position.y, item.position.z) for key, item in objects.items() if key in types
+        },
+    )
+
+
+def slice_item(whole: str, number: int) -> str:
+    """Name of a slice that does not exist yet."""
+    return f"{whole}#{number}"
+
+
+def direct_parent(item: ThorObject, objects: dict[str, ThorObject]) -> str | None:
+    """The innermost receptacle that an object is in or on, by its id."""
+    parents = [objects[key] for key in item.parent_receptacles or () if key in objects and key != item.object_id]
+    if not parents:
+        return None
+    return min(parents, key=lambda parent: (not parent.pickupable, _volume(parent), parent.object_id)).object_id
+
+
+def _whereabouts(item: ThorObject, objects: dict[str, ThorObject], places: Iterable[str]) -> str:
+    if item.is_picked_up:
+        return ABSENT
+    parent = direct_parent(item, objects)
+    known = parent is not None and (parent in places or objects[parent].pickupable)
+    return parent if known and parent is not None else FLOOR
+
+
+def _is_remains(item: ThorObject) -> bool:
+    """Whether it is what sliced or broken things leave in the metadata."""
+    return item.is_broken or (item.is_sliced and not item.object_type.endswith("Sliced"))
+
+
+def _is_place(item: ThorObject) -> bool:
+    furniture = item.receptacle and item.object_type != "Floor"
+    lamp = item.toggleable and item.object_type.endswith("Lamp")
+    return not item.pickupable and (furniture or lamp)
+
+
+def _volume(item: ThorObject) -> float:
+    box = item.axis_aligned_bounding_box
+    return math.inf if box is None else box.size.x * box.size.y * box.size.z

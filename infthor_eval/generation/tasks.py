@@ -1,0 +1,92 @@
+"""The task pool: ALFRED's seven task types over the object types of a room."""
+
+from enum import StrEnum
+
+import msgspec
+
+from infthor_eval.formats.trajectory import SubTask, TaskInfo
+from infthor_eval.generation.affordances import preposition
+from infthor_eval.generation.wording import an, noun, plural
+
+__all__ = ["Task", "TaskType", "sub_task"]
+
+
+class TaskType(StrEnum):
+    """ALFRED's task types."""
+
+    PLACE = "pick_and_place_simple"
+    PLACE_TWO = "pick_two_obj_and_place"
+    EXAMINE = "look_at_obj_in_light"
+    CLEAN = "pick_clean_then_place_in_recep"
+    HEAT = "pick_heat_then_place_in_recep"
+    COOL = "pick_cool_then_place_in_recep"
+    STACK = "pick_and_place_with_movable_recep"
+
+
+class Task(msgspec.Struct, frozen=True):
+    """One task, by object types.
+
+    Attributes:
+        kind: its type.
+        pickup: the object that is handled (the whole's type, also where `sliced`).
+        receptacle: where it goes; None for EXAMINE.
+        movable: for STACK, the receptacle that is carried with it.
+        light: for EXAMINE, the lamp.
+        sliced: whether a slice of the object is asked for.
+    """
+
+    kind: TaskType
+    pickup: str
+    receptacle: str | None = None
+    movable: str | None = None
+    light: str | None = None
+    sliced: bool = False
+
+    @property
+    def target(self) -> str:
+        """The type that must be at its place in the end."""
+        return f"{self.pickup}Sliced" if self.sliced else self.pickup
+
+
+_TEMPLATES = {
+    TaskType.PLACE: "put {item} {where}",
+    TaskType.PLACE_TWO: "put two {items} {where}",
+    TaskType.EXAMINE: "look at {item} under the {light}",
+    TaskType.CLEAN: "put a clean {bare} {where}",
+    TaskType.HEAT: "put a hot {bare} {where}",
+    TaskType.COOL: "put a cold {bare} {where}",
+    TaskType.STACK: "put {movable} with {item} in it {where}",
+}
+_ONTO = {"Plate"}  # things lie on these, not in them
+
+
+def sub_task(task: Task, scene: str) -> SubTask:
+    """The task as trajectories hold it, with a description in words.
+
+    Args:
+        task: the task.
+        scene: name of the scene.
+    """
+    info = TaskInfo(str(task.kind), task.pickup, task.movable, task.receptacle, scene)
+    params = {
+        "mrecep_target": task.movable or "",
+        "object_sliced": task.sliced,
+        "object_target": task.pickup,
+        "parent_target": task.receptacle or "",
+        "toggle_target": task.light or "",
+    }
+    return SubTask(info, _describe(task), params)
+
+
+def _describe(task: Task) -> str:
+    bare = f"sliced {noun(task.pickup)}" if task.sliced else noun(task.pickup)
+    place = task.receptacle
+    text = _TEMPLATES[task.kind].format(
+        item=an(bare),
+        items=f"slices of {noun(task.pickup)}" if task.sliced else plural(bare),
+        bare=bare,
+        where=f"{preposition(place)} the {noun(place)}" if place else "",
+        light=noun(task.light) if task.light else "",
+        movable=an(noun(task.movable)) if task.movable else "",
+    )
+    return text.replace(" in it ", " on it ") if task.movable in _ONTO else text
