@@ -1,0 +1,60 @@
+"""`python -m infthor_eval.sim [--data DIR] [--supplement FILE] <arguments of a Unity player>`.
+
+The Controller starts this process as if it were Unity and names the pipes in the environment. Of Unity's own
+arguments only the screen's size matters.
+"""
+
+import os
+import sys
+from argparse import ArgumentParser
+from pathlib import Path
+
+__all__ = ["main"]
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Runs the simulator until the controller hangs up; returns the exit code."""
+    # OpenMP's threads must not spin between frames: the controller needs the core meanwhile.
+    os.environ.setdefault("OMP_WAIT_POLICY", "passive")
+    os.environ.setdefault("NUMBA_NUM_THREADS", str(min(4, os.cpu_count() or 1)))
+    from infthor_eval.errors import InfthorError
+    from infthor_eval.sim.fifo import FifoPeer
+    from infthor_eval.sim.peer import Peer
+    from infthor_eval.sim.scenes.catalogue import Catalogue
+    from infthor_eval.sim.simulation import Simulation
+
+    parser = ArgumentParser(
+        prog="python -m infthor_eval.sim", description="AI2-THOR's embedded stand-in", add_help=False
+    )
+    parser.add_argument("--data", type=Path)
+    parser.add_argument("--supplement", type=Path)
+    parser.add_argument("-screen-width", dest="width", type=int, default=300)
+    parser.add_argument("-screen-height", dest="height", type=int, default=300)
+    options, _ = parser.parse_known_args(arguments)
+    try:
+        pipes = FifoPeer(_pipe("AI2THOR_FIFO_SERVER_PIPE_PATH"), _pipe("AI2THOR_FIFO_CLIENT_PIPE_PATH"))
+        with pipes:
+            sim = Simulation(Catalogue(options.data, options.supplement), options.width, options.height)
+            Peer(sim).serve(pipes)
+    except BrokenPipeError:
+        return 0  # the controller went away while a reply was under way
+    except InfthorError as error:
+        print(f"infthor_eval.sim: {error}", file=sys.stderr)
+        return error.exit_code
+    return 0
+
+
+def _pipe(variable: str) -> Path:
+    from infthor_eval.errors import UsageError
+
+    path = os.environ.get(variable)
+    if not path:
+        raise UsageError(
+            f"{variable} is not set: this process is started by ai2thor's Controller"
+            " (local_executable_path, FIFO server), not by hand"
+        )
+    return Path(path)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,14 @@
+"""What the agent and the user can do, one module per kind of action; importing this package registers them all."""
+
+from infthor_eval.sim.actions import (  # noqa: F401 - imported to be registered
+    cameras,
+    interaction,
+    movement,
+    queries,
+    restoring,
+    scenes,
+    states,
+)
+from infthor_eval.sim.actions.registry import Action, bind, names
+
+__all__ = ["Action", "bind", "names"]

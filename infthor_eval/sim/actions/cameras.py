@@ -1,0 +1,85 @@
+# ruff: noqa: ARG001 - the wire's arguments are accepted even where nothing depends on them
+"""Pictures: resolution, quality, third-party cameras, the map view."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from infthor_eval.sim.actions.registry import action
+from infthor_eval.sim.errors import ActionError
+from infthor_eval.sim.geometry import to_array
+from infthor_eval.sim.simulation import Simulation, ThirdPartyCamera
+
+__all__: list[str] = []
+
+_LARGEST = 4096
+
+
+@action("ChangeResolution")
+def change_resolution(sim: Simulation, x: int, y: int) -> None:
+    """Changes the size of all pictures, pixels."""
+    if not (1 <= x <= _LARGEST and 1 <= y <= _LARGEST):
+        raise ActionError(f"The resolution must be within 1 to {_LARGEST}, not {x}x{y}")
+    sim.width, sim.height = int(x), int(y)
+
+
+@action("ChangeQuality")
+def change_quality(sim: Simulation, quality: str) -> None:
+    """`Ultra` and `High WebGL` take four rays per pixel, the others one."""
+    sim.configure(supersample=quality in {"Ultra", "High WebGL"})
+
+
+@action("AddThirdPartyCamera")
+def add_third_party_camera(
+    sim: Simulation,
+    position: Mapping[str, Any] | None = None,
+    rotation: Mapping[str, Any] | None = None,
+    fieldOfView: float = 90.0,
+    orthographic: bool = False,
+    orthographicSize: float = 5.0,
+    skyboxColor: Any = None,
+) -> None:
+    """Adds a camera; its frames come with every reply from now on."""
+    sim.cameras.append(_camera(position or {}, rotation or {}, fieldOfView, orthographic, orthographicSize))
+
+
+@action("UpdateThirdPartyCamera")
+def update_third_party_camera(
+    sim: Simulation,
+    thirdPartyCameraId: int = 0,
+    position: Mapping[str, Any] | None = None,
+    rotation: Mapping[str, Any] | None = None,
+    fieldOfView: float | None = None,
+    skyboxColor: Any = None,
+) -> None:
+    """Moves a third-party camera; what is not given stays."""
+    if not 0 <= thirdPartyCameraId < len(sim.cameras):
+        raise ActionError(f"There is no third party camera with id {thirdPartyCameraId}")
+    old = sim.cameras[thirdPartyCameraId]
+    sim.cameras[thirdPartyCameraId] = ThirdPartyCamera(
+        old.position if position is None else to_array(position),
+        old.rotation if rotation is None else to_array(rotation),
+        old.field_of_view if fieldOfView is None else _checked_angle(fieldOfView),
+        old.orthographic_size,
+    )
+
+
+@action("ToggleMapView")
+def toggle_map_view(sim: Simulation) -> None:
+    """Switches the agent's own picture between its camera and a map of the scene from above."""
+    sim.map_view = not sim.map_view
+
+
+def _camera(
+    position: Mapping[str, Any], rotation: Mapping[str, Any], angle: float, orthographic: bool, size: float
+) -> ThirdPartyCamera:
+    if orthographic and size <= 0:
+        raise ActionError(f"orthographicSize must be positive, not {size}")
+    return ThirdPartyCamera(
+        to_array(position), to_array(rotation), _checked_angle(angle), size if orthographic else None
+    )
+
+
+def _checked_angle(angle: float) -> float:
+    if not 0 < angle < 180:
+        raise ActionError(f"fieldOfView must be in (0, 180) noninclusive, not {angle}")
+    return float(angle)

@@ -1,0 +1,196 @@
+# ruff: noqa: ARG001 - the wire's arguments are accepted even where nothing depends on them
+"""Picking up, putting, opening, closing, toggling and slicing."""
+
+from typing import Any
+
+from infthor_eval.sim.actions.registry import action
+from infthor_eval.sim.actions.targets import held_object, interactable
+from infthor_eval.sim.effects import slice_object, toggle
+from infthor_eval.sim.errors import ActionError, ErrorCode
+from infthor_eval.sim.objects import SimObject
+from infthor_eval.sim.placement_rules import allowed_in
+from infthor_eval.sim.receptacles import drawer_offset, find_place
+from infthor_eval.sim.simulation import Simulation
+
+__all__: list[str] = []
+
+_CROWDED = 0.35  # overlap that `forceAction` tolerates when a receptacle is nearly full
+_SWITCH_WHILE_CLOSED = frozenset({"Microwave"})
+
+
+@action("PickupObject")
+def pick_up(
+    sim: Simulation,
+    objectId: str | None = None,
+    x: float | None = None,
+    y: float | None = None,
+    forceAction: bool = False,
+    manualInteract: bool = False,
+) -> None:
+    """Takes an object into the hand, with all it contains."""
+    target = interactable(sim, objectId, forceAction, x, y)
+    if not target.kind.pickupable:
+        raise ActionError(
+            f"{target.object_id} must have the property CanPickup to be picked up.", ErrorCode.NOT_PICKUPABLE
+        )
+    if sim.world.held is not None:
+        raise ActionError(
+            f"Agent hand has something in it already! Can't pick up anything else. Holding {sim.world.held}.",
+            ErrorCode.INVENTORY_FULL,
+        )
+    world = sim.world
+    world.detach(target)
+    world.held = target.object_id
+    target.state.picked_up = True
+    world.carry()
+
+
+@action("PutObject")
+def put(
+    sim: Simulation,
+    objectId: str | None = None,
+    x: float | None = None,
+    y: float | None = None,
+    forceAction: bool = False,
+    placeStationary: bool = True,
+    randomSeed: int = 0,
+    putNearXY: bool = False,
+) -> None:
+    """Puts the held object into or onto the receptacle `objectId`."""
+    held = held_object(sim)
+    if held is None:
+        raise ActionError(
+            "Can't place an object if Agent isn't holding anything in their hand.", ErrorCode.NOT_IN_INVENTORY
+        )
+    target = interactable(sim, objectId, forceAction, x, y)
+    _check_receptacle(held, target)
+    placed = find_place(sim.world, held, target)
+    if placed is None and forceAction:
+        placed = find_place(sim.world, held, target, _CROWDED)
+    if placed is None:
+        raise ActionError("No valid positions to place object found", ErrorCode.RECEPTACLE_FULL)
+    release(sim, placed)
+    sim.world.attach(held, target)
+    sim.world.touch()
+
+
+def _check_receptacle(held: SimObject, target: SimObject) -> None:
+    if not target.kind.receptacle:
+        raise ActionError(f"This target object is NOT a receptacle! {target.object_id}")
+    if target.kind.encloses and target.kind.openable and target.state.openness == 0:
+        raise ActionError("Target openable Receptacle is CLOSED, can't place if target is not open!",
+                          ErrorCode.RECEPTACLE_CLOSED)  # fmt: skip
+    if not allowed_in(held.object_type, target.object_type):
+        raise ActionError(f"{held.object_id} cannot be placed in {target.object_id}", ErrorCode.NOT_ALLOWED)
+
+
+def release(sim: Simulation, pose: SimObject) -> None:
+    """Takes the held object out of the hand and gives it, and what it contains, the pose of `pose`."""
+    world = sim.world
+    assert world.held is not None
+    held = world.objects[world.held]
+    world.set_pose(held, pose.position, pose.rotation)
+    held.state.picked_up = False
+    world.held = None
+
+
+@action("OpenObject")
+def open_object(
+    sim: Simulation,
+    objectId: str | None = None,
+    x: float | None = None,
+    y: float | None = None,
+    forceAction: bool = False,
+    openness: float = 1.0,
+) -> None:
+    """Opens a door, drawer or lid to `openness`, 0 (closed) to 1."""
+    if not 0 <= openness <= 1:
+        raise ActionError(f"openness must be in [0:1], not {openness}")
+    target = interactable(sim, objectId, forceAction, x, y)
+    if not target.kind.openable:
+        raise ActionError(f"{target.object_id} is not an Openable object")
+    if target.state.openness == openness and openness > 0:
+        raise ActionError(f"object already open: {target.object_id}")
+    if target.state.toggled and target.object_type in _SWITCH_WHILE_CLOSED and openness > 0:
+        raise ActionError(f"Can't open {target.object_id}: it is on. Turn it off first.")
+    set_openness(sim, target, openness)
+
+
+@action("CloseObject")
+def close_object(
+    sim: Simulation,
+    objectId: str | None = None,
+    x: float | None = None,
+    y: float | None = None,
+    forceAction: bool = False,
+) -> None:
+    """Closes a door, drawer or lid."""
+    target = interactable(sim, objectId, forceAction, x, y)
+    if not target.kind.openable:
+        raise ActionError(f"{target.object_id} is not an Openable object")
+    if target.state.openness == 0:
+        raise ActionError(f"object already closed: {target.object_id}")
+    set_openness(sim, target, 0.0)
+
+
+def set_openness(sim: Simulation, target: SimObject, openness: float) -> None:
+    """Opens or closes; what lies in a drawer comes along."""
+    before = drawer_offset(target)
+    target.state.openness = float(openness)
+    sim.world.shift(sim.world.children(target), drawer_offset(target) - before)
+    sim.world.touch(target)
+
+
+@action("ToggleObjectOn")
+def toggle_on(
+    sim: Simulation,
+    objectId: str | None = None,
+    x: float | None = None,
+    y: float | None = None,
+    forceAction: bool = False,
+) -> None:
+    """Switches an object on."""
+    _toggle(sim, interactable(sim, objectId, forceAction, x, y), True)
+
+
+@action("ToggleObjectOff")
+def toggle_off(
+    sim: Simulation,
+    objectId: str | None = None,
+    x: float | None = None,
+    y: float | None = None,
+    forceAction: bool = False,
+) -> None:
+    """Switches an object off."""
+    _toggle(sim, interactable(sim, objectId, forceAction, x, y), False)
+
+
+def _toggle(sim: Simulation, target: SimObject, on: bool) -> None:
+    if not target.kind.toggleable:
+        raise ActionError(f"{target.object_id} is not toggleable")
+    if target.object_type == "StoveBurner":
+        raise ActionError(f"{target.object_id} is not self controlled; toggle its StoveKnob")
+    if target.state.toggled == on:
+        raise ActionError(f"{target.object_id} is already toggled {'on' if on else 'off'}!")
+    if on and target.object_type in _SWITCH_WHILE_CLOSED and target.state.openness > 0:
+        raise ActionError(f"Target {target.object_id} must be closed to be toggled on.")
+    if target.state.broken:
+        raise ActionError(f"{target.object_id} is broken and cannot be toggled.")
+    toggle(sim.world, target, on)
+
+
+@action("SliceObject")
+def cut(
+    sim: Simulation,
+    objectId: str | None = None,
+    x: float | None = None,
+    y: float | None = None,
+    forceAction: bool = False,
+) -> Any:
+    """Cuts an object into slices, which are new objects."""
+    target = interactable(sim, objectId, forceAction, x, y)
+    if not target.kind.sliceable:
+        raise ActionError(f"{target.object_id} Does not have the CanBeSliced property!")
+    if target.object_id == sim.world.held:
+        raise ActionError("target object is in the agent's hand; put it down to slice it")
+    slice_object(sim.world, target)

@@ -1,0 +1,134 @@
+# ruff: noqa: ARG001 - the wire's arguments are accepted even where nothing depends on them
+"""Setting a scene to a recorded or random state: poses, toggles, states of objects, random placement."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from infthor_eval.sim.actions.registry import action
+from infthor_eval.sim.errors import ActionError
+from infthor_eval.sim.restore import Pose, set_poses, spawn_randomly
+from infthor_eval.sim.simulation import Simulation
+
+__all__: list[str] = []
+
+
+@action("SetObjectPoses")
+def set_object_poses(
+    sim: Simulation, objectPoses: list[Any], placeStationary: bool = True, enablePhysicsJitter: bool = True,
+    forceRigidbodySleep: bool = True, skipMoveable: bool = False,
+) -> None:  # fmt: skip
+    """Places the listed objects by name; a name listed twice is copied, pickupable objects not listed vanish."""
+    set_poses(sim.world, [_pose(entry) for entry in objectPoses], keep_moveable=skipMoveable)
+
+
+@action("SetObjectToggles")
+def set_object_toggles(sim: Simulation, objectToggles: list[Any]) -> None:
+    """Switches all objects of the listed types on or off."""
+    for entry in objectToggles:
+        if not isinstance(entry, Mapping) or not isinstance(entry.get("objectType"), str):
+            raise ActionError(f"objectToggles needs entries with objectType and isOn, not {entry!r}")
+        for item in sim.world.objects.values():
+            if item.object_type == entry["objectType"] and item.kind.toggleable:
+                item.state.toggled = bool(entry.get("isOn", False))
+                sim.world.touch(item)
+
+
+@action("SetStateOfAllObjects")
+def set_state_of_all_objects(sim: Simulation, StateChange: str, forceAction: bool = True) -> None:
+    """Makes every object dirty or clean, full of water or empty, and the like."""
+    change = _CHANGES.get(StateChange)
+    if change is None:
+        raise ActionError(f"{StateChange!r} is not a state change; use one of {', '.join(sorted(_CHANGES))}")
+    capability, attribute, value = change
+    for item in sim.world.objects.values():
+        if getattr(item.kind, capability):
+            setattr(item.state, attribute, value)
+            sim.world.touch(item)
+
+
+_CHANGES: dict[str, tuple[str, str, Any]] = {
+    "CanBeDirty": ("dirtyable", "dirty", True),
+    "CanBeClean": ("dirtyable", "dirty", False),
+    "CanBeFilled": ("fillable", "fill_liquid", "water"),
+    "CanBeEmptied": ("fillable", "fill_liquid", None),
+    "CanBeUsedUp": ("usable_up", "used_up", True),
+}
+
+
+@action("SetObjectStates")
+def set_object_states(sim: Simulation, SetObjectStates: Mapping[str, Any]) -> None:
+    """Opens, switches, dirties and so on all objects of a type, or all at once.
+
+    `SetObjectStates` holds `objectType` (or none for all), `stateChange` and the new value under its own name
+    (`isOpen`, `isToggled`, `isDirty`, `isBroken`, `isFilledWithLiquid`, `isUsedUp`, `isCooked`).
+    """
+    wanted = str(SetObjectStates.get("stateChange", ""))
+    found = _STATES.get(wanted)
+    if found is None:
+        raise ActionError(f"{wanted!r} is not a stateChange; use one of {', '.join(sorted(_STATES))}")
+    capability, key, attribute, on, off = found
+    value = on if SetObjectStates.get(key, True) else off
+    only = SetObjectStates.get("objectType")
+    for item in sim.world.objects.values():
+        if getattr(item.kind, capability) and only in (None, "", item.object_type):
+            setattr(item.state, attribute, value)
+            sim.world.touch(item)
+
+
+_STATES: dict[str, tuple[str, str, str, Any, Any]] = {
+    "openable": ("openable", "isOpen", "openness", 1.0, 0.0),
+    "toggleable": ("toggleable", "isToggled", "toggled", True, False),
+    "dirtyable": ("dirtyable", "isDirty", "dirty", True, False),
+    "breakable": ("breakable", "isBroken", "broken", True, False),
+    "canFillWithLiquid": ("fillable", "isFilledWithLiquid", "fill_liquid", "water", None),
+    "canBeUsedUp": ("usable_up", "isUsedUp", "used_up", True, False),
+    "cookable": ("cookable", "isCooked", "cooked", True, False),
+}
+
+
+@action("RemoveFromScene")
+def remove_from_scene(sim: Simulation, objectId: str) -> None:
+    """Takes an object out of the scene."""
+    sim.world.remove(sim.world.get(objectId))
+
+
+@action("InitialRandomSpawn")
+def initial_random_spawn(
+    sim: Simulation,
+    randomSeed: int = 0,
+    forceVisible: bool = False,
+    numPlacementAttempts: int = 5,
+    placeStationary: bool = True,
+    excludedReceptacles: Sequence[str] | None = None,
+    excludedObjectIds: Sequence[str] | None = None,
+    numDuplicatesOfType: list[Any] | None = None,
+    allowFloor: bool = False,
+    allowMoveable: bool = False,
+) -> None:
+    """Spreads the pickupable objects over the receptacles, the same way for the same seed."""
+    if numDuplicatesOfType:
+        raise ActionError("numDuplicatesOfType is not offered by the embedded simulator; use SetObjectPoses")
+    spawn_randomly(
+        sim.world,
+        np.random.default_rng(randomSeed),
+        excluded_types=frozenset(excludedReceptacles or ()),
+        kept=frozenset(excludedObjectIds or ()),
+        in_open_only=forceVisible,
+    )
+
+
+@action("SetRandomSeed")
+def set_random_seed(sim: Simulation, seed: int) -> None:
+    """Starts the simulator's random numbers anew."""
+    sim.random = np.random.default_rng(seed)
+
+
+def _pose(entry: Any) -> Pose:
+    if not isinstance(entry, Mapping) or not isinstance(entry.get("objectName"), str):
+        raise ActionError(f"objectPoses needs entries with objectName, position and rotation, not {entry!r}")
+    try:
+        return Pose.from_wire(entry)
+    except (TypeError, ValueError, AttributeError) as error:
+        raise ActionError(f"objectPoses: {entry['objectName']} has no usable position or rotation ({error})") from error

@@ -1,0 +1,84 @@
+"""Starting scenes: Reset, Initialize, CreateHouse."""
+
+from typing import Any
+
+from infthor_eval.errors import DataError
+from infthor_eval.sim.actions.registry import action
+from infthor_eval.sim.errors import ActionError, ErrorCode
+from infthor_eval.sim.render.camera import FAR, NEAR
+from infthor_eval.sim.settings import AGENT_MODES, Settings
+from infthor_eval.sim.simulation import Simulation
+
+__all__: list[str] = []
+
+
+@action("Reset")
+def reset(sim: Simulation, sceneName: str) -> None:
+    """Loads a scene by name."""
+    try:
+        world = sim.catalogue.load(sceneName)
+    except DataError as error:
+        sim.failed_reset = str(error)
+        raise ActionError(str(error)) from error
+    sim.failed_reset = ""
+    sim.settings = Settings()
+    sim.map_view = False
+    sim.load(world)
+
+
+@action("Initialize", lenient=True)
+def initialize(
+    sim: Simulation,
+    agentMode: str = "default",
+    gridSize: float = 0.25,
+    snapToGrid: bool = True,
+    rotateStepDegrees: float = 90.0,
+    visibilityDistance: float = 1.5,
+    fieldOfView: float = 90.0,
+    renderDepthImage: bool = False,
+    renderInstanceSegmentation: bool = False,
+    renderObjectImage: bool = False,
+    renderSemanticSegmentation: bool = False,
+    renderClassImage: bool = False,
+    fastActionEmit: bool = True,
+    agentCount: int = 1,
+) -> dict[str, float]:
+    """Sets up the agent; arguments that only Unity knows are passed over, as Unity does."""
+    if sim.failed_reset:
+        raise ActionError(sim.failed_reset)
+    if agentMode.lower() not in AGENT_MODES:
+        raise ActionError(
+            f"agentMode {agentMode!r} is not offered by the embedded simulator; use one of {', '.join(AGENT_MODES)}"
+        )
+    _check(agentCount == 1, f"agentCount must be 1, not {agentCount}")
+    _check(gridSize > 0, f"gridSize must be positive, not {gridSize}")
+    _check(0 < fieldOfView < 180, f"fieldOfView must be in (0, 180) noninclusive, not {fieldOfView}")
+    _check(visibilityDistance >= 0, f"visibilityDistance must be at least 0, not {visibilityDistance}")
+    sim.configure(
+        agent_mode=agentMode.lower(),
+        grid_size=float(gridSize),
+        snap_to_grid=snapToGrid,
+        rotate_step=float(rotateStepDegrees),
+        visibility_distance=float(visibilityDistance),
+        field_of_view=float(fieldOfView),
+        depth=renderDepthImage,
+        instances=renderInstanceSegmentation or renderObjectImage,
+        classes=renderSemanticSegmentation or renderClassImage,
+        fast_emit=fastActionEmit,
+    )
+    return {"cameraNearPlane": NEAR, "cameraFarPlane": FAR}
+
+
+@action("CreateHouse")
+def create_house(sim: Simulation, house: dict[str, Any]) -> None:
+    """Builds a ProcTHOR house from its JSON."""
+    try:
+        world = sim.catalogue.house(house)
+    except DataError as error:
+        raise ActionError(str(error)) from error
+    sim.load(world)
+
+
+def _check(holds: bool, message: str) -> None:
+    if not holds:
+        raise ActionError(message, ErrorCode.INVALID_ARGUMENT)

@@ -1,0 +1,132 @@
+"""What actions set off: slicing, breaking, heating, cooling, cleaning, and filling."""
+
+import numpy as np
+
+from infthor_eval.sim.geometry import yaw_matrix
+from infthor_eval.sim.object_types import object_type
+from infthor_eval.sim.objects import SimObject
+from infthor_eval.sim.world import World
+
+__all__ = ["SLICES", "break_object", "settle", "slice_object", "toggle"]
+
+SLICES = {"Apple": 5, "Bread": 9, "Egg": 1, "Lettuce": 7, "Potato": 8, "Tomato": 6}
+"""How many slices each type falls into; the highest number seen in ALFRED's recordings, or above."""
+
+_SLICED = {"Egg": "EggCracked"}
+_COOKS = frozenset({"Microwave", "StoveBurner", "Toaster"})
+_WASHABLE_LIQUID = "water"
+
+
+def slice_object(world: World, target: SimObject) -> list[SimObject]:
+    """Replaces an object by its slices; an egg by its cracked self.
+
+    Returns:
+        The new objects; their ids are the old one's and `|AppleSliced_1` and so on.
+    """
+    name = _SLICED.get(target.object_type, f"{target.object_type}Sliced")
+    count = SLICES[target.object_type]
+    owner = None if target.parent is None else world.objects[target.parent]
+    axis = int(np.argmax(target.box_size * (1.0, 0.0, 1.0)))
+    length = float(target.box_size[axis])
+    size = target.box_size.copy()
+    size[axis] = length / count
+    middle, matrix = target.center, yaw_matrix(float(target.rotation[1]))
+    world.remove(target)
+    made = []
+    for number in range(1, count + 1):
+        piece = target.duplicate(f"{target.object_id}|{name}_{number}")
+        piece.kind, piece.name = object_type(name), f"{target.name}_{name}_{number}"
+        piece.box_size, piece.box_center, piece.asset_id = size.copy(), np.zeros(3), ""
+        offset = np.zeros(3)
+        offset[axis] = (number - 0.5) * length / count - length / 2
+        piece.rotation = np.array([0.0, float(target.rotation[1]), 0.0])
+        piece.position = middle + matrix @ offset
+        piece.state.sliced = name != "EggCracked"
+        piece.state.picked_up = False
+        world.add(piece)
+        if owner is not None:
+            world.attach(piece, owner)
+        made.append(piece)
+    return made
+
+
+def break_object(world: World, target: SimObject) -> None:
+    """Breaks an object; an egg cracks, and what was in a vessel spills."""
+    if target.object_type == "Egg":
+        slice_object(world, target)
+        return
+    target.state.broken = True
+    target.state.fill_liquid = None
+    world.touch(target)
+
+
+def toggle(world: World, target: SimObject, on: bool) -> None:
+    """Switches an object and what it controls, and lets heat, water and coffee do their work."""
+    target.state.toggled = on
+    world.touch(target)
+    for controlled in target.controls:
+        item = world.objects.get(controlled)
+        if item is not None:
+            item.state.toggled = on
+            world.touch(item)
+    settle(world)
+
+
+def settle(world: World) -> None:
+    """Applies every source of heat, cold and liquid to what is in it now; runs after each action."""
+    for source in list(world.objects.values()):
+        if source.object_type == "Fridge":
+            _chill(world, source)
+        elif source.kind.toggleable and source.state.toggled:
+            _work(world, source)
+        elif source.object_type == "StoveBurner" and source.state.toggled:
+            _heat(world, source)
+
+
+def _work(world: World, source: SimObject) -> None:
+    name = source.object_type
+    if name in _COOKS:
+        _heat(world, source)
+    elif name == "CoffeeMachine":
+        for item in world.children(source):
+            if item.kind.fillable and item.state.fill_liquid is None:
+                item.state.fill_liquid, item.state.temperature = "coffee", "Hot"
+                world.touch(item)
+    elif name in {"Faucet", "ShowerHead"}:
+        _rinse(world, source)
+
+
+def _heat(world: World, source: SimObject) -> None:
+    for item in world.descendants(source):
+        cooks = item.kind.cookable and not item.state.cooked
+        if item.state.temperature != "Hot" or cooks:
+            item.state.temperature = "Hot"
+            item.state.cooked = item.state.cooked or cooks
+            world.touch(item)
+
+
+def _chill(world: World, source: SimObject) -> None:
+    if source.state.openness > 0:
+        return
+    for item in world.descendants(source):
+        if item.state.temperature != "Cold":
+            item.state.temperature = "Cold"
+            world.touch(item)
+
+
+def _rinse(world: World, source: SimObject) -> None:
+    """Running water cleans and fills what stands in the basin below the tap."""
+    low, high = source.bounds()
+    middle = (low + high) / 2
+    for basin in world.objects.values():
+        if basin.object_type not in {"SinkBasin", "Sink", "BathtubBasin", "Bathtub"}:
+            continue
+        b_low, b_high = basin.bounds()
+        if np.any(middle[[0, 2]] < b_low[[0, 2]] - 0.5) or np.any(middle[[0, 2]] > b_high[[0, 2]] + 0.5):
+            continue
+        for item in world.descendants(basin):
+            fills = item.kind.fillable and item.state.fill_liquid is None and not item.state.broken
+            if item.state.dirty or fills:
+                item.state.dirty = False
+                item.state.fill_liquid = _WASHABLE_LIQUID if fills else item.state.fill_liquid
+                world.touch(item)

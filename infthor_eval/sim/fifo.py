@@ -1,0 +1,125 @@
+"""The simulator's side of ai2thor's FIFO transport: two named pipes, framed messages.
+
+A frame is a header `!BI` (field type, length of the body) and a body; a message is frames and an empty end frame.
+"""
+
+import json
+import os
+import struct
+from collections.abc import Sequence
+from enum import IntEnum
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from infthor_eval.errors import SimulatorError
+
+__all__ = ["FieldType", "FifoPeer"]
+
+_HEADER = struct.Struct("!BI")
+
+
+class FieldType(IntEnum):
+    """What a frame carries; the numbers are ai2thor's."""
+
+    METADATA = 1
+    ACTION = 2
+    RGB = 4
+    DEPTH = 5
+    CLASSES = 8
+    IDS = 9
+    THIRD_PARTY_RGB = 10
+    METADATA_PATCH = 11
+    THIRD_PARTY_DEPTH = 12
+    THIRD_PARTY_IDS = 14
+    THIRD_PARTY_CLASSES = 15
+    END_OF_MESSAGE = 255
+
+
+_END = _HEADER.pack(FieldType.END_OF_MESSAGE, 0)
+
+
+class FifoPeer:
+    """Sends states and receives actions over the pipes that the Controller made.
+
+    Args:
+        server_pipe: path of the pipe that states are written to.
+        client_pipe: path of the pipe that actions are read from; opened after the first state only, as Unity does.
+    """
+
+    def __init__(self, server_pipe: Path, client_pipe: Path) -> None:
+        self._client_path = client_pipe
+        self._out = os.open(server_pipe, os.O_WRONLY)
+        self._in: int | None = None
+
+    def __enter__(self) -> "FifoPeer":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        os.close(self._out)
+        if self._in is not None:
+            os.close(self._in)
+
+    def send(self, frames: Sequence[tuple[FieldType, bytes | memoryview]]) -> None:
+        """Writes one message of these frames."""
+        for kind, body in frames:
+            view = memoryview(body).cast("B")
+            self._write(_HEADER.pack(kind, len(view)))
+            self._write(view)
+        self._write(_END)
+
+    def receive(self) -> dict[str, Any] | None:
+        """The next action, or None when the Controller has closed the pipe.
+
+        Raises:
+            SimulatorError: what arrives is not an action message.
+        """
+        if self._in is None:
+            self._in = os.open(self._client_path, os.O_RDONLY)
+        action: dict[str, Any] | None = None
+        while True:
+            header = self._read(_HEADER.size)
+            if header is None:
+                return None
+            kind, length = _HEADER.unpack(header)
+            body = self._read(length) if length else b""
+            if body is None:
+                return None
+            if kind == FieldType.END_OF_MESSAGE:
+                break
+            action = _parse(kind, body)
+        if action is None:
+            raise SimulatorError(
+                "the controller sent a message without an action; it must be ai2thor 5.0.0's FIFO form"
+            )
+        return action
+
+    def _write(self, data: bytes | memoryview) -> None:
+        view = memoryview(data)
+        while view:
+            view = view[os.write(self._out, view) :]
+
+    def _read(self, size: int) -> bytes | None:
+        assert self._in is not None
+        parts = []
+        while size:
+            part = os.read(self._in, size)
+            if not part:
+                return None
+            parts.append(part)
+            size -= len(part)
+        return b"".join(parts)
+
+
+def _parse(kind: int, body: bytes) -> dict[str, Any]:
+    if kind != FieldType.ACTION:
+        raise SimulatorError(f"the controller sent a frame of type {kind} where an action (2) is expected")
+    try:
+        action = json.loads(body)
+    except ValueError as error:
+        raise SimulatorError(f"the controller sent an action that is not JSON ({error})") from error
+    if not isinstance(action, dict):
+        raise SimulatorError("the controller sent an action that is not a JSON object")
+    return action

@@ -1,0 +1,90 @@
+"""Rotations and boxes in Unity's frame: left-handed, y up, z forward, metres and degrees."""
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = [
+    "Array",
+    "aabb_gap",
+    "aabb_overlap",
+    "corners",
+    "euler_matrix",
+    "object_id",
+    "rounded",
+    "to_array",
+    "to_xyz",
+    "yaw_matrix",
+]
+
+Array = NDArray[np.float64]
+
+_SIGNS = np.array(
+    [[1, -1, 1], [-1, -1, 1], [-1, -1, -1], [1, -1, -1], [1, 1, 1], [-1, 1, 1], [-1, 1, -1], [1, 1, -1]], dtype=float
+)
+
+
+def euler_matrix(rotation: Sequence[float] | Array) -> Array:
+    """Rotation matrix (3, 3) of Unity's Euler angles (x, y, z) in degrees: first z, then x, then y."""
+    x, y, z = (math.radians(float(a)) for a in rotation)
+    cx, sx, cy, sy, cz, sz = math.cos(x), math.sin(x), math.cos(y), math.sin(y), math.cos(z), math.sin(z)
+    return np.array(
+        [
+            [cy * cz + sy * sx * sz, -cy * sz + sy * sx * cz, sy * cx],
+            [cx * sz, cx * cz, -sx],
+            [-sy * cz + cy * sx * sz, sy * sz + cy * sx * cz, cy * cx],
+        ]
+    )
+
+
+def yaw_matrix(yaw: float) -> Array:
+    """Rotation matrix (3, 3) about the vertical axis by `yaw` degrees; 0 looks along +z, 90 along +x."""
+    return euler_matrix((0.0, yaw, 0.0))
+
+
+def corners(center: Array, size: Array, rotation: Array | None = None) -> Array:
+    """The 8 corners (8, 3) of a box, bottom four first, in AI2-THOR's order; `rotation` is a matrix."""
+    offsets = _SIGNS * (np.asarray(size) * 0.5)
+    return center + (offsets if rotation is None else offsets @ rotation.T)
+
+
+def to_xyz(vector: Sequence[float] | Array) -> dict[str, float]:
+    """`{"x", "y", "z"}` of a vector of 3, as the wire has it."""
+    return {"x": float(vector[0]), "y": float(vector[1]), "z": float(vector[2])}
+
+
+def to_array(value: Mapping[str, float] | Sequence[float]) -> Array:
+    """Vector of 3 from `{"x", "y", "z"}` (absent components are 0) or a sequence."""
+    if isinstance(value, Mapping):
+        return np.array([float(value.get(axis, 0.0)) for axis in "xyz"])
+    return np.array([float(v) for v in value])
+
+
+def rounded(vector: Array, digits: int = 4) -> list[float]:
+    """A vector as plain floats, rounded so that equal states serialise to equal bytes."""
+    return [round(float(v), digits) + 0.0 for v in vector]
+
+
+def object_id(object_type: str, position: Sequence[float] | Array) -> str:
+    """AI2-THOR's id of an object that starts at `position`, e.g. `Mug|-01.90|+00.94|+00.38`."""
+    return "|".join([object_type, *(_coordinate(float(v)) for v in position)])
+
+
+def _coordinate(value: float) -> str:
+    magnitude = f"{abs(value):05.2f}"
+    if value == 0:
+        return "+00.00"
+    return ("+" if value > 0 else "-") + magnitude
+
+
+def aabb_overlap(low_a: Array, high_a: Array, low_b: Array, high_b: Array) -> bool:
+    """Whether two axis-aligned boxes, given by their low and high corners, share volume."""
+    return bool(np.all(low_a < high_b) and np.all(low_b < high_a))
+
+
+def aabb_gap(point: Array, low: Array, high: Array) -> float:
+    """Distance in metres from a point to an axis-aligned box; any number of dimensions, 0 inside."""
+    nearest = np.clip(point, low, high)
+    return float(np.linalg.norm(point - nearest))

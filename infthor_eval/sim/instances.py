@@ -1,0 +1,47 @@
+"""Colours that stand for objects and classes in the segmentation frames; the same name always has the same colour."""
+
+import hashlib
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from infthor_eval.sim.render.picture import Picture
+from infthor_eval.sim.world import World
+
+__all__ = ["class_color", "class_image", "instance_color", "instance_image"]
+
+
+@lru_cache(maxsize=65536)
+def instance_color(object_id: str) -> tuple[int, int, int]:
+    """Colour of one object."""
+    return _color("instance", object_id)
+
+
+@lru_cache(maxsize=4096)
+def class_color(name: str) -> tuple[int, int, int]:
+    """Colour of one object type."""
+    return _color("class", name)
+
+
+def instance_image(picture: Picture) -> NDArray[np.uint8]:
+    """Instance frame (h, w, 4) RGBA, bottom row first; walls have the colour of their class."""
+    colors = [instance_color(name) if "|" in name else class_color(name) for name in picture.names]
+    return _paint(picture, colors)
+
+
+def class_image(picture: Picture, world: World) -> NDArray[np.uint8]:
+    """Class frame (h, w, 4) RGBA, bottom row first."""
+    colors = [class_color(world.objects[n].object_type if n in world.objects else n) for n in picture.names]
+    return _paint(picture, colors)
+
+
+def _paint(picture: Picture, colors: list[tuple[int, int, int]]) -> NDArray[np.uint8]:
+    table = np.array([(*color, 255) for color in [*colors, (0, 0, 0)]], dtype=np.uint8)
+    packed = table.view(np.uint32).ravel()
+    return packed[picture.instances].view(np.uint8).reshape(*picture.instances.shape, 4)
+
+
+def _color(kind: str, name: str) -> tuple[int, int, int]:
+    digest = hashlib.blake2b(f"{kind}:{name}".encode(), digest_size=3).digest()
+    return digest[0], digest[1], max(digest[2], 1)

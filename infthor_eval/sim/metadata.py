@@ -1,0 +1,156 @@
+"""The metadata of AI2-THOR 5.x, of one object and of the agent, as plain values."""
+
+from typing import Any
+
+import numpy as np
+
+from infthor_eval.sim.geometry import corners, rounded, to_xyz
+from infthor_eval.sim.objects import SimObject
+from infthor_eval.sim.simulation import Simulation, ThirdPartyCamera
+from infthor_eval.sim.world import World
+
+__all__ = ["Outcome", "agent_metadata", "object_metadata", "third_party_metadata"]
+
+_DIGITS = 6
+
+
+class Outcome:
+    """How the last action ended, as the metadata reports it."""
+
+    def __init__(self, action: str, error: str = "", code: str = "", value: Any = None) -> None:
+        self.action, self.error, self.code, self.value = action, error, code, value
+
+    def fields(self) -> dict[str, Any]:
+        """The part of the metadata that tells of the last action."""
+        return {
+            "lastAction": self.action,
+            "lastActionSuccess": not self.error,
+            "errorMessage": self.error,
+            "errorCode": self.code,
+            "actionReturn": self.value,
+        }
+
+
+def object_metadata(item: SimObject) -> dict[str, Any]:
+    """All fields of one object but those that change with the agent: `visible`, `isInteractable`, `distance`."""
+    kind, state = item.kind, item.state
+    oriented = kind.pickupable or kind.moveable
+    return {
+        "name": item.name,
+        "position": _xyz(item.position),
+        "rotation": _xyz(item.rotation),
+        "receptacle": kind.receptacle,
+        "toggleable": kind.toggleable,
+        "isToggled": kind.toggleable and state.toggled,
+        "breakable": kind.breakable,
+        "isBroken": state.broken,
+        "canFillWithLiquid": kind.fillable,
+        "isFilledWithLiquid": state.fill_liquid is not None,
+        "fillLiquid": state.fill_liquid,
+        "dirtyable": kind.dirtyable,
+        "isDirty": state.dirty,
+        "canBeUsedUp": kind.usable_up,
+        "isUsedUp": state.used_up,
+        "cookable": kind.cookable,
+        "isCooked": state.cooked,
+        "temperature": state.temperature,
+        "isHeatSource": kind.heat_source,
+        "isColdSource": kind.cold_source,
+        "sliceable": kind.sliceable,
+        "isSliced": state.sliced,
+        "openable": kind.openable,
+        "isOpen": state.openness > 0,
+        "openness": state.openness,
+        "pickupable": kind.pickupable,
+        "isPickedUp": state.picked_up,
+        "moveable": kind.moveable,
+        "mass": kind.mass,
+        "salientMaterials": list(kind.materials) if kind.pickupable or kind.moveable else None,
+        "receptacleObjectIds": list(item.contents) if kind.receptacle else None,
+        "objectType": item.object_type,
+        "objectId": item.object_id,
+        "assetId": item.asset_id,
+        "parentReceptacles": None if item.parent is None else [item.parent],
+        "controlledObjects": list(item.controls) or None,
+        "isMoving": False,
+        "axisAlignedBoundingBox": _axis_aligned(item),
+        "objectOrientedBoundingBox": _oriented(item) if oriented else None,
+    }
+
+
+def agent_metadata(sim: Simulation, outcome: Outcome) -> dict[str, Any]:
+    """The fields of the agent, of the scene and of the last action; all but `objects` and `colors`."""
+    world, agent = sim.world, sim.world.agent
+    held = None if world.held is None else world.objects[world.held]
+    low, high = world.scene_bounds()
+    view = sim.width, sim.height
+    return {
+        **outcome.fields(),
+        "isSceneAtRest": True,
+        "agent": {
+            "name": "agent",
+            "position": _xyz(agent.position),
+            "rotation": {"x": 0.0, "y": agent.yaw, "z": 0.0},
+            "cameraHorizon": agent.horizon,
+            "isStanding": agent.standing,
+            "inHighFrictionArea": False,
+        },
+        "heldObjectPose": _held_pose(world),
+        "arm": None,
+        "fov": sim.settings.field_of_view,
+        "cameraPosition": _xyz(agent.camera_position()),
+        "cameraOrthSize": 0.0,
+        "thirdPartyCameras": [third_party_metadata(index, camera) for index, camera in enumerate(sim.cameras)],
+        "collided": False,
+        "collidedObjects": [],
+        "inventoryObjects": [] if held is None else [{"objectId": held.object_id, "objectType": held.object_type}],
+        "sceneName": world.scene,
+        "screenWidth": view[0],
+        "screenHeight": view[1],
+        "agentId": 0,
+        "depthFormat": "Meters",
+        "currentTime": 0.0,
+        "sceneBounds": _box((low + high) / 2, high - low),
+    }
+
+
+def third_party_metadata(index: int, camera: ThirdPartyCamera) -> dict[str, Any]:
+    """Pose of one third-party camera."""
+    return {
+        "thirdPartyCameraId": index,
+        "position": _xyz(camera.position),
+        "rotation": _xyz(camera.rotation),
+        "fieldOfView": camera.field_of_view,
+    }
+
+
+def _held_pose(world: World) -> dict[str, Any] | None:
+    if world.held is None:
+        return None
+    item, agent = world.objects[world.held], world.agent
+    local = agent.camera_matrix().T @ (item.position - agent.camera_position())
+    turn = item.rotation - np.array([agent.horizon, agent.yaw, 0.0])
+    return {
+        "position": _xyz(item.position),
+        "rotation": _xyz(item.rotation),
+        "localPosition": _xyz(local),
+        "localRotation": _xyz(turn % 360),
+    }
+
+
+def _axis_aligned(item: SimObject) -> dict[str, Any]:
+    center, size = item.axis_aligned()
+    return _box(center, size)
+
+
+def _box(center: Any, size: Any) -> dict[str, Any]:
+    points = [rounded(point) for point in corners(center, size)]
+    return {"cornerPoints": points, "center": _xyz(center), "size": _xyz(size)}
+
+
+def _oriented(item: SimObject) -> dict[str, Any]:
+    return {"cornerPoints": [rounded(point) for point in item.oriented_corners()]}
+
+
+def _xyz(vector: Any) -> dict[str, float]:
+    return to_xyz(rounded(vector, _DIGITS))

@@ -1,0 +1,121 @@
+"""One object of the world: its pose, its box and its state."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from infthor_eval.sim.geometry import Array, corners, euler_matrix
+from infthor_eval.sim.object_types import ObjectType
+
+__all__ = ["ObjectState", "SimObject"]
+
+
+@dataclass
+class ObjectState:
+    """What actions change beside the pose; the names follow AI2-THOR's metadata."""
+
+    openness: float = 0.0
+    toggled: bool = False
+    broken: bool = False
+    fill_liquid: str | None = None
+    dirty: bool = False
+    used_up: bool = False
+    cooked: bool = False
+    sliced: bool = False
+    picked_up: bool = False
+    temperature: str = "RoomTemp"
+
+
+@dataclass(eq=False)
+class SimObject:
+    """An object, its pose and its state.
+
+    Attributes:
+        object_id: fixed for the object's life, however it is moved.
+        position: origin of the object in the world, metres (3,).
+        rotation: Unity's Euler angles in degrees (3,).
+        box_center: centre of the box in the object's own frame, metres (3,).
+        box_size: extents of the box in the object's own frame, metres (3,).
+        front: yaw in degrees of the object's front relative to its own frame; doors and drawers open that way.
+        support: height in metres above the bottom of the box where things stand on it; None: the top of the box.
+        hinge: -1 or 1, the side of the door's hinge seen from the front; 0 where there is none.
+        holes: rectangles (x0, z0, x1, z1) that are cut out of the box's top, metres from its middle in its own frame.
+        hollow: its front is left to drawers and the like that are objects of their own.
+        style: index that varies colours between objects of one type.
+    """
+
+    object_id: str
+    name: str
+    kind: ObjectType
+    position: Array
+    rotation: Array
+    box_center: Array
+    box_size: Array
+    asset_id: str = ""
+    front: float = 0.0
+    support: float | None = None
+    hinge: int = 0
+    holes: tuple[tuple[float, float, float, float], ...] = ()
+    hollow: bool = False
+    style: int = 0
+    parent: str | None = None
+    controls: tuple[str, ...] = ()
+    state: ObjectState = field(default_factory=ObjectState)
+    contents: list[str] = field(default_factory=list)
+    version: int = 0
+    _bounds: tuple[bytes, Array, Array] | None = field(default=None, init=False, repr=False)
+
+    @property
+    def object_type(self) -> str:
+        """Name of the type."""
+        return self.kind.name
+
+    @property
+    def matrix(self) -> Array:
+        """Rotation matrix (3, 3) of the object."""
+        return euler_matrix(self.rotation)
+
+    @property
+    def center(self) -> Array:
+        """Centre of the box in the world, metres (3,)."""
+        return self.position + self.matrix @ self.box_center
+
+    def oriented_corners(self) -> Array:
+        """The 8 corners (8, 3) of the box, turned with the object."""
+        return corners(self.center, self.box_size, self.matrix)
+
+    def bounds(self) -> tuple[Array, Array]:
+        """Low and high corner of the axis-aligned box in the world, metres."""
+        key = b"".join(a.tobytes() for a in (self.position, self.rotation, self.box_center, self.box_size))
+        if self._bounds is None or self._bounds[0] != key:
+            points = self.oriented_corners()
+            self._bounds = (key, points.min(axis=0), points.max(axis=0))
+        return self._bounds[1], self._bounds[2]
+
+    def axis_aligned(self) -> tuple[Array, Array]:
+        """Centre and size of the axis-aligned box in the world, metres."""
+        low, high = self.bounds()
+        return (low + high) / 2, high - low
+
+    def surface_height(self) -> float:
+        """World height in metres of the surface that things stand on."""
+        low, high = self.bounds()
+        return float(high[1] if self.support is None else low[1] + self.support)
+
+    def place_bottom(self, point: Array) -> None:
+        """Moves the object so that the middle of the underside of its box is at `point` (world, metres)."""
+        low, high = self.bounds()
+        middle = (low + high) / 2
+        self.position = self.position + np.array([point[0] - middle[0], point[1] - low[1], point[2] - middle[2]])
+
+    def duplicate(self, object_id: str) -> "SimObject":
+        """A copy of this object with its own state and another id."""
+        return replace(
+            self,
+            object_id=object_id,
+            position=self.position.copy(),
+            rotation=self.rotation.copy(),
+            state=replace(self.state),
+            contents=[],
+            parent=None,
+        )

@@ -1,0 +1,90 @@
+"""Metadata as msgpack, fast: what does not change with the agent is packed once per state of an object.
+
+Packing 70 objects of 45 fields anew takes longer than drawing the frame, so an object's unchanging fields are kept
+as bytes, and the few others are packed after them into the same map.
+"""
+
+import struct
+from typing import Any
+
+import msgpack
+import numpy as np
+
+from infthor_eval.sim.geometry import Array
+from infthor_eval.sim.instances import class_color, instance_color
+from infthor_eval.sim.metadata import Outcome, agent_metadata, object_metadata
+from infthor_eval.sim.render.shell import SHELL_NAMES
+from infthor_eval.sim.simulation import Simulation
+
+__all__ = ["MetadataPacker"]
+
+_DYNAMIC = 3
+_VISIBLE = msgpack.packb("visible") + b"\xc3" + msgpack.packb("isInteractable") + b"\xc3" + msgpack.packb("distance")
+_HIDDEN = msgpack.packb("visible") + b"\xc2" + msgpack.packb("isInteractable") + b"\xc2" + msgpack.packb("distance")
+_DOUBLE = struct.Struct(">Bd")
+
+
+class MetadataPacker:
+    """Packs the metadata of one simulation; keeps the packed objects between replies."""
+
+    def __init__(self) -> None:
+        self._packed: dict[str, tuple[int, int, bytes]] = {}
+        self._colors: tuple[tuple[str, ...], bytes] | None = None
+        self._world_id = -1
+
+    def message(self, sim: Simulation, outcome: Outcome, sequence: int, with_colors: bool) -> bytes:
+        """The METADATA body of one reply."""
+        agent = agent_metadata(sim, outcome)
+        parts = [_map_head(4), msgpack.packb("agents"), _array_head(1), _map_head(len(agent) + 2)]
+        parts += [_entries(agent), msgpack.packb("objects"), *self._objects(sim)]
+        parts += [msgpack.packb("colors"), self._color_list(sim) if with_colors else b"\xc0"]
+        top = {"sequenceId": sequence, "activeAgentId": 0, "thirdPartyCameras": agent["thirdPartyCameras"]}
+        parts.append(_entries(top))
+        return b"".join(parts)
+
+    def patch(self, outcome: Outcome) -> bytes:
+        """The METADATA_PATCH body of one reply, for an action that changed nothing."""
+        packed: bytes = msgpack.packb({**outcome.fields(), "agentId": 0})
+        return packed
+
+    def _objects(self, sim: Simulation) -> list[bytes]:
+        world = sim.world
+        if self._world_id != id(world):
+            self._packed.clear()
+            self._world_id = id(world)
+        seen = sim.visible()
+        positions: Array = np.array([o.position for o in world.objects.values()]).reshape(-1, 3)
+        away = np.linalg.norm(positions - world.agent.position, axis=1)
+        parts = [_array_head(len(world.objects))]
+        for item, distance in zip(world.objects.values(), away, strict=True):
+            known = self._packed.get(item.object_id)
+            if known is None or known[0] != item.version:
+                fields = object_metadata(item)
+                known = (item.version, len(fields), _entries(fields))
+                self._packed[item.object_id] = known
+            parts += [_map_head(known[1] + _DYNAMIC), known[2], _VISIBLE if item.object_id in seen else _HIDDEN]
+            parts.append(_DOUBLE.pack(0xCB, distance))
+        return parts
+
+    def _color_list(self, sim: Simulation) -> bytes:
+        ids = tuple(sim.world.objects)
+        if self._colors is None or self._colors[0] != ids:
+            types = sorted({o.object_type for o in sim.world.objects.values()} | set(SHELL_NAMES))
+            listed: list[dict[str, Any]] = [{"name": i, "color": list(instance_color(i))} for i in ids]
+            listed += [{"name": t, "color": list(class_color(t))} for t in types]
+            self._colors = (ids, msgpack.packb(listed))
+        return self._colors[1]
+
+
+def _entries(fields: dict[str, Any]) -> bytes:
+    """The packed keys and values of a map, without its head."""
+    packed: bytes = msgpack.packb(fields)
+    return packed[len(_map_head(len(fields))) :]
+
+
+def _map_head(size: int) -> bytes:
+    return bytes([0x80 | size]) if size < 16 else struct.pack(">BH", 0xDE, size)
+
+
+def _array_head(size: int) -> bytes:
+    return bytes([0x90 | size]) if size < 16 else struct.pack(">BH", 0xDC, size)

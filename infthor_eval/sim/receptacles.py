@@ -1,0 +1,209 @@
+# ruff: noqa: SIM905 - tables of names read best as words
+"""Where things stand: the surfaces of receptacles, what lies on them, and where there is room for one thing more."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from infthor_eval.sim.geometry import Array, yaw_matrix
+from infthor_eval.sim.objects import SimObject
+from infthor_eval.sim.world import World
+
+__all__ = ["Surface", "find_place", "owner_of", "surfaces"]
+
+_WALL = 0.02  # thickness in metres of the sides and floors of hollow receptacles
+_OPEN_TOP = frozenset("BathtubBasin Bowl Box Cup GarbageCan LaundryHamper Mug Pan Plate Pot Sink SinkBasin".split())
+_SHELVES = {"Fridge": (0.32, 0.5, 0.68), "Safe": (0.04,), "Cabinet": (0.03,), "Microwave": (0.08,), "Drawer": (0.12,)}
+_OVERHANG = frozenset(
+    "Bowl CoffeeMachine Cup HandTowelHolder Mug Pan Plate Pot StoveBurner Toaster Toilet ToiletPaperHanger"
+    " TowelHolder".split()
+)
+_STEP = 0.05
+_CLEARANCE = 0.008
+_SLIDE = 0.8  # share of its depth that a drawer comes out
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A horizontal rectangle that things stand on.
+
+    Attributes:
+        center: its middle in the world, metres (3,).
+        half: half extents along the receptacle's own x and z (2,).
+        yaw: rotation of the receptacle in degrees.
+        headroom: free height above, metres.
+        overhang: how far in metres a thing may stick out beyond the edge.
+    """
+
+    center: Array
+    half: tuple[float, float]
+    yaw: float
+    headroom: float
+    overhang: float = 0.03
+
+
+def surfaces(receptacle: SimObject) -> list[Surface]:
+    """The surfaces of a receptacle, lowest first."""
+    size = receptacle.box_size
+    low, high = receptacle.bounds()
+    yaw = float(receptacle.rotation[1])
+    name = receptacle.object_type
+    half = (size[0] / 2, size[2] / 2)
+    if name in _SHELVES and receptacle.kind.encloses:
+        inner = (max(half[0] - _WALL, 0.02), max(half[1] - _WALL, 0.02))
+        heights = [low[1] + share * (high[1] - low[1]) for share in _SHELVES[name]]
+        tops = [*heights[1:], float(high[1]) - _WALL]
+        slide = drawer_offset(receptacle)
+        middle = (low + high) / 2 + slide
+        return [
+            Surface(np.array([middle[0], y, middle[2]]), inner, yaw, top - y)
+            for y, top in zip(heights, tops, strict=True)
+        ]
+    middle = (low + high) / 2
+    overhang = math.inf if name in _OVERHANG else 0.03
+    if name in _OPEN_TOP:
+        base = float(low[1]) + min(_WALL, (high[1] - low[1]) * 0.3)
+        if receptacle.support is not None:
+            base = max(base, float(low[1]) + receptacle.support)
+        shrink = 0.8 if name in {"Bowl", "Cup", "Mug", "Plate", "Pot", "Pan"} else 1.0
+        inner = (max(half[0] * shrink - _WALL / 2, 0.015), max(half[1] * shrink - _WALL / 2, 0.015))
+        return [Surface(np.array([middle[0], base, middle[2]]), inner, yaw, math.inf, overhang)]
+    return [Surface(np.array([middle[0], receptacle.surface_height(), middle[2]]), half, yaw, math.inf, overhang)]
+
+
+def drawer_offset(receptacle: SimObject) -> Array:
+    """How far (3,), in metres, an open drawer's tray has come out of its box; zero for all else."""
+    if receptacle.object_type != "Drawer" or receptacle.state.openness == 0:
+        return np.zeros(3)
+    matrix = yaw_matrix(float(receptacle.rotation[1]) + receptacle.front)
+    turned = round(receptacle.front / 90) % 2
+    depth = receptacle.box_size[0 if turned else 2]
+    return matrix @ np.array([0.0, 0.0, _SLIDE * depth * receptacle.state.openness])
+
+
+def find_place(
+    world: World,
+    item: SimObject,
+    receptacle: SimObject,
+    crowd: float = 0.0,
+    random: np.random.Generator | None = None,
+) -> SimObject | None:
+    """A copy of `item` standing in the free place of `receptacle` that is nearest to the agent; None if it is full.
+
+    Args:
+        world: the world; not changed.
+        item: what is to be put, e.g. the held object.
+        receptacle: where.
+        crowd: how far, as a share of their size, neighbours may overlap.
+        random: picks any free place instead of the nearest.
+    """
+    boxes = [o.bounds() for o in _neighbours(world, item, receptacle)]
+    ghost = item.duplicate(item.object_id)
+    for surface in _by_reach(world, surfaces(receptacle)):
+        for turn in (0.0, 90.0):
+            ghost.rotation = np.array([0.0, (surface.yaw + turn) % 360, 0.0])
+            place = _free_point(world, ghost, surface, boxes, crowd, random)
+            if place is not None:
+                ghost.place_bottom(place)
+                return ghost
+    return None
+
+
+def _neighbours(world: World, item: SimObject, receptacle: SimObject) -> Iterator[SimObject]:
+    """What could be in the way: things in this receptacle, and loose ones of others that reach into it."""
+    inside = {o.object_id for o in world.descendants(item)} | {item.object_id}
+    for other in world.objects.values():
+        if other.object_id in inside or other is receptacle or not other.kind.pickupable:
+            continue
+        if other.parent == receptacle.object_id or (other.parent is not None and receptacle.parent != other.parent):
+            yield other
+
+
+def _by_reach(world: World, found: list[Surface]) -> list[Surface]:
+    eye = world.agent.position[1]
+    return sorted(found, key=lambda s: (abs(s.center[1] - eye), s.center[1]))
+
+
+def _free_point(
+    world: World,
+    ghost: SimObject,
+    surface: Surface,
+    boxes: list[tuple[Array, Array]],
+    crowd: float,
+    random: np.random.Generator | None,
+) -> Array | None:
+    low, high = ghost.bounds()
+    height = high[1] - low[1]
+    if height > surface.headroom + 0.02:
+        return None
+    turn = yaw_matrix(surface.yaw)
+    local = np.abs(turn.T @ (high - low)) if surface.yaw % 90 == 0 else high - low
+    points = _grid(world, surface, (local[0] / 2, local[2] / 2), turn)
+    if not len(points):
+        return None
+    half = (high - low) / 2 * (1 - crowd)
+    gap = _CLEARANCE * (1 - crowd)
+    free = np.ones(len(points), dtype=bool)
+    for other_low, other_high in boxes:
+        if other_low[1] > surface.center[1] + height or other_high[1] < surface.center[1] + 0.004:
+            continue
+        middle, other = (other_low + other_high) / 2, (other_high - other_low) / 2 * (1 - crowd)
+        free &= (np.abs(points[:, 0] - middle[0]) > half[0] + other[0] + gap) | (
+            np.abs(points[:, 2] - middle[2]) > half[2] + other[2] + gap
+        )
+    chosen = points[free]
+    if not len(chosen):
+        return None
+    return chosen[0] if random is None else chosen[int(random.integers(len(chosen)))]
+
+
+def _grid(world: World, surface: Surface, half: tuple[float, float], turn: Array) -> Array:
+    """Points (n, 3) of the surface at which something of this half size stands wholly on it, nearest first."""
+    spans = [surface.half[i] - half[i] for i in range(2)]
+    if min(spans) < -surface.overhang:
+        return np.zeros((0, 3))
+    axes = []
+    for span in spans:
+        count = max(1, math.ceil(2 * max(span, 0.0) / _STEP) + 1)
+        axes.append(np.linspace(-max(span, 0.0), max(span, 0.0), count) if count > 1 else np.zeros(1))
+    xs, zs = np.meshgrid(axes[0], axes[1], indexing="ij")
+    flat = np.stack([xs.ravel(), np.zeros(xs.size), zs.ravel()], axis=1) @ turn.T + surface.center
+    away = np.hypot(flat[:, 0] - world.agent.position[0], flat[:, 2] - world.agent.position[2])
+    edge = np.maximum(0.0, 0.06 - np.minimum(axes[0].max() - np.abs(xs.ravel()), axes[1].max() - np.abs(zs.ravel())))
+    return flat[np.argsort(np.round(away + 3 * edge, 6), kind="stable")]
+
+
+def owner_of(world: World, item: SimObject) -> SimObject | None:
+    """The receptacle that `item`, by its position alone, stands in or on; None for one in mid-air or on the floor."""
+    low, high = item.bounds()
+    point = np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
+    best: tuple[float, SimObject] | None = None
+    inside = {o.object_id for o in world.descendants(item)}
+    for other in world.objects.values():
+        if other is item or not other.kind.receptacle or other.object_id in inside:
+            continue
+        cost = _holding_cost(other, point, item)
+        if cost is not None and (best is None or cost < best[0]):
+            best = (cost, other)
+    return None if best is None else best[1]
+
+
+def _holding_cost(receptacle: SimObject, point: Array, item: SimObject) -> float | None:
+    """How far-fetched it is that a thing whose underside is at `point` stands in `receptacle`; None: it does not."""
+    low, high = receptacle.bounds()
+    if not (low[0] - 0.01 <= point[0] <= high[0] + 0.01 and low[2] - 0.01 <= point[2] <= high[2] + 0.01):
+        return None
+    if receptacle.object_type == "Floor":
+        return 5.0
+    volume = float(np.prod(np.maximum(high - low, 0.02)))
+    if receptacle.kind.encloses or receptacle.object_type in _OPEN_TOP:
+        inside = low[1] - 0.03 <= point[1] <= high[1] - 0.005
+        if receptacle.kind.pickupable and float(np.prod(item.box_size)) > volume:
+            return None
+        return 0.01 * volume if inside else None
+    gap = point[1] - receptacle.surface_height()
+    if -0.12 <= gap <= 0.25:
+        return 0.1 + abs(gap)
+    return 1.0 + abs(gap) if low[1] <= point[1] <= high[1] + 0.05 else None

@@ -1,0 +1,110 @@
+"""What the ray caster draws: boxes, ellipsoids and (tapered) cylinders, one row of numbers each.
+
+A row holds the primitive's world pose, half extents, colour and material; see the column constants. In the
+primitive's own frame, scaled by its half extents, a box is [-1, 1]^3, an ellipsoid the unit sphere and a cylinder has
+its axis along y with radius `BOTTOM` at y = -1 and `TOP` at y = 1.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+
+from infthor_eval.sim.geometry import Array
+
+__all__ = [
+    "AXES",
+    "BOTTOM",
+    "CENTER",
+    "COLOR",
+    "COLUMNS",
+    "EMISSION",
+    "HALF",
+    "INSTANCE",
+    "KIND",
+    "MATERIAL",
+    "TOP",
+    "Color",
+    "Kind",
+    "Material",
+    "Part",
+    "rows",
+]
+
+KIND, CENTER, HALF, AXES, BOTTOM, TOP, COLOR, MATERIAL, EMISSION, INSTANCE = 0, 1, 4, 7, 16, 17, 18, 21, 22, 23
+COLUMNS = 24
+_MIN_HALF = 5e-4  # thinner than half a millimetre is drawn half a millimetre thick
+
+Color = tuple[float, float, float]
+
+
+class Kind(IntEnum):
+    """Forms of primitives."""
+
+    BOX = 0
+    ELLIPSOID = 1
+    CYLINDER = 2
+    CUP = 3  # a cylinder without its top: one sees its inside
+
+
+class Material(IntEnum):
+    """Surface patterns."""
+
+    PLAIN = 0
+    WOOD = 1
+    PLANKS = 2
+    TILES = 3
+    FABRIC = 4
+    STONE = 5
+    METAL = 6
+    GLASS = 7
+    PAPER = 8
+    CARPET = 9
+
+
+@dataclass(frozen=True)
+class Part:
+    """One primitive of an object, in the object's frame.
+
+    Attributes:
+        center: metres (3,).
+        half: half extents in metres (3,).
+        matrix: rotation (3, 3), None for none.
+        bottom: radius at the bottom of a cylinder, relative to its half extents.
+        top: radius at the top.
+        emission: 0 lit by the lights only, 1 shines by itself.
+    """
+
+    kind: Kind
+    center: Sequence[float] | Array
+    half: Sequence[float] | Array
+    color: Color
+    material: Material = Material.PLAIN
+    matrix: Array | None = None
+    bottom: float = 1.0
+    top: float = 1.0
+    emission: float = 0.0
+
+
+def rows(parts: Iterable[Part], position: Array, matrix: Array, instance: int) -> Array:
+    """World rows (n, COLUMNS) of an object's parts.
+
+    Args:
+        parts: the parts, in the object's frame.
+        position: origin of the object in the world (3,).
+        matrix: rotation of the object (3, 3).
+        instance: index of the object in the picture's table of instances.
+    """
+    listed = list(parts)
+    out = np.zeros((len(listed), COLUMNS))
+    for row, part in zip(out, listed, strict=True):
+        axes = matrix if part.matrix is None else matrix @ part.matrix
+        row[KIND] = part.kind
+        row[CENTER : CENTER + 3] = position + matrix @ np.asarray(part.center, dtype=float)
+        row[HALF : HALF + 3] = np.maximum(part.half, _MIN_HALF)
+        row[AXES : AXES + 9] = axes.T.reshape(9)  # one axis of the primitive after the other
+        row[BOTTOM], row[TOP] = part.bottom, part.top
+        row[COLOR : COLOR + 3] = part.color
+        row[MATERIAL], row[EMISSION], row[INSTANCE] = part.material, part.emission, instance
+    return out

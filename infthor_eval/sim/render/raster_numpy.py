@@ -1,0 +1,91 @@
+"""The ray caster in numpy: the same picture as `raster_numba`, for machines without numba.
+
+Every formula has the order of operations of its twin, so the two agree bit for bit.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from infthor_eval.sim.geometry import Array
+from infthor_eval.sim.render.camera import Camera, Projection
+from infthor_eval.sim.render.primitives import BOTTOM, KIND, TOP, Kind
+
+__all__ = ["cast"]
+
+_TINY = 1e-12
+
+
+def cast(prims: Array, seen: Projection, camera: Camera) -> tuple[Array, NDArray[np.int32]]:
+    """Depth (h, w) in metres and, per pixel, the nearest primitive's position in `seen` (h, w), -1 for none."""
+    us, vs = camera.rays()
+    depth = np.full((len(vs), len(us)), camera.far)
+    nearest = np.full((len(vs), len(us)), -1, dtype=np.int32)
+    for order, (row, box) in enumerate(zip(seen.index, seen.box, strict=True)):
+        x0, x1, y0, y1 = box[0], box[1] + 1, box[2], box[3] + 1
+        u, v = us[None, x0:x1], vs[y0:y1, None]
+        steps = seen.steps[order]
+        d = [(steps[0, i] + u * steps[1, i]) + v * steps[2, i] for i in range(3)]
+        t = _hit(prims[row], seen.origin[order], d, camera.near)
+        window = depth[y0:y1, x0:x1]
+        closer = (t > camera.near) & (t < window)
+        window[closer] = t[closer]
+        nearest[y0:y1, x0:x1][closer] = order
+    return depth, nearest
+
+
+def _hit(prim: Array, o: Array, d: list[Array], near: float) -> Array:
+    kind = prim[KIND]
+    if kind == Kind.BOX:
+        return _hit_box(o, d)
+    if kind == Kind.ELLIPSOID:
+        return _hit_sphere(o, d)
+    return _hit_cylinder(o, d, prim[BOTTOM], prim[TOP], kind == Kind.CUP, near)
+
+
+def _steady(d: Array) -> Array:
+    return np.where((d > -_TINY) & (d < _TINY), _TINY, d)
+
+
+def _hit_box(o: Array, d: list[Array]) -> Array:
+    enter: Array = np.array(-np.inf)
+    leave: Array = np.array(np.inf)
+    for i in range(3):
+        inverse = 1.0 / _steady(d[i])
+        t1, t2 = (-1.0 - o[i]) * inverse, (1.0 - o[i]) * inverse
+        enter = np.maximum(enter, np.minimum(t1, t2))
+        leave = np.minimum(leave, np.maximum(t1, t2))
+    return np.where(enter <= leave, enter, np.inf)
+
+
+def _hit_sphere(o: Array, d: list[Array]) -> Array:
+    a = d[0] * d[0] + d[1] * d[1] + d[2] * d[2]
+    b = o[0] * d[0] + o[1] * d[1] + o[2] * d[2]
+    c = o[0] * o[0] + o[1] * o[1] + o[2] * o[2] - 1.0
+    disc = b * b - a * c
+    root = np.sqrt(np.maximum(disc, 0.0))
+    return np.where(disc >= 0.0, (-b - root) / a, np.inf)
+
+
+def _hit_cylinder(o: Array, d: list[Array], bottom: float, top: float, is_open: bool, near: float) -> Array:
+    m, k = (bottom + top) * 0.5, (top - bottom) * 0.5
+    radius = m + k * o[1]
+    a = _steady(d[0] * d[0] + d[2] * d[2] - k * k * d[1] * d[1])
+    b = o[0] * d[0] + o[2] * d[2] - k * d[1] * radius
+    c = o[0] * o[0] + o[2] * o[2] - radius * radius
+    disc = b * b - a * c
+    root = np.sqrt(np.maximum(disc, 0.0))
+    best = np.full(disc.shape, np.inf)
+    for sign in (-1.0, 1.0):
+        t = (-b + sign * root) / a
+        y = o[1] + t * d[1]
+        good = (disc >= 0.0) & (y >= -1.0) & (y <= 1.0) & (m + k * y >= 0.0) & (t > near) & (t < best)
+        best = np.where(good, t, best)
+    inverse = 1.0 / _steady(d[1])
+    for y, limit in ((-1.0, bottom), (1.0, top)):
+        if is_open and y > 0:
+            continue
+        t = (y - o[1]) * inverse
+        x, z = o[0] + t * d[0], o[2] + t * d[2]
+        good = (x * x + z * z <= limit * limit) & (t > near) & (t < best)
+        best = np.where(good, t, best)
+    return best

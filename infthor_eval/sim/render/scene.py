@@ -1,0 +1,70 @@
+"""A world as primitives: the rooms' shell and every object's shape, kept until the object changes."""
+
+import numpy as np
+
+from infthor_eval.sim.geometry import Array
+from infthor_eval.sim.objects import SimObject
+from infthor_eval.sim.render.lighting import Lights
+from infthor_eval.sim.render.primitives import COLUMNS, rows
+from infthor_eval.sim.render.shapes import shape
+from infthor_eval.sim.render.shell import SHELL_NAMES, shell_rows
+from infthor_eval.sim.world import World
+
+__all__ = ["SceneModel"]
+
+_LAMPS = {"DeskLamp": 0.9, "FloorLamp": 1.1, "Candle": 0.35}
+_DARK = 0.55  # share of light that is left when every light switch is off
+
+
+class SceneModel:
+    """The primitives of one world; remembers each object's rows by the object's version."""
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        self._rows: dict[str, tuple[int, int, Array]] = {}
+        self._shell = shell_rows(world)
+        self._version = -1
+        self._all: Array = np.zeros((0, COLUMNS))
+        self._names: tuple[str, ...] = ()
+        self._held: Array = np.zeros((0, COLUMNS))
+
+    def primitives(self) -> tuple[Array, Array, tuple[str, ...]]:
+        """Rows of all that is seen but the held object (n, COLUMNS), rows of what is held, names of instances."""
+        if self._version != self._world.version:
+            self._rebuild()
+        return self._all, self._held, self._names
+
+    def lights(self) -> Lights:
+        """The lamps that are on, and daylight by the state of the light switches."""
+        lamps, switches = [], []
+        for item in self._world.objects.values():
+            if item.object_type in _LAMPS and item.state.toggled:
+                low, high = item.bounds()
+                lamps.append([(low[0] + high[0]) / 2, high[1] - 0.08, (low[2] + high[2]) / 2, _LAMPS[item.object_type]])
+            elif item.object_type == "LightSwitch":
+                switches.append(item.state.toggled)
+        dark = bool(switches) and not any(switches)
+        return Lights(np.array(lamps).reshape(-1, 4), _DARK if dark else 1.0)
+
+    def _rebuild(self) -> None:
+        world = self._world
+        names = [*SHELL_NAMES, *world.objects]
+        parts, held = [self._shell], [np.zeros((0, COLUMNS))]
+        in_hand = set() if world.held is None else {world.held}
+        if world.held is not None:
+            in_hand |= {o.object_id for o in world.descendants(world.objects[world.held])}
+        for index, item in enumerate(world.objects.values(), start=len(SHELL_NAMES)):
+            if world.hidden(item):
+                continue
+            (held if item.object_id in in_hand else parts).append(self._object_rows(item, index))
+        self._rows = {key: value for key, value in self._rows.items() if key in world.objects}
+        self._all, self._held = np.concatenate(parts), np.concatenate(held)
+        self._names, self._version = tuple(names), world.version
+
+    def _object_rows(self, item: SimObject, index: int) -> Array:
+        known = self._rows.get(item.object_id)
+        if known is None or known[:2] != (item.version, index):
+            made = rows(shape(item), item.position, item.matrix, index)
+            known = (item.version, index, made)
+            self._rows[item.object_id] = known
+        return known[2]

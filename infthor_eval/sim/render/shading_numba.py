@@ -1,0 +1,160 @@
+"""Colours of the cast pixels, compiled by numba."""
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import njit, prange
+from numpy.typing import NDArray
+
+from infthor_eval.sim.geometry import Array
+from infthor_eval.sim.render import patterns
+from infthor_eval.sim.render.camera import Camera, Projection
+from infthor_eval.sim.render.lighting import AMBIENT, HEADLIGHT, LAMP_REACH, SKY, SUN, SUN_DIRECTION, Lights
+from infthor_eval.sim.render.primitives import (
+    AXES,
+    BOTTOM,
+    COLOR,
+    EMISSION,
+    HALF,
+    KIND,
+    MATERIAL,
+    TOP,
+    Kind,
+    Material,
+)
+
+__all__ = ["shade"]
+
+_RIM = 1.0 - 1e-6
+_BANDS = 8
+_BOX, _ELLIPSOID, _CUP = int(Kind.BOX), int(Kind.ELLIPSOID), int(Kind.CUP)
+_SUN_X, _SUN_Y, _SUN_Z = SUN_DIRECTION
+_WOOD, _PLANKS, _TILES = int(Material.WOOD), int(Material.PLANKS), int(Material.TILES)
+_FABRIC, _STONE, _METAL = int(Material.FABRIC), int(Material.STONE), int(Material.METAL)
+_GLASS, _PAPER, _CARPET = int(Material.GLASS), int(Material.PAPER), int(Material.CARPET)
+_wood, _planks, _tiles = (njit(cache=True)(f) for f in (patterns.wood, patterns.planks, patterns.tiles))
+_fabric, _stone, _metal = (njit(cache=True)(f) for f in (patterns.fabric, patterns.stone, patterns.metal))
+_glass, _paper, _carpet = (njit(cache=True)(f) for f in (patterns.glass, patterns.paper, patterns.carpet))
+
+
+def shade(
+    prims: Array, seen: Projection, camera: Camera, depth: Array, nearest: NDArray[np.int32], lights: Lights
+) -> NDArray[np.uint8]:
+    """RGB picture (h, w, 3), bottom row first, of what `cast` found."""
+    us, vs = camera.rays()
+    rgb = np.zeros((*nearest.shape, 3), dtype=np.uint8)
+    _shade(
+        prims[seen.index], seen.origin, seen.steps, camera.position, camera.matrix, us, vs, depth, nearest,
+        lights.lamps, lights.daylight, rgb,
+    )  # fmt: skip
+    return rgb
+
+
+@njit(cache=True)
+def _pattern(material: float, a: float, b: float) -> float:  # noqa: PLR0911 - one line per material
+    if material == _WOOD:
+        return _wood(a, b)
+    if material == _PLANKS:
+        return _planks(a, b)
+    if material == _TILES:
+        return _tiles(a, b)
+    if material == _FABRIC:
+        return _fabric(a, b)
+    if material == _STONE:
+        return _stone(a, b)
+    if material == _METAL:
+        return _metal(a, b)
+    if material == _GLASS:
+        return _glass(a, b)
+    if material == _PAPER:
+        return _paper(a, b)
+    if material == _CARPET:
+        return _carpet(a, b)
+    return 1.0
+
+
+@njit(cache=True)
+def _surface(p: Array, x: float, y: float, z: float) -> Any:
+    """World normal and the two metric surface coordinates of a hit point in the primitive's scaled frame."""
+    hx, hy, hz = p[HALF], p[HALF + 1], p[HALF + 2]
+    ax, ay, az = abs(x), abs(y), abs(z)
+    nx, ny, nz = x, y, z
+    a, b = x * hx + z * hz, y * hy
+    if p[KIND] == _BOX:
+        if ax >= ay and ax >= az:
+            ny, nz, a = 0.0, 0.0, z * hz
+        elif ay >= az:
+            nx, nz, a, b = 0.0, 0.0, x * hx, z * hz
+        else:
+            nx, ny, a = 0.0, 0.0, x * hx
+    elif p[KIND] != _ELLIPSOID:
+        if ay >= _RIM and not (y > 0 and p[KIND] == _CUP):
+            nx, nz = 0.0, 0.0
+        else:
+            k = (p[TOP] - p[BOTTOM]) * 0.5
+            m = (p[BOTTOM] + p[TOP]) * 0.5
+            ny = -k * (m + k * y)
+    nx, ny, nz = nx / hx, ny / hy, nz / hz
+    wx = p[AXES] * nx + p[AXES + 3] * ny + p[AXES + 6] * nz
+    wy = p[AXES + 1] * nx + p[AXES + 4] * ny + p[AXES + 7] * nz
+    wz = p[AXES + 2] * nx + p[AXES + 5] * ny + p[AXES + 8] * nz
+    length = math.sqrt(wx * wx + wy * wy + wz * wz) + 1e-12
+    return wx / length, wy / length, wz / length, a, b
+
+
+@njit(cache=True)
+def _light(n: Any, r: Any, w: Any, lamps: Array, daylight: float) -> float:
+    nx, ny, nz = n
+    length = math.sqrt(r[0] * r[0] + r[1] * r[1] + r[2] * r[2])
+    facing = (nx * r[0] + ny * r[1] + nz * r[2]) / length
+    if facing > 0.0:
+        nx, ny, nz = -nx, -ny, -nz
+    sun = nx * _SUN_X + ny * _SUN_Y + nz * _SUN_Z
+    light = (AMBIENT + SKY * ny + SUN * max(sun, 0.0) + HEADLIGHT * abs(facing)) * daylight
+    for i in range(len(lamps)):
+        lx, ly, lz = lamps[i, 0] - w[0], lamps[i, 1] - w[1], lamps[i, 2] - w[2]
+        square = lx * lx + ly * ly + lz * lz
+        cosine = (nx * lx + ny * ly + nz * lz) / (math.sqrt(square) + 1e-6)
+        light = light + lamps[i, 3] * max(cosine, 0.0) * (LAMP_REACH / (LAMP_REACH + square))
+    return light
+
+
+@njit(cache=True, parallel=True)
+def _shade(
+    prims: Array,
+    origin: Array,
+    steps: Array,
+    eye: Array,
+    view: Array,
+    us: Array,
+    vs: Array,
+    depth: Array,
+    nearest: NDArray[np.int32],
+    lamps: Array,
+    daylight: float,
+    rgb: NDArray[np.uint8],
+) -> None:
+    height = len(vs)
+    for band in prange(_BANDS):
+        for y in range(band * height // _BANDS, (band + 1) * height // _BANDS):
+            v = vs[y]
+            for x in range(len(us)):
+                order = nearest[y, x]
+                if order < 0:
+                    continue
+                p, o, s = prims[order], origin[order], steps[order]
+                u, t = us[x], depth[y, x]
+                lx = o[0] + t * ((s[0, 0] + u * s[1, 0]) + v * s[2, 0])
+                ly = o[1] + t * ((s[0, 1] + u * s[1, 1]) + v * s[2, 1])
+                lz = o[2] + t * ((s[0, 2] + u * s[1, 2]) + v * s[2, 2])
+                nx, ny, nz, a, b = _surface(p, lx, ly, lz)
+                rx = (view[0, 2] + u * view[0, 0]) + v * view[0, 1]
+                ry = (view[1, 2] + u * view[1, 0]) + v * view[1, 1]
+                rz = (view[2, 2] + u * view[2, 0]) + v * view[2, 1]
+                w = (eye[0] + t * rx, eye[1] + t * ry, eye[2] + t * rz)
+                light = _light((nx, ny, nz), (rx, ry, rz), w, lamps, daylight)
+                glow = p[EMISSION]
+                level = glow * 1.15 + (1.0 - glow) * (light * _pattern(p[MATERIAL], a, b))
+                for i in range(3):
+                    rgb[y, x, i] = np.uint8(min(p[COLOR + i] * level * 255.0, 255.0))

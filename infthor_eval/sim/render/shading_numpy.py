@@ -1,0 +1,83 @@
+"""Colours of the cast pixels in numpy; the twin of `shading_numba`, formula for formula."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from infthor_eval.sim.geometry import Array
+from infthor_eval.sim.render.camera import Camera, Projection
+from infthor_eval.sim.render.lighting import AMBIENT, HEADLIGHT, LAMP_REACH, SKY, SUN, SUN_DIRECTION, Lights
+from infthor_eval.sim.render.patterns import PATTERNS
+from infthor_eval.sim.render.primitives import AXES, BOTTOM, COLOR, EMISSION, HALF, KIND, MATERIAL, TOP, Kind
+
+__all__ = ["shade"]
+
+_RIM = 1.0 - 1e-6
+
+
+def shade(
+    prims: Array, seen: Projection, camera: Camera, depth: Array, nearest: NDArray[np.int32], lights: Lights
+) -> NDArray[np.uint8]:
+    """RGB picture (h, w, 3), bottom row first, of what `cast` found."""
+    us, vs = camera.rays()
+    rgb = np.zeros((*nearest.shape, 3), dtype=np.uint8)
+    ys, xs = np.nonzero(nearest >= 0)
+    if not len(ys):
+        return rgb
+    order = nearest[ys, xs]
+    p = prims[seen.index[order]]
+    u, v, t = us[xs], vs[ys], depth[ys, xs]
+    o, s = seen.origin[order], seen.steps[order]
+    local = [o[:, i] + t * ((s[:, 0, i] + u * s[:, 1, i]) + v * s[:, 2, i]) for i in range(3)]
+    normal, a, b = _surface(p, local)
+    ray = [(camera.matrix[i, 2] + u * camera.matrix[i, 0]) + v * camera.matrix[i, 1] for i in range(3)]
+    world = [camera.position[i] + t * ray[i] for i in range(3)]
+    light = _light(normal, ray, world, lights)
+    factor = np.ones(len(ys))
+    for material, pattern in PATTERNS.items():
+        at = p[:, MATERIAL] == material
+        factor[at] = pattern(a[at], b[at])
+    glow = p[:, EMISSION]
+    level = glow * 1.15 + (1.0 - glow) * (light * factor)
+    for i in range(3):
+        rgb[ys, xs, i] = np.minimum(p[:, COLOR + i] * level * 255.0, 255.0).astype(np.uint8)
+    return rgb
+
+
+def _surface(p: Array, local: list[Array]) -> tuple[list[Array], Array, Array]:
+    """World normals (3 arrays) and the two metric surface coordinates of hit points in scaled local frames."""
+    x, y, z = local
+    kind = p[:, KIND]
+    ax, ay, az = np.abs(x), np.abs(y), np.abs(z)
+    on_x = (ax >= ay) & (ax >= az)
+    on_y = ~on_x & (ay >= az)
+    k = (p[:, TOP] - p[:, BOTTOM]) * 0.5
+    m = (p[:, BOTTOM] + p[:, TOP]) * 0.5
+    box, ball = kind == Kind.BOX, kind == Kind.ELLIPSOID
+    cap = (ay >= _RIM) & ~((y > 0) & (kind == Kind.CUP))
+    nx = np.where(box, np.where(on_x, x, 0.0), np.where(ball | ~cap, x, 0.0))
+    nz = np.where(box, np.where(on_x | on_y, 0.0, z), np.where(ball | ~cap, z, 0.0))
+    ny = np.where(box, np.where(on_y, y, 0.0), np.where(ball, y, np.where(cap, y, -k * (m + k * y))))
+    hx, hy, hz = p[:, HALF], p[:, HALF + 1], p[:, HALF + 2]
+    nx, ny, nz = nx / hx, ny / hy, nz / hz
+    normal = [p[:, AXES + i] * nx + p[:, AXES + 3 + i] * ny + p[:, AXES + 6 + i] * nz for i in range(3)]
+    length = np.sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]) + 1e-12
+    mx, my, mz = x * hx, y * hy, z * hz
+    a = np.where(box, np.where(on_x, mz, mx), mx + mz)
+    b = np.where(box & on_y, mz, my)
+    return [n / length for n in normal], a, b
+
+
+def _light(normal: list[Array], ray: list[Array], world: list[Array], lights: Lights) -> Array:
+    nx, ny, nz = normal
+    length = np.sqrt(ray[0] * ray[0] + ray[1] * ray[1] + ray[2] * ray[2])
+    facing = (nx * ray[0] + ny * ray[1] + nz * ray[2]) / length
+    flip = np.where(facing > 0.0, -1.0, 1.0)
+    nx, ny, nz, facing = nx * flip, ny * flip, nz * flip, np.abs(facing)
+    sun = nx * SUN_DIRECTION[0] + ny * SUN_DIRECTION[1] + nz * SUN_DIRECTION[2]
+    light = (AMBIENT + SKY * ny + SUN * np.maximum(sun, 0.0) + HEADLIGHT * facing) * lights.daylight
+    for lamp in lights.lamps:
+        lx, ly, lz = lamp[0] - world[0], lamp[1] - world[1], lamp[2] - world[2]
+        square = lx * lx + ly * ly + lz * lz
+        cosine = (nx * lx + ny * ly + nz * lz) / (np.sqrt(square) + 1e-6)
+        light = light + lamp[3] * np.maximum(cosine, 0.0) * (LAMP_REACH / (LAMP_REACH + square))
+    return light

@@ -1,0 +1,5 @@
+"""What each type of object looks like: assemblies of primitives in the object's box."""
+
+from infthor_eval.sim.render.shapes.catalogue import shape
+
+__all__ = ["shape"]

@@ -1,0 +1,105 @@
+"""A drawing board for one object: coordinates run from -1 to 1 across the object's box, front towards +z."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from infthor_eval.sim.geometry import Array, euler_matrix, yaw_matrix
+from infthor_eval.sim.objects import ObjectState, SimObject
+from infthor_eval.sim.render.primitives import Color, Kind, Material, Part
+
+__all__ = ["Builder", "shade_of"]
+
+Vector = Sequence[float]
+
+
+def shade_of(color: Color, factor: float) -> Color:
+    """A colour made darker (factor below 1) or lighter."""
+    return (min(color[0] * factor, 1.0), min(color[1] * factor, 1.0), min(color[2] * factor, 1.0))
+
+
+class Builder:
+    """Collects the parts of one object.
+
+    Positions are fractions of the half box from its centre: (0, -1, 0) is the middle of the underside, (0, 0, 1) the
+    middle of the front. `half` are fractions too, so (1, 1, 1) fills the box.
+    """
+
+    def __init__(self, item: SimObject) -> None:
+        self.item = item
+        self.state: ObjectState = item.state
+        self.parts: list[Part] = []
+        self.style = item.style
+        self._turn = yaw_matrix(item.front)
+        turned = round(item.front / 90) % 2
+        x, y, z = (float(v) / 2 for v in item.box_size)
+        self.half: Array = np.array([z, y, x] if turned else [x, y, z])
+
+    def thick(self, metres: float, axis: int) -> float:
+        """A length in metres as a fraction of the half box along `axis`, at most 1."""
+        return min(1.0, metres / max(float(self.half[axis]), 1e-6))
+
+    def metric(self, at: Vector) -> Array:
+        """A position given in fractions, as metres in the object's frame (3,)."""
+        return self.item.box_center + self._turn @ (np.asarray(at, dtype=float) * self.half)
+
+    def add(
+        self,
+        kind: Kind,
+        at: Vector,
+        half: Vector,
+        color: Color,
+        material: Material = Material.PLAIN,
+        *,
+        tilt: Vector = (0.0, 0.0, 0.0),
+        bottom: float = 1.0,
+        top: float = 1.0,
+        glow: float = 0.0,
+    ) -> None:
+        """Adds a primitive; `tilt` are Euler angles in degrees about its own middle."""
+        matrix = self._turn @ euler_matrix(tilt) if any(tilt) else self._turn
+        metres = np.asarray(half, dtype=float) * self.half
+        self.parts.append(Part(kind, self.metric(at), metres, color, material, matrix, bottom, top, glow))
+
+    def box(self, at: Vector, half: Vector, color: Color, material: Material = Material.PLAIN, **more: float) -> None:
+        """Adds a box."""
+        self.add(Kind.BOX, at, half, color, material, **more)  # type: ignore[arg-type]
+
+    def ball(self, at: Vector, half: Vector, color: Color, material: Material = Material.PLAIN, **more: float) -> None:
+        """Adds an ellipsoid."""
+        self.add(Kind.ELLIPSOID, at, half, color, material, **more)  # type: ignore[arg-type]
+
+    def tube(self, at: Vector, half: Vector, color: Color, material: Material = Material.PLAIN, **more: float) -> None:
+        """Adds an upright cylinder; `bottom` and `top` are its relative radii."""
+        self.add(Kind.CYLINDER, at, half, color, material, **more)  # type: ignore[arg-type]
+
+    def cup(self, at: Vector, half: Vector, color: Color, material: Material = Material.PLAIN, **more: float) -> None:
+        """Adds a cylinder that is open at the top."""
+        self.add(Kind.CUP, at, half, color, material, **more)  # type: ignore[arg-type]
+
+    def rod(self, at: Vector, radius: float, length: float, axis: int, color: Color) -> None:
+        """Adds a round bar, `radius` and half `length` in metres, along axis 0 (x), 1 (y) or 2 (z)."""
+        tilt = {0: (0.0, 0.0, 90.0), 1: (0.0, 0.0, 0.0), 2: (90.0, 0.0, 0.0)}[axis]
+        matrix = self._turn @ euler_matrix(tilt)
+        self.parts.append(Part(Kind.CYLINDER, self.metric(at), (radius, length, radius), color, Material.METAL, matrix))
+
+    def slab(self, at: Vector, metres: Vector, color: Color, material: Material = Material.PLAIN) -> None:
+        """Adds a box whose half extents are given in metres."""
+        self.parts.append(Part(Kind.BOX, self.metric(at), tuple(metres), color, material, self._turn))
+
+    def swung(
+        self, hinge: Vector, offset: Vector, metres: Vector, angle: float, color: Color, material: Material
+    ) -> None:
+        """Adds a box that has turned about an upright hinge.
+
+        Args:
+            hinge: where the hinge is, in fractions.
+            offset: the box's middle from the hinge before turning, metres.
+            metres: half extents in metres.
+            angle: degrees of turn.
+            color: its colour.
+            material: its surface.
+        """
+        turn = self._turn @ yaw_matrix(angle)
+        center = self.metric(hinge) + turn @ np.asarray(offset, dtype=float)
+        self.parts.append(Part(Kind.BOX, center, tuple(metres), color, material, turn))

@@ -1,0 +1,134 @@
+# ruff: noqa: SIM905 - tables of names read best as words
+"""What a scene's objects are to each other: fronts, hinges, drawers in desks, sinks in counters, knobs of burners."""
+
+import numpy as np
+
+from infthor_eval.sim.geometry import Array
+from infthor_eval.sim.navigation import NavGrid
+from infthor_eval.sim.objects import SimObject
+from infthor_eval.sim.world import World
+
+__all__ = ["arrange"]
+
+_INNER = frozenset("Cabinet Drawer Shelf Safe Microwave".split())
+_BASINS = frozenset("Sink SinkBasin BathtubBasin".split())
+_HOLED = frozenset("Bathtub CounterTop Desk DiningTable Dresser SideTable Sink".split())
+_FACING_ROOM = frozenset(
+    "Blinds Cabinet CounterTop Curtains Drawer Dresser Faucet Fridge HandTowelHolder LightSwitch Microwave Mirror"
+    " Painting Poster Safe Shelf ShelvingUnit ShowerDoor Sink Television Toilet ToiletPaperHanger TowelHolder"
+    " Window".split()
+)
+
+
+def arrange(world: World) -> None:
+    """Works out, in place, what a list of boxes does not tell."""
+    items = list(world.objects.values())
+    fixed = [o for o in items if not o.kind.pickupable]
+    for item in fixed:
+        if item.object_type in _FACING_ROOM:
+            item.front = _front(item, world.nav)
+        if item.object_type == "Cabinet" or item.kind.encloses:
+            item.hinge = _hinge(item)
+    for item in fixed:
+        item.holes = tuple(_holes(item, fixed)) if item.object_type in _HOLED else ()
+        item.hollow = item.kind.receptacle and item.object_type not in _INNER and any(
+            other.object_type in _INNER and other is not item and _inside(other, item) for other in fixed
+        )  # fmt: skip
+    _connect_knobs(items)
+    _raise_supports(world)
+
+
+def _front(item: SimObject, nav: NavGrid) -> float:
+    """Yaw of the front in the object's own frame: towards the free floor; a cabinet's hinge narrows the choice."""
+    low, high = item.bounds()
+    center, half = (low + high) / 2, (high - low) / 2
+    hinge = item.position - center
+    scores = []
+    for angle in (0.0, 90.0, 180.0, 270.0):
+        direction = np.round([np.sin(np.radians(angle)), 0.0, np.cos(np.radians(angle))])
+        face = center + direction * half
+        free = nav.freedom(face[0], face[2], angle)
+        at_face = float(hinge @ direction) >= float(np.abs(direction) @ half) - 0.08
+        bonus = 100 if item.object_type == "Cabinet" and at_face else 0
+        thin = float(np.abs(direction) @ half) <= min(half[0], half[2]) + 1e-6
+        flat = 3 if thin and item.object_type in {"Window", "Painting", "Mirror", "Poster"} else 0
+        scores.append((free + bonus + flat * 10, thin, -angle))
+    best = max(scores)
+    return (-best[2] - float(item.rotation[1])) % 360
+
+
+def _hinge(item: SimObject) -> int:
+    """The side of the hinge, seen in the frame of the front: where a cabinet's origin is; left for other doors."""
+    if item.object_type != "Cabinet":
+        return -1
+    angle = np.radians(float(item.rotation[1]) + item.front)
+    aside = float((item.position - item.center) @ (np.cos(angle), 0.0, -np.sin(angle)))
+    return 1 if aside > 0 else -1
+
+
+def _inside(inner: SimObject, outer: SimObject) -> bool:
+    low, high = outer.bounds()
+    center = inner.center
+    return bool(np.all((center > low - 0.02) & (center < high + 0.02)))
+
+
+def _holes(item: SimObject, fixed: list[SimObject]) -> list[tuple[float, float, float, float]]:
+    low, high = item.bounds()
+    found: list[tuple[float, float, float, float]] = []
+    wanted = {"Bathtub": {"BathtubBasin"}, "Sink": {"SinkBasin"}}.get(item.object_type, {"Sink", "SinkBasin"})
+    for other in fixed:
+        if other.object_type not in wanted or other is item:
+            continue
+        o_low, o_high = other.bounds()
+        level = o_low[1] - 0.1 <= high[1] and o_high[1] + 0.3 >= low[1]
+        cut_low, cut_high = np.maximum(low, o_low), np.minimum(high, o_high)
+        if level and cut_low[0] < cut_high[0] and cut_low[2] < cut_high[2]:
+            found.append(_own_frame(item, cut_low, cut_high))
+    return found
+
+
+def _own_frame(item: SimObject, low: Array, high: Array) -> tuple[float, float, float, float]:
+    points = (np.array([low, high]) - item.center) @ item.matrix
+    a, b = points.min(axis=0), points.max(axis=0)
+    return float(a[0]), float(a[2]), float(b[0]), float(b[2])
+
+
+def _connect_knobs(items: list[SimObject]) -> None:
+    """Each stove knob controls a burner: knobs from left to right, burners in the same order."""
+    knobs = [o for o in items if o.object_type == "StoveKnob"]
+    burners = [o for o in items if o.object_type == "StoveBurner"]
+    if not knobs or not burners or any(k.controls for k in knobs):
+        return
+    axis = int(np.argmax(np.ptp([k.position for k in knobs], axis=0) * (1.0, 0.0, 1.0)))
+    other = 2 - axis
+    knobs.sort(key=lambda o: (float(o.position[axis]), o.object_id))
+    burners.sort(key=lambda o: (round(float(o.position[axis]), 1), float(o.position[other])))
+    for index, knob in enumerate(knobs):
+        knob.controls = (burners[index * len(burners) // len(knobs)].object_id,)
+
+
+def _raise_supports(world: World) -> None:
+    """Learns from what lies on a table or seat, where its box does not tell, how high its surface is."""
+    lying: dict[str, list[float]] = {}
+    for item in world.objects.values():
+        if item.kind.pickupable:
+            low, high = item.bounds()
+            middle = (low + high) / 2
+            for other in world.objects.values():
+                if other.object_type in _LEARNING and _over(other, middle):
+                    lying.setdefault(other.object_id, []).append(float(low[1]))
+    for object_id, heights in lying.items():
+        owner = world.objects[object_id]
+        low, high = owner.bounds()
+        level = float(np.median(heights)) - float(low[1])
+        usual = (float(high[1]) if owner.support is None else float(low[1]) + owner.support) - float(low[1])
+        if 0.2 * (high[1] - low[1]) < level < high[1] - low[1] - 0.05 and abs(level - usual) > 0.04:
+            owner.support = level
+
+
+_LEARNING = frozenset("ArmChair Bed Chair Desk Ottoman Sofa SideTable Stool".split())
+
+
+def _over(owner: SimObject, point: Array) -> bool:
+    low, high = owner.bounds()
+    return bool(low[0] < point[0] < high[0] and low[2] < point[2] < high[2] and low[1] < point[1] < high[1] + 0.1)

@@ -1,0 +1,81 @@
+"""Scene names and what makes the worlds of that name."""
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from infthor_eval.errors import DataError
+from infthor_eval.sim.navigation import NavGrid
+from infthor_eval.sim.scenes.dataset import FloorPlanData
+from infthor_eval.sim.scenes.floorplan import build_floor_plan
+from infthor_eval.sim.scenes.procedural import ROOM_KINDS, build_room
+from infthor_eval.sim.scenes.supplement import Supplement, read_supplement
+from infthor_eval.sim.world import AGENT_HEIGHT, Agent, Room, World
+
+__all__ = ["Catalogue"]
+
+_PROCEDURAL = re.compile(r"([a-z-]+)-(\d+)")
+_FLOOR_PLAN = re.compile(r"FloorPlan(_[A-Za-z0-9_]+|\d+)")
+
+
+class Catalogue:
+    """Makes a fresh world for a scene name.
+
+    Args:
+        data: folder with recorded floor plans, see `FloorPlanData`; None for none.
+        supplement: file with what trajectories add to them, see `Supplement`; None for none.
+    """
+
+    def __init__(self, data: Path | None = None, supplement: Path | None = None) -> None:
+        self._folder = data
+        self._data = None if data is None else FloorPlanData(data)
+        self._supplement_path = supplement
+        self._supplement: Mapping[str, Supplement] | None = None if supplement is not None else {}
+
+    def load(self, name: str) -> World:
+        """The world of a scene name.
+
+        Raises:
+            DataError: the name means nothing, or its data are missing; the message says which.
+        """
+        name = name.removesuffix("_physics")
+        if name == "Procedural":
+            return self.empty()
+        if _FLOOR_PLAN.fullmatch(name):
+            return self._floor_plan(name)
+        procedural = _PROCEDURAL.fullmatch(name)
+        if procedural and procedural[1] in ROOM_KINDS:
+            return build_room(procedural[1], int(procedural[2]))
+        kinds = ", ".join(f"{kind}-<seed>" for kind in ROOM_KINDS)
+        raise DataError(f"Scene {name!r} is unknown; use {kinds}, or FloorPlan<N> with --data")
+
+    def empty(self) -> World:
+        """A bare room, the state before the first Reset and before CreateHouse."""
+        room = Room(-1.5, 1.5, -1.5, 1.5)
+        cells = [(x * 0.25, z * 0.25) for x in range(-4, 5) for z in range(-4, 5)]
+        return World("Procedural", {}, (room,), NavGrid(cells), Agent(np.array([0.0, AGENT_HEIGHT, 0.0])))
+
+    def house(self, house: Mapping[str, Any]) -> World:
+        """The world of a ProcTHOR house.
+
+        Raises:
+            DataError: it does not have ProcTHOR's form.
+        """
+        from infthor_eval.sim.scenes.procthor import build_house
+
+        return build_house(house)
+
+    def _floor_plan(self, name: str) -> World:
+        if self._data is None:
+            raise DataError(
+                f"Scene {name} needs recorded data: start the simulator with --data DIR"
+                " (thor_scenes/objects.jsonl.gz and alfred/layouts/)"
+            )
+        if self._supplement is None:
+            assert self._supplement_path is not None
+            self._supplement = read_supplement(self._supplement_path)
+        extra = self._supplement.get(name, Supplement())
+        return build_floor_plan(name, self._data.objects(name), self._data.cells(name), extra)

@@ -1,0 +1,91 @@
+"""Recorded floor plans on disk: objects as AI2-THOR 5 reported them, and cells that the agent reached.
+
+A data folder holds `thor_scenes/objects.jsonl.gz` (one `{"scene", "objects"}` a line) and
+`alfred/layouts/FloorPlan<N>-layout.npy` (reachable (x, z), metres).
+"""
+
+import gzip
+import json
+import zlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from infthor_eval.errors import DataError
+from infthor_eval.sim.geometry import Array
+
+__all__ = ["FloorPlanData"]
+
+_OBJECTS = Path("thor_scenes/objects.jsonl.gz")
+_LAYOUTS = Path("alfred/layouts")
+_KEY = '{"scene":"'
+
+
+class FloorPlanData:
+    """Reads floor plans from a data folder; only the wanted line of the big file is parsed."""
+
+    def __init__(self, root: Path) -> None:
+        self._root = root
+        self._lines: dict[str, str] | None = None
+
+    def names(self) -> list[str]:
+        """Floor plans that the folder has objects for."""
+        return list(self._index())
+
+    def objects(self, scene: str) -> list[dict[str, Any]]:
+        """Metadata of every object of a floor plan.
+
+        Raises:
+            DataError: the file or the floor plan is not there, or its line is not JSON.
+        """
+        line = self._index().get(scene)
+        path = self._root / _OBJECTS
+        if line is None:
+            raise DataError(f"{path}: has no {scene}; it has {len(self._index())} other floor plans")
+        try:
+            found: list[dict[str, Any]] = json.loads(line)["objects"]
+        except (ValueError, KeyError) as error:
+            raise DataError(f"{path}: the line of {scene} is not of the form scene, objects ({error})") from error
+        return found
+
+    def cells(self, scene: str) -> Array | None:
+        """Reachable (x, z) of a floor plan, (n, 2) metres; None where the folder has no layout of it.
+
+        Raises:
+            DataError: the layout is not an array of that form.
+        """
+        path = self._root / _LAYOUTS / f"{scene}-layout.npy"
+        if not path.exists():
+            return None
+        try:
+            cells: Array = np.load(path, allow_pickle=False)
+        except (OSError, ValueError) as error:
+            raise DataError(f"{path}: not a readable layout ({error})") from error
+        if cells.ndim != 2 or cells.shape[1] != 2:
+            raise DataError(f"{path}: must be an array (n, 2), not {cells.shape}")
+        return cells
+
+    def _index(self) -> dict[str, str]:
+        """Unparsed lines by scene: parsing one of them takes 2 ms, all of them 0.2 s."""
+        if self._lines is None:
+            path = self._root / _OBJECTS
+            try:
+                with gzip.open(path, "rt", encoding="utf-8") as file:
+                    lines = [line for line in file if line.strip()]
+            except (OSError, EOFError, UnicodeDecodeError, zlib.error) as error:
+                raise DataError(
+                    f"{path}: cannot be read ({error}); --data must name a folder laid out like the published data"
+                ) from error
+            self._lines = {_scene_of(path, number, line): line for number, line in enumerate(lines, start=1)}
+        return self._lines
+
+
+def _scene_of(path: Path, number: int, line: str) -> str:
+    compact = line[:80].replace('": "', '":"')
+    if compact.startswith(_KEY):
+        return compact[len(_KEY) :].split('"', 1)[0]
+    try:
+        return str(json.loads(line)["scene"])
+    except (ValueError, KeyError, TypeError) as error:
+        raise DataError(f"{path}: line {number} is not of the form scene, objects ({error})") from error

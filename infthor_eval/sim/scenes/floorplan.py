@@ -1,0 +1,93 @@
+# ruff: noqa: SIM905 - tables of names read best as words
+"""Worlds from recorded floor plans."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from infthor_eval.errors import DataError
+from infthor_eval.sim.geometry import Array
+from infthor_eval.sim.navigation import NavGrid
+from infthor_eval.sim.objects import SimObject
+from infthor_eval.sim.restore import settle_parents
+from infthor_eval.sim.scenes.adoption import adopt
+from infthor_eval.sim.scenes.arrangement import arrange
+from infthor_eval.sim.scenes.recorded import recorded_object
+from infthor_eval.sim.scenes.supplement import Supplement
+from infthor_eval.sim.world import AGENT_HEIGHT, Agent, Room, World
+
+__all__ = ["build_floor_plan"]
+
+_CEILING = 2.6
+_ON_WALLS = frozenset("Blinds Curtains Floor Window".split())  # these reach beyond the room
+_STYLES = {0: "tiles", 2: "wood", 3: "carpet", 4: "tiles"}
+
+
+def build_floor_plan(name: str, entries: Sequence[Mapping[str, Any]], layout: Array | None, extra: Supplement) -> World:
+    """The world of a recorded floor plan.
+
+    Args:
+        name: e.g. `FloorPlan10`.
+        entries: `metadata["objects"]` of the floor plan.
+        layout: reachable (x, z), (n, 2) metres; None where it is not known.
+        extra: what trajectories add.
+
+    Raises:
+        DataError: neither a layout nor trajectories tell where the agent can stand, or an entry is malformed.
+    """
+    cells = [] if layout is None else [(float(x), float(z)) for x, z in layout]
+    cells += extra.cells
+    if not cells:
+        raise DataError(f"{name}: no alfred/layouts/{name}-layout.npy and no visited cells: nowhere to stand")
+    nav = NavGrid(cells)
+    objects = {item.object_id: item for item in map(recorded_object, entries)}
+    floor = max((float(o.bounds()[1][1]) for o in objects.values() if o.object_type == "Floor"), default=0.0)
+    objects = adopt(objects, extra.objects, nav, floor)
+    room = _room(name, list(objects.values()), cells, floor)
+    height = floor + AGENT_HEIGHT if extra.floor_y is None else extra.floor_y
+    middle = nav.nearest((room.x_min + room.x_max) / 2, (room.z_min + room.z_max) / 2)
+    yaw = max((0.0, 90.0, 180.0, 270.0), key=lambda angle: nav.freedom(*middle, angle, reach=3.0))
+    world = World(name, objects, (room,), nav, Agent(np.array([middle[0], height, middle[1]]), yaw), seed=_number(name))
+    arrange(world)
+    _settle(world, entries)
+    return world
+
+
+def _settle(world: World, entries: Sequence[Mapping[str, Any]]) -> None:
+    """Finds the parents of loose objects: as recorded where one is known, by position else."""
+    for entry in entries:
+        item = world.objects.get(str(entry["objectId"]))
+        if item is None or not item.kind.pickupable:
+            continue
+        parents = [world.objects[p] for p in entry.get("parentReceptacles") or () if p in world.objects]
+        inner = [p for p in parents if p.object_type != "Floor" and p.kind.receptacle and p is not item]
+        if inner:
+            world.attach(item, min(inner, key=lambda p: (float(np.prod(p.box_size)), p.object_id)))
+    settle_parents(world)
+    world.templates = {}
+    for item in world.objects.values():
+        if item.kind.pickupable:
+            world.templates.setdefault(item.object_type, []).append(item.duplicate(item.object_id))
+
+
+def _room(name: str, objects: list[SimObject], cells: list[tuple[float, float]], floor: float) -> Room:
+    """A rectangle around all that the room holds."""
+    lows = [np.array([x - 0.25, floor, z - 0.25]) for x, z in cells]
+    highs = [np.array([x + 0.25, floor, z + 0.25]) for x, z in cells]
+    for item in objects:
+        if item.object_type not in _ON_WALLS:
+            low, high = item.bounds()
+            lows.append(low)
+            highs.append(high)
+    low, high = np.min(lows, axis=0), np.max(highs, axis=0)
+    number = _number(name)
+    return Room(
+        float(low[0]), float(high[0]), float(low[2]), float(high[2]), max(floor + _CEILING, float(high[1]) + 0.05),
+        floor, _STYLES.get(number // 100, "wood"), number,
+    )  # fmt: skip
+
+
+def _number(name: str) -> int:
+    digits = "".join(letter for letter in name if letter.isdigit())
+    return int(digits[:9]) if digits else 0

@@ -1,0 +1,114 @@
+# ruff: noqa: SIM905 - tables of names read best as words
+"""Procedural kitchens: a counter with sink, stove and appliances along one wall, a table, and what belongs to them."""
+
+import numpy as np
+
+from infthor_eval.sim.objects import SimObject
+from infthor_eval.sim.scenes.roomplan import RoomPlan
+
+__all__ = ["furnish_kitchen"]
+
+_HEIGHT, _DEPTH = 0.92, 0.65  # of the counter, metres
+_MODULE = 0.6
+_TOOLS = (
+    "Apple Bread ButterKnife Bowl Cup DishSponge Egg Fork Knife Lettuce Mug Pan PepperShaker Plate Pot Potato"
+    " SaltShaker SoapBottle Spatula Spoon Tomato Cup Mug Plate Bowl Apple Potato Tomato".split()
+)
+_MORE = "Bottle Book Kettle Ladle Mug PaperTowelRoll Plate Statue Vase WineBottle Spoon Fork Egg Bowl".split()
+
+
+def furnish_kitchen(plan: RoomPlan, loose: int = 34) -> None:
+    """Furnishes a room as a kitchen with about `loose` small things."""
+    _counter(plan)
+    _table(plan)
+    plan.try_against("GarbageCan", _shuffled(plan, ("x-", "x+", "z-")))
+    if plan.random.random() < 0.6:
+        plan.try_against("SideTable", _shuffled(plan, ("x-", "x+", "z-")))
+    more = [str(kind) for kind in plan.random.permutation(_MORE)]
+    plan.loose += [*_TOOLS, *more][:loose]
+
+
+def _shuffled(plan: RoomPlan, sides: tuple[str, ...]) -> list[str]:
+    return [str(side) for side in plan.random.permutation(sides)]
+
+
+def _counter(plan: RoomPlan) -> None:
+    """The fridge and a counter of modules along the z+ wall, cabinets above."""
+    start, end = plan.span("z+")
+    plan.against("z+", "Fridge", start + 0.5, size=(0.9, 1.85, 0.75), gap=0.02)
+    first = start + 1.0
+    count = int((end - first) // _MODULE)
+    sink = int(plan.random.integers(1, count - 1)) if count > 3 else 1
+    stove = (sink + 2) % count if count > 3 else count - 1
+    stove = stove if abs(stove - sink) > 1 else (sink - 2) % count
+    top = plan.against(
+        "z+", "CounterTop", first + count * _MODULE / 2, y=_HEIGHT - 0.04, size=(count * _MODULE, 0.04, _DEPTH)
+    )
+    top.support = None
+    for index in range(count):
+        at = first + (index + 0.5) * _MODULE
+        _lower(plan, at, index, drawer=index != sink)
+        if index == sink:
+            _sink(plan, top, at)
+        elif index == stove:
+            _stove(plan, at)
+        if index not in (sink, stove):
+            upper = plan.against("z+", "Cabinet", at, y=1.5, size=(_MODULE - 0.02, 0.65, 0.35))
+            upper.hinge = 1 if index % 2 else -1
+    free = [i for i in range(count) if i not in (sink, stove)]
+    for kind, index in zip(("Microwave", "CoffeeMachine", "Toaster"), plan.random.permutation(free), strict=False):
+        size = {"Microwave": (0.52, 0.32, 0.4), "CoffeeMachine": (0.25, 0.36, 0.3), "Toaster": (0.2, 0.2, 0.3)}[kind]
+        plan.against("z+", kind, first + (int(index) + 0.5) * _MODULE, y=_HEIGHT, size=size, gap=0.08)
+
+
+def _lower(plan: RoomPlan, at: float, index: int, drawer: bool) -> None:
+    top = _HEIGHT - 0.05
+    if drawer:
+        plan.against("z+", "Drawer", at, y=top - 0.17, size=(_MODULE - 0.02, 0.16, _DEPTH - 0.06))
+        top -= 0.18
+    cabinet = plan.against("z+", "Cabinet", at, y=0.1, size=(_MODULE - 0.02, top - 0.11, _DEPTH - 0.06))
+    cabinet.hinge = 1 if index % 2 else -1
+
+
+def _sink(plan: RoomPlan, top: SimObject, at: float) -> None:
+    sink = plan.against("z+", "Sink", at, y=_HEIGHT - 0.17, size=(0.56, 0.172, 0.46), gap=0.1)
+    basin = plan.against("z+", "SinkBasin", at, y=_HEIGHT - 0.165, size=(0.5, 0.16, 0.38), gap=0.12)
+    basin.object_id, basin.name = f"{sink.object_id}|SinkBasin", f"SinkBasin_{sink.name.split('_')[1]}"
+    faucet = plan.against("z+", "Faucet", at, y=_HEIGHT, size=(0.16, 0.28, 0.2), gap=0.04)
+    faucet.style = 0
+    top.holes = (_hole_of(top, sink),)
+    sink.holes = (_hole_of(sink, basin),)
+    plan.against("z+", "Window", at, y=1.25, size=(0.8, 0.9, 0.06), gap=-0.02)
+
+
+def _hole_of(outer: SimObject, inner: SimObject) -> tuple[float, float, float, float]:
+    offset = outer.matrix.T @ (inner.center - outer.center)
+    half = inner.box_size / 2
+    return offset[0] - half[0], offset[2] - half[2], offset[0] + half[0], offset[2] + half[2]
+
+
+def _stove(plan: RoomPlan, at: float) -> None:
+    burners = []
+    for dx in (-0.14, 0.14):
+        for gap in (0.06, 0.34):
+            burners.append(plan.against("z+", "StoveBurner", at + dx, y=_HEIGHT, size=(0.22, 0.015, 0.22), gap=gap))
+    for index, burner in enumerate(burners):
+        knob = plan.against(
+            "z+", "StoveKnob", at - 0.21 + 0.14 * index, y=_HEIGHT - 0.045, size=(0.05, 0.05, 0.04), gap=_DEPTH - 0.01
+        )
+        knob.controls = (burner.object_id,)
+
+
+def _table(plan: RoomPlan) -> None:
+    """A dining table with chairs in the half of the room away from the counter."""
+    room = plan.room
+    length = float(plan.random.uniform(1.1, 1.4))
+    side = "x-" if plan.random.random() < 0.5 else "x+"
+    x = room.x_min + 0.5 if side == "x-" else room.x_max - 0.5
+    z = room.z_min + length / 2 + 0.15
+    plan.place("DiningTable", x, z, 90.0, size=(length, 0.78, 0.85))
+    aside = 0.72 if side == "x-" else -0.72
+    yaw = 270.0 if side == "x-" else 90.0
+    for dz in np.linspace(-0.25, 0.25, 2) * length:
+        plan.place("Chair", x + aside * 0.9, round(z + float(dz), 2), yaw, size=(0.42, 0.9, 0.45))
+    plan.against("z-", "LightSwitch", (room.x_min + room.x_max) / 2 + 0.6, y=1.2, size=(0.1, 0.14, 0.02))

@@ -1,0 +1,184 @@
+"""A room while it is being furnished: walls, what stands where, and the floor that stays free."""
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from infthor_eval.sim.geometry import Array, aabb_overlap
+from infthor_eval.sim.navigation import CELL, NavGrid
+from infthor_eval.sim.objects import SimObject
+from infthor_eval.sim.placement_rules import allowed_in
+from infthor_eval.sim.receptacles import find_place
+from infthor_eval.sim.sizes import SIZES, default_object
+from infthor_eval.sim.world import AGENT_HEIGHT, Agent, Room, World
+
+__all__ = ["RoomPlan", "finish"]
+
+_BODY = 0.23  # the agent's radius and a little, metres
+_KNEE, _HEAD = 0.1, 1.6
+
+
+class RoomPlan:
+    """Furnishes one rectangular room.
+
+    Args:
+        room: the shell.
+        random: decides everything that varies.
+    """
+
+    def __init__(self, room: Room, random: np.random.Generator) -> None:
+        self.room = room
+        self.random = random
+        self.objects: list[SimObject] = []
+        self.loose: list[str] = []
+        self.reserved: list[tuple[Array, Array]] = []
+
+    def place(
+        self,
+        kind: str,
+        x: float,
+        z: float,
+        yaw: float = 0.0,
+        y: float = 0.0,
+        size: tuple[float, float, float] | None = None,
+    ) -> SimObject:
+        """Puts an object with the middle of its underside at (x, y, z)."""
+        item = default_object(kind, np.zeros(3), yaw, None if size is None else np.array(size))
+        item.place_bottom(np.array([x, y, z]))
+        named = default_object(kind, np.round(item.position, 4), yaw, item.box_size)
+        named.support = item.support
+        self.objects.append(named)
+        return named
+
+    def against(
+        self,
+        side: str,
+        kind: str,
+        at: float,
+        y: float = 0.0,
+        size: tuple[float, float, float] | None = None,
+        gap: float = 0.0,
+    ) -> SimObject:
+        """Puts an object with its back to a wall.
+
+        Args:
+            side: `x-`, `x+`, `z-` or `z+`.
+            kind: type.
+            at: where along the wall, metres (x for z walls, z for x walls).
+            y: height of its underside.
+            size: width, height, depth; the usual one if None.
+            gap: distance from the wall.
+        """  # fmt: skip
+        depth = (SIZES[kind] if size is None else size)[2] / 2 + gap
+        room = self.room
+        x, z, yaw = {
+            "z+": (at, room.z_max - depth, 180.0),
+            "z-": (at, room.z_min + depth, 0.0),
+            "x+": (room.x_max - depth, at, 270.0),
+            "x-": (room.x_min + depth, at, 90.0),
+        }[side]
+        return self.place(kind, x, z, yaw, y, size)
+
+    def span(self, side: str) -> tuple[float, float]:
+        """From and to of a wall along its length."""
+        room = self.room
+        return (room.x_min, room.x_max) if side[0] == "z" else (room.z_min, room.z_max)
+
+    def clear(self, low: Array, high: Array, margin: float = 0.0) -> bool:
+        """Whether a box touches no furniture and no reserved floor."""
+        grown_low, grown_high = low - margin, high + margin
+        boxes = [o.bounds() for o in self.objects if o.object_type != "Floor"] + self.reserved
+        return not any(aabb_overlap(grown_low, grown_high, a, b) for a, b in boxes)
+
+    def try_against(
+        self, kind: str, sides: Iterable[str], size: tuple[float, float, float] | None = None
+    ) -> SimObject | None:
+        """Puts an object somewhere along one of the walls where there is room; None if there is none."""
+        width = (SIZES[kind] if size is None else size)[0]
+        for side in sides:
+            start, end = self.span(side)
+            places = np.arange(start + width / 2 + 0.1, end - width / 2 - 0.1 + 1e-6, 0.15)
+            for at in self.random.permutation(places):
+                item = self.against(side, kind, round(float(at), 2), size=size, gap=0.02)
+                self.objects.pop()
+                low, high = item.bounds()
+                blocked = any(s == side and a - width / 2 < at < b + width / 2 for s, a, b in self.room.openings)
+                if not blocked and self.clear(low, high, 0.05):
+                    self.objects.append(item)
+                    return item
+        return None
+
+    def free_cells(self) -> list[tuple[float, float]]:
+        """Cells where the agent fits between what stands on the floor."""
+        room = self.room
+        boxes = [
+            o.bounds() for o in self.objects
+            if o.object_type != "Floor" and o.bounds()[0][1] < _HEAD and o.bounds()[1][1] > _KNEE
+        ]  # fmt: skip
+        xs = np.arange(np.ceil((room.x_min + _BODY) / CELL), np.floor((room.x_max - _BODY) / CELL) + 1) * CELL
+        zs = np.arange(np.ceil((room.z_min + _BODY) / CELL), np.floor((room.z_max - _BODY) / CELL) + 1) * CELL
+        cells = np.array([(x, z) for x in xs for z in zs]).reshape(-1, 2)
+        for low, high in boxes:
+            nearest = np.clip(cells, low[[0, 2]], high[[0, 2]])
+            cells = cells[np.hypot(*(cells - nearest).T) >= _BODY]
+        return [(float(x), float(z)) for x, z in cells]
+
+
+def finish(name: str, seed: int, plans: list[RoomPlan], doors: list[tuple[float, float]] | None = None) -> World:
+    """The world of furnished rooms: free floor, the agent on it, and loose things on and in the furniture.
+
+    Args:
+        name: of the scene.
+        seed: of the scene.
+        plans: the rooms.
+        doors: cells (x, z) in doorways.
+    """
+    grid = NavGrid([cell for plan in plans for cell in plan.free_cells()] + (doors or []))
+    connected = max((grid.reachable(*cell) for cell in _samples(grid)), key=len)
+    nav = NavGrid(connected)
+    objects: dict[str, SimObject] = {}
+    for plan in plans:
+        for item in plan.objects:
+            objects[item.object_id] = item
+    room = plans[0].room
+    start = nav.nearest((room.x_min + room.x_max) / 2, (room.z_min + room.z_max) / 2)
+    yaw = max((0.0, 90.0, 180.0, 270.0), key=lambda angle: nav.freedom(*start, angle, reach=3.0))
+    agent = Agent(np.array([start[0], AGENT_HEIGHT, start[1]]), yaw)
+    world = World(name, objects, tuple(p.room for p in plans), nav, agent, seed=seed)
+    for plan in plans:
+        _scatter(world, plan)
+    for item in world.objects.values():
+        if item.kind.pickupable:
+            world.templates.setdefault(item.object_type, []).append(item.duplicate(item.object_id))
+    return world
+
+
+def _samples(grid: NavGrid) -> list[tuple[float, float]]:
+    left, found = set(grid), []
+    while left:
+        cell = min(left)
+        found.append(cell)
+        left -= set(grid.reachable(*cell))
+        left.discard(cell)
+    return found
+
+
+def _scatter(world: World, plan: RoomPlan) -> None:
+    """Puts the plan's loose things into or onto the plan's furniture, where the agent can get at them."""
+    homes = [
+        o for o in plan.objects if o.kind.receptacle and o.object_type not in {"Floor", "Toaster", "CoffeeMachine"}
+    ]
+    for kind in plan.loose:
+        item = default_object(kind, np.zeros(3))
+        item.style = int(plan.random.integers(1000))
+        fitting = [o for o in homes if allowed_in(kind, o.object_type)]
+        for index in plan.random.permutation(len(fitting)):
+            place = find_place(world, item, fitting[index], random=plan.random)
+            if place is None:
+                continue
+            made = default_object(kind, np.round(place.position, 4), float(place.rotation[1]))
+            made.style = item.style
+            if made.object_id not in world.objects:
+                world.add(made)
+                world.attach(made, fitting[index])
+                break

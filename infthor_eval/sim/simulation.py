@@ -1,0 +1,140 @@
+"""One running simulator: the scene, the settings, the cameras, and the pictures of the present moment."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from infthor_eval.sim.geometry import Array, euler_matrix
+from infthor_eval.sim.render.camera import FAR, Camera
+from infthor_eval.sim.render.picture import Backend, Picture, backend, cast_picture, colour_picture
+from infthor_eval.sim.render.scene import SceneModel
+from infthor_eval.sim.scenes.catalogue import Catalogue
+from infthor_eval.sim.settings import Settings
+from infthor_eval.sim.visibility import visible_ids
+from infthor_eval.sim.world import World
+
+__all__ = ["Simulation", "ThirdPartyCamera"]
+
+
+@dataclass(frozen=True)
+class ThirdPartyCamera:
+    """A camera that is not the agent's; an orthographic size makes it a map view from above."""
+
+    position: Array
+    rotation: Array
+    field_of_view: float = 90.0
+    orthographic_size: float | None = None
+
+
+@dataclass
+class Simulation:
+    """The state behind the protocol: everything that an action may read or change.
+
+    Attributes:
+        width: of the pictures, pixels.
+        height: of the pictures, pixels.
+        catalogue: makes worlds from scene names.
+        map_view: the agent's frame shows the scene from above.
+        failed_reset: why the last Reset found no scene; Initialize tells it again, as the client reads only that.
+    """
+
+    catalogue: Catalogue
+    width: int = 300
+    height: int = 300
+    settings: Settings = field(default_factory=Settings)
+    cameras: list[ThirdPartyCamera] = field(default_factory=list)
+    random: np.random.Generator = field(default_factory=lambda: np.random.default_rng(0))
+    renderer: Backend = field(default_factory=backend)
+    map_view: bool = False
+    failed_reset: str = ""
+
+    def __post_init__(self) -> None:
+        self.load(self.catalogue.empty())
+
+    def load(self, world: World) -> None:
+        """Makes `world` the present scene; settings stay until the next Initialize."""
+        self.world = world
+        self.cameras.clear()
+        self.random = np.random.default_rng(world.seed)
+        self._model = SceneModel(world)
+        self._key: tuple[object, ...] | None = None
+        self._full: Picture | None = None
+        self._visible: frozenset[str] | None = None
+
+    def view(self) -> Picture:
+        """The agent's view without what it holds, cast once per state of the world."""
+        self._refresh()
+        return self._view
+
+    def full_view(self) -> Picture:
+        """The agent's view with the held object in front."""
+        self._refresh()
+        _, held, names = self._model.primitives()
+        if not len(held):
+            return self._view
+        if self._full is None:
+            self._full = cast_picture(held, names, self._view.camera, self.renderer, self._view)
+        return self._full
+
+    def agent_picture(self) -> Picture:
+        """What the agent's frame shows: its view, or the map from above when the map view is on."""
+        if not self.map_view:
+            return self.full_view()
+        low, high = self.world.scene_bounds()
+        middle = (low + high) / 2
+        size = float(max(high[0] - low[0], high[2] - low[2])) / 2 + 0.1
+        return self.third_party(
+            ThirdPartyCamera(np.array([middle[0], high[1] - 0.05, middle[2]]), np.array([90.0, 0.0, 0.0]), 90.0, size)
+        )
+
+    def visible(self) -> frozenset[str]:
+        """Ids of the objects that the agent sees within its visibility distance."""
+        self._refresh()
+        if self._visible is None:
+            self._visible = visible_ids(self.world, self._view, self.settings.visibility_distance)
+        return self._visible
+
+    def colours(self, picture: Picture) -> NDArray[np.uint8]:
+        """RGB (h, w, 3), bottom row first; with supersampling the mean of 2x2 rays per pixel."""
+        lights = self._model.lights()
+        if not self.settings.supersample:
+            return colour_picture(picture, lights, self.renderer)
+        fine = cast_picture(picture.prims, picture.names, picture.camera.scaled(2), self.renderer)
+        rgb = colour_picture(fine, lights, self.renderer).astype(np.uint16)
+        total = rgb[0::2, 0::2] + rgb[1::2, 0::2] + rgb[0::2, 1::2] + rgb[1::2, 1::2]
+        return ((total + 2) // 4).astype(np.uint8)
+
+    def third_party(self, camera: ThirdPartyCamera) -> Picture:
+        """What a third-party camera sees."""
+        prims, held, names = self._model.primitives()
+        lens = self._lens(camera)
+        return cast_picture(np.concatenate([prims, held]), names, lens, self.renderer)
+
+    def _lens(self, camera: ThirdPartyCamera) -> Camera:
+        matrix = euler_matrix(camera.rotation)
+        if camera.orthographic_size is None:
+            return Camera(camera.position, matrix, camera.field_of_view, self.width, self.height)
+        away = camera.orthographic_size * 40.0  # a long lens from far away is an orthographic view
+        angle = float(np.degrees(2 * np.arctan(camera.orthographic_size / away)))
+        eye = camera.position - matrix[:, 2] * away
+        return Camera(eye, matrix, angle, self.width, self.height, near=away, far=away + FAR)
+
+    def _refresh(self) -> None:
+        agent = self.world.agent
+        key = (self.world.version, tuple(agent.position), agent.yaw, agent.horizon, agent.standing, self.width,
+               self.height, self.settings.field_of_view, self.settings.visibility_distance)  # fmt: skip
+        if key == self._key:
+            return
+        camera = Camera(
+            agent.camera_position(), agent.camera_matrix(), self.settings.field_of_view, self.width, self.height
+        )
+        prims, _, names = self._model.primitives()
+        self._view = cast_picture(prims, names, camera, self.renderer)
+        self._full = None
+        self._visible = None
+        self._key = key
+
+    def configure(self, **changes: object) -> None:
+        """Changes some of the settings."""
+        self.settings = replace(self.settings, **changes)  # type: ignore[arg-type]

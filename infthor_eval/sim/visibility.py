@@ -1,0 +1,30 @@
+"""What the agent sees: objects in the camera's view that nothing hides, near enough to interact with."""
+
+import numpy as np
+
+from infthor_eval.sim.render.picture import Picture
+from infthor_eval.sim.world import World
+
+__all__ = ["visible_ids"]
+
+_SHARE = 2.5e-5  # of the picture's pixels that must show an object: 2 pixels at 300x300
+
+
+def visible_ids(world: World, picture: Picture, max_distance: float) -> frozenset[str]:
+    """Ids of the objects that AI2-THOR would report as visible.
+
+    Args:
+        world: the scene.
+        picture: the agent's view, cast without the held object, which hides nothing.
+        max_distance: `visibilityDistance`, horizontal metres from the agent to the object's box.
+    """
+    counts = np.bincount(picture.instances.ravel() + 1, minlength=len(picture.names) + 1)[1:]
+    least = max(1, round(_SHARE * picture.instances.size))
+    seen = set()
+    for index in np.nonzero(counts >= least)[0]:
+        item = world.objects.get(picture.names[index])
+        if item is not None and world.reach(item) <= max_distance:
+            seen.add(item.object_id)
+    if world.held is not None:
+        seen.add(world.held)
+    return frozenset(seen)

@@ -1,0 +1,188 @@
+"""The state of one scene: its objects, its agent, and who contains whom."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from infthor_eval.sim.errors import ActionError
+from infthor_eval.sim.geometry import Array, aabb_gap, euler_matrix
+from infthor_eval.sim.navigation import NavGrid
+from infthor_eval.sim.objects import SimObject
+
+__all__ = ["AGENT_HEIGHT", "CAMERA_HEIGHT", "Agent", "Room", "World"]
+
+AGENT_HEIGHT = 0.9009992  # agent.y of AI2-THOR's default agent on a floor at 0
+CAMERA_HEIGHT = 0.675  # camera above agent.y, fitted to the boxes recorded in ALFRED
+_CROUCH = 0.35
+_HAND = np.array([0.0, -0.16, 0.38])  # where AI2-THOR holds an object, in the camera's frame, metres
+
+
+@dataclass
+class Agent:
+    """The default agent: where it stands, which way it and its camera look (degrees, horizon down positive)."""
+
+    position: Array
+    yaw: float = 0.0
+    horizon: float = 0.0
+    standing: bool = True
+
+    def camera_position(self) -> Array:
+        """Position of the camera in the world, metres (3,)."""
+        lift = CAMERA_HEIGHT if self.standing else CAMERA_HEIGHT - _CROUCH
+        return self.position + np.array([0.0, lift, 0.0])
+
+    def camera_matrix(self) -> Array:
+        """Rotation matrix (3, 3) of the camera."""
+        return euler_matrix((self.horizon, self.yaw, 0.0))
+
+
+@dataclass(frozen=True)
+class Room:
+    """The shell of one room: a rectangle on the floor with walls around, metres."""
+
+    x_min: float
+    x_max: float
+    z_min: float
+    z_max: float
+    height: float = 2.6
+    floor: float = 0.0
+    floor_style: str = "wood"
+    style: int = 0
+    openings: tuple[tuple[str, float, float], ...] = ()  # (side "x-", "x+", "z-" or "z+", from, to) of doorways
+
+
+@dataclass
+class World:
+    """A scene as it is now.
+
+    Attributes:
+        objects: by id, in the order of the metadata.
+        version: grows with every change, so that views can be cached.
+    """
+
+    scene: str
+    objects: dict[str, SimObject]
+    rooms: tuple[Room, ...]
+    nav: NavGrid
+    agent: Agent
+    seed: int = 0
+    held: str | None = None
+    version: int = 0
+    templates: dict[str, list[SimObject]] = field(default_factory=dict)
+
+    def get(self, object_id: str) -> SimObject:
+        """The object with this id.
+
+        Raises:
+            ActionError: there is none.
+        """
+        found = self.objects.get(object_id)
+        if found is None:
+            raise ActionError(f"objectId: {object_id} is not the objectId on any object in the scene!")
+        return found
+
+    def touch(self, *changed: SimObject) -> None:
+        """Records that these objects (and the view) changed."""
+        self.version += 1
+        for item in changed:
+            item.version += 1
+
+    def add(self, item: SimObject) -> None:
+        """Adds an object; its id must be new."""
+        self.objects[item.object_id] = item
+        self.touch(item)
+
+    def remove(self, item: SimObject) -> None:
+        """Takes an object out of the scene; its contents stay where they are, on nothing."""
+        self.detach(item)
+        for content in self.children(item):
+            content.parent = None
+            self.touch(content)
+        if self.held == item.object_id:
+            self.held = None
+        del self.objects[item.object_id]
+        self.touch()
+
+    def attach(self, item: SimObject, receptacle: SimObject) -> None:
+        """Puts `item` among the contents of `receptacle`."""
+        self.detach(item)
+        item.parent = receptacle.object_id
+        receptacle.contents.append(item.object_id)
+        self.touch(item, receptacle)
+
+    def detach(self, item: SimObject) -> None:
+        """Takes `item` out of whatever contains it."""
+        if item.parent is not None:
+            receptacle = self.objects[item.parent]
+            receptacle.contents.remove(item.object_id)
+            item.parent = None
+            self.touch(item, receptacle)
+
+    def children(self, item: SimObject) -> list[SimObject]:
+        """What `item` contains directly."""
+        return [self.objects[content] for content in item.contents]
+
+    def descendants(self, item: SimObject) -> Iterator[SimObject]:
+        """Everything inside or on `item`, at any depth."""
+        for child in self.children(item):
+            yield child
+            yield from self.descendants(child)
+
+    def ancestors(self, item: SimObject) -> Iterator[SimObject]:
+        """What contains `item`, from the nearest outwards."""
+        while item.parent is not None:
+            item = self.objects[item.parent]
+            yield item
+
+    def shift(self, items: Iterable[SimObject], offset: Array) -> None:
+        """Moves objects, and all they contain, by `offset` metres (3,)."""
+        for item in items:
+            for part in (item, *self.descendants(item)):
+                part.position = part.position + offset
+                self.touch(part)
+
+    def carry(self) -> None:
+        """Takes what the agent holds, and all it contains, to the agent's hand."""
+        if self.held is None:
+            return
+        item = self.objects[self.held]
+        turn = np.array([item.rotation[0], self.agent.yaw, item.rotation[2]])
+        middle = euler_matrix(turn) @ item.box_center
+        self.set_pose(item, self.hand_pose() - middle, turn)
+
+    def set_pose(self, item: SimObject, position: Array, rotation: Array) -> None:
+        """Moves and turns an object; what it contains comes along as if fixed to it."""
+        turn = euler_matrix(rotation) @ item.matrix.T
+        yaw = float(rotation[1] - item.rotation[1])
+        pivot = item.position.copy()
+        for part in self.descendants(item):
+            part.position = position + turn @ (part.position - pivot)
+            part.rotation = np.array([part.rotation[0], (part.rotation[1] + yaw) % 360, part.rotation[2]])
+            self.touch(part)
+        item.position, item.rotation = np.asarray(position, dtype=float), np.asarray(rotation, dtype=float)
+        self.touch(item)
+
+    def hidden(self, item: SimObject) -> bool:
+        """Whether something closed encloses the object."""
+        return any(outer.kind.encloses and outer.kind.openable and outer.state.openness == 0
+                   for outer in self.ancestors(item))  # fmt: skip
+
+    def hand_pose(self) -> Array:
+        """World position (3,) at which the agent holds an object."""
+        return self.agent.camera_position() + self.agent.camera_matrix() @ _HAND
+
+    def distance(self, item: SimObject) -> float:
+        """Metres from the agent to the object's origin, as the metadata reports it."""
+        return float(np.linalg.norm(item.position - self.agent.position))
+
+    def reach(self, item: SimObject) -> float:
+        """Horizontal metres from the agent to the nearest point of the object's box."""
+        low, high = item.bounds()
+        return aabb_gap(self.agent.position[[0, 2]], low[[0, 2]], high[[0, 2]])
+
+    def scene_bounds(self) -> tuple[Array, Array]:
+        """Low and high corner of all rooms, metres."""
+        low = [min(r.x_min for r in self.rooms), min(r.floor for r in self.rooms), min(r.z_min for r in self.rooms)]
+        high = [max(r.x_max for r in self.rooms), max(r.height for r in self.rooms), max(r.z_max for r in self.rooms)]
+        return np.array(low), np.array(high)
