@@ -87,7 +87,7 @@ def _grouped(records: Sequence[UnitRecord], name_of: Callable[[UnitRecord], str]
 
 def _accuracy(records: Sequence[UnitRecord]) -> Accuracy:
     trajectories = [record.traj_id for record in records]
-    scores: dict[str, Any] = {
+    scores: dict[Scorer, Estimate] = {
         scorer: clustered_mean([_score(record, scorer) for record in records], trajectories)
         for scorer in (SCORERS if records else ())
     }
