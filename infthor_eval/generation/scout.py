@@ -20,7 +20,7 @@ _HORIZONS = (-30, 0, 30, 60)
 _REACH = 1.5  # the simulator's visibility distance, metres
 _SIDEWAYS = 32.0  # degrees off the camera's axis; half the field of view is 30
 _TOO_NEAR = 0.5  # closer than this a door may hit the agent and an object fills the frame
-_TRIALS = 40
+_TRIALS = 30
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,9 @@ def find_viewpoint(
     found = None
     for viewpoint in list(_candidates(here, grid, focus, distances))[:_TRIALS]:
         there = _teleport(simulator, grid, here, viewpoint)
-        if there.success and _shows(there, shown, min_pixels):
+        if not there.success or not _shows(there, shown, min_pixels):
+            continue
+        if inside is None or _comes_into_view(simulator, shown[0], inside, min_pixels):
             found = viewpoint
             break
     _return(simulator, here)
@@ -74,6 +76,15 @@ def _shows(view: View, shown: list[str], min_pixels: int) -> bool:
         return False
     instances = view.instances
     return instances is None or (shown[0] in instances and instances[shown[0]].pixels >= min_pixels)
+
+
+def _comes_into_view(simulator: Simulator, holder: str, inside: str, min_pixels: int) -> bool:
+    """Whether opening a receptacle shows an object in it; it is closed again."""
+    opened = simulator.query("OpenObject", objectId=holder)
+    if not opened.success:
+        return False
+    shown = _shows(opened, [inside], min_pixels)
+    return simulator.query("CloseObject", objectId=holder).success and shown
 
 
 def _candidates(view: View, grid: Grid, focus: ThorObject, distances: dict[Stand, int]) -> Iterator[Viewpoint]:
@@ -110,7 +121,7 @@ def _middle(item: ThorObject) -> Vector:
 
 def _teleport(simulator: Simulator, grid: Grid, here: View, viewpoint: Viewpoint) -> View:
     x, z = grid.position(viewpoint.stand.cell)
-    return simulator.step(
+    return simulator.query(
         "Teleport",
         position={"x": x, "y": here.agent.position.y, "z": z},
         rotation={"x": 0.0, "y": float(viewpoint.stand.facing), "z": 0.0},
@@ -120,7 +131,7 @@ def _teleport(simulator: Simulator, grid: Grid, here: View, viewpoint: Viewpoint
 
 def _return(simulator: Simulator, here: View) -> None:
     at = here.agent.position
-    simulator.step(
+    simulator.query(
         "Teleport",
         position={"x": at.x, "y": at.y, "z": at.z},
         rotation={"x": 0.0, "y": here.agent.rotation, "z": 0.0},

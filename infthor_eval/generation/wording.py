@@ -10,6 +10,7 @@ __all__ = ["an", "compact", "noun", "plural"]
 
 _VOWEL_SOUND = re.compile(r"^(?:[aeio]|u(?!se|ni))", re.IGNORECASE)
 _LETTERS = {"CD": "CD", "TVStand": "TV stand", "Television": "television"}
+_PLURALS = {"blinds", "boots", "curtains"}
 _IRREGULAR = {"knife": "knives", "butter knife": "butter knives", "shelf": "shelves", "loaf": "loaves"}
 
 
@@ -24,7 +25,9 @@ def noun(kind: str) -> str:
 
 
 def an(words: str) -> str:
-    """The words with "a" or "an" before them."""
+    """The words with "a" or "an" before them; plural nouns ("boots") stay as they are."""
+    if words in _PLURALS:
+        return words
     return f"{'an' if _VOWEL_SOUND.match(words) else 'a'} {words}"
 
 

@@ -96,9 +96,13 @@ class _Chooser:
         left = list(candidates)
         rng.shuffle(left)
         chosen: list[Candidate] = []
+        room = Counter({_group(item): max(2, number // 5) for item in left})
         while left and len(chosen) < number:
             best = min(left, key=self._use)
             left.remove(best)
+            room[_group(best)] -= 1
+            if room[_group(best)] < 0:
+                continue  # where little happened, presence questions must not fill the place of all others
             chosen.append(best)
             self._groups[_group(best)] += 1
             self._subjects.update((_group(best), subject) for subject in best.subjects)
