@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, cast
 
 import PIL
+import tokenizers
 import torch
 import transformers
 from safetensors import SafetensorError
@@ -104,6 +105,7 @@ def assemble(
         "versions": {
             "torch": torch.__version__,
             "transformers": transformers.__version__,
+            "tokenizers": tokenizers.__version__,
             "pillow": PIL.__version__,
         },
     }

@@ -1,6 +1,6 @@
 """Greedy decoding, token by token, with the checkpoint's own end tokens and repetition penalty."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, cast
 
@@ -56,7 +56,7 @@ def generate(
     logits: torch.Tensor,
     step: Callable[[int], torch.Tensor],
     *,
-    context: Sequence[int],
+    context: Iterable[int],
     settings: Generation,
     max_new_tokens: int,
     finished: Callable[[list[int]], bool],
@@ -66,7 +66,7 @@ def generate(
     Args:
         logits: (vocabulary,), of the first token.
         step: feeds one token and returns the logits of the next.
-        context: all ids before the reply, for the repetition penalty.
+        context: all ids before the reply; read only where there is a repetition penalty.
         settings: end tokens and penalty.
         max_new_tokens: limit.
         finished: looks at the ids so far after each token.
@@ -74,21 +74,23 @@ def generate(
     Returns:
         The ids without the end token.
     """
-    penalise = RepetitionPenaltyLogitsProcessor(settings.repetition_penalty)
-    seen = torch.tensor([context], device=logits.device)
+    before = list(context) if settings.repetition_penalty != 1.0 else []
     reply: list[int] = []
     while True:
-        scores = logits[None].float()
-        if settings.repetition_penalty != 1.0:
-            scores = penalise(cast(Any, seen), cast(Any, scores))
-        token = int(scores.argmax())
+        token = int(_penalised(logits.float(), before + reply, settings.repetition_penalty).argmax())
         if token in settings.end_ids:
             return reply
         reply.append(token)
         if len(reply) == max_new_tokens or finished(reply):
             return reply
-        seen = torch.cat([seen, seen.new_tensor([[token]])], dim=1)
         logits = step(token)
+
+
+def _penalised(logits: torch.Tensor, seen: list[int], penalty: float) -> torch.Tensor:
+    if penalty == 1.0:
+        return logits
+    ids = torch.tensor([seen], device=logits.device)
+    return RepetitionPenaltyLogitsProcessor(penalty)(cast(Any, ids), cast(Any, logits[None]))[0]
 
 
 def cut_at_stop(text: str, stop: Sequence[str]) -> str | None:

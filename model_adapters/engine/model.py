@@ -11,7 +11,7 @@ from model_adapters.engine.features import FeatureCache
 from model_adapters.engine.loaded import Loaded
 from model_adapters.engine.options import EngineOptions
 from model_adapters.engine.prefix import Prefix
-from model_adapters.engine.prompt import Prompter, Unit, n_tokens
+from model_adapters.engine.prompt import Prompter, Unit, n_tokens, token_ids
 from model_adapters.protocols import Part, Reply
 from model_adapters.transcript import Transcript
 
@@ -86,7 +86,9 @@ class TransformersModel:
             self._prefix.reset()
         try:
             return self._reply(units, n_context, max_new_tokens, stop)
-        except torch.OutOfMemoryError as error:
+        except (RuntimeError, MemoryError) as error:
+            if not _is_out_of_memory(error):
+                raise
             self._prefix.reset()
             self._features.clear()
             raise ModelError(f"out of memory on a context of {n_context} tokens ({self.name})") from error
@@ -95,11 +97,10 @@ class TransformersModel:
         shared = self._prefix.rewind_to(units)
         cached = self._prefix.n_tokens
         logits = self._prefix.feed(units[shared:], reserve=max_new_tokens)
-        context = [token for unit in units for token in ((unit,) if isinstance(unit, int) else unit.ids)]
         ids = generate(
             logits,
             lambda token: self._prefix.feed([token]),
-            context=context,
+            context=token_ids(units),
             settings=self._loaded.generation,
             max_new_tokens=max_new_tokens,
             finished=lambda ids: cut_at_stop(self._decode(ids), stop) is not None if stop else False,
@@ -119,6 +120,11 @@ class TransformersModel:
                 f"a context of {n_context} tokens and {max_new_tokens} new ones is beyond the {limit} tokens "
                 f"of {self.name}; use fewer frames, or set max_tokens if the model can take more"
             )
+
+
+def _is_out_of_memory(error: Exception) -> bool:
+    # torch has an exception of its own for GPUs only; on CPU the allocator's name in the message tells.
+    return isinstance(error, torch.OutOfMemoryError | MemoryError) or "DefaultCPUAllocator" in str(error)
 
 
 class TransformersConversation(Transcript):

@@ -5,7 +5,7 @@ one placeholder per frame; placeholders are expanded afterwards, id by id. So me
 as the checkpoint means them, and the cost per reply is that of a short text even where frames take 100,000 tokens.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -16,7 +16,7 @@ from infthor_eval.formats.frames import FrameRef
 from model_adapters.engine.family import Family, Size
 from model_adapters.protocols import Part
 
-__all__ = ["Frame", "Prompter", "Unit", "n_tokens"]
+__all__ = ["Frame", "Prompter", "Unit", "n_tokens", "token_ids"]
 
 
 @dataclass(frozen=True)
@@ -42,6 +42,15 @@ Unit = int | Frame  # what is encoded, compared and cut as a whole: a token of t
 def n_tokens(units: Sequence[Unit]) -> int:
     """Tokens of a prompt, frames expanded."""
     return sum(1 if isinstance(unit, int) else len(unit.ids) for unit in units)
+
+
+def token_ids(units: Iterable[Unit]) -> Iterator[int]:
+    """All ids of a prompt, frames expanded."""
+    for unit in units:
+        if isinstance(unit, int):
+            yield unit
+        else:
+            yield from unit.ids
 
 
 class Prompter:

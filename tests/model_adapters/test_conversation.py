@@ -14,13 +14,9 @@ from PIL import Image
 from infthor_eval.errors import DataError, ModelError
 from infthor_eval.formats.frames import FrameRef
 from model_adapters import Part, check_adapter, load
-from model_adapters.engine.prompt import Unit
+from model_adapters.engine.prompt import token_ids
 
 NEW = 6
-
-
-def _ids(units: Sequence[Unit]) -> list[int]:
-    return [token for unit in units for token in ((unit,) if isinstance(unit, int) else unit.ids)]
 
 
 def _inputs(model: Any, parts: Sequence[Part]) -> dict[str, torch.Tensor]:
@@ -61,7 +57,7 @@ def test_ids_are_those_of_the_chat_template_on_the_whole(tiny: Any, frames: list
     talk = tiny.conversation()
     talk.append(*parts)
     expected = _inputs(tiny, parts)["input_ids"][0].tolist()
-    assert _ids(tiny.units(talk.parts)) == expected
+    assert list(token_ids(tiny.units(talk.parts))) == expected
     assert talk.n_tokens == len(expected)
 
 
@@ -233,8 +229,15 @@ def test_a_text_with_the_image_token_is_refused(tiny: Any, frames: list[FrameRef
         talk.reply(1)
 
 
+ERRORS = [
+    torch.OutOfMemoryError("no memory"),
+    RuntimeError("[enforce fail at alloc_cpu.cpp:1] DefaultCPUAllocator: can't allocate memory"),
+]
+
+
+@pytest.mark.parametrize("error", ERRORS)
 def test_out_of_memory_names_the_size_and_the_model_goes_on(
-    tiny: Any, plain: Any, frames: list[FrameRef], monkeypatch: pytest.MonkeyPatch
+    tiny: Any, plain: Any, frames: list[FrameRef], monkeypatch: pytest.MonkeyPatch, error: Exception
 ) -> None:
     talk = tiny.conversation()
     talk.append(*frames, "\nWhat?")
@@ -245,7 +248,7 @@ def test_out_of_memory_names_the_size_and_the_model_goes_on(
         calls.append(1)
         output = forward(*args, **kwargs)
         if len(calls) == 2:
-            raise torch.OutOfMemoryError("no memory")
+            raise error
         return output
 
     monkeypatch.setattr(tiny._loaded.model, "forward", failing)

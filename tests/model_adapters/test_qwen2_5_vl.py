@@ -16,6 +16,7 @@ from safetensors.torch import load_file, save_file
 from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.formats.frames import FrameRef
 from model_adapters import check_adapter, load
+from model_adapters.engine.prompt import token_ids
 from model_adapters.tiny.qwen2_5_vl import save_tiny_checkpoint
 
 
@@ -222,5 +223,5 @@ def test_ids_and_reply_are_those_of_transformers_own_processor(checkpoint: Path,
     model = _load(checkpoint)
     units = model.units((*frames, question))
     assert name == "Qwen2_5_VLProcessor"
-    assert [token for unit in units for token in ((unit,) if isinstance(unit, int) else unit.ids)] == ids
+    assert list(token_ids(units)) == ids
     assert list(_ask(model, frames).token_ids) == reply
