@@ -14,7 +14,7 @@ from infthor_eval.nieh.scoring import SCORERS, Scorer, score
 from infthor_eval.nieh.statistics import Estimate, clustered_mean
 from infthor_eval.runs.journal import UnitRecord
 
-__all__ = ["CLUE_COLUMNS", "Accuracy", "PublishedTable", "accuracies", "published_table4", "summarise"]
+__all__ = ["CLUE_COLUMNS", "Accuracy", "PublishedTable", "accuracies", "published_table4", "record_score", "summarise"]
 
 CLUE_COLUMNS = ("1", "2", ">=3", "total")  # the columns of the paper's Table 4
 
@@ -72,7 +72,8 @@ def _task(records: Sequence[UnitRecord], task: str) -> dict[str, Any]:
         "by_clues": {name: _as_json(accuracy) for name, accuracy in accuracies(of_task).items()},
         "by_question_type": _grouped(of_task, lambda record: record.question_type or "untyped"),
         "below_full_marks": {
-            scorer: [record.question_id for record in of_task if _score(record, scorer) < 1.0] for scorer in SCORERS
+            scorer: [record.question_id for record in of_task if record_score(record, scorer) < 1.0]
+            for scorer in SCORERS
         },
         "failures": [
             {"question_id": record.question_id, "reason": record.failure} for record in of_task if record.failure
@@ -88,13 +89,14 @@ def _grouped(records: Sequence[UnitRecord], name_of: Callable[[UnitRecord], str]
 def _accuracy(records: Sequence[UnitRecord]) -> Accuracy:
     trajectories = [record.traj_id for record in records]
     scores: dict[Scorer, Estimate] = {
-        scorer: clustered_mean([_score(record, scorer) for record in records], trajectories)
+        scorer: clustered_mean([record_score(record, scorer) for record in records], trajectories)
         for scorer in (SCORERS if records else ())
     }
     return Accuracy(len(records), sum(record.failure is not None for record in records), scores)
 
 
-def _score(record: UnitRecord, scorer: Scorer) -> float:
+def record_score(record: UnitRecord, scorer: Scorer) -> float:
+    """The score of a recorded reply; 0 where there is none."""
     return score(last_line(record.reply), record.answers, scorer) if record.reply is not None else 0.0
 
 

@@ -1,4 +1,4 @@
-"""NIEH results as a table on the terminal."""
+"""NIEH results as tables on the terminal."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -7,9 +7,10 @@ from rich import box
 from rich.table import Table
 
 from infthor_eval.nieh.scoring import SCORERS
+from infthor_eval.report.comparison import Comparison
 from infthor_eval.report.nieh_results import CLUE_COLUMNS, published_table4
 
-__all__ = ["nieh_table"]
+__all__ = ["comparison_table", "nieh_table"]
 
 
 def nieh_table(summaries: Sequence[dict[str, Any]]) -> Table:
@@ -58,3 +59,35 @@ def _cells(by_clues: dict[str, Any], scorer: str) -> list[str]:
 
 def _simulated(summary: dict[str, Any]) -> bool:
     return any(task["simulator"] == "embedded" for task in summary["run"]["tasks"].values())
+
+
+def comparison_table(rows: Sequence[Comparison], first: str, second: str) -> Table:
+    """Differences in percentage points: a row per task and scorer.
+
+    Args:
+        rows: what `compare` found.
+        first: the first run's model.
+        second: the second run's model.
+    """
+    table = Table(box=box.SIMPLE_HEAD, title=f"{second} against {first}, accuracy in %", title_justify="left")
+    for name in ("task", "scorer"):
+        table.add_column(name)
+    for name in ("first", "second", "difference", "95 % interval", "p", "questions", "only in one"):
+        table.add_column(name, justify="right")
+    for row in rows:
+        estimate, p = row.difference.estimate, row.difference.p
+        interval = significance = "-"  # one trajectory alone tells nothing about others
+        if estimate.low is not None and estimate.high is not None and p is not None:
+            interval, significance = f"[{100 * estimate.low:+.2f}, {100 * estimate.high:+.2f}]", f"{p:.4f}"
+        table.add_row(
+            row.task,
+            row.scorer,
+            f"{100 * row.first:.2f}",
+            f"{100 * row.second:.2f}",
+            f"{100 * estimate.mean:+.2f}",
+            interval,
+            significance,
+            str(estimate.n),
+            str(row.n_unshared),
+        )
+    return table
