@@ -19,6 +19,12 @@ QUESTIONS = (
 )
 
 
+@pytest.fixture(autouse=True)
+def no_published_data(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Tests find no data set that the machine's user may have fetched."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+
+
 @pytest.fixture
 def make_nieh_set(tmp_path: Path) -> Callable[..., Path]:
     """Writes an NIEH set of plain-coloured frames and returns its folder."""

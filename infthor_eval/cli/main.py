@@ -13,6 +13,7 @@ __all__ = ["main"]
 # Name, and the one line that the overview shows; the module infthor_eval.cli.<name> has the command.
 _COMMANDS = {
     "run": "Evaluate a model on tasks (the default command).",
+    "fetch": "Download the published data.",
     "compare": "Compare two runs on the same questions.",
     "ls": "List the models or the tasks.",
     "generate": "Make long-horizon trajectories in a scene.",

@@ -13,6 +13,7 @@ from PIL import Image
 
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.hub_data import default_folder
 from infthor_eval.formats.nieh_set import LeftOut, NiehSet
 from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.formats.question import Question
@@ -49,16 +50,18 @@ def task_questions(
 
     Args:
         context: the context's name (`infthor_eval.nieh.contexts`).
-        data: folder of an NIEH set.
+        data: folder of an NIEH set; None is the published set where `infthor-eval fetch nieh` put it.
         bundled: name of a set that comes with the package; `data` is not looked at then.
 
     Raises:
-        UsageError: neither set is given, or the context is unknown.
+        UsageError: there is no set, or the context is unknown.
         DataError: the set cannot be read.
     """
-    if bundled is None and data is None:
-        raise UsageError("this task asks questions on a data set of yours; give its folder with --data")
-    root = packaged_folder(f"sets/{bundled}") if bundled else Path(str(data))
+    if bundled is None and data is None and not default_folder().is_dir():
+        raise UsageError(
+            "no NIEH set to ask about; give its folder with --data, or fetch the published one: fetch nieh"
+        )
+    root = packaged_folder(f"sets/{bundled}") if bundled else Path(data or default_folder())
     nieh_set = open_set(str(root))
     frames_of = context_named(context)
     questions, left_out = [], list(nieh_set.left_out)

@@ -1,0 +1,62 @@
+"""Unpacking archives that come from elsewhere.
+
+An archive is untrusted: its members may point outside the folder, be links or devices, or unpack to more than the
+disk holds. Nothing is unpacked where any member is not a plain file or folder below the target.
+"""
+
+import shutil
+import tarfile
+import tempfile
+from pathlib import Path, PurePosixPath
+
+from infthor_eval.errors import DataError
+
+__all__ = ["unpack_tar"]
+
+_MAX_FILES = 2_000_000
+_MAX_FILE_BYTES = 2 * 2**30
+
+
+def unpack_tar(archive: Path, target: Path, max_bytes: int = 500 * 2**30) -> None:
+    """Unpack a tar file's one top folder as `target`, whole or not at all.
+
+    Args:
+        archive: the tar file, compressed or not.
+        target: the folder to make; its name must be that of the archive's top folder.
+        max_bytes: most bytes that the archive may unpack to.
+
+    Raises:
+        DataError: the archive is damaged, has a member that is refused, or does not fit on the disk.
+    """
+    target.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        with (
+            tarfile.open(archive) as tar,
+            tempfile.TemporaryDirectory(dir=target.parent, prefix=".unpacking-") as scratch,
+        ):
+            members = _checked(tar, archive, target.name, min(max_bytes, shutil.disk_usage(target.parent).free))
+            tar.extractall(scratch, members=members, filter="data")
+            (Path(scratch) / target.name).rename(target)
+    except (tarfile.TarError, EOFError) as error:
+        raise DataError(f"{archive}: a damaged archive ({error}); delete it and fetch it again") from error
+    except OSError as error:
+        raise DataError(f"{archive}: cannot be unpacked to {target} ({error.strerror or error})") from error
+
+
+def _checked(tar: tarfile.TarFile, archive: Path, top: str, max_bytes: int) -> list[tarfile.TarInfo]:
+    members, total = [], 0
+    for member in tar:
+        path = PurePosixPath(member.name)
+        if path.is_absolute() or ".." in path.parts:
+            raise DataError(f"{archive}: {member.name!r} points outside the folder; do not use this archive")
+        if not (member.isfile() or member.isdir()):
+            raise DataError(f"{archive}: {member.name!r} is a link or device; do not use this archive")
+        if path.parts and path.parts[0] != top:
+            raise DataError(f"{archive}: {member.name!r} is not below {top}/; this is another archive")
+        total += member.size
+        members.append(member)
+        if member.size > _MAX_FILE_BYTES or total > max_bytes or len(members) > _MAX_FILES:
+            raise DataError(f"{archive}: unpacks to more than the limit or the free disk; make room or check the file")
+    if not members:
+        raise DataError(f"{archive}: is empty; delete it and fetch it again")
+    return members

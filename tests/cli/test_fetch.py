@@ -1,0 +1,115 @@
+"""`fetch` against a hub of our own: a local server that speaks the hub's protocol for one data set."""
+
+import hashlib
+import json
+import tarfile
+import threading
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+
+import pytest
+
+from infthor_eval.cli import main
+from infthor_eval.formats.hub_data import NIEH_REPOSITORY
+
+COMMIT = "0" * 40
+
+
+class Hub(BaseHTTPRequestHandler):
+    files: dict[str, bytes]
+    status = 200
+
+    def do_HEAD(self):
+        self.do_GET()
+
+    def do_GET(self):
+        name = self.path.rpartition("/")[2]
+        if self.status != 200:
+            self.answer(self.status, b"{}", {"X-Error-Code": "GatedRepo"})
+        elif "/tree/" in self.path:
+            entries = [
+                {"type": "file", "path": file, "size": len(content), "oid": hashlib.sha1(content).hexdigest()}
+                for file, content in self.files.items()
+            ]
+            self.answer(200, json.dumps(entries).encode(), {"Content-Type": "application/json"})
+        elif self.path.startswith(f"/api/datasets/{NIEH_REPOSITORY}"):
+            siblings = [{"rfilename": file} for file in self.files]
+            self.answer(200, json.dumps({"id": NIEH_REPOSITORY, "sha": COMMIT, "siblings": siblings}).encode())
+        elif name in self.files:
+            content = self.files[name]
+            etag = hashlib.sha256(content).hexdigest()
+            self.answer(200, content, {"ETag": f'"{etag}"', "X-Repo-Commit": COMMIT})
+        else:
+            self.answer(404, b"{}", {"X-Error-Code": "EntryNotFound"})
+
+    def answer(self, status, content, headers=()):
+        self.send_response(status)
+        for key, value in dict(headers).items():
+            self.send_header(key, value)
+        self.send_header("Content-Length", str(len(content)))
+        self.end_headers()
+        if self.command == "GET":
+            self.wfile.write(content)
+
+    def log_message(self, *_):
+        pass
+
+
+@pytest.fixture
+def hub(make_nieh_set, tmp_path, monkeypatch):
+    root = make_nieh_set(size=56, name="published")
+    with tarfile.open(tmp_path / "metadata.tar", "w") as tar:
+        tar.add(root / "metadata", "metadata")
+    csv = (root / "qa_set_test.csv").read_text().splitlines(keepends=True)
+    files = {
+        "qa_set_nieh_single_clue.csv": "".join(csv[:2]).encode(),
+        "qa_set_nieh_multi_clue.csv": "".join([csv[0], *csv[2:]]).encode(),
+        "metadata.tar": (tmp_path / "metadata.tar").read_bytes(),
+    }
+    handler = type("ThisHub", (Hub,), {"files": files})
+    server = ThreadingHTTPServer(("127.0.0.1", 0), handler)
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    yield f"http://127.0.0.1:{server.server_port}", handler
+    server.shutdown()
+    server.server_close()
+
+
+def run(capfd, *arguments):
+    with pytest.raises(SystemExit) as ended:
+        main([str(argument) for argument in arguments])
+    return ended.value.code, *capfd.readouterr()
+
+
+def test_what_was_fetched_is_found_by_the_task_and_not_fetched_again(hub, tmp_path, capfd):
+    endpoint, handler = hub
+    code, out, err = run(capfd, "fetch", "nieh", "--endpoint", endpoint)
+    assert code == 0, err
+    assert "nieh: 5 questions" in out
+    assert list((tmp_path / "cache").rglob("metadata.tar")) == []
+    handler.status = 500
+    assert run(capfd, "fetch", "nieh", "--endpoint", endpoint)[0] == 0
+    code, out, _ = run(capfd, "--model", "oracle", "--tasks", "nieh_gt", "--output", tmp_path / "out")
+    assert code == 0
+    assert "100.00" in out
+
+
+def test_no_access_and_no_network_are_one_line_with_the_mend(hub, tmp_path, capfd):
+    endpoint, handler = hub
+    handler.status = 403
+    code, _, err = run(capfd, "fetch", "nieh", "--endpoint", endpoint, "--dir", tmp_path / "d")
+    assert (code, len(err.strip().splitlines())) == (2, 1)
+    assert "hf auth login" in err
+    code, _, err = run(capfd, "fetch", "nieh", "--endpoint", "http://127.0.0.1:9", "--dir", tmp_path / "d")
+    assert (code, len(err.strip().splitlines())) == (2, 1)
+    assert "cannot be fetched" in err
+
+
+def test_an_archive_that_points_elsewhere_is_refused(hub, tmp_path, capfd):
+    endpoint, handler = hub
+    with tarfile.open(tmp_path / "evil.tar", "w") as tar:
+        tar.add(tmp_path / "metadata.tar", "../evil")
+    handler.files["metadata.tar"] = (tmp_path / "evil.tar").read_bytes()
+    code, _, err = run(capfd, "fetch", "nieh", "--endpoint", endpoint, "--dir", tmp_path / "d")
+    assert code == 2
+    assert "points outside" in err
+    assert not (tmp_path / "d" / "metadata").exists()
