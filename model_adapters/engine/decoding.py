@@ -74,22 +74,23 @@ def generate(
     Returns:
         The ids without the end token.
     """
-    before = list(context) if settings.repetition_penalty != 1.0 else []
+    seen = set(context) if settings.repetition_penalty != 1.0 else set()  # how often does not matter
     reply: list[int] = []
     while True:
-        token = int(_penalised(logits.float(), before + reply, settings.repetition_penalty).argmax())
+        token = int(_penalised(logits.float(), seen, settings.repetition_penalty).argmax())
         if token in settings.end_ids:
             return reply
         reply.append(token)
+        seen.add(token)
         if len(reply) == max_new_tokens or finished(reply):
             return reply
         logits = step(token)
 
 
-def _penalised(logits: torch.Tensor, seen: list[int], penalty: float) -> torch.Tensor:
+def _penalised(logits: torch.Tensor, seen: set[int], penalty: float) -> torch.Tensor:
     if penalty == 1.0:
         return logits
-    ids = torch.tensor([seen], device=logits.device)
+    ids = torch.tensor([list(seen)], device=logits.device)
     return RepetitionPenaltyLogitsProcessor(penalty)(cast(Any, ids), cast(Any, logits[None]))[0]
 
 
