@@ -47,6 +47,10 @@ class SafeController(ai2thor.controller.Controller):
             )
         except PeerFault as fault:
             raise self._explained(fault) from fault
+        except OSError as error:
+            self.stop()
+            what = launch.executable or "AI2-THOR's own build"
+            raise SimulatorError(f"{what}: cannot be started ({error}); check the command, or the network") from error
         except (RuntimeError, ValueError) as error:
             # Also what ai2thor says of a scene or a build that does not exist.
             self.stop()

@@ -65,6 +65,7 @@ class Simulator:
         self._scene: str | dict[str, Any] | None = None
         self._episode: list[tuple[dict[str, Any], bool]] = []
         self._failures = 0
+        self._saved: int | None = None  # length of the episode of which the process keeps a copy
         self._view: View | None = None
         self.restarts = 0
 
@@ -87,16 +88,18 @@ class Simulator:
             raise SimulatorError("no scene is loaded; reset the simulator to one first")
         return self._view
 
-    def reset(self, scene: str | dict[str, Any]) -> View:
+    def reset(self, scene: str | dict[str, Any] | None) -> View:
         """Load a scene and begin an episode.
 
         Args:
-            scene: its name (`FloorPlan10`, `kitchen-3`), or the description of a ProcTHOR house.
+            scene: its name (`FloorPlan10`, `kitchen-3`), the description of a ProcTHOR house, or None for the
+                present one.
 
         Raises:
             SimulatorError: the simulator cannot be started, or refuses the scene.
         """
-        self._scene, self._episode, self._failures = scene, [], 0
+        self._scene, self._episode, self._failures = scene or self._scene, [], 0
+        self._saved = None
         while True:
             try:
                 self._view = self._load()
@@ -138,7 +141,12 @@ class Simulator:
         return answer
 
     def mark(self) -> int:
-        """Remember where the episode is now, for `rewind`."""
+        """Remember where the episode is now, for `rewind`; one mark at a time is cheap to go back to.
+
+        The embedded simulator keeps a copy of its state. Unity cannot: there `rewind` repeats the episode.
+        """
+        saved = self.query("SaveState").success
+        self._saved = len(self._episode) if saved else None
         return len(self._episode)
 
     def rewind(self, mark: int) -> View:
@@ -147,8 +155,10 @@ class Simulator:
         Raises:
             SimulatorError: as `step`.
         """
-        if self._scene is None:
-            raise SimulatorError("no scene is loaded; reset the simulator to one first")
+        if self._saved == mark and (view := self.query("RestoreState")).success:
+            del self._episode[mark:]
+            self._view = view
+            return view
         calls = [call for call, _ in self._episode[:mark]]
         view = self.reset(self._scene)
         for call in calls:
@@ -157,6 +167,7 @@ class Simulator:
 
     def close(self) -> None:
         """Stop the simulator; a later `reset` starts it again."""
+        self._saved = None
         if self._controller is not None:
             self._controller.stop()
             self._controller = None

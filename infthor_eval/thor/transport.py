@@ -98,7 +98,7 @@ class SafeFifoServer(FifoServer):
         for pipe in (self.server_pipe, self.client_pipe):
             if pipe is not None:
                 pipe.close()
-        self.raw_metadata = self.raw_files = None
+        self.raw_metadata = self.raw_files = self.last_event = None
         self.tmp_dir.cleanup()
 
     def _recv_message(self, timeout: float | None) -> tuple[Any, Any]:

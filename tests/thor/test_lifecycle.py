@@ -1,0 +1,93 @@
+"""The embedded simulator through the wrapper: what users start and stop."""
+
+import gc
+import os
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from infthor_eval.errors import SimulatorError
+from infthor_eval.thor.launch import Launch, embedded
+from infthor_eval.thor.simulator import Simulator
+
+from .test_simulator import children, open_files, scripted
+
+SCENE = "kitchen-3"
+
+
+def test_an_episode_survives_the_death_of_its_simulator():
+    actions = ["MoveAhead", "RotateRight", "MoveAhead", "LookDown", "RotateLeft", "MoveAhead"]
+    frames = []
+    for deadly in (None, 3):
+        with Simulator(embedded()) as simulator:
+            simulator.reset(SCENE)
+            for index, action in enumerate(actions):
+                if index == deadly:
+                    os.kill(simulator._controller.unity_pid, 9)
+                view = simulator.step(action)
+            assert simulator.restarts == (deadly is not None)
+            frames.append((view.agent, view.frame))
+    assert frames[0][0] == frames[1][0]
+    assert np.array_equal(frames[0][1], frames[1][1])
+
+
+def test_a_query_is_no_part_of_the_episode():
+    with Simulator(embedded()) as simulator:
+        before = simulator.reset(SCENE)
+        assert simulator.query("GetReachablePositions").result
+        assert simulator.view is before
+        assert simulator.mark() == 0
+
+
+def test_rewinding_brings_the_world_back():
+    with Simulator(embedded()) as simulator:
+        simulator.reset(SCENE)
+        there = simulator.step("RotateRight")
+        mark = simulator.mark()
+        simulator.step("MoveAhead")
+        simulator.step("RotateRight")
+        back = simulator.rewind(mark)
+        assert back.agent == there.agent
+        assert np.array_equal(back.frame, there.frame)
+        assert simulator.step("MoveAhead").success
+
+
+@pytest.mark.parametrize("scene", ["FloorPlan9999", "nowhere"])
+def test_an_unknown_scene_is_one_line(scene):
+    with Simulator(embedded()) as simulator, pytest.raises(SimulatorError, match=scene) as caught:
+        simulator.reset(scene)
+    assert "\n" not in str(caught.value)
+
+
+def test_an_executable_that_is_not_there():
+    with Simulator(Launch("/nowhere/simulator")) as simulator, pytest.raises(SimulatorError, match="nowhere"):
+        simulator.reset(SCENE)
+
+
+def test_two_hundred_starts_and_stops_leave_nothing(tmp_path):
+    def cycle():
+        with Simulator(scripted(tmp_path)) as simulator:
+            simulator.reset(SCENE)
+            simulator.step("MoveAhead")
+
+    cycle()
+    gc.collect()
+    before = children(), open_files(), threading.active_count(), leftovers()
+    memory = resident()
+    for _ in range(200):
+        cycle()
+    gc.collect()
+    assert (children(), open_files(), threading.active_count(), leftovers()) == before
+    assert resident() - memory < 20
+
+
+def leftovers():
+    return sorted(path.name for path in Path("/tmp").glob("infthor-*"))
+
+
+def resident():
+    """Resident memory of this process, MB."""
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
