@@ -106,6 +106,14 @@ class Model(Protocol):
         """All that can change a number, as JSON values; two models of equal identity answer alike."""
         ...
 
+    def tokens_per_frame(self, frame: FrameRef) -> int:
+        """How many of the model's tokens one frame becomes, its surroundings in the chat template not counted.
+
+        Raises:
+            DataError: the frame cannot be read.
+        """
+        ...
+
     def conversation(self) -> Conversation:
         """A new, empty conversation."""
         ...

@@ -6,12 +6,13 @@ from typing import Any
 import torch
 
 from infthor_eval.errors import ModelError
+from infthor_eval.formats.frames import FrameRef
 from model_adapters.engine.decoding import cut_at_stop, generate
 from model_adapters.engine.features import FeatureCache
 from model_adapters.engine.loaded import Loaded
 from model_adapters.engine.options import EngineOptions
 from model_adapters.engine.prefix import Prefix
-from model_adapters.engine.prompt import Prompter, Unit, n_tokens, token_ids
+from model_adapters.engine.prompt import Frame, Prompter, Unit, n_tokens, token_ids
 from model_adapters.protocols import Part, Reply
 from model_adapters.transcript import Transcript
 
@@ -60,6 +61,10 @@ class TransformersModel:
                 "end_ids": sorted(generation.end_ids),
             },
         }
+
+    def tokens_per_frame(self, frame: FrameRef) -> int:
+        """How many tokens one frame becomes, as the checkpoint's processor has it."""
+        return next(len(unit.ids) for unit in self.units([frame]) if isinstance(unit, Frame))
 
     def conversation(self) -> "TransformersConversation":
         """A new, empty conversation."""

@@ -18,6 +18,9 @@ class HashModel:
     name = "hash"
     max_tokens = None
 
+    def tokens_per_frame(self, frame):
+        return 1
+
     def identity(self) -> dict[str, Any]:
         return {"model": self.name}
 
