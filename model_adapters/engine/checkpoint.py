@@ -8,7 +8,7 @@ PIL ones: torchvision's resize gives other pixels, and the numbers must not depe
 import contextlib
 import hashlib
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, cast
 
@@ -20,7 +20,7 @@ from safetensors import SafetensorError
 
 from infthor_eval.errors import ModelError, UsageError
 from model_adapters.engine.decoding import read_generation
-from model_adapters.engine.family import Family
+from model_adapters.engine.family import Family, MakeFamily
 from model_adapters.engine.hub import fetch
 from model_adapters.engine.loaded import Loaded
 from model_adapters.engine.options import CheckpointOptions, EngineOptions
@@ -32,7 +32,7 @@ _FINGERPRINTED = {".bin", ".jinja", ".json", ".model", ".safetensors", ".txt"}
 
 def load_checkpoint(
     options: CheckpointOptions,
-    family: Callable[[Any, Any], Family],
+    family: MakeFamily,
     model_types: Sequence[str],
     image_settings: Mapping[str, Any],
 ) -> Loaded:
@@ -40,7 +40,7 @@ def load_checkpoint(
 
     Args:
         options: where from, and how to run it.
-        family: makes the family of a model and an image processor.
+        family: makes the family of a model, an image processor and a tokenizer.
         model_types: the `model_type`s in a config that the family can run.
         image_settings: settings of the image processor that differ from the checkpoint's.
 
@@ -67,7 +67,7 @@ def load_checkpoint(
         tokenizer,
         image_processor,
         template=template,
-        family=family(model, image_processor),
+        family=family(model, image_processor, tokenizer),
         origin=_origin(options.pretrained, folder, commit),
     )
 

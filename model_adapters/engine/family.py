@@ -1,12 +1,12 @@
 """What the engine has to know about a model family, and nothing else does."""
 
 from collections.abc import Sequence
-from typing import Protocol
+from typing import Any, Protocol
 
 import torch
 from PIL import Image
 
-__all__ = ["Family", "Size"]
+__all__ = ["Family", "MakeFamily", "Size"]
 
 Size = tuple[int, int]  # width, height in pixels
 
@@ -41,4 +41,12 @@ class Family(Protocol):
         Returns:
             (1, tokens), or (3, 1, tokens) where positions have three axes.
         """
+        ...
+
+
+class MakeFamily(Protocol):
+    """A class of families: made of a model, an image processor and a tokenizer."""
+
+    def __call__(self, model: Any, image_processor: Any, tokenizer: Any) -> Family:
+        """Make the family of these loaded parts."""
         ...

@@ -1,6 +1,7 @@
 """Options that every transformers model takes."""
 
 from dataclasses import dataclass
+from typing import Any
 
 __all__ = ["CheckpointOptions", "EngineOptions"]
 
@@ -26,6 +27,10 @@ class EngineOptions:
     chunk_tokens: int = 1024
     feature_cache_mb: int = 128
     max_tokens: int | None = None
+
+    def image_settings(self) -> dict[str, Any]:
+        """Settings of the image processor that differ from the checkpoint's; families with options for it override."""
+        return {}
 
     def __post_init__(self) -> None:
         if self.chunk_tokens < 1 or self.feature_cache_mb < 0 or (self.max_tokens or 0) < 0:

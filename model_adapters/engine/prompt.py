@@ -84,7 +84,10 @@ class Prompter:
             tokenize=False,
             add_generation_prompt=True,
         )
-        ids: list[int] = self._tokenizer(text, add_special_tokens=False)["input_ids"]
+        # As transformers' processors do: what begins every text is added, unless the template has done it.
+        begin = self._tokenizer.bos_token
+        begun = begin is not None and text.startswith(begin)
+        ids: list[int] = self._tokenizer(text, add_special_tokens=not begun)["input_ids"]
         placeholder = self._family.placeholder_id
         if ids.count(placeholder) != len(frames):
             raise ModelError(

@@ -8,27 +8,25 @@ from typing import Any
 import torch
 from PIL import Image
 
-from model_adapters.engine.checkpoint import load_checkpoint
+from model_adapters.engine.adapter import CheckpointAdapter
 from model_adapters.engine.family import Size
-from model_adapters.engine.model import TransformersModel
 from model_adapters.engine.options import CheckpointOptions
+from model_adapters.families.plain import PlainFamily
 
-__all__ = ["Qwen25VL", "Qwen25VLFamily", "Qwen25VLOptions", "pixel_limits"]
+__all__ = ["PixelLimits", "Qwen25VL", "Qwen25VLFamily"]
 
 
-class Qwen25VLFamily:
+class Qwen25VLFamily(PlainFamily):
     """Frames of Qwen2.5-VL.
 
     Args:
         model: a `Qwen2_5_VLForConditionalGeneration`.
         image_processor: a `Qwen2VLImageProcessor`.
+        tokenizer: the checkpoint's tokenizer.
     """
 
-    def __init__(self, model: Any, image_processor: Any) -> None:
-        self._model = model
-        self._image_processor = image_processor
-        self.placeholder_id: int = model.config.image_token_id
-        self.slot_id = self.placeholder_id
+    def __init__(self, model: Any, image_processor: Any, tokenizer: Any) -> None:
+        super().__init__(model, image_processor, tokenizer)
         self._grids: dict[Size, tuple[int, int, int]] = {}
 
     def frame_ids(self, size: Size) -> tuple[int, ...]:
@@ -38,11 +36,9 @@ class Qwen25VLFamily:
     @torch.inference_mode()
     def features(self, images: Sequence[Image.Image]) -> list[torch.Tensor]:
         """The vision tower's merged patches, (tokens, hidden), for each image."""
-        inputs = self._image_processor(images=list(images), return_tensors="pt")
-        device = self._model.get_input_embeddings().weight.device
-        grids = inputs["image_grid_thw"].to(device)
-        output = self._model.get_image_features(inputs["pixel_values"].to(device), grids, return_dict=True)
-        return [tensor.to(device) for tensor in output.pooler_output]
+        inputs = self._inputs(images)
+        output = self._model.get_image_features(inputs["pixel_values"], inputs["image_grid_thw"], return_dict=True)
+        return list(output.pooler_output)
 
     def positions(self, ids: torch.Tensor, sizes: Sequence[Size], start: int) -> torch.Tensor:
         """Temporal, height and width positions, (3, 1, tokens).
@@ -68,38 +64,32 @@ class Qwen25VLFamily:
         return self._grids[size]
 
 
-def pixel_limits(min_pixels: int | None, max_pixels: int | None) -> dict[str, int]:
-    """Settings that keep a frame's area (pixels) within limits, for `load_checkpoint`; empty for the checkpoint's."""
-    limits = {"min_pixels": min_pixels, "max_pixels": max_pixels}
-    return {name: value for name, value in limits.items() if value is not None}
-
-
 @dataclass(frozen=True, kw_only=True)
-class Qwen25VLOptions(CheckpointOptions):
-    """Options of qwen2.5-vl.
+class PixelLimits:
+    """Limits of a frame's area.
 
     Attributes:
         min_pixels: smaller frames are enlarged to this area; the checkpoint's setting where None.
         max_pixels: larger frames are reduced to this area; the checkpoint's setting where None.
     """
 
-    pretrained: str = "Qwen/Qwen2.5-VL-7B-Instruct"
     min_pixels: int | None = None
     max_pixels: int | None = None
 
+    def image_settings(self) -> dict[str, int]:
+        """Settings of the image processor that differ from the checkpoint's."""
+        limits = {"min_pixels": self.min_pixels, "max_pixels": self.max_pixels}
+        return {name: value for name, value in limits.items() if value is not None}
 
-class Qwen25VL:
+
+@dataclass(frozen=True, kw_only=True)
+class _Options(PixelLimits, CheckpointOptions):
+    pretrained: str = "Qwen/Qwen2.5-VL-7B-Instruct"
+
+
+class Qwen25VL(CheckpointAdapter):
     """The adapter `qwen2.5-vl`."""
 
-    Options = Qwen25VLOptions
-
-    @classmethod
-    def build(cls, name: str, options: Qwen25VLOptions, seed: int) -> TransformersModel:  # noqa: ARG003
-        """Load a checkpoint; nothing in it is random.
-
-        Raises:
-            ModelError: it cannot be loaded.
-        """
-        limits = pixel_limits(options.min_pixels, options.max_pixels)
-        loaded = load_checkpoint(options, Qwen25VLFamily, model_types=("qwen2_5_vl",), image_settings=limits)
-        return TransformersModel(name, loaded, options)
+    Options = _Options
+    family = Qwen25VLFamily
+    model_types = ("qwen2_5_vl",)

@@ -1,26 +1,17 @@
 """A Qwen2.5-VL of two layers with random weights: the real classes, template and frame tokens, without a download."""
 
-import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
-import torch
-from transformers import (
-    GenerationConfig,
-    PreTrainedTokenizerBase,
-    Qwen2_5_VLConfig,
-    Qwen2_5_VLForConditionalGeneration,
-)
+from transformers import Qwen2_5_VLConfig
 from transformers.models.qwen2_vl.image_processing_pil_qwen2_vl import Qwen2VLImageProcessorPil
 
-from model_adapters.engine.checkpoint import assemble, resolve_device, resolve_dtype
-from model_adapters.engine.model import TransformersModel
-from model_adapters.engine.options import EngineOptions
-from model_adapters.families.qwen2_5_vl import Qwen25VLFamily, pixel_limits
-from model_adapters.tiny.tokenizer import train_tokenizer
+from model_adapters.families.qwen2_5_vl import PixelLimits, Qwen25VLFamily
+from model_adapters.tiny.twin import SPREAD, TinyAdapter, TinyOptions, Twin
 
-__all__ = ["Qwen25VLTiny", "TinyOptions", "save_tiny_checkpoint"]
+__all__ = ["Qwen25VLTiny", "save_tiny_checkpoint"]
 
 _SPECIAL = (
     "<|endoftext|>",
@@ -61,84 +52,21 @@ _TEMPLATE = """\
 """
 
 
-@dataclass(frozen=True, kw_only=True)
-class TinyOptions(EngineOptions):
-    """Options of qwen2.5-vl-tiny; its weights come from the run's seed.
-
-    Attributes:
-        dtype: float32 unless told otherwise, so that replies do not hang on rounding.
-        device: cpu unless told otherwise.
-        min_pixels: smaller frames are enlarged to this area.
-        max_pixels: larger frames are reduced to this area.
-    """
-
-    dtype: str = "float32"
-    device: str = "cpu"
-    min_pixels: int | None = None
-    max_pixels: int | None = None
-
-
-class Qwen25VLTiny:
-    """The adapter `qwen2.5-vl-tiny`."""
-
-    Options = TinyOptions
-
-    @classmethod
-    def build(cls, name: str, options: TinyOptions, seed: int) -> TransformersModel:
-        """Make a model with random weights of this seed."""
-        tokenizer = _tokenizer()
-        model = _model(tokenizer, seed, options.attn_implementation)
-        dtype = resolve_dtype(options)
-        model = model.to(resolve_device(options), torch.float32 if isinstance(dtype, str) else dtype)
-        image_processor = Qwen2VLImageProcessorPil(**pixel_limits(options.min_pixels, options.max_pixels))
-        origin = {"checkpoint": name, "seed": seed}
-        family = Qwen25VLFamily(model, image_processor)
-        loaded = assemble(model, tokenizer, image_processor, template=_TEMPLATE, family=family, origin=origin)
-        return TransformersModel(name, loaded, options)
-
-
-def save_tiny_checkpoint(folder: Path, seed: int) -> None:
-    """Write the tiny model as a checkpoint that `qwen2.5-vl` and transformers' auto classes load.
-
-    Args:
-        folder: made if it does not exist.
-        seed: of the weights.
-    """
-    folder.mkdir(parents=True, exist_ok=True)
-    tokenizer = _tokenizer()
-    tokenizer.chat_template = _TEMPLATE
-    tokenizer.save_pretrained(folder)
-    _model(tokenizer, seed, "sdpa").save_pretrained(folder)
-    Qwen2VLImageProcessorPil().save_pretrained(folder)
-    # The full processor class cannot be built without torchvision; these are the files that it would write.
-    video = {"video_processor_type": "Qwen2VLVideoProcessor", "processor_class": "Qwen2_5_VLProcessor"}
-    for name, content in {
-        "processor_config.json": {"processor_class": "Qwen2_5_VLProcessor"},
-        "video_preprocessor_config.json": video,
-    }.items():
-        (folder / name).write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
-
-
-def _tokenizer() -> PreTrainedTokenizerBase:
-    return train_tokenizer(_SPECIAL, end="<|im_end|>", pad="<|endoftext|>")
-
-
-def _model(tokenizer: PreTrainedTokenizerBase, seed: int, attn_implementation: str) -> Any:
-    ids = {token: cast(int, tokenizer.convert_tokens_to_ids(token)) for token in _SPECIAL}
-    config = Qwen2_5_VLConfig(
+def _config(ids: Mapping[str, int], vocab_size: int) -> Any:
+    return Qwen2_5_VLConfig(
         image_token_id=ids["<|image_pad|>"],
         video_token_id=ids["<|video_pad|>"],
         vision_start_token_id=ids["<|vision_start|>"],
         vision_end_token_id=ids["<|vision_end|>"],
         text_config={
-            "vocab_size": len(tokenizer),
+            "vocab_size": vocab_size,
             "hidden_size": 64,
             "intermediate_size": 128,
             "num_hidden_layers": 2,
             "num_attention_heads": 4,
             "num_key_value_heads": 2,
             "max_position_embeddings": 128_000,
-            "initializer_range": _SPREAD,
+            "initializer_range": SPREAD,
             "bos_token_id": None,
             "eos_token_id": ids["<|im_end|>"],
             "pad_token_id": ids["<|endoftext|>"],
@@ -151,19 +79,44 @@ def _model(tokenizer: PreTrainedTokenizerBase, seed: int, attn_implementation: s
             "num_heads": 2,
             "out_hidden_size": 64,
             "fullatt_block_indexes": [1],
-            "initializer_range": _SPREAD,
+            "initializer_range": SPREAD,
         },
     )
-    with torch.random.fork_rng(devices=[]):
-        torch.manual_seed(seed)
-        model = Qwen2_5_VLForConditionalGeneration._from_config(
-            config, attn_implementation=attn_implementation, dtype=torch.float32
-        )
-    model.generation_config = GenerationConfig(
-        eos_token_id=[ids["<|im_end|>"], ids["<|endoftext|>"]], pad_token_id=ids["<|endoftext|>"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Options(PixelLimits, TinyOptions):
+    pass
+
+
+class Qwen25VLTiny(TinyAdapter):
+    """The adapter `qwen2.5-vl-tiny`."""
+
+    Options = _Options
+    twin = Twin(
+        special=_SPECIAL,
+        end="<|im_end|>",
+        pad="<|endoftext|>",
+        image="<|image_pad|>",
+        template=_TEMPLATE,
+        config=_config,
+        image_processor=Qwen2VLImageProcessorPil,
+        family=Qwen25VLFamily,
+        files={
+            "processor_config.json": {"processor_class": "Qwen2_5_VLProcessor"},
+            "video_preprocessor_config.json": {
+                "video_processor_type": "Qwen2VLVideoProcessor",
+                "processor_class": "Qwen2_5_VLProcessor",
+            },
+        },
     )
-    return model
 
 
-# Wider than usual (0.02): with it, replies of a model without training differ from frame to frame.
-_SPREAD = 0.2
+def save_tiny_checkpoint(folder: Path, seed: int) -> None:
+    """Write the tiny Qwen2.5-VL as a checkpoint that `qwen2.5-vl` and transformers' auto classes load.
+
+    Args:
+        folder: made if it does not exist.
+        seed: of the weights.
+    """
+    Qwen25VLTiny.twin.save(folder, seed)

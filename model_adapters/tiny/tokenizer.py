@@ -1,8 +1,8 @@
 """Byte-level BPE tokenizers trained on the spot, so that tiny models need no download."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
-from tokenizers import Regex, Tokenizer, decoders, models, normalizers, pre_tokenizers, trainers
+from tokenizers import Regex, Tokenizer, decoders, models, normalizers, pre_tokenizers, processors, trainers
 from transformers import PreTrainedTokenizerFast
 
 from model_adapters.tiny.corpus import CORPUS
@@ -13,14 +13,24 @@ __all__ = ["train_tokenizer"]
 _SPLIT = r"""[^\r\n\p{L}\p{N}]?\p{L}+|\p{N}| ?[^\s\p{L}\p{N}]+[\r\n]*|\s*[\r\n]+|\s+(?!\S)|\s+"""
 
 
-def train_tokenizer(special: Sequence[str], end: str, pad: str, n_merged: int = 600) -> PreTrainedTokenizerFast:
+def train_tokenizer(
+    special: Sequence[str],
+    *,
+    end: str,
+    pad: str,
+    begin: str | None = None,
+    named: Mapping[str, str],
+    n_merged: int = 600,
+) -> PreTrainedTokenizerFast:
     """Train a tokenizer on the package's corpus.
 
     Args:
-        special: special tokens, which take the ids behind the trained ones in this order; `end` and `pad` are among
+        special: special tokens, which take the ids behind the trained ones in this order; the tokens below are among
             them.
         end: the token that ends a turn.
         pad: the padding token.
+        begin: the token put before every text, if any.
+        named: tokens that processors look up by attribute, as `image_token`.
         n_merged: tokens that are trained, the 256 bytes among them.
     """
     tokenizer = Tokenizer(models.BPE())
@@ -39,10 +49,15 @@ def train_tokenizer(special: Sequence[str], end: str, pad: str, n_merged: int = 
     )
     tokenizer.train_from_iterator(CORPUS.splitlines(), trainer)
     tokenizer.add_special_tokens(list(special))
+    if begin is not None:
+        tokenizer.post_processor = processors.TemplateProcessing(
+            single=f"{begin} $A", special_tokens=[(begin, tokenizer.token_to_id(begin))]
+        )
     return PreTrainedTokenizerFast(
         tokenizer_object=tokenizer,
+        bos_token=begin,
         eos_token=end,
         pad_token=pad,
-        extra_special_tokens=[token for token in special if token not in (end, pad)],
+        extra_special_tokens=dict(named),
         clean_up_tokenization_spaces=False,
     )

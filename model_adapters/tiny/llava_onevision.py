@@ -1,0 +1,90 @@
+"""A LLaVA-OneVision of two layers with random weights; frames take as many tokens as in the real one."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from transformers import LlavaOnevisionConfig
+from transformers.models.llava_onevision.image_processing_pil_llava_onevision import (
+    LlavaOnevisionImageProcessorPil,
+)
+
+from model_adapters.families.llava_onevision import LlavaOnevisionFamily
+from model_adapters.tiny.twin import SPREAD, TinyAdapter, Twin
+
+__all__ = ["LlavaOnevisionTiny"]
+
+# As the family's: images first, then the texts, each on a line of its own.
+_TEMPLATE = """\
+{%- for message in messages -%}
+{{- '<|im_start|>' + message.role + ' ' -}}
+{%- if message.content is string -%}
+{{- '\\n' + message.content -}}
+{%- else -%}
+{%- for part in message.content if part.type == 'image' -%}{{- '<image>' -}}{%- endfor -%}
+{%- for part in message.content if part.type == 'video' -%}{{- '<video>' -}}{%- endfor -%}
+{%- for part in message.content if part.type == 'text' -%}{{- '\\n' + part.text -}}{%- endfor -%}
+{%- endif -%}
+{{- '<|im_end|>' -}}
+{%- endfor -%}
+{%- if add_generation_prompt -%}
+{{- '<|im_start|>assistant\\n' -}}
+{%- endif -%}
+"""
+
+
+def _config(ids: Mapping[str, int], vocab_size: int) -> Any:
+    return LlavaOnevisionConfig(
+        image_token_index=ids["<image>"],
+        video_token_index=ids["<video>"],
+        text_config={
+            "model_type": "qwen2",
+            "vocab_size": vocab_size,
+            "hidden_size": 64,
+            "intermediate_size": 128,
+            "num_hidden_layers": 2,
+            "num_attention_heads": 4,
+            "num_key_value_heads": 2,
+            "max_position_embeddings": 32_768,
+            "initializer_range": SPREAD,
+            "bos_token_id": None,
+            "eos_token_id": ids["<|im_end|>"],
+            "pad_token_id": ids["<|endoftext|>"],
+        },
+        vision_config={
+            "model_type": "siglip_vision_model",
+            "image_size": 384,
+            "patch_size": 14,
+            "hidden_size": 16,
+            "intermediate_size": 32,
+            "num_hidden_layers": 1,
+            "num_attention_heads": 1,
+            "vision_use_head": False,
+        },
+    )
+
+
+class LlavaOnevisionTiny(TinyAdapter):
+    """The adapter `llava-onevision-tiny`."""
+
+    twin = Twin(
+        special=("<|endoftext|>", "<|im_start|>", "<|im_end|>", "<image>", "<video>"),
+        end="<|im_end|>",
+        pad="<|endoftext|>",
+        image="<image>",
+        template=_TEMPLATE,
+        config=_config,
+        image_processor=LlavaOnevisionImageProcessorPil,
+        family=LlavaOnevisionFamily,
+        files={
+            "processor_config.json": {
+                "processor_class": "LlavaOnevisionProcessor",
+                "num_image_tokens": 729,
+                "vision_feature_select_strategy": "full",
+                "vision_aspect_ratio": "anyres_max_9",
+            },
+            "video_preprocessor_config.json": {
+                "video_processor_type": "LlavaOnevisionVideoProcessor",
+                "processor_class": "LlavaOnevisionProcessor",
+            },
+        },
+    )
