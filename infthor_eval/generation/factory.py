@@ -2,7 +2,7 @@
 
 import random
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -22,11 +22,11 @@ from infthor_eval.formats.trajectory import (
     Trajectory,
 )
 from infthor_eval.generation.affordances import goes_into
-from infthor_eval.generation.navigation import Grid
 from infthor_eval.generation.planner import plan
 from infthor_eval.generation.recorder import object_log
 from infthor_eval.generation.rollout import Rollout, RolloutError
 from infthor_eval.generation.sampling import TaskPool
+from infthor_eval.generation.scout import reachable
 from infthor_eval.generation.symbolic import Operator, Room, room_of
 from infthor_eval.generation.tasks import Task, TaskType, sub_task
 from infthor_eval.thor.restore import restore
@@ -123,10 +123,10 @@ class _Factory:
     def begin(self) -> None:
         """Load the scene and put the agent somewhere."""
         view = self._simulator.reset(self._settings.scene)
-        reachable = self._reachable()
-        if not reachable:
+        grid = reachable(self._simulator)
+        if not grid.cells:
             raise UsageError(f"scene {self._settings.scene}: the agent can stand nowhere; choose another scene")
-        x, z = self._rng.choice(reachable)
+        x, z = grid.position(self._rng.choice(sorted(grid.cells)))
         start = InitAction(x, view.agent.position.y, z, float(self._rng.choice([0, 90, 180, 270])), 30.0)
         self._scene = Scene(
             floor_plan=self._settings.scene,
@@ -218,7 +218,7 @@ class _Factory:
     def _carry_out(self, operators: Sequence[Operator]) -> bool:
         """Run operators; where that fails, the simulator is as it was before and nothing is added."""
         mark = self._simulator.mark()
-        rollout = Rollout(self._simulator, Grid(self._reachable()), len(self._high))
+        rollout = Rollout(self._simulator, len(self._high))
         try:
             rollout.run(list(operators))
         except RolloutError as error:
@@ -238,10 +238,6 @@ class _Factory:
 
     def _room(self) -> Room:
         return room_of(self._simulator.view)
-
-    def _reachable(self) -> list[tuple[float, float]]:
-        positions: Iterable[dict[str, float]] = self._simulator.query("GetReachablePositions").result or ()
-        return sorted((position["x"], position["z"]) for position in positions)
 
 
 def _number(scene: str) -> int:

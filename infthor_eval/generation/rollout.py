@@ -9,7 +9,7 @@ from typing import Any
 
 from infthor_eval.formats.trajectory import ApiAction, DiscreteAction, HighAction, LowAction, PlannerAction
 from infthor_eval.generation.navigation import GRID, Grid
-from infthor_eval.generation.scout import HORIZON_STEP, Viewpoint, find_viewpoint, stand_of
+from infthor_eval.generation.scout import HORIZON_STEP, Viewpoint, find_viewpoint, reachable, stand_of
 from infthor_eval.generation.symbolic import Operator, direct_parent
 from infthor_eval.generation.wording import compact
 from infthor_eval.thor.simulator import Simulator
@@ -41,18 +41,17 @@ class Rollout:
 
     Attributes:
         simulator: carries the actions out.
-        grid: the reachable cells.
         acted: the actions.
         high: the sub-goals.
         first_high: number of the first sub-goal.
     """
 
     simulator: Simulator
-    grid: Grid
     first_high: int = 0
     acted: list[Acted] = field(default_factory=list)
     high: list[HighAction] = field(default_factory=list)
     _slices: dict[str, str] = field(default_factory=dict)
+    _grid: Grid | None = None
 
     def run(self, operators: list[Operator]) -> None:
         """Carry out a plan.
@@ -137,27 +136,36 @@ class Rollout:
     def _go(self, shown: list[str], inside: str | None = None) -> None:
         """Walk to where the objects can be acted on, as a sub-goal of its own."""
         target = self._view.objects[shown[0]]
-        viewpoint = find_viewpoint(self.simulator, self.grid, shown, inside, _MIN_PIXELS)
-        if viewpoint is None:
-            raise RolloutError(f"no place to reach {target.object_type} from")
-        path = self.grid.path(stand_of(self._view, self.grid), viewpoint.stand)
-        if path is None:
-            raise RolloutError(f"no way to {target.object_type}")
-        looks = self._looks(viewpoint)
-        if not path and not looks:
+        viewpoint, moves = self._way(shown, inside)
+        if not moves:
             return
-        stand = viewpoint.stand
-        location = f"loc|{stand.cell[0]}|{stand.cell[1]}|{stand.facing // _TURN}|{viewpoint.horizon}"
-        high = HighAction(
-            self.first_high + len(self.high),
-            DiscreteAction("GotoLocation", [compact(target.object_type)]),
-            PlannerAction("GotoLocation", location=location, object_id=target.object_id),
-        )
-        self.high.append(high)
-        for action in path + looks:
+        (x, z), facing = viewpoint.stand.cell, viewpoint.stand.facing
+        location = f"loc|{x}|{z}|{facing // _TURN}|{viewpoint.horizon}"
+        action = PlannerAction("GotoLocation", location=location, object_id=target.object_id)
+        words = DiscreteAction("GotoLocation", [compact(target.object_type)])
+        self.high.append(HighAction(self.first_high + len(self.high), words, action))
+        self._walk(moves, shown)
+
+    def _way(self, shown: list[str], inside: str | None = None) -> tuple[Viewpoint, list[str]]:
+        """Where to act on the objects, and the actions that lead there."""
+        target = self._view.objects[shown[0]].object_type
+        if self._grid is None:
+            self._grid = reachable(self.simulator)
+        grid = self._grid
+        viewpoint = find_viewpoint(self.simulator, grid, shown, inside, _MIN_PIXELS)
+        if viewpoint is None:
+            raise RolloutError(f"no place to reach {target} from")
+        path = grid.path(stand_of(self._view, grid), viewpoint.stand)
+        if path is None:
+            raise RolloutError(f"no way to {target}")
+        return viewpoint, path + self._looks(viewpoint)
+
+    def _walk(self, moves: list[str], shown: list[str]) -> None:
+        for action in moves:
             self._move(action)
         if not all(self._view.objects[key].visible for key in shown):
-            raise RolloutError(f"{target.object_type} is out of sight after walking to it")
+            target = self._view.objects[shown[0]].object_type
+            raise RolloutError(f"{target} is out of sight after walking to it")
 
     def _looks(self, viewpoint: Viewpoint) -> list[str]:
         steps = round((viewpoint.horizon - self._view.agent.horizon) / HORIZON_STEP)
@@ -165,10 +173,7 @@ class Rollout:
 
     def _move(self, action: str) -> None:
         if action == "MoveAhead":
-            before = stand_of(self._view, self.grid)
             self._act(ApiAction(action, move_magnitude=GRID), {"moveMagnitude": GRID}, "25")
-            if stand_of(self._view, self.grid) == before:
-                raise RolloutError("MoveAhead went nowhere")
         else:
             degrees = _TURN if action.startswith("Rotate") else HORIZON_STEP
             self._act(ApiAction(action), {"degrees": float(degrees)}, str(degrees))
@@ -179,11 +184,14 @@ class Rollout:
         """An action on an object, stored in the form that trajectories have (the held object and its
         receptacle)."""
         acted_on = item if receptacle is None else receptacle
-        view = self._view
-        if acted_on not in view.objects or not view.objects[acted_on].visible:
-            raise RolloutError(f"{action}: {acted_on.split('|')[0]} is not in sight")
+        if acted_on not in self._view.objects:
+            raise RolloutError(f"{action}: {acted_on.split('|')[0]} is gone")
+        if not self._view.objects[acted_on].visible:
+            # A thing just put down or uncovered may lie where it cannot be seen from here: step aside.
+            self._walk(self._way([acted_on])[1], [acted_on])
         api = ApiAction(action, object_id=item, receptacle_id=receptacle)
         self._act(api, {"objectId": acted_on})
+        self._grid = None  # a door or a thing on the floor may be in the way now, or no longer
 
     def _act(self, api: ApiAction, arguments: dict[str, Any], suffix: str = "") -> None:
         before = self._view

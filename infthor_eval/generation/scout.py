@@ -12,7 +12,7 @@ from infthor_eval.generation.navigation import Grid, Stand
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import ThorObject, Vector, View
 
-__all__ = ["CAMERA_HEIGHT", "HORIZON_STEP", "Viewpoint", "find_viewpoint", "stand_of"]
+__all__ = ["CAMERA_HEIGHT", "HORIZON_STEP", "Viewpoint", "find_viewpoint", "reachable", "stand_of"]
 
 CAMERA_HEIGHT = 0.675  # of the camera above the agent's position, metres
 HORIZON_STEP = 30
@@ -63,6 +63,12 @@ def find_viewpoint(
             break
     _return(simulator, here)
     return found
+
+
+def reachable(simulator: Simulator) -> Grid:
+    """The cells that the agent can reach as things are now."""
+    positions = simulator.query("GetReachablePositions").result or ()
+    return Grid((position["x"], position["z"]) for position in positions)
 
 
 def stand_of(view: View, grid: Grid) -> Stand:
