@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from infthor_eval.report import nieh_table, summarise
-from infthor_eval.runs import Plan, RunOutcome, RunRequest, UnitRecord, execute, plan
+from infthor_eval.runs import Observer, Plan, RunOutcome, RunRequest, UnitRecord, execute, plan
 from model_adapters import options
 
 __all__ = ["evaluate"]
@@ -29,7 +29,6 @@ def evaluate(requests: Sequence[RunRequest]) -> int:
     for request in requests:
         options(request.model)  # an unknown model is refused before the data are read
     plans = [plan(request) for request in requests]
-    _say_what_is_left_out(plans[0])
     summaries, outcomes = [], []
     for ready in plans:
         outcome = _execute(ready)
@@ -43,29 +42,32 @@ def evaluate(requests: Sequence[RunRequest]) -> int:
     return int(any(_say_what_failed(outcome) for outcome in outcomes))
 
 
-def _execute(ready: Plan) -> RunOutcome:
+def _execute(plan: Plan) -> RunOutcome:
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    found = 0
+    found = made = 0
     with Progress(*columns, console=_notes, transient=True) as progress:
-        bar = progress.add_task(ready.request.model, total=ready.n_units)
 
-        def observe(_: UnitRecord, resumed: bool) -> None:
-            nonlocal found
-            found += resumed
-            progress.advance(bar)
+        def begin(ready: Plan) -> Observer:
+            _say_what_is_left_out(ready)
+            bar = progress.add_task(ready.request.model, total=ready.n_units)
 
-        outcome = execute(ready, observe)
-    made = ready.n_units - found
+            def observe(_: UnitRecord, resumed: bool) -> None:
+                nonlocal found, made
+                found, made = found + resumed, made + (not resumed)
+                progress.advance(bar)
+
+            return observe
+
+        outcome = execute(plan, begin)
     _notes.print(
-        f"{ready.request.model}: {made} answered now, {found} found in the journal of an earlier run",
-        highlight=False,
+        f"{plan.request.model}: {made} answered now, {found} found in the journal of an earlier run", highlight=False
     )
     return outcome
 
 
 def _say_what_is_left_out(ready: Plan) -> None:
     for task in ready.tasks:
-        for reason, n in sorted(Counter(item.reason for item in task.left_out).items()):
+        for reason, n in sorted(Counter(item.reason for item in task.resolved.left_out).items()):
             _notes.print(f"{task.name}: {n} question(s) left out: {reason}", style="yellow", highlight=False)
 
 

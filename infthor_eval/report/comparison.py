@@ -44,7 +44,7 @@ def compare(first: Iterable[UnitRecord], second: Iterable[UnitRecord]) -> list[C
     if not shared:
         raise DataError("the two runs share no question of the same task; compare runs on the same set")
     found = []
-    for task in sorted({task for task, _ in shared}):
+    for task in sorted({key[0] for key in shared}):
         keys = [key for key in shared if key[0] == task]
         unshared = sum(key[0] == task for key in ours.keys() ^ theirs.keys())
         for scorer in SCORERS:

@@ -2,9 +2,8 @@
 
 from typing import Protocol
 
-from infthor_eval.formats.frames import FrameRef
 from infthor_eval.runs.units import Unit
-from model_adapters import Bound, Model, Reply
+from model_adapters import Bound, Model, Part, Reply
 
 __all__ = ["Answerer", "answerer_for"]
 
@@ -22,21 +21,21 @@ class Answerer(Protocol):
 
 
 class _ModelAnswerer:
-    """Keeps one conversation, so that units on the same frames share what the model has encoded of them."""
+    """Keeps one conversation, so that units in the same context share what the model has encoded of it."""
 
     def __init__(self, model: Model) -> None:
         self._conversation = model.conversation()
         self._start = self._conversation.mark()
-        self._after_frames = self._start
-        self._frames: tuple[FrameRef, ...] = ()
+        self._after_context = self._start
+        self._context: tuple[Part, ...] = ()
 
     def answer(self, unit: Unit) -> Reply:
-        if unit.frames != self._frames:
+        if unit.context != self._context:
             self._conversation.rewind(self._start)
-            self._frames = ()
-            self._conversation.append(*unit.frames)
-            self._frames, self._after_frames = unit.frames, self._conversation.mark()
-        self._conversation.rewind(self._after_frames)
+            self._context = ()
+            self._conversation.append(*unit.context)
+            self._context, self._after_context = unit.context, self._conversation.mark()
+        self._conversation.rewind(self._after_context)
         self._conversation.append(unit.text)
         return self._conversation.reply(unit.decoding["max_gen_toks"], unit.decoding.get("until", ()))
 

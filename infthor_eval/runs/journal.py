@@ -1,6 +1,6 @@
 """The journal of a run: every finished unit, one JSON line each, on disk before it counts.
 
-The first line says what run it is. A unit is found again by its task and its question, and counts only if the
+The first line says what run it is. A unit is found again by its task, question and variant, and counts only if the
 fingerprint of its inputs is the same, so an answer given to other inputs is never taken for this one's. A line that
 a killed process left unfinished is cut off when the journal is opened again.
 """
@@ -28,6 +28,7 @@ class UnitRecord(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     Attributes:
         task: the lm-eval task.
         question_id: see `Question.id`.
+        variant: which of the task's ways of asking it this is ("depth=0.4"); empty where there is one.
         fingerprint: of the unit's inputs: the prompt, the frames' content, the gold answers, the decoding settings.
         traj_id: the trajectory that the question is about; intervals cluster by it.
         question: the question's text.
@@ -50,6 +51,7 @@ class UnitRecord(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     question_type: str
     n_clues: int
     answers: tuple[str | int | float, ...]
+    variant: str = ""
     reply: str | None = None
     failure: str | None = None
     n_context_tokens: int = 0
@@ -58,9 +60,9 @@ class UnitRecord(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     seconds: float = 0.0
 
     @property
-    def key(self) -> tuple[str, str]:
+    def key(self) -> tuple[str, str, str]:
         """Which unit of the run this is."""
-        return self.task, self.question_id
+        return self.task, self.question_id, self.variant
 
 
 # Is told of each unit that is done, and whether it was found in the journal of an earlier, stopped run.
@@ -105,7 +107,7 @@ class Journal:
         """Everything recorded, the latest of a unit where it was tried again."""
         return list(self._records.values())
 
-    def answered(self, key: tuple[str, str], fingerprint: str) -> UnitRecord | None:
+    def answered(self, key: tuple[str, str, str], fingerprint: str) -> UnitRecord | None:
         """The record of a unit that was answered from these inputs; a failed one is tried again by the next run."""
         record = self._records.get(key)
         if record is None or record.failure is not None or record.fingerprint != fingerprint:

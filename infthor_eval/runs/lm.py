@@ -7,10 +7,10 @@ from lm_eval.api.instance import Instance
 from lm_eval.api.model import LM
 
 from infthor_eval.errors import DataError, ModelError
-from infthor_eval.nieh.task import doc_frames, doc_question
+from infthor_eval.nieh.task import doc_parts, doc_question
 from infthor_eval.runs.answering import answerer_for
 from infthor_eval.runs.journal import Journal, Observer, UnitRecord
-from infthor_eval.runs.units import Unit, by_shared_frames
+from infthor_eval.runs.units import Unit, by_shared_context
 from model_adapters import Bound, Model, Reply
 
 __all__ = ["JournaledLM"]
@@ -52,7 +52,7 @@ class JournaledLM(LM):
     def generate_until(self, requests: Sequence[Instance]) -> list[str]:
         """One response per request; empty where the model could not answer (the journal has the reason)."""
         units = [_unit(request) for request in requests]
-        records = {id(unit): self._record(unit) for group in by_shared_frames(units) for unit in group}
+        records = {id(unit): self._record(unit) for group in by_shared_context(units) for unit in group}
         return [records[id(unit)].reply or "" for unit in units]
 
     def loglikelihood(self, requests: Sequence[Instance]) -> list[tuple[float, bool]]:
@@ -68,7 +68,7 @@ class JournaledLM(LM):
             inputs = unit.fingerprint
         except DataError as error:
             return self._keep(_as_record(unit, "", failure=str(error)))
-        found = self._journal.answered((unit.task, unit.question.id), inputs)
+        found = self._journal.answered((unit.task, unit.question.id, unit.variant), inputs)
         if found is not None:
             self._observe(found, True)
             return found
@@ -88,7 +88,9 @@ class JournaledLM(LM):
 def _unit(request: Instance) -> Unit:
     if request.task_name is None:
         raise ModelError("lm-eval sent a request without its task's name; use lm_eval 0.4.13")
-    return Unit(request.task_name, doc_question(request.doc), doc_frames(request.doc), request.args[1])
+    *context, text = doc_parts(request.doc)
+    question, variant = doc_question(request.doc), request.doc["variant"]
+    return Unit(request.task_name, question, variant, tuple(context), str(text), request.args[1])
 
 
 def _as_record(
@@ -97,6 +99,7 @@ def _as_record(
     return UnitRecord(
         task=unit.task,
         question_id=unit.question.id,
+        variant=unit.variant,
         fingerprint=inputs,
         traj_id=unit.question.traj_id,
         question=unit.question.text,

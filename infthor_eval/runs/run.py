@@ -2,22 +2,25 @@
 
 import json
 import logging
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import infthor_eval
 from infthor_eval.errors import UsageError
-from infthor_eval.formats.nieh_set import LeftOut, NiehSet
-from infthor_eval.formats.question import Question
-from infthor_eval.nieh.task import open_set, task_questions
+from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.nieh.contexts import context_named
+from infthor_eval.nieh.work import Work, find_set, find_work, open_set
 from infthor_eval.runs.catalog import Catalog
 from infthor_eval.runs.identity import fingerprint
 from infthor_eval.runs.journal import Journal, Observer, UnitRecord
 from model_adapters import Bound, Model, load
 
-__all__ = ["Plan", "RunOutcome", "RunRequest", "execute", "plan"]
+__all__ = ["Plan", "RunOutcome", "RunRequest", "TaskPlan", "execute", "plan"]
+
+# Bounds read no frames; contexts that are measured in tokens are cut for them as for Qwen2.5-VL (published count).
+_BOUND_TOKENS_PER_FRAME = 121
 
 
 @dataclass(frozen=True)
@@ -45,27 +48,45 @@ class RunRequest:
 
 @dataclass(frozen=True)
 class TaskPlan:
-    """One task: its settings, its questions, and what of the set cannot be asked."""
+    """One task: its file's settings, and what it asks.
+
+    Attributes:
+        name: the lm-eval task.
+        config: the task file's settings.
+        work: what is asked and what is left out; None as long as that depends on a model which is not loaded yet.
+    """
 
     name: str
     config: Mapping[str, Any]
-    data: NiehSet
-    questions: list[Question]
-    left_out: list[LeftOut]
+    work: Work | None
+
+    @property
+    def resolved(self) -> Work:
+        """The work, once it is known."""
+        if self.work is None:
+            raise ValueError(f"what {self.name} asks depends on the model; load it first")
+        return self.work
 
 
 @dataclass(frozen=True)
 class Plan:
-    """A request whose names, files and questions have been found to be in order."""
+    """A request whose names, files and questions have been found to be in order.
+
+    Attributes:
+        request: what was asked for.
+        tasks: what it comes to.
+        tokens_per_frame: the model's tokens of one frame, where a task's frames depend on it.
+    """
 
     request: RunRequest
     tasks: list[TaskPlan]
+    tokens_per_frame: int | None = None
 
     @property
     def n_units(self) -> int:
-        """Questions that will be asked, over all tasks."""
+        """Questions that will be asked, over all tasks and variants."""
         limit = self.request.limit
-        return sum(len(t.questions) if limit is None else min(limit, len(t.questions)) for t in self.tasks)
+        return sum(min(limit or len(task.resolved.cases), len(task.resolved.cases)) for task in self.tasks)
 
 
 @dataclass(frozen=True)
@@ -81,7 +102,7 @@ def plan(request: RunRequest) -> Plan:
     """Check a request before anything expensive is loaded.
 
     Raises:
-        UsageError: an unknown task, or a task without its data.
+        UsageError: an unknown task, or a task without its data or with nothing that can be asked.
         DataError: the set is not what the format says.
     """
     open_set.cache_clear()  # its files may have changed since an earlier run of this process
@@ -89,38 +110,76 @@ def plan(request: RunRequest) -> Plan:
     tasks = []
     for name in catalog.expand(request.tasks):
         config = catalog.tasks[name]
-        given = {"data": str(request.data)} if request.data else {}
-        data, questions, left_out = task_questions(**given, **config["dataset_kwargs"])
-        if not questions:
-            reasons = "; ".join(sorted({item.reason for item in left_out})[:3]) or "its files are empty"
-            raise UsageError(f"task {name}: {data.root} has no question that can be asked ({reasons})")
-        tasks.append(TaskPlan(name, config, data, questions, left_out))
+        settings = _metadata(request) | config["dataset_kwargs"]
+        if context_named(settings["context"]).needs_model:
+            work = None
+            find_set(**settings)
+        else:
+            work = find_work(settings)
+            _refuse_nothing(name, work)
+        tasks.append(TaskPlan(name, config, work))
     return Plan(request, tasks)
 
 
-def execute(ready: Plan, observe: Observer) -> RunOutcome:
+def execute(ready: Plan, begin: Callable[[Plan], Observer]) -> RunOutcome:
     """Load the model, ask what the journal does not hold yet, and write the run's files.
 
     The folder `<output>/<model>/<tasks>-<identity>/` holds `journal.jsonl` and lm-eval's results and samples.
 
+    Args:
+        ready: what `plan` found.
+        begin: called once all that will be asked is known; what it returns is told of each unit that is done.
+
     Raises:
-        UsageError: a wrong model name or option, or another process at the same run.
+        UsageError: a wrong model name or option, another process at the same run, or nothing that can be asked.
         ModelError: the model cannot be loaded.
     """
     request = ready.request
     model = load(request.model, request.model_options, request.seed)
     try:
+        ready = _resolved(ready, model)
         if isinstance(model, Bound):
-            model.study([question for task in ready.tasks for question in task.questions])
+            model.study([question for task in ready.tasks for question in task.resolved.data.questions])
         identity = _identity(ready, model)
-        name = f"{'+'.join(request.tasks)}-{fingerprint(identity)}"
-        folder = request.output / request.model / name
+        folder = request.output / request.model / f"{'+'.join(request.tasks)}-{fingerprint(identity)}"
         with Journal(folder / "journal.jsonl", identity) as journal:
-            _evaluate(ready, model, journal, observe, folder / "lm_eval")
+            _evaluate(ready, model, journal, begin(ready), folder / "lm_eval")
             return RunOutcome(folder, identity, journal.records)
     finally:
         if isinstance(model, Model):
             model.close()
+
+
+def _metadata(request: RunRequest, tokens_per_frame: int | None = None) -> dict[str, Any]:
+    """What this run tells its tasks beside their files' own settings."""
+    ours = {"data": str(request.data) if request.data else None, "tokens_per_frame": tokens_per_frame}
+    return {"seed": request.seed} | {key: value for key, value in ours.items() if value is not None}
+
+
+def _refuse_nothing(name: str, work: Work) -> None:
+    if not work.cases:
+        reasons = "; ".join(sorted({item.reason for item in work.left_out})[:3]) or "its files are empty"
+        raise UsageError(f"task {name}: no question of {work.data.root} can be asked ({reasons})")
+
+
+def _resolved(ready: Plan, model: Model | Bound) -> Plan:
+    """The plan with the work that depends on the model."""
+    waiting = [task for task in ready.tasks if task.work is None]
+    if not waiting:
+        return ready
+    tokens = _tokens_per_frame(model, find_set(**_metadata(ready.request) | waiting[0].config["dataset_kwargs"]))
+    tasks = []
+    for task in ready.tasks:
+        settings = _metadata(ready.request, tokens) | task.config["dataset_kwargs"]
+        tasks.append(replace(task, work=task.work or find_work(settings)))
+        _refuse_nothing(task.name, tasks[-1].resolved)
+    return Plan(ready.request, tasks, tokens)
+
+
+def _tokens_per_frame(model: Model | Bound, data: NiehSet) -> int:
+    if isinstance(model, Bound):
+        return _BOUND_TOKENS_PER_FRAME
+    return model.tokens_per_frame(data.frames(data.questions[0].traj_id)[0])
 
 
 def _identity(ready: Plan, model: Model | Bound) -> dict[str, Any]:
@@ -137,22 +196,19 @@ def _identity(ready: Plan, model: Model | Bound) -> dict[str, Any]:
 
 
 def _task_identity(task: TaskPlan) -> dict[str, Any]:
+    work = task.resolved
+    left_out = [{"question_id": i.question.id, "variant": i.variant, "reason": i.reason} for i in work.left_out]
     return {
         "config": dict(task.config),
-        "data": task.data.fingerprint,
-        "simulator": task.data.simulator,
-        "n_questions": len(task.questions),
-        "left_out": [{"question_id": item.question.id, "reason": item.reason} for item in task.left_out],
+        "data": work.data.fingerprint,
+        "simulator": work.data.simulator,
+        "n_cases": len(work.cases),
+        "left_out": left_out,
     }
 
 
-def _evaluate(
-    ready: Plan,
-    model: Model | Bound,
-    journal: Journal,
-    observe: Observer,
-    output: Path,
-) -> None:
+def _evaluate(ready: Plan, model: Model | Bound, journal: Journal, observe: Observer, output: Path) -> None:
+    """Have lm-eval drive the model through the tasks, and write its own files."""
     import lm_eval.models  # noqa: F401 - before anything is registered, or the built-in models vanish (0.4.13)
     from datasets.utils.logging import disable_progress_bar
     from lm_eval import simple_evaluate
@@ -163,7 +219,6 @@ def _evaluate(
 
     disable_progress_bar()
     logging.getLogger("lm_eval").setLevel(logging.ERROR)
-    data = ready.request.data
     tracker = EvaluationTracker(output_path=str(output))
     results = simple_evaluate(
         model=JournaledLM(model, journal, observe),
@@ -171,7 +226,7 @@ def _evaluate(
         task_manager=TaskManager(
             include_path=str(Catalog.packaged().folder),
             include_defaults=False,
-            metadata={"pixels": False, **({"data": str(data)} if data else {})},
+            metadata={**_metadata(ready.request, ready.tokens_per_frame), "pixels": False},
         ),
         limit=ready.request.limit,
         bootstrap_iters=0,
@@ -179,5 +234,5 @@ def _evaluate(
     )
     samples = results.pop("samples")
     tracker.save_results_aggregated(results=results, samples=samples)
-    for task in sorted(samples):
-        tracker.save_results_samples(task_name=task, samples=samples[task])
+    for name in sorted(samples):
+        tracker.save_results_samples(task_name=name, samples=samples[name])

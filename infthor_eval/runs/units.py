@@ -1,4 +1,4 @@
-"""Units of a run: one question in one context, with all that its reply depends on."""
+"""Units of a run: one question asked in one way, with all that its reply depends on."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -8,64 +8,62 @@ from typing import Any
 
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.question import Question
-from infthor_eval.nieh.prompts import question_text
 from infthor_eval.runs.identity import fingerprint
 
-__all__ = ["Unit", "by_shared_frames"]
+__all__ = ["Unit", "by_shared_context"]
 
 
 @dataclass(frozen=True)
 class Unit:
-    """A question, the frames it is asked on, and how the reply is decoded.
+    """A question, the context it is asked in, and how the reply is decoded.
 
     Attributes:
         task: the lm-eval task that asks.
         question: the question with its gold answers.
-        frames: the context, in order.
+        variant: which of the task's ways of asking this is; empty where there is one.
+        context: what the model is shown before the question's text.
+        text: the text with the question.
         decoding: lm-eval's generation settings (`max_gen_toks`, `until`, ...).
     """
 
     task: str
     question: Question
-    frames: tuple[FrameRef, ...]
+    variant: str
+    context: tuple[str | FrameRef, ...]
+    text: str
     decoding: Mapping[str, Any]
-
-    @property
-    def text(self) -> str:
-        """What follows the frames."""
-        return question_text(self.question)
 
     @cached_property
     def fingerprint(self) -> str:
-        """Hash of the inputs: text, content of the frames, gold answers, decoding.
+        """Hash of the inputs: context with the frames' content, text, gold answers, decoding.
 
         Raises:
             DataError: a frame cannot be read.
         """
         return fingerprint(
             {
+                "context": [[part.digest] if isinstance(part, FrameRef) else part for part in self.context],
                 "text": self.text,
-                "frames": [frame.digest for frame in self.frames],
                 "answers": list(self.question.answers),
                 "decoding": dict(self.decoding),
             }
         )
 
 
-def by_shared_frames(units: Iterable[Unit]) -> list[list[Unit]]:
-    """Units in the order of work: those on the same frames together, those of one trajectory after another.
+def by_shared_context(units: Iterable[Unit]) -> list[list[Unit]]:
+    """Units in the order of work: those in the same context together, those of one trajectory after another.
 
-    Neighbours then share as long a prefix of frames as there is, which a model's conversation encodes once. The
-    order depends on the units alone, so it is the same when a run is resumed.
+    Neighbours then share as long a prefix as there is, which a model's conversation encodes once. The order depends on
+    the units alone, so it is the same when a run is resumed.
     """
     ordered = sorted(units, key=lambda unit: (unit.task, unit.question.traj_id))
     groups: list[list[Unit]] = []
     for _, of_trajectory in groupby(ordered, key=lambda unit: (unit.task, unit.question.traj_id)):
         # One trajectory at a time: names of all frames of all units at once would not fit in memory.
-        named = sorted(of_trajectory, key=_frame_names)
-        groups += [list(group) for _, group in groupby(named, key=_frame_names)]
+        named = sorted(of_trajectory, key=_names)
+        groups += [list(group) for _, group in groupby(named, key=_names)]
     return groups
 
 
-def _frame_names(unit: Unit) -> list[str]:
-    return [frame.path.name for frame in unit.frames]
+def _names(unit: Unit) -> list[str]:
+    return [part.path.name if isinstance(part, FrameRef) else part for part in unit.context]

@@ -29,9 +29,9 @@ def test_what_was_recorded_is_there_when_the_run_goes_on(tmp_path):
     with Journal(path, IDENTITY) as journal:
         journal.append(record())
     with Journal(path, IDENTITY) as journal:
-        assert journal.answered(("t", "q1"), "f") == record()
-        assert journal.answered(("t", "q1"), "other inputs") is None
-        assert journal.answered(("other task", "q1"), "f") is None
+        assert journal.answered(("t", "q1", ""), "f") == record()
+        assert journal.answered(("t", "q1", ""), "other inputs") is None
+        assert journal.answered(("other task", "q1", ""), "f") is None
     assert read_journal(path) == (IDENTITY, [record()])
 
 
@@ -56,7 +56,7 @@ def test_a_failed_unit_is_tried_again_and_its_later_reply_counts(tmp_path):
     failed = record(reply=None, failure="too long", fingerprint="")
     with Journal(path, IDENTITY) as journal:
         journal.append(failed)
-        assert journal.answered(("t", "q1"), "") is None
+        assert journal.answered(("t", "q1", ""), "") is None
         journal.append(record())
         assert journal.records == [record()]
     assert read_journal(path)[1] == [record()]

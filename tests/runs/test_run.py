@@ -9,8 +9,8 @@ from infthor_eval.runs import execute, plan, read_journal
 from model_adapters import Reply
 
 
-def silent(record, resumed):
-    pass
+def silent(ready):
+    return lambda record, resumed: None
 
 
 def test_oracle_is_right_everywhere_and_lm_eval_agrees(make_request):
@@ -25,8 +25,8 @@ def test_oracle_is_right_everywhere_and_lm_eval_agrees(make_request):
 
 def test_the_same_command_goes_on_and_another_starts_anew(make_request):
     resumed = []
-    first = execute(plan(make_request()), lambda record, found: resumed.append(found))
-    again = execute(plan(make_request()), lambda record, found: resumed.append(found))
+    first = execute(plan(make_request()), lambda _: lambda record, found: resumed.append(found))
+    again = execute(plan(make_request()), lambda _: lambda record, found: resumed.append(found))
     assert resumed == [False] * 10 + [True] * 10
     assert again == first
     for changes in ({"seed": 1}, {"limit": 1}, {"tasks": ("nieh_gt",)}, {"model": "blind"}):
@@ -45,7 +45,7 @@ def test_a_changed_frame_of_the_same_size_is_noticed(make_request):
     content[-20] ^= 1
     frame.write_bytes(bytes(content))
     resumed = Counter()
-    execute(plan(request), lambda record, found: resumed.update([(record.question, found)]))
+    execute(plan(request), lambda _: lambda record, found: resumed.update([(record.question, found)]))
     made = {question for question, found in resumed if not found}
     assert made == {"Is there a mug?", "Where was the mug before you put it?"}
 
@@ -61,6 +61,9 @@ class Recorder:
 
     def identity(self):
         return {}
+
+    def tokens_per_frame(self, frame):
+        return 100
 
     def conversation(self):
         return self
@@ -123,7 +126,7 @@ def test_a_unit_that_fails_is_recorded_and_the_run_goes_on(make_request, recorde
 def test_a_frame_that_is_no_image_is_left_out_of_the_contexts_that_need_it(make_request):
     request = make_request()
     (request.data / "metadata" / "traj_b" / "img" / "000000002.png").write_text("text")
-    left_out = {task.name: len(task.left_out) for task in plan(request).tasks}
+    left_out = {task.name: len(task.resolved.left_out) for task in plan(request).tasks}
     assert left_out == {"nieh_gt": 1, "nieh_full": 2}
 
 
@@ -131,7 +134,7 @@ def test_a_task_without_its_data_or_without_a_question_is_refused(make_request, 
     with pytest.raises(UsageError, match="give its folder with --data"):
         plan(make_request(data=None))
     empty = make_nieh_set([Question("t", "q", (99,), ("a",))], name="empty")
-    with pytest.raises(UsageError, match=r"no question that can be asked \(clue 99 is outside trajectory t"):
+    with pytest.raises(UsageError, match=r"can be asked \(clue 99 is outside trajectory t"):
         plan(make_request(data=empty))
 
 

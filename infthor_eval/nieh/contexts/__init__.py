@@ -1,0 +1,36 @@
+"""Contexts by the names that task files use."""
+
+from infthor_eval.errors import UsageError
+from infthor_eval.nieh.contexts import sequence, views
+from infthor_eval.nieh.contexts.base import Case, Context, Settings, Unfit
+from infthor_eval.nieh.contexts.haystack import haystack
+
+__all__ = ["CONTEXTS", "Case", "Context", "Settings", "Unfit", "context_named"]
+
+CONTEXTS = {
+    "clues": Context(views.clues),
+    "trajectory": Context(views.trajectory),
+    "truncate_head": Context(views.truncate_head, needs_model=True),
+    "haystack": Context(haystack, needs_model=True),
+    "interleaved": Context(
+        sequence.interleaved,
+        intro="Answer the question given the state and action sequence of the embodied agent.",
+        parts=sequence.interleaved_parts,
+    ),
+    "text_state": Context(
+        sequence.last_state,
+        intro="Answer the question given the description of the environment and the agent's state (the last image).",
+        parts=sequence.state_parts,
+    ),
+}
+
+
+def context_named(name: str) -> Context:
+    """The context of that name.
+
+    Raises:
+        UsageError: there is none.
+    """
+    if name not in CONTEXTS:
+        raise UsageError(f"unknown context {name!r}; a task's dataset_kwargs takes {', '.join(CONTEXTS)}")
+    return CONTEXTS[name]

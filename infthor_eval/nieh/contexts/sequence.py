@@ -1,0 +1,79 @@
+"""Contexts in which text stands between or instead of frames."""
+
+import json
+from collections.abc import Sequence
+from itertools import zip_longest
+from pathlib import Path
+
+from infthor_eval.errors import DataError
+from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.question import Question
+from infthor_eval.nieh.contexts.base import Case, Part, Settings, Unfit
+
+__all__ = ["interleaved", "interleaved_parts", "last_state", "state_parts"]
+
+_MARK = "<image>"  # where a frame stands in traj.txt
+
+
+def interleaved(data: NiehSet, question: Question, _settings: Settings) -> list[Case | Unfit]:
+    """Goals, frames and actions of the whole trajectory in time order (published: `interleaved`)."""
+    folder = data.folder(question.traj_id)
+    n_marks, n_frames = _sequence_text(folder).count(_MARK), len(data.frames(question.traj_id))
+    if n_marks == n_frames:
+        return [Case(tuple(range(n_frames)))]
+    after_actions = _frames_after_actions(data, question.traj_id)
+    if n_marks != len(after_actions) + 1:
+        return [Unfit(f"traj.txt has {n_marks} frames, which fit neither {n_frames} frames nor the actions")]
+    return [Case((0, *after_actions))]
+
+
+def interleaved_parts(data: NiehSet, question: Question, frames: Sequence[FrameRef]) -> list[Part]:
+    """The texts of traj.txt with the frames in their places."""
+    texts = _sequence_text(data.folder(question.traj_id)).strip().split(_MARK)
+    parts = (part for pair in zip_longest(texts, frames) for part in pair)
+    return [part for part in parts if part]
+
+
+def last_state(data: NiehSet, question: Question, _settings: Settings) -> list[Case | Unfit]:
+    """The last frame, beside the text of the last state (published: `text_state`)."""
+    if not _states(data.folder(question.traj_id)):
+        return [Unfit("the trajectory has no state_summary")]
+    return [Case((len(data.frames(question.traj_id)) - 1,))]
+
+
+def state_parts(data: NiehSet, question: Question, frames: Sequence[FrameRef]) -> list[Part]:
+    """The text of the last state, then the last frame."""
+    states = _states(data.folder(question.traj_id))
+    return [states[max(states, key=int)], *frames]
+
+
+def _sequence_text(folder: Path) -> str:
+    try:
+        return (folder / "traj.txt").read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise DataError(f"{folder / 'traj.txt'}: cannot be read ({error}); replay the trajectory again") from error
+
+
+def _frames_after_actions(data: NiehSet, traj_id: str) -> list[int]:
+    """The last frame of each low-level action: published sets have several (expert_log.json)."""
+    path = data.folder(traj_id) / "expert_log.json"
+    position = {frame.path.stem: number for number, frame in enumerate(data.frames(traj_id))}
+    last: dict[int, int] = {}
+    try:
+        for image in json.loads(path.read_text(encoding="utf-8"))["images"]:
+            last[int(image["low_idx"])] = position[Path(image["image_name"]).stem]
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise DataError(f"{path}: not a log of actions and their frames ({error}); replay it again") from error
+    return [last[action] for action in sorted(last)]
+
+
+def _states(folder: Path) -> dict[str, str]:
+    path = folder / "traj_data.json"
+    if not path.is_file():
+        return {}
+    try:
+        states = json.loads(path.read_text(encoding="utf-8")).get("state_summary") or {}
+        return {str(int(step)): str(text) for step, text in states.items()}
+    except (ValueError, AttributeError) as error:
+        raise DataError(f"{path}: state_summary is not a mapping of steps to texts ({error})") from error
