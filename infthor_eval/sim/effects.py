@@ -26,7 +26,7 @@ def slice_object(world: World, target: SimObject) -> list[SimObject]:
     name = _SLICED.get(target.object_type, f"{target.object_type}Sliced")
     count = SLICES[target.object_type]
     owner = None if target.parent is None else world.objects[target.parent]
-    axis = int(np.argmax(target.box_size * (1.0, 0.0, 1.0)))
+    axis = _slicing_axis(world, target)
     length = float(target.box_size[axis])
     size = target.box_size.copy()
     size[axis] = length / count
@@ -48,6 +48,12 @@ def slice_object(world: World, target: SimObject) -> list[SimObject]:
             world.attach(piece, owner)
         made.append(piece)
     return made
+
+
+def _slicing_axis(world: World, target: SimObject) -> int:
+    """The level axis of the object that lies most across the agent's view, so that no slice hides the next."""
+    across = target.matrix.T @ world.agent.camera_matrix()[:, 0]
+    return 0 if abs(across[0]) >= abs(across[2]) else 2
 
 
 def break_object(world: World, target: SimObject) -> None:

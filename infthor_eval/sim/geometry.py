@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from decimal import ROUND_HALF_UP, Decimal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,10 +74,13 @@ def object_id(object_type: str, position: Sequence[float] | Array) -> str:
 
 
 def _coordinate(value: float) -> str:
-    magnitude = f"{abs(value):05.2f}"
-    if value == 0:
-        return "+00.00"
-    return ("+" if value > 0 else "-") + magnitude
+    """A coordinate as Unity's Mono prints it: single precision, 7 digits, then two decimals, halves away from zero.
+
+    A negative that rounds to zero loses its sign: `00.00`.
+    """
+    decimal = Decimal(f"{float(np.float32(value)):.7g}").quantize(Decimal("0.01"), ROUND_HALF_UP)
+    sign = "+" if value >= 0 else "-" if decimal else ""
+    return f"{sign}{abs(decimal):05.2f}"
 
 
 def aabb_overlap(low_a: Array, high_a: Array, low_b: Array, high_b: Array) -> bool:

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from infthor_eval.sim.footprints import Rect
 from infthor_eval.sim.geometry import Array, corners, euler_matrix
 from infthor_eval.sim.object_types import ObjectType
 
@@ -39,7 +40,8 @@ class SimObject:
         front: yaw in degrees of the object's front relative to its own frame; doors and drawers open that way.
         support: height in metres above the bottom of the box where things stand on it; None: the top of the box.
         hinge: -1 or 1, the side of the door's hinge seen from the front; 0 where there is none.
-        holes: rectangles (x0, z0, x1, z1) that are cut out of the box's top, metres from its middle in its own frame.
+        pieces: rectangles that make up the object's plan where it is not the whole box, metres from the box's middle
+            in the object's own frame; empty for the whole.
         hollow: its front is left to drawers and the like that are objects of their own.
         style: index that varies colours between objects of one type.
     """
@@ -55,7 +57,7 @@ class SimObject:
     front: float = 0.0
     support: float | None = None
     hinge: int = 0
-    holes: tuple[tuple[float, float, float, float], ...] = ()
+    pieces: tuple[Rect, ...] = ()
     hollow: bool = False
     style: int = 0
     parent: str | None = None

@@ -35,6 +35,7 @@ class Surface:
         yaw: rotation of the receptacle in degrees.
         headroom: free height above, metres.
         overhang: how far in metres a thing may stick out beyond the edge.
+        from_middle: the first choice is the middle, as walls hide what stands near them; else the agent's side.
     """
 
     center: Array
@@ -42,6 +43,7 @@ class Surface:
     yaw: float
     headroom: float
     overhang: float = 0.03
+    from_middle: bool = False
 
 
 def surfaces(receptacle: SimObject) -> list[Surface]:
@@ -58,7 +60,7 @@ def surfaces(receptacle: SimObject) -> list[Surface]:
         slide = drawer_offset(receptacle)
         middle = (low + high) / 2 + slide
         return [
-            Surface(np.array([middle[0], y, middle[2]]), inner, yaw, top - y)
+            Surface(np.array([middle[0], y, middle[2]]), inner, yaw, top - y, from_middle=True)
             for y, top in zip(heights, tops, strict=True)
         ]
     middle = (low + high) / 2
@@ -69,8 +71,15 @@ def surfaces(receptacle: SimObject) -> list[Surface]:
             base = max(base, float(low[1]) + receptacle.support)
         shrink = 0.8 if name in {"Bowl", "Cup", "Mug", "Plate", "Pot", "Pan"} else 1.0
         inner = (max(half[0] * shrink - _WALL / 2, 0.015), max(half[1] * shrink - _WALL / 2, 0.015))
-        return [Surface(np.array([middle[0], base, middle[2]]), inner, yaw, math.inf, overhang)]
-    return [Surface(np.array([middle[0], receptacle.surface_height(), middle[2]]), half, yaw, math.inf, overhang)]
+        return [Surface(np.array([middle[0], base, middle[2]]), inner, yaw, math.inf, overhang, True)]
+    level = receptacle.surface_height()
+    if not receptacle.pieces:
+        return [Surface(np.array([middle[0], level, middle[2]]), half, yaw, math.inf, overhang)]
+    found = []
+    for x0, z0, x1, z1 in receptacle.pieces:
+        at = receptacle.center + receptacle.matrix @ np.array([(x0 + x1) / 2, 0.0, (z0 + z1) / 2])
+        found.append(Surface(np.array([at[0], level, at[2]]), ((x1 - x0) / 2, (z1 - z0) / 2), yaw, math.inf, overhang))
+    return found
 
 
 def drawer_offset(receptacle: SimObject) -> Array:
@@ -122,8 +131,14 @@ def _neighbours(world: World, item: SimObject, receptacle: SimObject) -> Iterato
 
 
 def _by_reach(world: World, found: list[Surface]) -> list[Surface]:
-    eye = world.agent.position[1]
-    return sorted(found, key=lambda s: (abs(s.center[1] - eye), s.center[1]))
+    agent = world.agent.position
+
+    def cost(surface: Surface) -> tuple[float, float, float]:
+        turned = yaw_matrix(surface.yaw).T @ (agent - surface.center)
+        away = np.maximum(np.abs(turned[[0, 2]]) - surface.half, 0.0)
+        return round(abs(surface.center[1] - agent[1]), 3), float(np.hypot(*away)), float(surface.center[1])
+
+    return sorted(found, key=cost)
 
 
 def _free_point(
@@ -170,7 +185,8 @@ def _grid(world: World, surface: Surface, half: tuple[float, float], turn: Array
         axes.append(np.linspace(-max(span, 0.0), max(span, 0.0), count) if count > 1 else np.zeros(1))
     xs, zs = np.meshgrid(axes[0], axes[1], indexing="ij")
     flat = np.stack([xs.ravel(), np.zeros(xs.size), zs.ravel()], axis=1) @ turn.T + surface.center
-    away = np.hypot(flat[:, 0] - world.agent.position[0], flat[:, 2] - world.agent.position[2])
+    origin = surface.center if surface.from_middle else world.agent.position
+    away = np.hypot(flat[:, 0] - origin[0], flat[:, 2] - origin[2])
     edge = np.maximum(0.0, 0.06 - np.minimum(axes[0].max() - np.abs(xs.ravel()), axes[1].max() - np.abs(zs.ravel())))
     return flat[np.argsort(np.round(away + 3 * edge, 6), kind="stable")]
 
@@ -199,7 +215,7 @@ def _holding_cost(receptacle: SimObject, point: Array, item: SimObject) -> float
         return 5.0
     volume = float(np.prod(np.maximum(high - low, 0.02)))
     if receptacle.kind.encloses or receptacle.object_type in _OPEN_TOP:
-        inside = low[1] - 0.03 <= point[1] <= high[1] - 0.005
+        inside = low[1] - (0.12 if receptacle.kind.encloses else 0.03) <= point[1] <= high[1] - 0.005
         if receptacle.kind.pickupable and float(np.prod(item.box_size)) > volume:
             return None
         return 0.01 * volume if inside else None

@@ -6,12 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from infthor_eval.sim.geometry import Array, euler_matrix
+from infthor_eval.sim.objects import SimObject
 from infthor_eval.sim.render.camera import FAR, Camera
 from infthor_eval.sim.render.picture import Backend, Picture, backend, cast_picture, colour_picture
+from infthor_eval.sim.render.primitives import INSTANCE
 from infthor_eval.sim.render.scene import SceneModel
 from infthor_eval.sim.scenes.catalogue import Catalogue
 from infthor_eval.sim.settings import Settings
-from infthor_eval.sim.visibility import visible_ids
+from infthor_eval.sim.visibility import enclosures, visible_ids
 from infthor_eval.sim.world import World
 
 __all__ = ["Simulation", "ThirdPartyCamera"]
@@ -94,6 +96,20 @@ class Simulation:
         if self._visible is None:
             self._visible = visible_ids(self.world, self._view, self.settings.visibility_distance)
         return self._visible
+
+    def visible_inside(self, item: SimObject) -> bool:
+        """Whether the agent would see the object if what contains it were not drawn.
+
+        Only in recorded scenes: their receptacles are boxes, coarser than the real ones, and may hide what the
+        agent of the recording saw in them. What is inside something closed stays hidden.
+        """
+        if not self.world.coarse or self.world.hidden(item):
+            return False
+        around = enclosures(self.world, item)
+        prims, _, names = self._model.primitives()
+        kept = prims[~np.isin(prims[:, INSTANCE], [names.index(o.object_id) for o in around])]
+        picture = cast_picture(kept, names, self.view().camera, self.renderer)
+        return item.object_id in visible_ids(self.world, picture, self.settings.visibility_distance)
 
     def colours(self, picture: Picture) -> NDArray[np.uint8]:
         """RGB (h, w, 3), bottom row first; with supersampling the mean of 2x2 rays per pixel."""

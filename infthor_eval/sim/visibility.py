@@ -2,10 +2,11 @@
 
 import numpy as np
 
+from infthor_eval.sim.objects import SimObject
 from infthor_eval.sim.render.picture import Picture
 from infthor_eval.sim.world import World
 
-__all__ = ["visible_ids"]
+__all__ = ["enclosures", "visible_ids"]
 
 _SHARE = 2.5e-5  # of the picture's pixels that must show an object: 2 pixels at 300x300
 
@@ -28,3 +29,15 @@ def visible_ids(world: World, picture: Picture, max_distance: float) -> frozense
     if world.held is not None:
         seen.add(world.held)
     return frozenset(seen)
+
+
+def enclosures(world: World, item: SimObject) -> list[SimObject]:
+    """What contains the object, and the fixed receptacles whose box its middle is in."""
+    point = item.center
+    found = list(world.ancestors(item))
+    for other in world.objects.values():
+        low, high = other.bounds()
+        fixed = other.kind.receptacle and not other.kind.pickupable and other not in found
+        if fixed and bool(np.all((point > low - 0.05) & (point < high + 0.05))):
+            found.append(other)
+    return [o for o in found if o.object_type != "Floor" and o is not item]

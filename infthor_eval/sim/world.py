@@ -59,6 +59,7 @@ class World:
     Attributes:
         objects: by id, in the order of the metadata.
         version: grows with every change, so that views can be cached.
+        coarse: the shapes of its furniture are only known as boxes, as in recordings.
     """
 
     scene: str
@@ -69,6 +70,7 @@ class World:
     seed: int = 0
     held: str | None = None
     version: int = 0
+    coarse: bool = False
     templates: dict[str, list[SimObject]] = field(default_factory=dict)
 
     def get(self, object_id: str) -> SimObject:

@@ -18,7 +18,7 @@ def interactable(sim: Simulation, object_id: str | None, force: bool, x: float |
     elif x is not None or y is not None:
         raise ActionError("Provide either objectId or x and y, not both.", ErrorCode.AMBIGUOUS_ACTION)
     found = sim.world.get(object_id)
-    if not force and object_id not in sim.visible():
+    if not force and object_id not in sim.visible() and not sim.visible_inside(found):
         raise ActionError("Target object not found within the specified visibility.", ErrorCode.NOT_VISIBLE)
     return found
 

@@ -1,9 +1,12 @@
 # ruff: noqa: SIM905 - tables of names read best as words
 """What a scene's objects are to each other: fronts, hinges, drawers in desks, sinks in counters, knobs of burners."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
-from infthor_eval.sim.geometry import Array
+from infthor_eval.sim.footprints import Rect, without
+from infthor_eval.sim.geometry import Array, aabb_overlap, yaw_matrix
 from infthor_eval.sim.navigation import NavGrid
 from infthor_eval.sim.objects import SimObject
 from infthor_eval.sim.world import World
@@ -12,7 +15,9 @@ __all__ = ["arrange"]
 
 _INNER = frozenset("Cabinet Drawer Shelf Safe Microwave".split())
 _BASINS = frozenset("Sink SinkBasin BathtubBasin".split())
-_HOLED = frozenset("Bathtub CounterTop Desk DiningTable Dresser SideTable Sink".split())
+_HOLED = frozenset("CounterTop Desk DiningTable Dresser SideTable Sink".split())
+_BODY = np.array([0.2, 0.0, 0.2])  # half of the floor that the agent takes, metres
+_LIP, _BEFORE = 0.05, 0.6  # how far a counter reaches over its cabinets, and how far before them is floor, metres
 _FACING_ROOM = frozenset(
     "Blinds Cabinet CounterTop Curtains Drawer Dresser Faucet Fridge HandTowelHolder LightSwitch Microwave Mirror"
     " Painting Poster Safe Shelf ShelvingUnit ShowerDoor Sink Television Toilet ToiletPaperHanger TowelHolder"
@@ -30,7 +35,10 @@ def arrange(world: World) -> None:
         if item.object_type == "Cabinet" or item.kind.encloses:
             item.hinge = _hinge(item)
     for item in fixed:
-        item.holes = tuple(_holes(item, fixed)) if item.object_type in _HOLED else ()
+        item.pieces = _plan(item, fixed, world.nav) if item.object_type in _HOLED else ()
+        if item.object_type == "Cabinet":
+            item.hollow = any(o.object_type in _BASINS and _cuts(o, item) for o in fixed)
+            continue
         item.hollow = item.kind.receptacle and item.object_type not in _INNER and any(
             other.object_type in _INNER and other is not item and _inside(other, item) for other in fixed
         )  # fmt: skip
@@ -66,25 +74,61 @@ def _hinge(item: SimObject) -> int:
     return 1 if aside > 0 else -1
 
 
+def _cuts(a: SimObject, b: SimObject) -> bool:
+    """Whether two boxes share more than a sliver."""
+    return aabb_overlap(a.bounds()[0] + 0.02, a.bounds()[1] - 0.02, b.bounds()[0] + 0.02, b.bounds()[1] - 0.02)
+
+
 def _inside(inner: SimObject, outer: SimObject) -> bool:
     low, high = outer.bounds()
     center = inner.center
     return bool(np.all((center > low - 0.02) & (center < high + 0.02)))
 
 
-def _holes(item: SimObject, fixed: list[SimObject]) -> list[tuple[float, float, float, float]]:
+def _plan(item: SimObject, fixed: list[SimObject], nav: NavGrid) -> tuple[Rect, ...]:
+    """The object's plan less the sinks in it and, of counters, less the floor in front of what is below them.
+
+    A counter around a corner is recorded as one box; where the agent stands, and what its cabinets open on, is floor.
+    """
     low, high = item.bounds()
-    found: list[tuple[float, float, float, float]] = []
-    wanted = {"Bathtub": {"BathtubBasin"}, "Sink": {"SinkBasin"}}.get(item.object_type, {"Sink", "SinkBasin"})
+    holes = [_own_frame(item, *cut) for cut in _sinks(item, fixed)]
+    if item.object_type == "CounterTop":
+        for x, z in nav:
+            if low[0] < x < high[0] and low[2] < z < high[2]:
+                point = np.array([x, low[1], z])
+                holes.append(_own_frame(item, point - _BODY, point + _BODY))
+        holes += [_own_frame(item, *front) for front in _fronts_below(item, fixed)]
+    half = item.box_size / 2
+    whole = (-float(half[0]), -float(half[2]), float(half[0]), float(half[2]))
+    return () if not holes else without(whole, holes)
+
+
+def _sinks(item: SimObject, fixed: list[SimObject]) -> Iterator[tuple[Array, Array]]:
+    low, high = item.bounds()
+    wanted = {"SinkBasin"} if item.object_type == "Sink" else {"Sink", "SinkBasin"}
     for other in fixed:
         if other.object_type not in wanted or other is item:
             continue
         o_low, o_high = other.bounds()
-        level = o_low[1] - 0.1 <= high[1] and o_high[1] + 0.3 >= low[1]
-        cut_low, cut_high = np.maximum(low, o_low), np.minimum(high, o_high)
-        if level and cut_low[0] < cut_high[0] and cut_low[2] < cut_high[2]:
-            found.append(_own_frame(item, cut_low, cut_high))
-    return found
+        if o_low[1] - 0.1 <= high[1] and o_high[1] + 0.3 >= low[1]:
+            yield o_low, o_high
+
+
+def _fronts_below(counter: SimObject, fixed: list[SimObject]) -> Iterator[tuple[Array, Array]]:
+    """The floor before the cabinets and drawers that stand below a counter."""
+    high = counter.bounds()[1]
+    for other in fixed:
+        if other.object_type not in {"Cabinet", "Drawer"}:
+            continue
+        o_low, o_high = other.bounds()
+        if o_high[1] > high[1] + 0.05 or high[1] - o_high[1] > 0.5:
+            continue
+        ahead = np.round(yaw_matrix(float(other.rotation[1]) + other.front)[:, 2])
+        start, end = o_low + ahead * (_LIP + (o_high - o_low)), o_high + ahead * _BEFORE
+        yield (
+            np.minimum(start, end) * np.abs(ahead) + o_low * (1 - np.abs(ahead)),
+            np.maximum(start, end) * np.abs(ahead) + o_high * (1 - np.abs(ahead)),
+        )
 
 
 def _own_frame(item: SimObject, low: Array, high: Array) -> tuple[float, float, float, float]:

@@ -48,7 +48,15 @@ def build_floor_plan(name: str, entries: Sequence[Mapping[str, Any]], layout: Ar
     height = floor + AGENT_HEIGHT if extra.floor_y is None else extra.floor_y
     middle = nav.nearest((room.x_min + room.x_max) / 2, (room.z_min + room.z_max) / 2)
     yaw = max((0.0, 90.0, 180.0, 270.0), key=lambda angle: nav.freedom(*middle, angle, reach=3.0))
-    world = World(name, objects, (room,), nav, Agent(np.array([middle[0], height, middle[1]]), yaw), seed=_number(name))
+    world = World(
+        name,
+        objects,
+        (room,),
+        nav,
+        Agent(np.array([middle[0], height, middle[1]]), yaw),
+        seed=_number(name),
+        coarse=True,
+    )
     arrange(world)
     _settle(world, entries)
     return world

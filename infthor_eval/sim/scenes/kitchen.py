@@ -3,6 +3,7 @@
 
 import numpy as np
 
+from infthor_eval.sim.footprints import Rect, without
 from infthor_eval.sim.objects import SimObject
 from infthor_eval.sim.scenes.roomplan import RoomPlan
 
@@ -76,15 +77,18 @@ def _sink(plan: RoomPlan, top: SimObject, at: float) -> None:
     basin.object_id, basin.name = f"{sink.object_id}|SinkBasin", f"SinkBasin_{sink.name.split('_')[1]}"
     faucet = plan.against("z+", "Faucet", at, y=_HEIGHT, size=(0.16, 0.28, 0.2), gap=0.04)
     faucet.style = 0
-    top.holes = (_hole_of(top, sink),)
-    sink.holes = (_hole_of(sink, basin),)
+    top.pieces, sink.pieces = _around(top, sink), _around(sink, basin)
     plan.against("z+", "Window", at, y=1.25, size=(0.8, 0.9, 0.06), gap=-0.02)
 
 
-def _hole_of(outer: SimObject, inner: SimObject) -> tuple[float, float, float, float]:
-    offset = outer.matrix.T @ (inner.center - outer.center)
-    half = inner.box_size / 2
-    return offset[0] - half[0], offset[2] - half[2], offset[0] + half[0], offset[2] + half[2]
+def _around(outer: SimObject, inner: SimObject) -> tuple[Rect, ...]:
+    """The plan of `outer` less that of `inner`; both look the same way."""
+    middle = outer.matrix.T @ (inner.center - outer.center)
+    whole, hole = outer.box_size / 2, inner.box_size / 2
+    return without(
+        (-float(whole[0]), -float(whole[2]), float(whole[0]), float(whole[2])),
+        [(middle[0] - hole[0], middle[2] - hole[2], middle[0] + hole[0], middle[2] + hole[2])],
+    )
 
 
 def _stove(plan: RoomPlan, at: float) -> None:

@@ -1,6 +1,7 @@
 """A drawing board for one object: coordinates run from -1 to 1 across the object's box, front towards +z."""
 
 from collections.abc import Sequence
+from typing import TypedDict, Unpack
 
 import numpy as np
 
@@ -16,6 +17,15 @@ Vector = Sequence[float]
 def shade_of(color: Color, factor: float) -> Color:
     """A colour made darker (factor below 1) or lighter."""
     return (min(color[0] * factor, 1.0), min(color[1] * factor, 1.0), min(color[2] * factor, 1.0))
+
+
+class Details(TypedDict, total=False):
+    """Optional properties of a part; see `Part`."""
+
+    tilt: Vector
+    bottom: float
+    top: float
+    glow: float
 
 
 class Builder:
@@ -61,21 +71,46 @@ class Builder:
         metres = np.asarray(half, dtype=float) * self.half
         self.parts.append(Part(kind, self.metric(at), metres, color, material, matrix, bottom, top, glow))
 
-    def box(self, at: Vector, half: Vector, color: Color, material: Material = Material.PLAIN, **more: float) -> None:
+    def box(
+        self, at: Vector, half: Vector, color: Color, material: Material = Material.PLAIN, **more: Unpack[Details]
+    ) -> None:
         """Adds a box."""
-        self.add(Kind.BOX, at, half, color, material, **more)  # type: ignore[arg-type]
+        self.add(Kind.BOX, at, half, color, material, **more)
 
-    def ball(self, at: Vector, half: Vector, color: Color, material: Material = Material.PLAIN, **more: float) -> None:
+    def ball(
+        self, at: Vector, half: Vector, color: Color, material: Material = Material.PLAIN, **more: Unpack[Details]
+    ) -> None:
         """Adds an ellipsoid."""
-        self.add(Kind.ELLIPSOID, at, half, color, material, **more)  # type: ignore[arg-type]
+        self.add(Kind.ELLIPSOID, at, half, color, material, **more)
 
-    def tube(self, at: Vector, half: Vector, color: Color, material: Material = Material.PLAIN, **more: float) -> None:
+    def tube(
+        self, at: Vector, half: Vector, color: Color, material: Material = Material.PLAIN, **more: Unpack[Details]
+    ) -> None:
         """Adds an upright cylinder; `bottom` and `top` are its relative radii."""
-        self.add(Kind.CYLINDER, at, half, color, material, **more)  # type: ignore[arg-type]
+        self.add(Kind.CYLINDER, at, half, color, material, **more)
 
-    def cup(self, at: Vector, half: Vector, color: Color, material: Material = Material.PLAIN, **more: float) -> None:
+    def cup(
+        self, at: Vector, half: Vector, color: Color, material: Material = Material.PLAIN, **more: Unpack[Details]
+    ) -> None:
         """Adds a cylinder that is open at the top."""
-        self.add(Kind.CUP, at, half, color, material, **more)  # type: ignore[arg-type]
+        self.add(Kind.CUP, at, half, color, material, **more)
+
+    def open_front(self, color: Color, material: Material, wall: float) -> None:
+        """Adds a box without its front: five boards `wall` metres thick."""
+        x, y, z = (self.thick(wall / 2, axis) for axis in range(3))
+        inner = shade_of(color, 0.8)
+        self.box((0, 0, -1 + z), (1, 1, z), inner, material)
+        for side in (-1, 1):
+            self.box((side * (1 - x), 0, z), (x, 1, 1 - z), color, material)
+            self.box((0, side * (1 - y), z), (1 - 2 * x, y, 1 - z), color, material)
+
+    def open_top(self, color: Color, material: Material, wall: float) -> None:
+        """Adds a box without its lid: five boards `wall` metres thick."""
+        x, y, z = (self.thick(wall / 2, axis) for axis in range(3))
+        self.box((0, -1 + y, 0), (1, y, 1), shade_of(color, 0.85), material)
+        for side in (-1, 1):
+            self.box((side * (1 - x), y, 0), (x, 1 - y, 1), color, material)
+            self.box((0, y, side * (1 - z)), (1 - 2 * x, 1 - y, z), color, material)
 
     def rod(self, at: Vector, radius: float, length: float, axis: int, color: Color) -> None:
         """Adds a round bar, `radius` and half `length` in metres, along axis 0 (x), 1 (y) or 2 (z)."""

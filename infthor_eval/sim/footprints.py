@@ -1,0 +1,45 @@
+"""Plans of flat things that are not rectangles: counters around corners, tops with sinks cut out."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+__all__ = ["Rect", "without"]
+
+Rect = tuple[float, float, float, float]
+"""x0, z0, x1, z1 in metres."""
+
+
+def without(whole: Rect, holes: Sequence[Rect]) -> tuple[Rect, ...]:
+    """Rectangles that together cover `whole` but none of the holes; few and large ones."""
+    cutting = [h for h in holes if h[0] < whole[2] and h[2] > whole[0] and h[1] < whole[3] and h[3] > whole[1]]
+    if not cutting:
+        return (whole,)
+    xs = _edges(whole[0], whole[2], [v for h in cutting for v in (h[0], h[2])])
+    zs = _edges(whole[1], whole[3], [v for h in cutting for v in (h[1], h[3])])
+    mid_x, mid_z = (xs[1:] + xs[:-1]) / 2, (zs[1:] + zs[:-1]) / 2
+    solid = np.ones((len(mid_x), len(mid_z)), dtype=bool)
+    for x0, z0, x1, z1 in cutting:
+        inside_x, inside_z = (mid_x > x0) & (mid_x < x1), (mid_z > z0) & (mid_z < z1)
+        solid &= ~(inside_x[:, None] & inside_z[None, :])
+    return tuple(_merged(solid, xs, zs))
+
+
+def _edges(low: float, high: float, cuts: list[float]) -> np.ndarray:
+    return np.unique(np.round([low, high, *(c for c in cuts if low < c < high)], 4))
+
+
+def _merged(solid: np.ndarray, xs: np.ndarray, zs: np.ndarray) -> list[Rect]:
+    """Greedy cover of the solid cells of an uneven grid: the largest rectangle from each first free cell."""
+    left, found = solid.copy(), []
+    for i, j in np.argwhere(solid):
+        if not left[i, j]:
+            continue
+        i_end, j_end = i + 1, j + 1
+        while j_end < left.shape[1] and left[i, j_end]:
+            j_end += 1
+        while i_end < left.shape[0] and left[i_end, j:j_end].all():
+            i_end += 1
+        left[i:i_end, j:j_end] = False
+        found.append((float(xs[i]), float(zs[j]), float(xs[i_end]), float(zs[j_end])))
+    return found

@@ -1,0 +1,141 @@
+"""Machines, screens and lamps."""
+
+from collections.abc import Callable
+
+from infthor_eval.sim.render.primitives import Color, Material
+from infthor_eval.sim.render.shapes.builder import Builder, shade_of
+from infthor_eval.sim.render.shapes.palette import BLACK, BRASS, CHROME, DARK, STEEL, WHITE, pick
+
+__all__ = ["SHAPES"]
+
+_SCREEN: Color = (0.35, 0.6, 0.9)
+_WARM: Color = (1.0, 0.93, 0.7)
+_SHADES: tuple[Color, ...] = ((0.9, 0.85, 0.72), (0.75, 0.35, 0.3), (0.5, 0.6, 0.68))
+
+
+def toaster(b: Builder) -> None:
+    """A rounded box with two slots, glowing inside while on."""
+    color = pick((STEEL, (0.7, 0.2, 0.18), WHITE), b.style)
+    b.box((0, 0, 0), (1, 0.92, 0.96), color, Material.METAL)
+    slot: Color = (1.0, 0.4, 0.1) if b.state.toggled else BLACK
+    for side in (-1, 1):
+        b.box((side * 0.35, 0.92, 0), (0.16, 0.03, 0.75), slot, glow=0.9 if b.state.toggled else 0.0)
+    b.box((0, 0.2, 0.98), (0.2, 0.12, 0.04), DARK)
+    b.box((0, 1.0, 0), (0.02, 0.01, 0.9), shade_of(color, 0.7))
+
+
+def coffee_machine(b: Builder) -> None:
+    """A back with a tank, a head, and a plate for the mug in front; a stream and a light while on."""
+    color = pick((BLACK, STEEL, (0.5, 0.15, 0.14)), b.style)
+    b.box((0, 0, -0.6), (0.9, 1, 0.4), color, Material.METAL)
+    b.box((0, 0.72, 0.1), (0.9, 0.28, 0.85), shade_of(color, 1.15), Material.METAL)
+    b.box((0, -0.92, 0.1), (0.95, 0.08, 0.9), DARK)
+    b.tube((0, 0.36, 0.25), (0.2, 0.1, 0.2), CHROME, Material.METAL, bottom=0.5)
+    lamp: Color = (0.2, 1.0, 0.3) if b.state.toggled else (0.4, 0.1, 0.1)
+    b.ball((0.6, 0.72, 0.95), (0.1, 0.08, 0.06), lamp, glow=0.9 if b.state.toggled else 0.2)
+    if b.state.toggled:
+        b.tube((0, -0.2, 0.25), (0.05, 0.5, 0.05), (0.3, 0.17, 0.08))
+
+
+def television(b: Builder) -> None:
+    """A flat screen on a foot."""
+    screen = _SCREEN if b.state.toggled else (0.06, 0.07, 0.09)
+    z = b.thick(0.02, 2)
+    b.box((0, 0.08, 0), (1, 0.9, z), BLACK)
+    b.box((0, 0.08, z), (0.96, 0.83, z * 0.2), screen, Material.GLASS, glow=0.85 if b.state.toggled else 0.0)
+    b.box((0, -0.97, 0), (0.4, 0.03, min(1.0, 6 * z)), DARK)
+    b.box((0, -0.88, 0), (0.06, 0.12, z), DARK)
+    if b.state.broken:
+        b.box((0, 0.1, z * 1.3), (0.6, 0.01, z * 0.2), WHITE, tilt=(0, 0, 30))
+
+
+def desktop(b: Builder) -> None:
+    """A screen with a keyboard before it."""
+    screen = _SCREEN if b.state.toggled else (0.06, 0.07, 0.09)
+    b.box((0, 0.2, -0.5), (0.8, 0.75, 0.1), BLACK)
+    b.box((0, 0.22, -0.38), (0.75, 0.66, 0.03), screen, Material.GLASS, glow=0.85 if b.state.toggled else 0.0)
+    b.box((0, -0.8, -0.5), (0.08, 0.2, 0.08), DARK)
+    b.box((0, -0.95, 0.6), (0.6, 0.05, 0.35), DARK)
+
+
+def laptop(b: Builder) -> None:
+    """Keyboard and lid; the lid lies flat when closed."""
+    y = b.thick(0.01, 1)
+    b.box((0, -1 + y, 0.1), (1, y, 0.88), STEEL, Material.METAL)
+    b.box((0, -1 + 2 * y, 0.1), (0.88, 0.02, 0.5), DARK)
+    if b.state.openness == 0:
+        b.box((0, -1 + 3 * y, 0.1), (1, y * 0.8, 0.88), shade_of(STEEL, 0.9), Material.METAL)
+        return
+    z = b.thick(0.008, 2)
+    b.box((0, 0, -0.88), (1, 1, z), STEEL, Material.METAL)
+    screen = _SCREEN if b.state.toggled else (0.07, 0.08, 0.1)
+    b.box((0, 0.05, -0.88 + z), (0.92, 0.86, z * 0.4), screen, Material.GLASS, glow=0.85 if b.state.toggled else 0.0)
+
+
+def desk_lamp(b: Builder) -> None:
+    """A foot, a stem and a shade that is bright when lit."""
+    _lamp(b, foot=0.35, shade_low=0.2)
+
+
+def floor_lamp(b: Builder) -> None:
+    """The same, tall."""
+    _lamp(b, foot=0.6, shade_low=0.62)
+
+
+def _lamp(b: Builder, foot: float, shade_low: float) -> None:
+    lit = b.state.toggled
+    y = b.thick(0.015, 1)
+    b.tube((0, -1 + y, 0), (foot, y, foot), BRASS, Material.METAL)
+    b.rod((0, -0.1, 0), 0.012, float(b.half[1]) * 0.9, 1, BRASS)
+    middle, half = (1 + shade_low) / 2, (1 - shade_low) / 2
+    color = _WARM if lit else pick(_SHADES, b.style)
+    b.tube((0, middle, 0), (1, half, 1), color, Material.FABRIC, top=0.6, glow=0.95 if lit else 0.0)
+
+
+def cell_phone(b: Builder) -> None:
+    """A slab with a screen."""
+    b.box((0, -0.1, 0), (1, 0.9, 1), BLACK)
+    lit = b.state.toggled
+    b.box((0, 0.9, 0), (0.88, 0.1, 0.9), _SCREEN if lit else (0.2, 0.24, 0.32), glow=0.8 if lit else 0.0)
+
+
+def remote(b: Builder) -> None:
+    """A bar with rows of keys."""
+    b.box((0, -0.2, 0), (1, 0.8, 1), DARK)
+    for row in range(5):
+        for side in (-0.45, 0.0, 0.45):
+            b.box((side, 0.75, -0.6 + 0.3 * row), (0.15, 0.2, 0.08), (0.7, 0.7, 0.72))
+    b.box((-0.45, 0.75, 0.85), (0.18, 0.22, 0.08), (0.85, 0.2, 0.15))
+
+
+def vacuum(b: Builder) -> None:
+    """A head, a body and a handle."""
+    b.box((0, -0.9, 0.4), (1, 0.1, 0.6), (0.6, 0.15, 0.15))
+    b.tube((0, -0.2, -0.3), (0.5, 0.6, 0.5), (0.35, 0.36, 0.4), Material.METAL)
+    b.rod((0, 0.6, -0.5), 0.015, float(b.half[1]) * 0.4, 1, DARK)
+
+
+def alarm_clock(b: Builder) -> None:
+    """A clock with a face, hands and two bells."""
+    color = pick(((0.75, 0.2, 0.18), BRASS, (0.3, 0.5, 0.5)), b.style)
+    b.box((0, -0.1, 0), (1, 0.85, 0.85), color)
+    b.box((0, -0.1, 0.88), (0.75, 0.65, 0.1), WHITE)
+    b.box((0, 0.08, 1), (0.05, 0.25, 0.05), BLACK)
+    b.box((0.2, -0.1, 1), (0.22, 0.05, 0.05), BLACK)
+    for side in (-1, 1):
+        b.ball((side * 0.5, 0.85, 0), (0.35, 0.15, 0.4), BRASS, Material.METAL)
+
+
+SHAPES: dict[str, Callable[[Builder], None]] = {
+    "AlarmClock": alarm_clock,
+    "CellPhone": cell_phone,
+    "CoffeeMachine": coffee_machine,
+    "DeskLamp": desk_lamp,
+    "Desktop": desktop,
+    "FloorLamp": floor_lamp,
+    "Laptop": laptop,
+    "RemoteControl": remote,
+    "Television": television,
+    "Toaster": toaster,
+    "VacuumCleaner": vacuum,
+}

@@ -1,0 +1,235 @@
+"""What is built into rooms: sinks, taps, baths, toilets, windows, pictures, switches, stoves, rails."""
+
+from collections.abc import Callable
+
+from infthor_eval.sim.render.primitives import Color, Kind, Material
+from infthor_eval.sim.render.shapes.builder import Builder, shade_of
+from infthor_eval.sim.render.shapes.palette import BLACK, BRASS, CHROME, CLOTHS, DARK, GLASS, STEEL, WHITE, WOODS, pick
+from infthor_eval.sim.render.shapes.tables import cut_slab
+
+__all__ = ["SHAPES"]
+
+_CERAMIC: Color = (0.95, 0.95, 0.93)
+_SKY: Color = (0.66, 0.83, 0.97)
+_WATER: Color = (0.55, 0.75, 0.9)
+
+
+def floor(b: Builder) -> None:
+    """The floor of a room; its pattern comes with the style of the shell."""
+    b.box((0, 0, 0), (1, 1, 1), *_FLOORS[b.style % len(_FLOORS)])
+
+
+_FLOORS: tuple[tuple[Color, Material], ...] = (
+    ((0.62, 0.44, 0.29), Material.PLANKS),
+    ((0.78, 0.76, 0.72), Material.TILES),
+    ((0.60, 0.56, 0.52), Material.CARPET),
+)
+
+
+def sink(b: Builder) -> None:
+    """A rim of steel or stone around the basins; a hollow tub where the basins are not objects of their own."""
+    color = STEEL if b.style % 2 else _CERAMIC
+    if not b.item.pieces:
+        b.open_top(color, Material.METAL, 0.02)
+        return
+    rim = b.thick(0.008, 1)
+    cut_slab(b, 1 - rim, rim, color, Material.METAL)
+
+
+def basin(b: Builder) -> None:
+    """A tub with a drain."""
+    b.open_top(STEEL if b.style % 2 else _CERAMIC, Material.METAL, 0.014)
+    b.tube((0, -0.93, 0), (b.thick(0.025, 0), 0.03, b.thick(0.025, 2)), DARK)
+
+
+def faucet(b: Builder) -> None:
+    """A tap: a post, a spout to the front, two handles; water falls while it is on."""
+    r = 0.014
+    b.rod((0, 0, -0.7), r, float(b.half[1]) * 0.95, 1, CHROME)
+    b.rod((0, 0.9, 0.05), r * 0.8, float(b.half[2]) * 0.85, 2, CHROME)
+    b.rod((0, 0.7, 0.85), r * 0.7, float(b.half[1]) * 0.2, 1, CHROME)
+    for side in (-1, 1):
+        b.tube((side * 0.75, -0.75, -0.7), (0.2, 0.25, b.thick(0.02, 2)), CHROME, Material.METAL)
+    b.box((0, -0.93, -0.7), (1, 0.07, min(0.3, b.thick(0.03, 2))), CHROME, Material.METAL)
+    if b.state.toggled:
+        b.rod((0, -0.35, 0.85), 0.008, float(b.half[1]) * 0.9, 1, _WATER)
+
+
+def bathtub(b: Builder) -> None:
+    """A white tub; its bottom is an object of its own where the recording has one."""
+    b.open_top(_CERAMIC, Material.PLAIN, 0.07)
+
+
+def toilet(b: Builder) -> None:
+    """A bowl in front of a tank."""
+    b.box((0, 0.45, -0.72), (0.95, 0.55, 0.28), _CERAMIC)
+    b.box((0, 0.93, -0.72), (1.0, 0.05, 0.28), shade_of(_CERAMIC, 0.96))
+    b.tube((0, -0.55, 0.1), (0.55, 0.45, 0.6), _CERAMIC, bottom=0.75)
+    b.tube((0, -0.2, 0.25), (0.85, 0.1, 0.75), shade_of(_CERAMIC, 0.98))
+    lid = 0.02
+    if b.state.openness > 0:
+        b.tube((0, -0.08, 0.25), (0.5, 0.02, 0.45), (0.55, 0.7, 0.8))
+        b.box((0, 0.35, -0.4), (0.8, 0.45, 0.04), shade_of(_CERAMIC, 0.97))
+    else:
+        b.tube((0, -0.07, 0.25), (0.85, lid, 0.75), WHITE)
+    b.box((-0.7, 0.6, -0.42), (0.12, 0.03, 0.03), CHROME, Material.METAL)
+
+
+def window(b: Builder) -> None:
+    """A bright pane in a white frame with a cross."""
+    x, y = b.thick(0.03, 0), b.thick(0.03, 1)
+    b.box((0, 0, 0), (1, 1, 0.4), _SKY, Material.GLASS, glow=0.8)
+    for side in (-1, 1):
+        b.box((side * (1 - x), 0, 0), (x, 1, 1), WHITE)
+        b.box((0, side * (1 - y), 0), (1, y, 1), WHITE)
+    b.box((0, 0, 0), (x * 0.6, 1, 0.8), WHITE)
+    b.box((0, 0, 0), (1, y * 0.6, 0.8), WHITE)
+    if b.state.broken:
+        b.box((0.2, 0.3, 0.5), (0.5, 0.02, 0.1), BLACK, tilt=(0, 0, 40))
+
+
+def curtains(b: Builder) -> None:
+    """Cloth in folds on a rail."""
+    color = pick(CLOTHS, b.style)
+    for index in range(8):
+        at = -0.875 + 0.25 * index
+        b.tube((at, -0.03, 0), (0.14, 0.97, 0.7), shade_of(color, 0.9 + 0.15 * (index % 2)), Material.FABRIC)
+    b.rod((0, 0.97, 0), 0.012, float(b.half[0]), 0, BRASS)
+
+
+def blinds(b: Builder) -> None:
+    """Slats: a bundle at the top when open."""
+    count = 3 if b.state.openness > 0 else 9
+    for index in range(count):
+        b.box((0, 0.95 - index * 1.9 / count, 0), (1, 0.75 / count, 0.6), (0.9, 0.88, 0.82))
+
+
+def painting(b: Builder) -> None:
+    """A framed picture of hills."""
+    x, y = b.thick(0.04, 0), b.thick(0.04, 1)
+    b.box((0, 0, -0.2), (1, 1, 0.8), pick(WOODS, b.style), Material.WOOD)
+    b.box((0, 0, 0.3), (1 - x, 1 - y, 0.55), pick(((0.7, 0.8, 0.9), (0.9, 0.75, 0.55), (0.6, 0.65, 0.8)), b.style))
+    b.box((0, -0.5, 0.35), ((1 - x) * 0.99, 0.4, 0.55), pick(((0.35, 0.5, 0.3), (0.5, 0.35, 0.25)), b.style))
+    b.ball((0.35, 0.4, 0.85), (0.15, 0.15 * float(b.half[0] / b.half[1]), 0.06), (0.95, 0.85, 0.4))
+
+
+def mirror(b: Builder) -> None:
+    """A shiny plate in a frame."""
+    b.box((0, 0, -0.3), (1, 1, 0.7), STEEL, Material.METAL)
+    color: Color = (0.5, 0.45, 0.35) if b.state.dirty else (0.78, 0.86, 0.9)
+    b.box((0, 0, 0.3), (1 - b.thick(0.02, 0), 1 - b.thick(0.02, 1), 0.6), color, Material.GLASS)
+    if b.state.broken:
+        b.box((0, 0.1, 0.9), (0.7, 0.01, 0.05), BLACK, tilt=(0, 0, 35))
+
+
+def light_switch(b: Builder) -> None:
+    """A plate with a rocker."""
+    b.box((0, 0, -0.2), (1, 1, 0.8), WHITE)
+    up = 0.3 if b.state.toggled else -0.3
+    b.box((0, up, 0.5), (0.4, 0.35, 0.5), (0.75, 0.75, 0.72))
+
+
+def burner(b: Builder) -> None:
+    """A ring on the stove, glowing while it is on."""
+    hot = b.state.toggled
+    b.tube((0, 0, 0), (1, 1, 1), (0.9, 0.3, 0.1) if hot else DARK, glow=0.8 if hot else 0.0)
+    b.tube((0, 0.2, 0), (0.62, 1, 0.62), BLACK)
+    b.tube((0, 0.4, 0), (0.35, 1, 0.35), (1.0, 0.45, 0.15) if hot else DARK, glow=0.8 if hot else 0.0)
+
+
+def knob(b: Builder) -> None:
+    """A round knob with a mark."""
+    b.add(Kind.CYLINDER, (0, 0, 0), (1, 1, 1), DARK, tilt=(90, 0, 0))
+    turn = 90.0 if b.state.toggled else 0.0
+    b.add(Kind.BOX, (0, 0, 0.95), (0.12, 0.9, 0.1), WHITE, tilt=(0, 0, turn))
+
+
+def shower_head(b: Builder) -> None:
+    """A pipe with a rose; drops fall while it is on."""
+    b.rod((0, -0.1, -0.8), 0.012, float(b.half[1]) * 0.9, 1, CHROME)
+    b.rod((0, 0.85, -0.1), 0.012, float(b.half[2]) * 0.7, 2, CHROME)
+    b.tube((0, 0.75, 0.5), (0.6, 0.05, 0.5), CHROME, Material.METAL, top=0.5)
+    if b.state.toggled:
+        for x, z in ((-0.3, 0.4), (0.3, 0.4), (0.0, 0.7), (0.0, 0.2)):
+            b.rod((x, -0.1, z), 0.005, float(b.half[1]) * 0.8, 1, _WATER)
+
+
+def shower_glass(b: Builder) -> None:
+    """A frame around a pane that one sees through: only its edges are drawn."""
+    x, y, z = b.thick(0.012, 0), b.thick(0.012, 1), b.thick(0.012, 2)
+    flat = 0 if b.half[0] < b.half[2] else 2
+    for side in (-1, 1):
+        if flat == 0:
+            b.box((0, 0, side * (1 - z)), (min(1.0, x * 2), 1, z), CHROME, Material.METAL)
+            b.box((0, side * (1 - y), 0), (min(1.0, x * 2), y, 1), CHROME, Material.METAL)
+        else:
+            b.box((side * (1 - x), 0, 0), (x, 1, min(1.0, z * 2)), CHROME, Material.METAL)
+            b.box((0, side * (1 - y), 0), (1, y, min(1.0, z * 2)), CHROME, Material.METAL)
+
+
+def shower_door(b: Builder) -> None:
+    """The framed door of a shower, swung out when open, with a grip."""
+    shower_glass(b)
+    b.box((0, 0, 0.6) if b.half[0] < b.half[2] else (0.6, 0, 0), (b.thick(0.02, 0), 0.12, b.thick(0.02, 2)), GLASS)
+
+
+def shower_curtain(b: Builder) -> None:
+    """A curtain on a rail, gathered to one side when open."""
+    color = pick(CLOTHS, b.style + 2)
+    long = 0 if b.half[0] >= b.half[2] else 2
+    share = 0.35 if b.state.openness > 0 else 1.0
+    for index in range(6):
+        at = -1 + share * (2 * index + 1) / 6
+        where = (at, 0, 0) if long == 0 else (0, 0, at)
+        half = (share / 5, 1, 0.5) if long == 0 else (0.5, 1, share / 5)
+        b.tube(where, half, shade_of(color, 0.95 + 0.1 * (index % 2)), Material.FABRIC)
+    b.rod((0, 0.99, 0), 0.012, float(b.half[long]), long, CHROME)
+
+
+def rail(b: Builder) -> None:
+    """A bar that a towel hangs on."""
+    b.rod((0, 0, 0.5), 0.01, float(b.half[0]), 0, CHROME)
+    for side in (-1, 1):
+        b.box((side * 0.92, 0, -0.2), (0.06, 0.9, 0.8), CHROME, Material.METAL)
+
+
+def paper_hanger(b: Builder) -> None:
+    """A holder for a roll of paper."""
+    b.rod((0, 0, 0.4), 0.012, float(b.half[0]), 0, CHROME)
+    b.box((0, 0, -0.8), (0.9, 0.8, 0.2), CHROME, Material.METAL)
+
+
+def doorway(b: Builder) -> None:
+    """A door frame."""
+    x, y = b.thick(0.05, 0), b.thick(0.05, 1)
+    for side in (-1, 1):
+        b.box((side * (1 - x), 0, 0), (x, 1, 1), WHITE, Material.WOOD)
+    b.box((0, 1 - y, 0), (1, y, 1), WHITE, Material.WOOD)
+
+
+SHAPES: dict[str, Callable[[Builder], None]] = {
+    "Bathtub": bathtub,
+    "BathtubBasin": basin,
+    "Blinds": blinds,
+    "Curtains": curtains,
+    "Doorway": doorway,
+    "Faucet": faucet,
+    "Floor": floor,
+    "HandTowelHolder": rail,
+    "LightSwitch": light_switch,
+    "Mirror": mirror,
+    "Painting": painting,
+    "Poster": painting,
+    "ShowerCurtain": shower_curtain,
+    "ShowerDoor": shower_door,
+    "ShowerGlass": shower_glass,
+    "ShowerHead": shower_head,
+    "Sink": sink,
+    "SinkBasin": basin,
+    "StoveBurner": burner,
+    "StoveKnob": knob,
+    "Toilet": toilet,
+    "ToiletPaperHanger": paper_hanger,
+    "TowelHolder": rail,
+    "Window": window,
+}

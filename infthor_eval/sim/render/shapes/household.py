@@ -1,0 +1,324 @@
+"""Small things of living rooms, bedrooms and bathrooms."""
+
+from collections.abc import Callable
+
+from infthor_eval.sim.render.primitives import Color, Kind, Material
+from infthor_eval.sim.render.shapes.builder import Builder, shade_of
+from infthor_eval.sim.render.shapes.palette import (
+    BLACK,
+    BRASS,
+    CERAMICS,
+    CHROME,
+    CLOTHS,
+    DARK,
+    LEAF,
+    PAPER,
+    STEEL,
+    WHITE,
+    WOODS,
+    pick,
+)
+
+__all__ = ["SHAPES"]
+
+_COVERS: tuple[Color, ...] = ((0.6, 0.18, 0.15), (0.18, 0.3, 0.5), (0.2, 0.42, 0.3), (0.55, 0.42, 0.2))
+
+
+def book(b: Builder) -> None:
+    """Covers around pages; two leaves when open."""
+    color = pick(_COVERS, b.style)
+    if b.state.openness > 0:
+        for side in (-1, 1):
+            b.box((side * 0.5, 0.2, 0), (0.48, 0.6, 0.96), PAPER, Material.PAPER)
+            b.box((side * 0.5, -0.8, 0), (0.5, 0.2, 1), color)
+        return
+    b.box((0.03, 0, 0), (0.94, 0.7, 0.96), PAPER)
+    for side in (-1, 1):
+        b.box((0, side * 0.86, 0), (1, 0.14, 1), color, Material.FABRIC)
+    b.box((-0.95, 0, 0), (0.05, 1, 1), shade_of(color, 0.8))
+    b.box((0.1, 0.99, 0.2), (0.5, 0.02, 0.3), shade_of(color, 1.6))
+
+
+def newspaper(b: Builder) -> None:
+    """A folded paper with lines."""
+    b.box((0, 0, 0), (1, 1, 1), (0.85, 0.85, 0.82), Material.PAPER)
+    b.box((0, 0.95, 0.75), (0.9, 0.08, 0.12), DARK)
+
+
+def card(b: Builder) -> None:
+    """A plastic card with a stripe and a chip."""
+    b.box((0, 0, 0), (1, 1, 1), pick(((0.15, 0.3, 0.65), (0.75, 0.6, 0.2), (0.5, 0.12, 0.2)), b.style))
+    b.box((0, 0.9, 0.6), (1, 0.2, 0.15), BLACK)
+    b.box((-0.5, 0.9, -0.2), (0.18, 0.2, 0.2), BRASS)
+
+
+def pen(b: Builder) -> None:
+    """A pen with its cap."""
+    color = pick(((0.1, 0.15, 0.5), (0.1, 0.1, 0.1), (0.6, 0.1, 0.1)), b.style)
+    b.box((0, 0, 0.3), (0.9, 0.9, 0.7), color)
+    b.box((0, 0, -0.65), (1, 1, 0.35), shade_of(color, 1.6))
+
+
+def pencil(b: Builder) -> None:
+    """A yellow pencil with a rubber and a point."""
+    b.box((0, 0, 0.05), (1, 1, 0.75), (0.93, 0.75, 0.15))
+    b.box((0, 0, 0.9), (1, 1, 0.1), (0.85, 0.45, 0.45))
+    b.box((0, 0, -0.85), (0.5, 0.5, 0.15), (0.75, 0.6, 0.4))
+
+
+def disc(b: Builder) -> None:
+    """A shiny disc with a hole."""
+    b.tube((0, 0, 0), (1, 1, 1), (0.75, 0.8, 0.88), Material.METAL)
+    b.tube((0, 0.1, 0), (0.2, 1, 0.2), (0.35, 0.36, 0.4))
+
+
+def keys(b: Builder) -> None:
+    """A ring with two keys."""
+    b.tube((-0.6, 0, 0), (0.4, 0.6, 0.7), BRASS, Material.METAL)
+    b.tube((-0.6, 0.1, 0), (0.25, 0.7, 0.45), (0.3, 0.25, 0.15))
+    b.box((0.35, 0, 0.3), (0.65, 0.6, 0.15), STEEL, Material.METAL)
+    b.box((0.3, 0.2, -0.4), (0.6, 0.6, 0.15), BRASS, Material.METAL, tilt=(0, 15, 0))
+
+
+def watch(b: Builder) -> None:
+    """A face on a strap."""
+    b.tube((0, 0, 0), (0.95, 0.7, 0.95), DARK)
+    b.tube((0, 0.5, 0), (0.7, 0.5, 0.7), (0.9, 0.85, 0.6), Material.METAL)
+
+
+def pillow(b: Builder) -> None:
+    """A soft cushion."""
+    color = pick(CLOTHS, b.style)
+    b.ball((0, 0, 0), (1, 1, 1), color, Material.FABRIC)
+    b.box((0, 0, 0), (0.85, 0.5, 0.85), shade_of(color, 1.05), Material.FABRIC)
+
+
+def teddy(b: Builder) -> None:
+    """Body, head, ears, arms and legs."""
+    fur: Color = (0.6, 0.42, 0.25)
+    b.ball((0, -0.35, 0), (0.6, 0.55, 0.7), fur, Material.STONE)
+    b.ball((0, 0.5, 0.05), (0.5, 0.42, 0.6), fur, Material.STONE)
+    b.ball((0, 0.42, 0.55), (0.2, 0.15, 0.3), shade_of(fur, 1.4))
+    for side in (-1, 1):
+        b.ball((side * 0.4, 0.85, 0), (0.18, 0.15, 0.2), shade_of(fur, 0.9))
+        b.ball((side * 0.72, -0.1, 0.1), (0.28, 0.2, 0.3), fur)
+        b.ball((side * 0.4, -0.85, 0.45), (0.28, 0.18, 0.5), fur)
+        b.ball((side * 0.18, 0.6, 0.6), (0.05, 0.05, 0.05), BLACK)
+
+
+def ball(b: Builder) -> None:
+    """An orange ball with seams."""
+    b.ball((0, 0, 0), (0.99, 0.99, 0.99), (0.85, 0.42, 0.12), Material.STONE)
+    b.tube((0, 0, 0), (1.005, 0.02, 1.005), BLACK)
+    b.add(Kind.CYLINDER, (0, 0, 0), (1.005, 0.02, 1.005), BLACK, tilt=(0, 0, 90))
+
+
+def bat(b: Builder) -> None:
+    """A bat along its longest side."""
+    _club(b, (0.7, 0.5, 0.3), thick=1.0, handle=0.45)
+
+
+def racket(b: Builder) -> None:
+    """A frame of strings on a handle, along its longest side."""
+    axis = max(range(3), key=lambda i: float(b.half[i]))
+    flat = min(range(3), key=lambda i: float(b.half[i]))
+    half, at, grip, low = [1.0] * 3, [0.0] * 3, [0.14] * 3, [0.0] * 3
+    half[axis], half[flat], at[axis] = 0.55, 0.5, 0.45
+    grip[axis], grip[flat], low[axis] = 0.5, 0.6, -0.5
+    b.ball(at, half, (0.85, 0.82, 0.6), Material.FABRIC)
+    b.box(low, grip, (0.25, 0.25, 0.5))
+
+
+def _club(b: Builder, color: Color, thick: float, handle: float) -> None:
+    axis = max(range(3), key=lambda i: float(b.half[i]))
+    body, grip, at, low = [thick] * 3, [handle] * 3, [0.0] * 3, [0.0] * 3
+    body[axis], at[axis] = 0.6, 0.4
+    grip[axis], low[axis] = 0.4, -0.6
+    b.box(at, body, color, Material.WOOD)
+    b.box(low, grip, shade_of(color, 0.7), Material.WOOD)
+
+
+def candle(b: Builder) -> None:
+    """A wax stick with a wick, and a flame when lit."""
+    b.tube((0, -0.15, 0), (1, 0.85, 1), pick(((0.93, 0.88, 0.75), (0.7, 0.3, 0.3), (0.5, 0.6, 0.7)), b.style))
+    b.tube((0, 0.8, 0), (0.08, 0.15, 0.08), BLACK)
+    if b.state.toggled:
+        b.ball((0, 1.0, 0), (0.25, 0.25, 0.25), (1.0, 0.75, 0.2), glow=1.0)
+
+
+def vase(b: Builder) -> None:
+    """A belly with a narrow neck."""
+    color = pick(CERAMICS, b.style + 1)
+    if b.state.broken:
+        _shards(b, color)
+        return
+    b.ball((0, -0.3, 0), (1, 0.7, 1), color)
+    b.cup((0, 0.6, 0), (0.55, 0.4, 0.55), color, bottom=0.6)
+
+
+def statue(b: Builder) -> None:
+    """A figure on a plinth."""
+    color = pick((BRASS, (0.75, 0.73, 0.7), (0.35, 0.3, 0.28)), b.style)
+    if b.state.broken:
+        _shards(b, color)
+        return
+    b.box((0, -0.88, 0), (0.9, 0.12, 0.9), DARK)
+    b.tube((0, -0.2, 0), (0.9, 0.6, 0.9), color, Material.METAL, top=0.5)
+    b.ball((0, 0.65, 0), (0.6, 0.35, 0.6), color, Material.METAL)
+
+
+def _shards(b: Builder, color: Color) -> None:
+    for index, (x, z) in enumerate(((-0.6, -0.4), (0.1, 0.5), (0.6, -0.2), (-0.2, 0.0), (0.4, 0.6))):
+        b.box((x, -0.85, z), (0.3, 0.12, 0.2), color, tilt=(0, 40 * index, 12))
+
+
+def plant(b: Builder) -> None:
+    """Leaves in a pot."""
+    b.tube((0, -0.72, 0), (0.6, 0.28, 0.6), (0.62, 0.34, 0.22), top=1.0, bottom=0.75)
+    b.tube((0, -0.3, 0), (0.08, 0.4, 0.08), (0.35, 0.25, 0.12))
+    for x, y, z in ((0.0, 0.55, 0.0), (-0.5, 0.15, 0.2), (0.5, 0.25, -0.2), (0.1, 0.1, 0.55), (-0.1, 0.3, -0.55)):
+        b.ball((x, y, z), (0.45, 0.4, 0.4), shade_of(LEAF, 0.85 + 0.3 * abs(x)), Material.STONE)
+
+
+def _bottle_with_head(b: Builder, color: Color, head: Color) -> None:
+    b.tube((0, -0.3, 0), (1, 0.7, 1), color, top=0.85)
+    b.tube((0, 0.55, 0), (0.3, 0.2, 0.3), head)
+    b.box((0, 0.88, 0.25), (0.35, 0.12, 0.65), head)
+
+
+def soap_bottle(b: Builder) -> None:
+    """A bottle with a pump; flat when used up."""
+    color: Color = (
+        (0.8, 0.8, 0.8) if b.state.used_up else pick(((0.3, 0.65, 0.7), (0.85, 0.6, 0.25), (0.6, 0.75, 0.4)), b.style)
+    )
+    _bottle_with_head(b, color, WHITE)
+
+
+def spray_bottle(b: Builder) -> None:
+    """A bottle with a trigger."""
+    _bottle_with_head(b, pick(((0.25, 0.45, 0.8), (0.3, 0.7, 0.4)), b.style), (0.85, 0.25, 0.2))
+
+
+def soap_bar(b: Builder) -> None:
+    """A rounded bar."""
+    b.ball((0, 0, 0), (1.05, 1, 1.05), (0.93, 0.82, 0.7))
+    b.box((0, 0, 0), (0.85, 0.9, 0.88), (0.95, 0.86, 0.74))
+
+
+def sponge(b: Builder) -> None:
+    """Two layers."""
+    b.box((0, -0.3, 0), (1, 0.7, 1), (0.95, 0.82, 0.25), Material.STONE)
+    b.box((0, 0.7, 0), (1, 0.3, 1), (0.25, 0.5, 0.3), Material.FABRIC)
+
+
+def cloth(b: Builder) -> None:
+    """A crumpled rag."""
+    color: Color = (0.45, 0.38, 0.3) if b.state.dirty else pick(CLOTHS, b.style)
+    b.box((0, -0.3, 0), (1, 0.7, 1), color, Material.FABRIC)
+    b.box((0.1, 0.6, -0.1), (0.6, 0.4, 0.5), shade_of(color, 1.15), Material.FABRIC, tilt=(0, 25, 0))
+
+
+def towel(b: Builder) -> None:
+    """A hanging or lying cloth with a border."""
+    color = pick(CLOTHS, b.style + 1)
+    b.box((0, 0, 0), (1, 1, 1), color, Material.FABRIC)
+    flat = min(range(3), key=lambda i: float(b.half[i]))
+    half, at = [1.005] * 3, [0.0] * 3
+    axis = 1 if flat != 1 else 2
+    half[axis], at[axis] = 0.06, -0.75
+    b.box(at, half, WHITE, Material.FABRIC)
+
+
+def toilet_paper(b: Builder) -> None:
+    """A roll with a core along its axis of equal sides."""
+    color: Color = (0.7, 0.6, 0.45) if b.state.used_up else WHITE
+    width = 0.4 if b.state.used_up else 1.0
+    b.tube((0, 0, 0), (width, 1, width), color, Material.FABRIC)
+    b.tube((0, 0.02, 0), (0.35, 1, 0.35), (0.6, 0.48, 0.33))
+
+
+def tissue_box(b: Builder) -> None:
+    """A box with a tissue sticking out."""
+    b.box((0, -0.15, 0), (1, 0.85, 1), pick(((0.5, 0.65, 0.8), (0.8, 0.6, 0.65)), b.style))
+    if not b.state.used_up:
+        b.tube((0, 0.8, 0), (0.3, 0.2, 0.3), WHITE, bottom=0.4)
+
+
+def stick_tool(b: Builder) -> None:
+    """A plunger or a brush: a stick with a working end at its foot."""
+    color: Color = (0.65, 0.2, 0.15) if b.item.object_type == "Plunger" else (0.9, 0.9, 0.92)
+    b.tube((0, -0.8, 0), (1, 0.2, 1), color, top=0.6)
+    b.tube((0, 0.15, 0), (0.16, 0.85, 0.16), pick(WOODS, b.style))
+
+
+def boots(b: Builder) -> None:
+    """Two shafts with feet."""
+    for side in (-1, 1):
+        b.box((side * 0.5, 0.1, -0.4), (0.42, 0.9, 0.5), (0.35, 0.22, 0.12))
+        b.box((side * 0.5, -0.78, 0.2), (0.42, 0.22, 0.8), (0.3, 0.18, 0.1))
+
+
+def watering_can(b: Builder) -> None:
+    """A can with a spout and a handle."""
+    color: Color = (0.3, 0.55, 0.45)
+    b.tube((0, -0.3, -0.2), (0.9, 0.7, 0.55), color, Material.METAL)
+    b.add(Kind.CYLINDER, (0, 0.0, 0.65), (0.15, 0.6, 0.1), color, tilt=(45, 0, 0))
+    b.box((0, 0.85, -0.2), (0.15, 0.1, 0.5), shade_of(color, 0.8))
+
+
+def dumbbell(b: Builder) -> None:
+    """Two weights on a bar."""
+    b.box((0, 0, 0), (0.25, 0.25, 1), CHROME, Material.METAL)
+    for side in (-1, 1):
+        b.box((0, 0, side * 0.7), (1, 1, 0.3), DARK)
+
+
+def foil(b: Builder) -> None:
+    """A roll of foil."""
+    b.box((0, 0, 0), (1, 1, 1), STEEL, Material.METAL)
+    b.box((0, 0.5, 0.9), (0.95, 0.5, 0.12), (0.3, 0.4, 0.7))
+
+
+def decor(b: Builder) -> None:
+    """A tall ornament."""
+    b.tube((0, -0.9, 0), (1, 0.1, 1), DARK)
+    b.tube((0, 0, 0), (0.6, 0.9, 0.6), pick(CERAMICS, b.style), top=0.5)
+    b.ball((0, 0.75, 0), (0.5, 0.25, 0.5), pick(CERAMICS, b.style + 1))
+
+
+SHAPES: dict[str, Callable[[Builder], None]] = {
+    "AluminumFoil": foil,
+    "BaseballBat": bat,
+    "BasketBall": ball,
+    "Book": book,
+    "Boots": boots,
+    "CD": disc,
+    "Candle": candle,
+    "Cloth": cloth,
+    "CreditCard": card,
+    "DishSponge": sponge,
+    "Dumbbell": dumbbell,
+    "HandTowel": towel,
+    "HousePlant": plant,
+    "KeyChain": keys,
+    "Newspaper": newspaper,
+    "Pen": pen,
+    "Pencil": pencil,
+    "Pillow": pillow,
+    "Plunger": stick_tool,
+    "RoomDecor": decor,
+    "ScrubBrush": stick_tool,
+    "SoapBar": soap_bar,
+    "SoapBottle": soap_bottle,
+    "SprayBottle": spray_bottle,
+    "Statue": statue,
+    "TableTopDecor": decor,
+    "TeddyBear": teddy,
+    "TennisRacket": racket,
+    "TissueBox": tissue_box,
+    "ToiletPaper": toilet_paper,
+    "Towel": towel,
+    "Vase": vase,
+    "Watch": watch,
+    "WateringCan": watering_can,
+}

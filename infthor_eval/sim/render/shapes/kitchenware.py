@@ -1,0 +1,201 @@
+"""Dishes, pots, cutlery, bottles."""
+
+from collections.abc import Callable
+
+from infthor_eval.sim.render.primitives import Color, Kind, Material
+from infthor_eval.sim.render.shapes.builder import Builder, shade_of
+from infthor_eval.sim.render.shapes.palette import BLACK, CERAMICS, CHROME, DARK, GLASS, STEEL, WHITE, WOODS, pick
+
+__all__ = ["SHAPES"]
+
+_LIQUIDS: dict[str, Color] = {"water": (0.5, 0.72, 0.88), "coffee": (0.25, 0.14, 0.07), "wine": (0.45, 0.05, 0.12)}
+
+
+def _liquid(b: Builder, level: float, radius: float, at: tuple[float, float] = (0.0, 0.0)) -> None:
+    if b.state.fill_liquid is not None:
+        color = _LIQUIDS.get(b.state.fill_liquid, _LIQUIDS["water"])
+        b.tube((at[0], level, at[1]), (radius, 0.02, radius), color)
+
+
+def mug(b: Builder) -> None:
+    """A cup with a handle on the longer side."""
+    color = pick(CERAMICS, b.style)
+    long = 0 if b.half[0] >= b.half[2] else 2
+    ratio = min(1.0, float(b.half[2 - long] / b.half[long]))
+    shift = 1 - ratio
+    at = (-shift, 0, 0) if long == 0 else (0, 0, -shift)
+    half = (ratio, 1, 1) if long == 0 else (1, 1, ratio)
+    b.cup(at, half, color, bottom=0.85)
+    b.tube((at[0], -0.92, at[2]), (half[0] * 0.85, 0.08, half[2] * 0.85), shade_of(color, 0.8))
+    _liquid(b, 0.6, min(half[0], half[2]) * 0.9, (at[0], at[2]))
+    reach = max(1 - (2 * ratio - 1), 0.25)
+    for level in (-0.45, 0.45):
+        middle = (1 - reach / 2, level, 0) if long == 0 else (0, level, 1 - reach / 2)
+        bar = (reach / 2, 0.1, 0.12) if long == 0 else (0.12, 0.1, reach / 2)
+        b.box(middle, bar, color)
+    b.box((0.93, 0, 0) if long == 0 else (0, 0, 0.93), (0.07, 0.55, 0.12) if long == 0 else (0.12, 0.55, 0.07), color)
+
+
+def cup(b: Builder) -> None:
+    """A tumbler."""
+    color = pick((GLASS, (0.4, 0.6, 0.75), (0.8, 0.5, 0.3)), b.style)
+    b.cup((0, 0, 0), (1, 1, 1), color, Material.GLASS, bottom=0.75)
+    b.tube((0, -0.94, 0), (0.75, 0.05, 0.75), shade_of(color, 0.8))
+    _liquid(b, 0.4, 0.85)
+
+
+def bowl(b: Builder) -> None:
+    """A wide bowl on a foot."""
+    color = pick(CERAMICS, b.style)
+    b.cup((0, 0.1, 0), (1, 0.9, 1), color, bottom=0.5)
+    b.tube((0, -0.9, 0), (0.5, 0.1, 0.5), shade_of(color, 0.85))
+    _liquid(b, 0.5, 0.85)
+
+
+def plate(b: Builder) -> None:
+    """A flat plate with a rim."""
+    color = pick(CERAMICS, b.style)
+    b.cup((0, 0, 0), (1, 1, 1), color, bottom=0.65)
+    b.tube((0, -0.8, 0), (0.66, 0.2, 0.66), shade_of(color, 0.92))
+
+
+def pot(b: Builder) -> None:
+    """A pot with two ears."""
+    color = pick((STEEL, (0.35, 0.36, 0.38), (0.6, 0.25, 0.2)), b.style)
+    long = 0 if b.half[0] >= b.half[2] else 2
+    body = max(0.6, float(b.half[2 - long] / b.half[long]) * 0.98)
+    half: tuple[float, float, float] = (body, 1, 1) if long == 0 else (1, 1, body)
+    if abs(b.half[0] - b.half[2]) < 0.05 * b.half[0]:
+        half = (0.85, 1, 0.85)
+    b.cup((0, 0, 0), half, color, Material.METAL, bottom=0.92)
+    b.tube((0, -0.94, 0), (half[0] * 0.92, 0.06, half[2] * 0.92), shade_of(color, 0.7))
+    _liquid(b, 0.3, min(half[0], half[2]) * 0.94)
+    for side in (-1, 1):
+        ear = (side * 0.92, 0.65, 0) if long == 0 else (0, 0.65, side * 0.92)
+        b.box(ear, (0.08, 0.08, 0.3) if long == 0 else (0.3, 0.08, 0.08), BLACK)
+
+
+def pan(b: Builder) -> None:
+    """A shallow pan with a long handle."""
+    long = 0 if b.half[0] >= b.half[2] else 2
+    ratio = min(0.95, float(b.half[2 - long] / b.half[long]))
+    shift = 1 - ratio
+    at = (-shift, 0, 0) if long == 0 else (0, 0, -shift)
+    half = (ratio, 0.95, 1) if long == 0 else (1, 0.95, ratio)
+    b.cup((at[0], 0, at[2]), half, DARK, Material.METAL, bottom=0.88)
+    b.tube((at[0], -0.85, at[2]), (half[0] * 0.88, 0.1, half[2] * 0.88), (0.14, 0.14, 0.15))
+    length = max(1 - ratio, 0.05)
+    where = (1 - length, 0.6, 0) if long == 0 else (0, 0.6, 1 - length)
+    b.box(where, (length, 0.25, 0.08) if long == 0 else (0.08, 0.25, length), BLACK)
+
+
+def kettle(b: Builder) -> None:
+    """A round kettle with a spout and a handle over its lid."""
+    color = pick((STEEL, (0.65, 0.2, 0.16), (0.3, 0.45, 0.55)), b.style)
+    b.tube((0, -0.4, 0), (0.85, 0.6, 0.85), color, Material.METAL, top=0.7)
+    b.ball((0, 0.2, 0), (0.6, 0.2, 0.6), shade_of(color, 0.9), Material.METAL)
+    b.add(Kind.CYLINDER, (0, -0.05, 0.78), (0.12, 0.4, 0.12), color, tilt=(50, 0, 0))
+    for side in (-1, 1):
+        b.box((0, 0.45, side * 0.5), (0.08, 0.5, 0.06), BLACK)
+    b.box((0, 0.92, 0), (0.1, 0.08, 0.55), BLACK)
+
+
+def _bottle(b: Builder, color: Color, label: Color, neck: float) -> None:
+    b.tube((0, -0.35, 0), (1, 0.65, 1), color, Material.GLASS)
+    b.tube((0, 0.42, 0), (1, 0.14, 1), color, Material.GLASS, top=neck)
+    b.tube((0, 0.75, 0), (neck, 0.25, neck), color, Material.GLASS)
+    b.tube((0, -0.35, 0), (1.02, 0.3, 1.02), label, Material.PAPER)
+    if b.state.broken:
+        b.box((0, 0.1, 0.9), (0.05, 0.5, 0.2), BLACK)
+
+
+def wine_bottle(b: Builder) -> None:
+    """A dark bottle with a label."""
+    _bottle(b, (0.12, 0.25, 0.14), (0.9, 0.87, 0.75), 0.35)
+
+
+def bottle(b: Builder) -> None:
+    """A clear bottle with a coloured label."""
+    _bottle(b, GLASS, pick(((0.3, 0.5, 0.7), (0.75, 0.4, 0.25)), b.style), 0.4)
+
+
+def _handled(b: Builder, share: float, handle: Color) -> None:
+    """A handle over the last `share` of the length, towards +z."""
+    b.box((0, 0, 1 - share), (0.5, 0.9, share), handle)
+
+
+def knife(b: Builder) -> None:
+    """A blade and a dark handle."""
+    _handled(b, 0.36, (0.15, 0.13, 0.12))
+    b.box((0.15, 0, -0.36), (0.85, 0.35, 0.64), CHROME, Material.METAL)
+
+
+def butter_knife(b: Builder) -> None:
+    """All of steel."""
+    _handled(b, 0.45, shade_of(STEEL, 0.9))
+    b.box((0, 0, -0.45), (1, 0.5, 0.55), CHROME, Material.METAL)
+
+
+def fork(b: Builder) -> None:
+    """A handle and tines."""
+    b.box((0, 0, 0.35), (0.3, 0.6, 0.65), STEEL, Material.METAL)
+    b.box((0, 0, -0.4), (1, 0.6, 0.14), STEEL, Material.METAL)
+    for at in (-0.8, -0.27, 0.27, 0.8):
+        b.box((at, 0.2, -0.75), (0.16, 0.5, 0.25), STEEL, Material.METAL)
+
+
+def spoon(b: Builder) -> None:
+    """A handle and a bowl."""
+    b.box((0, 0.1, 0.35), (0.3, 0.5, 0.65), STEEL, Material.METAL)
+    b.ball((0, 0, -0.65), (1, 1, 0.35), CHROME, Material.METAL)
+
+
+def spatula(b: Builder) -> None:
+    """A slotted blade on a long handle."""
+    b.box((0, 0.2, 0.35), (0.22, 0.6, 0.65), DARK)
+    b.box((0, -0.3, -0.65), (1, 0.5, 0.35), (0.3, 0.3, 0.32))
+    for at in (-0.4, 0.0, 0.4):
+        b.box((at, 0.25, -0.65), (0.1, 0.1, 0.22), (0.6, 0.6, 0.62))
+
+
+def ladle(b: Builder) -> None:
+    """A cup at the end of a long handle."""
+    b.cup((0, -0.3, -0.68), (0.95, 0.7, 0.32), STEEL, Material.METAL, bottom=0.6)
+    b.box((0, 0.5, 0.3), (0.15, 0.2, 0.7), CHROME, Material.METAL)
+
+
+def shaker(b: Builder) -> None:
+    """A glass with a metal cap."""
+    fill: Color = WHITE if b.item.object_type == "SaltShaker" else (0.22, 0.18, 0.15)
+    b.tube((0, -0.25, 0), (1, 0.75, 1), fill, Material.GLASS, top=0.8)
+    b.tube((0, 0.7, 0), (0.82, 0.3, 0.82), CHROME, Material.METAL, top=0.7)
+
+
+def paper_roll(b: Builder) -> None:
+    """A roll of kitchen paper on a post."""
+    color: Color = (0.75, 0.7, 0.6) if b.state.used_up else (0.96, 0.96, 0.94)
+    width = 0.35 if b.state.used_up else 1.0
+    b.tube((0, 0, 0), (width, 0.95, width), color, Material.FABRIC)
+    b.tube((0, 0, 0), (0.2, 1, 0.2), pick(WOODS, b.style))
+
+
+SHAPES: dict[str, Callable[[Builder], None]] = {
+    "Bottle": bottle,
+    "Bowl": bowl,
+    "ButterKnife": butter_knife,
+    "Cup": cup,
+    "Fork": fork,
+    "Kettle": kettle,
+    "Knife": knife,
+    "Ladle": ladle,
+    "Mug": mug,
+    "Pan": pan,
+    "PaperTowelRoll": paper_roll,
+    "PepperShaker": shaker,
+    "Plate": plate,
+    "Pot": pot,
+    "SaltShaker": shaker,
+    "Spatula": spatula,
+    "Spoon": spoon,
+    "WineBottle": wine_bottle,
+}

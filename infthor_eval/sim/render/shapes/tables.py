@@ -1,0 +1,148 @@
+"""Tables, counters, shelves and chests."""
+
+from collections.abc import Callable, Sequence
+
+from infthor_eval.sim.footprints import Rect
+from infthor_eval.sim.render.primitives import Color, Material
+from infthor_eval.sim.render.shapes.builder import Builder, shade_of
+from infthor_eval.sim.render.shapes.palette import CHROME, DARK, WOODS, pick
+
+__all__ = ["SHAPES", "cut_slab"]
+
+_STONES: tuple[Color, ...] = ((0.55, 0.53, 0.5), (0.35, 0.35, 0.37), (0.72, 0.69, 0.63))
+
+
+def counter(b: Builder) -> None:
+    """A slab of stone, cut out where sinks are; a tall box has a body of wood below it."""
+    height = 2 * float(b.half[1])
+    color = pick(_STONES, b.style)
+    if height < 0.1 and b.item.support is not None:  # a recorded counter is a thin space above its slab
+        half = 0.018 / float(b.half[1])
+        cut_slab(b, b.item.support / float(b.half[1]) - 1 - half, half, color, Material.STONE)
+        return
+    slab = b.thick(0.025, 1) if height > 0.08 else 1.0
+    top = 1.0 if b.item.support is None else b.item.support / float(b.half[1]) - 1
+    cut_slab(b, top - slab, slab, color, Material.STONE)
+    if height > 0.2:
+        wood = pick(WOODS, b.style)
+        if b.item.hollow:
+            _carcass(b, wood, top - 2 * slab)
+        else:
+            body = (top - 2 * slab + 1) / 2
+            cut_slab(b, -1 + body, body, wood, Material.WOOD, shrink=0.96)
+
+
+def cut_slab(b: Builder, at: float, half: float, color: Color, material: Material, shrink: float = 1.0) -> None:
+    """A board over the object's plan, its middle at height `at`, `half` thick (fractions)."""
+    turned = round(b.item.front / 90)
+    x, z = float(b.half[0]), float(b.half[2])
+    for piece in b.item.pieces or ((-x, -z, x, z),):
+        x0, z0, x1, z1 = _turn(piece, turned) if b.item.pieces else piece
+        middle = ((x0 + x1) / 2 / x, at, (z0 + z1) / 2 / z)
+        b.box(middle, ((x1 - x0) / 2 / x * shrink, half, (z1 - z0) / 2 / z * shrink), color, material)
+
+
+def _turn(rect: Rect, quarters: int) -> Rect:
+    """A rectangle of the object's frame in the frame of its front, which is turned by quarter turns."""
+    x0, z0, x1, z1 = rect
+    for _ in range(quarters % 4):
+        x0, z0, x1, z1 = -z1, x0, -z0, x1
+    return x0, z0, x1, z1
+
+
+def _carcass(b: Builder, color: Color, top: float) -> None:
+    """Sides and back from the floor up to `top`; the front is left to drawers."""
+    x, z = b.thick(0.012, 0), b.thick(0.01, 2)
+    middle, half = (top - 1) / 2, (top + 1) / 2
+    for side in (-1, 1):
+        b.box((side * (1 - x), middle, 0), (x, half, 1), shade_of(color, 0.9), Material.WOOD)
+    b.box((0, middle, -1 + z), (1 - 2 * x, half, z), shade_of(color, 0.7), Material.WOOD)
+
+
+def _surface(b: Builder) -> float:
+    """Height of the board's upper side, as a fraction of the half box."""
+    return 1.0 if b.item.support is None else b.item.support / float(b.half[1]) - 1
+
+
+def table(b: Builder) -> None:
+    """A board on four legs; with a raised back where the surface is lower than the box."""
+    color = pick(WOODS, b.style)
+    surface = _surface(b)
+    board = b.thick(0.02, 1)
+    b.box((0, surface - board, 0), (1, board, 1), color, Material.WOOD)
+    if surface < 1 - b.thick(0.12, 1):
+        z = b.thick(0.015, 2)
+        b.box((0, (1 + surface) / 2, -1 + z), (1, (1 - surface) / 2, z), shade_of(color, 0.85), Material.WOOD)
+    if b.item.hollow:
+        _carcass(b, color, surface - 2 * board)
+        return
+    under = surface - 2 * board
+    x, z = b.thick(0.03, 0), b.thick(0.03, 2)
+    for sx in (-1, 1):
+        for sz in (-1, 1):
+            b.box((sx * (0.97 - x), (under - 1) / 2, sz * (0.97 - z)), (x, (under + 1) / 2, z), shade_of(color, 0.85),
+                  Material.WOOD)  # fmt: skip
+    apron = b.thick(0.035, 1)
+    b.box((0, under - apron, 0), (0.9, apron, 0.9), shade_of(color, 0.8), Material.WOOD)
+
+
+def chest(b: Builder) -> None:
+    """A closed body with a board on top: dressers and stands whose drawers are not objects of their own."""
+    color = pick(WOODS, b.style)
+    board, top = b.thick(0.02, 1), _surface(b)
+    b.box((0, top - board, 0), (1, board, 1), color, Material.WOOD)
+    if b.item.hollow:
+        _carcass(b, color, top - 2 * board)
+        return
+    middle, half = (top - 2 * board - 1) / 2, (top - 2 * board + 1) / 2
+    b.box((0, middle, -0.02), (0.97, half, 0.95), shade_of(color, 0.85), Material.WOOD)
+    for row in range(3):
+        level = middle + half * (0.6 - row * 0.6)
+        for side in (-1, 1):
+            b.box((side * 0.48, level, 0.96), (0.45, 0.26, 0.03), color, Material.WOOD)
+            b.ball((side * 0.48, level, 1.0), (b.thick(0.015, 0), b.thick(0.015, 1), b.thick(0.015, 2)), CHROME)
+
+
+def shelf(b: Builder) -> None:
+    """A board at the foot of the space that things stand in."""
+    color = pick(WOODS, b.style // 3)
+    height = 2 * float(b.half[1])
+    thick = min(0.01, max(height / 2, 0.004))
+    b.slab((0, -1 - thick / max(float(b.half[1]), 1e-6) + 0.002, 0), (float(b.half[0]), thick, float(b.half[2])), color,
+           Material.WOOD)  # fmt: skip
+
+
+def shelving(b: Builder) -> None:
+    """An open rack."""
+    color = pick(WOODS, b.style)
+    x, y, z = b.thick(0.012, 0), b.thick(0.01, 1), b.thick(0.008, 2)
+    for side in (-1, 1):
+        b.box((side * (1 - x), 0, 0), (x, 1, 1), color, Material.WOOD)
+    b.box((0, 0, -1 + z), (1, 1, z), shade_of(color, 0.7), Material.WOOD)
+    levels: Sequence[float] = (-0.9, 1 - y) if b.item.hollow else (-0.9, -0.3, 0.3, 1 - y)
+    for level in levels:
+        b.box((0, level, 0), (1, y, 1), shade_of(color, 0.95), Material.WOOD)
+
+
+def cart(b: Builder) -> None:
+    """Two trays on wheels."""
+    for level in (-0.5, 0.92):
+        b.box((0, level, 0), (1, 0.06, 1), (0.75, 0.77, 0.8), Material.METAL)
+    for sx in (-1, 1):
+        for sz in (-1, 1):
+            b.box((sx * 0.94, 0, sz * 0.94), (0.04, 1, 0.04), CHROME, Material.METAL)
+            b.ball((sx * 0.94, -0.95, sz * 0.94), (0.08, 0.06, 0.08), DARK)
+
+
+SHAPES: dict[str, Callable[[Builder], None]] = {
+    "Cart": cart,
+    "CoffeeTable": table,
+    "CounterTop": counter,
+    "Desk": table,
+    "DiningTable": table,
+    "Dresser": chest,
+    "Shelf": shelf,
+    "ShelvingUnit": shelving,
+    "SideTable": table,
+    "TVStand": chest,
+}
