@@ -16,7 +16,6 @@ from safetensors.torch import load_file, save_file
 from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.formats.frames import FrameRef
 from model_adapters import check_adapter, load
-from model_adapters.engine.prompt import token_ids
 from model_adapters.tiny.qwen2_5_vl import save_tiny_checkpoint
 
 
@@ -185,43 +184,3 @@ def test_the_template_may_lie_in_the_old_json_file_or_the_tokenizer(copy: Path, 
 def test_an_unknown_dtype_or_device_is_a_usage_error(checkpoint: Path, option: str, value: str) -> None:
     with pytest.raises(UsageError, match=f"{option}={value}"):
         _load(checkpoint, **{option: value})
-
-
-PEERS = Path(sys.prefix) / "test-peers"  # torchvision's Python half, kept out of the environment
-
-PROCESSOR = """
-import json, sys
-import torch
-library = torch.library.Library("torchvision", "DEF")
-for name in ("nms", "qnms"):
-    library.define(name + "(Tensor dets, Tensor scores, float iou_threshold) -> Tensor")
-from PIL import Image
-from transformers import AutoModelForImageTextToText, AutoProcessor
-folder, question, *paths = sys.argv[1:]
-processor = AutoProcessor.from_pretrained(folder)
-content = [{"type": "image"}] * len(paths) + [{"type": "text", "text": question}]
-text = processor.apply_chat_template([{"role": "user", "content": content}], add_generation_prompt=True)
-inputs = processor(text=[text], images=[Image.open(path) for path in paths], return_tensors="pt")
-model = AutoModelForImageTextToText.from_pretrained(folder)
-output = model.generate(**inputs, do_sample=False, max_new_tokens=8)
-ids = inputs["input_ids"][0].tolist()
-print(json.dumps([type(processor).__name__, ids, output[0, len(ids):].tolist()]))
-"""
-
-
-@pytest.mark.skipif(not PEERS.is_dir(), reason="torchvision is not set aside in test-peers (make test does it)")
-def test_ids_and_reply_are_those_of_transformers_own_processor(checkpoint: Path, frames: list[FrameRef]) -> None:
-    question = "\nWhat do you see?"
-    run = subprocess.run(
-        [sys.executable, "-c", PROCESSOR, str(checkpoint), question, *(str(frame.path) for frame in frames)],
-        check=True,
-        capture_output=True,
-        text=True,
-        env=os.environ | {"PYTHONPATH": str(PEERS)},
-    )
-    name, ids, reply = json.loads(run.stdout.splitlines()[-1])
-    model = _load(checkpoint)
-    units = model.units((*frames, question))
-    assert name == "Qwen2_5_VLProcessor"
-    assert list(token_ids(units)) == ids
-    assert list(_ask(model, frames).token_ids) == reply
