@@ -5,7 +5,6 @@ The folder form is that of the published data (hub dataset `PEARLS-Lab/infini-th
 """
 
 import hashlib
-import json
 from collections import Counter
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,6 +14,7 @@ from infthor_eval.errors import DataError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.qa_csv import read_questions
 from infthor_eval.formats.question import Question
+from infthor_eval.formats.set_info import simulator_of
 from infthor_eval.formats.step_log import read_steps
 
 __all__ = ["LeftOut", "NiehSet"]
@@ -84,21 +84,14 @@ class NiehSet:
                 digest.update(f"{traj_id}/{index}:{frame.path.name}:{frame.path.stat().st_size}\n".encode())
         return digest.hexdigest()
 
-    @cached_property
+    @property
     def simulator(self) -> str | None:
-        """What rendered the frames ("embedded", "unity"), from the set's `set.json`; None where it does not say.
+        """What rendered the frames ("embedded", "unity"); None where the set does not say.
 
         Raises:
             DataError: `set.json` is not a JSON object.
         """
-        path = self.root / "set.json"
-        if not path.is_file():
-            return None
-        try:
-            info = json.loads(path.read_text(encoding="utf-8"))
-            return str(info["simulator"]) if "simulator" in info else None
-        except (ValueError, TypeError) as error:
-            raise DataError(f"{path}: not a JSON object ({error}); write the set again") from error
+        return simulator_of(self.root)
 
     def reasons(self) -> Counter[str]:
         """How many questions were left out, by reason."""

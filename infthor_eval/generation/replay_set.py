@@ -18,6 +18,7 @@ from typing import Any
 import msgspec
 
 from infthor_eval.errors import DataError, InfthorError, SimulatorError
+from infthor_eval.formats.set_info import claim_for_simulator
 from infthor_eval.formats.trajectory import Source, Trajectory, folder_name, iter_sources
 from infthor_eval.generation.replay import Replayed, replay
 from infthor_eval.thor.simulator import Simulator
@@ -153,6 +154,7 @@ def replay_set(
     started = time.monotonic()
     metadata = out / "metadata"
     metadata.mkdir(parents=True, exist_ok=True)
+    claim_for_simulator(out, simulator.kind)
     summary = Summary(failures=list(selection.failures))
     for source, trajectory in selection.items:
         try:

@@ -14,6 +14,7 @@ class Launch:
     """What to start and how long to wait for it.
 
     Attributes:
+        kind: "unity" or "embedded": what sets made with it are labelled by.
         executable: command line of the simulator; None for the build that ai2thor downloads.
         platform: name of ai2thor's platform for its own build ("CloudRendering" needs no X server).
         timeout: seconds for one reply.
@@ -21,6 +22,7 @@ class Launch:
     """
 
     executable: str | None = None
+    kind: str = "unity"
     platform: str | None = None
     timeout: float = 100.0
     start_timeout: float = 300.0
@@ -46,9 +48,9 @@ def embedded(
         words += ["--data", str(Path(data).resolve())]
     if supplement is not None:
         words += ["--supplement", str(Path(supplement).resolve())]
-    return Launch(shlex.join(words), timeout=timeout, start_timeout=start_timeout)
+    return Launch(shlex.join(words), "embedded", timeout=timeout, start_timeout=start_timeout)
 
 
 def unity(executable: Path | None = None, *, platform: str | None = None) -> Launch:
     """A Unity build of AI2-THOR: an executable at hand, or the build that ai2thor downloads itself."""
-    return Launch(None if executable is None else shlex.quote(str(executable)), platform)
+    return Launch(None if executable is None else shlex.quote(str(executable)), platform=platform)

@@ -78,6 +78,11 @@ class Simulator:
         self.close()
 
     @property
+    def kind(self) -> str:
+        """Which simulator this is, "embedded" or "unity"."""
+        return self._launch.kind
+
+    @property
     def view(self) -> View:
         """The world after the last action.
 
