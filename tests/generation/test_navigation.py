@@ -1,0 +1,47 @@
+from hypothesis import given
+from hypothesis import strategies as st
+
+from infthor_eval.generation.navigation import GRID, Grid, Stand
+
+cells = st.frozensets(st.tuples(st.integers(0, 4), st.integers(0, 4)), min_size=1, max_size=25)
+
+
+def grid_of(chosen):
+    return Grid((x * GRID + 0.125, z * GRID - 1.0) for x, z in chosen)
+
+
+@given(cells, st.data())
+def test_paths_lead_where_they_should_and_are_shortest(chosen, data):
+    grid = grid_of(chosen)
+    stands = sorted(Stand(cell, facing) for cell in grid.cells for facing in (0, 90, 180, 270))
+    start, goal = data.draw(st.sampled_from(stands)), data.draw(st.sampled_from(stands))
+    distances = grid.distances(start)
+    path = grid.path(start, goal)
+    assert (path is None) == (goal not in distances)
+    if path is not None:
+        assert len(path) == distances[goal]
+        assert walk(grid, start, path) == goal
+
+
+def walk(grid, stand, path):
+    ahead = {0: (0, 1), 90: (1, 0), 180: (0, -1), 270: (-1, 0)}
+    for action in path:
+        turn = {"RotateLeft": -90, "RotateRight": 90, "MoveAhead": 0}[action]
+        cell = stand.cell
+        if action == "MoveAhead":
+            dx, dz = ahead[stand.facing]
+            cell = (cell[0] + dx, cell[1] + dz)
+            assert cell in grid.cells
+        stand = Stand(cell, (stand.facing + turn) % 360)
+    return stand
+
+
+@given(cells)
+def test_positions_and_cells_agree(chosen):
+    grid = grid_of(chosen)
+    assert len(grid.cells) == len(chosen)
+    assert all(grid.cell(*grid.position(cell)) == cell for cell in grid.cells)
+
+
+def test_no_cells():
+    assert not Grid([]).cells

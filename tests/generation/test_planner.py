@@ -1,0 +1,83 @@
+from collections import deque
+
+import pytest
+
+from infthor_eval.generation.goals import achieved, least_remaining
+from infthor_eval.generation.planner import plan
+from infthor_eval.generation.sampling import tasks_of
+from infthor_eval.generation.symbolic import room_of
+from infthor_eval.generation.tasks import Task, TaskType
+
+from .rooms import APPLE, COUNTER, KITCHEN, MUG
+
+ROOM = room_of(KITCHEN)
+EXTRA = {"Faucet"}
+
+
+def names(task):
+    return [step.name.removesuffix("Object").removesuffix("Location") for step in plan(task, ROOM)]
+
+
+@pytest.mark.parametrize(
+    ("task", "steps"),
+    [
+        (Task(TaskType.PLACE, "Mug", "DiningTable"), "Goto Pickup Goto Put"),
+        (Task(TaskType.CLEAN, "Mug", "DiningTable"), "Goto Pickup Goto Clean Goto Put"),
+        (Task(TaskType.HEAT, "Apple", "CounterTop"), "Goto Pickup Goto Heat Goto Put"),
+        (Task(TaskType.COOL, "Mug", "CounterTop"), "Goto Pickup Goto Cool Goto Put"),
+        (Task(TaskType.EXAMINE, "Mug", light="DeskLamp"), "Goto Pickup Goto Toggle"),
+        (Task(TaskType.PLACE_TWO, "Apple", "CounterTop"), "Goto Pickup Goto Put Goto Pickup Goto Put"),
+        (Task(TaskType.STACK, "Apple", "CounterTop", movable="Plate"), "Goto Pickup Put Pickup Goto Put"),
+        (
+            Task(TaskType.PLACE, "Apple", "CounterTop", sliced=True),
+            "Goto Pickup Goto Put Pickup Slice",
+        ),
+    ],
+)
+def test_plans_of_every_type(task, steps):
+    found = names(task)
+    assert sorted(found) == sorted(steps.split())
+    assert found[-1] == steps.split()[-1]
+
+
+def test_nothing_to_do_and_nothing_to_be_done():
+    assert plan(Task(TaskType.PLACE, "Mug", "CounterTop"), ROOM) == []
+    assert plan(Task(TaskType.PLACE, "Vase", "CounterTop"), ROOM) is None
+
+
+def test_contents_move_with_what_carries_them():
+    steps = plan(Task(TaskType.STACK, "Spoon", "DiningTable", movable="Mug"), ROOM)
+    assert [step.item for step in steps if step.name == "PickupObject"] == [MUG.object_id]
+
+
+@pytest.mark.parametrize("task", tasks_of(ROOM, EXTRA), ids=str)
+def test_no_shorter_plan_exists(task):
+    """Against plain breadth-first search, and the bound never exceeds what is left."""
+    found = plan(task, ROOM)
+    assert found is not None
+    assert len(found) == shortest(task, len(found))
+
+
+def shortest(task, limit):
+    from infthor_eval.generation.planner import _Problem
+
+    problem = _Problem(task, ROOM)
+    depth = {problem.start: 0}
+    queue = deque([problem.start])
+    while queue:
+        state = queue.popleft()
+        assert least_remaining(task, ROOM, state) + depth[state] <= limit or not achieved(task, ROOM, state)
+        if achieved(task, ROOM, state):
+            return depth[state]
+        for _, following in problem.successors(state):
+            if following not in depth:
+                depth[following] = depth[state] + 1
+                queue.append(following)
+    return None
+
+
+def test_the_room_is_read_from_the_metadata():
+    where = dict(ROOM.start.where)
+    assert where[MUG.object_id] == COUNTER.object_id
+    assert ROOM.types[f"{APPLE.object_id}#1"] == "AppleSliced" and where[f"{APPLE.object_id}#1"] == ""
+    assert ROOM.place_of("Spoon|+00.20|+00.95|+00.00", where) == COUNTER.object_id

@@ -1,0 +1,121 @@
+import gzip
+import json
+from pathlib import Path
+
+import pytest
+from PIL import Image
+
+from infthor_eval.errors import SimulatorError
+from infthor_eval.formats.step_log import read_steps, worlds
+from infthor_eval.formats.trajectory import iter_sources, iter_trajectories
+from infthor_eval.generation.factory import Settings
+from infthor_eval.generation.generate_set import generate_set
+from infthor_eval.generation.replay import box_iou
+from infthor_eval.generation.replay_set import replay_set, select
+from infthor_eval.generation.supplement import write_supplement
+from infthor_eval.thor.launch import embedded
+from infthor_eval.thor.simulator import Simulator
+
+SHARED = Path(__file__).parents[2] / "../shared/data"
+JOB = Settings("kitchen-3", 4, min_steps=40, min_subgoals=1)
+
+
+@pytest.fixture(scope="module")
+def generated(tmp_path_factory):
+    out = tmp_path_factory.mktemp("generated")
+    with Simulator(embedded()) as simulator:
+        result = generate_set([JOB], simulator, out)
+    assert not result.failures
+    return result.paths[0]
+
+
+def test_a_generated_trajectory_replays_whole(generated, tmp_path):
+    with Simulator(embedded()) as simulator:
+        summary = replay_set(select([generated]), simulator, tmp_path)
+        again = replay_set(select([generated]), simulator, tmp_path)
+    trajectory = next(iter_trajectories(generated))
+    assert summary.document()["whole"] == 1 and not summary.failures
+    assert (again.resumed, summary.resumed) == (1, 0)
+    folder = tmp_path / "metadata" / trajectory.traj_id
+    steps = read_steps(folder)
+    frames = sorted((folder / "img").iterdir())
+    assert len(steps) == len(frames) == len(trajectory.plan.low_actions) + 1 >= 41
+    assert Image.open(frames[0]).size == (300, 300)
+    assert [entry["visible"] for entry in trajectory.object_log] == [step.object_log.visible for step in steps]
+    last = list(worlds(steps))[-1]
+    assert last and all(state.type for state in last.values())
+    images = json.loads((folder / "expert_log.json").read_text())["images"]
+    assert [image["low_idx"] for image in images[:4]] == [0, 0, 1, 2]
+    assert (folder / "traj.txt").read_text().startswith("<|goal|>Your main goal: ")
+    assert not list((tmp_path / "metadata").glob(".*"))
+
+
+def test_the_seed_decides_and_what_exists_is_kept(generated, tmp_path):
+    with Simulator(embedded()) as simulator:
+        generate_set([JOB], simulator, tmp_path)
+        assert (tmp_path / generated.name).read_bytes() == generated.read_bytes()
+        assert generate_set([JOB], simulator, tmp_path).resumed == 1
+        other = Settings(JOB.scene, JOB.seed, min_steps=41, min_subgoals=1)
+        assert "other settings" in generate_set([other], simulator, tmp_path).failures[0]
+
+
+def test_one_bad_trajectory_does_not_stop_the_others(generated, tmp_path):
+    good = generated.read_bytes()
+    nowhere = json.loads(good)
+    nowhere["scene"]["floor_plan"], nowhere["traj_id"] = "nowhere-1", "../../escape"
+    lines = [json.dumps(nowhere).encode(), b"{broken", json.dumps(json.loads(good)).encode()]
+    path = tmp_path / "all.jsonl.gz"
+    path.write_bytes(gzip.compress(b"\n".join(lines)))
+    with Simulator(embedded()) as simulator:
+        summary = replay_set(select([path]), simulator, tmp_path / "set")
+    assert len(summary.reports) == 1
+    assert sorted(failure.place.rpartition(":")[2] for failure in summary.failures) == ["1", "2"]
+    assert [folder.name for folder in (tmp_path / "set/metadata").iterdir()] == [JOB.traj_id]
+
+
+def test_another_trajectory_of_the_same_name_is_refused(generated, tmp_path):
+    changed = json.loads(generated.read_bytes())
+    changed["plan"]["low_actions"] = changed["plan"]["low_actions"][:2]
+    (tmp_path / "short.json").write_text(json.dumps(changed))
+    with Simulator(embedded()) as simulator:
+        replay_set(select([tmp_path / "short.json"]), simulator, tmp_path / "set")
+        summary = replay_set(select([generated]), simulator, tmp_path / "set")
+    assert "another trajectory" in summary.failures[0].message
+
+
+@pytest.mark.skipif(not SHARED.is_dir(), reason="recorded data not at ../shared/data")
+def test_recorded_trajectories_replay(tmp_path):
+    selection = select([SHARED / "alfred/valid_seen.jsonl.gz"], limit=3, per_floor_plan=1)
+    write_supplement((trajectory for _, trajectory in selection.items), tmp_path / "supplement.json")
+    with Simulator(embedded(SHARED, tmp_path / "supplement.json")) as simulator:
+        summary = replay_set(selection, simulator, tmp_path)
+    document = summary.document()
+    assert document["trajectories"] == document["floor_plans"] == 3
+    assert document["actions"]["MoveAhead"]["accepted"] > 20
+    assert document["iou"]
+    # Passed on as it came, with what the typed form leaves out.
+    raw = json.loads(next((tmp_path / "metadata").glob("*/traj_data.json")).read_bytes())
+    assert raw["turk_annotations"]
+
+
+def test_selection_limits(tmp_path):
+    document = {
+        "scene": {"floor_plan": "A", "init_action": {"x": 0, "y": 0, "z": 0}},
+        "plan": {"low_actions": []},
+    }
+    rows = [json.dumps({**document, "scene": {**document["scene"], "floor_plan": name}}) for name in "AABB"]
+    (tmp_path / "a.jsonl").write_text("\n".join(rows))
+    assert len(list(iter_sources(tmp_path / "a.jsonl"))) == 4
+    assert len(select([tmp_path / "a.jsonl"], per_floor_plan=1).items) == 2
+    assert len(select([tmp_path / "a.jsonl"], limit=3).items) == 3
+
+
+def test_overlap_of_boxes():
+    assert box_iou((0, 0, 9, 9), (0, 0, 9, 9)) == 1.0
+    assert box_iou((0, 0, 9, 9), (5, 0, 14, 9)) == pytest.approx(50 / 150)
+    assert box_iou((0, 0, 1, 1), (5, 5, 6, 6)) == 0.0
+
+
+def test_the_simulator_error_is_told(tmp_path):
+    with Simulator(embedded()) as simulator, pytest.raises(SimulatorError, match="FloorPlan1"):
+        simulator.reset("FloorPlan1")

@@ -1,0 +1,42 @@
+import pytest
+
+from infthor_eval.generation.affordances import preposition
+from infthor_eval.generation.wording import an, noun, plural
+
+
+@pytest.mark.parametrize(
+    ("kind", "words"),
+    [
+        ("Mug", "a mug"),
+        ("Apple", "an apple"),
+        ("AlarmClock", "an alarm clock"),
+        ("CoffeeTable", "a coffee table"),
+        ("TVStand", "a TV stand"),
+        ("CD", "a CD"),
+        ("AppleSliced", "a sliced apple"),
+        ("Ottoman", "an ottoman"),
+        ("Boots", "boots"),
+    ],
+)
+def test_words_with_their_article(kind, words):
+    assert an(noun(kind)) == words
+
+
+@pytest.mark.parametrize(
+    ("kind", "words"),
+    [
+        ("Mug", "mugs"),
+        ("Knife", "knives"),
+        ("Potato", "potatoes"),
+        ("TissueBox", "tissue boxes"),
+        ("Dish", "dishes"),
+        ("Candy", "candies"),
+        ("Key", "keys"),
+    ],
+)
+def test_plurals(kind, words):
+    assert plural(noun(kind)) == words
+
+
+def test_prepositions():
+    assert [preposition(kind) for kind in ("Fridge", "CounterTop", "Plate", "Mug")] == ["in", "on", "on", "in"]

@@ -1,0 +1,29 @@
+"""Views made by hand, for tests that need no simulator (as in tests/thor)."""
+
+from infthor_eval.thor.view import AgentPose, ThorObject, Vector, View
+
+
+def thing(object_id, **fields):
+    """An object where its id says."""
+    parts = object_id.split("|")
+    position = Vector(*(float(part) for part in parts[1:4]))
+    kind = parts[4].split("_")[0] if len(parts) > 4 else parts[0]
+    given = {"name": f"{kind}_{len(object_id)}", "position": position, "visible": True, **fields}
+    return ThorObject(object_id=object_id, object_type=kind, **given)
+
+
+def view(*things, inventory=(), instances=None):
+    """The world with these objects, after a successful action."""
+    return View(
+        frame=None,
+        depth=None,
+        objects={item.object_id: item for item in things},
+        agent=AgentPose(Vector(0, 0.9, 0), 0.0, 0.0),
+        inventory=tuple(inventory),
+        success=True,
+        error="",
+        error_code="",
+        result=None,
+        scene="by-hand",
+        instances=instances,
+    )
