@@ -3,6 +3,7 @@
 Importing this package imports neither torch nor transformers; they come with the first model that needs them.
 """
 
+from model_adapters.backend import Backend, BackendConversation
 from model_adapters.check import ContractError, check_adapter, check_bound
 from model_adapters.protocols import Adapter, Bound, Conversation, Mark, Model, Part, Reply
 from model_adapters.registry import load, names, options
@@ -10,6 +11,8 @@ from model_adapters.transcript import Transcript
 
 __all__ = [
     "Adapter",
+    "Backend",
+    "BackendConversation",
     "Bound",
     "ContractError",
     "Conversation",

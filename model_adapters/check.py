@@ -92,6 +92,8 @@ def _check_parts(model: Model, frame: FrameRef) -> None:
         talk.append(*parts)
         sizes.append(talk.n_tokens)
     _require(sizes == sorted(set(sizes)), f"n_tokens does not grow with every part: {sizes}")
+    per_frame = model.tokens_per_frame(frame)
+    _require(0 < per_frame <= sizes[1] - sizes[0], "tokens_per_frame() is not within what a frame adds to n_tokens")
     split, whole = _opened(model, frame, "\nWhat do", " you see?"), _opened(model, frame, "\nWhat do you see?")
     _require(split.n_tokens == whole.n_tokens, "a text appended in two pieces differs from the same text in one")
     _require(_raises(TypeError, talk.append, 3), "append() of something that is no part does not raise TypeError")

@@ -22,6 +22,7 @@ _BUILT_IN = {
     "blind": "model_adapters.bounds:Blind",
     "deepseek-vl": "model_adapters.families.deepseek_vl:DeepseekVL",
     "deepseek-vl-tiny": "model_adapters.tiny.deepseek_vl:DeepseekVLTiny",
+    "hf-vlm": "model_adapters.families.hf_vlm:HfVlm",
     "llava-onevision": "model_adapters.families.llava_onevision:LlavaOnevision",
     "llava-onevision-tiny": "model_adapters.tiny.llava_onevision:LlavaOnevisionTiny",
     "oracle": "model_adapters.bounds:Oracle",

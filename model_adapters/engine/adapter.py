@@ -2,7 +2,8 @@
 
 from typing import ClassVar
 
-from model_adapters.engine.checkpoint import load_checkpoint
+from infthor_eval.errors import ModelError
+from model_adapters.engine.checkpoint import load_checkpoint, locate
 from model_adapters.engine.family import MakeFamily
 from model_adapters.engine.model import TransformersModel
 from model_adapters.engine.options import CheckpointOptions
@@ -30,5 +31,10 @@ class CheckpointAdapter:
         Raises:
             ModelError: it cannot be loaded.
         """
-        loaded = load_checkpoint(options, cls.family, cls.model_types, options.image_settings())
-        return TransformersModel(name, loaded, options)
+        source = locate(options)
+        found = source.config.model_type
+        if found not in cls.model_types:
+            raise ModelError(
+                f"{options.pretrained} is a {found} checkpoint, not {' or '.join(cls.model_types)}; try hf-vlm"
+            )
+        return TransformersModel(name, load_checkpoint(source, cls.family), options)

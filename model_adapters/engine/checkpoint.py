@@ -8,7 +8,8 @@ PIL ones: torchvision's resize gives other pixels, and the numbers must not depe
 import contextlib
 import hashlib
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
 
@@ -25,39 +26,56 @@ from model_adapters.engine.hub import fetch
 from model_adapters.engine.loaded import Loaded
 from model_adapters.engine.options import CheckpointOptions, EngineOptions
 
-__all__ = ["assemble", "load_checkpoint", "resolve_device", "resolve_dtype"]
+__all__ = ["Source", "assemble", "load_checkpoint", "loading", "locate", "resolve_device", "resolve_dtype"]
 
 _FINGERPRINTED = {".bin", ".jinja", ".json", ".model", ".safetensors", ".txt"}
 
 
-def load_checkpoint(
-    options: CheckpointOptions,
-    family: MakeFamily,
-    model_types: Sequence[str],
-    image_settings: Mapping[str, Any],
-) -> Loaded:
+@dataclass(frozen=True)
+class Source:
+    """A checkpoint that was found.
+
+    Attributes:
+        folder: where it lies.
+        commit: of the hub's repository; None for a folder of the user's.
+        config: its config.
+        options: what was asked for.
+    """
+
+    folder: Path
+    commit: str | None
+    config: Any
+    options: CheckpointOptions
+
+
+def locate(options: CheckpointOptions) -> Source:
+    """Find a checkpoint and read its config.
+
+    Raises:
+        ModelError: there is none, or it cannot be had.
+    """
+    folder, commit = fetch(options.pretrained, options.revision)
+    with loading(options):
+        config = transformers.AutoConfig.from_pretrained(folder, trust_remote_code=options.trust_remote_code)
+    return Source(folder, commit, config, options)
+
+
+def load_checkpoint(source: Source, family: MakeFamily) -> Loaded:
     """Load everything a conversation needs.
 
     Args:
-        options: where from, and how to run it.
+        source: the checkpoint.
         family: makes the family of a model, an image processor and a tokenizer.
-        model_types: the `model_type`s in a config that the family can run.
-        image_settings: settings of the image processor that differ from the checkpoint's.
 
     Raises:
-        ModelError: the checkpoint is missing, incomplete, of another family, or cannot be had.
-        UsageError: there is no such dtype.
+        ModelError: the checkpoint is incomplete or damaged.
+        UsageError: there is no such dtype or device.
     """
-    folder, commit = fetch(options.pretrained, options.revision)
+    options, folder = source.options, source.folder
     remote = {"trust_remote_code": options.trust_remote_code}
-    with _one_line(options):
-        config = transformers.AutoConfig.from_pretrained(folder, **remote)
-        if config.model_type not in model_types:
-            raise ModelError(
-                f"{options.pretrained} is a {config.model_type} checkpoint, not {' or '.join(model_types)}"
-            )
+    with loading(options):
         image_processor = transformers.AutoImageProcessor.from_pretrained(
-            folder, backend="pil", **remote, **image_settings
+            folder, backend="pil", **remote, **options.image_settings()
         )
         tokenizer = transformers.AutoTokenizer.from_pretrained(folder, **remote)
         template = _chat_template(folder, tokenizer)
@@ -68,7 +86,7 @@ def load_checkpoint(
         image_processor,
         template=template,
         family=family(model, image_processor, tokenizer),
-        origin=_origin(options.pretrained, folder, commit),
+        origin=_origin(source),
     )
 
 
@@ -152,8 +170,12 @@ def resolve_dtype(options: EngineOptions) -> torch.dtype | str:
 
 
 @contextlib.contextmanager
-def _one_line(options: CheckpointOptions) -> Iterator[None]:
-    """Turn the errors of transformers' loading into one line."""
+def loading(options: CheckpointOptions) -> Iterator[None]:
+    """Turn the errors of transformers' loading into one line.
+
+    Raises:
+        ModelError: something could not be loaded.
+    """
     try:
         yield
     except (OSError, ValueError, ImportError, KeyError, SafetensorError) as error:
@@ -191,11 +213,11 @@ def _chat_template(folder: Path, tokenizer: Any) -> str:
     return template
 
 
-def _origin(pretrained: str, folder: Path, commit: str | None) -> dict[str, Any]:
-    if commit is not None:
-        return {"checkpoint": pretrained, "revision": commit}
+def _origin(source: Source) -> dict[str, Any]:
+    if source.commit is not None:
+        return {"checkpoint": source.options.pretrained, "revision": source.commit}
     # The folder's name, not its place: a checkpoint that was moved is the same checkpoint.
-    return {"checkpoint": folder.resolve().name, "fingerprint": _fingerprint(folder)}
+    return {"checkpoint": source.folder.resolve().name, "fingerprint": _fingerprint(source.folder)}
 
 
 def _fingerprint(folder: Path) -> str:

@@ -1,12 +1,14 @@
-"""Any transformers model as a `Model`: conversations over one encoded prefix."""
+"""Any transformers model of a known family as a `Model`: conversations over one encoded prefix."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import torch
 
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
+from model_adapters.backend import BackendConversation
 from model_adapters.engine.decoding import cut_at_stop, generate
 from model_adapters.engine.features import FeatureCache
 from model_adapters.engine.loaded import Loaded
@@ -14,9 +16,8 @@ from model_adapters.engine.options import EngineOptions
 from model_adapters.engine.prefix import Prefix
 from model_adapters.engine.prompt import Frame, Prompter, Unit, n_tokens, token_ids
 from model_adapters.protocols import Part, Reply
-from model_adapters.transcript import Transcript
 
-__all__ = ["TransformersConversation", "TransformersModel"]
+__all__ = ["TransformersModel", "check_limit", "context_limit", "identity", "naming_memory_errors"]
 
 
 class TransformersModel:
@@ -36,39 +37,26 @@ class TransformersModel:
         self._loaded = loaded
         self._options = options
         keep = options.feature_cache_mb * 2**20 if options.share_prefix else 0
-        features = FeatureCache(loaded.family, keep)
+        self._features = FeatureCache(loaded.family, keep)
         self._prompter = Prompter(loaded.tokenizer, loaded.template, loaded.family)
-        self._prefix = Prefix(loaded.model, loaded.family, features, options.chunk_tokens)
-        self._features = features
+        self._prefix = Prefix(loaded.model, loaded.family, self._features, options.chunk_tokens)
 
     @property
     def max_tokens(self) -> int | None:
         """The checkpoint's context limit, or the option's."""
-        limit = self._loaded.max_tokens if self._options.max_tokens is None else self._options.max_tokens
-        return limit or None
+        return context_limit(self._loaded, self._options)
 
     def identity(self) -> dict[str, Any]:
         """Checkpoint, precision, kernels, versions and generation settings, as JSON values."""
-        generation = self._loaded.generation
-        return self._loaded.identity | {
-            "adapter": self.name,
-            "max_tokens": self.max_tokens,
-            "share_prefix": self._options.share_prefix,
-            "chunk_tokens": self._options.chunk_tokens,
-            "generation": {
-                "do_sample": False,
-                "repetition_penalty": generation.repetition_penalty,
-                "end_ids": sorted(generation.end_ids),
-            },
-        }
+        return identity(self.name, self._loaded, self._options)
 
     def tokens_per_frame(self, frame: FrameRef) -> int:
         """How many tokens one frame becomes, as the checkpoint's processor has it."""
         return next(len(unit.ids) for unit in self.units([frame]) if isinstance(unit, Frame))
 
-    def conversation(self) -> "TransformersConversation":
+    def conversation(self) -> BackendConversation:
         """A new, empty conversation."""
-        return TransformersConversation(self)
+        return BackendConversation(self)
 
     def close(self) -> None:
         """Free the KV cache, the features and the weights."""
@@ -82,23 +70,32 @@ class TransformersModel:
         """What a reply to these parts would be made from."""
         return self._prompter.units(parts)
 
-    def reply(self, parts: Sequence[Part], max_new_tokens: int, stop: Sequence[str]) -> Reply:
+    def count(self, parts: Sequence[Part]) -> int:
+        """Tokens that a reply to these parts would be made from."""
+        return n_tokens(self.units(parts))
+
+    def encode(self, units: Sequence[Unit]) -> torch.Tensor:
+        """Encode a prompt from nothing, a few units at first; logits of the next token, (vocabulary,)."""
+        self._prefix.reset()
+        self._prefix.feed(units[:2])
+        return self._prefix.feed(units[2:])
+
+    def answer(self, parts: Sequence[Part], max_new_tokens: int, stop: Sequence[str]) -> Reply:
         """Answer one user turn; see `Conversation.reply`."""
         units = self.units(parts)
         n_context = n_tokens(units)
-        self._check_limit(n_context, max_new_tokens)
+        check_limit(self.name, n_context, max_new_tokens, self.max_tokens)
         if not self._options.share_prefix:
             self._prefix.reset()
         try:
-            return self._reply(units, n_context, max_new_tokens, stop)
-        except (RuntimeError, MemoryError) as error:
-            if not _is_out_of_memory(error):
-                raise
+            with naming_memory_errors(self.name, n_context):
+                return self._answer(units, n_context, max_new_tokens, stop)
+        except ModelError:
             self._prefix.reset()
             self._features.clear()
-            raise ModelError(f"out of memory on a context of {n_context} tokens ({self.name})") from error
+            raise
 
-    def _reply(self, units: list[Unit], n_context: int, max_new_tokens: int, stop: Sequence[str]) -> Reply:
+    def _answer(self, units: list[Unit], n_context: int, max_new_tokens: int, stop: Sequence[str]) -> Reply:
         shared = self._prefix.rewind_to(units)
         cached = self._prefix.n_tokens
         logits = self._prefix.feed(units[shared:], reserve=max_new_tokens)
@@ -108,7 +105,7 @@ class TransformersModel:
             context=token_ids(units),
             settings=self._loaded.generation,
             max_new_tokens=max_new_tokens,
-            finished=lambda ids: cut_at_stop(self._decode(ids), stop) is not None if stop else False,
+            finished=lambda ids: bool(stop) and cut_at_stop(self._decode(ids), stop) is not None,
         )
         self._prefix.cut(len(units))
         text = self._decode(ids)
@@ -118,34 +115,53 @@ class TransformersModel:
     def _decode(self, ids: list[int]) -> str:
         return self._loaded.tokenizer.decode(ids, skip_special_tokens=True)
 
-    def _check_limit(self, n_context: int, max_new_tokens: int) -> None:
-        limit = self.max_tokens
-        if limit is not None and n_context + max_new_tokens > limit:
-            raise ModelError(
-                f"a context of {n_context} tokens and {max_new_tokens} new ones is beyond the {limit} tokens "
-                f"of {self.name}; use fewer frames, or set max_tokens if the model can take more"
-            )
+
+def context_limit(loaded: Loaded, options: EngineOptions) -> int | None:
+    """The checkpoint's context limit, or the option's; None for none."""
+    return (loaded.max_tokens if options.max_tokens is None else options.max_tokens) or None
 
 
-def _is_out_of_memory(error: Exception) -> bool:
-    # torch has an exception of its own for GPUs only; on CPU the allocator's name in the message tells.
-    return isinstance(error, torch.OutOfMemoryError | MemoryError) or "DefaultCPUAllocator" in str(error)
+def identity(name: str, loaded: Loaded, options: EngineOptions) -> dict[str, Any]:
+    """What distinguishes this model, run like this, from others, as JSON values."""
+    generation = loaded.generation
+    return loaded.identity | {
+        "adapter": name,
+        "max_tokens": context_limit(loaded, options),
+        "share_prefix": options.share_prefix,
+        "chunk_tokens": options.chunk_tokens,
+        "generation": {
+            "do_sample": False,
+            "repetition_penalty": generation.repetition_penalty,
+            "end_ids": sorted(generation.end_ids),
+        },
+    }
 
 
-class TransformersConversation(Transcript):
-    """A conversation with a `TransformersModel`."""
+def check_limit(name: str, n_context: int, max_new_tokens: int, limit: int | None) -> None:
+    """Refuse what does not fit.
 
-    def __init__(self, model: TransformersModel) -> None:
-        super().__init__()
-        self._model = model
+    Raises:
+        ModelError: context and reply are beyond the limit.
+    """
+    if limit is not None and n_context + max_new_tokens > limit:
+        raise ModelError(
+            f"a context of {n_context} tokens and {max_new_tokens} new ones is beyond the {limit} tokens "
+            f"of {name}; use fewer frames, or set max_tokens if the model can take more"
+        )
 
-    @property
-    def n_tokens(self) -> int:
-        """Tokens that `reply` would give the model now."""
-        return n_tokens(self._model.units(self.parts))
 
-    def reply(self, max_new_tokens: int, stop: Sequence[str] = ()) -> Reply:
-        """Answer greedily; see `Conversation.reply`."""
-        if max_new_tokens < 1:
-            raise ValueError(f"max_new_tokens must be at least 1, not {max_new_tokens}")
-        return self._model.reply(self.parts, max_new_tokens, stop)
+@contextmanager
+def naming_memory_errors(name: str, n_context: int) -> Iterator[None]:
+    """Turn errors of memory into one line with the size of the context.
+
+    Raises:
+        ModelError: memory ran out.
+    """
+    try:
+        yield
+    except (RuntimeError, MemoryError) as error:
+        # torch has an exception of its own for GPUs only; on CPU the allocator's name in the message tells.
+        cpu = isinstance(error, MemoryError) or "DefaultCPUAllocator" in str(error)
+        if not (cpu or isinstance(error, torch.OutOfMemoryError)):
+            raise
+        raise ModelError(f"out of memory on a context of {n_context} tokens ({name})") from error

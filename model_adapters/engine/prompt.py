@@ -16,7 +16,7 @@ from infthor_eval.formats.frames import FrameRef
 from model_adapters.engine.family import Family, Size
 from model_adapters.protocols import Part
 
-__all__ = ["Frame", "Prompter", "Unit", "n_tokens", "token_ids"]
+__all__ = ["Frame", "Prompter", "Unit", "begins", "n_tokens", "render", "token_ids"]
 
 
 @dataclass(frozen=True)
@@ -53,6 +53,34 @@ def token_ids(units: Iterable[Unit]) -> Iterator[int]:
             yield from unit.ids
 
 
+def render(tokenizer: Any, template: str, parts: Sequence[Part]) -> str:
+    """The chat template over one user turn of these parts, asking for the reply.
+
+    Raises:
+        ModelError: the template leaves a text out.
+    """
+    # Most templates read a text under "text", a few under "content".
+    content = [
+        {"type": "text", "text": part, "content": part} if isinstance(part, str) else {"type": "image"}
+        for part in parts
+    ]
+    text: str = tokenizer.apply_chat_template(
+        [{"role": "user", "content": content}],
+        chat_template=template,
+        tokenize=False,
+        add_generation_prompt=True,
+    )
+    for part in parts:
+        if isinstance(part, str) and part.strip() not in text:
+            raise ModelError(f"the chat template leaves out the text {part.strip()[:40]!r}; it cannot be used")
+    return text
+
+
+def begins(tokenizer: Any, text: str) -> bool:
+    """Whether the template wrote the token that begins every text; where not, processors let the tokenizer add it."""
+    return tokenizer.bos_token is not None and text.startswith(tokenizer.bos_token)
+
+
 class Prompter:
     """Renders and tokenises conversations for one model.
 
@@ -77,17 +105,8 @@ class Prompter:
             ModelError: the tokenised template does not hold one placeholder per frame.
         """
         frames = [self._frame(part) for part in parts if isinstance(part, FrameRef)]
-        content = [{"type": "text", "text": part} if isinstance(part, str) else {"type": "image"} for part in parts]
-        text = self._tokenizer.apply_chat_template(
-            [{"role": "user", "content": content}],
-            chat_template=self._template,
-            tokenize=False,
-            add_generation_prompt=True,
-        )
-        # As transformers' processors do: what begins every text is added, unless the template has done it.
-        begin = self._tokenizer.bos_token
-        begun = begin is not None and text.startswith(begin)
-        ids: list[int] = self._tokenizer(text, add_special_tokens=not begun)["input_ids"]
+        text = render(self._tokenizer, self._template, parts)
+        ids: list[int] = self._tokenizer(text, add_special_tokens=not begins(self._tokenizer, text))["input_ids"]
         placeholder = self._family.placeholder_id
         if ids.count(placeholder) != len(frames):
             raise ModelError(

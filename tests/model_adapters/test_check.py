@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.question import Question
 from model_adapters import ContractError, Mark, Model, Part, Reply, Transcript, check_adapter, check_bound
 
@@ -18,8 +19,8 @@ class HashModel:
     name = "hash"
     max_tokens = None
 
-    def tokens_per_frame(self, frame):
-        return 1
+    def tokens_per_frame(self, frame: FrameRef) -> int:
+        return 10
 
     def identity(self) -> dict[str, Any]:
         return {"model": self.name}
@@ -134,6 +135,13 @@ def test_a_broken_conversation_is_named(methods: dict[str, Any], clause: str) ->
 def test_a_broken_identity_is_named(identity: Method, clause: str) -> None:
     with pytest.raises(ContractError, match=clause):
         check_adapter(type("Broken", (HashModel,), {"identity": identity})())
+
+
+@pytest.mark.parametrize("count", [0, 11])
+def test_a_wrong_count_of_a_frames_tokens_is_named(count: int) -> None:
+    broken = type("Broken", (HashModel,), {"tokens_per_frame": lambda self, frame: count})()
+    with pytest.raises(ContractError, match="tokens_per_frame"):
+        check_adapter(broken)
 
 
 def test_something_else_is_no_model() -> None:

@@ -125,6 +125,7 @@ def test_a_frame_takes_the_published_number_of_tokens(family: str, model: Any, s
         talk.append(*scene[:count])
         sizes.append(talk.n_tokens)
     assert sizes[1] - sizes[0] == FAMILIES[family]
+    assert model.tokens_per_frame(scene[0]) == FAMILIES[family] - (2 if family == "qwen2.5-vl" else 0)
 
 
 def test_sharing_changes_no_reply(family: str, model: Any, checkpoints: dict[str, Path], scene: list[FrameRef]) -> None:

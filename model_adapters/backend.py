@@ -1,0 +1,40 @@
+"""A conversation on top of whatever answers one user turn at a time."""
+
+from collections.abc import Sequence
+from typing import Protocol
+
+from model_adapters.protocols import Part, Reply
+from model_adapters.transcript import Transcript
+
+__all__ = ["Backend", "BackendConversation"]
+
+
+class Backend(Protocol):
+    """What answers: it gets all parts every time and finds out by itself what it has seen before."""
+
+    def count(self, parts: Sequence[Part]) -> int:
+        """Tokens that a reply to these parts would be made from."""
+        ...
+
+    def answer(self, parts: Sequence[Part], max_new_tokens: int, stop: Sequence[str]) -> Reply:
+        """Answer one user turn of these parts; see `Conversation.reply`."""
+        ...
+
+
+class BackendConversation(Transcript):
+    """A conversation that keeps the parts and leaves the rest to a back end."""
+
+    def __init__(self, backend: Backend) -> None:
+        super().__init__()
+        self._backend = backend
+
+    @property
+    def n_tokens(self) -> int:
+        """Tokens that `reply` would give the model now."""
+        return self._backend.count(self.parts)
+
+    def reply(self, max_new_tokens: int, stop: Sequence[str] = ()) -> Reply:
+        """Answer greedily; see `Conversation.reply`."""
+        if max_new_tokens < 1:
+            raise ValueError(f"max_new_tokens must be at least 1, not {max_new_tokens}")
+        return self._backend.answer(self.parts, max_new_tokens, stop)

@@ -1,0 +1,172 @@
+"""Any model of `AutoModelForImageTextToText` with a chat template, so that next month's model needs no code.
+
+Models of the known families run as these. Of others, the processor tells what a frame's placeholder expands to, and the
+model's `get_image_features` what goes into the slots; before the first reply, token ids and logits are compared with
+what the processor and the plain model make of a sample, so that an architecture that works in another way is refused
+instead of being run wrongly. With share_prefix=false it is run by its own processor and `generate`.
+"""
+
+import functools
+import inspect
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+import transformers
+from PIL import Image
+from transformers.models.auto.modeling_auto import MODEL_FOR_IMAGE_TEXT_TO_TEXT_MAPPING_NAMES
+
+from infthor_eval.errors import ModelError, UsageError
+from infthor_eval.formats.frames import FrameRef
+from model_adapters.engine.checkpoint import Source, load_checkpoint, loading, locate
+from model_adapters.engine.family import MakeFamily, Size
+from model_adapters.engine.loaded import Loaded
+from model_adapters.engine.model import TransformersModel
+from model_adapters.engine.options import CheckpointOptions
+from model_adapters.engine.prompt import token_ids
+from model_adapters.engine.whole import WholeModel, expanded, image_token, processed
+from model_adapters.families.deepseek_vl import DeepseekVLFamily
+from model_adapters.families.llava_onevision import LlavaOnevisionFamily
+from model_adapters.families.pixtral import PixtralFamily
+from model_adapters.families.plain import PlainFamily
+from model_adapters.families.qwen2_5_vl import Qwen25VLFamily
+from model_adapters.protocols import Model, Part
+
+__all__ = ["HfVlm", "ProcessorFamily"]
+
+_TOLERANCE = {torch.float32: 1e-3, torch.float64: 1e-3}  # of the largest logit; half precision is compared more loosely
+_HALF_TOLERANCE = 0.1
+
+
+class ProcessorFamily(PlainFamily):
+    """Frames of a model whose processor knows what they expand to.
+
+    Args:
+        model: a transformers model with `get_image_features`.
+        image_processor: its image processor.
+        tokenizer: its tokenizer.
+        processor: its processor.
+
+    Raises:
+        ModelError: the processor names no image token.
+    """
+
+    def __init__(self, model: Any, image_processor: Any, tokenizer: Any, processor: Any) -> None:
+        super().__init__(model, image_processor, tokenizer)
+        self._processor = processor
+        self.placeholder_id = tokenizer.convert_tokens_to_ids(image_token(processor))
+        self._image_features = getattr(model, "get_image_features", None) or model.model.get_image_features
+
+    def frame_ids(self, size: Size) -> tuple[int, ...]:
+        """What the processor expands the placeholder of one image to."""
+        return tuple(expanded(self._processor, Image.new("RGB", size, "gray")))
+
+    @torch.inference_mode()
+    def features(self, images: Sequence[Image.Image]) -> list[torch.Tensor]:
+        """The model's own features, (slots, hidden), for each image."""
+        takes = inspect.signature(self._image_features).parameters
+        found = []
+        for image in images:
+            inputs = {name: value for name, value in self._inputs([image]).items() if name in takes}
+            pooled = self._image_features(**inputs, return_dict=True).pooler_output
+            parts = pooled if isinstance(pooled, list | tuple) else [pooled]
+            found.append(torch.cat([part.reshape(-1, part.shape[-1]) for part in parts]))
+        return found
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Options(CheckpointOptions):
+    pretrained: str = ""
+
+
+class HfVlm:
+    """The adapter `hf-vlm`."""
+
+    Options = _Options
+
+    @classmethod
+    def build(cls, name: str, options: _Options, seed: int) -> Model:  # noqa: ARG003
+        """Load a checkpoint; nothing in it is random.
+
+        Raises:
+            UsageError: no checkpoint was named.
+            ModelError: it cannot be loaded, sees no images, or cannot share prefixes.
+        """
+        if not options.pretrained:
+            raise UsageError(f"{name} needs pretrained=..., a hub id or a folder")
+        source = locate(options)
+        kind = source.config.model_type
+        if kind not in MODEL_FOR_IMAGE_TEXT_TO_TEXT_MAPPING_NAMES:
+            raise ModelError(f"{options.pretrained} is a {kind} checkpoint, which sees no images")
+        known = _known(source.config)
+        if known is not None:
+            return TransformersModel(name, load_checkpoint(source, known), options)
+        processor = _processor(source)
+        family = functools.partial(ProcessorFamily, processor=processor)
+        if not options.share_prefix:
+            return WholeModel(name, load_checkpoint(source, PlainFamily), processor, options)
+        loaded = load_checkpoint(source, family)
+        model = TransformersModel(name, loaded, options)
+        _compare(model, loaded, processor)
+        return model
+
+
+def _known(config: Any) -> MakeFamily | None:
+    """The family made for this architecture, if there is one."""
+    families: dict[str, MakeFamily] = {
+        "qwen2_5_vl": Qwen25VLFamily,
+        "llava_onevision": LlavaOnevisionFamily,
+        "deepseek_vl_hybrid": DeepseekVLFamily,
+    }
+    if config.model_type == "llava" and config.vision_config.model_type == "pixtral":
+        return PixtralFamily
+    return families.get(config.model_type)
+
+
+def _processor(source: Source) -> Any:
+    remote = {"trust_remote_code": source.options.trust_remote_code}
+    with loading(source.options):
+        processor = transformers.AutoProcessor.from_pretrained(source.folder, **remote)
+        processor.image_processor = transformers.AutoImageProcessor.from_pretrained(
+            source.folder, backend="pil", **remote
+        )
+    if not hasattr(processor, "tokenizer"):
+        raise ModelError(f"{source.options.pretrained} has no processor of images and text together")
+    return processor
+
+
+@torch.inference_mode()
+def _compare(model: TransformersModel, loaded: Loaded, processor: Any) -> None:
+    """Run a sample by the shared machinery and by the processor and the plain model.
+
+    Raises:
+        ModelError: they differ in token ids or logits.
+    """
+    kind = loaded.model.config.model_type
+    mend = f"{kind} cannot be run with shared prefixes; use share_prefix=false"
+    with tempfile.TemporaryDirectory() as folder:
+        parts = _sample(Path(folder))
+        inputs = processed(processor, loaded.template, parts)
+        units = model.units(parts)
+        if list(token_ids(units)) != inputs["input_ids"][0].tolist():
+            raise ModelError(f"token ids differ from the processor's: {mend}")
+        logits = model.encode(units)
+    weight = loaded.model.get_input_embeddings().weight
+    expected = loaded.model(**inputs.to(weight.device, loaded.model.dtype)).logits[0, -1]
+    difference = (logits - expected).abs().max() / expected.abs().max()
+    if difference > _TOLERANCE.get(loaded.model.dtype, _HALF_TOLERANCE):
+        raise ModelError(f"logits differ from the plain model's: {mend}")
+
+
+def _sample(folder: Path) -> list[Part]:
+    draw = np.random.default_rng(0)
+    frames = []
+    for number, (height, width) in enumerate([(300, 300), (200, 280)]):
+        path = folder / f"{number}.png"
+        Image.fromarray(draw.integers(0, 256, (height, width, 3), dtype=np.uint8)).save(path)
+        frames.append(FrameRef(path))
+    return ["The first view:\n", frames[0], "RotateLeft", frames[1], frames[0], "\nWhat do you see?"]
