@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-__all__ = ["Rect", "without"]
+__all__ = ["Rect", "polygon_rects", "without"]
 
 Rect = tuple[float, float, float, float]
 """x0, z0, x1, z1 in metres."""
@@ -23,6 +23,26 @@ def without(whole: Rect, holes: Sequence[Rect]) -> tuple[Rect, ...]:
         inside_x, inside_z = (mid_x > x0) & (mid_x < x1), (mid_z > z0) & (mid_z < z1)
         solid &= ~(inside_x[:, None] & inside_z[None, :])
     return tuple(_merged(solid, xs, zs))
+
+
+def polygon_rects(points: Sequence[tuple[float, float]]) -> tuple[Rect, ...]:
+    """Rectangles that cover a polygon (x, z) of level and upright edges."""
+    outline = np.asarray(points, dtype=float)
+    xs, zs = np.unique(np.round(outline[:, 0], 4)), np.unique(np.round(outline[:, 1], 4))
+    mid_x, mid_z = (xs[1:] + xs[:-1]) / 2, (zs[1:] + zs[:-1]) / 2
+    solid = np.array([[_contains(outline, x, z) for z in mid_z] for x in mid_x], dtype=bool).reshape(
+        len(mid_x), len(mid_z)
+    )
+    return tuple(_merged(solid, xs, zs))
+
+
+def _contains(outline: np.ndarray, x: float, z: float) -> bool:
+    """Whether a ray from (x, z) along +x crosses the outline an odd number of times."""
+    inside = False
+    for (x0, z0), (x1, z1) in zip(outline, np.roll(outline, -1, axis=0), strict=True):
+        if (z0 > z) != (z1 > z) and x < x0 + (z - z0) * (x1 - x0) / (z1 - z0):
+            inside = not inside
+    return inside
 
 
 def _edges(low: float, high: float, cuts: list[float]) -> np.ndarray:

@@ -10,10 +10,11 @@ from infthor_eval.sim.geometry import Array, aabb_gap, euler_matrix
 from infthor_eval.sim.navigation import NavGrid
 from infthor_eval.sim.objects import SimObject
 
-__all__ = ["AGENT_HEIGHT", "CAMERA_HEIGHT", "Agent", "Room", "World"]
+__all__ = ["AGENT_HEIGHT", "CAMERA_HEIGHT", "FLOOR_STYLES", "Agent", "Room", "Wall", "World"]
 
 AGENT_HEIGHT = 0.9009992  # agent.y of AI2-THOR's default agent on a floor at 0
 CAMERA_HEIGHT = 0.675  # camera above agent.y, fitted to the boxes recorded in ALFRED
+FLOOR_STYLES = ("wood", "tiles", "carpet")
 _CROUCH = 0.35
 _HAND = np.array([0.0, -0.16, 0.38])  # where AI2-THOR holds an object, in the camera's frame, metres
 
@@ -38,8 +39,21 @@ class Agent:
 
 
 @dataclass(frozen=True)
+class Wall:
+    """A stretch of wall from (x0, z0) to (x1, z1), metres, between two heights."""
+
+    x0: float
+    z0: float
+    x1: float
+    z1: float
+    bottom: float
+    top: float
+    style: int = 0
+
+
+@dataclass(frozen=True)
 class Room:
-    """The shell of one room: a rectangle on the floor with walls around, metres."""
+    """The shell of one room: a rectangle on the floor with walls around, metres; else see `Wall`."""
 
     x_min: float
     x_max: float
@@ -49,6 +63,7 @@ class Room:
     floor: float = 0.0
     floor_style: str = "wood"
     style: int = 0
+    walled: bool = True
     openings: tuple[tuple[str, float, float], ...] = ()  # (side "x-", "x+", "z-" or "z+", from, to) of doorways
 
 
@@ -71,6 +86,7 @@ class World:
     held: str | None = None
     version: int = 0
     coarse: bool = False
+    walls: tuple[Wall, ...] = ()
     templates: dict[str, list[SimObject]] = field(default_factory=dict)
 
     def get(self, object_id: str) -> SimObject:

@@ -47,7 +47,8 @@ def fabric(a: Any, b: Any) -> Any:
 
 def stone(a: Any, b: Any) -> Any:
     """Speckles of 15 mm."""
-    shade = (np.floor(a / 0.015) * 0.7548776662 + np.floor(b / 0.015) * 0.5698402910) * 17.3
+    x, y = np.floor(a / 0.015), np.floor(b / 0.015)
+    shade = x * 0.7548776662 + y * 0.5698402910 + x * y * 0.3183098862
     return 0.88 + 0.12 * (shade - np.floor(shade))
 
 
@@ -72,7 +73,8 @@ def paper(a: Any, b: Any) -> Any:
 
 def carpet(a: Any, b: Any) -> Any:
     """Tufts of 2 cm."""
-    shade = (np.floor(a / 0.02) * 0.7548776662 + np.floor(b / 0.02) * 0.5698402910) * 13.1
+    x, y = np.floor(a / 0.02), np.floor(b / 0.02)
+    shade = x * 0.7548776662 + y * 0.5698402910 + x * y * 0.3183098862
     return 0.9 + 0.1 * (shade - np.floor(shade))
 
 

@@ -2,17 +2,17 @@
 
 import numpy as np
 
-from infthor_eval.sim.geometry import Array
+from infthor_eval.sim.geometry import Array, yaw_matrix
 from infthor_eval.sim.render.primitives import Color, Kind, Material, Part, rows
-from infthor_eval.sim.world import Room, World
+from infthor_eval.sim.world import Room, Wall, World
 
-__all__ = ["SHELL_NAMES", "shell_rows"]
+__all__ = ["FLOORS", "SHELL_NAMES", "shell_rows"]
 
 SHELL_NAMES = ("Wall", "Ceiling", "Ground")
 _WALLS: tuple[Color, ...] = (
     (0.86, 0.82, 0.74), (0.74, 0.80, 0.82), (0.82, 0.76, 0.72), (0.76, 0.81, 0.73), (0.83, 0.83, 0.80),
 )  # fmt: skip
-_FLOORS: dict[str, tuple[Color, Material]] = {
+FLOORS: dict[str, tuple[Color, Material]] = {
     "wood": ((0.62, 0.44, 0.29), Material.PLANKS),
     "tiles": ((0.78, 0.76, 0.72), Material.TILES),
     "carpet": ((0.60, 0.56, 0.52), Material.CARPET),
@@ -26,19 +26,31 @@ def shell_rows(world: World) -> Array:
     origin, straight = np.zeros(3), np.eye(3)
     made = []
     for room in world.rooms:
-        made.append(rows(_walls(room), origin, straight, 0))
+        if room.walled:
+            made.append(rows(_walls(room), origin, straight, 0))
         width, length = (room.x_max - room.x_min) / 2, (room.z_max - room.z_min) / 2
         middle = ((room.x_max + room.x_min) / 2, (room.z_max + room.z_min) / 2)
         ceiling = Part(
             Kind.BOX, (middle[0], room.height + _THICK, middle[1]), (width, _THICK, length), (0.9, 0.9, 0.88)
         )
         made.append(rows([ceiling], origin, straight, 1))
-        color, material = _FLOORS[room.floor_style]
+        color, material = FLOORS[room.floor_style]
+        made.append(rows(_thresholds(room, color, material), origin, straight, 2))
         ground = Part(
             Kind.BOX, (middle[0], room.floor - _THICK - 0.002, middle[1]), (width, _THICK, length), color, material
         )
         made.append(rows([ground], origin, straight, 2))
+    made.append(rows([_standing(wall) for wall in world.walls], origin, straight, 0))
     return np.concatenate(made)
+
+
+def _standing(wall: Wall) -> Part:
+    along = np.array([wall.x1 - wall.x0, wall.z1 - wall.z0])
+    length = float(np.hypot(*along))
+    yaw = float(np.degrees(np.arctan2(along[0], along[1])))
+    center = ((wall.x0 + wall.x1) / 2, (wall.bottom + wall.top) / 2, (wall.z0 + wall.z1) / 2)
+    half = (_THICK, (wall.top - wall.bottom) / 2, length / 2 + _THICK)
+    return Part(Kind.BOX, center, half, _WALLS[wall.style % len(_WALLS)], matrix=yaw_matrix(yaw))
 
 
 def _walls(room: Room) -> list[Part]:
@@ -66,6 +78,25 @@ def _walls(room: Room) -> list[Part]:
                     _slab(along_x, middle, at[side[0] + side[1]], half, room.floor + 0.05, 0.05, _THICK + 0.008, trim)
                 )
     return parts
+
+
+def _thresholds(room: Room, color: Color, material: Material) -> list[Part]:
+    """The floor within the thickness of the walls, in doorways."""
+    level = room.floor - _THICK - 0.001
+    made = []
+    for side, low, high in room.openings:
+        middle, half = (low + high) / 2, (high - low) / 2
+        at = {"x-": room.x_min, "x+": room.x_max, "z-": room.z_min, "z+": room.z_max}[side]
+        made.append(Part(Kind.BOX, *_laid(side[0] == "z", middle, at, half, level), color, material))
+    return made
+
+
+def _laid(
+    along_x: bool, middle: float, at: float, half: float, level: float
+) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+    if along_x:
+        return (middle, level, at), (half, _THICK, 2 * _THICK)
+    return (at, level, middle), (2 * _THICK, _THICK, half)
 
 
 def _pieces(

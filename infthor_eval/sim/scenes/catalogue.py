@@ -32,6 +32,7 @@ class Catalogue:
     def __init__(self, data: Path | None = None, supplement: Path | None = None) -> None:
         self._folder = data
         self._data = None if data is None else FloorPlanData(data)
+        self._assets: dict[str, tuple[float, float, float]] | None = None
         self._supplement_path = supplement
         self._supplement: Mapping[str, Supplement] | None = None if supplement is not None else {}
 
@@ -64,9 +65,11 @@ class Catalogue:
         Raises:
             DataError: it does not have ProcTHOR's form.
         """
-        from infthor_eval.sim.scenes.procthor import build_house
+        from infthor_eval.sim.scenes.procthor import build_house, read_asset_sizes
 
-        return build_house(house)
+        if self._assets is None:
+            self._assets = {} if self._folder is None else read_asset_sizes(self._folder)
+        return build_house(house, self._assets)
 
     def _floor_plan(self, name: str) -> World:
         if self._data is None:

@@ -15,7 +15,7 @@ from infthor_eval.sim.scenes.adoption import adopt
 from infthor_eval.sim.scenes.arrangement import arrange
 from infthor_eval.sim.scenes.recorded import recorded_object
 from infthor_eval.sim.scenes.supplement import Supplement
-from infthor_eval.sim.world import AGENT_HEIGHT, Agent, Room, World
+from infthor_eval.sim.world import AGENT_HEIGHT, FLOOR_STYLES, Agent, Room, World
 
 __all__ = ["build_floor_plan"]
 
@@ -58,6 +58,9 @@ def build_floor_plan(name: str, entries: Sequence[Mapping[str, Any]], layout: Ar
         coarse=True,
     )
     arrange(world)
+    for item in objects.values():
+        if item.object_type == "Floor":
+            item.style = FLOOR_STYLES.index(room.floor_style)
     _settle(world, entries)
     return world
 

@@ -7,7 +7,7 @@ from infthor_eval.sim.footprints import Rect, without
 from infthor_eval.sim.objects import SimObject
 from infthor_eval.sim.scenes.roomplan import RoomPlan
 
-__all__ = ["furnish_kitchen"]
+__all__ = ["around", "furnish_kitchen"]
 
 _HEIGHT, _DEPTH = 0.92, 0.65  # of the counter, metres
 _MODULE = 0.6
@@ -23,6 +23,7 @@ def furnish_kitchen(plan: RoomPlan, loose: int = 34) -> None:
     _counter(plan)
     _table(plan)
     plan.try_against("GarbageCan", _shuffled(plan, ("x-", "x+", "z-")))
+    plan.try_against("HousePlant", _shuffled(plan, ("x-", "x+", "z-")), (0.34, 0.7, 0.34))
     if plan.random.random() < 0.6:
         plan.try_against("SideTable", _shuffled(plan, ("x-", "x+", "z-")))
     more = [str(kind) for kind in plan.random.permutation(_MORE)]
@@ -63,7 +64,7 @@ def _counter(plan: RoomPlan) -> None:
 
 
 def _lower(plan: RoomPlan, at: float, index: int, drawer: bool) -> None:
-    top = _HEIGHT - 0.05
+    top = _HEIGHT - (0.05 if drawer else 0.19)
     if drawer:
         plan.against("z+", "Drawer", at, y=top - 0.17, size=(_MODULE - 0.02, 0.16, _DEPTH - 0.06))
         top -= 0.18
@@ -77,11 +78,11 @@ def _sink(plan: RoomPlan, top: SimObject, at: float) -> None:
     basin.object_id, basin.name = f"{sink.object_id}|SinkBasin", f"SinkBasin_{sink.name.split('_')[1]}"
     faucet = plan.against("z+", "Faucet", at, y=_HEIGHT, size=(0.16, 0.28, 0.2), gap=0.04)
     faucet.style = 0
-    top.pieces, sink.pieces = _around(top, sink), _around(sink, basin)
+    top.pieces, sink.pieces = around(top, sink), around(sink, basin)
     plan.against("z+", "Window", at, y=1.25, size=(0.8, 0.9, 0.06), gap=-0.02)
 
 
-def _around(outer: SimObject, inner: SimObject) -> tuple[Rect, ...]:
+def around(outer: SimObject, inner: SimObject) -> tuple[Rect, ...]:
     """The plan of `outer` less that of `inner`; both look the same way."""
     middle = outer.matrix.T @ (inner.center - outer.center)
     whole, hole = outer.box_size / 2, inner.box_size / 2
@@ -104,15 +105,17 @@ def _stove(plan: RoomPlan, at: float) -> None:
 
 
 def _table(plan: RoomPlan) -> None:
-    """A dining table with chairs in the half of the room away from the counter."""
+    """A dining table with two chairs in a corner away from the counter, clear of doorways."""
     room = plan.room
-    length = float(plan.random.uniform(1.1, 1.4))
-    side = "x-" if plan.random.random() < 0.5 else "x+"
-    x = room.x_min + 0.5 if side == "x-" else room.x_max - 0.5
+    length = round(float(plan.random.uniform(1.1, 1.4)), 2)
     z = room.z_min + length / 2 + 0.15
-    plan.place("DiningTable", x, z, 90.0, size=(length, 0.78, 0.85))
-    aside = 0.72 if side == "x-" else -0.72
-    yaw = 270.0 if side == "x-" else 90.0
-    for dz in np.linspace(-0.25, 0.25, 2) * length:
-        plan.place("Chair", x + aside * 0.9, round(z + float(dz), 2), yaw, size=(0.42, 0.9, 0.45))
-    plan.against("z-", "LightSwitch", (room.x_min + room.x_max) / 2 + 0.6, y=1.2, size=(0.1, 0.14, 0.02))
+    for side in _shuffled(plan, ("x-", "x+")):
+        inward = 1.0 if side == "x-" else -1.0
+        x = (room.x_min if side == "x-" else room.x_max) + 0.5 * inward
+        ends = np.array([[x - 0.45 * inward, 0.0, z - length / 2], [x + 0.95 * inward, 1.0, z + length / 2]])
+        if plan.clear(ends.min(axis=0), ends.max(axis=0)):
+            plan.place("DiningTable", x, z, 90.0, size=(length, 0.78, 0.85))
+            for share in (-0.25, 0.25):
+                yaw = 270.0 if side == "x-" else 90.0
+                plan.place("Chair", x + 0.65 * inward, round(z + share * length, 2), yaw, size=(0.42, 0.9, 0.45))
+            return

@@ -1,42 +1,129 @@
-"""Rooms made from a seed: the same name is always the same room."""
+"""Rooms and houses made from a seed: the same name is always the same scene."""
 
 import zlib
 from collections.abc import Callable
 
 import numpy as np
 
+from infthor_eval.errors import SimulatorError
+from infthor_eval.sim.scenes.bathroom import furnish_bathroom
+from infthor_eval.sim.scenes.bedroom import furnish_bedroom
 from infthor_eval.sim.scenes.kitchen import furnish_kitchen
+from infthor_eval.sim.scenes.living_room import furnish_living_room
 from infthor_eval.sim.scenes.roomplan import RoomPlan, finish
-from infthor_eval.sim.world import Room, World
+from infthor_eval.sim.world import FLOOR_STYLES, Room, World
 
 __all__ = ["ROOM_KINDS", "build_room"]
 
-_FURNISH: dict[str, Callable[[RoomPlan], None]] = {"kitchen": furnish_kitchen}
+_FURNISH: dict[str, Callable[[RoomPlan], None]] = {
+    "kitchen": furnish_kitchen,
+    "living-room": furnish_living_room,
+    "bedroom": furnish_bedroom,
+    "bathroom": furnish_bathroom,
+}
 _FLOORS = {"kitchen": "tiles", "bathroom": "tiles", "bedroom": "carpet", "living-room": "wood"}
-ROOM_KINDS = tuple(_FURNISH)
+_SIZES = {  # metres: least and most width, least and most length
+    "kitchen": (4.4, 5.4, 3.8, 4.8),
+    "living-room": (4.6, 5.6, 4.6, 5.6),
+    "bedroom": (4.4, 5.2, 4.2, 5.0),
+    "bathroom": (3.4, 4.2, 3.2, 4.0),
+}
+_DOOR = 0.5  # half of a doorway's width, metres
+_DRAWS = 20
+_MOST = 0.85  # of a room's free floor
+_REACH = 0.75  # metres from a place to stand to a thing's box
+ROOM_KINDS = (*_FURNISH, "house")
 
 
 def build_room(kind: str, seed: int) -> World:
-    """The world of `<kind>-<seed>`."""
-    random = np.random.default_rng([zlib.crc32(kind.encode()), seed])
-    plan = RoomPlan(shell(kind, random, seed), random)
-    lay_floor(plan)
-    _FURNISH[kind](plan)
-    return finish(f"{kind}-{seed}", seed, [plan])
+    """The world of `<kind>-<seed>`: the first draw of furniture that leaves every room open.
+
+    Raises:
+        SimulatorError: no draw does.
+    """
+    for attempt in range(_DRAWS):
+        random = np.random.default_rng([zlib.crc32(kind.encode()), seed, attempt])
+        if kind == "house":
+            plans, doors = _house_plans(random, seed)
+        else:
+            plans, doors = [RoomPlan(_shell(kind, random, seed), random)], []
+            _furnish(plans[0], kind)
+        world = finish(f"{kind}-{seed}", seed, plans, doors)
+        if all(_open(world, plan) for plan in plans):
+            return world
+    raise SimulatorError(f"{kind}-{seed}: {_DRAWS} draws of furniture all block the way; use another seed")
 
 
-def shell(kind: str, random: np.random.Generator, seed: int) -> Room:
-    """A room of a size that suits its kind, its floor around (0, 0)."""
-    width, length = random.uniform(4.2, 5.4) / 2, random.uniform(3.8, 4.8) / 2
-    return Room(
-        -round(width, 2), round(width, 2), -round(length, 2), round(length, 2), floor_style=_FLOORS[kind], style=seed
-    )
+def _open(world: World, plan: RoomPlan) -> bool:
+    """Whether the agent gets to most of a room's free floor, and near everything in it that holds things."""
+    free = plan.free_cells()
+    reached = [cell for cell in free if world.nav.stands(*cell)]
+    if len(reached) < _MOST * len(free):
+        return False
+    cells = np.array(reached)
+    for item in plan.objects:
+        low, high = item.bounds()
+        nearest = np.clip(cells, low[[0, 2]], high[[0, 2]])
+        if item.kind.receptacle and np.hypot(*(cells - nearest).T).min() > _REACH:
+            return False
+    return True
 
 
-def lay_floor(plan: RoomPlan) -> None:
-    """The Floor object of a room."""
+def _shell(kind: str, random: np.random.Generator, seed: int) -> Room:
+    """A room of a size that suits its kind, around (0, 0)."""
+    least_x, most_x, least_z, most_z = _SIZES[kind]
+    width, length = round(random.uniform(least_x, most_x) / 2, 2), round(random.uniform(least_z, most_z) / 2, 2)
+    return Room(-width, width, -length, length, floor_style=_FLOORS[kind], style=seed)
+
+
+def _furnish(plan: RoomPlan, kind: str) -> None:
     room = plan.room
-    plan.place(
+    floor = plan.place(
         "Floor", (room.x_min + room.x_max) / 2, (room.z_min + room.z_max) / 2, y=room.floor - 0.1,
         size=(room.x_max - room.x_min, 0.1, room.z_max - room.z_min),
     )  # fmt: skip
+    floor.style = FLOOR_STYLES.index(room.floor_style)
+    _FURNISH[kind](plan)
+    switch = plan.try_against("LightSwitch", ["z-", "x-", "x+"], (0.1, 0.14, 0.02), y=1.2)
+    if switch is not None:
+        switch.state.toggled = True
+
+
+def _house_plans(random: np.random.Generator, seed: int) -> tuple[list[RoomPlan], list[tuple[float, float]]]:
+    """Four rooms, two by two, joined by doorways between neighbours, and the cells in the doorways."""
+    west, east = round(random.uniform(4.6, 5.2), 2), round(random.uniform(4.6, 5.2), 2)
+    south, north = round(random.uniform(4.6, 5.2), 2), round(random.uniform(4.4, 5.0), 2)
+    gap = 0.1  # the thickness of an inner wall
+    spans = {
+        "living-room": (-west, 0.0, -south, 0.0),
+        "bedroom": (gap, east, -south, 0.0),
+        "kitchen": (-west, 0.0, gap, north),
+        "bathroom": (gap, min(east, 4.2), gap, min(north, 4.2)),
+    }
+    door_x, door_z = -round(west * 0.22, 2), -round(south * 0.72, 2)
+    upper_z = round(gap + 1.0, 2)
+    openings = {
+        "living-room": (("z+", door_x - _DOOR, door_x + _DOOR), ("x+", door_z - _DOOR, door_z + _DOOR)),
+        "bedroom": (("x-", door_z - _DOOR, door_z + _DOOR),),
+        "kitchen": (("z-", door_x - _DOOR, door_x + _DOOR), ("x+", upper_z - _DOOR, upper_z + _DOOR)),
+        "bathroom": (("x-", upper_z - _DOOR, upper_z + _DOOR),),
+    }
+    plans: list[RoomPlan] = []
+    for kind, (x0, x1, z0, z1) in spans.items():
+        room = Room(x0, x1, z0, z1, floor_style=_FLOORS[kind], style=seed + len(plans), openings=openings[kind])
+        plan = RoomPlan(room, random)
+        plan.keep_doors_free()
+        _furnish(plan, kind)
+        plans.append(plan)
+    doors = [(x, z) for x, z in _doorway_cells(door_x, gap / 2, True)]
+    doors += [(x, z) for x, z in _doorway_cells(door_z, gap / 2, False)]
+    doors += [(x, z) for x, z in _doorway_cells(upper_z, gap / 2, False)]
+    return plans, doors
+
+
+def _doorway_cells(at: float, across: float, along_x: bool) -> list[tuple[float, float]]:
+    """Cells in a doorway whose middle is `at` along the wall, which stands `across`."""
+    lines = [v for v in np.arange(round((at - _DOOR) * 4), round((at + _DOOR) * 4) + 1) * 0.25 if abs(v - at) < 0.28]
+    steps = np.arange(-3, 4) * 0.25
+    near = [s for s in steps if abs(s - across) < 0.4]
+    return [(float(a), float(s)) if along_x else (float(s), float(a)) for a in lines for s in near]

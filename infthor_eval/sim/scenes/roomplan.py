@@ -16,6 +16,7 @@ __all__ = ["RoomPlan", "finish"]
 
 _BODY = 0.23  # the agent's radius and a little, metres
 _KNEE, _HEAD = 0.1, 1.6
+_CLEAR = 0.9  # metres of floor before a doorway
 
 
 class RoomPlan:
@@ -91,7 +92,7 @@ class RoomPlan:
         return not any(aabb_overlap(grown_low, grown_high, a, b) for a, b in boxes)
 
     def try_against(
-        self, kind: str, sides: Iterable[str], size: tuple[float, float, float] | None = None
+        self, kind: str, sides: Iterable[str], size: tuple[float, float, float] | None = None, y: float = 0.0
     ) -> SimObject | None:
         """Puts an object somewhere along one of the walls where there is room; None if there is none."""
         width = (SIZES[kind] if size is None else size)[0]
@@ -99,14 +100,26 @@ class RoomPlan:
             start, end = self.span(side)
             places = np.arange(start + width / 2 + 0.1, end - width / 2 - 0.1 + 1e-6, 0.15)
             for at in self.random.permutation(places):
-                item = self.against(side, kind, round(float(at), 2), size=size, gap=0.02)
+                item = self.against(side, kind, round(float(at), 2), y, size, gap=0.02 if y == 0 else 0.0)
                 self.objects.pop()
                 low, high = item.bounds()
                 blocked = any(s == side and a - width / 2 < at < b + width / 2 for s, a, b in self.room.openings)
-                if not blocked and self.clear(low, high, 0.05):
+                if not blocked and self.clear(low, high, 0.05 if y == 0 else 0.01):
                     self.objects.append(item)
                     return item
         return None
+
+    def keep_doors_free(self) -> None:
+        """Reserves the floor before each doorway."""
+        room = self.room
+        for side, low, high in room.openings:
+            x0, x1, z0, z1 = {
+                "x-": (room.x_min, room.x_min + _CLEAR, low, high),
+                "x+": (room.x_max - _CLEAR, room.x_max, low, high),
+                "z-": (low, high, room.z_min, room.z_min + _CLEAR),
+                "z+": (low, high, room.z_max - _CLEAR, room.z_max),
+            }[side]
+            self.reserved.append((np.array([x0, 0.0, z0]), np.array([x1, 2.0, z1])))
 
     def free_cells(self) -> list[tuple[float, float]]:
         """Cells where the agent fits between what stands on the floor."""

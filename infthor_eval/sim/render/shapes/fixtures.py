@@ -6,6 +6,8 @@ from infthor_eval.sim.render.primitives import Color, Kind, Material
 from infthor_eval.sim.render.shapes.builder import Builder, shade_of
 from infthor_eval.sim.render.shapes.palette import BLACK, BRASS, CHROME, CLOTHS, DARK, GLASS, STEEL, WHITE, WOODS, pick
 from infthor_eval.sim.render.shapes.tables import cut_slab
+from infthor_eval.sim.render.shell import FLOORS
+from infthor_eval.sim.world import FLOOR_STYLES
 
 __all__ = ["SHAPES"]
 
@@ -15,15 +17,8 @@ _WATER: Color = (0.55, 0.75, 0.9)
 
 
 def floor(b: Builder) -> None:
-    """The floor of a room; its pattern comes with the style of the shell."""
-    b.box((0, 0, 0), (1, 1, 1), *_FLOORS[b.style % len(_FLOORS)])
-
-
-_FLOORS: tuple[tuple[Color, Material], ...] = (
-    ((0.62, 0.44, 0.29), Material.PLANKS),
-    ((0.78, 0.76, 0.72), Material.TILES),
-    ((0.60, 0.56, 0.52), Material.CARPET),
-)
+    """The floor of a room; its style is an index of `FLOORS`."""
+    cut_slab(b, 0.0, 1.0, *FLOORS[FLOOR_STYLES[b.style % len(FLOOR_STYLES)]])
 
 
 def sink(b: Builder) -> None:
@@ -38,7 +33,8 @@ def sink(b: Builder) -> None:
 
 def basin(b: Builder) -> None:
     """A tub with a drain."""
-    b.open_top(STEEL if b.style % 2 else _CERAMIC, Material.METAL, 0.014)
+    steel = b.style % 2 == 1 and b.item.object_type == "SinkBasin"
+    b.open_top(STEEL if steel else _CERAMIC, Material.METAL if steel else Material.PLAIN, 0.014)
     b.tube((0, -0.93, 0), (b.thick(0.025, 0), 0.03, b.thick(0.025, 2)), DARK)
 
 
@@ -78,12 +74,12 @@ def toilet(b: Builder) -> None:
 def window(b: Builder) -> None:
     """A bright pane in a white frame with a cross."""
     x, y = b.thick(0.03, 0), b.thick(0.03, 1)
-    b.box((0, 0, 0), (1, 1, 0.4), _SKY, Material.GLASS, glow=0.8)
+    b.box((0, 0, 0), (1, 1, 0.85), _SKY, Material.GLASS, glow=0.8)
     for side in (-1, 1):
         b.box((side * (1 - x), 0, 0), (x, 1, 1), WHITE)
         b.box((0, side * (1 - y), 0), (1, y, 1), WHITE)
-    b.box((0, 0, 0), (x * 0.6, 1, 0.8), WHITE)
-    b.box((0, 0, 0), (1, y * 0.6, 0.8), WHITE)
+    b.box((0, 0, 0), (x * 0.6, 1, 0.95), WHITE)
+    b.box((0, 0, 0), (1, y * 0.6, 0.95), WHITE)
     if b.state.broken:
         b.box((0.2, 0.3, 0.5), (0.5, 0.02, 0.1), BLACK, tilt=(0, 0, 40))
 

@@ -1,0 +1,232 @@
+"""Worlds from ProcTHOR house JSON, as `CreateHouse` takes it."""
+
+import gzip
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from infthor_eval.errors import DataError
+from infthor_eval.sim.footprints import Rect, polygon_rects
+from infthor_eval.sim.geometry import Array, to_array
+from infthor_eval.sim.navigation import CELL, NavGrid
+from infthor_eval.sim.object_types import object_type
+from infthor_eval.sim.objects import SimObject
+from infthor_eval.sim.restore import settle_parents
+from infthor_eval.sim.scenes.arrangement import arrange
+from infthor_eval.sim.sizes import SIZES, style_of, support_height
+from infthor_eval.sim.world import AGENT_HEIGHT, FLOOR_STYLES, Agent, Room, Wall, World
+
+__all__ = ["build_house", "read_asset_sizes"]
+
+_HEIGHT = 2.6
+_BODY = 0.22
+_DOOR_TOP = 2.05
+_FLOORS = {"Kitchen": "tiles", "Bathroom": "tiles", "Bedroom": "carpet", "LivingRoom": "wood"}
+_ASSETS = Path("procthor/asset-database.json.gz")
+Span = tuple[float, float, float, float]
+
+
+def read_asset_sizes(root: Path) -> dict[str, tuple[float, float, float]]:
+    """Bounding boxes (width, height, depth) of ProcTHOR's assets by id; empty where the folder has none.
+
+    Raises:
+        DataError: the file is there but not readable.
+    """
+    path = root / _ASSETS
+    if not path.exists():
+        return {}
+    try:
+        with gzip.open(path, "rt", encoding="utf-8") as file:
+            content = json.load(file)
+        return {
+            asset["assetId"]: tuple(max(float(asset["boundingBox"][axis]), 0.002) for axis in "xyz")  # type: ignore[misc]
+            for assets in content.values()
+            for asset in assets
+        }
+    except (OSError, EOFError, ValueError, KeyError, TypeError) as error:
+        raise DataError(f"{path}: not a readable asset database ({error!r})") from error
+
+
+def build_house(house: Mapping[str, Any], assets: Mapping[str, tuple[float, float, float]]) -> World:
+    """The world of a house.
+
+    Args:
+        house: ProcTHOR's JSON: `rooms`, `walls`, `doors`, `windows`, `objects`, `metadata`.
+        assets: sizes of assets; a type's usual size serves for the others.
+
+    Raises:
+        DataError: the JSON does not have that form, or leaves nowhere to stand.
+    """
+    try:
+        return _build(house, assets)
+    except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
+        raise DataError(f"house: not in ProcTHOR's form ({error!r})") from error
+
+
+def _build(house: Mapping[str, Any], assets: Mapping[str, tuple[float, float, float]]) -> World:
+    floors = [(str(r.get("roomType", "")), polygon_rects(_outline(r["floorPolygon"]))) for r in house["rooms"]]
+    doors = list(_door_spans(house))
+    walls = tuple(_walls(house, doors))
+    objects: dict[str, SimObject] = {}
+    for index, (kind, rects) in enumerate(floors):
+        floor = _floor(index, kind, rects)
+        objects[floor.object_id] = floor
+    for entry in _flat(house.get("objects", ())):
+        item = _object(entry, assets)
+        objects[item.object_id] = item
+    for entry in house.get("windows", ()):
+        if "assetPosition" in entry:
+            objects[str(entry["id"])] = _window(entry, house)
+    rooms = tuple(
+        Room(*(r[0], r[2], r[1], r[3]), _HEIGHT, 0.0, _FLOORS.get(kind, "wood"), index, walled=False)
+        for index, (kind, rects) in enumerate(floors) for r in rects
+    )  # fmt: skip
+    nav = _nav([r for _, rects in floors for r in rects], walls, list(objects.values()))
+    world = World("Procedural", objects, rooms, nav, _agent(house, nav), walls=walls)
+    arrange(world)
+    settle_parents(world)
+    for item in objects.values():
+        if item.kind.pickupable:
+            world.templates.setdefault(item.object_type, []).append(item.duplicate(item.object_id))
+    return world
+
+
+def _outline(polygon: Sequence[Mapping[str, float]]) -> list[tuple[float, float]]:
+    return [(float(p["x"]), float(p["z"])) for p in polygon]
+
+
+def _flat(entries: Sequence[Mapping[str, Any]]) -> Iterator[Mapping[str, Any]]:
+    for entry in entries:
+        yield entry
+        yield from _flat(entry.get("children", ()))
+
+
+def _object(entry: Mapping[str, Any], assets: Mapping[str, tuple[float, float, float]]) -> SimObject:
+    """An object; ProcTHOR's position is the middle of the asset's box."""
+    found = str(entry["id"])
+    kind = str(entry.get("objectType") or found.split("|", 1)[0])
+    asset = str(entry.get("assetId", ""))
+    size = np.array(assets.get(asset) or SIZES.get(kind, (0.3, 0.3, 0.3)))
+    rotation = to_array(entry.get("rotation") or {})
+    return SimObject(
+        object_id=found,
+        name=found,
+        kind=object_type(kind),
+        position=to_array(entry["position"]),
+        rotation=np.array([0.0, rotation[1] % 360, 0.0]),
+        box_center=np.zeros(3),
+        box_size=size,
+        asset_id=asset,
+        support=support_height(kind, float(size[1])),
+        style=style_of(asset or found),
+    )
+
+
+def _floor(index: int, kind: str, rects: Sequence[Rect]) -> SimObject:
+    low = np.array([min(r[0] for r in rects), -0.1, min(r[1] for r in rects)])
+    high = np.array([max(r[2] for r in rects), 0.0, max(r[3] for r in rects)])
+    middle = (low + high) / 2
+    found = f"room|{index}"
+    item = SimObject(
+        found, f"Floor_{index}", object_type("Floor"), middle, np.zeros(3), np.zeros(3), high - low, style=0
+    )
+    item.style = FLOOR_STYLES.index(_FLOORS.get(kind, "wood"))
+    item.pieces = tuple((r[0] - middle[0], r[1] - middle[2], r[2] - middle[0], r[3] - middle[2]) for r in rects)
+    return item
+
+
+def _window(entry: Mapping[str, Any], house: Mapping[str, Any]) -> SimObject:
+    wall = next(w for w in house["walls"] if w["id"] == entry["wall0"])
+    x0, z0, x1, z1 = _base(wall["polygon"])
+    length = math.dist((x0, z0), (x1, z1))
+    local = to_array(entry["assetPosition"])
+    share = float(local[0]) / max(length, 1e-6)
+    found = str(entry["id"])
+    return SimObject(
+        found, found, object_type("Window"), np.array([x0 + (x1 - x0) * share, local[1], z0 + (z1 - z0) * share]),
+        np.array([0.0, math.degrees(math.atan2(x1 - x0, z1 - z0)) + 90.0, 0.0]), np.zeros(3),
+        np.array([1.0, 1.2, 0.16]), asset_id=str(entry.get("assetId", "")),
+    )  # fmt: skip
+
+
+def _base(polygon: Sequence[Mapping[str, float]]) -> Span:
+    """The two lower corners of a wall."""
+    lower = sorted(polygon, key=lambda p: float(p["y"]))[:2]
+    first, second = [p for p in polygon if any(p is q for q in lower)]
+    return float(first["x"]), float(first["z"]), float(second["x"]), float(second["z"])
+
+
+def _door_spans(house: Mapping[str, Any]) -> Iterator[tuple[str, float, float]]:
+    """Of each doorway: a wall it is in, and from and to along that wall, metres."""
+    for door in house.get("doors", ()):
+        if "holePolygon" in door:
+            points = [float(p["x"]) for p in door["holePolygon"]]
+        else:
+            points = [float(door["boundingBox"]["min"]["x"]), float(door["boundingBox"]["max"]["x"])]
+        for key in ("wall0", "wall1"):
+            if door.get(key):
+                yield str(door[key]), min(points), max(points)
+
+
+def _walls(house: Mapping[str, Any], doors: Sequence[tuple[str, float, float]]) -> Iterator[Wall]:
+    for wall in house["walls"]:
+        x0, z0, x1, z1 = _base(wall["polygon"])
+        length = math.dist((x0, z0), (x1, z1))
+        if length < 1e-6 or wall.get("empty"):
+            continue
+        style = style_of(str(wall.get("roomId", "")))
+        at = 0.0
+        for _, low, high in sorted(d for d in doors if d[0] == str(wall["id"])):
+            yield _stretch((x0, z0, x1, z1), length, at, low, 0.0, style)
+            yield _stretch((x0, z0, x1, z1), length, low, high, _DOOR_TOP, style)
+            at = high
+        yield _stretch((x0, z0, x1, z1), length, at, length, 0.0, style)
+
+
+def _stretch(ends: Span, length: float, low: float, high: float, bottom: float, style: int) -> Wall:
+    x0, z0, x1, z1 = ends
+    a, b = low / length, high / length
+    return Wall(x0 + (x1 - x0) * a, z0 + (z1 - z0) * a, x0 + (x1 - x0) * b, z0 + (z1 - z0) * b, bottom, _HEIGHT, style)
+
+
+def _nav(rects: Sequence[Rect], walls: Sequence[Wall], objects: list[SimObject]) -> NavGrid:
+    cells = {
+        (round(x * CELL, 4), round(z * CELL, 4)) for r in rects
+        for x in range(math.ceil(r[0] / CELL), math.floor(r[2] / CELL) + 1)
+        for z in range(math.ceil(r[1] / CELL), math.floor(r[3] / CELL) + 1)
+    }  # fmt: skip
+    points: Array = np.array(sorted(cells)).reshape(-1, 2)
+    for wall in walls:
+        if wall.bottom < 1.0:
+            points = points[_distance(points, wall) >= _BODY]
+    for item in objects:
+        low, high = item.bounds()
+        if item.object_type != "Floor" and not item.kind.pickupable and low[1] < 1.6 and high[1] > 0.1:
+            nearest = np.clip(points, low[[0, 2]], high[[0, 2]])
+            points = points[np.hypot(*(points - nearest).T) >= _BODY]
+    if not len(points):
+        raise DataError("house: its rooms leave nowhere to stand")
+    return NavGrid([(float(x), float(z)) for x, z in points])
+
+
+def _distance(points: Array, wall: Wall) -> Array:
+    a, b = np.array([wall.x0, wall.z0]), np.array([wall.x1, wall.z1])
+    along = b - a
+    share = np.clip((points - a) @ along / max(float(along @ along), 1e-9), 0.0, 1.0)
+    away: Array = np.hypot(*(points - (a + share[:, None] * along)).T)
+    return away
+
+
+def _agent(house: Mapping[str, Any], nav: NavGrid) -> Agent:
+    start = (house.get("metadata") or {}).get("agent") or {}
+    if "position" in start:
+        x, z = nav.nearest(float(start["position"]["x"]), float(start["position"]["z"]))
+    else:
+        x, z = max((nav.reachable(*cell) for cell in list(nav)[:: max(1, len(nav) // 20)]), key=len)[0]
+    turn = start.get("rotation", 0.0)
+    yaw = float(turn.get("y", 0.0) if isinstance(turn, Mapping) else turn)
+    return Agent(np.array([x, AGENT_HEIGHT, z]), yaw % 360, float(start.get("horizon", 0.0)))
