@@ -40,8 +40,13 @@ def command(context: click.Context, folder: Path, out: Path, seed: int, per_traj
     write_questions(out, made.questions)
     output = Console(soft_wrap=True)
     output.print(_words(made, out), highlight=False, markup=False)
+    notes = Console(stderr=True, soft_wrap=True)
+    for question in made.doubted:
+        notes.print(
+            f"left out, the checker disagrees: {question.traj_id}: {question.text}", highlight=False, markup=False
+        )
     for line in made.skipped:
-        Console(stderr=True, soft_wrap=True).print(f"skipped: {line}", style="red", highlight=False, markup=False)
+        notes.print(f"skipped: {line}", style="red", highlight=False, markup=False)
     context.exit(1 if made.skipped else 0)
 
 

@@ -7,7 +7,7 @@ from functools import cached_property
 from infthor_eval.errors import DataError
 from infthor_eval.formats.step_log import ObjectState, Seen, Step, worlds
 
-__all__ = ["DEFAULT_SHARE", "FRAME_PIXELS", "History", "Move", "canonical"]
+__all__ = ["DEFAULT_SHARE", "FRAME_PIXELS", "Event", "History", "Move", "canonical"]
 
 FRAME_PIXELS = 300 * 300
 DEFAULT_SHARE = 0.001  # of the frame: 90 pixels, about a fork on a table an arm's length away
@@ -38,6 +38,25 @@ class Move:
     before: int
     target: str
     after: int
+
+
+@dataclass(frozen=True)
+class Event:
+    """An action on an object that was carried out.
+
+    Attributes:
+        frame: the frame after it.
+        action: its name.
+        target: id of the object acted on.
+        kind: its type.
+        receptacle: id of the receptacle, for PutObject.
+    """
+
+    frame: int
+    action: str
+    target: str
+    kind: str
+    receptacle: str | None
 
 
 class History:
@@ -83,6 +102,12 @@ class History:
         seen = self.seen(frame)
         return all(key in seen and seen[key].pixels >= self.least for key in ids)
 
+    def shows_slices(self, frame: int, whole: str) -> bool:
+        """Whether a frame shows a slice of an object."""
+        world = self.world(frame)
+        slices = (key for key in world if key.startswith(f"{whole}|") and world[key].type.endswith("Sliced"))
+        return any(self.shows(frame, key) for key in slices)
+
     def parent(self, frame: int, item: str) -> str | None:
         """What an object is directly in or on at a frame; None where it is held, lies on the floor, or it is not
         clear."""
@@ -105,21 +130,26 @@ class History:
         return frozenset(canonical(state.type) for step in self.steps for state in step.changes.values())
 
     @cached_property
+    def events(self) -> tuple[Event, ...]:
+        """The actions on objects that were carried out, in order."""
+        return tuple(
+            Event(frame, step.action.partition(" ")[0], step.target, self._kind(frame, step.target), step.receptacle)
+            for frame, step in enumerate(self.steps)
+            if step.success and step.action is not None and step.target is not None
+        )
+
+    @cached_property
     def moves(self) -> tuple[Move, ...]:
         """Every time that an object was picked up and put down, in order."""
         found: list[Move] = []
         picked: dict[str, int] = {}
-        for frame, step in enumerate(self.steps):
-            name = (step.action or "").partition(" ")[0]
-            if not step.success or step.target is None:
-                continue
-            if name == "PickupObject":
-                picked[step.target] = frame - 1
-            elif name == "PutObject" and step.receptacle is not None and step.target in picked:
-                before = picked.pop(step.target)
-                kind = self.world(before)[step.target].type
-                origin = self.parent(before, step.target)
-                found.append(Move(step.target, kind, origin, before, step.receptacle, frame))
+        for event in self.events:
+            if event.action == "PickupObject":
+                picked[event.target] = event.frame - 1
+            elif event.action == "PutObject" and event.receptacle is not None and event.target in picked:
+                before = picked.pop(event.target)
+                origin = self.parent(before, event.target)
+                found.append(Move(event.target, event.kind, origin, before, event.receptacle, event.frame))
         return tuple(found)
 
     def moves_of(self, item: str) -> tuple[Move, ...]:
@@ -130,19 +160,40 @@ class History:
     def handled(self) -> dict[str, set[str]]:
         """The objects that were picked up, by type."""
         found: dict[str, set[str]] = {}
-        for frame, step in enumerate(self.steps):
-            if step.success and step.target is not None and (step.action or "").startswith("PickupObject"):
-                found.setdefault(self.world(frame)[step.target].type, set()).add(step.target)
+        for event in self.events:
+            if event.action == "PickupObject":
+                found.setdefault(event.kind, set()).add(event.target)
         return found
 
-    def best_frame(self, item: str) -> int | None:
-        """The frame that shows an object largest and whole; None where none shows it large enough."""
-        frames = [
-            (seen[item].pixels, -frame)
-            for frame in range(len(self))
-            if item in (seen := self.seen(frame)) and seen[item].pixels >= self.least
-        ]
-        return -max(frames)[1] if frames else None
+    def alone(self, frame: int, item: str) -> bool:
+        """Whether a frame shows no other object that people would call the same, however small."""
+        kind = canonical(self._kind(frame, item))
+        world = self.world(frame)
+        others = (key for key in self.seen(frame) if key != item and key in world)
+        return not any(canonical(world[key].type) == kind and not _parts(key, item) for key in others)
+
+    def only_one(self, frame: int, item: str) -> bool:
+        """Whether the scene has no other object that people would call the same."""
+        world = self.world(frame)
+        kind = canonical(world[item].type)
+        return not any(
+            canonical(state.type) == kind and key != item and not _parts(key, item) for key, state in world.items()
+        )
+
+    def contents(self, frame: int, receptacle: str) -> frozenset[str]:
+        """The objects directly in or on a receptacle."""
+        world = self.world(frame)
+        return frozenset(key for key in world if self.parent(frame, key) == receptacle)
+
+    def _kind(self, frame: int, item: str) -> str:
+        """The type of an object; one that the action used up was there the frame before."""
+        state = self.world(frame).get(item) or self.world(frame - 1)[item]
+        return state.type
+
+
+def _parts(one: str, other: str) -> bool:
+    """Whether one is a part of the other, as a basin is of its sink."""
+    return one.startswith(f"{other}|") or other.startswith(f"{one}|")
 
 
 def _snapshots(steps: list[Step]) -> Iterator[dict[str, ObjectState]]:

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from infthor_eval.generation.questions.candidates import Candidate, answer_of, distinct, the
-from infthor_eval.generation.questions.history import History, Move, canonical
+from infthor_eval.generation.questions.history import History, Move
 
 __all__ = ["KIND", "locations"]
 
@@ -23,10 +23,10 @@ def locations(history: History) -> Iterator[Candidate]:
 
 def _origin(history: History, kind: str, moves: tuple[Move, ...]) -> Iterator[Candidate]:
     move = moves[0]
-    if move.origin is None or not history.shows(move.before, move.item, move.origin):
+    if not _left(history, move):
         return
     when = "first picked it up" if len(moves) > 1 else "picked it up"
-    place = history.world(move.before)[move.origin].type
+    place = history.world(move.before)[move.origin or ""].type
     yield _candidate(f"Where was {the(kind)} before you {when}?", (move.before,), [place], kind)
 
 
@@ -39,35 +39,36 @@ def _destination(history: History, kind: str, moves: tuple[Move, ...]) -> Iterat
 
 def _now(history: History, kind: str, moves: tuple[Move, ...]) -> Iterator[Candidate]:
     move, last = moves[-1], len(history) - 1
-    alone = sum(state.type == kind for state in history.world(last).values()) == 1
+    alone = move.item in history.world(last) and history.only_one(last, move.item)
     if alone and _arrived(history, move) and history.parent(last, move.item) == move.target:
-        carried = any(other.after > move.after and other.item == move.target for other in history.moves)
-        if not carried:
-            place = history.world(last)[move.target].type
-            yield _candidate(f"Where is {the(kind)} now?", (move.after,), [place], kind)
+        place = history.world(last)[move.target].type
+        yield _candidate(f"Where is {the(kind)} now?", (move.after,), [place], kind)
 
 
 def _journey(history: History, kind: str, moves: tuple[Move, ...]) -> Iterator[Candidate]:
     first = moves[0]
-    if first.origin is None or not history.shows(first.before, first.item, first.origin):
+    if not _left(history, first):
         return
     if not all(_arrived(history, move) for move in moves):
         return
-    places = [history.world(first.before)[first.origin].type]
+    places = [history.world(first.before)[first.origin or ""].type]
     places += [history.world(move.after)[move.target].type for move in moves]
     if distinct(places):
         clues = (first.before, *(move.after for move in moves))
         yield _candidate(f"In which places was {the(kind)}, from first to last?", clues, places, kind)
 
 
+def _left(history: History, move: Move) -> bool:
+    """Whether the frame before the pick-up shows the object, and no other of its type, where it was."""
+    shown = move.origin is not None and history.shows(move.before, move.item, move.origin)
+    return shown and history.alone(move.before, move.item)
+
+
 def _arrived(history: History, move: Move) -> bool:
     """Whether the frame after the put shows the object where it was put."""
     shown = history.shows(move.after, move.item, move.target)
     parent = history.parent(move.after, move.item)
-    if not shown or parent is None:
-        return False
-    world = history.world(move.after)
-    return canonical(world[parent].type) == canonical(world[move.target].type)
+    return shown and parent == move.target
 
 
 def _candidate(text: str, clues: tuple[int, ...], places: list[str], kind: str) -> Candidate:

@@ -9,8 +9,17 @@ from pathlib import Path
 from infthor_eval.errors import DataError
 from infthor_eval.formats.question import Question
 from infthor_eval.formats.step_log import read_steps
-from infthor_eval.generation.questions import location, presence, put_action
+from infthor_eval.generation.questions import (
+    contents,
+    counting,
+    final_state,
+    location,
+    open_state,
+    presence,
+    put_action,
+)
 from infthor_eval.generation.questions.candidates import Candidate
+from infthor_eval.generation.questions.checker import Checker
 from infthor_eval.generation.questions.history import DEFAULT_SHARE, History
 
 __all__ = ["Made", "make_questions"]
@@ -24,11 +33,13 @@ class Made:
         questions: in the order of trajectories, then of their first clue.
         trajectories: how many were read.
         skipped: those that could not be, one line each.
+        doubted: questions left out because the checker did not agree with them.
     """
 
     questions: list[Question] = field(default_factory=list)
     trajectories: int = 0
     skipped: list[str] = field(default_factory=list)
+    doubted: list[Question] = field(default_factory=list)
 
     def by_kind(self) -> dict[str, int]:
         """Number of questions by type."""
@@ -68,7 +79,9 @@ def make_questions(folder: Path, *, seed: int = 0, per_trajectory: int = 25, sha
     for history in histories:
         rng = random.Random(f"{seed}/{history.traj_id}")
         chosen = chooser.choose(_candidates(history, vocabulary, rng), per_trajectory, rng)
-        made.questions += [item.question(history.traj_id) for item in chosen]
+        checker = Checker(history.steps, share)
+        for question in (item.question(history.traj_id) for item in chosen):
+            (made.questions if checker.verdict(question).sound else made.doubted).append(question)
     return made
 
 
@@ -81,8 +94,18 @@ def _folders(folder: Path) -> list[Path]:
 
 
 def _candidates(history: History, vocabulary: frozenset[str], rng: random.Random) -> list[Candidate]:
-    found = [*location.locations(history), *put_action.puts(history)]
-    return [*found, *presence.present(history), *presence.absent(history, vocabulary, rng)]
+    return [
+        *presence.present(history),
+        *presence.absent(history, vocabulary, rng),
+        *open_state.open_states(history),
+        *location.locations(history),
+        *contents.slicings(history),
+        *contents.at_slicing(history),
+        *contents.at_opening(history),
+        *put_action.puts(history),
+        *final_state.final_states(history),
+        *counting.counts(history),
+    ]
 
 
 class _Chooser:

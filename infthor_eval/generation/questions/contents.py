@@ -1,0 +1,68 @@
+"""Slicing and container content: what was sliced, and what a receptacle held at a told moment."""
+
+from collections import Counter
+from collections.abc import Iterator
+
+from infthor_eval.generation.affordances import preposition
+from infthor_eval.generation.questions.candidates import Candidate, answer_of, distinct, the
+from infthor_eval.generation.questions.evidence import cover
+from infthor_eval.generation.questions.history import Event, History
+
+__all__ = ["CONTENT", "SLICING", "at_opening", "at_slicing", "slicings"]
+
+CONTENT = "container_content"
+SLICING = "slicing"
+_MANY = 6  # longer lists are a test of writing, not of seeing
+
+
+def slicings(history: History) -> Iterator[Candidate]:
+    """What the agent sliced."""
+    events = [event for event in history.events if event.action == "SliceObject"]
+    kinds = [event.kind for event in events]
+    shown = all(history.shows_slices(event.frame, event.target) for event in events)
+    if events and shown and len(set(kinds)) == len(kinds) and distinct(kinds):
+        answers = tuple(answer_of(kind) for kind in kinds)
+        yield Candidate(SLICING, "What did you slice?", tuple(event.frame for event in events), answers, tuple(kinds))
+
+
+def at_slicing(history: History) -> Iterator[Candidate]:
+    """What else lay where something was sliced."""
+    events = [event for event in history.events if event.action == "SliceObject"]
+    count = Counter(event.kind for event in events)
+    for event in events:
+        place = history.parent(event.frame - 1, event.target)
+        if count[event.kind] == 1 and place is not None and history.shows_slices(event.frame, event.target):
+            kind = history.world(event.frame)[place].type
+            text = f"What else was {preposition(kind)} {the(kind)} when you sliced {the(event.kind)}?"
+            leave_out = frozenset({event.kind, f"{event.kind}Sliced"})
+            yield from _contents(history, SLICING, text, event, place, leave_out)
+
+
+def at_opening(history: History) -> Iterator[Candidate]:
+    """What was in the only receptacle of its type when it was first opened."""
+    opened: set[str] = set()
+    for event in history.events:
+        first = event.action == "OpenObject" and event.target not in opened
+        opened |= {event.target} if event.action == "OpenObject" else set()
+        if first and history.only_one(event.frame, event.target):
+            text = f"What was {preposition(event.kind)} {the(event.kind)} when you first opened it?"
+            yield from _contents(history, CONTENT, text, event, event.target, frozenset())
+
+
+def _contents(
+    history: History, kind: str, text: str, event: Event, place: str, leave_out: frozenset[str]
+) -> Iterator[Candidate]:
+    """A question on what a receptacle holds right after an event, shown while that does not change."""
+    inside = history.contents(event.frame, place)
+    asked = {key for key in inside if history.world(event.frame)[key].type not in leave_out}
+    shown = {}
+    for frame in range(event.frame, len(history)):
+        if history.contents(frame, place) != inside:
+            break
+        if history.shows(frame, place):
+            shown[frame] = frozenset(key for key in asked if history.shows(frame, key))
+    clues = cover(asked, shown) if asked else None
+    kinds = sorted(history.world(event.frame)[key].type for key in asked)
+    if clues is not None and len(set(kinds)) == len(kinds) <= _MANY and distinct(kinds):
+        place_kind = history.world(event.frame)[place].type
+        yield Candidate(kind, text, clues, tuple(answer_of(item) for item in kinds), (place_kind, *kinds))

@@ -1,0 +1,72 @@
+"""Final object state: is it in, what is in, how many are in; as things are at the end."""
+
+from collections.abc import Iterator
+
+from infthor_eval.generation.affordances import preposition
+from infthor_eval.generation.questions.candidates import Candidate, answer_of, distinct, the
+from infthor_eval.generation.questions.evidence import cover
+from infthor_eval.generation.questions.history import History, canonical
+
+__all__ = ["KIND", "final_states"]
+
+KIND = "final_state"
+_MANY = 6
+
+
+def final_states(history: History) -> Iterator[Candidate]:
+    """Questions on receptacles that the agent put something into and that alone are of their type."""
+    last = len(history) - 1
+    targets = sorted({move.target for move in history.moves})
+    singles = [key for key in targets if key in history.world(last) and history.only_one(last, key)]
+    for key in singles:
+        yield from _inside(history, key)
+        yield from _what(history, key)
+
+
+def _inside(history: History, receptacle: str) -> Iterator[Candidate]:
+    """Whether a moved object is in it in the end: yes where it was put there last, no where it was taken away."""
+    last = len(history) - 1
+    world = history.world(last)
+    for item in sorted({move.item for move in history.moves if receptacle in {move.target, move.origin}}):
+        move = history.moves_of(item)[-1]
+        here = history.parent(last, item)
+        alone = item in world and history.only_one(last, item) and len(history.handled[move.kind]) == 1
+        if not alone or here != move.target:
+            continue
+        if history.shows(move.after, item, move.target) and history.parent(move.after, item) == here:
+            kind = world[receptacle].type
+            text = f"Is {the(world[item].type)} {preposition(kind)} {the(kind)} now?"
+            answer = "yes" if here == receptacle else "no"
+            yield Candidate(KIND, text, (move.after,), (answer,), (world[item].type, kind))
+
+
+def _what(history: History, receptacle: str) -> Iterator[Candidate]:
+    """What is in it in the end, and how many things."""
+    last = len(history) - 1
+    world = history.world(last)
+    inside = history.contents(last, receptacle)
+    since = {item: _arrival(history, item, receptacle) for item in inside}
+    shown = {}
+    for frame in range(min(since.values(), default=0), len(history)):
+        here = history.contents(frame, receptacle)
+        held = {key for key in here if key in history.seen(frame)}
+        if history.shows(frame, receptacle) and held <= inside:
+            shown[frame] = frozenset(key for key in held if frame >= since[key] and history.shows(frame, key))
+    clues = cover(inside, shown) if inside else None
+    if clues is None or len(inside) > _MANY:
+        return
+    kind = world[receptacle].type
+    kinds = sorted(world[key].type for key in inside)
+    where = f"{preposition(kind)} {the(kind)}"
+    yield Candidate(KIND, f"How many objects are {where} now?", clues, (str(len(inside)),), (kind, "#"))
+    if len({canonical(item) for item in kinds}) == len(kinds) and distinct(kinds):
+        answers = tuple(answer_of(item) for item in kinds)
+        yield Candidate(KIND, f"What is {where} now?", clues, answers, (kind, *kinds))
+
+
+def _arrival(history: History, item: str, receptacle: str) -> int:
+    """The frame from which on the object stays in the receptacle."""
+    frame = len(history) - 1
+    while frame > 0 and history.parent(frame - 1, item) == receptacle:
+        frame -= 1
+    return frame

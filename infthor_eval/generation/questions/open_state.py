@@ -1,0 +1,68 @@
+"""Open state: "Was the fridge open when you picked up the mug?", "Is the fridge open now?" """
+
+from collections import Counter
+from collections.abc import Iterator
+
+from infthor_eval.generation.affordances import preposition
+from infthor_eval.generation.questions.candidates import Candidate, the
+from infthor_eval.generation.questions.history import Event, History
+
+__all__ = ["KIND", "open_states", "phrase"]
+
+KIND = "open_state"
+_UNASKED = frozenset({"Blinds", "Curtains", "Book", "Kettle", "ShowerCurtain", "ShowerDoor", "Window"})
+_ASKED_AT = {"PickupObject", "PutObject", "SliceObject", "ToggleObjectOn"}
+
+
+def open_states(history: History) -> Iterator[Candidate]:
+    """Questions on what is the only one of its type and can be opened."""
+    last = len(history) - 1
+    singles = sorted(
+        key
+        for key, state in history.world(last).items()
+        if state.is_open is not None and state.type not in _UNASKED and history.only_one(last, key)
+    )
+    phrases = Counter(phrase(history, event) for event in history.events)
+    for key in singles:
+        yield from _now(history, key)
+        for event in history.events:
+            told = phrase(history, event)
+            about = key in {event.target, event.receptacle}
+            if event.action in _ASKED_AT and phrases[told] == 1 and not about:
+                yield from _then(history, key, event, told)
+
+
+def phrase(history: History, event: Event) -> str:
+    """What the agent did, as the end of a "when you ..." """
+    if event.action == "PutObject" and event.receptacle is not None:
+        kind = history.world(event.frame)[event.receptacle].type
+        return f"put {the(event.kind)} {preposition(kind)} {the(kind)}"
+    verbs = {"PickupObject": "picked up", "SliceObject": "sliced", "ToggleObjectOn": "turned on"}
+    return f"{verbs.get(event.action, event.action)} {the(event.kind)}"
+
+
+def _then(history: History, key: str, event: Event, told: str) -> Iterator[Candidate]:
+    world = history.world(event.frame)
+    if key in world and history.shows(event.frame, key) and _shows_event(history, event):
+        answer = "yes" if world[key].is_open else "no"
+        text = f"Was {the(world[key].type)} open when you {told}?"
+        yield Candidate(KIND, text, (event.frame,), (answer,), (world[key].type, event.kind))
+
+
+def _shows_event(history: History, event: Event) -> bool:
+    """Whether the frame after it shows what was done."""
+    if event.action == "SliceObject":
+        return history.shows_slices(event.frame, event.target)
+    if event.receptacle is None:
+        return history.shows(event.frame, event.target)
+    inside = history.parent(event.frame, event.target) == event.receptacle
+    return inside and history.shows(event.frame, event.target, event.receptacle)
+
+
+def _now(history: History, key: str) -> Iterator[Candidate]:
+    last = len(history) - 1
+    state = history.world(last)[key]
+    frame = next((frame for frame in range(last, -1, -1) if history.shows(frame, key)), None)
+    if frame is not None and history.world(frame)[key].is_open == state.is_open:
+        answer = "yes" if state.is_open else "no"
+        yield Candidate(KIND, f"Is {the(state.type)} open now?", (frame,), (answer,), (state.type,))
