@@ -9,6 +9,7 @@ from typing import Any
 
 import torch
 
+from infthor_eval.errors import ModelError
 from model_adapters.engine.family import Family
 from model_adapters.engine.features import FeatureCache
 from model_adapters.engine.kv_cache import BufferedCache
@@ -75,6 +76,10 @@ class Prefix:
 
         Returns:
             Logits of the token that follows the last unit, (vocabulary,).
+
+        Raises:
+            DataError: a frame cannot be read.
+            ModelError: processor and model disagree on how many tokens a frame takes.
         """
         self._cache.reserve(self.n_tokens + n_tokens(units) + reserve)
         logits = None
@@ -114,6 +119,11 @@ class Prefix:
         embeds = self._embeddings(ids)
         if frames:
             features = torch.cat(self._features.get(frames))
+            if len(features) != len(slots):
+                raise ModelError(
+                    f"the processor makes {len(slots)} image tokens of {len(frames)} frames and the model "
+                    f"{len(features)} features; they do not belong to one checkpoint"
+                )
             embeds[slots] = features.to(embeds.dtype)
         positions = self._family.positions(ids, [frame.size for frame in frames], self._starts[-1])
         done = False

@@ -9,6 +9,7 @@ from typing import Any
 
 import torch
 from PIL import Image
+from transformers import StoppingCriteria, StoppingCriteriaList
 
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
@@ -58,6 +59,20 @@ def expanded(processor: Any, image: Image.Image) -> list[int]:
     inputs = processor(text=[image_token(processor)], images=[image], add_special_tokens=False, return_tensors="pt")
     ids: list[int] = inputs["input_ids"][0].tolist()
     return ids
+
+
+class _StopAt(StoppingCriteria):
+    """Ends generation as soon as the reply's text has a stop string."""
+
+    def __init__(self, tokenizer: Any, n_context: int, stop: Sequence[str]) -> None:
+        self._tokenizer = tokenizer
+        self._n_context = n_context
+        self._stop = stop
+
+    def __call__(self, input_ids: torch.Tensor, scores: torch.Tensor, **kwargs: Any) -> torch.Tensor:
+        text = self._tokenizer.decode(input_ids[0, self._n_context :], skip_special_tokens=True)
+        done = cut_at_stop(text, self._stop) is not None
+        return torch.tensor([done], device=input_ids.device)
 
 
 class WholeModel:
@@ -116,8 +131,7 @@ class WholeModel:
                 **inputs.to(weight.device, model.dtype),
                 do_sample=False,
                 max_new_tokens=max_new_tokens,
-                stop_strings=list(stop) or None,
-                tokenizer=tokenizer,
+                stopping_criteria=StoppingCriteriaList([_StopAt(tokenizer, n_context, stop)]),
             )
         ends = self._loaded.generation.end_ids
         ids = [token for token in output[0, n_context:].tolist() if token not in ends]
