@@ -23,6 +23,8 @@ _PATH = click.Path(path_type=Path)
 @click.option("--min-subgoals", type=click.IntRange(1), default=1, show_default=True, help="Sub-goals at least.")
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of the first trajectory.")
 @click.option("--count", type=click.IntRange(1), default=1, show_default=True, help="Trajectories for each scene.")
+@click.option("--final-task", is_flag=True, help="End with a task on what was seen at both ends of the trajectory.")
+@click.option("--test-set", is_flag=True, help="As the published test sets: with a final task, without bathrooms.")
 @click.option("--out", required=True, type=_PATH, help="Directory for the trajectory files.")
 @click.option("--data", type=_PATH, help="Folder with recorded floor plans, for scenes among them.")
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as one JSON object.")
@@ -34,6 +36,8 @@ def command(
     min_subgoals: int,
     seed: int,
     count: int,
+    final_task: bool,
+    test_set: bool,
     out: Path,
     data: Path | None,
     as_json: bool,
@@ -46,12 +50,16 @@ def command(
     from rich.progress import Progress
 
     from infthor_eval.generation.factory import Settings
-    from infthor_eval.generation.generate_set import generate_set
+    from infthor_eval.generation.generate_set import generate_set, is_bathroom
     from infthor_eval.thor.launch import embedded
     from infthor_eval.thor.simulator import Simulator
 
-    jobs = [Settings(scene, seed + k, min_steps, min_subgoals) for scene in scenes for k in range(count)]
     notes = Console(stderr=True, soft_wrap=True)
+    chosen = [scene for scene in scenes if not (test_set and is_bathroom(scene))]
+    for scene in set(scenes) - set(chosen):
+        notes.print(f"{scene}: bathrooms are left out of test sets", highlight=False, markup=False)
+    final = final_task or test_set
+    jobs = [Settings(scene, seed + k, min_steps, min_subgoals, final) for scene in chosen for k in range(count)]
     with Simulator(embedded(data)) as simulator, Progress(console=notes, transient=True) as progress:
         bar = progress.add_task("generate", total=len(jobs))
         result = generate_set(jobs, simulator, out, lambda: progress.advance(bar))

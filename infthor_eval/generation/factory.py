@@ -2,7 +2,7 @@
 
 import random
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -22,12 +22,13 @@ from infthor_eval.formats.trajectory import (
     Trajectory,
 )
 from infthor_eval.generation.affordances import goes_into
+from infthor_eval.generation.final_task import ends_of
 from infthor_eval.generation.planner import plan
 from infthor_eval.generation.recorder import object_log
 from infthor_eval.generation.rollout import Rollout, RolloutError
 from infthor_eval.generation.sampling import TaskPool
 from infthor_eval.generation.scout import reachable
-from infthor_eval.generation.symbolic import Operator, Room, room_of
+from infthor_eval.generation.symbolic import Operator, room_of
 from infthor_eval.generation.tasks import Task, TaskType, sub_task
 from infthor_eval.thor.restore import restore
 from infthor_eval.thor.simulator import Simulator
@@ -35,6 +36,7 @@ from infthor_eval.thor.simulator import Simulator
 __all__ = ["Settings", "Statistics", "generate"]
 
 _TRIALS = 60  # tasks tried in a row without success before the scene counts as unsolvable
+_LONGER = 4  # how often a trajectory is made longer because no final task works
 
 
 @dataclass(frozen=True)
@@ -46,6 +48,7 @@ class Settings:
         seed: makes every choice.
         min_steps: low-level actions at least.
         min_subgoals: sub-goals at least.
+        final_task: whether a final task follows (see `final_task`).
         kinds: task types to draw from.
     """
 
@@ -53,6 +56,7 @@ class Settings:
     seed: int
     min_steps: int
     min_subgoals: int
+    final_task: bool = False
     kinds: tuple[TaskType, ...] = tuple(TaskType)
 
     @property
@@ -67,6 +71,7 @@ class Settings:
             "seed": self.seed,
             "min_steps": self.min_steps,
             "min_subgoals": self.min_subgoals,
+            "final_task": self.final_task,
             "task_types": [str(kind) for kind in self.kinds],
         }
 
@@ -102,6 +107,8 @@ def generate(settings: Settings, simulator: Simulator) -> tuple[Trajectory, Stat
     while not factory.long_enough():
         factory.extend()
     factory.put_down()
+    if settings.final_task:
+        factory.finish()
     return factory.trajectory(), factory.statistics
 
 
@@ -110,6 +117,7 @@ class _Factory:
 
     def __init__(self, settings: Settings, simulator: Simulator) -> None:
         self._settings = settings
+        self._name = f"scene {settings.scene}, seed {settings.seed}"
         self._simulator = simulator
         self._rng = random.Random(f"{settings.scene}/{settings.seed}")
         self._pool = TaskPool(settings.kinds, self._rng)
@@ -118,6 +126,7 @@ class _Factory:
         self._log: list[dict[str, Any]] = []
         self._sub_tasks: list[SubTask] = []
         self._sub_trajs: list[SubTrajectory] = []
+        self._final: SubTask | None = None
         self.statistics = Statistics()
 
     def begin(self) -> None:
@@ -149,27 +158,43 @@ class _Factory:
 
     def extend(self) -> None:
         """Add one task: the first sampled one that can be planned and carried out."""
-        room = self._room()
+        if self._first_that_works(lambda _: True, _TRIALS) is None:
+            reasons = "; ".join(f"{reason} ({count})" for reason, count in self.statistics.reasons.most_common(3))
+            raise UsageError(
+                f"{self._name}: no further task works after {len(self._low)} steps "
+                f"({reasons or 'nothing there to do'}); choose another scene or seed"
+            )
+
+    def finish(self) -> None:
+        """Add the final task; where none works, another ordinary one comes before it."""
+        for _ in range(_LONGER):
+            task = self._first_that_works(ends_of(self._log).allow_task, None)
+            if task is not None:
+                self._final = self._sub_tasks.pop()
+                return
+            self.extend()
+            self.put_down()
+        raise UsageError(f"{self._name}: no final task works; choose another scene or seed")
+
+    def _first_that_works(self, allowed: Callable[[Task], bool], trials: int | None) -> Task | None:
+        """Try sampled tasks until one becomes part of the trajectory; None where none does."""
+        room = room_of(self._simulator.view)
         kinds = {item.object_type for item in self._simulator.view.objects.values()}
-        trials = 0
+        tried = 0
         for task in self._pool.sample(room, kinds):
-            operators = plan(task, room)
+            operators = plan(task, room) if allowed(task) else None
             if not operators:
                 continue
-            trials += 1
-            if trials > _TRIALS:
-                break
+            if tried == trials:
+                return None
+            tried += 1
             if self._try(task, operators):
-                return
-        reasons = "; ".join(f"{reason} ({count})" for reason, count in self.statistics.reasons.most_common(3))
-        raise UsageError(
-            f"scene {self._settings.scene}, seed {self._settings.seed}: no further task works after "
-            f"{len(self._low)} steps and {trials} trials ({reasons}); choose another scene or seed"
-        )
+                return task
+        return None
 
     def put_down(self) -> None:
         """Put a held object down, as a sub-goal of its own outside any task."""
-        room = self._room()
+        room = room_of(self._simulator.view)
         held = room.start.held
         if held is None:
             return
@@ -190,6 +215,7 @@ class _Factory:
             traj_id=settings.traj_id,
             sub_tasks=self._sub_tasks,
             sub_trajs=self._sub_trajs,
+            long_horizon_task=self._final,
             object_log=self._log,
             gen_info={
                 "generator": f"infthor-eval {__version__}",
@@ -235,9 +261,6 @@ class _Factory:
     def _note(self, step: int, view: Any = None) -> None:
         entry = object_log(view or self._simulator.view)
         self._log.append({"step": step, **msgspec.to_builtins(entry)})
-
-    def _room(self) -> Room:
-        return room_of(self._simulator.view)
 
 
 def _number(scene: str) -> int:

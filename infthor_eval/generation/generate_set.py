@@ -10,7 +10,7 @@ from infthor_eval.formats.trajectory import encode_trajectory, iter_sources
 from infthor_eval.generation.factory import Settings, Statistics, generate
 from infthor_eval.thor.simulator import Simulator
 
-__all__ = ["Generated", "generate_set"]
+__all__ = ["Generated", "generate_set", "is_bathroom"]
 
 
 @dataclass
@@ -69,6 +69,12 @@ def generate_set(
             result.resumed += there
         progress()
     return result
+
+
+def is_bathroom(scene: str) -> bool:
+    """Whether a scene is one by its name (`bathroom-3`, `FloorPlan401` to `FloorPlan430`)."""
+    number = scene.removeprefix("FloorPlan")
+    return scene.startswith("bathroom-") or (number.isdigit() and 400 < int(number) <= 430)
 
 
 def _make(path: Path, job: Settings, simulator: Simulator, totals: Statistics) -> int:

@@ -15,7 +15,7 @@ from infthor_eval.generation.goals import achieved, least_remaining
 from infthor_eval.generation.symbolic import ABSENT, FLOOR, Operator, Room, State, slice_item
 from infthor_eval.generation.tasks import Task, TaskType
 
-__all__ = ["plan"]
+__all__ = ["plan", "relevant_items"]
 
 _APPLIANCE = {TaskType.CLEAN: "SinkBasin", TaskType.HEAT: "Microwave", TaskType.COOL: "Fridge"}
 _LIMIT = 200_000  # states; the hardest of thousands of random problems took a tenth of it
@@ -52,6 +52,20 @@ def plan(task: Task, room: Room) -> list[Operator] | None:
     return None
 
 
+def relevant_items(task: Task, room: Room) -> set[str]:
+    """Ids of the items that can play a part: those of the task's types, knives to slice with, and what holds them."""
+    types = {task.pickup, task.target, task.movable} | (set(KNIVES) if task.sliced else set())
+    where = dict(room.start.where)
+    kept = {item for item in where if room.types[item] in types or item == room.start.held}
+    if task.sliced:
+        kept |= {slice_item(item, number) for item in kept if slice_item(item, 1) in where for number in (1, 2)}
+    # What the kept items lie in may itself be carried (a mug on a plate), and must then be known.
+    for item in list(kept):
+        while (item := where.get(item, ABSENT)) in where:
+            kept.add(item)
+    return kept
+
+
 def _trace(came: dict[State, tuple[State, Operator] | None], state: State) -> list[Operator]:
     operators: list[Operator] = []
     while (step := came[state]) is not None:
@@ -66,13 +80,8 @@ class _Problem:
     def __init__(self, task: Task, room: Room) -> None:
         self._task = task
         self._room = room
-        types = {task.pickup, task.target, task.movable} | (set(KNIVES) if task.sliced else set())
         where = dict(room.start.where)
-        kept = {item for item in where if room.types[item] in types or item == room.start.held}
-        # What the kept items lie in may itself be carried (a mug on a plate), and must then be known.
-        for item in list(kept):
-            while (item := where.get(item, ABSENT)) in where:
-                kept.add(item)
+        kept = relevant_items(task, room)
         self.start = State(
             room.start.at,
             room.start.held,
