@@ -1,6 +1,8 @@
 """NIEH results as numbers: a pure function of a run's journal."""
 
-from collections.abc import Callable, Iterable, Sequence
+import math
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -62,22 +64,48 @@ def summarise(identity: dict[str, Any], records: Iterable[UnitRecord]) -> dict[s
     Times and cache hits are not in it: they differ between a run and the same run resumed.
     """
     kept = sorted(records, key=lambda record: record.key)
-    return {"run": identity, "tasks": {task: _task(kept, task) for task in identity["tasks"]}}
+    return {"run": identity, "tasks": {task: _task(kept, task, about) for task, about in identity["tasks"].items()}}
 
 
-def _task(records: Sequence[UnitRecord], task: str) -> dict[str, Any]:
+def _task(records: Sequence[UnitRecord], task: str, identity: Mapping[str, Any]) -> dict[str, Any]:
     of_task = [record for record in records if record.task == task]
     return {
         "n": len(of_task),
         "by_clues": {name: _as_json(accuracy) for name, accuracy in accuracies(of_task).items()},
         "by_question_type": _grouped(of_task, lambda record: record.question_type or "untyped"),
+        "by_variant": _grouped(of_task, lambda record: record.variant or "-"),
+        "left_out": _left_out(of_task, identity["left_out"]),
+        "yes_no": _yes_no(of_task),
         "below_full_marks": {
-            scorer: [record.question_id for record in of_task if record_score(record, scorer) < 1.0]
-            for scorer in SCORERS
+            scorer: [_name(record) for record in of_task if record_score(record, scorer) < 1.0] for scorer in SCORERS
         },
-        "failures": [
-            {"question_id": record.question_id, "reason": record.failure} for record in of_task if record.failure
-        ],
+        "failures": [{"question": _name(record), "reason": record.failure} for record in of_task if record.failure],
+    }
+
+
+def _name(record: UnitRecord) -> str:
+    return f"{record.question_id} {record.variant}".strip()
+
+
+def _left_out(records: Sequence[UnitRecord], left_out: Sequence[Mapping[str, str]]) -> dict[str, Any]:
+    """What was not asked, by reason, and the means with it counted as wrong: the other denominator."""
+    n = len(records) + len(left_out)
+    means = {str(s): math.fsum(record_score(r, s) for r in records) / n if n else None for s in SCORERS}
+    reasons = Counter(item["reason"] for item in left_out)
+    return {"n": len(left_out), "by_reason": dict(sorted(reasons.items())), "mean_counting_them_wrong": means}
+
+
+def _yes_no(records: Sequence[UnitRecord]) -> dict[str, Any]:
+    """Bias and form on yes/no questions: a model that always says yes shows here, as does one that says neither."""
+    asked = [record for record in records if [str(answer).lower() for answer in record.answers] in (["yes"], ["no"])]
+    said = [score(last_line(record.reply or ""), ["yes"], "strict") for record in asked]
+    denied = [score(last_line(record.reply or ""), ["no"], "strict") for record in asked]
+    n = len(asked)
+    return {
+        "n": n,
+        "share_gold_yes": sum(str(record.answers[0]).lower() == "yes" for record in asked) / n if n else None,
+        "share_said_yes": sum(said) / n if n else None,
+        "n_neither": n - int(sum(said) + sum(denied)),
     }
 
 

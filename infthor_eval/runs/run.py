@@ -2,7 +2,7 @@
 
 import json
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -116,8 +116,8 @@ def plan(request: RunRequest) -> Plan:
             find_set(**settings)
         else:
             work = find_work(settings)
-            _refuse_nothing(name, work)
         tasks.append(TaskPlan(name, config, work))
+    _refuse_nothing(tasks)
     return Plan(request, tasks)
 
 
@@ -156,10 +156,13 @@ def _metadata(request: RunRequest, tokens_per_frame: int | None = None) -> dict[
     return {"seed": request.seed} | {key: value for key, value in ours.items() if value is not None}
 
 
-def _refuse_nothing(name: str, work: Work) -> None:
-    if not work.cases:
-        reasons = "; ".join(sorted({item.reason for item in work.left_out})[:3]) or "its files are empty"
-        raise UsageError(f"task {name}: no question of {work.data.root} can be asked ({reasons})")
+def _refuse_nothing(tasks: Sequence[TaskPlan]) -> None:
+    """A task of several may have nothing to ask (no window so large fits); all of them may not."""
+    if any(task.work is None or task.work.cases for task in tasks):
+        return
+    reasons = {item.reason for task in tasks for item in task.resolved.left_out}
+    said = "; ".join(sorted(reasons)[:3]) or "its files are empty"
+    raise UsageError(f"no question of {tasks[0].resolved.data.root} can be asked ({said})")
 
 
 def _resolved(ready: Plan, model: Model | Bound) -> Plan:
@@ -172,7 +175,7 @@ def _resolved(ready: Plan, model: Model | Bound) -> Plan:
     for task in ready.tasks:
         settings = _metadata(ready.request, tokens) | task.config["dataset_kwargs"]
         tasks.append(replace(task, work=task.work or find_work(settings)))
-        _refuse_nothing(task.name, tasks[-1].resolved)
+    _refuse_nothing(tasks)
     return Plan(ready.request, tasks, tokens)
 
 
@@ -222,7 +225,7 @@ def _evaluate(ready: Plan, model: Model | Bound, journal: Journal, observe: Obse
     tracker = EvaluationTracker(output_path=str(output))
     results = simple_evaluate(
         model=JournaledLM(model, journal, observe),
-        tasks=[task.name for task in ready.tasks],
+        tasks=[task.name for task in ready.tasks if task.resolved.cases],
         task_manager=TaskManager(
             include_path=str(Catalog.packaged().folder),
             include_defaults=False,

@@ -1,0 +1,44 @@
+"""How much faster `nieh_mini` is when questions share the frames' prefix, and whether the replies are the same.
+
+Both runs go through the whole runner (lm-eval, journal) in one process; the times are those of answering.
+
+    python benchmarks/nieh_mini_sharing.py [--model qwen2.5-vl-tiny] [--tasks nieh_mini]
+"""
+
+import argparse
+import tempfile
+from collections import defaultdict
+from pathlib import Path
+
+from infthor_eval.runs import RunRequest, UnitRecord, execute, plan
+
+
+def answer(model: str, tasks: str, shared: bool, output: Path) -> list[UnitRecord]:
+    """Every record of a run with sharing on or off."""
+    request = RunRequest(model, (tasks,), output, model_options={"share_prefix": str(shared).lower()})
+    return execute(plan(request), lambda _: lambda *_: None).records
+
+
+def main() -> None:
+    """Run both and print seconds, factor and equality by task."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--model", default="qwen2.5-vl-tiny")
+    parser.add_argument("--tasks", default="nieh_mini")
+    chosen = parser.parse_args()
+    seconds: defaultdict[str, dict[bool, float]] = defaultdict(dict)
+    replies: dict[bool, dict[tuple[str, str, str], str | None]] = {}
+    with tempfile.TemporaryDirectory() as folder:
+        for shared in (True, False):
+            records = answer(chosen.model, chosen.tasks, shared, Path(folder))
+            replies[shared] = {record.key: record.reply for record in records}
+            for record in records:
+                seconds[record.task][shared] = seconds[record.task].get(shared, 0.0) + record.seconds
+    print(f"{'task':18} {'questions':>9} {'shared s':>9} {'plain s':>9} {'factor':>7}")
+    for task, times in sorted(seconds.items()):
+        n = sum(key[0] == task for key in replies[True])
+        print(f"{task:18} {n:9} {times[True]:9.2f} {times[False]:9.2f} {times[False] / times[True]:7.2f}")
+    print("replies equal:", "yes" if replies[True] == replies[False] else "NO")
+
+
+if __name__ == "__main__":
+    main()

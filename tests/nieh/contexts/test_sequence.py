@@ -1,0 +1,56 @@
+import json
+
+import pytest
+
+from infthor_eval.errors import DataError
+from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.question import Question
+from infthor_eval.nieh.contexts import CONTEXTS, Settings, Unfit
+
+QUESTION = Question("t", "Where is it?", (1,), ("Shelf",))
+
+
+def shown(context, root):
+    """What the context shows: texts, and frames by number."""
+    data = NiehSet(root)
+    (case,) = CONTEXTS[context].cases(data, QUESTION, Settings())
+    if isinstance(case, Unfit):
+        return case.reason
+    frames = [data.frames("t")[position] for position in case.frames]
+    parts = CONTEXTS[context].parts(data, QUESTION, frames)
+    return [int(part.path.stem) if isinstance(part, FrameRef) else part for part in parts]
+
+
+@pytest.fixture
+def folder(make_nieh_set):
+    root = make_nieh_set([QUESTION], n_frames=3, size=56)
+    folder = root / "metadata" / "t"
+    (folder / "traj.txt").write_text("Goal<image>MoveAhead<image>PickupObject Mug<image>\n")
+    return folder
+
+
+def test_interleaved_puts_each_frame_where_the_text_has_it(folder):
+    assert shown("interleaved", folder.parents[1]) == ["Goal", 0, "MoveAhead", 1, "PickupObject Mug", 2]
+
+
+def test_interleaved_takes_the_last_of_several_frames_of_an_action(folder):
+    (folder / "traj.txt").write_text("Goal<image>MoveAhead<image>")
+    log = {"images": [{"low_idx": 0, "image_name": "000000001.png"}, {"low_idx": 0, "image_name": "000000002.png"}]}
+    (folder / "expert_log.json").write_text(json.dumps(log))
+    assert shown("interleaved", folder.parents[1]) == ["Goal", 0, "MoveAhead", 2]
+    (folder / "traj.txt").write_text("Goal<image>")
+    assert "traj.txt has 1 frames" in shown("interleaved", folder.parents[1])
+    (folder / "expert_log.json").write_text("{}")
+    with pytest.raises(DataError, match=r"expert_log\.json: not a log"):
+        shown("interleaved", folder.parents[1])
+
+
+def test_text_state_shows_the_last_state_and_the_last_frame(folder):
+    root = folder.parents[1]
+    assert shown("text_state", root) == "the trajectory has no state_summary"
+    (folder / "traj_data.json").write_text(json.dumps({"state_summary": {"9": "nine", "10": "ten"}}))
+    assert shown("text_state", root) == ["ten", 2]
+    (folder / "traj_data.json").write_text(json.dumps({"state_summary": [1]}))
+    with pytest.raises(DataError, match="state_summary is not a mapping"):
+        shown("text_state", root)
