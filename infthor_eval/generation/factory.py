@@ -23,17 +23,18 @@ from infthor_eval.formats.trajectory import (
 )
 from infthor_eval.generation.affordances import goes_into
 from infthor_eval.generation.final_task import ends_of
+from infthor_eval.generation.pddl import problem
 from infthor_eval.generation.planner import plan
 from infthor_eval.generation.recorder import object_log
 from infthor_eval.generation.rollout import Rollout, RolloutError
 from infthor_eval.generation.sampling import TaskPool
 from infthor_eval.generation.scout import reachable
-from infthor_eval.generation.symbolic import Operator, room_of
+from infthor_eval.generation.symbolic import Operator, Room, room_of
 from infthor_eval.generation.tasks import Task, TaskType, sub_task
 from infthor_eval.thor.restore import restore
 from infthor_eval.thor.simulator import Simulator
 
-__all__ = ["Settings", "Statistics", "generate"]
+__all__ = ["Made", "Settings", "Statistics", "generate"]
 
 _TRIALS = 60  # tasks tried in a row without success before the scene counts as unsolvable
 _LONGER = 4  # how often a trajectory is made longer because no final task works
@@ -91,7 +92,16 @@ class Statistics:
         self.reasons += other.reasons
 
 
-def generate(settings: Settings, simulator: Simulator) -> tuple[Trajectory, Statistics]:
+@dataclass
+class Made:
+    """One trajectory, with the planning problem of each of its tasks as PDDL (the final one last)."""
+
+    trajectory: Trajectory
+    statistics: Statistics
+    problems: list[str]
+
+
+def generate(settings: Settings, simulator: Simulator) -> Made:
     """Make one trajectory.
 
     Args:
@@ -109,7 +119,7 @@ def generate(settings: Settings, simulator: Simulator) -> tuple[Trajectory, Stat
     factory.put_down()
     if settings.final_task:
         factory.finish()
-    return factory.trajectory(), factory.statistics
+    return Made(factory.trajectory(), factory.statistics, factory.problems)
 
 
 class _Factory:
@@ -128,6 +138,7 @@ class _Factory:
         self._sub_trajs: list[SubTrajectory] = []
         self._final: SubTask | None = None
         self.statistics = Statistics()
+        self.problems: list[str] = []
 
     def begin(self) -> None:
         """Load the scene and put the agent somewhere."""
@@ -188,7 +199,7 @@ class _Factory:
             if tried == trials:
                 return None
             tried += 1
-            if self._try(task, operators):
+            if self._try(task, room, operators):
                 return task
         return None
 
@@ -225,7 +236,7 @@ class _Factory:
             },
         )
 
-    def _try(self, task: Task, operators: Sequence[Operator]) -> bool:
+    def _try(self, task: Task, room: Room, operators: Sequence[Operator]) -> bool:
         name = f"{task.kind}{' sliced' if task.sliced else ''}"
         self.statistics.tried[name] += 1
         low, high = len(self._low), len(self._high)
@@ -234,6 +245,7 @@ class _Factory:
             return False
         self.statistics.accepted[name] += 1
         self._pool.used(task)
+        self.problems.append(problem(task, room, f"task-{len(self.problems):03d}"))
         described = sub_task(task, self._settings.scene)
         self._sub_trajs.append(
             SubTrajectory(len(self._sub_tasks), (high, len(self._high)), (low, len(self._low)), described.task_desc)

@@ -8,6 +8,7 @@ from typing import Any
 from infthor_eval.errors import InfthorError, UsageError
 from infthor_eval.formats.trajectory import encode_trajectory, iter_sources
 from infthor_eval.generation.factory import Settings, Statistics, generate
+from infthor_eval.generation.pddl import DOMAIN
 from infthor_eval.thor.simulator import Simulator
 
 __all__ = ["Generated", "generate_set", "is_bathroom"]
@@ -47,7 +48,7 @@ class Generated:
 def generate_set(
     jobs: Sequence[Settings], simulator: Simulator, out: Path, progress: Callable[[], None] = lambda: None
 ) -> Generated:
-    """Make the trajectories that `out` does not have yet, one file each.
+    """Make the trajectories that `out` does not have yet, one file each, and beside it their tasks as PDDL.
 
     Args:
         jobs: what to make.
@@ -78,12 +79,18 @@ def is_bathroom(scene: str) -> bool:
 
 
 def _make(path: Path, job: Settings, simulator: Simulator, totals: Statistics) -> int:
-    trajectory, statistics = generate(job, simulator)
-    totals.add(statistics)
+    made = generate(job, simulator)
+    totals.add(made.statistics)
+    folder = path.with_suffix(".pddl")
+    folder.mkdir(exist_ok=True)
+    (folder / "domain.pddl").write_text(DOMAIN)
+    for number, problem in enumerate(made.problems):
+        (folder / f"task-{number:03d}.pddl").write_text(problem)
+    # The trajectory comes last: where it is, everything is.
     partial = path.with_name(f".{path.name}.partial")
-    partial.write_bytes(encode_trajectory(trajectory))
+    partial.write_bytes(encode_trajectory(made.trajectory))
     partial.replace(path)
-    return len(trajectory.plan.low_actions)
+    return len(made.trajectory.plan.low_actions)
 
 
 def _earlier(path: Path, job: Settings) -> int:
