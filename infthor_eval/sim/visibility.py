@@ -27,7 +27,9 @@ def visible_ids(world: World, picture: Picture, max_distance: float) -> frozense
         if item is not None and world.reach(item) <= max_distance:
             seen.add(item.object_id)
     if world.held is not None:
-        seen.add(world.held)
+        held = world.objects[world.held]
+        seen.add(held.object_id)
+        seen.update(o.object_id for o in world.descendants(held) if not world.hidden(o))
     return frozenset(seen)
 
 

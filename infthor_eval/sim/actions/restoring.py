@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from infthor_eval.sim.actions.interaction import set_openness
 from infthor_eval.sim.actions.registry import action
 from infthor_eval.sim.errors import ActionError
 from infthor_eval.sim.restore import Pose, set_poses, spawn_randomly
@@ -36,24 +37,22 @@ def set_object_toggles(sim: Simulation, objectToggles: list[Any]) -> None:
 
 
 @action("SetStateOfAllObjects")
-def set_state_of_all_objects(sim: Simulation, StateChange: str, forceAction: bool = True) -> None:
-    """Makes every object dirty or clean, full of water or empty, and the like."""
+def set_state_of_all_objects(sim: Simulation, StateChange: str, forceAction: bool = False) -> None:
+    """Makes every object that can be so dirty, filled or used up; the contrary without `forceAction`."""
     change = _CHANGES.get(StateChange)
     if change is None:
         raise ActionError(f"{StateChange!r} is not a state change; use one of {', '.join(sorted(_CHANGES))}")
-    capability, attribute, value = change
+    capability, attribute, on, off = change
     for item in sim.world.objects.values():
         if getattr(item.kind, capability):
-            setattr(item.state, attribute, value)
+            setattr(item.state, attribute, on if forceAction else off)
             sim.world.touch(item)
 
 
-_CHANGES: dict[str, tuple[str, str, Any]] = {
-    "CanBeDirty": ("dirtyable", "dirty", True),
-    "CanBeClean": ("dirtyable", "dirty", False),
-    "CanBeFilled": ("fillable", "fill_liquid", "water"),
-    "CanBeEmptied": ("fillable", "fill_liquid", None),
-    "CanBeUsedUp": ("usable_up", "used_up", True),
+_CHANGES: dict[str, tuple[str, str, Any, Any]] = {
+    "CanBeDirty": ("dirtyable", "dirty", True, False),
+    "CanBeFilled": ("fillable", "fill_liquid", "water", None),
+    "CanBeUsedUp": ("usable_up", "used_up", True, False),
 }
 
 
@@ -72,7 +71,11 @@ def set_object_states(sim: Simulation, SetObjectStates: Mapping[str, Any]) -> No
     value = on if SetObjectStates.get(key, True) else off
     only = SetObjectStates.get("objectType")
     for item in sim.world.objects.values():
-        if getattr(item.kind, capability) and only in (None, "", item.object_type):
+        if not getattr(item.kind, capability) or only not in (None, "", item.object_type):
+            continue
+        if attribute == "openness":
+            set_openness(sim, item, value)
+        else:
             setattr(item.state, attribute, value)
             sim.world.touch(item)
 

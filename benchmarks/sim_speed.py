@@ -1,0 +1,112 @@
+"""How fast the embedded simulator is through the real Controller, beside the transport's own rate.
+
+    python benchmarks/sim_speed.py [--scene kitchen-1] [--steps 600]
+
+Prints one JSON object: steps per second with RGB, with RGB, ids and depth, and of a process that answers every
+action with the same ready-made reply of the same size ("transport"); seconds from start to first frame; megabytes of
+the simulator's process at the start and at the end. The frames are 300x300.
+"""
+
+import argparse
+import json
+import os
+import shlex
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+_MOVES = ("RotateRight", "MoveAhead", "MoveAhead", "LookDown", "MoveLeft", "LookUp", "RotateLeft", "MoveBack", "Pass")
+_FULL = {"renderInstanceSegmentation": True, "renderDepthImage": True}
+
+
+def controller(command: str, scene: str, **init: Any) -> Any:
+    """A Controller on a stand-in started by `command`."""
+    from ai2thor.controller import Controller
+
+    return Controller(
+        local_executable_path=command, x_display="0", scene=scene, gridSize=0.25, visibilityDistance=1.5,
+        fieldOfView=60, server_timeout=60.0, **init,
+    )  # fmt: skip
+
+
+def rate(client: Any, steps: int) -> float:
+    """Steps per second over a fixed mixture of moves."""
+    for index in range(20):
+        client.step(_MOVES[index % len(_MOVES)])
+    start = time.perf_counter()
+    for index in range(steps):
+        client.step(_MOVES[index % len(_MOVES)])
+    return steps / (time.perf_counter() - start)
+
+
+def memory(client: Any) -> float:
+    """Resident megabytes of the stand-in."""
+    status = Path(f"/proc/{client.server.unity_proc.pid}/status").read_text(encoding="ascii")
+    line = next(line for line in status.splitlines() if line.startswith("VmRSS"))
+    return int(line.split()[1]) / 1024
+
+
+def echo(scene: str, full: bool) -> None:
+    """Answers every action with one ready-made reply: what the transport and the client cost by themselves."""
+    from infthor_eval.sim.fifo import FifoPeer
+    from infthor_eval.sim.peer import Peer
+    from infthor_eval.sim.scenes.catalogue import Catalogue
+    from infthor_eval.sim.simulation import Simulation
+
+    peer = Peer(Simulation(Catalogue()))
+    peer.answer({"action": "Reset", "sceneName": scene, "sequenceId": 0})
+    peer.answer({"action": "Initialize", "sequenceId": 1, "fieldOfView": 60, **(_FULL if full else {})})
+    replies = {n: peer.answer({"action": "Pass", "sequenceId": n}) for n in (0, 1)}
+    head, metadata = replies[1][0]
+    marker = b"\xaasequenceId\x01"
+    assert bytes(metadata).count(marker) == 1
+    server, client = (Path(os.environ[f"AI2THOR_FIFO_{side}_PIPE_PATH"]) for side in ("SERVER", "CLIENT"))
+    with FifoPeer(server, client) as pipes:
+        pipes.send(replies[0])
+        while (message := pipes.receive()) is not None:
+            if message["action"] in {"GetScenesInBuild", "Initialize"}:
+                pipes.send(peer.answer(message))
+                continue
+            number = marker[:-1] + b"\xce" + int(message["sequenceId"]).to_bytes(4, "big")
+            pipes.send([(head, bytes(metadata).replace(marker, number)), *replies[1][1:]])
+
+
+def measure(scene: str, steps: int) -> dict[str, Any]:
+    """All numbers; see the module."""
+    python = shlex.quote(sys.executable)
+    result: dict[str, Any] = {"scene": scene, "steps": steps}
+    for name, init in (("rgb", {}), ("rgb_ids_depth", _FULL)):
+        start = time.perf_counter()
+        client = controller(f"{python} -m infthor_eval.sim", scene, **init)
+        result[f"{name}_seconds_to_first_frame"] = round(time.perf_counter() - start, 2)
+        result["objects"] = len(client.last_event.metadata["objects"])
+        result[f"{name}_megabytes_at_start"] = round(memory(client), 1)
+        result[f"{name}_steps_per_second"] = round(rate(client, steps), 1)
+        result[f"{name}_megabytes_at_end"] = round(memory(client), 1)
+        client.stop()
+        kind = "full" if init else "rgb"
+        client = controller(f"{python} {shlex.quote(__file__)} --echo {kind} --scene {scene}", scene, **init)
+        result[f"{name}_transport_steps_per_second"] = round(rate(client, steps), 1)
+        client.stop()
+    return result
+
+
+def main() -> None:
+    """Parses the arguments; see the module."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--scene", default="kitchen-1")
+    parser.add_argument("--steps", type=int, default=600)
+    parser.add_argument("--echo", choices=("rgb", "full"), help=argparse.SUPPRESS)
+    options, _ = parser.parse_known_args()
+    if options.echo:
+        echo(options.scene, options.echo == "full")
+        return
+    with tempfile.TemporaryDirectory() as home:
+        os.environ["HOME"] = home  # ai2thor writes logs below HOME and prunes what it finds there
+        print(json.dumps(measure(options.scene, options.steps), indent=1))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,59 @@
+"""Every reply's metadata has the form of AI2-THOR 5.x."""
+
+import re
+
+import pytest
+
+from .harness import Bench
+from .schema import check
+
+_ID = re.compile(r"[A-Za-z]+(\|[+-]?\d\d\.\d\d){3}(\|[A-Za-z]+(_\d+)?)?")
+
+
+def test_through_the_controller(kitchen):
+    event = kitchen.reset("kitchen-3")
+    for action in ("Pass", "MoveAhead", "RotateRight", "LookDown", "MoveBack"):
+        event = kitchen.step(action)
+        check(event.metadata)
+        assert event.metadata["lastAction"] == action
+
+
+@pytest.mark.parametrize("scene", ["kitchen-2", "living-room-2", "bedroom-2", "bathroom-2", "house-2"])
+def test_every_kind_of_scene(scene):
+    bench = Bench()
+    metadata = bench.reset(scene)
+    check(metadata)
+    ids = [o["objectId"] for o in metadata["objects"]]
+    assert len(ids) == len(set(ids))
+    assert all(_ID.fullmatch(i) for i in ids)
+
+
+def test_nulls_where_not_applicable():
+    bench = Bench()
+    bench.reset("kitchen-1")
+    apple, fridge = bench.object(bench.first("Apple")), bench.object(bench.first("Fridge"))
+    assert apple["receptacleObjectIds"] is None
+    assert apple["objectOrientedBoundingBox"] is not None
+    assert isinstance(fridge["receptacleObjectIds"], list)
+    assert fridge["parentReceptacles"] is None
+    assert bench.metadata["heldObjectPose"] is None
+
+
+def test_boxes_contain_the_position_of_upright_things():
+    bench = Bench()
+    for item in bench.reset("bedroom-4")["objects"]:
+        box = item["axisAlignedBoundingBox"]
+        corners = box["cornerPoints"]
+        for index, axis in enumerate("xyz"):
+            low, high = min(c[index] for c in corners), max(c[index] for c in corners)
+            assert low == pytest.approx(box["center"][axis] - box["size"][axis] / 2, abs=2e-4)
+            assert high == pytest.approx(box["center"][axis] + box["size"][axis] / 2, abs=2e-4)
+
+
+def test_ids_are_printed_as_unity_prints_them():
+    from infthor_eval.sim.geometry import object_id
+
+    assert object_id("AlarmClock", (2.6857, 1.2324, 1.3974)) == "AlarmClock|+02.69|+01.23|+01.40"
+    assert object_id("CellPhone", (-1.96499991, 0.593926966, 0.9192637)) == "CellPhone|-01.97|+00.59|+00.92"
+    assert object_id("Cloth", (0.705, -0.00154149532, -2.75)) == "Cloth|+00.71|00.00|-02.75"
+    assert object_id("Floor", (0.0, 0.0, 0.0)) == "Floor|+00.00|+00.00|+00.00"
