@@ -25,6 +25,7 @@ from model_adapters.engine.family import Family, MakeFamily
 from model_adapters.engine.hub import fetch
 from model_adapters.engine.loaded import Loaded
 from model_adapters.engine.options import CheckpointOptions, EngineOptions
+from model_adapters.engine.rope import apply_rope
 
 __all__ = ["Source", "assemble", "load_checkpoint", "loading", "locate", "resolve_device", "resolve_dtype"]
 
@@ -79,13 +80,15 @@ def load_checkpoint(source: Source, family: MakeFamily) -> Loaded:
         )
         tokenizer = transformers.AutoTokenizer.from_pretrained(folder, **remote)
         template = _chat_template(folder, tokenizer)
-        model = _load_model(folder, options)
+        max_tokens = apply_rope(source.config, options.rope)
+        model = _load_model(source)
     return assemble(
         model,
         tokenizer,
         image_processor,
         template=template,
         family=family(model, image_processor, tokenizer),
+        max_tokens=max_tokens,
         origin=_origin(source),
     )
 
@@ -97,6 +100,7 @@ def assemble(
     *,
     template: str,
     family: Family,
+    max_tokens: int | None,
     origin: Mapping[str, Any],
 ) -> Loaded:
     """Put loaded parts together and write down what identifies them.
@@ -107,17 +111,18 @@ def assemble(
         image_processor: its image processor.
         template: its chat template.
         family: its family.
+        max_tokens: its context limit.
         origin: where the weights come from, for the identity.
 
     Raises:
         ModelError: its generation settings are not supported.
     """
-    text_config = model.config.get_text_config()
     identity = dict(origin) | {
         "class": type(model).__name__,
         "dtype": str(model.dtype).removeprefix("torch."),
         "device": model.device.type,
         "attn_implementation": model.config._attn_implementation,
+        "rope": getattr(model.config.get_text_config(), "rope_parameters", None),
         "image_processor": json.loads(image_processor.to_json_string()),
         "chat_template": _digest(template.encode()),
         "versions": {
@@ -133,7 +138,7 @@ def assemble(
         template=template,
         family=family,
         generation=read_generation(model.generation_config),
-        max_tokens=getattr(text_config, "max_position_embeddings", None),
+        max_tokens=max_tokens,
         identity=identity,
     )
 
@@ -183,10 +188,12 @@ def loading(options: CheckpointOptions) -> Iterator[None]:
         raise ModelError(f"the checkpoint {options.pretrained} cannot be loaded: {reason}") from error
 
 
-def _load_model(folder: Path, options: CheckpointOptions) -> Any:
+def _load_model(source: Source) -> Any:
+    options = source.options
     device = resolve_device(options)
     model, report = cast(Any, transformers.AutoModelForImageTextToText).from_pretrained(
-        folder,
+        source.folder,
+        config=source.config,
         dtype=resolve_dtype(options),
         attn_implementation=options.attn_implementation,
         device_map=options.device_map,

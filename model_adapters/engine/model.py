@@ -15,6 +15,7 @@ from model_adapters.engine.loaded import Loaded
 from model_adapters.engine.options import EngineOptions
 from model_adapters.engine.prefix import Prefix
 from model_adapters.engine.prompt import Frame, Prompter, Unit, n_tokens, token_ids
+from model_adapters.engine.rope import length_rope
 from model_adapters.protocols import Part, Reply
 
 __all__ = ["TransformersModel", "check_limit", "context_limit", "identity", "naming_memory_errors"]
@@ -39,7 +40,9 @@ class TransformersModel:
         keep = options.feature_cache_mb * 2**20 if options.share_prefix else 0
         self._features = FeatureCache(loaded.family, keep)
         self._prompter = Prompter(loaded.tokenizer, loaded.template, loaded.family)
-        self._prefix = Prefix(loaded.model, loaded.family, self._features, options.chunk_tokens)
+        self._prefix = Prefix(
+            loaded.model, loaded.family, self._features, options.chunk_tokens, length_rope(loaded.model)
+        )
 
     @property
     def max_tokens(self) -> int | None:
@@ -77,6 +80,7 @@ class TransformersModel:
     def encode(self, units: Sequence[Unit]) -> torch.Tensor:
         """Encode a prompt from nothing, a few units at first; logits of the next token, (vocabulary,)."""
         self._prefix.reset()
+        self._prefix.rewind_to(units)
         self._prefix.feed(units[:2])
         return self._prefix.feed(units[2:])
 

@@ -3,7 +3,26 @@
 from dataclasses import dataclass
 from typing import Any
 
-__all__ = ["CheckpointOptions", "EngineOptions"]
+__all__ = ["CheckpointOptions", "EngineOptions", "parse_rope"]
+
+
+_ROPES = ("dynamic", "linear", "longrope", "yarn")
+
+
+def parse_rope(text: str) -> tuple[str, float]:
+    """Kind and factor of a context extension `KIND:FACTOR`.
+
+    Raises:
+        ValueError: it has another form, or a factor that extends nothing.
+    """
+    kind, _, number = text.partition(":")
+    try:
+        factor = float(number)
+    except ValueError:
+        factor = 0.0
+    if kind not in _ROPES or not 1 < factor < 1000:
+        raise ValueError(f"rope={text} is not KIND:FACTOR with KIND one of {', '.join(_ROPES)} and FACTOR above 1")
+    return kind, factor
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -18,6 +37,7 @@ class EngineOptions:
         chunk_tokens: most tokens encoded in one forward pass.
         feature_cache_mb: memory for vision features of frames seen before, in MiB.
         max_tokens: context limit instead of the checkpoint's; 0 for none.
+        rope: context extension KIND:FACTOR (yarn:4, linear:2, dynamic:4, longrope:8) instead of the checkpoint's RoPE.
     """
 
     dtype: str = "auto"
@@ -27,6 +47,7 @@ class EngineOptions:
     chunk_tokens: int = 1024
     feature_cache_mb: int = 128
     max_tokens: int | None = None
+    rope: str | None = None
 
     def image_settings(self) -> dict[str, Any]:
         """Settings of the image processor that differ from the checkpoint's; families with options for it override."""
@@ -35,6 +56,8 @@ class EngineOptions:
     def __post_init__(self) -> None:
         if self.chunk_tokens < 1 or self.feature_cache_mb < 0 or (self.max_tokens or 0) < 0:
             raise ValueError("chunk_tokens must be positive, feature_cache_mb and max_tokens not negative")
+        if self.rope is not None:
+            parse_rope(self.rope)
 
 
 @dataclass(frozen=True, kw_only=True)

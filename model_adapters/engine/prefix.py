@@ -13,7 +13,8 @@ from infthor_eval.errors import ModelError
 from model_adapters.engine.family import Family
 from model_adapters.engine.features import FeatureCache
 from model_adapters.engine.kv_cache import BufferedCache
-from model_adapters.engine.prompt import Frame, Unit, n_tokens
+from model_adapters.engine.prompt import Frame, Unit, n_tokens, token_ids
+from model_adapters.engine.rope import LengthRope
 
 __all__ = ["Prefix"]
 
@@ -26,11 +27,21 @@ class Prefix:
         family: its family.
         features: where the frames' features come from.
         chunk_tokens: most tokens in one forward pass (a frame with more makes a chunk of its own).
+        rope: the model's rotary embeddings where their frequencies depend on the prompt's length.
     """
 
-    def __init__(self, model: Any, family: Family, features: FeatureCache, chunk_tokens: int) -> None:
+    def __init__(
+        self,
+        model: Any,
+        family: Family,
+        features: FeatureCache,
+        chunk_tokens: int,
+        rope: LengthRope | None = None,
+    ) -> None:
         self._model = model
         self._family = family
+        self._rope = rope
+        self._rope_key = -1
         self._features = features
         self._chunk_tokens = chunk_tokens
         self._embeddings = model.get_input_embeddings()
@@ -54,6 +65,8 @@ class Prefix:
         Returns:
             How many units are shared.
         """
+        if self._rope is not None:
+            self._set_rope(self._rope, units)
         shared = 0
         for ours, theirs in zip(self._units, units[:-1], strict=False):
             if ours is not theirs and ours != theirs:
@@ -61,6 +74,16 @@ class Prefix:
             shared += 1
         self.cut(shared)
         return shared
+
+    def _set_rope(self, rope: LengthRope, units: Sequence[Unit]) -> None:
+        """Set the frequencies for a prompt; what was encoded with others cannot be used for it."""
+        ids = torch.tensor(list(token_ids(units)))
+        sizes = [unit.size for unit in units if isinstance(unit, Frame)]
+        n_positions = int(self._family.positions(ids, sizes, 0).max()) + 1
+        if rope.key(n_positions) != self._rope_key:
+            self.reset()
+            rope.set(n_positions)
+            self._rope_key = rope.key(n_positions)
 
     def cut(self, n_units: int) -> None:
         """Keep the first `n_units` units."""

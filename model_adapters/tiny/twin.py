@@ -1,7 +1,7 @@
 """How a tiny twin of a model family is made: the real classes, random weights, a tokenizer trained on the spot."""
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar, cast
@@ -13,6 +13,7 @@ from model_adapters.engine.checkpoint import assemble, resolve_device, resolve_d
 from model_adapters.engine.family import MakeFamily
 from model_adapters.engine.model import TransformersModel
 from model_adapters.engine.options import EngineOptions
+from model_adapters.engine.rope import apply_rope
 from model_adapters.tiny.tokenizer import train_tokenizer
 
 __all__ = ["SPREAD", "TinyAdapter", "TinyOptions", "Twin"]
@@ -59,13 +60,17 @@ class Twin:
             self.special, end=self.end, pad=self.pad, begin=self.begin, named={"image_token": self.image}
         )
 
-    def model(self, tokenizer: PreTrainedTokenizerBase, seed: int, attn_implementation: str) -> Any:
+    def model_config(self, tokenizer: PreTrainedTokenizerBase) -> Any:
+        """The config for a tokenizer."""
+        return self.config(_ids(self.special, tokenizer), len(tokenizer))
+
+    def model(self, tokenizer: PreTrainedTokenizerBase, config: Any, seed: int, attn_implementation: str) -> Any:
         """The model with random weights of this seed, in float32 on the CPU."""
-        ids = {token: cast(int, tokenizer.convert_tokens_to_ids(token)) for token in self.special}
+        ids = _ids(self.special, tokenizer)
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(seed)
             model = cast(Any, AutoModelForImageTextToText).from_config(
-                self.config(ids, len(tokenizer)), attn_implementation=attn_implementation, dtype=torch.float32
+                config, attn_implementation=attn_implementation, dtype=torch.float32
             )
         ends = list(dict.fromkeys([ids[self.end], ids[self.pad]]))
         model.generation_config = GenerationConfig(eos_token_id=ends, pad_token_id=ids[self.pad])
@@ -82,10 +87,14 @@ class Twin:
         tokenizer = self.tokenizer()
         tokenizer.chat_template = self.template
         tokenizer.save_pretrained(folder)
-        self.model(tokenizer, seed, "sdpa").save_pretrained(folder)
+        self.model(tokenizer, self.model_config(tokenizer), seed, "sdpa").save_pretrained(folder)
         self.image_processor(**self.image_settings).save_pretrained(folder)
         for name, content in self.files.items():
             (folder / name).write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+
+
+def _ids(tokens: Sequence[str], tokenizer: PreTrainedTokenizerBase) -> dict[str, int]:
+    return {token: cast(int, tokenizer.convert_tokens_to_ids(token)) for token in tokens}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -117,7 +126,9 @@ class TinyAdapter:
         twin = cls.twin
         tokenizer = twin.tokenizer()
         dtype = resolve_dtype(options)
-        model = twin.model(tokenizer, seed, options.attn_implementation)
+        config = twin.model_config(tokenizer)
+        max_tokens = apply_rope(config, options.rope)
+        model = twin.model(tokenizer, config, seed, options.attn_implementation)
         model = model.to(resolve_device(options), torch.float32 if isinstance(dtype, str) else dtype)
         image_processor = twin.image_processor(**{**twin.image_settings, **options.image_settings()})
         loaded = assemble(
@@ -126,6 +137,7 @@ class TinyAdapter:
             image_processor,
             template=twin.template,
             family=twin.family(model, image_processor, tokenizer),
+            max_tokens=max_tokens,
             origin={"checkpoint": name, "seed": seed},
         )
         return TransformersModel(name, loaded, options)

@@ -180,7 +180,7 @@ def test_pixtral_refuses_another_llava(checkpoints: dict[str, Path], tmp_path: P
     twin = _twin("pixtral")
     vocabulary = {token: index for index, token in enumerate(("[IMG]", "<s>"))}
     tokenizer = twin.tokenizer()
-    model = twin.model(tokenizer, 0, "sdpa")
+    model = twin.model(tokenizer, twin.model_config(tokenizer), 0, "sdpa")
     tokenizer.get_vocab = lambda: vocabulary  # type: ignore[method-assign]
     with pytest.raises(ModelError, match=r"no \[IMG_BREAK\] or no \[IMG_END\]"):
         twin.family(model, twin.image_processor(), tokenizer)
