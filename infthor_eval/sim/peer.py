@@ -43,12 +43,13 @@ class Peer:
     def answer(self, message: Mapping[str, Any]) -> Frames:
         """The frames of the reply to one action."""
         sequence = int(message.get("sequenceId", 0))
-        outcome, query = self._act(message)
+        outcome, query = self.act(message)
         if query and self._sim.settings.fast_emit:
             return [(FieldType.METADATA_PATCH, self._packer.patch(outcome))]
         return self._reply(outcome, sequence, message)
 
-    def _act(self, message: Mapping[str, Any]) -> tuple[Outcome, bool]:
+    def act(self, message: Mapping[str, Any]) -> tuple[Outcome, bool]:
+        """Does one action; how it ended, and whether it was a mere query."""
         name = str(message.get("action"))
         try:
             found, arguments = bind(message)

@@ -2,16 +2,17 @@
 """Where things stand: the surfaces of receptacles, what lies on them, and where there is room for one thing more."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from infthor_eval.sim.geometry import Array, yaw_matrix
 from infthor_eval.sim.objects import SimObject
 from infthor_eval.sim.world import World
 
-__all__ = ["Surface", "find_place", "owner_of", "surfaces"]
+__all__ = ["Seen", "Surface", "find_place", "owner_of", "surfaces"]
 
 _WALL = 0.02  # thickness in metres of the sides and floors of hollow receptacles
 _OPEN_TOP = frozenset("BathtubBasin Bowl Box Cup GarbageCan LaundryHamper Mug Pan Plate Pot Sink SinkBasin".split())
@@ -23,6 +24,9 @@ _OVERHANG = frozenset(
 _STEP = 0.05
 _CLEARANCE = 0.008
 _SLIDE = 0.8  # share of its depth that a drawer comes out
+
+
+Seen = Callable[[Array], NDArray[np.bool_]]
 
 
 @dataclass(frozen=True)
@@ -98,6 +102,7 @@ def find_place(
     receptacle: SimObject,
     crowd: float = 0.0,
     random: np.random.Generator | None = None,
+    seen: Seen | None = None,
 ) -> SimObject | None:
     """A copy of `item` standing in the free place of `receptacle` that is nearest to the agent; None if it is full.
 
@@ -107,13 +112,14 @@ def find_place(
         receptacle: where.
         crowd: how far, as a share of their size, neighbours may overlap.
         random: picks any free place instead of the nearest.
+        seen: tells which of some points (n, 3) come into question; None: all.
     """
     boxes = [o.bounds() for o in _neighbours(world, item, receptacle)]
     ghost = item.duplicate(item.object_id)
     for surface in _by_reach(world, surfaces(receptacle)):
         for turn in (0.0, 90.0):
             ghost.rotation = np.array([0.0, (surface.yaw + turn) % 360, 0.0])
-            place = _free_point(world, ghost, surface, boxes, crowd, random)
+            place = _free_point(world, ghost, surface, boxes, crowd, random, seen)
             if place is not None:
                 ghost.place_bottom(place)
                 return ghost
@@ -148,6 +154,7 @@ def _free_point(
     boxes: list[tuple[Array, Array]],
     crowd: float,
     random: np.random.Generator | None,
+    seen: Seen | None,
 ) -> Array | None:
     low, high = ghost.bounds()
     height = high[1] - low[1]
@@ -158,6 +165,8 @@ def _free_point(
     points = _grid(world, surface, (local[0] / 2, local[2] / 2), turn)
     if not len(points):
         return None
+    if seen is not None:
+        points = points[seen(points + np.array([0.0, height / 2, 0.0]))]
     half = (high - low) / 2 * (1 - crowd)
     gap = _CLEARANCE * (1 - crowd)
     free = np.ones(len(points), dtype=bool)

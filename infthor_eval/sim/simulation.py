@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from infthor_eval.sim.geometry import Array, euler_matrix
 from infthor_eval.sim.objects import SimObject
-from infthor_eval.sim.render.camera import FAR, Camera
+from infthor_eval.sim.render.camera import FAR, NEAR, Camera
 from infthor_eval.sim.render.picture import Backend, Picture, backend, cast_picture, colour_picture
 from infthor_eval.sim.render.primitives import INSTANCE
 from infthor_eval.sim.render.scene import SceneModel
@@ -17,6 +17,9 @@ from infthor_eval.sim.visibility import enclosures, visible_ids
 from infthor_eval.sim.world import World
 
 __all__ = ["Simulation", "ThirdPartyCamera"]
+
+
+_WELL_WITHIN = 0.9  # of half the frame
 
 
 @dataclass(frozen=True)
@@ -96,6 +99,16 @@ class Simulation:
         if self._visible is None:
             self._visible = visible_ids(self.world, self._view, self.settings.visibility_distance)
         return self._visible
+
+    def in_view(self, points: Array) -> NDArray[np.bool_]:
+        """Which of some points (n, 3) lie well within the agent's frame, whatever may hide them."""
+        camera = self.view().camera
+        local = (points - camera.position) @ camera.matrix
+        limit = _WELL_WITHIN * np.tan(np.radians(camera.field_of_view) / 2)
+        depth = np.maximum(local[:, 2], 1e-6)
+        across = np.abs(local[:, 0]) <= depth * limit * camera.width / camera.height
+        inside: NDArray[np.bool_] = (local[:, 2] > NEAR) & across & (np.abs(local[:, 1]) <= depth * limit)
+        return inside
 
     def visible_inside(self, item: SimObject) -> bool:
         """Whether the agent would see the object if what contains it were not drawn.

@@ -50,8 +50,8 @@ def problems(value: Any, form: Any, where: str = "") -> list[str]:
 
 def check(metadata: dict[str, Any]) -> None:
     wrong = problems(dict(metadata), AGENT, "metadata")
-    for item in metadata["objects"]:
-        item = {key: value for key, value in item.items() if key != "visibleBounds2D"}  # added by the client
+    for listed in metadata["objects"]:
+        item = {key: value for key, value in listed.items() if key != "visibleBounds2D"}  # added by the client
         wrong += problems(item, OBJECT, item.get("objectId", "?"))
         if item["temperature"] not in {"RoomTemp", "Hot", "Cold"}:
             wrong.append(f"{item['objectId']}: temperature {item['temperature']}")

@@ -1,5 +1,7 @@
 """What actions do to the world, and what the world refuses."""
 
+import itertools
+
 import pytest
 
 from .harness import Bench
@@ -83,7 +85,7 @@ def test_contents_come_along_with_a_drawer_and_a_plate(bench):
     halfway = inside.position.copy()
     bench.ok("OpenObject", objectId=drawer.object_id, forceAction=True)
     assert (inside.position - before) == pytest.approx((halfway - before) * 2)
-    assert abs((halfway - before)).sum() > 0.1
+    assert abs(halfway - before).sum() > 0.1
     bench.ok("CloseObject", objectId=drawer.object_id, forceAction=True)
     assert inside.position == pytest.approx(before)
     plate, apple = bench.first("Plate"), bench.first("Apple")
@@ -217,7 +219,7 @@ def test_teleport_refuses_what_collides(bench, position):
 def test_shortest_path_leads_to_the_fridge(bench):
     fridge = bench.first("Fridge")
     corners = bench.ok("GetShortestPath", objectId=fridge)["actionReturn"]["corners"]
-    steps = zip(corners, corners[1:], strict=False)
+    steps = itertools.pairwise(corners)
     assert all(abs(a["x"] - b["x"]) + abs(a["z"] - b["z"]) == pytest.approx(0.25, abs=1e-6) for a, b in steps)
     end, goal = corners[-1], bench.object(fridge)["position"]
     assert abs(end["x"] - goal["x"]) + abs(end["z"] - goal["z"]) < 1.5

@@ -64,14 +64,22 @@ def put(
         )
     target = interactable(sim, objectId, forceAction, x, y)
     _check_receptacle(held, target)
-    placed = find_place(sim.world, held, target)
-    if placed is None and forceAction:
-        placed = find_place(sim.world, held, target, _CROWDED)
+    placed = _place(sim, held, target, forceAction)
     if placed is None:
         raise ActionError("No valid positions to place object found", ErrorCode.RECEPTACLE_FULL)
     release(sim, placed)
     sim.world.attach(held, target)
     sim.world.touch()
+
+
+def _place(sim: Simulation, held: SimObject, target: SimObject, force: bool) -> SimObject | None:
+    """A free place: one that the agent sees if there is one; a forced put squeezes in where it is crowded."""
+    for crowd in (0.0, _CROWDED) if force else (0.0,):
+        for seen in (sim.in_view, None):
+            placed = find_place(sim.world, held, target, crowd, seen=seen)
+            if placed is not None:
+                return placed
+    return None
 
 
 def _check_receptacle(held: SimObject, target: SimObject) -> None:

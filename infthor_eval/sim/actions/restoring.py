@@ -133,5 +133,5 @@ def _pose(entry: Any) -> Pose:
         raise ActionError(f"objectPoses needs entries with objectName, position and rotation, not {entry!r}")
     try:
         return Pose.from_wire(entry)
-    except (TypeError, ValueError, AttributeError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise ActionError(f"objectPoses: {entry['objectName']} has no usable position or rotation ({error})") from error

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from infthor_eval.sim.geometry import Array
 from infthor_eval.sim.render.camera import Camera, Projection, project
+from infthor_eval.sim.render.kernel_cache import drop_stale_kernels
 from infthor_eval.sim.render.lighting import Lights
 from infthor_eval.sim.render.primitives import COLUMNS, INSTANCE
 
@@ -50,6 +51,7 @@ def backend(name: str | None = None) -> Backend:
     """The renderer: `numba`, or `numpy` where numba is not installed or INFTHOR_SIM_RENDERER asks for it."""
     chosen = name or os.environ.get("INFTHOR_SIM_RENDERER", "")
     if chosen != "numpy":
+        drop_stale_kernels()
         try:
             from infthor_eval.sim.render import raster_numba, shading_numba
         except ModuleNotFoundError:

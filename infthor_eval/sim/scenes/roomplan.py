@@ -16,6 +16,7 @@ __all__ = ["RoomPlan", "finish"]
 
 _BODY = 0.23  # the agent's radius and a little, metres
 _KNEE, _HEAD = 0.1, 1.6
+_AT_MOST = {"Sink": 0, "SinkBasin": 0, "Microwave": 0, "Fridge": 4, "StoveBurner": 1, "BathtubBasin": 1, "Toilet": 2}
 _CLEAR = 0.9  # metres of floor before a doorway
 
 
@@ -187,10 +188,12 @@ def _scatter(world: World, plan: RoomPlan) -> None:
         fitting = [o for o in homes if allowed_in(kind, o.object_type)]
         for index in plan.random.permutation(len(fitting)):
             place = find_place(world, item, fitting[index], random=plan.random)
-            if place is None:
+            full = len(fitting[index].contents) >= _AT_MOST.get(fitting[index].object_type, 99)
+            if place is None or full:
                 continue
             made = default_object(kind, np.round(place.position, 4), float(place.rotation[1]))
             made.style = item.style
+            made.state.openness = 1.0 if kind in {"Box", "Laptop"} else 0.0  # as AI2-THOR's rooms have them
             if made.object_id not in world.objects:
                 world.add(made)
                 world.attach(made, fitting[index])

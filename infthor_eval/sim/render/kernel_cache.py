@@ -1,0 +1,31 @@
+"""Keeps numba's cache of compiled kernels true to the sources.
+
+Numba recompiles a kernel when its own file changes, but not when a function or constant that it takes from another
+file does. A stamp of all the kernels' sources beside the cache tells when it is stale.
+"""
+
+import hashlib
+from pathlib import Path
+
+__all__ = ["drop_stale_kernels"]
+
+_SOURCES = ("camera.py", "lighting.py", "patterns.py", "primitives.py", "raster_numba.py", "shading_numba.py")
+_HERE = Path(__file__).parent
+
+
+def drop_stale_kernels(folder: Path = _HERE) -> bool:
+    """Removes compiled kernels that were made from other sources than those in `folder`; whether there were any."""
+    digest = hashlib.blake2b(b"".join((folder / name).read_bytes() for name in _SOURCES), digest_size=16).hexdigest()
+    cache = folder / "__pycache__"
+    stamp = cache / "kernels.stamp"
+    if stamp.exists() and stamp.read_text(encoding="ascii") == digest:
+        return False
+    try:
+        stale = [*cache.glob("*_numba.*.nbi"), *cache.glob("*_numba.*.nbc")]
+        for path in stale:
+            path.unlink(missing_ok=True)
+        cache.mkdir(exist_ok=True)
+        stamp.write_text(digest, encoding="ascii")
+    except PermissionError:  # a read-only installation: its files change together, with an upgrade
+        return False
+    return bool(stale)

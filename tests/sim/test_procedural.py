@@ -1,0 +1,135 @@
+"""Procedural rooms are furnished as their kind needs, connected, and different from seed to seed."""
+
+import pytest
+
+from infthor_eval.sim.errors import ActionError
+from infthor_eval.sim.scenes.catalogue import Catalogue
+from infthor_eval.sim.scenes.procedural import ROOM_KINDS
+
+from .harness import Bench
+
+NEEDED = {
+    "kitchen": "Fridge Microwave CounterTop SinkBasin Faucet Cabinet Drawer DiningTable StoveBurner CoffeeMachine Knife"
+    " Mug Plate Apple Tomato Potato Egg Pan Pot GarbageCan",
+    "living-room": "Sofa CoffeeTable TVStand Television FloorLamp Drawer ArmChair GarbageCan",
+    "bedroom": "Bed Desk DeskLamp Dresser Drawer SideTable Chair",
+    "bathroom": "Toilet Bathtub BathtubBasin SinkBasin Faucet CounterTop Cabinet SoapBar Cloth TowelHolder",
+}
+
+
+@pytest.mark.parametrize("kind", sorted(NEEDED))
+@pytest.mark.parametrize("seed", range(5))
+def test_furniture_of_the_kind(kind, seed):
+    world = Catalogue().load(f"{kind}-{seed}")
+    missing = set(NEEDED[kind].split()) - {o.object_type for o in world.objects.values()}
+    assert not missing
+    assert 35 <= len(world.objects) <= 80
+    assert len(world.nav.reachable(world.agent.position[0], world.agent.position[2])) == len(world.nav)
+
+
+@pytest.mark.parametrize("kind", ROOM_KINDS)
+def test_names_are_reproducible_and_seeds_differ(kind):
+    first, again, other = (Catalogue().load(f"{kind}-{seed}") for seed in (3, 3, 4))
+    assert list(first.objects) == list(again.objects)
+    assert list(first.objects) != list(other.objects)
+
+
+@pytest.mark.parametrize("seed", [2, 5])
+def test_a_house_is_connected(seed):
+    world = Catalogue().load(f"house-{seed}")
+    assert len(world.rooms) == 4
+    for room in world.rooms:
+        assert any(room.x_min < x < room.x_max and room.z_min < z < room.z_max for x, z in world.nav)
+
+
+@pytest.mark.parametrize(
+    "task",
+    [
+        "pick Apple put CounterTop", "pick Mug heat Microwave put DiningTable", "pick Apple cool Fridge put CounterTop",
+        "pick Plate clean SinkBasin put CounterTop", "pick Knife slice Tomato put CounterTop",
+    ],
+)  # fmt: skip
+def test_tasks_can_be_done_by_an_agent_that_must_see(task):
+    bench = Bench(size=150)
+    bench.reset("kitchen-2")
+    _, what, *rest = task.split()
+    pick(bench, what)
+    for verb, target in zip(rest[::2], rest[1::2], strict=True):
+        VERBS[verb](bench, target)
+    assert bench.metadata["inventoryObjects"] == []
+
+
+def pick(bench: Bench, kind: str) -> str:
+    """Picks up the first object of a kind that the agent gets to see."""
+    for item in [o["objectId"] for o in bench.metadata["objects"] if o["objectType"] == kind]:
+        parent = bench.sim.world.objects[item].parent
+        if bench.sim.world.hidden(bench.sim.world.objects[item]):
+            bench.stand_before(parent)
+            bench.ok("OpenObject", objectId=parent)
+        bench.stand_before(item)
+        bench.ok("PickupObject", objectId=item)
+        return item
+    raise ActionError(f"no {kind}")
+
+
+def put(bench: Bench, kind: str) -> str:
+    target = bench.first(kind)
+    bench.stand_before(target)
+    bench.ok("PutObject", objectId=target)
+    return target
+
+
+def store(bench: Bench, kind: str) -> tuple[str, str]:
+    """Opens, puts, closes; returns what was stored and where."""
+    target, item = bench.first(kind), bench.metadata["inventoryObjects"][0]["objectId"]
+    bench.stand_before(target)
+    bench.ok("OpenObject", objectId=target)
+    bench.ok("PutObject", objectId=target)
+    bench.ok("CloseObject", objectId=target)
+    return item, target
+
+
+def heat(bench: Bench, kind: str) -> None:
+    item, target = store(bench, kind)
+    bench.ok("ToggleObjectOn", objectId=target)
+    bench.ok("ToggleObjectOff", objectId=target)
+    fetch(bench, item, target, "Hot")
+
+
+def cool(bench: Bench, kind: str) -> None:
+    item, target = store(bench, kind)
+    fetch(bench, item, target, "Cold")
+
+
+def fetch(bench: Bench, item: str, target: str, temperature: str) -> None:
+    bench.ok("OpenObject", objectId=target)
+    bench.stand_before(item)
+    bench.ok("PickupObject", objectId=item)
+    bench.ok("CloseObject", objectId=target, forceAction=True)
+    assert bench.object(item)["temperature"] == temperature
+
+
+def clean(bench: Bench, kind: str) -> None:
+    item = bench.metadata["inventoryObjects"][0]["objectId"]
+    bench.ok("DirtyObject", objectId=item)
+    target = put(bench, kind)
+    faucet = bench.first("Faucet")
+    bench.stand_before(faucet)
+    bench.ok("ToggleObjectOn", objectId=faucet)
+    bench.ok("ToggleObjectOff", objectId=faucet)
+    assert not bench.object(item)["isDirty"]
+    bench.stand_before(target)
+    bench.ok("PickupObject", objectId=item)
+
+
+def cut(bench: Bench, kind: str) -> None:
+    target = bench.first(kind)
+    parent = bench.sim.world.objects[target].parent
+    if bench.sim.world.hidden(bench.sim.world.objects[target]):
+        bench.stand_before(parent)
+        bench.ok("OpenObject", objectId=parent)
+    bench.stand_before(target)
+    bench.ok("SliceObject", objectId=target)
+
+
+VERBS = {"put": put, "heat": heat, "cool": cool, "clean": clean, "slice": cut}
