@@ -16,7 +16,7 @@ from infthor_eval.runs import RunRequest, UnitRecord, execute, plan
 def answer(model: str, tasks: str, shared: bool, output: Path) -> list[UnitRecord]:
     """Every record of a run with sharing on or off."""
     request = RunRequest(model, (tasks,), output, model_options={"share_prefix": str(shared).lower()})
-    return execute(plan(request), lambda _: lambda *_: None).records
+    return execute(plan(request), lambda *_: lambda *_: None).records
 
 
 def main() -> None:

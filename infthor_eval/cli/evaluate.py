@@ -9,13 +9,13 @@ import msgspec
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from infthor_eval.report import nieh_table, summarise
-from infthor_eval.runs import Observer, Plan, RunOutcome, RunRequest, UnitRecord, execute, plan
+from infthor_eval.report import depth_table, nieh_table, summarise
+from infthor_eval.runs import Budget, Observer, Plan, RunOutcome, RunRequest, UnitRecord, execute, plan
 from model_adapters import options
 
 __all__ = ["evaluate"]
 
-_TABLE_WIDTH = 116  # on a narrower terminal lines wrap; cut-off numbers would be worse
+_TABLE_WIDTH = 130  # on a narrower terminal lines wrap; cut-off numbers would be worse
 _notes = Console(stderr=True, soft_wrap=True)
 _output = Console(soft_wrap=True, width=max(Console().width, _TABLE_WIDTH))
 
@@ -36,7 +36,9 @@ def evaluate(requests: Sequence[RunRequest]) -> int:
         _write_json(outcome.folder / "results.json", summary)
         outcomes.append(outcome)
         summaries.append(summary)
-    _output.print(nieh_table(summaries))
+    for table in (depth_table(summaries), nieh_table(summaries)):
+        if table is not None:
+            _output.print(table)
     for outcome in outcomes:
         _output.print(f"{outcome.identity['model']['name']}: {outcome.folder}", highlight=False)
     return int(any(_say_what_failed(outcome) for outcome in outcomes))
@@ -47,8 +49,9 @@ def _execute(plan: Plan) -> RunOutcome:
     found = made = 0
     with Progress(*columns, console=_notes, transient=True) as progress:
 
-        def begin(ready: Plan) -> Observer:
+        def begin(ready: Plan, budgets: list[Budget]) -> Observer:
             _say_what_is_left_out(ready)
+            _say_what_it_costs(budgets)
             bar = progress.add_task(ready.request.model, total=ready.n_units)
 
             def observe(_: UnitRecord, resumed: bool) -> None:
@@ -69,6 +72,16 @@ def _say_what_is_left_out(ready: Plan) -> None:
     for task in ready.tasks:
         for reason, n in sorted(Counter(item.reason for item in task.resolved.left_out).items()):
             _notes.print(f"{task.name}: {n} question(s) left out: {reason}", style="yellow", highlight=False)
+
+
+def _say_what_it_costs(budgets: list[Budget]) -> None:
+    for budget in budgets:
+        limit = "no limit" if budget.limit is None else f"limit {budget.limit:,}"
+        _notes.print(
+            f"{budget.task}: {budget.n_contexts} contexts, the longest request {budget.longest:,} tokens ({limit}): "
+            f"{budget.outcome}",
+            highlight=False,
+        )
 
 
 def _say_what_failed(outcome: RunOutcome) -> int:

@@ -2,13 +2,14 @@
 
 from infthor_eval.report.comparison import Comparison, compare
 from infthor_eval.report.nieh_results import accuracies, published_table4, summarise
-from infthor_eval.report.tables import comparison_table, nieh_table
+from infthor_eval.report.tables import comparison_table, depth_table, nieh_table
 
 __all__ = [
     "Comparison",
     "accuracies",
     "compare",
     "comparison_table",
+    "depth_table",
     "nieh_table",
     "published_table4",
     "summarise",

@@ -16,7 +16,16 @@ from infthor_eval.nieh.scoring import SCORERS, Scorer, score
 from infthor_eval.nieh.statistics import Estimate, clustered_mean
 from infthor_eval.runs.journal import UnitRecord
 
-__all__ = ["CLUE_COLUMNS", "Accuracy", "PublishedTable", "accuracies", "published_table4", "record_score", "summarise"]
+__all__ = [
+    "CLUE_COLUMNS",
+    "Accuracy",
+    "PublishedRow",
+    "PublishedTable",
+    "accuracies",
+    "published_table4",
+    "record_score",
+    "summarise",
+]
 
 CLUE_COLUMNS = ("1", "2", ">=3", "total")  # the columns of the paper's Table 4
 
@@ -37,14 +46,22 @@ class Accuracy:
 
 
 @dataclass(frozen=True)
+class PublishedRow:
+    """One model's row: its name here, and percentages by column."""
+
+    model: str
+    values: tuple[float, ...]
+
+
+@dataclass(frozen=True)
 class PublishedTable:
-    """A table of the paper: percentages by row and column, and where they stand."""
+    """A table of the paper: rows by the paper's name of the model, and where they stand."""
 
     source: str
     context: str
     scorer: Scorer
     columns: tuple[str, ...]
-    rows: dict[str, tuple[float, ...]]
+    rows: dict[str, PublishedRow]
 
 
 def clue_column(n_clues: int) -> str:
@@ -145,7 +162,7 @@ def published_table4() -> PublishedTable:
     """
     path = packaged_folder("results") / "published" / "nieh_table4.yaml"
     table = yaml.safe_load(path.read_text(encoding="utf-8"))
-    rows = {name: tuple(map(float, row)) for name, row in table["rows"].items()}
-    if tuple(table["columns"]) != CLUE_COLUMNS or any(len(row) != len(CLUE_COLUMNS) for row in rows.values()):
+    rows = {name: PublishedRow(row["model"], tuple(map(float, row["values"]))) for name, row in table["rows"].items()}
+    if tuple(table["columns"]) != CLUE_COLUMNS or any(len(row.values) != len(CLUE_COLUMNS) for row in rows.values()):
         raise DataError(f"{path}: the columns must be {', '.join(CLUE_COLUMNS)}")
     return PublishedTable(table["source"], table["context"], table["scorer"], CLUE_COLUMNS, rows)

@@ -1,6 +1,6 @@
 """NIEH results as tables on the terminal."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from rich import box
@@ -8,9 +8,9 @@ from rich.table import Table
 
 from infthor_eval.nieh.scoring import SCORERS
 from infthor_eval.report.comparison import Comparison
-from infthor_eval.report.nieh_results import CLUE_COLUMNS, published_table4
+from infthor_eval.report.nieh_results import CLUE_COLUMNS, PublishedRow, PublishedTable, published_table4
 
-__all__ = ["comparison_table", "nieh_table"]
+__all__ = ["comparison_table", "depth_table", "nieh_table"]
 
 
 def nieh_table(summaries: Sequence[dict[str, Any]]) -> Table:
@@ -21,25 +21,21 @@ def nieh_table(summaries: Sequence[dict[str, Any]]) -> Table:
     """
     table = Table(box=box.SIMPLE_HEAD, title="NIEH accuracy, % by number of clues", title_justify="left")
     for name in ("model", "task", "scorer"):
-        table.add_column(name)
-    for name in (*CLUE_COLUMNS, "± 95 %", "n", "failed"):
+        table.add_column(name, no_wrap=True, overflow="fold")
+    for name in (*CLUE_COLUMNS, "± 95 %", "n", "left out", "failed"):
         table.add_column(name, justify="right")
     for summary in summaries:
         for task, result in summary["tasks"].items():
             for scorer in SCORERS:
-                table.add_row(summary["run"]["model"]["name"], task, scorer, *_cells(result["by_clues"], scorer))
+                table.add_row(summary["run"]["model"]["name"], task, scorer, *_cells(result, scorer))
         table.add_section()
     published = published_table4()
     for name, row in published.rows.items():
-        table.add_row(
-            name,
-            f"published, {published.context}",
-            published.scorer,
-            *map("{:.2f}".format, row),
-            "",
-            "",
-            style="dim",
-        )
+        cells = [f"{value:.2f}" for value in row.values]
+        table.add_row(name, f"published, {published.context}", published.scorer, *cells, style="dim")
+        for summary in summaries:
+            for task, cells in _differences(summary, row, published):
+                table.add_row("  ours minus published", task, published.scorer, *cells)
     if any(_simulated(summary) for summary in summaries):
         table.caption = (
             "Questions on frames of the embedded simulator: not comparable with the published rows, which are on "
@@ -49,16 +45,70 @@ def nieh_table(summaries: Sequence[dict[str, Any]]) -> Table:
     return table
 
 
-def _cells(by_clues: dict[str, Any], scorer: str) -> list[str]:
+def _cells(result: dict[str, Any], scorer: str) -> list[str]:
+    by_clues = result["by_clues"]
     total = by_clues["total"]
     means = [f"{100 * by_clues[name][scorer]['mean']:.2f}" if by_clues[name]["n"] else "-" for name in CLUE_COLUMNS]
-    high, mean = total[scorer]["high"], total[scorer]["mean"]
-    reach = "-" if high is None else f"{100 * (high - mean):.2f}"  # one trajectory alone tells nothing about others
-    return [*means, reach, str(total["n"]), str(total["n_failed"])]
+    # One trajectory alone tells nothing about others: no interval.
+    known = total["n"] > 0 and total[scorer]["high"] is not None
+    reach = f"{100 * (total[scorer]['high'] - total[scorer]['mean']):.2f}" if known else "-"
+    return [*means, reach, str(total["n"]), str(result["left_out"]["n"]), str(total["n_failed"])]
+
+
+def _differences(
+    summary: dict[str, Any], row: PublishedRow, published: PublishedTable
+) -> Iterator[tuple[str, list[str]]]:
+    """How far a run of the published model is from its row, and whether its interval (=) holds the published value."""
+    if summary["run"]["model"]["name"] != row.model:
+        return
+    for task, about in summary["run"]["tasks"].items():
+        # Frames that a simulator of ours rendered are another data set.
+        if about["config"]["dataset_kwargs"]["context"] != published.context or about["simulator"] is not None:
+            continue
+        by_clues = summary["tasks"][task]["by_clues"]
+        yield (
+            task,
+            [
+                _difference(by_clues[name], value, published)
+                for name, value in zip(CLUE_COLUMNS, row.values, strict=True)
+            ],
+        )
+
+
+def _difference(cell: dict[str, Any], value: float, published: PublishedTable) -> str:
+    if not cell["n"]:
+        return "-"
+    ours = cell[published.scorer]
+    within = ours["low"] is not None and 100 * ours["low"] <= value <= 100 * ours["high"]
+    return f"{100 * ours['mean'] - value:+.2f}{' =' if within else ''}"
 
 
 def _simulated(summary: dict[str, Any]) -> bool:
     return any(task["simulator"] == "embedded" for task in summary["run"]["tasks"].values())
+
+
+def depth_table(summaries: Sequence[dict[str, Any]]) -> Table | None:
+    """Accuracy in percent by depth of the needle: a row per run, haystack task and scorer; None without any."""
+    variants = {name for summary in summaries for task in summary["tasks"].values() for name in task["by_variant"]}
+    depths = sorted(name for name in variants if name.startswith("depth="))
+    if not depths:
+        return None
+    table = Table(box=box.SIMPLE_HEAD, title="Accuracy, % by depth of the needle (questions)", title_justify="left")
+    for name in ("model", "task", "scorer"):
+        table.add_column(name, no_wrap=True, overflow="fold")
+    for depth in depths:
+        table.add_column(depth, justify="right")
+    for summary in summaries:
+        for task, result in summary["tasks"].items():
+            if set(depths) & set(result["by_variant"]):
+                for scorer in SCORERS:
+                    cells = [_at_depth(result["by_variant"].get(depth), scorer) for depth in depths]
+                    table.add_row(summary["run"]["model"]["name"], task, scorer, *cells)
+    return table
+
+
+def _at_depth(found: dict[str, Any] | None, scorer: str) -> str:
+    return f"{100 * found[scorer]['mean']:.2f} ({found['n']})" if found else "-"
 
 
 def comparison_table(rows: Sequence[Comparison], first: str, second: str) -> Table:

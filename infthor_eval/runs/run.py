@@ -12,6 +12,7 @@ from infthor_eval.errors import UsageError
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.nieh.contexts import context_named
 from infthor_eval.nieh.work import Work, find_set, find_work, open_set
+from infthor_eval.runs.budget import Budget, budget_of
 from infthor_eval.runs.catalog import Catalog
 from infthor_eval.runs.identity import fingerprint
 from infthor_eval.runs.journal import Journal, Observer, UnitRecord
@@ -121,14 +122,15 @@ def plan(request: RunRequest) -> Plan:
     return Plan(request, tasks)
 
 
-def execute(ready: Plan, begin: Callable[[Plan], Observer]) -> RunOutcome:
+def execute(ready: Plan, begin: Callable[[Plan, list[Budget]], Observer]) -> RunOutcome:
     """Load the model, ask what the journal does not hold yet, and write the run's files.
 
     The folder `<output>/<model>/<tasks>-<identity>/` holds `journal.jsonl` and lm-eval's results and samples.
 
     Args:
         ready: what `plan` found.
-        begin: called once all that will be asked is known; what it returns is told of each unit that is done.
+        begin: called before the first token is computed, with all that will be asked and what it costs in tokens
+            (nothing for a bound); what it returns is told of each unit that is done.
 
     Raises:
         UsageError: a wrong model name or option, another process at the same run, or nothing that can be asked.
@@ -141,9 +143,9 @@ def execute(ready: Plan, begin: Callable[[Plan], Observer]) -> RunOutcome:
         if isinstance(model, Bound):
             model.study([question for task in ready.tasks for question in task.resolved.data.questions])
         identity = _identity(ready, model)
-        folder = request.output / request.model / f"{'+'.join(request.tasks)}-{fingerprint(identity)}"
+        folder = request.output / request.model / f"{'+'.join(request.tasks)[:80]}-{fingerprint(identity)}"
         with Journal(folder / "journal.jsonl", identity) as journal:
-            _evaluate(ready, model, journal, begin(ready), folder / "lm_eval")
+            _evaluate(ready, model, journal, begin(ready, _budgets(ready, model)), folder / "lm_eval")
             return RunOutcome(folder, identity, journal.records)
     finally:
         if isinstance(model, Model):
@@ -177,6 +179,21 @@ def _resolved(ready: Plan, model: Model | Bound) -> Plan:
         tasks.append(replace(task, work=task.work or find_work(settings)))
     _refuse_nothing(tasks)
     return Plan(ready.request, tasks, tokens)
+
+
+def _budgets(ready: Plan, model: Model | Bound) -> list[Budget]:
+    if isinstance(model, Bound):
+        return []
+    return [
+        budget_of(
+            task.name,
+            task.config["dataset_kwargs"]["context"],
+            task.resolved,
+            model,
+            task.config["generation_kwargs"]["max_gen_toks"],
+        )
+        for task in ready.tasks
+    ]
 
 
 def _tokens_per_frame(model: Model | Bound, data: NiehSet) -> int:

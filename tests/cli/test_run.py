@@ -36,8 +36,8 @@ def test_the_table_shows_every_model_task_and_scorer_beside_the_published_rows(m
     )
     assert code == 0
     rows = [line.split() for line in out.splitlines()]
-    assert ["oracle", "nieh_gt", "strict", "100.00", "100.00", "100.00", "100.00", "0.00", "5", "0"] in rows
-    assert ["oracle", "nieh_full", "reference", "100.00", "100.00", "100.00", "100.00", "0.00", "5", "0"] in rows
+    assert ["oracle", "nieh_gt", "strict", "100.00", "100.00", "100.00", "100.00", "0.00", "5", "0", "0"] in rows
+    assert ["oracle", "nieh_full", "reference", "100.00", "100.00", "100.00", "100.00", "0.00", "5", "0", "0"] in rows
     assert any(row[:2] == ["blind", "nieh_gt"] for row in rows)
     assert "Qwen2.5-VL 7B" in out
     assert "82.20" in out
@@ -53,6 +53,32 @@ def test_frames_of_the_embedded_simulator_are_labelled(make_nieh_set, tmp_path, 
         capfd, "run", "--model", "oracle", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out"
     )
     assert "embedded simulator: not comparable" in " ".join(out.split())
+
+
+def test_the_haystack_is_shown_by_depth_and_counts_what_does_not_fit(make_nieh_set, tmp_path, capfd):
+    data = make_nieh_set([Question("t", "Is there a mug?", (70,), ("yes",))], n_frames=140, size=56)
+    tasks = "nieh_haystack_8k,nieh_haystack_1m"
+    code, out, err = run(capfd, "--model", "oracle", "--tasks", tasks, "--data", data, "--output", tmp_path / "out")
+    assert code == 0
+    rows = [line.split() for line in out.splitlines()]
+    # 8,000 // 121 = 66 frames: from frame 70, 57, 44, 31, 18; all inside 140 frames.
+    assert ["oracle", "nieh_haystack_8k", "strict", *["100.00", "(1)"] * 5] in rows
+    assert next(row for row in rows if row[1:3] == ["nieh_haystack_1m", "strict"])[-3:] == ["0", "5", "0"]
+    assert "nieh_haystack_1m: 5 question(s) left out: the window reaches outside the trajectory" in err
+
+
+def test_a_context_beyond_the_models_limit_is_told_before_it_is_refused(make_nieh_set, tmp_path, capfd):
+    data = make_nieh_set(n_frames=20)
+    arguments = ["--model", "qwen2.5-vl-tiny", "--model-args", "max_tokens=1200", "--data", data]
+    code, _, err = run(capfd, *arguments, "--tasks", "nieh", "--output", tmp_path / "out")
+    assert code == 1
+    told, refused = (
+        next(line for line in err.splitlines() if line.startswith(name)) for name in ("nieh_gt", "nieh_full")
+    )
+    assert "(limit 1,200): fits" in told
+    assert "2 of 2 contexts refused" in refused
+    assert err.index("2 of 2 contexts refused") < err.index("answered now")
+    assert "is beyond the 1200 tokens of qwen2.5-vl-tiny" in err
 
 
 def test_limit_asks_only_so_many_of_each_task(make_nieh_set, tmp_path, capfd):
@@ -151,7 +177,7 @@ def test_a_frame_that_breaks_in_mid_run_is_counted_as_failed_and_the_exit_code_s
     assert code == 1
     assert "nieh_gt: 2 question(s) failed, counted as wrong" in err
     assert str(frame) in err
-    assert next(line for line in out.splitlines() if "nieh_gt" in line).split()[-2:] == ["5", "2"]
+    assert next(line for line in out.splitlines() if "nieh_gt" in line).split()[-3:] == ["5", "0", "2"]
 
 
 def test_help_names_the_commands_and_the_version_is_told(capfd):

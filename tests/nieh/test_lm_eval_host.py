@@ -48,7 +48,7 @@ def test_hf_multimodal_runs_the_tasks_and_says_what_our_model_says(make_nieh_set
         data=data,
         output=tmp_path / "ours",
     )
-    execute(plan(request), lambda _: lambda *_: None)
+    execute(plan(request), lambda *_: lambda *_: None)
     theirs = replies(tmp_path / "theirs")
     assert len(theirs) == 10
     assert replies(tmp_path / "ours") == theirs

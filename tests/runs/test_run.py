@@ -9,7 +9,7 @@ from infthor_eval.runs import execute, plan, read_journal
 from model_adapters import Reply
 
 
-def silent(ready):
+def silent(ready, budgets):
     return lambda record, resumed: None
 
 
@@ -25,8 +25,8 @@ def test_oracle_is_right_everywhere_and_lm_eval_agrees(make_request):
 
 def test_the_same_command_goes_on_and_another_starts_anew(make_request):
     resumed = []
-    first = execute(plan(make_request()), lambda _: lambda record, found: resumed.append(found))
-    again = execute(plan(make_request()), lambda _: lambda record, found: resumed.append(found))
+    first = execute(plan(make_request()), lambda *_: lambda record, found: resumed.append(found))
+    again = execute(plan(make_request()), lambda *_: lambda record, found: resumed.append(found))
     assert resumed == [False] * 10 + [True] * 10
     assert again == first
     for changes in ({"seed": 1}, {"limit": 1}, {"tasks": ("nieh_gt",)}, {"model": "blind"}):
@@ -45,19 +45,19 @@ def test_a_changed_frame_of_the_same_size_is_noticed(make_request):
     content[-20] ^= 1
     frame.write_bytes(bytes(content))
     resumed = Counter()
-    execute(plan(request), lambda _: lambda record, found: resumed.update([(record.question, found)]))
+    execute(plan(request), lambda *_: lambda record, found: resumed.update([(record.question, found)]))
     made = {question for question, found in resumed if not found}
     assert made == {"Is there a mug?", "Where was the mug before you put it?"}
 
 
 class Recorder:
-    """A scripted model that keeps what it was asked, and fails where it is told to."""
+    """A scripted model that keeps what it was asked."""
 
     name = "recorder"
     max_tokens = None
 
     def __init__(self):
-        self.parts, self.asked, self.appended = [], [], 0
+        self.asked = []
 
     def identity(self):
         return {}
@@ -66,10 +66,15 @@ class Recorder:
         return 100
 
     def conversation(self):
-        return self
+        return Talk(self)
 
     def close(self):
-        self.parts = []
+        pass
+
+
+class Talk:
+    def __init__(self, model):
+        self.model, self.parts = model, []
 
     @property
     def n_tokens(self):
@@ -77,7 +82,6 @@ class Recorder:
 
     def append(self, *parts):
         self.parts += parts
-        self.appended += len(parts)
 
     def mark(self):
         return len(self.parts)
@@ -87,7 +91,7 @@ class Recorder:
 
     def reply(self, max_new_tokens, stop=()):
         assert max_new_tokens == 50
-        self.asked.append(list(self.parts))
+        self.model.asked.append(list(self.parts))
         for part in self.parts[:-1]:
             part.load()
         return Reply("first line\nmug", (1, 2), len(self.parts), 0)
@@ -100,11 +104,10 @@ def recorder(monkeypatch):
     return model
 
 
-def test_a_model_sees_the_frames_once_per_trajectory_and_the_published_words(make_request, recorder):
+def test_a_model_is_asked_by_trajectory_and_in_the_published_words(make_request, recorder):
     outcome = execute(plan(make_request(tasks=("nieh_full",))), silent)
     names = [[part.path.parts[-3] for part in parts[:-1]] for parts in recorder.asked]
     assert names == [["traj_a"] * 6] * 3 + [["traj_b"] * 6] * 2
-    assert recorder.appended == 12 + 5
     assert recorder.asked[0][-1] == (
         "\nAnswer the question given the agent's views in time order. Do not include explanation or reasoning in the "
         "answer. Answer with a single word or words.\nQuestion: Is there a mug?"

@@ -14,18 +14,29 @@ from infthor_eval.nieh.contexts.base import Case, Part, Settings, Unfit
 __all__ = ["interleaved", "interleaved_parts", "last_state", "state_parts"]
 
 _MARK = "<image>"  # where a frame stands in traj.txt
+_ACT = "<|act|>"  # what ends an action there
 
 
 def interleaved(data: NiehSet, question: Question, _settings: Settings) -> list[Case | Unfit]:
     """Goals, frames and actions of the whole trajectory in time order (published: `interleaved`)."""
-    folder = data.folder(question.traj_id)
-    n_marks, n_frames = _sequence_text(folder).count(_MARK), len(data.frames(question.traj_id))
-    if n_marks == n_frames:
-        return [Case(tuple(range(n_frames)))]
-    after_actions = _frames_after_actions(data, question.traj_id)
-    if n_marks != len(after_actions) + 1:
-        return [Unfit(f"traj.txt has {n_marks} frames, which fit neither {n_frames} frames nor the actions")]
-    return [Case((0, *after_actions))]
+    n_frames = len(data.frames(question.traj_id))
+    done = _actions_before_marks(_sequence_text(data.folder(question.traj_id)))
+    n_actions = max(done, default=0)
+    if n_actions + 1 == n_frames:
+        return [Case(tuple(done))]
+    after_actions = [0, *_frames_after_actions(data, question.traj_id)]
+    if n_actions + 1 != len(after_actions):
+        return [Unfit(f"traj.txt has {n_actions} actions, which fit neither the frames nor expert_log.json")]
+    return [Case(tuple(after_actions[number] for number in done))]
+
+
+def _actions_before_marks(text: str) -> list[int]:
+    """How many actions each frame mark comes after. The frame behind a goal shows what the last action left."""
+    done, n_actions = [], 0
+    for before in text.split(_MARK)[:-1]:
+        n_actions += before.rstrip().endswith(_ACT)
+        done.append(n_actions)
+    return done
 
 
 def interleaved_parts(data: NiehSet, question: Question, frames: Sequence[FrameRef]) -> list[Part]:

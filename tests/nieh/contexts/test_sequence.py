@@ -26,21 +26,26 @@ def shown(context, root):
 def folder(make_nieh_set):
     root = make_nieh_set([QUESTION], n_frames=3, size=56)
     folder = root / "metadata" / "t"
-    (folder / "traj.txt").write_text("Goal<image>MoveAhead<image>PickupObject Mug<image>\n")
+    (folder / "traj.txt").write_text(
+        "<|goal|>A<|goal|><image><|act|>Go<|act|><image><|goal|>B<|goal|><image><|act|>Take<|act|><image>\n"
+    )
     return folder
 
 
 def test_interleaved_puts_each_frame_where_the_text_has_it(folder):
-    assert shown("interleaved", folder.parents[1]) == ["Goal", 0, "MoveAhead", 1, "PickupObject Mug", 2]
+    assert shown("interleaved", folder.parents[1]) == [
+        *("<|goal|>A<|goal|>", 0, "<|act|>Go<|act|>", 1),
+        *("<|goal|>B<|goal|>", 1, "<|act|>Take<|act|>", 2),
+    ]
 
 
 def test_interleaved_takes_the_last_of_several_frames_of_an_action(folder):
-    (folder / "traj.txt").write_text("Goal<image>MoveAhead<image>")
+    (folder / "traj.txt").write_text("Goal<image><|act|>Go<|act|><image>")
     log = {"images": [{"low_idx": 0, "image_name": "000000001.png"}, {"low_idx": 0, "image_name": "000000002.png"}]}
     (folder / "expert_log.json").write_text(json.dumps(log))
-    assert shown("interleaved", folder.parents[1]) == ["Goal", 0, "MoveAhead", 2]
+    assert shown("interleaved", folder.parents[1]) == ["Goal", 0, "<|act|>Go<|act|>", 2]
     (folder / "traj.txt").write_text("Goal<image>")
-    assert "traj.txt has 1 frames" in shown("interleaved", folder.parents[1])
+    assert "traj.txt has 0 actions" in shown("interleaved", folder.parents[1])
     (folder / "expert_log.json").write_text("{}")
     with pytest.raises(DataError, match=r"expert_log\.json: not a log"):
         shown("interleaved", folder.parents[1])
