@@ -121,6 +121,7 @@ def assemble(
         "class": type(model).__name__,
         "dtype": str(model.dtype).removeprefix("torch."),
         "device": model.device.type,
+        "quantization": _quantized(model),
         "attn_implementation": model.config._attn_implementation,
         "rope": getattr(model.config.get_text_config(), "rope_parameters", None),
         "image_processor": json.loads(image_processor.to_json_string()),
@@ -196,14 +197,29 @@ def _load_model(source: Source) -> Any:
         config=source.config,
         dtype=resolve_dtype(options),
         attn_implementation=options.attn_implementation,
-        device_map=options.device_map,
+        device_map=options.device_map or ({"": device} if options.quantization else None),
+        quantization_config=_quantization(options),
         trust_remote_code=options.trust_remote_code,
         output_loading_info=True,
     )
     missing = sorted(report["missing_keys"])
     if missing:  # transformers would leave them random and only warn
         raise ModelError(f"{options.pretrained} lacks {len(missing)} weights of its model ({missing[0]}, ...)")
-    return model if options.device_map else model.to(device)
+    return model if options.device_map or options.quantization else model.to(device)
+
+
+def _quantization(options: CheckpointOptions) -> Any:
+    if options.quantization is None:
+        return None
+    kind = {"bnb4": "load_in_4bit", "bnb8": "load_in_8bit"}[options.quantization]
+    return transformers.BitsAndBytesConfig(**{kind: True})
+
+
+def _quantized(model: Any) -> str | None:
+    """Method of quantisation, asked for or the checkpoint's own."""
+    settings = getattr(model.config, "quantization_config", None)
+    method = settings.get("quant_method") if isinstance(settings, dict) else getattr(settings, "quant_method", None)
+    return None if method is None else str(getattr(method, "value", method))
 
 
 def _chat_template(folder: Path, tokenizer: Any) -> str:

@@ -18,8 +18,16 @@ _STEP = 1024  # buffers end at multiples of this, so that questions of slightly 
 class BufferedCache(Cache):
     """A cache of `BufferedLayer`s that are made as the model comes to its layers."""
 
-    def __init__(self) -> None:
+    def __init__(self, storage: torch.device | None = None) -> None:
+        """Make an empty cache.
+
+        Args:
+            storage: where the buffers lie; beside the layers' weights where None. With the CPU as storage, a layer's
+                keys and values are copied to the weights' device while the layer computes, and to nowhere else: a
+                context that does not fit on the device runs, at the speed of the connection.
+        """
         self._room = 0
+        self._storage = storage
         super().__init__(layers=[])
 
     def update(
@@ -34,6 +42,11 @@ class BufferedCache(Cache):
         while len(self.layers) <= layer_idx:
             self.layers.append(BufferedLayer(self))
         return super().update(key_states, value_states, layer_idx, *args, **kwargs)
+
+    @property
+    def storage(self) -> torch.device | None:
+        """Where the buffers lie."""
+        return self._storage
 
     @property
     def room(self) -> int:
@@ -69,7 +82,7 @@ class BufferedLayer(DynamicLayer):
         *args: Any,
         **kwargs: Any,
     ) -> tuple[torch.Tensor, torch.Tensor]:
-        """Write the new states behind the old ones and return all."""
+        """Write the new states behind the old ones and return all, on the states' device."""
         if not self.is_initialized:
             self.lazy_initialization(key_states, value_states)
         old = self.get_seq_length()
@@ -84,11 +97,11 @@ class BufferedLayer(DynamicLayer):
         keys[..., old:new, :] = key_states
         values[..., old:new, :] = value_states
         self.keys, self.values = keys[..., :new, :], values[..., :new, :]
-        return self.keys, self.values
+        return self.keys.to(key_states.device), self.values.to(value_states.device)
 
-    @staticmethod
-    def _grown(like: torch.Tensor, old: int, room: int, used: torch.Tensor | None) -> torch.Tensor:
-        buffer = like.new_empty((*like.shape[:-2], room, like.shape[-1]))
+    def _grown(self, like: torch.Tensor, old: int, room: int, used: torch.Tensor | None) -> torch.Tensor:
+        device = self._cache.storage or like.device
+        buffer = like.new_empty((*like.shape[:-2], room, like.shape[-1]), device=device)
         if used is not None and old:
             buffer[..., :old, :] = used
         return buffer

@@ -41,7 +41,12 @@ class TransformersModel:
         self._features = FeatureCache(loaded.family, keep)
         self._prompter = Prompter(loaded.tokenizer, loaded.template, loaded.family)
         self._prefix = Prefix(
-            loaded.model, loaded.family, self._features, options.chunk_tokens, length_rope(loaded.model)
+            loaded.model,
+            loaded.family,
+            self._features,
+            chunk_tokens=options.chunk_tokens,
+            rope=length_rope(loaded.model),
+            storage=torch.device("cpu") if options.kv_offload else None,
         )
 
     @property
@@ -168,4 +173,5 @@ def naming_memory_errors(name: str, n_context: int) -> Iterator[None]:
         cpu = isinstance(error, MemoryError) or "DefaultCPUAllocator" in str(error)
         if not (cpu or isinstance(error, torch.OutOfMemoryError)):
             raise
-        raise ModelError(f"out of memory on a context of {n_context} tokens ({name})") from error
+        mend = "use fewer frames, kv_offload=true, or a smaller chunk_tokens"
+        raise ModelError(f"out of memory on a context of {n_context} tokens ({name}); {mend}") from error

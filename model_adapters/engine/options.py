@@ -35,6 +35,7 @@ class EngineOptions:
         attn_implementation: sdpa, eager, flash_attention_2, ...
         share_prefix: encode what two replies have in common once; false encodes everything for every reply.
         chunk_tokens: most tokens encoded in one forward pass.
+        kv_offload: keep keys and values in CPU memory; slower, for contexts that do not fit on the GPU.
         feature_cache_mb: memory for vision features of frames seen before, in MiB.
         max_tokens: context limit instead of the checkpoint's; 0 for none.
         rope: context extension KIND:FACTOR (yarn:4, linear:2, dynamic:4, longrope:8) instead of the checkpoint's RoPE.
@@ -45,6 +46,7 @@ class EngineOptions:
     attn_implementation: str = "sdpa"
     share_prefix: bool = True
     chunk_tokens: int = 1024
+    kv_offload: bool = False
     feature_cache_mb: int = 128
     max_tokens: int | None = None
     rope: str | None = None
@@ -68,10 +70,17 @@ class CheckpointOptions(EngineOptions):
         pretrained: hub id or folder.
         revision: branch, tag or commit on the hub; the default branch where None.
         device_map: transformers' device map (auto, balanced, ...) instead of one device.
+        quantization: bnb4 or bnb8 for bitsandbytes with 4 or 8 bits per weight; none for the checkpoint's own.
         trust_remote_code: run code that comes with the checkpoint.
     """
 
     pretrained: str
     revision: str | None = None
     device_map: str | None = None
+    quantization: str | None = None
     trust_remote_code: bool = False
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.quantization not in (None, "bnb4", "bnb8"):
+            raise ValueError(f"quantization={self.quantization} is not bnb4, bnb8 or none")

@@ -28,6 +28,7 @@ class Prefix:
         features: where the frames' features come from.
         chunk_tokens: most tokens in one forward pass (a frame with more makes a chunk of its own).
         rope: the model's rotary embeddings where their frequencies depend on the prompt's length.
+        storage: where keys and values are kept; beside the weights where None.
     """
 
     def __init__(
@@ -35,13 +36,16 @@ class Prefix:
         model: Any,
         family: Family,
         features: FeatureCache,
+        *,
         chunk_tokens: int,
         rope: LengthRope | None = None,
+        storage: torch.device | None = None,
     ) -> None:
         self._model = model
         self._family = family
         self._rope = rope
         self._rope_key = -1
+        self._storage = storage
         self._features = features
         self._chunk_tokens = chunk_tokens
         self._embeddings = model.get_input_embeddings()
@@ -49,7 +53,7 @@ class Prefix:
 
     def reset(self) -> None:
         """Forget the sequence and free its memory."""
-        self._cache = BufferedCache()
+        self._cache = BufferedCache(self._storage)
         self._units: list[Unit] = []
         self._ends: list[int] = []  # tokens up to and with each unit
         self._starts: list[int] = [0]  # the position each unit starts at, and that of the next one

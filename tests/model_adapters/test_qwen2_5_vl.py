@@ -1,5 +1,6 @@
 """The Qwen2.5-VL family: loading real checkpoint folders, and the tiny twin."""
 
+import importlib.util
 import json
 import os
 import shutil
@@ -178,6 +179,26 @@ def test_the_template_may_lie_in_the_old_json_file_or_the_tokenizer(copy: Path, 
         _load(copy)
     (copy / "chat_template.json").write_text(json.dumps({"chat_template": template}))
     assert _load(copy).identity()["chat_template"] == tiny.identity()["chat_template"]
+
+
+def test_keys_and_values_can_lie_in_cpu_memory(checkpoint: Path, tiny: Any, frames: list[FrameRef]) -> None:
+    model = _load(checkpoint, kv_offload="true")
+    assert _ask(model, frames).token_ids == _ask(tiny, frames).token_ids
+    assert model.identity() == _load(checkpoint).identity()
+
+
+@pytest.mark.parametrize("value", ["bnb4", "bnb8"])
+def test_quantisation_without_its_library_is_one_line(checkpoint: Path, value: str) -> None:
+    if importlib.util.find_spec("bitsandbytes") is not None:
+        pytest.skip("bitsandbytes is installed")
+    with pytest.raises(ModelError, match=r"cannot be loaded: .*(bitsandbytes|accelerate)") as caught:
+        _load(checkpoint, quantization=value)
+    _one_line(caught.value)
+
+
+def test_an_unknown_quantisation_is_a_usage_error(checkpoint: Path) -> None:
+    with pytest.raises(UsageError, match="quantization=q5 is not bnb4, bnb8 or none"):
+        _load(checkpoint, quantization="q5")
 
 
 @pytest.mark.parametrize(("option", "value"), [("dtype", "float33"), ("device", "abacus")])
