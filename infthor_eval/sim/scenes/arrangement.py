@@ -68,7 +68,7 @@ def _front(item: SimObject, nav: NavGrid) -> float:
 def _hinge(item: SimObject) -> int:
     """The side of the hinge, seen in the frame of the front: where a cabinet's origin is; left for other doors."""
     if item.object_type != "Cabinet":
-        return -1
+        return 1
     angle = np.radians(float(item.rotation[1]) + item.front)
     aside = float((item.position - item.center) @ (np.cos(angle), 0.0, -np.sin(angle)))
     return 1 if aside > 0 else -1

@@ -79,23 +79,23 @@ def microwave(b: Builder) -> None:
     if b.state.openness == 0:
         b.box((0, 0, -z), (1, 1, 1 - z), body, Material.METAL)
         window: Color = (0.9, 0.75, 0.4) if b.state.toggled else (0.13, 0.14, 0.16)
-        b.box((-0.22, 0, 1 - z), (0.74, 0.92, z), shade_of(body, 0.85), Material.METAL)
-        b.box((-0.27, 0, 1 - z / 2), (0.58, 0.68, z), window, Material.GLASS, glow=lit)
-        b.box((0.44, 0, 1 + z), (x, 0.7, z), CHROME, Material.METAL)
+        b.box((0.22, 0, 1 - z), (0.74, 0.92, z), shade_of(body, 0.85), Material.METAL)
+        b.box((0.27, 0, 1 - z / 2), (0.58, 0.68, z), window, Material.GLASS, glow=lit)
+        b.box((-0.44, 0, 1 + z), (x, 0.7, z), CHROME, Material.METAL)
     else:
         b.open_front(body, Material.METAL, 0.03)
-        b.tube((-0.2, -0.86, 0), (0.55, 0.03, 0.75), (0.8, 0.86, 0.88), Material.GLASS)
-        b.box((0.76, 0, 0), (0.22, 0.94, 0.98), shade_of(body, 0.9), Material.METAL)
+        b.tube((0.2, -0.86, 0), (0.55, 0.03, 0.75), (0.8, 0.86, 0.88), Material.GLASS)
+        b.box((-0.76, 0, 0), (0.22, 0.94, 0.98), shade_of(body, 0.9), Material.METAL)
         wide = float(b.half[0])
-        angle = -_SWING * b.state.openness
-        b.swung((-1, 0, 1), (0.74 * wide, 0, -0.012), (0.74 * wide, 0.92 * float(b.half[1]), 0.012), angle,
+        angle = _SWING * b.state.openness
+        b.swung((1, 0, 1), (-0.74 * wide, 0, -0.012), (0.74 * wide, 0.92 * float(b.half[1]), 0.012), angle,
                 shade_of(body, 0.8), Material.METAL)  # fmt: skip
-        b.swung((-1, 0, 1), (0.72 * wide, 0, 0.002), (0.55 * wide, 0.65 * float(b.half[1]), 0.012), angle,
+        b.swung((1, 0, 1), (-0.72 * wide, 0, 0.002), (0.55 * wide, 0.65 * float(b.half[1]), 0.012), angle,
                 (0.13, 0.14, 0.16), Material.GLASS)  # fmt: skip
-    b.box((0.76, 0.1, 1 - z / 2), (0.18, 0.7, z), BLACK)
-    b.box((0.76, 0.62, 1), (0.14, 0.12, z), (0.2, 0.85, 0.45), glow=0.6)
+    b.box((-0.76, 0.1, 1 - z / 2), (0.18, 0.7, z), BLACK)
+    b.box((-0.76, 0.62, 1), (0.14, 0.12, z), (0.2, 0.85, 0.45), glow=0.6)
     for row in range(3):
-        b.box((0.76, 0.25 - 0.25 * row, 1), (0.12, 0.07, z), (0.55, 0.56, 0.58))
+        b.box((-0.76, 0.25 - 0.25 * row, 1), (0.12, 0.07, z), (0.55, 0.56, 0.58))
 
 
 def safe(b: Builder) -> None:
