@@ -20,7 +20,9 @@ def blocking_object(world: World, target: Array) -> str | None:
     What already touches the agent does not hold it: it could not get away otherwise.
     """
     for item in world.objects.values():
-        if item.state.openness <= 0 or not (item.object_type in _DOORED or item.object_type == "Drawer"):
+        if item.object_id in world.open_at_start or item.state.openness <= 0:
+            continue
+        if not (item.object_type in _DOORED or item.object_type == "Drawer"):
             continue
         leaf = door_leaf(item)
         if leaf is None or leaf[1][1] < _KNEE or leaf[0][1] > _HEAD:

@@ -15,7 +15,7 @@ __all__ = ["SIZES", "default_object", "style_of", "support_height"]
 # width, height, depth in metres, front towards z
 SIZES: dict[str, tuple[float, float, float]] = {
     "AlarmClock": (0.19, 0.18, 0.10), "AluminumFoil": (0.24, 0.04, 0.06), "Apple": (0.12, 0.12, 0.12),
-    "AppleSliced": (0.03, 0.11, 0.11), "ArmChair": (0.86, 0.91, 0.84), "BaseballBat": (0.24, 0.95, 0.12),
+    "AppleSliced": (0.03, 0.11, 0.11), "ArmChair": (0.86, 0.91, 0.84), "BaseballBat": (0.10, 0.10, 0.85),
     "BasketBall": (0.24, 0.24, 0.24), "Bathtub": (1.35, 0.60, 1.78), "BathtubBasin": (1.20, 0.42, 1.02),
     "Bed": (1.40, 0.92, 2.34), "Blinds": (1.01, 0.20, 0.03), "Book": (0.22, 0.03, 0.30),
     "Boots": (0.28, 0.52, 0.23), "Bottle": (0.11, 0.25, 0.11), "Bowl": (0.19, 0.09, 0.19),
@@ -51,7 +51,7 @@ SIZES: dict[str, tuple[float, float, float]] = {
     "Spoon": (0.04, 0.02, 0.21), "SprayBottle": (0.03, 0.25, 0.11), "Statue": (0.21, 0.34, 0.15),
     "Stool": (0.36, 0.76, 0.31), "StoveBurner": (0.22, 0.02, 0.22), "StoveKnob": (0.07, 0.08, 0.07),
     "TVStand": (1.20, 0.73, 0.60), "TableTopDecor": (0.40, 0.14, 0.31), "TeddyBear": (0.53, 0.57, 0.40),
-    "Television": (1.13, 0.81, 0.31), "TennisRacket": (0.26, 0.64, 0.32), "TissueBox": (0.20, 0.15, 0.10),
+    "Television": (1.13, 0.81, 0.31), "TennisRacket": (0.26, 0.04, 0.68), "TissueBox": (0.20, 0.15, 0.10),
     "Toaster": (0.22, 0.21, 0.36), "Toilet": (0.53, 1.04, 0.97), "ToiletPaper": (0.10, 0.12, 0.08),
     "ToiletPaperHanger": (0.23, 0.08, 0.10), "Tomato": (0.12, 0.10, 0.13),
     "TomatoSliced": (0.02, 0.10, 0.11), "Towel": (0.41, 0.59, 0.04), "TowelHolder": (0.66, 0.04, 0.11),

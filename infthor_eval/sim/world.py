@@ -74,6 +74,7 @@ class World:
     Attributes:
         objects: by id, in the order of the metadata.
         version: grows with every change, so that views can be cached.
+        open_at_start: doors that are open in the recording; its cells already go around them.
         coarse: the shapes of its furniture are only known as boxes, as in recordings.
     """
 
@@ -87,6 +88,7 @@ class World:
     version: int = 0
     coarse: bool = False
     walls: tuple[Wall, ...] = ()
+    open_at_start: frozenset[str] = frozenset()
     templates: dict[str, list[SimObject]] = field(default_factory=dict)
 
     def get(self, object_id: str) -> SimObject:

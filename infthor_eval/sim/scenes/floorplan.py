@@ -57,6 +57,7 @@ def build_floor_plan(name: str, entries: Sequence[Mapping[str, Any]], layout: Ar
         seed=_number(name),
         coarse=True,
     )
+    world.open_at_start = frozenset(o.object_id for o in objects.values() if o.state.openness > 0)
     arrange(world)
     for item in objects.values():
         if item.object_type == "Floor":

@@ -64,12 +64,13 @@ def _counter(plan: RoomPlan) -> None:
 
 
 def _lower(plan: RoomPlan, at: float, index: int, drawer: bool) -> None:
-    top = _HEIGHT - (0.05 if drawer else 0.19)
+    top = _HEIGHT - 0.05
     if drawer:
         plan.against("z+", "Drawer", at, y=top - 0.17, size=(_MODULE - 0.02, 0.16, _DEPTH - 0.06))
         top -= 0.18
     cabinet = plan.against("z+", "Cabinet", at, y=0.1, size=(_MODULE - 0.02, top - 0.11, _DEPTH - 0.06))
     cabinet.hinge = 1 if index % 2 else -1
+    cabinet.hollow = not drawer  # the sink hangs in it
 
 
 def _sink(plan: RoomPlan, top: SimObject, at: float) -> None:

@@ -186,9 +186,11 @@ def _scatter(world: World, plan: RoomPlan) -> None:
         item = default_object(kind, np.zeros(3))
         item.style = int(plan.random.integers(1000))
         fitting = [o for o in homes if allowed_in(kind, o.object_type)]
-        for index in plan.random.permutation(len(fitting)):
-            place = find_place(world, item, fitting[index], random=plan.random)
-            full = len(fitting[index].contents) >= _AT_MOST.get(fitting[index].object_type, 99)
+        holders = [o for o in fitting if o.object_type.endswith("Holder")]
+        order = [*holders, *(fitting[i] for i in plan.random.permutation(len(fitting)))]
+        for home in order:
+            place = find_place(world, item, home, random=plan.random)
+            full = len(home.contents) >= _AT_MOST.get(home.object_type, 99)
             if place is None or full:
                 continue
             made = default_object(kind, np.round(place.position, 4), float(place.rotation[1]))
@@ -196,5 +198,5 @@ def _scatter(world: World, plan: RoomPlan) -> None:
             made.state.openness = 1.0 if kind in {"Box", "Laptop"} else 0.0  # as AI2-THOR's rooms have them
             if made.object_id not in world.objects:
                 world.add(made)
-                world.attach(made, fitting[index])
+                world.attach(made, home)
                 break
