@@ -1,5 +1,7 @@
 """`infthor-eval ls`: what there is to evaluate, and on what."""
 
+from pathlib import Path
+
 import click
 from rich import box
 from rich.console import Console
@@ -11,10 +13,11 @@ __all__ = ["command"]
 
 
 @click.command("ls")
-@click.argument("what", type=click.Choice(["models", "tasks"]))
-def command(what: str) -> None:
-    """List the models with their options, or the tasks."""
-    Console().print(_models() if what == "models" else _tasks())
+@click.argument("what", type=click.Choice(["models", "tasks", "scenes"]))
+@click.option("--data", type=click.Path(path_type=Path), help="Folder with recorded floor plans, for scenes.")
+def command(what: str, data: Path | None) -> None:
+    """List the models with their options, the tasks, or the embedded simulator's scenes."""
+    Console().print({"models": _models, "tasks": _tasks}[what]() if what != "scenes" else _scenes(data))
 
 
 def _models() -> Table:
@@ -40,4 +43,16 @@ def _tasks() -> Table:
         settings = config["dataset_kwargs"]
         data = f"the bundled set {settings['bundled']}" if "bundled" in settings else "the set given with --data"
         table.add_row(name, f"context {settings['context']}, {data}")
+    return table
+
+
+def _scenes(data: Path | None) -> Table:
+    from infthor_eval.formats.floor_plans import floor_plan_names
+
+    table = Table("scene", "what it is", box=box.SIMPLE_HEAD)
+    for kind in ("kitchen", "living-room", "bedroom", "bathroom"):
+        table.add_row(f"{kind}-<seed>", f"a {kind.replace('-', ' ')} made from the seed")
+    table.add_row("house-<seed>", "a house of several rooms made from the seed")
+    for name in floor_plan_names(data) if data else ():
+        table.add_row(name, f"recorded, in {data}")
     return table

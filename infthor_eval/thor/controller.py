@@ -55,6 +55,10 @@ class SafeController(ai2thor.controller.Controller):
             # Also what ai2thor says of a scene or a build that does not exist.
             self.stop()
             message = " ".join(str(error).split())[:300]
+            if "no build exists" in message:  # what ai2thor says where it cannot reach its download server either
+                raise SimulatorError(
+                    "AI2-THOR's Unity build is neither here nor to be downloaded; go online once, or name an executable"
+                ) from error
             raise SimulatorError(f"scene {_scene_name(scene)}: {message}") from error
         except BaseException:
             self.stop()

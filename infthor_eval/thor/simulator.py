@@ -6,6 +6,7 @@ holds as far as the simulator is deterministic, so each repeated action must end
 """
 
 import logging
+from dataclasses import dataclass
 from types import TracebackType
 from typing import Any, Self
 
@@ -15,10 +16,21 @@ from infthor_eval.thor.launch import Launch
 from infthor_eval.thor.transport import PeerFault
 from infthor_eval.thor.view import View, view_of
 
-__all__ = ["Simulator"]
+__all__ = ["Mark", "Simulator"]
 
 _LOG = logging.getLogger(__name__)
 _INITIAL = {"gridSize": 0.25, "fieldOfView": 60, "visibilityDistance": 1.5, "snapToGrid": True}
+
+
+_WALKING = {"MoveAhead", "MoveBack", "MoveLeft", "MoveRight", "RotateLeft", "RotateRight", "LookUp", "LookDown"}
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A moment of an episode: how many actions led to it, and the world then."""
+
+    length: int
+    view: View
 
 
 class Simulator:
@@ -93,6 +105,17 @@ class Simulator:
             raise SimulatorError("no scene is loaded; reset the simulator to one first")
         return self._view
 
+    @property
+    def metadata(self) -> dict[str, Any]:
+        """The simulator's last reply as it came, with all its fields; `view` is the typed part of it.
+
+        Raises:
+            SimulatorError: no scene is loaded.
+        """
+        if self._controller is None or self._controller.last_event is None:
+            raise SimulatorError("no scene is loaded; reset the simulator to one first")
+        return dict(self._controller.last_event.metadata)
+
     def reset(self, scene: str | dict[str, Any] | None) -> View:
         """Load a scene and begin an episode.
 
@@ -145,30 +168,47 @@ class Simulator:
         self._view = before
         return answer
 
-    def mark(self) -> int:
-        """Remember where the episode is now, for `rewind`; one mark at a time is cheap to go back to.
+    def mark(self) -> Mark:
+        """Remember where the episode is now, for `rewind`; the last mark is cheap to go back to.
 
-        The embedded simulator keeps a copy of its state. Unity cannot: there `rewind` repeats the episode.
+        The embedded simulator keeps a copy of its state. Unity cannot: there `rewind` may repeat the episode.
         """
         saved = self.query("SaveState").success
         self._saved = len(self._episode) if saved else None
-        return len(self._episode)
+        return Mark(len(self._episode), self.view)
 
-    def rewind(self, mark: int) -> View:
+    def rewind(self, mark: Mark) -> View:
         """Bring the world back to where it was at a mark of this episode.
 
         Raises:
             SimulatorError: as `step`.
         """
-        if self._saved == mark and (view := self.query("RestoreState")).success:
-            del self._episode[mark:]
-            self._view = view
-            return view
-        calls = [call for call, _ in self._episode[:mark]]
-        view = self.reset(self._scene)
+        since = self._episode[mark.length :]
+        walked = all(call["action"] in _WALKING for call, _ in since)
+        if (walked and self._walk_back(mark)) or (self._saved == mark.length and self._restore()):
+            del self._episode[mark.length :]
+            self._view = mark.view
+            return mark.view
+        calls = [call for call, _ in self._episode[: mark.length]]
+        self.reset(None)
         for call in calls:
-            view = self.step(**call)
-        return view
+            self.step(**call)
+        return self.view
+
+    def _restore(self) -> bool:
+        return self.query("RestoreState").success
+
+    def _walk_back(self, mark: Mark) -> bool:
+        """Put the agent where it was; enough where it only walked and looked about since."""
+        agent = mark.view.agent
+        back = self.query(
+            "Teleport",
+            position={"x": agent.position.x, "y": agent.position.y, "z": agent.position.z},
+            rotation={"x": 0.0, "y": agent.rotation, "z": 0.0},
+            horizon=agent.horizon,
+            forceAction=True,
+        )
+        return back.success and back.agent == agent
 
     def close(self) -> None:
         """Stop the simulator; a later `reset` starts it again."""

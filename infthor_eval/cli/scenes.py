@@ -1,0 +1,58 @@
+"""`infthor-eval scenes`: look at a scene, or carry it to machines without Unity."""
+
+from pathlib import Path
+
+import click
+
+__all__ = ["command"]
+
+_DATA = click.option("--data", type=click.Path(path_type=Path), help="Folder with recorded floor plans.")
+
+
+@click.group("scenes")
+def command() -> None:
+    """Look at scenes (show), or carry them to machines without Unity (dump)."""
+
+
+@command.command("show")
+@click.argument("name")
+@_DATA
+@click.option("--out", type=click.Path(path_type=Path), help="The picture to write; NAME.png otherwise.")
+@click.option("--size", type=click.IntRange(64, 2048), default=600, show_default=True, help="Of each view, pixels.")
+def show(name: str, data: Path | None, out: Path | None, size: int) -> None:
+    """Draw scene NAME from above and as the agent first sees it, side by side."""
+    from PIL import Image
+
+    from infthor_eval.thor.launch import embedded
+    from infthor_eval.thor.scenes import scene_pictures
+    from infthor_eval.thor.simulator import Simulator
+
+    with Simulator(embedded(data), width=size, height=size, quality="Ultra") as simulator:
+        above, first = scene_pictures(simulator, name)
+    sheet = Image.new("RGB", (2 * size, size))
+    sheet.paste(Image.fromarray(above), (0, 0))
+    sheet.paste(Image.fromarray(first), (size, 0))
+    path = out or Path(f"{name}.png")
+    sheet.save(path)
+    click.echo(f"{name}: {path} (from above; first view)")
+
+
+@command.command("dump")
+@click.argument("names", nargs=-1, required=True)
+@click.option("--out", type=click.Path(path_type=Path), required=True, help="Folder of floor plans, made or added to.")
+@click.option("--unity", type=click.Path(path_type=Path), help="Unity's executable, not the build ai2thor downloads.")
+@click.option("--embedded", "is_embedded", is_flag=True, help="Dump scenes of the embedded simulator instead.")
+@_DATA
+def dump(names: tuple[str, ...], out: Path, unity: Path | None, is_embedded: bool, data: Path | None) -> None:
+    """Write what Unity reports of the scenes NAMES, for --data of the other commands.
+
+    With that folder they run in the embedded simulator on machines without Unity.
+    """
+    from infthor_eval.thor import launch
+    from infthor_eval.thor.scenes import dump_scene
+    from infthor_eval.thor.simulator import Simulator
+
+    start = launch.embedded(data) if is_embedded else launch.unity(unity)
+    with Simulator(start) as simulator:
+        for name in names:
+            click.echo(f"{name}: {dump_scene(simulator, name, out)} objects in {out}")

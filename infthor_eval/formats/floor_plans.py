@@ -1,0 +1,82 @@
+"""Writing floor plans into a folder of recorded ones (`--data`).
+
+The folder has `thor_scenes/objects.jsonl.gz`, one `{"scene", "objects"}` a line with every object's metadata as
+AI2-THOR 5.x reports it (boxes without corner points), and `alfred/layouts/FloorPlan<N>-layout.npy`, reachable (x, z)
+in metres.
+"""
+
+import gzip
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from infthor_eval.errors import DataError
+
+__all__ = ["floor_plan_names", "write_floor_plan"]
+
+_OBJECTS = Path("thor_scenes") / "objects.jsonl.gz"
+
+
+def floor_plan_names(root: Path) -> list[str]:
+    """The floor plans that a folder of recorded ones has.
+
+    Raises:
+        DataError: the folder's file of objects is missing or not what it should be.
+    """
+    path = root / _OBJECTS
+    try:
+        with gzip.open(path, "rt", encoding="utf-8") as file:
+            return [str(json.loads(line)["scene"]) for line in file if line.strip()]
+    except (OSError, EOFError, ValueError, KeyError, TypeError) as error:
+        raise DataError(
+            f"{path}: not a file of recorded floor plans ({error}); give their folder with --data"
+        ) from error
+
+
+def write_floor_plan(
+    root: Path, scene: str, objects: Sequence[dict[str, Any]], cells: Sequence[tuple[float, float]]
+) -> None:
+    """Add a floor plan to a folder of recorded ones, in place of what it has of that name.
+
+    Args:
+        root: the folder; made where it does not exist.
+        scene: name of the floor plan.
+        objects: metadata of every object, as AI2-THOR reports it.
+        cells: reachable (x, z), metres.
+
+    Raises:
+        DataError: the folder's file of objects cannot be read or written.
+    """
+    path = root / _OBJECTS
+    layouts = root / "alfred" / "layouts"
+    partial = path.with_name(path.name + ".partial")
+    line = json.dumps({"scene": scene, "objects": [_without_corners(item) for item in objects]})
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        layouts.mkdir(parents=True, exist_ok=True)
+        with gzip.open(partial, "wt", encoding="utf-8") as file:
+            file.writelines(f"{kept}\n" for kept in [*_others(path, scene), line])
+        np.save(layouts / f"{scene}-layout.npy", np.array(cells, dtype=np.float64).reshape(-1, 2))
+        types = sorted({item["objectType"] for item in objects})
+        (layouts / f"{scene}-objects.json").write_text(json.dumps(types, indent=1) + "\n", encoding="utf-8")
+        partial.replace(path)
+    except (OSError, EOFError, ValueError, KeyError) as error:
+        raise DataError(f"{path}: {scene} cannot be added ({error}); give another folder with --data") from error
+
+
+def _others(path: Path, scene: str) -> list[str]:
+    """The lines of all other scenes, as they stand."""
+    if not path.is_file():
+        return []
+    with gzip.open(path, "rt", encoding="utf-8") as file:
+        lines = [line.rstrip("\n") for line in file if line.strip()]
+    return [line for line in lines if json.loads(line)["scene"] != scene]
+
+
+def _without_corners(item: dict[str, Any]) -> dict[str, Any]:
+    box = item.get("axisAlignedBoundingBox") or {}
+    kept = {key: value for key, value in box.items() if key != "cornerPoints"}
+    return {**item, "axisAlignedBoundingBox": kept}

@@ -1,0 +1,55 @@
+"""Scenes of a simulator: what they look like, and carrying them to machines without Unity."""
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from infthor_eval.errors import SimulatorError
+from infthor_eval.formats.floor_plans import write_floor_plan
+from infthor_eval.thor.simulator import Simulator
+from infthor_eval.thor.view import View
+
+__all__ = ["dump_scene", "scene_pictures"]
+
+
+def scene_pictures(simulator: Simulator, scene: str) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+    """The scene from above, and the agent's first view: RGB, uint8, [height, width, 3].
+
+    Raises:
+        SimulatorError: the simulator does not have the scene, or frames are off.
+    """
+    first = simulator.reset(scene).frame
+    above = _asked(simulator, "ToggleMapView").frame
+    if first is None or above is None:
+        raise SimulatorError(f"scene {scene}: the simulator sends no frames; start it with rendering")
+    return above, first
+
+
+def dump_scene(simulator: Simulator, scene: str, folder: Path) -> int:
+    """Write what the simulator reports of a scene into a folder of recorded floor plans.
+
+    Args:
+        simulator: Unity, to carry a scene to machines without it; any other serves.
+        scene: its name.
+        folder: the folder (`--data`).
+
+    Returns:
+        The number of objects.
+
+    Raises:
+        SimulatorError: the simulator does not have the scene.
+        DataError: the folder cannot be written.
+    """
+    simulator.reset(scene)
+    objects = simulator.metadata["objects"]
+    reachable = _asked(simulator, "GetReachablePositions").result
+    write_floor_plan(folder, scene, objects, [(place["x"], place["z"]) for place in reachable])
+    return len(objects)
+
+
+def _asked(simulator: Simulator, action: str) -> View:
+    view = simulator.query(action)
+    if not view.success:
+        raise SimulatorError(f"{action} failed: {view.error}; use AI2-THOR 5.x")
+    return view

@@ -1,0 +1,58 @@
+import gzip
+import json
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from infthor_eval.cli import main
+
+
+def run(capfd, *arguments):
+    with pytest.raises(SystemExit) as ended:
+        main([str(argument) for argument in arguments])
+    return ended.value.code, *capfd.readouterr()
+
+
+def test_a_dumped_scene_runs_from_the_folder_and_keeps_its_objects(tmp_path, capfd):
+    folder = tmp_path / "data"
+    code, out, err = run(capfd, "scenes", "dump", "kitchen-2", "bedroom-1", "--embedded", "--out", folder)
+    assert code == 0, err
+    assert run(capfd, "scenes", "dump", "kitchen-2", "--embedded", "--out", folder)[0] == 0
+    with gzip.open(folder / "thor_scenes" / "objects.jsonl.gz", "rt") as file:
+        lines = [json.loads(line) for line in file]
+    assert [line["scene"] for line in lines] == ["bedroom-1", "kitchen-2"]
+    assert f"kitchen-2: {len(lines[1]['objects'])} objects" in out
+    assert all("cornerPoints" not in item["axisAlignedBoundingBox"] for item in lines[1]["objects"])
+    cells = np.load(folder / "alfred" / "layouts" / "kitchen-2-layout.npy")
+    assert cells.shape[1] == 2
+    assert len(cells) > 10
+    assert "kitchen-2" in run(capfd, "ls", "scenes", "--data", folder)[1]
+
+
+def test_a_scene_is_drawn_from_above_and_from_the_agent(tmp_path, capfd):
+    path = tmp_path / "kitchen.png"
+    code, _, err = run(capfd, "scenes", "show", "kitchen-1", "--out", path, "--size", 100)
+    assert code == 0, err
+    picture = np.asarray(Image.open(path))
+    assert picture.shape == (100, 200, 3)
+    for half in (picture[:, :100], picture[:, 100:]):
+        assert len(np.unique(half.reshape(-1, 3), axis=0)) > 20
+    assert (picture[:, :100] != picture[:, 100:]).any()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["scenes", "show", "attic-1"], "attic-1"),
+        (["scenes", "show", "FloorPlan1"], "FloorPlan1"),
+        (["scenes", "dump", "FloorPlan1", "--out", "x", "--unity", "/nowhere/thor"], "/nowhere/thor"),
+        (["ls", "scenes", "--data", "nowhere"], "not a file of recorded floor plans"),
+    ],
+)
+def test_a_scene_that_is_not_there_is_one_line(arguments, said, capfd, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    code, _, err = run(capfd, *arguments)
+    assert code in (1, 2)
+    assert said in err
+    assert len(err.strip().splitlines()) == 1
