@@ -27,7 +27,7 @@ from infthor_eval.generation.pddl import problem
 from infthor_eval.generation.planner import plan
 from infthor_eval.generation.recorder import object_log
 from infthor_eval.generation.rollout import Rollout, RolloutError
-from infthor_eval.generation.sampling import TaskPool
+from infthor_eval.generation.sampling import TaskPool, tasks_of
 from infthor_eval.generation.scout import reachable
 from infthor_eval.generation.symbolic import Operator, Room, room_of
 from infthor_eval.generation.tasks import Task, TaskType, sub_task
@@ -189,18 +189,26 @@ class _Factory:
 
     def _first_that_works(self, allowed: Callable[[Task], bool], trials: int | None) -> Task | None:
         """Try sampled tasks until one becomes part of the trajectory; None where none does."""
-        room = room_of(self._simulator.view)
-        kinds = {item.object_type for item in self._simulator.view.objects.values()}
+        view = self._simulator.view
+        kinds = {item.object_type for item in view.objects.values()}
+        blocked: set[str] = set()  # what turned out to be out of reach or full, as things are
+        room = room_of(view)
+        possible = set(tasks_of(room, kinds))
         tried = 0
         for task in self._pool.sample(room, kinds):
-            operators = plan(task, room) if allowed(task) else None
+            operators = plan(task, room) if task in possible and allowed(task) else None
             if not operators:
                 continue
             if tried == trials:
                 return None
             tried += 1
-            if self._try(task, room, operators):
+            failure = self._try(task, room, operators)
+            if failure is None:
                 return task
+            if failure.item is not None:
+                blocked.add(failure.item)
+                room = room_of(view, blocked)
+                possible = set(tasks_of(room, kinds))
         return None
 
     def put_down(self) -> None:
@@ -214,7 +222,7 @@ class _Factory:
         ]
         self._rng.shuffle(places)
         for place in places:
-            if self._carry_out([Operator("PutObject", held, place)]):
+            if self._carry_out([Operator("PutObject", held, place)]) is None:
                 return
 
     def trajectory(self) -> Trajectory:
@@ -236,13 +244,14 @@ class _Factory:
             },
         )
 
-    def _try(self, task: Task, room: Room, operators: Sequence[Operator]) -> bool:
+    def _try(self, task: Task, room: Room, operators: Sequence[Operator]) -> RolloutError | None:
         name = f"{task.kind}{' sliced' if task.sliced else ''}"
         self.statistics.tried[name] += 1
         low, high = len(self._low), len(self._high)
-        if not self._carry_out(operators):
+        failure = self._carry_out(operators)
+        if failure is not None:
             self._pool.failed(task)
-            return False
+            return failure
         self.statistics.accepted[name] += 1
         self._pool.used(task)
         self.problems.append(problem(task, room, f"task-{len(self.problems):03d}"))
@@ -251,9 +260,9 @@ class _Factory:
             SubTrajectory(len(self._sub_tasks), (high, len(self._high)), (low, len(self._low)), described.task_desc)
         )
         self._sub_tasks.append(described)
-        return True
+        return None
 
-    def _carry_out(self, operators: Sequence[Operator]) -> bool:
+    def _carry_out(self, operators: Sequence[Operator]) -> RolloutError | None:
         """Run operators; where that fails, the simulator is as it was before and nothing is added."""
         mark = self._simulator.mark()
         rollout = Rollout(self._simulator, len(self._high))
@@ -262,13 +271,13 @@ class _Factory:
         except RolloutError as error:
             self.statistics.reasons[str(error)] += 1
             self._simulator.rewind(mark)
-            return False
+            return error
         for acted in rollout.acted:
             acted.low.low_idx = len(self._low)
             self._low.append(acted.low)
             self._note(len(self._low), acted.view)
         self._high += rollout.high
-        return True
+        return None
 
     def _note(self, step: int, view: Any = None) -> None:
         entry = object_log(view or self._simulator.view)

@@ -40,7 +40,7 @@ def ends_of(object_log: Sequence[dict[str, Any]]) -> Ends:
     Args:
         object_log: one entry per frame, with the types that are visible there.
     """
-    count = max(1, math.ceil(SHARE * len(object_log)))
+    count = max(1, math.floor(SHARE * len(object_log)))
     early, late = object_log[:count], object_log[-count:]
     return Ends(*({kind for entry in part for kind in entry["visible"]} for part in (early, late)))
 

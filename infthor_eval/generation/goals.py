@@ -1,9 +1,12 @@
 """When a task is done, in the symbolic state, and a lower bound on what is left to do."""
 
+from infthor_eval.generation.affordances import KNIVES
 from infthor_eval.generation.symbolic import Room, State
 from infthor_eval.generation.tasks import Task, TaskType
 
-__all__ = ["achieved", "least_remaining"]
+__all__ = ["APPLIANCE", "achieved", "least_remaining"]
+
+APPLIANCE = {TaskType.CLEAN: "SinkBasin", TaskType.HEAT: "Microwave", TaskType.COOL: "Fridge"}
 
 
 def achieved(task: Task, room: Room, state: State) -> bool:
@@ -15,16 +18,45 @@ def achieved(task: Task, room: Room, state: State) -> bool:
 
 
 def least_remaining(task: Task, room: Room, state: State) -> int:
-    """A number of operators that no plan from this state can do without (0 where the goal holds)."""
+    """A number of operators that no plan from this state can do without; 0 just where the goal holds."""
     if achieved(task, room, state):
         return 0
+    here = room.types.get(state.at or "")
+    held = None if state.held is None else room.types[state.held]
+    needed = _to_slice(task, room, state, held) + _to_treat(task, state, here)
     if task.kind == TaskType.EXAMINE:
-        right = state.held is not None and room.types[state.held] == task.target
-        return 1 if right else 2
-    missing = _wanted(task) - _placed(task, room, state)
-    # Each missing object must be put, and picked up unless it is the one in the hand.
-    carried = state.held is not None and room.types[state.held] in {task.target, task.movable}
-    return 2 * missing - carried
+        return max(1, needed + (here != task.light) + (held != task.target))
+    # Whatever completes the goal happens at its receptacle.
+    return max(1, needed + (here != task.receptacle) + _to_carry(task, room, state, held))
+
+
+def _to_slice(task: Task, room: Room, state: State, held: str | None) -> int:
+    """What slicing still needs: the knife in the hand and the cut."""
+    if not task.sliced or any(parent for item, parent in state.where if room.types[item] == task.target):
+        return 0
+    in_hand = held == task.target
+    return 0 if in_hand else 1 + (held not in KNIVES)
+
+
+def _to_treat(task: Task, state: State, here: str | None) -> int:
+    """What washing, heating or cooling still needs: going there and doing it."""
+    treated = {TaskType.CLEAN: state.clean, TaskType.HEAT: state.hot, TaskType.COOL: state.cold}.get(task.kind)
+    return 0 if treated is None or treated else 1 + (here != APPLIANCE[task.kind])
+
+
+def _to_carry(task: Task, room: Room, state: State, held: str | None) -> int:
+    """The pick-ups and puts still needed; what is sliced where it shall be needs none."""
+    if task.kind == TaskType.STACK:
+        where = dict(state.where)
+        carriers = [item for item in where if room.types[item] == task.movable]
+        there = any(room.types.get(where[item]) == task.receptacle for item in carriers)
+        filled = task.sliced or any(
+            room.types.get(parent) == task.movable for item, parent in state.where if room.types[item] == task.target
+        )
+        return (0 if there else 2 - (held == task.movable)) + (0 if filled else 2 - (held == task.target))
+    if task.sliced:
+        return 0
+    return 2 * (_wanted(task) - _placed(task, room, state)) - (held == task.target)
 
 
 def _wanted(task: Task) -> int:

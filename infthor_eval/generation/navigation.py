@@ -18,6 +18,12 @@ class Stand:
     cell: Cell
     facing: int
 
+    @property
+    def ahead(self) -> Cell:
+        """The next cell that way."""
+        dx, dz = _AHEAD[self.facing]
+        return self.cell[0] + dx, self.cell[1] + dz
+
 
 class Grid:
     """The cells that the agent can reach."""
@@ -36,6 +42,10 @@ class Grid:
     def position(self, cell: Cell) -> tuple[float, float]:
         """The (x, z) position of a cell, metres."""
         return cell[0] * GRID + self._origin[0], cell[1] * GRID + self._origin[1]
+
+    def without(self, cell: Cell) -> "Grid":
+        """The same grid, one cell less."""
+        return Grid(self.position(other) for other in self.cells if other != cell)
 
     def distances(self, start: Stand) -> dict[Stand, int]:
         """Number of actions from a stand to every stand that can be reached."""
@@ -69,12 +79,11 @@ class Grid:
         return found
 
     def _moves(self, stand: Stand) -> list[tuple[str, Stand]]:
-        (x, z), facing = stand.cell, stand.facing
-        dx, dz = _AHEAD[facing]
+        facing = stand.facing
         moves = [
             ("RotateLeft", Stand(stand.cell, (facing - 90) % 360)),
             ("RotateRight", Stand(stand.cell, (facing + 90) % 360)),
         ]
-        if (x + dx, z + dz) in self.cells:
-            moves.insert(0, ("MoveAhead", Stand((x + dx, z + dz), facing)))
+        if stand.ahead in self.cells:
+            moves.insert(0, ("MoveAhead", Stand(stand.ahead, facing)))
         return moves

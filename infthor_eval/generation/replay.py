@@ -13,6 +13,7 @@ from infthor_eval.formats.step_log import write_steps
 from infthor_eval.formats.trajectory import LowAction, Trajectory
 from infthor_eval.generation.recorder import Recorder
 from infthor_eval.generation.sequence_text import sequence_text
+from infthor_eval.generation.state_summary import state_summaries
 from infthor_eval.thor.actions import text_of
 from infthor_eval.thor.grounding import Grounding
 from infthor_eval.thor.recorded import MissingObjectError, translate
@@ -69,7 +70,10 @@ class Replayed(msgspec.Struct):
 
 
 def replay(trajectory: Trajectory, simulator: Simulator, folder: Path, digest: str) -> Replayed:
-    """Run a trajectory and write `img/`, `metadata.json`, `traj.txt` and `expert_log.json` into a folder.
+    """Run a trajectory and write its frames and logs into a folder.
+
+    These are `img/`, `metadata.json`, `traj.txt`, `expert_log.json`, and `state_summary.json`: the room in words
+    after each task and at the end, by index of the low-level action.
 
     Args:
         trajectory: ALFRED's, ∞-THOR's or ours.
@@ -92,6 +96,9 @@ def replay(trajectory: Trajectory, simulator: Simulator, folder: Path, digest: s
     (folder / "traj.txt").write_text(sequence_text(trajectory, steps) + "\n")
     images = [{"low_idx": step.step, "image_name": step.img_filename} for step in steps]
     (folder / "expert_log.json").write_bytes(msgspec.json.encode({"images": images}) + b"\n")
+    ends = {item.low_pddl_idx[1] - 1 for item in trajectory.sub_trajs} | {len(trajectory.plan.low_actions) - 1}
+    summaries = {str(index): text for index, text in state_summaries(steps, ends).items()}
+    (folder / "state_summary.json").write_bytes(msgspec.json.encode(summaries) + b"\n")
     return run.report
 
 

@@ -22,7 +22,15 @@ _MIN_PIXELS = 60  # of what is acted on, in a frame of 90,000
 
 
 class RolloutError(Exception):
-    """The plan cannot be carried out here; the message says at which action and why."""
+    """The plan cannot be carried out here; the message says at which action and why.
+
+    Attributes:
+        item: id of an object that cannot be acted on as things are, where it was that.
+    """
+
+    def __init__(self, message: str, item: str | None = None) -> None:
+        super().__init__(message)
+        self.item = item
 
 
 @dataclass(frozen=True)
@@ -136,47 +144,64 @@ class Rollout:
     def _go(self, shown: list[str], inside: str | None = None) -> None:
         """Walk to where the objects can be acted on, as a sub-goal of its own."""
         target = self._view.objects[shown[0]]
-        viewpoint, moves = self._way(shown, inside)
-        if not moves:
+        viewpoint = self._viewpoint(shown, inside)
+        if self._moves(viewpoint) == []:
             return
         (x, z), facing = viewpoint.stand.cell, viewpoint.stand.facing
         location = f"loc|{x}|{z}|{facing // _TURN}|{viewpoint.horizon}"
         action = PlannerAction("GotoLocation", location=location, object_id=target.object_id)
         words = DiscreteAction("GotoLocation", [compact(target.object_type)])
         self.high.append(HighAction(self.first_high + len(self.high), words, action))
-        self._walk(moves, shown)
+        self._walk(viewpoint, shown)
 
-    def _way(self, shown: list[str], inside: str | None = None) -> tuple[Viewpoint, list[str]]:
-        """Where to act on the objects, and the actions that lead there."""
+    def _viewpoint(self, shown: list[str], inside: str | None = None) -> Viewpoint:
+        """Where to act on the objects from."""
+        found = find_viewpoint(self.simulator, self._cells(), shown, inside, _MIN_PIXELS)
+        if found is None:
+            target = self._view.objects[inside or shown[0]]
+            raise RolloutError(f"no place to reach {target.object_type} from", target.object_id)
+        return found
+
+    def _walk(self, viewpoint: Viewpoint, shown: list[str]) -> None:
+        """Go there. A refused step changes nothing and is not part of the trajectory: it is walked around."""
         target = self._view.objects[shown[0]].object_type
+        while (moves := self._moves(viewpoint)) is not None:
+            if all(self._move(action) for action in moves):
+                break
+        else:
+            raise RolloutError(f"no way to {target}")
+        if not all(self._view.objects[key].visible for key in shown):
+            raise RolloutError(f"{target} is out of sight after walking to it")
+
+    def _moves(self, viewpoint: Viewpoint) -> list[str] | None:
+        """The actions that lead to a viewpoint."""
+        grid = self._cells()
+        path = grid.path(stand_of(self._view, grid), viewpoint.stand)
+        return None if path is None else path + self._looks(viewpoint)
+
+    def _cells(self) -> Grid:
         if self._grid is None:
             self._grid = reachable(self.simulator)
-        grid = self._grid
-        viewpoint = find_viewpoint(self.simulator, grid, shown, inside, _MIN_PIXELS)
-        if viewpoint is None:
-            raise RolloutError(f"no place to reach {target} from")
-        path = grid.path(stand_of(self._view, grid), viewpoint.stand)
-        if path is None:
-            raise RolloutError(f"no way to {target}")
-        return viewpoint, path + self._looks(viewpoint)
-
-    def _walk(self, moves: list[str], shown: list[str]) -> None:
-        for action in moves:
-            self._move(action)
-        if not all(self._view.objects[key].visible for key in shown):
-            target = self._view.objects[shown[0]].object_type
-            raise RolloutError(f"{target} is out of sight after walking to it")
+        return self._grid
 
     def _looks(self, viewpoint: Viewpoint) -> list[str]:
         steps = round((viewpoint.horizon - self._view.agent.horizon) / HORIZON_STEP)
         return ["LookDown" if steps > 0 else "LookUp"] * abs(steps)
 
-    def _move(self, action: str) -> None:
-        if action == "MoveAhead":
-            self._act(ApiAction(action, move_magnitude=GRID), {"moveMagnitude": GRID}, "25")
-        else:
+    def _move(self, action: str) -> bool:
+        """One step of a walk; False where something is in the way, which the grid then knows."""
+        if action != "MoveAhead":
             degrees = _TURN if action.startswith("Rotate") else HORIZON_STEP
             self._act(ApiAction(action), {"degrees": float(degrees)}, str(degrees))
+            return True
+        grid = self._cells()
+        stand = stand_of(self._view, grid)
+        try:
+            self._act(ApiAction(action, move_magnitude=GRID), {"moveMagnitude": GRID}, "25")
+        except RolloutError:
+            self._grid = grid.without(stand.ahead)
+            return False
+        return True
 
     # -- single actions
 
@@ -188,7 +213,7 @@ class Rollout:
             raise RolloutError(f"{action}: {acted_on.split('|')[0]} is gone")
         if not self._view.objects[acted_on].visible:
             # A thing just put down or uncovered may lie where it cannot be seen from here: step aside.
-            self._walk(self._way([acted_on])[1], [acted_on])
+            self._walk(self._viewpoint([acted_on]), [acted_on])
         api = ApiAction(action, object_id=item, receptacle_id=receptacle)
         self._act(api, {"objectId": acted_on})
         self._grid = None  # a door or a thing on the floor may be in the way now, or no longer
@@ -197,7 +222,7 @@ class Rollout:
         before = self._view
         after = self.simulator.step(api.action, **arguments)
         if not after.success:
-            raise RolloutError(f"{api.action}: {after.error}")
+            raise RolloutError(f"{api.action}: {after.error}", arguments.get("objectId"))
         name = f"{api.action}_{suffix}" if suffix else api.action
         low = LowAction(api, self.first_high + len(self.high) - 1, DiscreteAction(name, _box(before, arguments)))
         self.acted.append(Acted(low, after, api.object_id, api.receptacle_id))

@@ -7,7 +7,7 @@ needs them, as ALFRED does.
 """
 
 import math
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 from dataclasses import dataclass, field
 
 from infthor_eval.generation.affordances import SLICEABLE
@@ -84,15 +84,15 @@ class Room:
         return item
 
 
-def room_of(view: View, at: str | None = None) -> Room:
-    """Read a room from what the simulator reports.
+def room_of(view: View, blocked: Container[str] = ()) -> Room:
+    """Read a room from what the simulator reports. The agent counts as being at no place.
 
     Args:
         view: the world now.
-        at: the place where the agent stands, if it went to one.
+        blocked: ids of objects that cannot be acted on as things are: not picked up, or not put into.
     """
     objects = {key: item for key, item in view.objects.items() if not _is_remains(item)}
-    items = {key: item for key, item in objects.items() if item.pickupable}
+    items = {key: item for key, item in objects.items() if item.pickupable and key not in blocked}
     places = {key for key, item in objects.items() if _is_place(item)}
     where = {key: _whereabouts(item, objects, places) for key, item in items.items()}
     types = {key: item.object_type for key, item in objects.items() if key in places or key in items}
@@ -105,9 +105,11 @@ def room_of(view: View, at: str | None = None) -> Room:
     return Room(
         types=types,
         places=frozenset(places),
-        receptacles=frozenset(key for key in types if key in objects and objects[key].receptacle),
+        receptacles=frozenset(
+            key for key in types if key in objects and objects[key].receptacle and key not in blocked
+        ),
         start=State(
-            at=at if at in types else None,
+            at=None,
             held=held,
             where=tuple(sorted(where.items())),
             lit=frozenset(key for key in places if objects[key].toggleable and objects[key].is_toggled),

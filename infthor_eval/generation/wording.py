@@ -10,8 +10,8 @@ __all__ = ["an", "compact", "noun", "plural"]
 
 _VOWEL_SOUND = re.compile(r"^(?:[aeio]|u(?!se|ni))", re.IGNORECASE)
 _LETTERS = {"CD": "CD", "TVStand": "TV stand", "Television": "television"}
-_PLURALS = {"blinds", "boots", "curtains"}
-_IRREGULAR = {"knife": "knives", "butter knife": "butter knives", "shelf": "shelves", "loaf": "loaves"}
+_BARE = {"blinds", "boots", "bread", "curtains", "lettuce", "toilet paper"}  # plural, or not counted
+_IRREGULAR = {"knife": "knives", "butter knife": "butter knives", "shelf": "shelves", "bread": "loaves of bread"}
 
 
 def noun(kind: str) -> str:
@@ -25,8 +25,8 @@ def noun(kind: str) -> str:
 
 
 def an(words: str) -> str:
-    """The words with "a" or "an" before them; plural nouns ("boots") stay as they are."""
-    if words in _PLURALS:
+    """The words with "a" or "an" before them; plurals ("boots") and substances ("bread") stay as they are."""
+    if words.removeprefix("sliced ") in _BARE:
         return words
     return f"{'an' if _VOWEL_SOUND.match(words) else 'a'} {words}"
 

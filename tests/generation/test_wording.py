@@ -16,6 +16,7 @@ from infthor_eval.generation.wording import an, noun, plural
         ("AppleSliced", "a sliced apple"),
         ("Ottoman", "an ottoman"),
         ("Boots", "boots"),
+        ("BreadSliced", "sliced bread"),
     ],
 )
 def test_words_with_their_article(kind, words):
@@ -32,6 +33,7 @@ def test_words_with_their_article(kind, words):
         ("Dish", "dishes"),
         ("Candy", "candies"),
         ("Key", "keys"),
+        ("Bread", "loaves of bread"),
     ],
 )
 def test_plurals(kind, words):

@@ -1,0 +1,60 @@
+"""The state of the room and the agent in words, as far as the agent has seen it.
+
+A model that is given text in place of the whole trajectory reads this: of every object that was ever in a frame the
+place where it was last seen, what is open or on, and what the agent holds.
+"""
+
+from infthor_eval.formats.step_log import ObjectState, Step, worlds
+from infthor_eval.generation.affordances import preposition
+from infthor_eval.generation.wording import an, noun
+
+__all__ = ["state_summaries"]
+
+_SURROUNDINGS = frozenset({"Floor", "Wall", "Ceiling"})
+
+
+def state_summaries(steps: list[Step], at: set[int]) -> dict[int, str]:
+    """Summaries after some of the actions.
+
+    Args:
+        steps: the log, with the fields that a replay adds.
+        at: indices of low-level actions.
+
+    Returns:
+        Index of the action to the summary.
+    """
+    known: dict[str, tuple[ObjectState, str | None]] = {}
+    held: list[str] = []
+    found: dict[int, str] = {}
+    for step, world in zip(steps, worlds(steps), strict=True):
+        held = [noun(state.type) for state in world.values() if state.held and state.exists]
+        for key in step.seen or {}:
+            if world[key].type not in _SURROUNDINGS:
+                known[key] = (world[key], _place(world, world[key]))
+        for key in [key for key in known if not world[key].exists or world[key].held]:
+            del known[key]
+        if step.step in at and step.action is not None:
+            found[step.step] = _words(known, held)
+    return found
+
+
+def _words(known: dict[str, tuple[ObjectState, str | None]], held: list[str]) -> str:
+    sentences = [f"You are holding {' and '.join(an(item) for item in held)}." if held else "Your hands are free."]
+    inside: dict[str, list[str]] = {}
+    for state, place in known.values():
+        if place is not None:
+            inside.setdefault(place, []).append(noun(state.type))
+    for place in sorted(inside):
+        items = ", ".join(an(item) for item in sorted(inside[place]))
+        sentences.append(f"You saw {items} {preposition(place)} the {noun(place)}.")
+    opened = sorted({noun(state.type) for state, _ in known.values() if state.is_open})
+    lit = sorted({noun(state.type) for state, _ in known.values() if state.is_on and state.type.endswith("Lamp")})
+    sentences += [f"Open: {', '.join(opened)}."] if opened else []
+    sentences += [f"Switched on: {', '.join(lit)}."] if lit else []
+    return " ".join(sentences)
+
+
+def _place(world: dict[str, ObjectState], state: ObjectState) -> str | None:
+    """The type of the innermost receptacle."""
+    parents = [world[key] for key in state.parents if key in world and world[key].type not in _SURROUNDINGS]
+    return max(parents, key=lambda item: len(item.parents)).type if parents else None

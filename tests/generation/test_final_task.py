@@ -1,0 +1,52 @@
+import pytest
+
+from infthor_eval.formats.trajectory import (
+    InitAction,
+    Plan,
+    Scene,
+    SubTask,
+    SubTrajectory,
+    TaskInfo,
+    Trajectory,
+)
+from infthor_eval.generation.final_task import ends_of, violation
+
+
+def log(*kinds):
+    return [{"visible": [kind]} for kind in kinds]
+
+
+def test_the_ends_are_a_fifth_each():
+    ends = ends_of(log(*"AABBBBBBCC"))
+    assert (ends.early, ends.late) == ({"A"}, {"C"})
+
+
+def trajectory(pickup, receptacle, movable=None, before=10):
+    task = SubTask(TaskInfo("pick_and_place_simple", pickup, movable, receptacle), "put it there")
+    return Trajectory(
+        Scene("kitchen-1", InitAction(0, 0, 0)),
+        Plan([]),
+        sub_trajs=[SubTrajectory(0, (0, 1), (0, before)), SubTrajectory(1, (1, 2), (before, before + 3))],
+        long_horizon_task=task,
+        object_log=log(*"AABBBBBBBCC", *"XXX"),
+    )
+
+
+@pytest.mark.parametrize(
+    ("pickup", "receptacle", "movable", "fine"),
+    [
+        ("A", "C", None, True),
+        ("C", "A", None, True),
+        ("A", "C", "A", True),
+        ("A", "A", None, False),
+        ("A", "B", None, False),
+        ("A", "C", "B", False),
+        ("X", "A", None, False),
+    ],
+)
+def test_the_rule_is_derived_from_the_log(pickup, receptacle, movable, fine):
+    assert (violation(trajectory(pickup, receptacle, movable)) is None) == fine
+
+
+def test_without_a_final_task():
+    assert violation(Trajectory(Scene("kitchen-1", InitAction(0, 0, 0)), Plan([]))) == "there is no final task"
