@@ -42,13 +42,15 @@ def read_asset_sizes(root: Path) -> dict[str, tuple[float, float, float]]:
     try:
         with gzip.open(path, "rt", encoding="utf-8") as file:
             content = json.load(file)
-        return {
-            asset["assetId"]: tuple(max(float(asset["boundingBox"][axis]), 0.002) for axis in "xyz")  # type: ignore[misc]
-            for assets in content.values()
-            for asset in assets
-        }
-    except (OSError, EOFError, ValueError, KeyError, TypeError) as error:
+        listed = [asset for assets in content.values() for asset in assets]
+        return {str(asset["assetId"]): _extents(asset["boundingBox"]) for asset in listed}
+    except (OSError, EOFError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise DataError(f"{path}: not a readable asset database ({error!r})") from error
+
+
+def _extents(box: Mapping[str, float]) -> tuple[float, float, float]:
+    x, y, z = (max(float(box[axis]), 0.002) for axis in "xyz")
+    return x, y, z
 
 
 def build_house(house: Mapping[str, Any], assets: Mapping[str, tuple[float, float, float]]) -> World:
@@ -69,11 +71,12 @@ def build_house(house: Mapping[str, Any], assets: Mapping[str, tuple[float, floa
 
 def _build(house: Mapping[str, Any], assets: Mapping[str, tuple[float, float, float]]) -> World:
     floors = [(str(r.get("roomType", "")), polygon_rects(_outline(r["floorPolygon"]))) for r in house["rooms"]]
+    ids = [str(r.get("id", f"room|{index}")) for index, r in enumerate(house["rooms"])]
     doors = list(_door_spans(house))
     walls = tuple(_walls(house, doors))
     objects: dict[str, SimObject] = {}
-    for index, (kind, rects) in enumerate(floors):
-        floor = _floor(index, kind, rects)
+    for found, (kind, rects) in zip(ids, floors, strict=True):
+        floor = _floor(found, kind, rects)
         objects[floor.object_id] = floor
     for entry in _flat(house.get("objects", ())):
         item = _object(entry, assets)
@@ -126,13 +129,12 @@ def _object(entry: Mapping[str, Any], assets: Mapping[str, tuple[float, float, f
     )
 
 
-def _floor(index: int, kind: str, rects: Sequence[Rect]) -> SimObject:
+def _floor(found: str, kind: str, rects: Sequence[Rect]) -> SimObject:
     low = np.array([min(r[0] for r in rects), -0.1, min(r[1] for r in rects)])
     high = np.array([max(r[2] for r in rects), 0.0, max(r[3] for r in rects)])
     middle = (low + high) / 2
-    found = f"room|{index}"
     item = SimObject(
-        found, f"Floor_{index}", object_type("Floor"), middle, np.zeros(3), np.zeros(3), high - low, style=0
+        found, f"Floor_{found}", object_type("Floor"), middle, np.zeros(3), np.zeros(3), high - low, style=0
     )
     item.style = FLOOR_STYLES.index(_FLOORS.get(kind, "wood"))
     item.pieces = tuple((r[0] - middle[0], r[1] - middle[2], r[2] - middle[0], r[3] - middle[2]) for r in rects)
@@ -176,7 +178,7 @@ def _walls(house: Mapping[str, Any], doors: Sequence[tuple[str, float, float]]) 
     for wall in house["walls"]:
         x0, z0, x1, z1 = _base(wall["polygon"])
         length = math.dist((x0, z0), (x1, z1))
-        if length < 1e-6 or wall.get("empty"):
+        if length < 1e-6 or wall.get("empty") or "exterior" in str(wall["id"]):
             continue
         style = style_of(str(wall.get("roomId", "")))
         at = 0.0

@@ -131,11 +131,12 @@ def racket(b: Builder) -> None:
 
 def _club(b: Builder, color: Color, thick: float, handle: float) -> None:
     axis = max(range(3), key=lambda i: float(b.half[i]))
-    body, grip, at, low = [thick] * 3, [handle] * 3, [0.0] * 3, [0.0] * 3
-    body[axis], at[axis] = 0.6, 0.4
-    grip[axis], low[axis] = 0.4, -0.6
-    b.box(at, body, color, Material.WOOD)
-    b.box(low, grip, shade_of(color, 0.7), Material.WOOD)
+    radius = min(float(b.half[i]) for i in range(3) if i != axis)
+    at, low = [0.0] * 3, [0.0] * 3
+    at[axis], low[axis] = 0.4, -0.6
+    length = float(b.half[axis])
+    b.rod(at, radius * thick, length * 0.6, axis, color)
+    b.rod(low, radius * handle, length * 0.4, axis, shade_of(color, 0.7))
 
 
 def candle(b: Builder) -> None:
