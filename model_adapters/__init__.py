@@ -3,9 +3,9 @@
 Importing this package imports neither torch nor transformers; they come with the first model that needs them.
 """
 
-from model_adapters.backend import Backend, BackendConversation
+from model_adapters.backend import Backend, BackendConversation, OneByOne
 from model_adapters.check import ContractError, check_adapter, check_bound
-from model_adapters.protocols import Adapter, Bound, Conversation, Mark, Model, Part, Reply
+from model_adapters.protocols import Adapter, BatchingConversation, Bound, Conversation, Mark, Model, Part, Reply
 from model_adapters.registry import load, names, options
 from model_adapters.transcript import Transcript
 
@@ -13,11 +13,13 @@ __all__ = [
     "Adapter",
     "Backend",
     "BackendConversation",
+    "BatchingConversation",
     "Bound",
     "ContractError",
     "Conversation",
     "Mark",
     "Model",
+    "OneByOne",
     "Part",
     "Reply",
     "Transcript",

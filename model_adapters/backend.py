@@ -6,7 +6,7 @@ from typing import Protocol
 from model_adapters.protocols import Part, Reply
 from model_adapters.transcript import Transcript
 
-__all__ = ["Backend", "BackendConversation"]
+__all__ = ["Backend", "BackendConversation", "OneByOne"]
 
 
 class Backend(Protocol):
@@ -19,6 +19,20 @@ class Backend(Protocol):
     def answer(self, parts: Sequence[Part], max_new_tokens: int, stop: Sequence[str]) -> Reply:
         """Answer one user turn of these parts; see `Conversation.reply`."""
         ...
+
+    def answer_each(self, prompts: Sequence[Sequence[Part]], max_new_tokens: int, stop: Sequence[str]) -> list[Reply]:
+        """Answer several user turns, each for itself; `OneByOne` has this for back ends that gain nothing by it."""
+        ...
+
+
+class OneByOne:
+    """Base of back ends that answer several turns one after the other."""
+
+    def answer_each(
+        self: Backend, prompts: Sequence[Sequence[Part]], max_new_tokens: int, stop: Sequence[str]
+    ) -> list[Reply]:
+        """Answer several user turns, each for itself."""
+        return [self.answer(parts, max_new_tokens, stop) for parts in prompts]
 
 
 class BackendConversation(Transcript):
@@ -35,6 +49,21 @@ class BackendConversation(Transcript):
 
     def reply(self, max_new_tokens: int, stop: Sequence[str] = ()) -> Reply:
         """Answer greedily; see `Conversation.reply`."""
-        if max_new_tokens < 1:
-            raise ValueError(f"max_new_tokens must be at least 1, not {max_new_tokens}")
+        _check(max_new_tokens)
         return self._backend.answer(self.parts, max_new_tokens, stop)
+
+    def replies(self, endings: Sequence[Sequence[Part]], max_new_tokens: int, stop: Sequence[str] = ()) -> list[Reply]:
+        """Answer several endings, each appended to what is here; see `BatchingConversation.replies`."""
+        _check(max_new_tokens)
+        prompts = []
+        for ending in endings:
+            here = self.mark()
+            self.append(*ending)
+            prompts.append(self.parts)
+            self.rewind(here)
+        return self._backend.answer_each(prompts, max_new_tokens, stop)
+
+
+def _check(max_new_tokens: int) -> None:
+    if max_new_tokens < 1:
+        raise ValueError(f"max_new_tokens must be at least 1, not {max_new_tokens}")

@@ -14,7 +14,7 @@ from PIL import Image
 
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.question import Question
-from model_adapters.protocols import Bound, Conversation, Model, Part, Reply
+from model_adapters.protocols import BatchingConversation, Bound, Conversation, Model, Part, Reply
 
 __all__ = ["ContractError", "check_adapter", "check_bound"]
 
@@ -48,6 +48,7 @@ def check_adapter(model: Model, frame_size: tuple[int, int] = (300, 300)) -> Non
         _check_reply(model, black)
         _check_frames(model, black, white)
         _check_sharing(model, black, white)
+        _check_batching(model, black, white)
 
 
 def check_bound(bound: Bound, questions: Sequence[Question]) -> None:
@@ -159,6 +160,19 @@ def _check_sharing(model: Model, black: FrameRef, white: FrameRef) -> None:
     _opened(model, white, "\nSomething else.").reply(1)  # whatever the back end has kept is of no use after this
     fresh = _opened(model, black, white, "\nWhat colour was the first frame?").reply(_NEW_TOKENS)
     _require(_same(shared[1], fresh), "a reply after a rewind differs from that of a fresh conversation")
+
+
+def _check_batching(model: Model, black: FrameRef, white: FrameRef) -> None:
+    talk = _opened(model, black)
+    if not isinstance(talk, BatchingConversation):
+        return
+    endings: list[list[Part]] = [[_QUESTION], [white, "\nWhat colours are the frames?"], ["\nWhy?"]]
+    size, together = talk.n_tokens, talk.replies(endings, _NEW_TOKENS)
+    _require(talk.n_tokens == size, "replies() changes the conversation")
+    alone = [_opened(model, black, *ending).reply(_NEW_TOKENS) for ending in endings]
+    _require(len(together) == len(alone), "replies() does not give one reply per ending")
+    _require(all(map(_same, together, alone)), "replies() differs from asking one by one")
+    _require(_raises(ValueError, talk.replies, endings, 0), "replies() of 0 tokens does not raise ValueError")
 
 
 def _opened(model: Model, *parts: Part) -> Conversation:

@@ -11,7 +11,7 @@ from typing import Any, ClassVar, Protocol, runtime_checkable
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.question import Question
 
-__all__ = ["Adapter", "Bound", "Conversation", "Mark", "Model", "Part", "Reply"]
+__all__ = ["Adapter", "BatchingConversation", "Bound", "Conversation", "Mark", "Model", "Part", "Reply"]
 
 Part = str | FrameRef
 
@@ -84,6 +84,25 @@ class Conversation(Protocol):
         Raises:
             ModelError: the context does not fit (the message gives its tokens and the limit) or memory ran out.
             DataError: a frame cannot be read.
+        """
+        ...
+
+
+@runtime_checkable
+class BatchingConversation(Conversation, Protocol):
+    """A conversation that can answer several endings at once, which saves time where the back end works in batches."""
+
+    def replies(self, endings: Sequence[Sequence[Part]], max_new_tokens: int, stop: Sequence[str] = ()) -> list[Reply]:
+        """What append, reply, rewind would give for each ending; the conversation stays as it was.
+
+        Args:
+            endings: the parts to append, one sequence per question.
+            max_new_tokens: at least 1, for each.
+            stop: strings that end a reply.
+
+        Raises:
+            ModelError: one of the contexts does not fit, or memory ran out; nothing is answered then.
+            DataError: a frame cannot be read; nothing is answered then.
         """
         ...
 

@@ -9,7 +9,7 @@ from transformers import GenerationConfig, RepetitionPenaltyLogitsProcessor
 
 from infthor_eval.errors import ModelError
 
-__all__ = ["Generation", "cut_at_stop", "generate", "read_generation"]
+__all__ = ["Generation", "cut_at_stop", "generate", "penalised", "read_generation"]
 
 # Settings that change greedy decoding and that this decoder does not have, with the values that switch them off.
 _UNSUPPORTED: dict[str, tuple[Any, ...]] = {
@@ -77,7 +77,7 @@ def generate(
     seen = set(context) if settings.repetition_penalty != 1.0 else set()  # how often does not matter
     reply: list[int] = []
     while True:
-        token = int(_penalised(logits.float(), seen, settings.repetition_penalty).argmax())
+        token = int(penalised(logits.float(), seen, settings.repetition_penalty).argmax())
         if token in settings.end_ids:
             return reply
         reply.append(token)
@@ -87,7 +87,8 @@ def generate(
         logits = step(token)
 
 
-def _penalised(logits: torch.Tensor, seen: set[int], penalty: float) -> torch.Tensor:
+def penalised(logits: torch.Tensor, seen: set[int], penalty: float) -> torch.Tensor:
+    """Logits, (vocabulary,), with those of seen tokens lowered as transformers' repetition penalty does."""
     if penalty == 1.0:
         return logits
     ids = torch.tensor([list(seen)], device=logits.device)

@@ -63,6 +63,15 @@ class BufferedCache(Cache):
         if excess > 0:
             self.crop(-excess)
 
+    def spread(self, n_rows: int, room: int) -> "BufferedCache":
+        """A new cache that holds this one's single sequence in each of its rows, with room for `room` tokens."""
+        spread = BufferedCache(self._storage)
+        spread.reserve(room)
+        for index, layer in enumerate(self.layers):
+            if isinstance(layer, BufferedLayer) and layer.keys is not None and layer.values is not None:
+                spread.update(layer.keys.expand(n_rows, -1, -1, -1), layer.values.expand(n_rows, -1, -1, -1), index)
+        return spread
+
 
 class BufferedLayer(DynamicLayer):
     """Keys and values of one layer, `keys` and `values` being views on the used part of the buffers.

@@ -9,12 +9,14 @@ import torch
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
 from model_adapters.backend import BackendConversation
+from model_adapters.engine.batch import answer_together
 from model_adapters.engine.decoding import cut_at_stop, generate
+from model_adapters.engine.embedding import Embedder
 from model_adapters.engine.features import FeatureCache
 from model_adapters.engine.loaded import Loaded
 from model_adapters.engine.options import EngineOptions
 from model_adapters.engine.prefix import Prefix
-from model_adapters.engine.prompt import Frame, Prompter, Unit, n_tokens, token_ids
+from model_adapters.engine.prompt import Frame, Prompter, Unit, n_common, n_tokens, token_ids
 from model_adapters.engine.rope import length_rope
 from model_adapters.protocols import Part, Reply
 
@@ -40,12 +42,14 @@ class TransformersModel:
         keep = options.feature_cache_mb * 2**20 if options.share_prefix else 0
         self._features = FeatureCache(loaded.family, keep)
         self._prompter = Prompter(loaded.tokenizer, loaded.template, loaded.family)
+        self._embed = Embedder(loaded.model, loaded.family, self._features)
+        self._rope = length_rope(loaded.model)
         self._prefix = Prefix(
             loaded.model,
             loaded.family,
-            self._features,
+            self._embed,
             chunk_tokens=options.chunk_tokens,
-            rope=length_rope(loaded.model),
+            rope=self._rope,
             storage=torch.device("cpu") if options.kv_offload else None,
         )
 
@@ -70,7 +74,7 @@ class TransformersModel:
         """Free the KV cache, the features and the weights."""
         self._prefix.reset()
         self._features.clear()
-        del self._prefix, self._features, self._prompter, self._loaded
+        del self._prefix, self._embed, self._features, self._rope, self._prompter, self._loaded
         if torch.cuda.is_available():
             torch.cuda.empty_cache()
 
@@ -91,20 +95,33 @@ class TransformersModel:
 
     def answer(self, parts: Sequence[Part], max_new_tokens: int, stop: Sequence[str]) -> Reply:
         """Answer one user turn; see `Conversation.reply`."""
-        units = self.units(parts)
-        n_context = n_tokens(units)
-        check_limit(self.name, n_context, max_new_tokens, self.max_tokens)
+        return self.answer_each([parts], max_new_tokens, stop)[0]
+
+    def answer_each(self, prompts: Sequence[Sequence[Part]], max_new_tokens: int, stop: Sequence[str]) -> list[Reply]:
+        """Answer several user turns, `batch_size` at a time; see `BatchingConversation.replies`."""
+        requests = [self.units(parts) for parts in prompts]
+        for units in requests:
+            check_limit(self.name, n_tokens(units), max_new_tokens, self.max_tokens)
+        # Rows of one batch have the same frequencies, and without sharing nothing is common to them.
+        together = self._options.share_prefix and self._rope is None
+        size = self._options.batch_size if together else 1
+        batches = [requests[at : at + size] for at in range(0, len(requests), size)]
+        return [reply for batch in batches for reply in self._answer_safely(batch, max_new_tokens, stop)]
+
+    def _answer_safely(self, batch: Sequence[Sequence[Unit]], max_new_tokens: int, stop: Sequence[str]) -> list[Reply]:
         if not self._options.share_prefix:
             self._prefix.reset()
         try:
-            with naming_memory_errors(self.name, n_context):
-                return self._answer(units, n_context, max_new_tokens, stop)
+            with naming_memory_errors(self.name, sum(map(n_tokens, batch))):
+                if len(batch) > 1:
+                    return self._answer_batch(batch, max_new_tokens, stop)
+                return [self._answer(batch[0], max_new_tokens, stop)]
         except ModelError:
             self._prefix.reset()
             self._features.clear()
             raise
 
-    def _answer(self, units: list[Unit], n_context: int, max_new_tokens: int, stop: Sequence[str]) -> Reply:
+    def _answer(self, units: Sequence[Unit], max_new_tokens: int, stop: Sequence[str]) -> Reply:
         shared = self._prefix.rewind_to(units)
         cached = self._prefix.n_tokens
         logits = self._prefix.feed(units[shared:], reserve=max_new_tokens)
@@ -114,12 +131,40 @@ class TransformersModel:
             context=token_ids(units),
             settings=self._loaded.generation,
             max_new_tokens=max_new_tokens,
-            finished=lambda ids: bool(stop) and cut_at_stop(self._decode(ids), stop) is not None,
+            finished=lambda ids: self._stopped(ids, stop),
         )
         self._prefix.cut(len(units))
+        return self._reply(ids, units, cached, stop)
+
+    def _answer_batch(self, batch: Sequence[Sequence[Unit]], max_new_tokens: int, stop: Sequence[str]) -> list[Reply]:
+        common = n_common(batch)
+        shared = min(self._prefix.rewind_to(batch[0]), common)
+        self._prefix.cut(shared)
+        cached = self._prefix.n_tokens
+        if shared < common:
+            self._prefix.feed(batch[0][shared:common])
+        found = answer_together(
+            self._loaded.model,
+            self._embed,
+            prefix=self._prefix,
+            prompts=batch,
+            n_shared=common,
+            settings=self._loaded.generation,
+            max_new_tokens=max_new_tokens,
+            finished=lambda ids: self._stopped(ids, stop),
+        )
+        reused = [cached, *[self._prefix.n_tokens] * (len(batch) - 1)]
+        return [
+            self._reply(ids, units, n_cached, stop) for ids, units, n_cached in zip(found, batch, reused, strict=True)
+        ]
+
+    def _reply(self, ids: list[int], units: Sequence[Unit], n_cached: int, stop: Sequence[str]) -> Reply:
         text = self._decode(ids)
         before_stop = cut_at_stop(text, stop)
-        return Reply(text if before_stop is None else before_stop, tuple(ids), n_context, cached)
+        return Reply(text if before_stop is None else before_stop, tuple(ids), n_tokens(units), n_cached)
+
+    def _stopped(self, ids: list[int], stop: Sequence[str]) -> bool:
+        return bool(stop) and cut_at_stop(self._decode(ids), stop) is not None
 
     def _decode(self, ids: list[int]) -> str:
         return self._loaded.tokenizer.decode(ids, skip_special_tokens=True)
@@ -138,6 +183,7 @@ def identity(name: str, loaded: Loaded, options: EngineOptions) -> dict[str, Any
         "max_tokens": context_limit(loaded, options),
         "share_prefix": options.share_prefix,
         "chunk_tokens": options.chunk_tokens,
+        "batch_size": options.batch_size,
         "generation": {
             "do_sample": False,
             "repetition_penalty": generation.repetition_penalty,

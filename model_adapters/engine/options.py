@@ -35,6 +35,8 @@ class EngineOptions:
         attn_implementation: sdpa, eager, flash_attention_2, ...
         share_prefix: encode what two replies have in common once; false encodes everything for every reply.
         chunk_tokens: most tokens encoded in one forward pass.
+        batch_size: most endings of one prefix that are answered together; each has its own copy of the prefix's keys
+            and values.
         kv_offload: keep keys and values in CPU memory; slower, for contexts that do not fit on the GPU.
         feature_cache_mb: memory for vision features of frames seen before, in MiB.
         max_tokens: context limit instead of the checkpoint's; 0 for none.
@@ -46,6 +48,7 @@ class EngineOptions:
     attn_implementation: str = "sdpa"
     share_prefix: bool = True
     chunk_tokens: int = 1024
+    batch_size: int = 1
     kv_offload: bool = False
     feature_cache_mb: int = 128
     max_tokens: int | None = None
@@ -56,8 +59,10 @@ class EngineOptions:
         return {}
 
     def __post_init__(self) -> None:
-        if self.chunk_tokens < 1 or self.feature_cache_mb < 0 or (self.max_tokens or 0) < 0:
-            raise ValueError("chunk_tokens must be positive, feature_cache_mb and max_tokens not negative")
+        if self.chunk_tokens < 1 or self.batch_size < 1 or self.feature_cache_mb < 0 or (self.max_tokens or 0) < 0:
+            raise ValueError(
+                "chunk_tokens and batch_size must be positive, feature_cache_mb and max_tokens not negative"
+            )
         if self.rope is not None:
             parse_rope(self.rope)
 

@@ -9,9 +9,8 @@ from typing import Any
 
 import torch
 
-from infthor_eval.errors import ModelError
+from model_adapters.engine.embedding import Embedder
 from model_adapters.engine.family import Family
-from model_adapters.engine.features import FeatureCache
 from model_adapters.engine.kv_cache import BufferedCache
 from model_adapters.engine.prompt import Frame, Unit, n_tokens, token_ids
 from model_adapters.engine.rope import LengthRope
@@ -25,7 +24,7 @@ class Prefix:
     Args:
         model: a transformers model that takes `inputs_embeds`, `position_ids` and `past_key_values`.
         family: its family.
-        features: where the frames' features come from.
+        embed: embeds pieces of prompts.
         chunk_tokens: most tokens in one forward pass (a frame with more makes a chunk of its own).
         rope: the model's rotary embeddings where their frequencies depend on the prompt's length.
         storage: where keys and values are kept; beside the weights where None.
@@ -35,7 +34,7 @@ class Prefix:
         self,
         model: Any,
         family: Family,
-        features: FeatureCache,
+        embed: Embedder,
         *,
         chunk_tokens: int,
         rope: LengthRope | None = None,
@@ -46,9 +45,8 @@ class Prefix:
         self._rope = rope
         self._rope_key = -1
         self._storage = storage
-        self._features = features
+        self._embed = embed
         self._chunk_tokens = chunk_tokens
-        self._embeddings = model.get_input_embeddings()
         self.reset()
 
     def reset(self) -> None:
@@ -62,6 +60,15 @@ class Prefix:
     def n_tokens(self) -> int:
         """Tokens encoded at present."""
         return self._ends[-1] if self._ends else 0
+
+    @property
+    def end(self) -> int:
+        """The position that the next token takes."""
+        return self._starts[-1]
+
+    def spread(self, n_rows: int, n_more: int) -> BufferedCache:
+        """A cache of its own with the sequence in each of several rows, and room for more tokens."""
+        return self._cache.spread(n_rows, self.n_tokens + n_more)
 
     def rewind_to(self, units: Sequence[Unit]) -> int:
         """Cut the sequence behind the units it shares with the given ones, which must have one more to be fed.
@@ -131,33 +138,12 @@ class Prefix:
 
     @torch.inference_mode()
     def _forward(self, chunk: list[Unit]) -> torch.Tensor:
-        frames = [unit for unit in chunk if isinstance(unit, Frame)]
-        flat: list[int] = []
-        slots: list[int] = []
-        firsts: list[int] = []
-        for unit in chunk:
-            firsts.append(len(flat))
-            if isinstance(unit, int):
-                flat.append(unit)
-            else:
-                slots.extend(len(flat) + at for at, token in enumerate(unit.ids) if token == self._family.slot_id)
-                flat.extend(unit.ids)
-        ids = torch.tensor(flat, device=self._embeddings.weight.device)
-        embeds = self._embeddings(ids)
-        if frames:
-            features = torch.cat(self._features.get(frames))
-            if len(features) != len(slots):
-                raise ModelError(
-                    f"the processor makes {len(slots)} image tokens of {len(frames)} frames and the model "
-                    f"{len(features)} features; they do not belong to one checkpoint"
-                )
-            embeds[slots] = features.to(embeds.dtype)
-        positions = self._family.positions(ids, [frame.size for frame in frames], self._starts[-1])
+        piece = self._embed(chunk, self._starts[-1])
         done = False
         try:
             output = self._model(
-                inputs_embeds=embeds[None],
-                position_ids=positions,
+                inputs_embeds=piece.embeds[None],
+                position_ids=piece.positions,
                 past_key_values=self._cache,
                 use_cache=True,
                 logits_to_keep=1,
@@ -166,17 +152,10 @@ class Prefix:
         finally:
             if not done:  # some layers have the chunk and some have not: nothing of it can be used again
                 self.reset()
-        self._note(chunk, positions, firsts)
-        return output.logits[0, -1]
-
-    def _note(self, chunk: list[Unit], positions: torch.Tensor, firsts: list[int]) -> None:
-        # A unit's first token has the same position on every axis; the next unit starts behind the largest one.
-        axis = positions.reshape(-1, positions.shape[-1])
-        starts = axis[0].tolist()
         end = self.n_tokens
         for unit in chunk:
             end += 1 if isinstance(unit, int) else len(unit.ids)
             self._units.append(unit)
             self._ends.append(end)
-        self._starts.extend(starts[first] for first in firsts[1:])
-        self._starts.append(int(axis.max()) + 1)
+        self._starts[-1:] = [*piece.starts, piece.end]
+        return output.logits[0, -1]

@@ -16,7 +16,7 @@ from infthor_eval.formats.frames import FrameRef
 from model_adapters.engine.family import Family, Size
 from model_adapters.protocols import Part
 
-__all__ = ["Frame", "Prompter", "Unit", "begins", "n_tokens", "render", "token_ids"]
+__all__ = ["Frame", "Prompter", "Unit", "begins", "n_common", "n_tokens", "render", "token_ids"]
 
 
 @dataclass(frozen=True)
@@ -42,6 +42,15 @@ Unit = int | Frame  # what is encoded, compared and cut as a whole: a token of t
 def n_tokens(units: Sequence[Unit]) -> int:
     """Tokens of a prompt, frames expanded."""
     return sum(1 if isinstance(unit, int) else len(unit.ids) for unit in units)
+
+
+def n_common(prompts: Sequence[Sequence[Unit]]) -> int:
+    """Units that all prompts begin with; at least one unit of each is left over."""
+    first = min(prompts, key=len)
+    for at, unit in enumerate(first[:-1]):
+        if any(prompt[at] is not unit and prompt[at] != unit for prompt in prompts):
+            return at
+    return len(first) - 1
 
 
 def token_ids(units: Iterable[Unit]) -> Iterator[int]:

@@ -13,7 +13,7 @@ from transformers import StoppingCriteria, StoppingCriteriaList
 
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
-from model_adapters.backend import BackendConversation
+from model_adapters.backend import BackendConversation, OneByOne
 from model_adapters.engine.decoding import cut_at_stop
 from model_adapters.engine.loaded import Loaded
 from model_adapters.engine.model import check_limit, context_limit, identity, naming_memory_errors
@@ -75,7 +75,7 @@ class _StopAt(StoppingCriteria):
         return torch.tensor([done], device=input_ids.device)
 
 
-class WholeModel:
+class WholeModel(OneByOne):
     """A loaded checkpoint behind the `Model` protocol, without any sharing.
 
     Args:
