@@ -250,6 +250,16 @@ def _at_opening(seen: Sequence[Glimpse], _preposition: str, place: str) -> list[
     return _listed(seen, place, lambda moment: moment.action == "OpenObject" and _target_is(moment, place), None)
 
 
+def _left_at_pickup(seen: Sequence[Glimpse], _preposition: str, place: str, item: str) -> list[str]:
+    if not seen[0].everything:
+        return _listed(seen, place, lambda _: True, None)
+    for previous, moment in pairwise(seen):
+        if moment.action == "PickupObject" and moment.target is not None and _target_is(moment, item):
+            holder = _holder(previous, moment.target)
+            return _names(moment, {key for key in moment.objects if _holder(moment, key) == holder})
+    return []
+
+
 def _listed(seen: Sequence[Glimpse], place: str, anchor: Callable[[Glimpse], bool], besides: str | None) -> list[str]:
     """What is in a receptacle: at the anchoring moment where everything is known, else in all glimpses together."""
     moments = [item for item in seen if anchor(item)][:1] if seen[0].everything else list(seen)
@@ -308,6 +318,7 @@ _SOLVERS: tuple[tuple[str, Callable[..., list[str]]], ...] = (
     (r"What did you slice\?", _sliced),
     (r"What else was (in|on) the (.+) when you sliced the (.+)\?", _else_at_slicing),
     (r"What was (in|on) the (.+) when you first opened it\?", _at_opening),
+    (r"What else was (in|on) the (.+) when you picked up the (.+) from it\?", _left_at_pickup),
     (r"Is the (.+) (in|on) the (.+) now\?", _is_in),
     (r"What is (in|on) the (.+) now\?", _what_now),
     (r"How many objects are (?:in|on) the (.+) now\?", lambda seen, place: _how_many(seen, "", place)),

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from infthor_eval.generation.affordances import preposition
 from infthor_eval.generation.questions.candidates import Candidate, answer_of, distinct, the
 from infthor_eval.generation.questions.evidence import cover
-from infthor_eval.generation.questions.history import Event, History
+from infthor_eval.generation.questions.history import Event, History, canonical
 
-__all__ = ["CONTENT", "SLICING", "at_opening", "at_slicing", "slicings"]
+__all__ = ["CONTENT", "SLICING", "at_opening", "at_pickup", "at_slicing", "slicings"]
 
 CONTENT = "container_content"
 SLICING = "slicing"
@@ -49,6 +49,18 @@ def at_opening(history: History) -> Iterator[Candidate]:
             yield from _contents(history, CONTENT, text, event, event.target, frozenset())
 
 
+def at_pickup(history: History) -> Iterator[Candidate]:
+    """What was left where something was picked up."""
+    events = [event for event in history.events if event.action == "PickupObject"]
+    count = Counter(event.kind for event in events)
+    for event in events:
+        place = history.parent(event.frame - 1, event.target)
+        if count[event.kind] == 1 and place is not None and place in history.world(event.frame):
+            kind = history.world(event.frame)[place].type
+            text = f"What else was {preposition(kind)} {the(kind)} when you picked up {the(event.kind)} from it?"
+            yield from _contents(history, CONTENT, text, event, place, frozenset())
+
+
 def _contents(
     history: History, kind: str, text: str, event: Event, place: str, leave_out: frozenset[str]
 ) -> Iterator[Candidate]:
@@ -59,10 +71,18 @@ def _contents(
     for frame in range(event.frame, len(history)):
         if history.contents(frame, place) != inside:
             break
-        if history.shows(frame, place):
+        if history.shows(frame, place) and not _others(history, frame, place):
             shown[frame] = frozenset(key for key in asked if history.shows(frame, key))
     clues = cover(asked, shown) if asked else None
     kinds = sorted(history.world(event.frame)[key].type for key in asked)
     if clues is not None and len(set(kinds)) == len(kinds) <= _MANY and distinct(kinds):
         place_kind = history.world(event.frame)[place].type
         yield Candidate(kind, text, clues, tuple(answer_of(item) for item in kinds), (place_kind, *kinds))
+
+
+def _others(history: History, frame: int, place: str) -> bool:
+    """Whether a frame shows contents of another receptacle that people would call the same."""
+    world = history.world(frame)
+    kind = canonical(world[place].type)
+    parents = {history.parent(frame, key) for key in history.seen(frame) if key in world} - {None, place}
+    return any(canonical(world[parent].type) == kind for parent in parents if parent is not None)

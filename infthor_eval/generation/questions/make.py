@@ -102,6 +102,7 @@ def _candidates(history: History, vocabulary: frozenset[str], rng: random.Random
         *contents.slicings(history),
         *contents.at_slicing(history),
         *contents.at_opening(history),
+        *contents.at_pickup(history),
         *put_action.puts(history),
         *final_state.final_states(history),
         *counting.counts(history),
