@@ -49,6 +49,7 @@ def command(
     from rich.console import Console
     from rich.progress import Progress
 
+    from infthor_eval.errors import UsageError
     from infthor_eval.generation.factory import Settings
     from infthor_eval.generation.generate_set import generate_set, is_bathroom
     from infthor_eval.thor.launch import embedded
@@ -56,8 +57,11 @@ def command(
 
     notes = Console(stderr=True, soft_wrap=True)
     chosen = [scene for scene in scenes if not (test_set and is_bathroom(scene))]
-    for scene in set(scenes) - set(chosen):
-        notes.print(f"{scene}: bathrooms are left out of test sets", highlight=False, markup=False)
+    left_out = sorted(set(scenes) - set(chosen))
+    if not chosen:
+        raise UsageError(f"{', '.join(left_out)}: bathrooms are left out of test sets; name other scenes")
+    if left_out:
+        notes.print(f"bathrooms are left out of test sets: {', '.join(left_out)}", highlight=False, markup=False)
     final = final_task or test_set
     jobs = [Settings(scene, seed + k, min_steps, min_subgoals, final) for scene in chosen for k in range(count)]
     with Simulator(embedded(data)) as simulator, Progress(console=notes, transient=True) as progress:
