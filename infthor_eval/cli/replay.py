@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,6 +13,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from infthor_eval.generation.replay_set import Selection, Summary
+    from infthor_eval.thor.launch import Launch
 
 __all__ = ["command"]
 
@@ -25,6 +27,7 @@ _SHOWN = 20  # failures and divergences printed one by one; all are in the JSON 
 @click.option("--data", type=_PATH, help="Folder with recorded floor plans, for trajectories in them.")
 @click.option("--limit", type=click.IntRange(1), help="Replay at most this many trajectories.")
 @click.option("--per-floor-plan", type=click.IntRange(1), help="At most this many of one floor plan.")
+@click.option("--frames", type=click.IntRange(1), default=1, show_default=True, help="Frames per move or turn.")
 @click.option("--unity", is_flag=True, help="Use AI2-THOR's own Unity build, not the embedded simulator.")
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as one JSON object.")
 @click.pass_context
@@ -35,6 +38,7 @@ def command(
     data: Path | None,
     limit: int | None,
     per_floor_plan: int | None,
+    frames: int,
     unity: bool,
     as_json: bool,
 ) -> None:
@@ -47,10 +51,14 @@ def command(
     from rich.console import Console
 
     from infthor_eval.generation.replay_set import select
+    from infthor_eval.thor import launch
+
+    def start(supplement: Path) -> Launch:
+        return launch.unity() if unity else launch.embedded(data, supplement)
 
     notes = Console(stderr=True, soft_wrap=True)
     selection = select(trajectories, limit, per_floor_plan)
-    summary = _replay(selection, out, data, unity, notes)
+    summary = _replay(selection, out, start, frames, notes)
     if as_json:
         import msgspec
 
@@ -62,21 +70,19 @@ def command(
     context.exit(1 if summary.failures else 0)
 
 
-def _replay(selection: Selection, out: Path, data: Path | None, unity: bool, notes: Console) -> Summary:
+def _replay(selection: Selection, out: Path, start: Callable[[Path], Launch], frames: int, notes: Console) -> Summary:
     from rich.progress import Progress
 
     from infthor_eval.generation.replay_set import replay_set
     from infthor_eval.generation.supplement import write_supplement
-    from infthor_eval.thor import launch
     from infthor_eval.thor.simulator import Simulator
 
     with tempfile.TemporaryDirectory(prefix="infthor-") as folder:
         supplement = Path(folder) / "supplement.json"
         write_supplement((trajectory for _, trajectory in selection.items), supplement)
-        start = launch.unity() if unity else launch.embedded(data, supplement)
-        with Simulator(start) as simulator, Progress(console=notes, transient=True) as progress:
+        with Simulator(start(supplement)) as simulator, Progress(console=notes, transient=True) as progress:
             bar = progress.add_task("replay", total=len(selection.items))
-            return replay_set(selection, simulator, out, lambda: progress.advance(bar))
+            return replay_set(selection, simulator, out, lambda: progress.advance(bar), frames)
 
 
 def _print(summary: Summary, output: Console) -> None:

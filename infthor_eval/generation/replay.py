@@ -11,6 +11,7 @@ import msgspec
 
 from infthor_eval.formats.step_log import write_steps
 from infthor_eval.formats.trajectory import LowAction, Trajectory
+from infthor_eval.generation.motion import between
 from infthor_eval.generation.recorder import Recorder
 from infthor_eval.generation.sequence_text import sequence_text
 from infthor_eval.generation.state_summary import state_summaries
@@ -47,6 +48,7 @@ class Replayed(msgspec.Struct):
         traj_id: the trajectory.
         digest: hash of its JSON, by which a later run knows that this is it.
         floor_plan: its scene.
+        frames: per action that moves the agent or its camera.
         accepted: number of actions carried out, by name.
         refusals: the others; the first is where the trajectory diverges.
         restore: what of the initial scene could not be restored, in words.
@@ -57,6 +59,7 @@ class Replayed(msgspec.Struct):
     traj_id: str
     digest: str
     floor_plan: str
+    frames: int = 1
     accepted: dict[str, int] = msgspec.field(default_factory=dict)
     refusals: list[Refusal] = msgspec.field(default_factory=list)
     restore: list[str] = msgspec.field(default_factory=list)
@@ -69,7 +72,7 @@ class Replayed(msgspec.Struct):
         return not self.refusals
 
 
-def replay(trajectory: Trajectory, simulator: Simulator, folder: Path, digest: str) -> Replayed:
+def replay(trajectory: Trajectory, simulator: Simulator, folder: Path, digest: str, frames: int = 1) -> Replayed:
     """Run a trajectory and write its frames and logs into a folder.
 
     These are `img/`, `metadata.json`, `traj.txt`, `expert_log.json`, and `state_summary.json`: the room in words
@@ -80,11 +83,12 @@ def replay(trajectory: Trajectory, simulator: Simulator, folder: Path, digest: s
         simulator: runs it; its scene is replaced.
         folder: exists and is empty.
         digest: of the trajectory's JSON, passed through.
+        frames: per action that moves the agent or its camera; the others have one.
 
     Raises:
         SimulatorError: the simulator fails or has no such scene.
     """
-    run = _Run(simulator, Replayed(trajectory.traj_id, digest, trajectory.scene.floor_plan))
+    run = _Run(simulator, Replayed(trajectory.traj_id, digest, trajectory.scene.floor_plan, frames))
     restored = restore(simulator, trajectory.scene)
     run.report.restore = [f"no {name} here" for name in restored.dropped] + restored.refused
     (folder / "img").mkdir()
@@ -136,6 +140,8 @@ class _Run:
             self.report.accepted[api.action] = self.report.accepted.get(api.action, 0) + 1
         else:
             self.report.refusals.append(Refusal(index, text, error))
+        for view in between(self._simulator, before.agent, self._simulator.view.agent, self.report.frames):
+            self.recorder.record(view, step=index, high_idx=low.high_idx)
         putting = api.action == "PutObject"
         step = self.recorder.record(
             self._simulator.view,

@@ -139,6 +139,7 @@ def replay_set(
     simulator: Simulator,
     out: Path,
     progress: Callable[[], None] = lambda: None,
+    frames: int = 1,
 ) -> Summary:
     """Replay the selected trajectories into `out/metadata/<traj_id>`.
 
@@ -147,6 +148,7 @@ def replay_set(
         simulator: runs them.
         out: the set; made where it does not exist.
         progress: is called after each trajectory.
+        frames: per action that moves the agent or its camera.
 
     Returns:
         The summary. The failure of one trajectory is in it and does not stop the others.
@@ -158,7 +160,7 @@ def replay_set(
     summary = Summary(failures=list(selection.failures))
     for source, trajectory in selection.items:
         try:
-            report, new = _one(source, trajectory, simulator, metadata)
+            report, new = _one(source, trajectory, simulator, metadata, frames)
         except InfthorError as error:
             summary.failures.append(Failure(source.place, f"{trajectory.traj_id}: {error}"))
         else:
@@ -174,20 +176,22 @@ def _all_sources(paths: Iterable[Path]) -> Iterator[Source]:
         yield from iter_sources(path)
 
 
-def _one(source: Source, trajectory: Trajectory, simulator: Simulator, metadata: Path) -> tuple[Replayed, bool]:
+def _one(
+    source: Source, trajectory: Trajectory, simulator: Simulator, metadata: Path, frames: int
+) -> tuple[Replayed, bool]:
     """The report of one trajectory, and whether it was made now."""
     digest = hashlib.blake2b(source.raw.strip(), digest_size=16).hexdigest()
     name = folder_name(trajectory.traj_id)
     final = metadata / name
     if final.exists():
-        return _earlier(final, digest), False
+        return _earlier(final, digest, frames), False
     partial = metadata / f".{name}.partial"
     if partial.exists():
         shutil.rmtree(partial)
     partial.mkdir()
     started = time.monotonic()
     try:
-        report = replay(trajectory, simulator, partial, digest)
+        report = replay(trajectory, simulator, partial, digest, frames)
         report.seconds = round(time.monotonic() - started, 3)
         (partial / _TRAJECTORY).write_bytes(source.raw.strip() + b"\n")
         (partial / _REPORT).write_bytes(msgspec.json.encode(report) + b"\n")
@@ -200,7 +204,7 @@ def _one(source: Source, trajectory: Trajectory, simulator: Simulator, metadata:
     return report, True
 
 
-def _earlier(folder: Path, digest: str) -> Replayed:
+def _earlier(folder: Path, digest: str, frames: int) -> Replayed:
     """The report of a trajectory that an earlier run replayed."""
     path = folder / _REPORT
     try:
@@ -209,4 +213,6 @@ def _earlier(folder: Path, digest: str) -> Replayed:
         raise DataError(f"{path}: not readable ({error}); remove the folder to replay it again") from error
     if report.digest != digest:
         raise DataError(f"{folder}: made from another trajectory of this name; remove it or choose another --out")
+    if report.frames != frames:
+        raise DataError(f"{folder}: made with {report.frames} frames per move; remove it or choose another --out")
     return report

@@ -44,16 +44,18 @@ def sequence_text(trajectory: Trajectory, steps: list[Step]) -> str:
 
     Args:
         trajectory: for goals and sub-goals.
-        steps: the replayed log, one frame per action after the first.
+        steps: the replayed log; of several frames of one action the last counts.
     """
     starts: dict[int, int | None] = {item.low_pddl_idx[0]: item.sub_traj_idx for item in trajectory.sub_trajs}
     starts = starts or {0: None}
     plans = {high.high_idx: plan_text(high) for high in trajectory.plan.high_pddl}
     parts: list[str] = []
     shown: int | None = None
-    for index, step in enumerate(steps[1:]):
-        if index in starts:
-            task = _task(trajectory, starts[index])
+    for step in steps:
+        if step.action is None:
+            continue
+        if step.step in starts:
+            task = _task(trajectory, starts[step.step])
             parts.append(f"<|goal|>Your main goal: {goal_text(trajectory, task)}<|goal|><image>")
         if step.high_idx is not None and step.high_idx != shown:
             shown = step.high_idx

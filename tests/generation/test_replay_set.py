@@ -50,6 +50,21 @@ def test_a_generated_trajectory_replays_whole(generated, tmp_path):
     assert not list((tmp_path / "metadata").glob(".*"))
 
 
+def test_several_frames_per_move(generated, tmp_path):
+    with Simulator(embedded()) as simulator:
+        summary = replay_set(select([generated]), simulator, tmp_path, frames=3)
+        again = replay_set(select([generated]), simulator, tmp_path)
+    assert summary.document()["whole"] == 1
+    assert "3 frames per move" in again.failures[0].message
+    steps = read_steps(tmp_path / "metadata" / JOB.traj_id)
+    first = [step for step in steps if step.step == 1]
+    assert [step.action is None for step in first] == [True, True, False]
+    assert [step.img_idx for step in steps] == list(range(len(steps)))
+    moves = sum(step.action is not None for step in steps)
+    assert moves == len(next(iter_trajectories(generated)).plan.low_actions)
+    assert (tmp_path / "metadata" / JOB.traj_id / "traj.txt").read_text().count("<|act|>") == 2 * moves
+
+
 def test_the_seed_decides_and_what_exists_is_kept(generated, tmp_path):
     with Simulator(embedded()) as simulator:
         generate_set([JOB], simulator, tmp_path)

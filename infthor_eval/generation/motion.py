@@ -1,0 +1,55 @@
+"""The views between two poses of the agent, for replays with several frames per action."""
+
+from collections.abc import Iterator
+
+from infthor_eval.thor.simulator import Simulator
+from infthor_eval.thor.view import AgentPose, Vector, View
+
+__all__ = ["between"]
+
+
+def between(simulator: Simulator, start: AgentPose, end: AgentPose, frames: int) -> Iterator[View]:
+    """Look from evenly spaced poses between two; the agent is back at the second one afterwards.
+
+    Args:
+        simulator: where the agent stands at `end`.
+        start: before the action.
+        end: after the action.
+        frames: of the whole action, the one at `end` included.
+
+    Yields:
+        `frames` - 1 views, none where the agent did not move.
+    """
+    if start == end:
+        return
+    for number in range(1, frames):
+        yield _look(simulator, _mix(start, end, number / frames))
+    if frames > 1:
+        _look(simulator, end)
+
+
+def _mix(start: AgentPose, end: AgentPose, share: float) -> AgentPose:
+    turn = (end.rotation - start.rotation + 180.0) % 360.0 - 180.0
+    one, other = start.position, end.position
+    return AgentPose(
+        Vector(
+            one.x + share * (other.x - one.x),
+            one.y + share * (other.y - one.y),
+            one.z + share * (other.z - one.z),
+        ),
+        (start.rotation + share * turn) % 360.0,
+        start.horizon + share * (end.horizon - start.horizon),
+        end.standing,
+    )
+
+
+def _look(simulator: Simulator, pose: AgentPose) -> View:
+    at = pose.position
+    return simulator.query(
+        "TeleportFull",
+        position={"x": at.x, "y": at.y, "z": at.z},
+        rotation={"x": 0.0, "y": pose.rotation, "z": 0.0},
+        horizon=pose.horizon,
+        standing=pose.standing,
+        forceAction=True,
+    )
