@@ -16,12 +16,13 @@ __all__ = ["Seen", "Surface", "find_place", "owner_of", "surfaces"]
 
 _WALL = 0.02  # thickness in metres of the sides and floors of hollow receptacles
 _OPEN_TOP = frozenset("BathtubBasin Bowl Box Cup GarbageCan LaundryHamper Mug Pan Plate Pot Sink SinkBasin".split())
-_SHELVES = {"Fridge": (0.32, 0.5, 0.68), "Safe": (0.04,), "Cabinet": (0.03,), "Microwave": (0.08,), "Drawer": (0.12,)}
+_SHELVES = {"Fridge": (0.22, 0.41, 0.62), "Safe": (0.04,), "Cabinet": (0.03,), "Microwave": (0.08,), "Drawer": (0.12,)}
 _OVERHANG = frozenset(
     "Bowl CoffeeMachine Cup HandTowelHolder Mug Pan Plate Pot StoveBurner Toaster Toilet ToiletPaperHanger"
     " TowelHolder".split()
 )
 _STEP = 0.05
+_BELOW_HAND = 0.15  # metres below the agent's own height at which it likes best to put things
 _CLEARANCE = 0.008
 _SLIDE = 0.8  # share of its depth that a drawer comes out
 
@@ -142,7 +143,11 @@ def _by_reach(world: World, found: list[Surface]) -> list[Surface]:
     def cost(surface: Surface) -> tuple[float, float, float]:
         turned = yaw_matrix(surface.yaw).T @ (agent - surface.center)
         away = np.maximum(np.abs(turned[[0, 2]]) - surface.half, 0.0)
-        return round(abs(surface.center[1] - agent[1]), 3), float(np.hypot(*away)), float(surface.center[1])
+        return (
+            round(abs(surface.center[1] - agent[1] + _BELOW_HAND), 3),
+            float(np.hypot(*away)),
+            float(surface.center[1]),
+        )
 
     return sorted(found, key=cost)
 

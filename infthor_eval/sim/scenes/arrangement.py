@@ -16,12 +16,12 @@ __all__ = ["arrange"]
 _INNER = frozenset("Cabinet Drawer Shelf Safe Microwave".split())
 _BASINS = frozenset("Sink SinkBasin BathtubBasin".split())
 _HOLED = frozenset("CounterTop Desk DiningTable Dresser SideTable Sink".split())
+_TALL = frozenset("Fridge ShelvingUnit Dresser".split())
 _BODY = np.array([0.2, 0.0, 0.2])  # half of the floor that the agent takes, metres
 _LIP, _BEFORE = 0.05, 0.6  # how far a counter reaches over its cabinets, and how far before them is floor, metres
+# boxes whose axes do not tell their front; other things face +z of their own frame, as nearly all assets do
 _FACING_ROOM = frozenset(
-    "Blinds Cabinet CounterTop Curtains Drawer Dresser Faucet Fridge HandTowelHolder LightSwitch Microwave Mirror"
-    " Painting Poster Safe Shelf ShelvingUnit ShowerDoor Sink Television Toilet ToiletPaperHanger TowelHolder"
-    " Window".split()
+    "Blinds Cabinet CounterTop Curtains Drawer Mirror Painting Poster Shelf ShelvingUnit ShowerDoor Sink Window".split()
 )
 
 
@@ -98,9 +98,16 @@ def _plan(item: SimObject, fixed: list[SimObject], nav: NavGrid) -> tuple[Rect, 
                 point = np.array([x, low[1], z])
                 holes.append(_own_frame(item, point - _BODY, point + _BODY))
         holes += [_own_frame(item, *front) for front in _fronts_below(item, fixed)]
+        holes += [_own_frame(item, *o.bounds()) for o in fixed if o.object_type in _TALL and _stands_through(o, item)]
     half = item.box_size / 2
     whole = (-float(half[0]), -float(half[2]), float(half[0]), float(half[2]))
     return () if not holes else without(whole, holes)
+
+
+def _stands_through(tall: SimObject, counter: SimObject) -> bool:
+    """Whether something goes from well below a counter to well above it."""
+    low, high = tall.bounds()
+    return bool(low[1] < counter.bounds()[0][1] - 0.3 and high[1] > counter.bounds()[1][1] + 0.3)
 
 
 def _sinks(item: SimObject, fixed: list[SimObject]) -> Iterator[tuple[Array, Array]]:

@@ -105,8 +105,9 @@ class Builder:
             self.box((0, side * (1 - y), z), (1 - 2 * x, y, 1 - z), color, material)
 
     def open_top(self, color: Color, material: Material, wall: float) -> None:
-        """Adds a box without its lid: five boards `wall` metres thick."""
-        x, y, z = (self.thick(wall / 2, axis) for axis in range(3))
+        """Adds a box without its lid: four sides `wall` metres thick on a thin bottom."""
+        x, z = self.thick(wall / 2, 0), self.thick(wall / 2, 2)
+        y = self.thick(min(wall / 2, 0.004), 1)
         self.box((0, -1 + y, 0), (1, y, 1), shade_of(color, 0.85), material)
         for side in (-1, 1):
             self.box((side * (1 - x), y, 0), (x, 1 - y, 1), color, material)

@@ -63,7 +63,7 @@ def fridge(b: Builder) -> None:
         b.box((0, 0, -z), (1, 1, 1 - z), shade_of(color, 0.92), Material.METAL)
     else:
         b.open_front(shade_of(color, 0.97), Material.PLAIN, 0.045)
-        for level in (-0.36, 0.0, 0.36):
+        for level in (-0.56, -0.18, 0.24):
             b.box((0, level - 0.03, 0.8), (0.93, 0.006, 0.02), (0.78, 0.86, 0.9), Material.GLASS)
             b.box((0, level - 0.03, -0.86), (0.93, 0.006, 0.05), (0.78, 0.86, 0.9), Material.GLASS)
         b.box((0, 0.9, -0.2), (0.3, 0.02, 0.3), (1.0, 1.0, 0.9), glow=0.9)
