@@ -36,10 +36,15 @@ class OneByOne:
 
 
 class BackendConversation(Transcript):
-    """A conversation that keeps the parts and leaves the rest to a back end."""
+    """A conversation that keeps the parts and leaves the rest to a back end.
 
-    def __init__(self, backend: Backend) -> None:
+    Attributes:
+        batch_size: how many endings the back end answers together.
+    """
+
+    def __init__(self, backend: Backend, batch_size: int = 1) -> None:
         super().__init__()
+        self.batch_size = batch_size
         self._backend = backend
 
     @property

@@ -92,6 +92,11 @@ class Conversation(Protocol):
 class BatchingConversation(Conversation, Protocol):
     """A conversation that can answer several endings at once, which saves time where the back end works in batches."""
 
+    @property
+    def batch_size(self) -> int:
+        """How many endings are worth handing over at once: as many are computed together."""
+        ...
+
     def replies(self, endings: Sequence[Sequence[Part]], max_new_tokens: int, stop: Sequence[str] = ()) -> list[Reply]:
         """What append, reply, rewind would give for each ending; the conversation stays as it was.
 

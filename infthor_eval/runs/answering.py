@@ -1,22 +1,27 @@
 """Having units answered, by a model through its conversation or by a bound from the answer key."""
 
+from collections.abc import Sequence
 from typing import Protocol
 
 from infthor_eval.runs.units import Unit
-from model_adapters import Bound, Model, Part, Reply
+from model_adapters import BatchingConversation, Bound, Model, Part, Reply
 
 __all__ = ["Answerer", "answerer_for"]
 
 
 class Answerer(Protocol):
-    """Gives the reply to a unit."""
+    """Gives the replies to units."""
 
-    def answer(self, unit: Unit) -> Reply:
-        """The reply to the unit.
+    @property
+    def batch_size(self) -> int:
+        """How many units are worth handing over at once."""
+
+    def answer(self, units: Sequence[Unit]) -> list[Reply]:
+        """The replies to units that share their context and decoding settings.
 
         Raises:
-            DataError: a frame cannot be read.
-            ModelError: the model cannot take the request.
+            DataError: a frame cannot be read; nothing is answered then.
+            ModelError: the model cannot take one of the requests; nothing is answered then.
         """
 
 
@@ -29,23 +34,37 @@ class _ModelAnswerer:
         self._after_context = self._start
         self._context: tuple[Part, ...] = ()
 
-    def answer(self, unit: Unit) -> Reply:
-        if unit.context != self._context:
+    @property
+    def batch_size(self) -> int:
+        return self._conversation.batch_size if isinstance(self._conversation, BatchingConversation) else 1
+
+    def answer(self, units: Sequence[Unit]) -> list[Reply]:
+        context, decoding = units[0].context, units[0].decoding
+        if context != self._context:
             self._conversation.rewind(self._start)
             self._context = ()
-            self._conversation.append(*unit.context)
-            self._context, self._after_context = unit.context, self._conversation.mark()
+            self._conversation.append(*context)
+            self._context, self._after_context = context, self._conversation.mark()
+        self._conversation.rewind(self._after_context)
+        limits = decoding["max_gen_toks"], decoding.get("until", ())
+        if len(units) > 1 and isinstance(self._conversation, BatchingConversation):
+            return self._conversation.replies([[unit.text] for unit in units], *limits)
+        return [self._reply(unit, *limits) for unit in units]
+
+    def _reply(self, unit: Unit, max_new_tokens: int, stop: Sequence[str]) -> Reply:
         self._conversation.rewind(self._after_context)
         self._conversation.append(unit.text)
-        return self._conversation.reply(unit.decoding["max_gen_toks"], unit.decoding.get("until", ()))
+        return self._conversation.reply(max_new_tokens, stop)
 
 
 class _BoundAnswerer:
+    batch_size = 1
+
     def __init__(self, bound: Bound) -> None:
         self._bound = bound
 
-    def answer(self, unit: Unit) -> Reply:
-        return Reply(self._bound.answer(unit.question), (), 0, 0)
+    def answer(self, units: Sequence[Unit]) -> list[Reply]:
+        return [Reply(self._bound.answer(unit.question), (), 0, 0) for unit in units]
 
 
 def answerer_for(model: Model | Bound) -> Answerer:

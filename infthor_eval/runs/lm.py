@@ -1,7 +1,7 @@
 """Our models as a guest of lm-eval: the `LM` that its evaluator drives."""
 
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from lm_eval.api.instance import Instance
 from lm_eval.api.model import LM
@@ -52,8 +52,11 @@ class JournaledLM(LM):
     def generate_until(self, requests: Sequence[Instance]) -> list[str]:
         """One response per request; empty where the model could not answer (the journal has the reason)."""
         units = [_unit(request) for request in requests]
-        records = {id(unit): self._record(unit) for group in by_shared_context(units) for unit in group}
-        return [records[id(unit)].reply or "" for unit in units]
+        replies: dict[int, str | None] = {}
+        for group in by_shared_context(units):
+            for unit, record in self._records(group):
+                replies[id(unit)] = record.reply
+        return [replies[id(unit)] or "" for unit in units]
 
     def loglikelihood(self, requests: Sequence[Instance]) -> list[tuple[float, bool]]:
         """Not offered: no task of ours compares likelihoods."""
@@ -63,21 +66,43 @@ class JournaledLM(LM):
         """Not offered, see `loglikelihood`."""
         raise ModelError("infthor-eval models answer in words; use a task with output_type generate_until")
 
-    def _record(self, unit: Unit) -> UnitRecord:
+    def _records(self, group: Sequence[Unit]) -> Iterator[tuple[Unit, UnitRecord]]:
+        """The records of units in one context, found in the journal or made, several at a time where that pays."""
+        waiting = []
+        for unit in group:
+            record = self._known(unit)
+            if record is None:
+                waiting.append(unit)
+            else:
+                yield unit, record
+        size = self._answerer.batch_size
+        for at in range(0, len(waiting), size):
+            yield from self._made(waiting[at : at + size])
+
+    def _known(self, unit: Unit) -> UnitRecord | None:
+        """The record of a unit that needs no answering: an earlier run's, or that of a frame that cannot be read."""
         try:
-            inputs = unit.fingerprint
+            found = self._journal.answered((unit.task, unit.question.id, unit.variant), unit.fingerprint)
         except DataError as error:
             return self._keep(_as_record(unit, "", failure=str(error)))
-        found = self._journal.answered((unit.task, unit.question.id, unit.variant), inputs)
         if found is not None:
             self._observe(found, True)
-            return found
+        return found
+
+    def _made(self, units: Sequence[Unit]) -> Iterator[tuple[Unit, UnitRecord]]:
         began = time.perf_counter()
         try:
-            reply = self._answerer.answer(unit)
+            replies = self._answerer.answer(units)
         except (DataError, ModelError) as error:
-            return self._keep(_as_record(unit, inputs, failure=str(error)))
-        return self._keep(_as_record(unit, inputs, reply=reply, seconds=time.perf_counter() - began))
+            if len(units) > 1:  # one of them may be to blame; the others are answered
+                for unit in units:
+                    yield from self._made([unit])
+            else:
+                yield units[0], self._keep(_as_record(units[0], units[0].fingerprint, failure=str(error)))
+            return
+        seconds = (time.perf_counter() - began) / len(units)
+        for unit, reply in zip(units, replies, strict=True):
+            yield unit, self._keep(_as_record(unit, unit.fingerprint, reply=reply, seconds=seconds))
 
     def _keep(self, record: UnitRecord) -> UnitRecord:
         self._journal.append(record)

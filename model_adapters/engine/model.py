@@ -68,7 +68,7 @@ class TransformersModel:
 
     def conversation(self) -> BackendConversation:
         """A new, empty conversation."""
-        return BackendConversation(self)
+        return BackendConversation(self, self._options.batch_size)
 
     def close(self) -> None:
         """Free the KV cache, the features and the weights."""

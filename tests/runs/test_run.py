@@ -3,7 +3,7 @@ from collections import Counter
 
 import pytest
 
-from infthor_eval.errors import UsageError
+from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.formats.question import Question
 from infthor_eval.runs import execute, plan, read_journal
 from model_adapters import Reply
@@ -149,3 +149,20 @@ def test_the_tiny_model_runs_through_and_shares_prefixes(make_request):
         by_trajectory.setdefault(record.traj_id, []).append(record)
     for records in by_trajectory.values():
         assert records[0].n_cached_tokens < records[1].n_cached_tokens
+
+
+def test_batches_give_the_same_replies_and_one_that_fails_takes_no_other_with_it(make_request, monkeypatch):
+    tasks = ("nieh_full",)
+    alone = execute(plan(make_request(model="qwen2.5-vl-tiny", tasks=tasks)), silent)
+    together = execute(
+        plan(make_request(model="qwen2.5-vl-tiny", tasks=tasks, model_options={"batch_size": "4"})), silent
+    )
+    assert {r.key: r.reply for r in together.records} == {r.key: r.reply for r in alone.records}
+
+    def replies(talk, endings, max_new_tokens, stop=()):
+        raise ModelError("out of memory on a batch")
+
+    monkeypatch.setattr("model_adapters.backend.BackendConversation.replies", replies)
+    options = {"batch_size": "3"}
+    survived = execute(plan(make_request(model="qwen2.5-vl-tiny", tasks=tasks, model_options=options)), silent)
+    assert {r.key: r.reply for r in survived.records} == {r.key: r.reply for r in alone.records}
