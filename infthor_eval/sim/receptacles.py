@@ -229,7 +229,8 @@ def _holding_cost(receptacle: SimObject, point: Array, item: SimObject) -> float
         return 5.0
     volume = float(np.prod(np.maximum(high - low, 0.02)))
     if receptacle.kind.encloses or receptacle.object_type in _OPEN_TOP:
-        inside = low[1] - (0.12 if receptacle.kind.encloses else 0.03) <= point[1] <= high[1] - 0.005
+        top = (low[1] + high[1]) / 2 if receptacle.object_type == "Drawer" else high[1] - 0.005
+        inside = low[1] - _sinking(receptacle) <= point[1] <= top
         if receptacle.kind.pickupable and float(np.prod(item.box_size)) > volume:
             return None
         return 0.01 * volume if inside else None
@@ -237,3 +238,10 @@ def _holding_cost(receptacle: SimObject, point: Array, item: SimObject) -> float
     if -0.12 <= gap <= 0.25:
         return 0.1 + abs(gap)
     return 1.0 + abs(gap) if low[1] <= point[1] <= high[1] + 0.05 else None
+
+
+def _sinking(receptacle: SimObject) -> float:
+    """How far below the box of a hollow receptacle, in metres, the underside of its contents may be recorded."""
+    if receptacle.kind.encloses:
+        return 0.12
+    return 0.03 if receptacle.kind.pickupable else 0.08

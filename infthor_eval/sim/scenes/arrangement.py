@@ -18,7 +18,7 @@ _BASINS = frozenset("Sink SinkBasin BathtubBasin".split())
 _HOLED = frozenset("CounterTop Desk DiningTable Dresser SideTable Sink".split())
 _TALL = frozenset("Fridge ShelvingUnit Dresser".split())
 _BODY = np.array([0.2, 0.0, 0.2])  # half of the floor that the agent takes, metres
-_LIP, _BEFORE = 0.05, 0.6  # how far a counter reaches over its cabinets, and how far before them is floor, metres
+_LIP, _BEFORE = 0.02, 0.6  # how far a counter reaches over its cabinets, and how far before them is floor, metres
 # boxes whose axes do not tell their front; other things face +z of their own frame, as nearly all assets do
 _FACING_ROOM = frozenset(
     "Blinds Cabinet CounterTop Curtains Drawer Mirror Painting Poster Shelf ShelvingUnit ShowerDoor Sink Window".split()

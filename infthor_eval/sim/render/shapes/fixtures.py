@@ -72,16 +72,17 @@ def toilet(b: Builder) -> None:
 
 
 def window(b: Builder) -> None:
-    """A bright pane in a white frame with a cross."""
-    x, y = b.thick(0.03, 0), b.thick(0.03, 1)
-    b.box((0, 0, 0), (1, 1, 0.85), _SKY, Material.GLASS, glow=0.8)
+    """A bright pane in a white frame with a cross, at the wall side of its box."""
+    x, y, z = b.thick(0.03, 0), b.thick(0.03, 1), b.thick(0.05, 2)
+    at = z - 1
+    b.box((0, 0, at), (1, 1, z * 0.85), _SKY, Material.GLASS, glow=0.8)
     for side in (-1, 1):
-        b.box((side * (1 - x), 0, 0), (x, 1, 1), WHITE)
-        b.box((0, side * (1 - y), 0), (1, y, 1), WHITE)
-    b.box((0, 0, 0), (x * 0.6, 1, 0.95), WHITE)
-    b.box((0, 0, 0), (1, y * 0.6, 0.95), WHITE)
+        b.box((side * (1 - x), 0, at), (x, 1, z), WHITE)
+        b.box((0, side * (1 - y), at), (1, y, z), WHITE)
+    b.box((0, 0, at), (x * 0.6, 1, z * 0.95), WHITE)
+    b.box((0, 0, at), (1, y * 0.6, z * 0.95), WHITE)
     if b.state.broken:
-        b.box((0.2, 0.3, 0.5), (0.5, 0.02, 0.1), BLACK, tilt=(0, 0, 40))
+        b.box((0.2, 0.3, at), (0.5, 0.02, z), BLACK, tilt=(0, 0, 40))
 
 
 def curtains(b: Builder) -> None:

@@ -113,12 +113,12 @@ def shelf(b: Builder) -> None:
 
 
 def shelving(b: Builder) -> None:
-    """An open rack."""
+    """An open rack on posts."""
     color = pick(WOODS, b.style)
-    x, y, z = b.thick(0.012, 0), b.thick(0.01, 1), b.thick(0.008, 2)
-    for side in (-1, 1):
-        b.box((side * (1 - x), 0, 0), (x, 1, 1), color, Material.WOOD)
-    b.box((0, 0, -1 + z), (1, 1, z), shade_of(color, 0.7), Material.WOOD)
+    x, y, z = b.thick(0.015, 0), b.thick(0.01, 1), b.thick(0.015, 2)
+    for side_x in (-1, 1):
+        for side_z in (-1, 1):
+            b.box((side_x * (1 - x), 0, side_z * (1 - z)), (x, 1, z), color, Material.WOOD)
     levels: Sequence[float] = (-0.9, 1 - y) if b.item.hollow else (-0.9, -0.3, 0.3, 1 - y)
     for level in levels:
         b.box((0, level, 0), (1, y, 1), shade_of(color, 0.95), Material.WOOD)
