@@ -116,7 +116,7 @@ def generate(settings: Settings, simulator: Simulator) -> Made:
     factory.begin()
     while not factory.long_enough():
         factory.extend()
-    factory.put_down()
+        factory.put_down()
     if settings.final_task:
         factory.finish()
     return Made(factory.trajectory(), factory.statistics, factory.problems)
@@ -191,28 +191,31 @@ class _Factory:
         """Try sampled tasks until one becomes part of the trajectory; None where none does."""
         view = self._simulator.view
         kinds = {item.object_type for item in view.objects.values()}
-        blocked: set[str] = set()  # what turned out to be out of reach or full, as things are
+        blocked: set[str] = set()  # what turned out to be out of reach, as things are
+        refused: set[tuple[str, str]] = set()  # what turned out to find no room in what
         room = room_of(view)
         possible = set(tasks_of(room, kinds))
         tried = 0
         for task in self._pool.sample(room, kinds):
             operators = plan(task, room) if task in possible and allowed(task) else None
-            if not operators:
-                continue
+            if not operators or all(step.name == "GotoLocation" for step in operators):
+                continue  # it holds already, or would by standing elsewhere
             if tried == trials:
                 return None
             tried += 1
             failure = self._try(task, room, operators)
             if failure is None:
                 return task
-            if failure.item is not None:
+            if failure.item is not None and failure.receptacle is not None:
+                refused.add((failure.item, failure.receptacle))
+            elif failure.item is not None:
                 blocked.add(failure.item)
-                room = room_of(view, blocked)
-                possible = set(tasks_of(room, kinds))
+            room = room_of(view, blocked, refused)
+            possible = set(tasks_of(room, kinds))
         return None
 
     def put_down(self) -> None:
-        """Put a held object down, as a sub-goal of its own outside any task."""
+        """Put a held object down, as a sub-goal of its own outside any task, wherever there is room for it."""
         room = room_of(self._simulator.view)
         held = room.start.held
         if held is None:

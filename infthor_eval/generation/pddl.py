@@ -151,7 +151,8 @@ def _rules(task: Task, room: Room, items: list[str], names: dict[str, str]) -> I
         kind = room.types[item]
         for holder in holders:
             usable = holder in room.places or room.types[holder] == task.movable
-            if usable and holder != item and goes_into(kind, room.types[holder]):
+            fits = goes_into(kind, room.types[holder]) and (item, holder) not in room.refused
+            if usable and holder != item and fits:
                 yield f"fits {names[item]} {names[holder]}"
         if kind in KNIVES and task.sliced:
             yield f"knife {names[item]}"

@@ -30,6 +30,8 @@ def plan(task: Task, room: Room) -> list[Operator] | None:
     Returns:
         The operators in order, empty where the goal holds already; None where there is no plan.
     """
+    if _hopeless(task, room):
+        return None
     problem = _Problem(task, room)
     start = problem.start
     tie = itertools.count()
@@ -49,6 +51,16 @@ def plan(task: Task, room: Room) -> list[Operator] | None:
                 rest = least_remaining(task, room, following)
                 heapq.heappush(queue, (spent + 1 + rest, next(tie), spent + 1, following))
     return None
+
+
+def _hopeless(task: Task, room: Room) -> bool:
+    """Whether it is plain, without searching, that nothing can get to where the task wants it."""
+    if task.receptacle is None:
+        return False
+    carried = {task.movable} if task.movable is not None else {task.pickup, task.target}
+    items = [item for item, _ in room.start.where if room.types[item] in carried]
+    goals = [key for key in room.receptacles if room.types[key] == task.receptacle]
+    return all((item, goal) in room.refused for item in items for goal in goals)
 
 
 def relevant_items(task: Task, room: Room) -> set[str]:
@@ -110,14 +122,17 @@ class _Problem:
         wanted = {task.receptacle, task.light, APPLIANCE.get(task.kind)}
         chosen = {place for place in room.places if room.types[place] in wanted}
         chosen |= {place for item in kept if (place := room.place_of(item, where)) in room.places and place}
-        aside = {base for item in kept if (base := room.types[item])}
-        for kind in sorted(aside):
-            fitting = sorted(place for place in room.places - chosen if self._takes(place, kind))
-            chosen |= set(fitting[:1])
+        wanted_or_source = set(chosen)
+        for item in sorted(kept):
+            fitting = [place for place in sorted(room.places) if self._takes(place, item)]
+            spare = [place for place in fitting if place not in wanted_or_source]
+            chosen |= set(spare[:1])
         return sorted(chosen)
 
-    def _takes(self, receptacle: str, kind: str) -> bool:
-        return receptacle in self._room.receptacles and goes_into(kind, self._room.types[receptacle])
+    def _takes(self, receptacle: str, item: str) -> bool:
+        types = self._room.types
+        fits = receptacle in self._room.receptacles and goes_into(types[item], types[receptacle])
+        return fits and (item, receptacle) not in self._room.refused
 
     def _gotos(self, state: State, where: dict[str, str]) -> Iterator[tuple[Operator, State]]:
         loose = [item for item, parent in where.items() if parent == FLOOR]
@@ -131,9 +146,8 @@ class _Problem:
                 yield Operator("PickupObject", item), _moved(state, item, ABSENT, held=item)
 
     def _puts(self, state: State, where: dict[str, str], held: str) -> Iterator[tuple[Operator, State]]:
-        kind = self._room.types[held]
         for receptacle in itertools.chain((state.at,), self._movables):
-            if receptacle is None or receptacle == held or not self._takes(receptacle, kind):
+            if receptacle is None or receptacle == held or not self._takes(receptacle, held):
                 continue
             if self._room.place_of(receptacle, where) == state.at:
                 yield Operator("PutObject", held, receptacle), _moved(state, held, receptacle, held=None)

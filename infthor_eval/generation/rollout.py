@@ -26,11 +26,13 @@ class RolloutError(Exception):
 
     Attributes:
         item: id of an object that cannot be acted on as things are, where it was that.
+        receptacle: id of the receptacle that the object finds no room in, where it was that.
     """
 
-    def __init__(self, message: str, item: str | None = None) -> None:
+    def __init__(self, message: str, item: str | None = None, receptacle: str | None = None) -> None:
         super().__init__(message)
         self.item = item
+        self.receptacle = receptacle
 
 
 @dataclass(frozen=True)
@@ -222,7 +224,7 @@ class Rollout:
         before = self._view
         after = self.simulator.step(api.action, **arguments)
         if not after.success:
-            raise RolloutError(f"{api.action}: {after.error}", arguments.get("objectId"))
+            raise RolloutError(f"{api.action}: {after.error}", api.object_id, api.receptacle_id)
         name = f"{api.action}_{suffix}" if suffix else api.action
         low = LowAction(api, self.first_high + len(self.high) - 1, DiscreteAction(name, _box(before, arguments)))
         self.acted.append(Acted(low, after, api.object_id, api.receptacle_id))

@@ -8,7 +8,7 @@ needs them, as ALFRED does.
 
 import math
 from collections.abc import Container, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from infthor_eval.generation.affordances import SLICEABLE
 from infthor_eval.thor.view import ThorObject, View
@@ -61,14 +61,14 @@ class Room:
         places: ids of the furniture and lamps.
         receptacles: ids of what things can be put into or onto, items among them.
         start: the state now.
-        positions: where each of them was, metres.
+        refused: (item, receptacle) pairs of which it is known that the one finds no room in the other.
     """
 
     types: dict[str, str]
     places: frozenset[str]
     receptacles: frozenset[str]
     start: State
-    positions: dict[str, tuple[float, float, float]] = field(default_factory=dict)
+    refused: frozenset[tuple[str, str]] = frozenset()
 
     def place_of(self, item: str, where: dict[str, str]) -> str | None:
         """The place at which an item, or a receptacle, can be reached; None where it does not exist or is
@@ -84,12 +84,13 @@ class Room:
         return item
 
 
-def room_of(view: View, blocked: Container[str] = ()) -> Room:
+def room_of(view: View, blocked: Container[str] = (), refused: Iterable[tuple[str, str]] = ()) -> Room:
     """Read a room from what the simulator reports. The agent counts as being at no place.
 
     Args:
         view: the world now.
         blocked: ids of objects that cannot be acted on as things are: not picked up, or not put into.
+        refused: as `Room.refused`.
     """
     objects = {key: item for key, item in view.objects.items() if not _is_remains(item)}
     items = {key: item for key, item in objects.items() if item.pickupable and key not in blocked}
@@ -114,9 +115,7 @@ def room_of(view: View, blocked: Container[str] = ()) -> Room:
             where=tuple(sorted(where.items())),
             lit=frozenset(key for key in places if objects[key].toggleable and objects[key].is_toggled),
         ),
-        positions={
-            key: (item.position.x, item.position.y, item.position.z) for key, item in objects.items() if key in types
-        },
+        refused=frozenset(refused),
     )
 
 
