@@ -12,6 +12,8 @@ if TYPE_CHECKING:
 
     from infthor_eval.generation.generate_set import Generated
 
+from infthor_eval.cli.options import floor_plans_option
+
 __all__ = ["command"]
 
 _PATH = click.Path(path_type=Path)
@@ -26,7 +28,7 @@ _PATH = click.Path(path_type=Path)
 @click.option("--final-task", is_flag=True, help="End with a task on what was seen at both ends of the trajectory.")
 @click.option("--test-set", is_flag=True, help="As the published test sets: with a final task, without bathrooms.")
 @click.option("--out", required=True, type=_PATH, help="Directory for the trajectory files.")
-@click.option("--data", type=_PATH, help="Folder with recorded floor plans, for scenes among them.")
+@floor_plans_option
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as one JSON object.")
 @click.pass_context
 def command(

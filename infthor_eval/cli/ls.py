@@ -7,6 +7,7 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
+from infthor_eval.cli.options import floor_plans_option
 from infthor_eval.errors import ModelError
 
 __all__ = ["command"]
@@ -14,7 +15,7 @@ __all__ = ["command"]
 
 @click.command("ls")
 @click.argument("what", type=click.Choice(["models", "tasks", "scenes"]))
-@click.option("--data", type=click.Path(path_type=Path), help="Folder with recorded floor plans, for scenes.")
+@floor_plans_option
 def command(what: str, data: Path | None) -> None:
     """List the models with their options, the tasks, or the embedded simulator's scenes."""
     Console().print({"models": _models, "tasks": _tasks}[what]() if what != "scenes" else _scenes(data))

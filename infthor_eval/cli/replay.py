@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from infthor_eval.generation.replay_set import Selection, Summary
     from infthor_eval.thor.launch import Launch
 
+from infthor_eval.cli.options import floor_plans_option
+
 __all__ = ["command"]
 
 _PATH = click.Path(path_type=Path)
@@ -24,7 +26,7 @@ _SHOWN = 20  # failures and divergences printed one by one; all are in the JSON 
 @click.command("replay")
 @click.argument("trajectories", nargs=-1, required=True, type=_PATH)
 @click.option("--out", required=True, type=_PATH, help="The set to write or to continue.")
-@click.option("--data", type=_PATH, help="Folder with recorded floor plans, for trajectories in them.")
+@floor_plans_option
 @click.option("--limit", type=click.IntRange(1), help="Replay at most this many trajectories.")
 @click.option("--per-floor-plan", type=click.IntRange(1), help="At most this many of one floor plan.")
 @click.option("--frames", type=click.IntRange(1), default=1, show_default=True, help="Frames per move or turn.")

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import click
 
-__all__ = ["command"]
+from infthor_eval.cli.options import floor_plans_option
 
-_DATA = click.option("--data", type=click.Path(path_type=Path), help="Folder with recorded floor plans.")
+__all__ = ["command"]
 
 
 @click.group("scenes")
@@ -16,7 +16,7 @@ def command() -> None:
 
 @command.command("show")
 @click.argument("name")
-@_DATA
+@floor_plans_option
 @click.option("--out", type=click.Path(path_type=Path), help="The picture to write; NAME.png otherwise.")
 @click.option("--size", type=click.IntRange(64, 2048), default=600, show_default=True, help="Of each view, pixels.")
 def show(name: str, data: Path | None, out: Path | None, size: int) -> None:
@@ -42,7 +42,7 @@ def show(name: str, data: Path | None, out: Path | None, size: int) -> None:
 @click.option("--out", type=click.Path(path_type=Path), required=True, help="Folder of floor plans, made or added to.")
 @click.option("--unity", type=click.Path(path_type=Path), help="Unity's executable, not the build ai2thor downloads.")
 @click.option("--embedded", "is_embedded", is_flag=True, help="Dump scenes of the embedded simulator instead.")
-@_DATA
+@floor_plans_option
 def dump(names: tuple[str, ...], out: Path, unity: Path | None, is_embedded: bool, data: Path | None) -> None:
     """Write what Unity reports of the scenes NAMES, for --data of the other commands.
 
