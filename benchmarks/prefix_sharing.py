@@ -1,28 +1,38 @@
 """What sharing the frame prefix between the questions of one trajectory saves.
 
-One run measures, on the same tiny Qwen2.5-VL, frames and questions:
+One run measures, on the same Qwen2.5-VL with random weights, the same frames and questions:
   shared   our conversation: frames appended once, then append, reply, rewind per question;
-  plain    the same with share_prefix=false: everything is encoded for every question, as a plain loop does;
+  batched  the same with all questions handed over at once and answered --batch-size at a time;
+  plain    the first way with share_prefix=false: everything is encoded for every question, as a plain loop does;
   floor    transformers alone, written out: one chunked prefill of the frames into its own cache, then per question the
            question's tokens and the reply's. Nothing can be faster without another model.
 
     python benchmarks/prefix_sharing.py --frames 120 --questions 24
+
+On a machine with a GPU it also tells tokens per second, peak memory and the largest context that fits, for random
+weights of the real shape:
+
+    python benchmarks/prefix_sharing.py --device cuda --model-size 7b --largest
 """
 
 import argparse
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
 from PIL import Image
-from transformers import DynamicCache
+from transformers import DynamicCache, Qwen2_5_VLConfig
 
+from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
-from model_adapters import load
+from model_adapters.engine.model import TransformersModel
+from model_adapters.tiny.qwen2_5_vl import Qwen25VLTiny
+from model_adapters.tiny.twin import TinyAdapter, TinyOptions
 
 PROMPT = (
     "\nAnswer the question given the agent's views in time order. Do not include explanation or reasoning in the "
@@ -36,31 +46,107 @@ Timed = tuple[float, Replies]
 
 
 def main() -> None:
-    """Run the three ways and print seconds, factors and whether the replies are equal."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--frames", type=int, default=120)
-    parser.add_argument("--questions", type=int, default=24)
-    parser.add_argument("--new-tokens", type=int, default=16)
-    parser.add_argument("--repeats", type=int, default=3, help="runs of shared and floor; the best counts")
-    parser.add_argument("--threads", type=int, default=2)
-    parser.add_argument("--seed", type=int, default=0)
-    options = parser.parse_args()
+    """Run the four ways and print seconds, factors and whether the replies are equal."""
+    options = _arguments()
     torch.set_num_threads(options.threads)
     questions = [f"Did you see {number} {OBJECTS[number % 8]}s?" for number in range(options.questions)]
     with tempfile.TemporaryDirectory() as folder:
         frames = synthetic_trajectory(Path(folder), options.frames, options.seed)
-        sharing, not_sharing = _tiny("true"), _tiny("false")
+        sharing = build(options)
+        not_sharing = TransformersModel("plain", sharing._loaded, replace(sharing._options, share_prefix=False))
         conversation(sharing, frames[:1], questions[:1], 2)  # imports, threads and kernels warm up here
-        sharing._features.clear()
+        ways = {
+            "shared": lambda: conversation(sharing, *work),
+            "batched": lambda: together(sharing, *work),
+            "floor": lambda: transformers_alone(sharing, *work),
+        }
         work = frames, questions, options.new_tokens
-        shared, floor = [], []
-        for _ in range(options.repeats):  # in turn, so that a busy machine is busy for both
-            sharing._prefix.reset()
-            sharing._features.clear()
-            shared.append(_timed(lambda: conversation(sharing, *work)))
-            floor.append(_timed(lambda: transformers_alone(sharing, *work)))
-        plain = [_timed(lambda: conversation(not_sharing, *work))]
-    report({"shared": shared, "plain": plain, "floor": floor}, options)
+        measured: dict[str, list[Timed]] = {name: [] for name in ways}
+        for _ in range(options.repeats):
+            for name, way in ways.items():  # in turn, so that a busy machine is busy for all
+                forget(sharing)
+                measured[name].append(_timed(way))
+        measured["plain"] = [_timed(lambda: conversation(not_sharing, *work))]
+        report(measured, options)
+        machine_report(sharing, frames, options)
+
+
+def _arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--frames", type=int, default=120)
+    parser.add_argument("--questions", type=int, default=24)
+    parser.add_argument("--new-tokens", type=int, default=16)
+    parser.add_argument("--repeats", type=int, default=3, help="runs of all but plain; the best counts")
+    parser.add_argument("--batch-size", type=int, default=8)
+    parser.add_argument("--threads", type=int, default=2)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--device", default="cpu")
+    parser.add_argument("--model-size", choices=("tiny", "7b"), default="tiny")
+    parser.add_argument("--largest", action="store_true", help="find the largest context that fits")
+    options = parser.parse_args()
+    if options.largest and not options.device.startswith("cuda"):
+        parser.error("--largest needs --device cuda: a CPU's memory is swapped, not used up")
+    return options
+
+
+def build(options: argparse.Namespace) -> TransformersModel:
+    """Qwen2.5-VL with random weights, tiny in float32 or of the 7B model's shape in bfloat16."""
+    twin, dtype = Qwen25VLTiny.twin, "float32"
+    if options.model_size == "7b":
+        twin, dtype = replace(twin, config=_real_shape), "bfloat16"
+    adapter = type("Adapter", (TinyAdapter,), {"twin": twin})
+    settings = TinyOptions(device=options.device, dtype=dtype, batch_size=options.batch_size, max_tokens=0)
+    return adapter.build(f"qwen2.5-vl-{options.model_size}", settings, options.seed)
+
+
+def _real_shape(ids: Mapping[str, int], vocab_size: int) -> Qwen2_5_VLConfig:  # noqa: ARG001 - the real vocabulary
+    config: Qwen2_5_VLConfig = Qwen25VLTiny.twin.config(ids, 152_064)
+    text, vision = config.text_config, config.vision_config
+    text.hidden_size, text.intermediate_size, text.num_hidden_layers = 3584, 18_944, 28
+    text.num_attention_heads, text.num_key_value_heads, text.layer_types = 28, 4, ["full_attention"] * 28
+    text.rope_parameters["mrope_section"] = [16, 24, 24]
+    vision.depth, vision.hidden_size, vision.intermediate_size, vision.num_heads = 32, 1280, 3420, 16
+    vision.out_hidden_size, vision.fullatt_block_indexes = 3584, [7, 15, 23, 31]
+    text.initializer_range = vision.initializer_range = 0.02
+    return config
+
+
+def forget(model: TransformersModel) -> None:
+    """Have the model start from nothing."""
+    model._prefix.reset()
+    model._features.clear()
+
+
+def machine_report(model: TransformersModel, frames: Sequence[FrameRef], options: argparse.Namespace) -> None:
+    """Print the speed of one prefill, the peak memory of a GPU, and the largest context that fits."""
+    forget(model)
+    on_gpu = options.device.startswith("cuda")
+    if on_gpu:
+        torch.cuda.reset_peak_memory_stats()
+    seconds, replies = _timed(lambda: [_prefill(model, frames)])
+    print(f"prefill          {replies[0][0]} tokens, {replies[0][0] / seconds:.0f} tokens/s")
+    if on_gpu:
+        print(f"peak memory      {torch.cuda.max_memory_allocated() / 2**30:.1f} GiB")
+    if options.largest:
+        print(f"largest context  {_largest(model, frames)} tokens (found by doubling)")
+
+
+def _prefill(model: TransformersModel, frames: Sequence[FrameRef]) -> tuple[int, ...]:
+    talk = model.conversation()
+    talk.append(*frames)
+    return (talk.reply(1).n_context_tokens,)
+
+
+def _largest(model: TransformersModel, frames: Sequence[FrameRef]) -> int:
+    fits = 0
+    repeated = list(frames)
+    while True:
+        forget(model)
+        try:
+            fits = _prefill(model, repeated)[0]
+        except ModelError:
+            return fits
+        repeated *= 2
 
 
 def report(measured: dict[str, list[Timed]], options: argparse.Namespace) -> None:
@@ -70,6 +156,7 @@ def report(measured: dict[str, list[Timed]], options: argparse.Namespace) -> Non
     print(f"{options.frames} frames, {options.questions} questions, {options.new_tokens} new tokens each")
     for name, seconds in best.items():
         print(f"{name:8s}{seconds:9.2f} s")
+    print(f"plain / batched  {best['plain'] / best['batched']:6.2f}")
     print(f"plain / shared   {best['plain'] / best['shared']:6.2f}")
     print(f"shared / floor   {best['shared'] / best['floor']:6.2f}")
     print(f"replies equal    {'yes' if all(reply == replies[0] for reply in replies) else 'NO'}")
@@ -100,6 +187,13 @@ def conversation(model: Any, frames: Sequence[FrameRef], questions: Sequence[str
     return replies
 
 
+def together(model: Any, frames: Sequence[FrameRef], questions: Sequence[str], new_tokens: int) -> Replies:
+    """Answer all questions on one prefix, several at a time."""
+    talk = model.conversation()
+    talk.append(*frames)
+    return [reply.token_ids for reply in talk.replies([[PROMPT + text] for text in questions], new_tokens)]
+
+
 @torch.inference_mode()
 def transformers_alone(
     model: Any, frames: Sequence[FrameRef], questions: Sequence[str], new_tokens: int, chunk_frames: int = 8
@@ -115,7 +209,8 @@ def transformers_alone(
         add_generation_prompt=True,
     )
     head, tail = text.replace("<|image_pad|>", "<|image_pad|>" * 121).split("@")
-    ids = torch.tensor([tokenizer(head)["input_ids"]])
+    device = bare.device
+    ids = torch.tensor([tokenizer(head)["input_ids"]], device=device)
     grids = torch.tensor([[1, 22, 22]] * len(frames))
     positions, _ = bare.model.get_rope_index(ids, (ids == pad).int(), image_grid_thw=grids)
     cache = DynamicCache()
@@ -127,8 +222,8 @@ def transformers_alone(
         part = slice(cache.get_seq_length(), ends[at + len(some) - 1])
         bare(
             input_ids=ids[:, part],
-            pixel_values=images["pixel_values"],
-            image_grid_thw=images["image_grid_thw"],
+            pixel_values=images["pixel_values"].to(device),
+            image_grid_thw=images["image_grid_thw"].to(device),
             position_ids=positions[:, :, part],
             past_key_values=cache,
             logits_to_keep=1,
@@ -158,10 +253,6 @@ def _decode(model: Any, cache: DynamicCache, ids: list[int], position: int, new_
         feed = [token]
     cache.crop(n_prefix - cache.get_seq_length())
     return tuple(reply)
-
-
-def _tiny(share_prefix: str) -> Any:
-    return load("qwen2.5-vl-tiny", {"share_prefix": share_prefix}, seed=0)
 
 
 def _timed(run: Callable[[], Replies]) -> Timed:
