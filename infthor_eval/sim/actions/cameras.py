@@ -1,10 +1,9 @@
 # ruff: noqa: ARG001 - the wire's arguments are accepted even where nothing depends on them
 """Pictures: resolution, quality, third-party cameras, the map view."""
 
-from collections.abc import Mapping
 from typing import Any
 
-from infthor_eval.sim.actions.registry import action
+from infthor_eval.sim.actions.registry import Vector3, action
 from infthor_eval.sim.errors import ActionError
 from infthor_eval.sim.geometry import to_array
 from infthor_eval.sim.simulation import Simulation, ThirdPartyCamera
@@ -31,23 +30,23 @@ def change_quality(sim: Simulation, quality: str) -> None:
 @action("AddThirdPartyCamera")
 def add_third_party_camera(
     sim: Simulation,
-    position: Mapping[str, Any] | None = None,
-    rotation: Mapping[str, Any] | None = None,
+    position: Vector3 | None = None,
+    rotation: Vector3 | None = None,
     fieldOfView: float = 90.0,
     orthographic: bool = False,
     orthographicSize: float = 5.0,
     skyboxColor: Any = None,
 ) -> None:
     """Adds a camera; its frames come with every reply from now on."""
-    sim.cameras.append(_camera(position or {}, rotation or {}, fieldOfView, orthographic, orthographicSize))
+    sim.cameras.append(_camera(position or Vector3(), rotation or Vector3(), fieldOfView, orthographic, orthographicSize))
 
 
 @action("UpdateThirdPartyCamera")
 def update_third_party_camera(
     sim: Simulation,
     thirdPartyCameraId: int = 0,
-    position: Mapping[str, Any] | None = None,
-    rotation: Mapping[str, Any] | None = None,
+    position: Vector3 | None = None,
+    rotation: Vector3 | None = None,
     fieldOfView: float | None = None,
     skyboxColor: Any = None,
 ) -> None:
@@ -69,9 +68,7 @@ def toggle_map_view(sim: Simulation) -> None:
     sim.map_view = not sim.map_view
 
 
-def _camera(
-    position: Mapping[str, Any], rotation: Mapping[str, Any], angle: float, orthographic: bool, size: float
-) -> ThirdPartyCamera:
+def _camera(position: Vector3, rotation: Vector3, angle: float, orthographic: bool, size: float) -> ThirdPartyCamera:
     if orthographic and size <= 0:
         raise ActionError(f"orthographicSize must be positive, not {size}")
     return ThirdPartyCamera(

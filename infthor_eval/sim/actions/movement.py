@@ -2,12 +2,10 @@
 """Moving, turning, looking and teleporting the agent."""
 
 import math
-from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
-from infthor_eval.sim.actions.registry import action
+from infthor_eval.sim.actions.registry import Vector3, action
 from infthor_eval.sim.errors import ActionError, ErrorCode
 from infthor_eval.sim.geometry import Array, to_array, to_xyz
 from infthor_eval.sim.obstacles import blocking_object, held_object_blocks
@@ -100,8 +98,8 @@ def wait(sim: Simulation) -> None:
 @action("Teleport")
 def teleport(
     sim: Simulation,
-    position: Mapping[str, Any] | None = None,
-    rotation: Mapping[str, Any] | None = None,
+    position: Vector3 | None = None,
+    rotation: Vector3 | None = None,
     horizon: float | None = None,
     standing: bool | None = None,
     forceAction: bool = False,
@@ -119,8 +117,8 @@ def teleport(
 @action("TeleportFull")
 def teleport_full(
     sim: Simulation,
-    position: Mapping[str, Any],
-    rotation: Mapping[str, Any],
+    position: Vector3,
+    rotation: Vector3,
     horizon: float,
     standing: bool,
     forceAction: bool = False,

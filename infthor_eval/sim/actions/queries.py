@@ -1,10 +1,10 @@
 # ruff: noqa: ARG001 - the wire's arguments are accepted even where nothing depends on them
 """Questions about the scene: where the agent can stand, what it would see, the way to an object."""
 
-from collections.abc import Mapping
 from typing import Any
 
-from infthor_eval.sim.actions.registry import action
+from infthor_eval.sim.actions.registry import Vector3, action
+from infthor_eval.sim.actions.targets import object_at
 from infthor_eval.sim.errors import ActionError
 from infthor_eval.sim.geometry import to_array
 from infthor_eval.sim.simulation import Simulation
@@ -33,8 +33,8 @@ def get_shortest_path(
     sim: Simulation,
     objectId: str | None = None,
     objectType: str | None = None,
-    position: Mapping[str, Any] | None = None,
-    target: Mapping[str, Any] | None = None,
+    position: Vector3 | None = None,
+    target: Vector3 | None = None,
     allowedError: float = 0.05,
 ) -> dict[str, Any]:
     """Corners of a shortest way over the grid to the standing place nearest to an object or point."""
@@ -48,7 +48,7 @@ def get_shortest_path(
     return {"corners": [{"x": x, "y": height, "z": z} for x, z in path]}
 
 
-def _goal(sim: Simulation, object_id: str | None, kind: str | None, target: Mapping[str, Any] | None) -> Any:
+def _goal(sim: Simulation, object_id: str | None, kind: str | None, target: Vector3 | None) -> Any:
     if target is not None:
         return to_array(target)
     if object_id is not None:
@@ -62,13 +62,8 @@ def _goal(sim: Simulation, object_id: str | None, kind: str | None, target: Mapp
 @action("GetObjectInFrame", query=True)
 def get_object_in_frame(sim: Simulation, x: float, y: float, checkVisible: bool = False) -> str | None:
     """Id of the object at (x, y), shares of the frame from its top left; None for none."""
-    picture = sim.view()
-    row = min(int((1 - y) * sim.height), sim.height - 1)
-    index = int(picture.instances[row, min(int(x * sim.width), sim.width - 1)])
-    name = picture.names[index] if index >= 0 else ""
-    if name not in sim.world.objects or (checkVisible and name not in sim.visible()):
-        return None
-    return name
+    found = object_at(sim, x, y)
+    return None if checkVisible and found not in sim.visible() else found
 
 
 @action("GetMapViewCameraProperties", query=True)

@@ -11,13 +11,20 @@ from typing import Any, Concatenate
 from infthor_eval.sim.errors import ActionError, ErrorCode
 from infthor_eval.sim.simulation import Simulation
 
-__all__ = ["Action", "action", "bind", "names"]
+__all__ = ["Action", "Vector3", "action", "bind", "names"]
 
 _PASSED_BY = frozenset(
     "action sequenceId agentId renderImage renderDepthImage renderClassImage renderObjectImage renderNormalsImage"
     " renderFlowImage renderSemanticSegmentation renderInstanceSegmentation visibilityDistance fixedDeltaTime"
     " physicsSimulationParams".split()
 )
+
+_LARGEST = 1e9
+
+
+class Vector3(dict[str, float]):
+    """Marks arguments that are a position (metres) or rotation (degrees): `{"x", "y", "z"}`, any of them absent."""
+
 
 Body = Callable[Concatenate[Simulation, ...], Any]
 
@@ -97,15 +104,20 @@ def _type_name(annotation: Any) -> str:
 
 
 def _fits(value: Any, annotation: Any) -> bool:
-    if annotation is Any:
-        return True
-    origin = typing.get_origin(annotation)
+    origin, inner = typing.get_origin(annotation), typing.get_args(annotation)
+    if annotation is Any or annotation is types.NoneType:
+        return annotation is Any or value is None
     if origin in (types.UnionType, typing.Union):
-        return any(_fits(value, option) for option in typing.get_args(annotation))
-    if annotation is types.NoneType:
-        return value is None
-    if annotation is float:
-        return isinstance(value, int | float) and not isinstance(value, bool)
-    if annotation is int:
-        return isinstance(value, int | float) and not isinstance(value, bool) and value == int(value)
+        return any(_fits(value, option) for option in inner)
+    if annotation is Vector3:
+        return isinstance(value, dict) and set(value) <= set("xyz") and all(_is_number(v) for v in value.values())
+    if annotation in (int, float):
+        return _is_number(value) and (annotation is float or value == int(value))
+    if origin is list:
+        return isinstance(value, list) and all(_fits(v, inner[0]) for v in value)
     return isinstance(value, origin or annotation)
+
+
+def _is_number(value: Any) -> bool:
+    """Whether a value is a number that geometry can bear: JSON lets NaN and infinities through."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= _LARGEST

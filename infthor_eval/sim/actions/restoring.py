@@ -1,7 +1,7 @@
 # ruff: noqa: ARG001 - the wire's arguments are accepted even where nothing depends on them
 """Setting a scene to a recorded or random state: poses, toggles, states of objects, random placement."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -104,8 +104,8 @@ def initial_random_spawn(
     forceVisible: bool = False,
     numPlacementAttempts: int = 5,
     placeStationary: bool = True,
-    excludedReceptacles: Sequence[str] | None = None,
-    excludedObjectIds: Sequence[str] | None = None,
+    excludedReceptacles: list[str] | None = None,
+    excludedObjectIds: list[str] | None = None,
     numDuplicatesOfType: list[Any] | None = None,
     allowFloor: bool = False,
     allowMoveable: bool = False,
@@ -115,7 +115,7 @@ def initial_random_spawn(
         raise ActionError("numDuplicatesOfType is not offered by the embedded simulator; use SetObjectPoses")
     spawn_randomly(
         sim.world,
-        np.random.default_rng(randomSeed),
+        seeded(randomSeed),
         excluded_types=frozenset(excludedReceptacles or ()),
         kept=frozenset(excludedObjectIds or ()),
         in_open_only=forceVisible,
@@ -125,7 +125,12 @@ def initial_random_spawn(
 @action("SetRandomSeed")
 def set_random_seed(sim: Simulation, seed: int) -> None:
     """Starts the simulator's random numbers anew."""
-    sim.random = np.random.default_rng(seed)
+    sim.random = seeded(seed)
+
+
+def seeded(seed: int) -> np.random.Generator:
+    """Random numbers from a seed of Unity's, which may be negative."""
+    return np.random.default_rng(int(seed) % 2**32)
 
 
 def _pose(entry: Any) -> Pose:

@@ -4,7 +4,7 @@ from infthor_eval.sim.errors import ActionError, ErrorCode
 from infthor_eval.sim.objects import SimObject
 from infthor_eval.sim.simulation import Simulation
 
-__all__ = ["held_object", "interactable"]
+__all__ = ["held_object", "interactable", "object_at"]
 
 
 def interactable(sim: Simulation, object_id: str | None, force: bool, x: float | None, y: float | None) -> SimObject:
@@ -14,7 +14,11 @@ def interactable(sim: Simulation, object_id: str | None, force: bool, x: float |
         ActionError: neither or both are given, there is no such object, or the agent does not see it near enough.
     """
     if object_id is None:
-        object_id = _at_pixel(sim, x, y)
+        if x is None or y is None:
+            raise ActionError("objectId, or x and y, must be given.", ErrorCode.MISSING_ARGUMENTS)
+        object_id = object_at(sim, x, y)
+        if object_id is None:
+            raise ActionError(f"No object is at x: {x}, y: {y}.")
     elif x is not None or y is not None:
         raise ActionError("Provide either objectId or x and y, not both.", ErrorCode.AMBIGUOUS_ACTION)
     found = sim.world.get(object_id)
@@ -28,15 +32,16 @@ def held_object(sim: Simulation) -> SimObject | None:
     return None if sim.world.held is None else sim.world.objects[sim.world.held]
 
 
-def _at_pixel(sim: Simulation, x: float | None, y: float | None) -> str:
-    if x is None or y is None:
-        raise ActionError("objectId, or x and y, must be given.", ErrorCode.MISSING_ARGUMENTS)
+def object_at(sim: Simulation, x: float, y: float) -> str | None:
+    """Id of the object shown at (x, y), shares of the frame from its top left; None for walls and the void.
+
+    Raises:
+        ActionError: the point is outside the frame.
+    """
     if not (0 <= x <= 1 and 0 <= y <= 1):
         raise ActionError("x/y must be in [0:1]")
     picture = sim.view()
     row = min(int((1 - y) * sim.height), sim.height - 1)
     index = picture.instances[row, min(int(x * sim.width), sim.width - 1)]
     name = picture.names[index] if index >= 0 else ""
-    if name not in sim.world.objects:
-        raise ActionError(f"No object is at x: {x}, y: {y}.")
-    return name
+    return name if name in sim.world.objects else None
