@@ -100,7 +100,8 @@ class HfVlm:
             raise UsageError(f"{name} needs pretrained=..., a hub id or a folder")
         source = locate(options)
         kind = source.config.model_type
-        if kind not in MODEL_FOR_IMAGE_TEXT_TO_TEXT_MAPPING_NAMES:
+        remote = options.trust_remote_code and "AutoModelForImageTextToText" in getattr(source.config, "auto_map", {})
+        if kind not in MODEL_FOR_IMAGE_TEXT_TO_TEXT_MAPPING_NAMES and not remote:
             raise ModelError(f"{options.pretrained} is a {kind} checkpoint, which sees no images")
         known = _known(source.config)
         if known is not None:
@@ -119,6 +120,7 @@ def _known(config: Any) -> MakeFamily | None:
     """The family made for this architecture, if there is one."""
     families: dict[str, MakeFamily] = {
         "qwen2_5_vl": Qwen25VLFamily,
+        "qwen2_vl": Qwen25VLFamily,
         "llava_onevision": LlavaOnevisionFamily,
         "deepseek_vl_hybrid": DeepseekVLFamily,
     }

@@ -1,7 +1,8 @@
 """hf-vlm on checkpoints that transformers' own `save_pretrained` wrote, of families this project has no code for."""
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from transformers import (
     LlavaConfig,
     LlavaForConditionalGeneration,
     LlavaProcessor,
+    Qwen2VLConfig,
 )
 from transformers.models.clip.image_processing_pil_clip import CLIPImageProcessorPil
 from transformers.models.gemma3.image_processing_pil_gemma3 import Gemma3ImageProcessorPil
@@ -27,9 +29,10 @@ from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.formats.frames import FrameRef
 from model_adapters import check_adapter, load
 from model_adapters.engine.model import TransformersModel
+from model_adapters.engine.prompt import token_ids
 from model_adapters.engine.whole import WholeModel, processed
 from model_adapters.tiny.pixtral import PixtralTiny
-from model_adapters.tiny.qwen2_5_vl import save_tiny_checkpoint
+from model_adapters.tiny.qwen2_5_vl import Qwen25VLTiny, save_tiny_checkpoint
 from model_adapters.tiny.tokenizer import train_tokenizer
 
 TEMPLATE = """\
@@ -204,6 +207,32 @@ def test_known_families_need_no_processor(tmp_path: Path, frames: list[FrameRef]
         talk = model.conversation()
         talk.append(*frames[:2], "?")
         assert talk.reply(2).n_context_tokens == talk.n_tokens
+
+
+def _qwen2_vl_config(ids: Mapping[str, int], vocab_size: int) -> Qwen2VLConfig:
+    newer = Qwen25VLTiny.twin.config(ids, vocab_size)
+    text = newer.text_config.to_dict()
+    del text["model_type"]
+    names = ("image_token_id", "video_token_id", "vision_start_token_id", "vision_end_token_id")
+    return Qwen2VLConfig(
+        text_config=text,
+        vision_config={"depth": 2, "embed_dim": 32, "hidden_size": 64, "num_heads": 2, "mlp_ratio": 2},
+        **{name: getattr(newer, name) for name in names},
+    )
+
+
+def test_qwen2_vl_runs_as_its_successor_and_as_transformers_has_it(tmp_path: Path, frames: list[FrameRef]) -> None:
+    replace(Qwen25VLTiny.twin, config=_qwen2_vl_config).save(tmp_path, seed=0)
+    model = _load(tmp_path, chunk_tokens="30")
+    parts = ("Goal.", *frames[:3], "\nWhat is it?")
+    units = model.units(parts)
+    ids = torch.tensor([list(token_ids(units))])
+    pixels = model._loaded.family._image_processor(images=[ref.load() for ref in frames[:3]], return_tensors="pt")
+    bare = model._loaded.model
+    with torch.inference_mode():
+        plain = bare(input_ids=ids, mm_token_type_ids=(ids == bare.config.image_token_id).int(), **pixels)
+    torch.testing.assert_close(model.encode(units), plain.logits[0, -1], atol=1e-4, rtol=1e-4)
+    assert type(bare).__name__ == "Qwen2VLForConditionalGeneration"
 
 
 def test_no_checkpoint_is_a_usage_error() -> None:
