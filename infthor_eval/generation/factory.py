@@ -4,6 +4,7 @@ import random
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from importlib.metadata import version
 from typing import Any
 
 import msgspec
@@ -241,6 +242,7 @@ class _Factory:
             object_log=self._log,
             gen_info={
                 "generator": f"infthor-eval {__version__}",
+                "ai2thor": version("ai2thor"),
                 "settings": settings.document(),
                 "tried": dict(self.statistics.tried),
                 "accepted": dict(self.statistics.accepted),

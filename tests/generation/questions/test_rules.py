@@ -31,7 +31,7 @@ KINDS = {
 @pytest.fixture(scope="module")
 def replayed(tmp_path_factory):
     folder = tmp_path_factory.mktemp("set")
-    jobs = [Settings(scene, 3, 140, 1) for scene in ("kitchen-3", "kitchen-5")]
+    jobs = [Settings(scene, 3, 110, 1) for scene in ("kitchen-3", "kitchen-5")]
     with Simulator(embedded()) as simulator:
         generate_set(jobs, simulator, folder / "trajectories")
         assert replay_set(select([folder / "trajectories"]), simulator, folder).document()["whole"] == 2
