@@ -38,7 +38,8 @@ def add_third_party_camera(
     skyboxColor: Any = None,
 ) -> None:
     """Adds a camera; its frames come with every reply from now on."""
-    sim.cameras.append(_camera(position or Vector3(), rotation or Vector3(), fieldOfView, orthographic, orthographicSize))
+    size = orthographicSize if orthographic else None
+    sim.cameras.append(_camera(position or Vector3(), rotation or Vector3(), fieldOfView, size))
 
 
 @action("UpdateThirdPartyCamera")
@@ -68,12 +69,10 @@ def toggle_map_view(sim: Simulation) -> None:
     sim.map_view = not sim.map_view
 
 
-def _camera(position: Vector3, rotation: Vector3, angle: float, orthographic: bool, size: float) -> ThirdPartyCamera:
-    if orthographic and size <= 0:
+def _camera(position: Vector3, rotation: Vector3, angle: float, size: float | None) -> ThirdPartyCamera:
+    if size is not None and size <= 0:
         raise ActionError(f"orthographicSize must be positive, not {size}")
-    return ThirdPartyCamera(
-        to_array(position), to_array(rotation), _checked_angle(angle), size if orthographic else None
-    )
+    return ThirdPartyCamera(to_array(position), to_array(rotation), _checked_angle(angle), size)
 
 
 def _checked_angle(angle: float) -> float:
