@@ -305,6 +305,11 @@ def _moves(seen: Sequence[Glimpse], words: str) -> list[str]:
     return [str(count)] if count else []
 
 
+def _openings(seen: Sequence[Glimpse], words: str) -> list[str]:
+    count = len(_events(seen, "OpenObject", words))
+    return [str(count)] if count else []
+
+
 _SOLVERS: tuple[tuple[str, Callable[..., list[str]]], ...] = (
     (r"Did you see (.+)\?", _presence),
     (r"Where was the (.+) before you (?:first )?picked it up\?", _before),
@@ -322,5 +327,6 @@ _SOLVERS: tuple[tuple[str, Callable[..., list[str]]], ...] = (
     (r"Is the (.+) (in|on) the (.+) now\?", _is_in),
     (r"What is (in|on) the (.+) now\?", _what_now),
     (r"How many objects are (?:in|on) the (.+) now\?", lambda seen, place: _how_many(seen, "", place)),
+    (r"How many times did you open the (.+)\?", _openings),
     (r"How many times did you pick up the (.+) and put it down again\?", _moves),
 )

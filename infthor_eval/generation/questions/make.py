@@ -110,10 +110,11 @@ def _candidates(history: History, vocabulary: frozenset[str], rng: random.Random
 
 
 class _Chooser:
-    """Chooses so that question types, yes and no, and object types are even over the whole set."""
+    """Chooses so that question types, yes and no, numbers of clues and object types are even over the whole set."""
 
     def __init__(self) -> None:
         self._groups: Counter[str] = Counter()
+        self._clues: Counter[tuple[str, int]] = Counter()
         self._subjects: Counter[tuple[str, str]] = Counter()
 
     def choose(self, candidates: Iterable[Candidate], number: int, rng: random.Random) -> list[Candidate]:
@@ -129,12 +130,14 @@ class _Chooser:
                 continue  # where little happened, presence questions must not fill the place of all others
             chosen.append(best)
             self._groups[_group(best)] += 1
+            self._clues[_group(best), min(len(best.clues), 3)] += 1
             self._subjects.update((_group(best), subject) for subject in best.subjects)
         return sorted(chosen, key=lambda item: (item.clues, item.text))
 
-    def _use(self, item: Candidate) -> tuple[float, float]:
+    def _use(self, item: Candidate) -> tuple[int, int, int]:
         group = _group(item)
-        return self._groups[group], sum(self._subjects[group, subject] for subject in item.subjects)
+        subjects = sum(self._subjects[group, subject] for subject in item.subjects)
+        return self._groups[group], self._clues[group, min(len(item.clues), 3)], subjects
 
 
 def _group(item: Candidate) -> str:

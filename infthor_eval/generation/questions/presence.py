@@ -1,7 +1,8 @@
 """Object presence: "Is there a mug in this place?"
 
 A no-question names a type that nowhere exists in the trajectory's scene and is not easily taken for one that does. No
-frame proves an absence, so it carries a sample of frames instead of evidence.
+frame proves an absence, so it carries a sampled frame instead of evidence: one, as a yes-question has one, because
+else the number of frames would give the answer away.
 """
 
 import random
@@ -14,7 +15,7 @@ from infthor_eval.generation.wording import an, noun
 __all__ = ["KIND", "absent", "present"]
 
 KIND = "object_presence"
-_SAMPLE = 3
+_BUSY = 3  # objects that a sampled frame shows at least, where the trajectory has such frames
 _TEMPLATE = "Did you see {item}?"
 
 # Not asked about: surroundings, parts, and what people would not call by that name.
@@ -64,10 +65,14 @@ def present(history: History) -> Iterator[Candidate]:
 def absent(history: History, vocabulary: frozenset[str], rng: random.Random) -> Iterator[Candidate]:
     """No-questions on types of a vocabulary that the scene does not have."""
     there = history.all_kinds
+    frames = [frame for frame in range(len(history)) if _shown(history, frame) >= _BUSY] or [0]
     for kind in sorted(vocabulary - there):
         if _asked(kind) and not any(kind in group and group & there for group in _TAKEN_FOR_EACH_OTHER):
-            frames = tuple(sorted(rng.sample(range(len(history)), min(_SAMPLE, len(history)))))
-            yield Candidate(KIND, _text(kind), frames, ("no",), (kind,))
+            yield Candidate(KIND, _text(kind), (rng.choice(frames),), ("no",), (kind,))
+
+
+def _shown(history: History, frame: int) -> int:
+    return sum(seen.pixels >= history.least for seen in history.seen(frame).values())
 
 
 def _asked(kind: str) -> bool:
