@@ -16,6 +16,7 @@ setup(
     package_data={
         "infthor_eval": ["sets/**/*"],
         "infthor_eval.nieh": ["*.yaml"],
+        "infthor_eval.report": ["*.html"],
         "infthor_eval.tasks": ["**/*.yaml"],
         "infthor_eval.results": ["README.md", "published/*.yaml"],
     },

@@ -13,7 +13,7 @@ from infthor_eval.report import depth_table, nieh_table, summarise
 from infthor_eval.runs import Budget, Observer, Plan, RunOutcome, RunRequest, UnitRecord, execute, plan
 from model_adapters import options
 
-__all__ = ["evaluate"]
+__all__ = ["evaluate", "execute_with_progress"]
 
 _TABLE_WIDTH = 130  # on a narrower terminal lines wrap; cut-off numbers would be worse
 _notes = Console(stderr=True, soft_wrap=True)
@@ -31,7 +31,7 @@ def evaluate(requests: Sequence[RunRequest]) -> int:
     plans = [plan(request) for request in requests]
     summaries, outcomes = [], []
     for ready in plans:
-        outcome = _execute(ready)
+        outcome = execute_with_progress(ready)
         summary = summarise(outcome.identity, outcome.records)
         _write_json(outcome.folder / "results.json", summary)
         outcomes.append(outcome)
@@ -44,7 +44,8 @@ def evaluate(requests: Sequence[RunRequest]) -> int:
     return int(any(_say_what_failed(outcome) for outcome in outcomes))
 
 
-def _execute(plan: Plan) -> RunOutcome:
+def execute_with_progress(plan: Plan) -> RunOutcome:
+    """Execute one planned run, with a progress bar and what is left out on standard error."""
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     found = made = 0
     with Progress(*columns, console=_notes, transient=True) as progress:

@@ -14,6 +14,7 @@ __all__ = ["main"]
 _COMMANDS = {
     "run": "Evaluate a model on tasks (the default command).",
     "fetch": "Download the published data.",
+    "validate": "Keep the questions of a set that one of several models answers.",
     "compare": "Compare two runs on the same questions.",
     "ls": "List the models, the tasks or the scenes.",
     "scenes": "Look at a scene, or carry it to machines without Unity.",

@@ -1,13 +1,42 @@
-"""Options that several commands take."""
+"""Options that several commands take, and how their values are written."""
 
 from pathlib import Path
 
 import click
 
-__all__ = ["floor_plans_option"]
+__all__ = ["floor_plans_option", "model_options_in", "names_in"]
 
 floor_plans_option = click.option(
     "--data",
     type=click.Path(exists=True, file_okay=False, path_type=Path),
     help="Folder with recorded floor plans (thor_scenes/, alfred/layouts/), for scenes among them.",
 )
+
+
+def names_in(text: str, option: str) -> tuple[str, ...]:
+    """Names written with commas, each once.
+
+    Raises:
+        click.UsageError: there is none.
+    """
+    names = tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
+    if not names:
+        raise click.UsageError(f"{option} is empty; give a name")
+    return names
+
+
+def model_options_in(text: str) -> dict[str, str]:
+    """Options of a model written as lm-eval writes them: `k=v,k=v`.
+
+    Raises:
+        click.UsageError: an item is of another form, or a key stands twice.
+    """
+    options: dict[str, str] = {}
+    for item in filter(None, (part.strip() for part in text.split(","))):
+        key, equals, value = item.partition("=")
+        if not equals or not key.strip():
+            raise click.UsageError(f"--model-args: {item!r} is not of the form key=value")
+        if key.strip() in options:
+            raise click.UsageError(f"--model-args: {key.strip()!r} is given twice")
+        options[key.strip()] = value.strip()
+    return options

@@ -4,6 +4,8 @@ from pathlib import Path
 
 import click
 
+from infthor_eval.cli.options import model_options_in, names_in
+
 __all__ = ["command"]
 
 
@@ -34,33 +36,13 @@ def command(
     requests = [
         RunRequest(
             model=model,
-            tasks=_names(tasks, "--tasks"),
+            tasks=names_in(tasks, "--tasks"),
             output=output,
             data=data,
-            model_options=_options(model_args),
+            model_options=model_options_in(model_args),
             limit=limit,
             seed=seed,
         )
-        for model in _names(models, "--model")
+        for model in names_in(models, "--model")
     ]
     return evaluate(requests)
-
-
-def _names(text: str, option: str) -> tuple[str, ...]:
-    names = tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
-    if not names:
-        raise click.UsageError(f"{option} is empty; give a name")
-    return names
-
-
-def _options(text: str) -> dict[str, str]:
-    """Options written as lm-eval writes them: `k=v,k=v`."""
-    options: dict[str, str] = {}
-    for item in filter(None, (part.strip() for part in text.split(","))):
-        key, equals, value = item.partition("=")
-        if not equals or not key.strip():
-            raise click.UsageError(f"--model-args: {item!r} is not of the form key=value")
-        if key.strip() in options:
-            raise click.UsageError(f"--model-args: {key.strip()!r} is given twice")
-        options[key.strip()] = value.strip()
-    return options

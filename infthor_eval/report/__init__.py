@@ -1,6 +1,7 @@
 """Tables and files made from journals."""
 
 from infthor_eval.report.comparison import Comparison, compare
+from infthor_eval.report.inspection import write_inspection_page
 from infthor_eval.report.nieh_results import accuracies, published_table4, summarise
 from infthor_eval.report.tables import comparison_table, depth_table, nieh_table
 
@@ -13,4 +14,5 @@ __all__ = [
     "nieh_table",
     "published_table4",
     "summarise",
+    "write_inspection_page",
 ]

@@ -1,0 +1,52 @@
+"""`infthor-eval validate`: keep the questions of a set that at least one of several models can answer."""
+
+from pathlib import Path
+from typing import Literal
+
+import click
+
+from infthor_eval.cli.options import model_options_in, names_in
+
+__all__ = ["command"]
+
+
+@click.command("validate")
+@click.argument("set_folder", metavar="SET", type=click.Path(path_type=Path))
+@click.option("--models", required=True, help="Model names with commas; the paper uses four.")
+@click.option("--model-args", multiple=True, metavar="MODEL:K=V,...", help="Options of one model; may be repeated.")
+@click.option("--out", type=click.Path(path_type=Path), required=True, help="Folder of the validated set.")
+@click.option("--decisions", type=click.Path(path_type=Path), help="The inspection list with keep or drop filled in.")
+@click.option("--scorer", type=click.Choice(["strict", "reference"]), default="strict", show_default=True)
+@click.option("--seed", type=int, default=0, show_default=True, help="For whatever is random.")
+def command(
+    set_folder: Path,
+    models: str,
+    model_args: tuple[str, ...],
+    out: Path,
+    decisions: Path | None,
+    scorer: Literal["strict", "reference"],
+    seed: int,
+) -> int:
+    """Ask every question of SET of each model, on its clue frames alone, and keep what one of them answers.
+
+    Rejected questions go to rejected.jsonl with every reply. Those with several clues that no model answers go to
+    inspection.csv and inspection.html; decide, and pass the decisions back. Stopped, the same command goes on.
+    """
+    from infthor_eval.cli.validation import validate
+    from infthor_eval.runs import RunRequest
+
+    options = dict(item.partition(":")[::2] for item in model_args)
+    requests = [
+        RunRequest(
+            model=model,
+            tasks=("nieh_gt",),
+            output=out / "runs",
+            data=set_folder,
+            model_options=model_options_in(options.pop(model, "")),
+            seed=seed,
+        )
+        for model in names_in(models, "--models")
+    ]
+    if options:
+        raise click.UsageError(f"--model-args is about {', '.join(options)}, which --models does not name")
+    return validate(requests, out, decisions, scorer)

@@ -1,0 +1,40 @@
+"""The page on which a person decides about questions that no model answered."""
+
+import os
+from collections.abc import Sequence
+from importlib import resources
+from pathlib import Path
+from urllib.parse import quote
+
+from jinja2 import Environment
+
+from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.nieh.validation import DECISIONS, Judged
+
+__all__ = ["write_inspection_page"]
+
+
+def write_inspection_page(path: Path, items: Sequence[Judged], data: NiehSet) -> None:
+    """Write the questions with their clue frames, gold answers and every reply; frames are linked, not copied.
+
+    Args:
+        path: the HTML file; open it in a browser, decide, and save the decisions as CSV.
+        items: the questions.
+        data: the set that their frames lie in.
+    """
+    template = resources.files(__package__).joinpath("inspection.html").read_text(encoding="utf-8")
+    # Questions and replies come from data files and models: whatever they hold is shown as text.
+    page = Environment(autoescape=True).from_string(template)
+    path.write_text(page.render(items=[_shown(item, data, path.parent) for item in items], choices=DECISIONS))
+
+
+def _shown(item: Judged, data: NiehSet, folder: Path) -> dict[str, object]:
+    question = item.question
+    frames = zip(question.clues, data.clue_frames(question), strict=True)
+    return {
+        "id": question.id,
+        "question": question.text,
+        "answer": ", ".join(map(str, question.answers)),
+        "replies": [(model, "(failed)" if reply is None else reply) for model, reply in item.replies.items()],
+        "frames": [{"index": i, "url": quote(os.path.relpath(frame.path, folder))} for i, frame in frames],
+    }

@@ -1,0 +1,114 @@
+import csv
+import json
+
+import pytest
+
+from infthor_eval.cli import main
+from infthor_eval.formats.qa_csv import read_questions
+from infthor_eval.formats.question import Question
+from model_adapters import load
+
+# Of known skill: which answers each scripted model gets right.
+SKILLS = {"one-clue": lambda q: len(q.clues) == 1, "yes": lambda q: q.answers == ("yes",), "none": lambda q: False}
+QUESTIONS = [
+    Question("t", "Is there a mug?", (1,), ("yes",)),
+    Question("t", "What is <b>it</b>?", (2,), ("mug",)),
+    Question("t", "Was it there?", (1, 2), ("yes",)),
+    Question("t", "Where was it?", (1, 3), ("shelf",)),
+    Question("t", "Which two?", (1, 2, 4), ("mug", "plate")),
+]
+
+
+class Scripted:
+    def __init__(self, name):
+        self.name = name
+
+    def identity(self):
+        return {}
+
+    def study(self, questions):
+        pass
+
+    def answer(self, question):
+        return ", ".join(question.answers) if SKILLS[self.name](question) else "<script>wrong</script>"
+
+
+@pytest.fixture
+def data(make_nieh_set, monkeypatch):
+    def load_scripted(name, *arguments):
+        return Scripted(name) if name in SKILLS else load(name, *arguments)
+
+    monkeypatch.setattr("infthor_eval.runs.run.load", load_scripted)
+    monkeypatch.setattr("infthor_eval.cli.validation.options", lambda name: "")
+    return make_nieh_set(QUESTIONS, size=56)
+
+
+def run(capfd, *arguments):
+    with pytest.raises(SystemExit) as ended:
+        main([str(argument) for argument in arguments])
+    return ended.value.code, *capfd.readouterr()
+
+
+def kept(folder):
+    return [question.text for question in read_questions(folder / "qa_set_validated.csv")]
+
+
+def test_what_one_model_answers_stays_and_the_rest_is_rejected_or_shown_to_a_person(data, tmp_path, capfd):
+    out = tmp_path / "validated"
+    code, printed, err = run(capfd, "validate", data, "--models", "yes,none", "--out", out)
+    assert code == 0, err
+    assert kept(out) == ["Is there a mug?", "Was it there?"]
+    rejected = [json.loads(line) for line in (out / "rejected.jsonl").read_text().splitlines()]
+    assert [item["question"] for item in rejected] == ["What is <b>it</b>?"]
+    assert set(rejected[0]["replies"]) == {"yes", "none"}
+    with (out / "inspection.csv").open(newline="") as file:
+        inspected = list(csv.DictReader(file))
+    assert [row["question"] for row in inspected] == ["Where was it?", "Which two?"]
+    assert "5 questions: 2 kept, 1 rejected, 2 to inspect" in printed
+    assert next(line for line in printed.splitlines() if line.startswith("  yes")).split()[3:7] == [
+        *("100.00", "100.00", "-", "100.00")
+    ]
+    assert run(capfd, "--model", "oracle", "--tasks", "nieh_gt", "--data", out, "--output", tmp_path / "o")[0] == 0
+
+
+def test_the_page_shows_frames_and_lets_no_markup_through(data, tmp_path, capfd):
+    out = tmp_path / "validated"
+    run(capfd, "validate", data, "--models", "none", "--out", out)
+    page = (out / "inspection.html").read_text()
+    assert "<script>wrong" not in page
+    assert "&lt;script&gt;wrong" in page
+    assert page.count("<img") == 2 + 2 + 3
+    source = page.split('<img src="')[1].split('"')[0]
+    assert (out / source).resolve().is_file()
+
+
+def test_decisions_are_applied(data, tmp_path, capfd):
+    out = tmp_path / "validated"
+    arguments = ["validate", data, "--models", "one-clue,none", "--out", out]
+    run(capfd, *arguments)
+    rows = list(csv.DictReader((out / "inspection.csv").open(newline="")))
+    decisions = tmp_path / "decisions.csv"
+    choices = zip(rows, ("keep", "drop", ""), strict=True)
+    decisions.write_text("question_id,decision\n" + "".join(f"{row['question_id']},{c}\n" for row, c in choices))
+    code, printed, err = run(capfd, *arguments, "--decisions", decisions)
+    assert code == 0
+    assert kept(out) == ["Is there a mug?", "What is <b>it</b>?", "Was it there?"]
+    assert "3 kept, 1 rejected, 1 to inspect" in printed
+    assert "0 answered now, 5 found" in err
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        ("question_id,decision\nx,keep\n", "about x, which is not in the set"),
+        ("question_id,decision\nx,maybe\n", "line 2: decision is 'maybe'; write keep or drop"),
+        ("question_id\nx\n", "no column question_id or decision"),
+    ],
+)
+def test_decisions_that_do_not_fit_are_refused(data, tmp_path, capfd, content, said):
+    decisions = tmp_path / "decisions.csv"
+    decisions.write_text(content)
+    code, _, err = run(capfd, "validate", data, "--models", "none", "--out", tmp_path / "v", "--decisions", decisions)
+    assert code == 2
+    assert said in err
+    assert not (tmp_path / "v" / "qa_set_validated.csv").exists()
