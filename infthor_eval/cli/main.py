@@ -20,6 +20,7 @@ _COMMANDS = {
     "scenes": "Look at a scene, or carry it to machines without Unity.",
     "generate": "Make long-horizon trajectories in a scene.",
     "replay": "Replay trajectories in the simulator into frames and metadata.",
+    "bundle": "Make a question set from a manifest of scenes and seeds.",
     "questions": "Make NIEH questions from replayed trajectories.",
 }
 _DEFAULT = "run"

@@ -80,11 +80,14 @@ def _frames_after_actions(data: NiehSet, traj_id: str) -> list[int]:
 
 
 def _states(folder: Path) -> dict[str, str]:
-    path = folder / "traj_data.json"
+    """Texts by low-level action: from `state_summary.json`, or the trajectory's own field (published form)."""
+    own, trajectory = folder / "state_summary.json", folder / "traj_data.json"
+    path = own if own.is_file() else trajectory
     if not path.is_file():
         return {}
     try:
-        states = json.loads(path.read_text(encoding="utf-8")).get("state_summary") or {}
+        found = json.loads(path.read_text(encoding="utf-8"))
+        states = found if path == own else found.get("state_summary") or {}
         return {str(int(step)): str(text) for step, text in states.items()}
     except (ValueError, AttributeError) as error:
         raise DataError(f"{path}: state_summary is not a mapping of steps to texts ({error})") from error

@@ -1,0 +1,40 @@
+"""`infthor-eval bundle`: make a question set from a manifest of scenes and seeds."""
+
+from pathlib import Path
+
+import click
+
+__all__ = ["command"]
+
+
+@click.command("bundle")
+@click.argument("manifest", type=click.Path(path_type=Path))
+@click.option("--out", type=click.Path(path_type=Path), required=True, help="Folder of the set, new or empty.")
+def command(manifest: Path, out: Path) -> int:
+    """Make the question set that MANIFEST describes: trajectories, frames, questions.
+
+    Where the manifest has digests (that of a bundled set does), it says whether the same files came out; exit status 1
+    where they differ.
+    """
+    from rich.console import Console
+    from rich.progress import Progress
+
+    from infthor_eval.generation.bundle import make_bundle, read_manifest
+    from infthor_eval.thor.launch import embedded
+    from infthor_eval.thor.simulator import Simulator
+
+    wanted = read_manifest(manifest)
+    with Simulator(embedded()) as simulator, Progress(console=Console(stderr=True), transient=True) as progress:
+        bar = progress.add_task(wanted.name, total=2 * len(wanted.trajectories))
+        finished, made = make_bundle(wanted, simulator, out, lambda: progress.advance(bar))
+    size = sum(path.stat().st_size for path in out.rglob("*") if path.is_file())
+    click.echo(f"{len(made.questions)} questions on {made.trajectories} trajectories, {size / 1e6:.1f} MB: {out}")
+    click.echo(f"by type: {made.by_kind()}\nby number of clues: {made.by_clues()}")
+    if not wanted.files:
+        return 0
+    names = wanted.files.keys() | finished.files.keys()
+    differing = sorted(name for name in names if wanted.files.get(name) != finished.files.get(name))
+    click.echo(f"{len(names) - len(differing)} of {len(names)} files as in the manifest")
+    for name in differing[:10]:
+        click.echo(f"differs: {name}", err=True)
+    return int(bool(differing))

@@ -1,0 +1,120 @@
+"""Question sets that come with the package, made from a manifest: scenes and seeds in, the same files out.
+
+The manifest says which trajectories to generate and how questions are drawn; the set's own copy of it also has the
+digest of every file, by which a test tells that the same set comes out again.
+"""
+
+import hashlib
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+import msgspec
+from PIL import Image
+
+from infthor_eval.errors import DataError
+from infthor_eval.formats.qa_csv import write_questions
+from infthor_eval.generation.factory import Settings
+from infthor_eval.generation.generate_set import generate_set
+from infthor_eval.generation.questions.make import Made, make_questions
+from infthor_eval.generation.replay_set import replay_set, select
+from infthor_eval.thor.simulator import Simulator
+
+__all__ = ["MANIFEST", "Manifest", "make_bundle", "read_manifest"]
+
+MANIFEST = "manifest.json"
+_NOT_SHIPPED = ("replay.json",)  # holds times
+
+
+class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """One trajectory: the arguments of `generate`."""
+
+    scene: str
+    seed: int
+    min_steps: int
+    min_subgoals: int = 1
+
+
+class Manifest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What a bundled set is made from.
+
+    Attributes:
+        name: of the set; the question file is `qa_set_<name>.csv`.
+        trajectories: what to generate.
+        per_trajectory: questions at most on one trajectory.
+        question_seed: makes every choice among the questions.
+        colors: frames are stored with a palette of so many colours, which halves the set.
+        files: digest by path of every file of the set; empty in a manifest that nothing was made from yet.
+    """
+
+    name: str
+    trajectories: tuple[Source, ...]
+    per_trajectory: int = 25
+    question_seed: int = 0
+    colors: int = 128
+    files: dict[str, str] = {}
+
+
+def read_manifest(path: Path) -> Manifest:
+    """Read a manifest.
+
+    Raises:
+        DataError: it cannot be read or is none.
+    """
+    try:
+        return msgspec.json.decode(path.read_bytes(), type=Manifest)
+    except OSError as error:
+        raise DataError(f"{path}: cannot be read ({error.strerror}); give a manifest") from error
+    except msgspec.DecodeError as error:
+        raise DataError(f"{path}: not a manifest ({error})") from error
+
+
+def make_bundle(
+    manifest: Manifest, simulator: Simulator, out: Path, progress: Callable[[], None] = lambda: None
+) -> tuple[Manifest, Made]:
+    """Make the set: generate, replay, ask, and store the frames small.
+
+    Args:
+        manifest: what to make; its digests are not looked at.
+        simulator: the embedded one.
+        out: folder of the set; must not exist or be empty.
+        progress: is called twice for each trajectory.
+
+    Returns:
+        The manifest with the digests of what was made, and the questions.
+
+    Raises:
+        DataError: the folder is not empty, or a trajectory could not be made.
+    """
+    if out.exists() and any(out.iterdir()):
+        raise DataError(f"{out}: is not empty; give a new folder")
+    jobs = [Settings(item.scene, item.seed, item.min_steps, item.min_subgoals) for item in manifest.trajectories]
+    with tempfile.TemporaryDirectory(prefix="infthor-") as folder:
+        generated = generate_set(jobs, simulator, Path(folder), progress)
+        replayed = replay_set(select([Path(folder)]), simulator, out, progress)
+    failures = [*generated.failures, *(f"{item.place}: {item.message}" for item in replayed.failures)]
+    if failures:
+        raise DataError(f"the set cannot be made: {failures[0]}")
+    made = make_questions(out, seed=manifest.question_seed, per_trajectory=manifest.per_trajectory)
+    write_questions(out / f"qa_set_{manifest.name}.csv", made.questions)
+    for frame in sorted(out.rglob("img/*.png")):
+        _store_small(frame, manifest.colors)
+    for name in _NOT_SHIPPED:
+        for path in out.rglob(name):
+            path.unlink()
+    finished = msgspec.structs.replace(manifest, files=_digests(out))
+    (out / MANIFEST).write_bytes(msgspec.json.format(msgspec.json.encode(finished), indent=1) + b"\n")
+    return finished, made
+
+
+def _store_small(path: Path, colors: int) -> None:
+    with Image.open(path) as frame:
+        small = frame.convert("RGB").quantize(colors, dither=Image.Dither.NONE)
+    small.save(path, optimize=True)
+
+
+def _digests(root: Path) -> dict[str, str]:
+    files = sorted(path for path in root.rglob("*") if path.is_file() and path.name != MANIFEST)
+    return {
+        str(path.relative_to(root)): hashlib.blake2b(path.read_bytes(), digest_size=16).hexdigest() for path in files
+    }
