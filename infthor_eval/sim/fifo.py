@@ -3,9 +3,12 @@
 A frame is a header `!BI` (field type, length of the body) and a body; a message is frames and an empty end frame.
 """
 
+import errno
 import json
 import os
+import select
 import struct
+import time
 from collections.abc import Sequence
 from enum import IntEnum
 from pathlib import Path
@@ -17,6 +20,7 @@ from infthor_eval.errors import SimulatorError
 __all__ = ["FieldType", "FifoPeer"]
 
 _HEADER = struct.Struct("!BI")
+_PAUSE = 0.01  # seconds between looks at a pipe that the other side has not opened yet
 
 
 class FieldType(IntEnum):
@@ -48,8 +52,9 @@ class FifoPeer:
     """
 
     def __init__(self, server_pipe: Path, client_pipe: Path) -> None:
+        self._parent = os.getppid()
         self._client_path = client_pipe
-        self._out = os.open(server_pipe, os.O_WRONLY)
+        self._out = self._open_out(server_pipe)
         self._in: int | None = None
 
     def __enter__(self) -> "FifoPeer":
@@ -77,7 +82,9 @@ class FifoPeer:
             SimulatorError: what arrives is not an action message.
         """
         if self._in is None:
-            self._in = os.open(self._client_path, os.O_RDONLY)
+            self._in = self._open_in()
+            if self._in is None:
+                return None
         action: dict[str, Any] | None = None
         while True:
             header = self._read(_HEADER.size)
@@ -95,6 +102,39 @@ class FifoPeer:
                 "the controller sent a message without an action; it must be ai2thor 5.0.0's FIFO form"
             )
         return action
+
+    def _open_out(self, path: Path) -> int:
+        """Opens the pipe of states when the controller reads from it.
+
+        A plain open would wait for ever for a controller that has died meanwhile.
+        """
+        while True:
+            try:
+                pipe = os.open(path, os.O_WRONLY | os.O_NONBLOCK)
+            except OSError as error:
+                if error.errno != errno.ENXIO:
+                    raise SimulatorError(f"{path}: the pipe of states cannot be opened ({error.strerror})") from error
+                self._check_parent()
+                time.sleep(_PAUSE)
+            else:
+                os.set_blocking(pipe, True)
+                return pipe
+
+    def _open_in(self) -> int | None:
+        """Opens the pipe of actions and waits for the controller to write to it; None if it dies before."""
+        pipe = os.open(self._client_path, os.O_RDONLY | os.O_NONBLOCK)
+        poll = select.poll()
+        poll.register(pipe, select.POLLIN)
+        while not poll.poll(_PAUSE * 1000):
+            if os.getppid() != self._parent:
+                os.close(pipe)
+                return None
+        os.set_blocking(pipe, True)
+        return pipe
+
+    def _check_parent(self) -> None:
+        if os.getppid() != self._parent:
+            raise SimulatorError("the controller died before it opened its pipe")
 
     def _write(self, data: bytes | memoryview) -> None:
         view = memoryview(data)
