@@ -243,32 +243,33 @@ def _sliced(seen: Sequence[Glimpse]) -> list[str]:
 
 
 def _else_at_slicing(seen: Sequence[Glimpse], _preposition: str, place: str, item: str) -> list[str]:
-    return _listed(seen, place, lambda moment: moment.action == "SliceObject" and _target_is(moment, item), item)
+    left_out = {_said(item), f"{_said(item)}sliced"}
+    return [name for name in _left_at(seen, "SliceObject", place, item) if name not in left_out]
 
 
 def _at_opening(seen: Sequence[Glimpse], _preposition: str, place: str) -> list[str]:
-    return _listed(seen, place, lambda moment: moment.action == "OpenObject" and _target_is(moment, place), None)
+    return _listed(_events(seen, "OpenObject", place)[:1] if seen[0].everything else seen, place)
 
 
 def _left_at_pickup(seen: Sequence[Glimpse], _preposition: str, place: str, item: str) -> list[str]:
+    return _left_at(seen, "PickupObject", place, item)
+
+
+def _left_at(seen: Sequence[Glimpse], action: str, place: str, item: str) -> list[str]:
+    """What is in the receptacle in which an object was until an action on it."""
     if not seen[0].everything:
-        return _listed(seen, place, lambda _: True, None)
+        return _listed(seen, place)
     for previous, moment in pairwise(seen):
-        if moment.action == "PickupObject" and moment.target is not None and _target_is(moment, item):
+        if moment.action == action and moment.target is not None and _target_is(moment, item):
             holder = _holder(previous, moment.target)
             return _names(moment, {key for key in moment.objects if _holder(moment, key) == holder})
     return []
 
 
-def _listed(seen: Sequence[Glimpse], place: str, anchor: Callable[[Glimpse], bool], besides: str | None) -> list[str]:
-    """What is in a receptacle: at the anchoring moment where everything is known, else in all glimpses together."""
-    moments = [item for item in seen if anchor(item)][:1] if seen[0].everything else list(seen)
-    found: dict[str, str] = {}
-    for item in moments:
-        for key in _inside(item, place):
-            found[key] = _name(item.objects[key].type)
-    left_out = set() if besides is None else {_said(besides), f"{_said(besides)}sliced"}
-    return sorted(name for name in found.values() if name not in left_out)
+def _listed(seen: Sequence[Glimpse], place: str) -> list[str]:
+    """What is in a receptacle in all glimpses together."""
+    found = {key: _name(item.objects[key].type) for item in seen for key in _inside(item, place)}
+    return sorted(found.values())
 
 
 def _is_in(seen: Sequence[Glimpse], item: str, _preposition: str, place: str) -> list[str]:

@@ -50,8 +50,10 @@ def _what(history: History, receptacle: str) -> Iterator[Candidate]:
     for frame in range(min(since.values(), default=0), len(history)):
         here = history.contents(frame, receptacle)
         held = {key for key in here if key in history.seen(frame)}
-        if history.shows(frame, receptacle) and held <= inside:
-            shown[frame] = frozenset(key for key in held if frame >= since[key] and history.shows(frame, key))
+        # A frame that shows something there that left later, even if it came back, tells another story.
+        stays = held <= inside and all(frame >= since[key] for key in held)
+        if history.shows(frame, receptacle) and stays:
+            shown[frame] = frozenset(key for key in held if history.shows(frame, key))
     clues = cover(inside, shown) if inside else None
     if clues is None or len(inside) > _MANY:
         return
