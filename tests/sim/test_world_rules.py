@@ -223,3 +223,25 @@ def test_shortest_path_leads_to_the_fridge(bench):
     assert all(abs(a["x"] - b["x"]) + abs(a["z"] - b["z"]) == pytest.approx(0.25, abs=1e-6) for a, b in steps)
     end, goal = corners[-1], bench.object(fridge)["position"]
     assert abs(end["x"] - goal["x"]) + abs(end["z"] - goal["z"]) < 1.5
+
+
+def test_random_placement_follows_its_seed(bench):
+    def places() -> list[tuple[str, object]]:
+        return [(o["objectId"], o["parentReceptacles"]) for o in bench.metadata["objects"] if o["pickupable"]]
+
+    start = places()
+    bench.ok("InitialRandomSpawn", randomSeed=3)
+    third = places()
+    bench.ok("InitialRandomSpawn", randomSeed=4)
+    assert len({repr(p) for p in (start, third, places())}) == 3
+    bench.reset("kitchen-1")
+    bench.ok("InitialRandomSpawn", randomSeed=3)
+    assert places() == third
+    drawn = []
+    for _ in range(2):
+        bench.reset("kitchen-1")
+        bench.ok("SetRandomSeed", seed=9)
+        bench.ok("InitialRandomSpawn")
+        drawn.append(places())
+    assert drawn[0] == drawn[1]
+    assert drawn[0] != third

@@ -100,7 +100,7 @@ def remove_from_scene(sim: Simulation, objectId: str) -> None:
 @action("InitialRandomSpawn")
 def initial_random_spawn(
     sim: Simulation,
-    randomSeed: int = 0,
+    randomSeed: int | None = None,
     forceVisible: bool = False,
     numPlacementAttempts: int = 5,
     placeStationary: bool = True,
@@ -110,12 +110,15 @@ def initial_random_spawn(
     allowFloor: bool = False,
     allowMoveable: bool = False,
 ) -> None:
-    """Spreads the pickupable objects over the receptacles, the same way for the same seed."""
+    """Spreads the pickupable objects over the receptacles, the same way for the same seed.
+
+    Without `randomSeed` it draws on from the numbers that SetRandomSeed started.
+    """
     if numDuplicatesOfType:
         raise ActionError("numDuplicatesOfType is not offered by the embedded simulator; use SetObjectPoses")
     spawn_randomly(
         sim.world,
-        seeded(randomSeed),
+        sim.random if randomSeed is None else seeded(randomSeed),
         excluded_types=frozenset(excludedReceptacles or ()),
         kept=frozenset(excludedObjectIds or ()),
         in_open_only=forceVisible,
