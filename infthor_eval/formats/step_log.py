@@ -193,9 +193,7 @@ def _rows(path: Path, columns: dict[str, Any]) -> list[dict[str, Any]]:
     wanted = len(columns["img_idx"])
     for name, column in lists.items():
         if len(column) != wanted:
-            raise DataError(
-                f"{path}: column '{name}' has {len(column)} entries, 'img_idx' has {wanted}; {_MEND}"
-            )
+            raise DataError(f"{path}: column '{name}' has {len(column)} entries, 'img_idx' has {wanted}; {_MEND}")
     return [dict(zip(lists, row, strict=True)) for row in zip(*lists.values(), strict=True)]
 
 

@@ -41,7 +41,7 @@ def test_the_domain_is_well_formed():
     assert len(actions) == 11 + len(TaskType)
     for action in actions:
         parameters = {word for word in action[3] if word.startswith("?")}
-        used = {word for word in re.findall(r"\?\w+", str(action[4:]))}
+        used = set(re.findall(r"\?\w+", str(action[4:])))
         assert used <= parameters
         names = set(re.findall(r"\['([a-z_-]+)'", str(action[4:]))) - {"and", "not", "increase", "total-cost", "="}
         assert names <= declared(domain)
