@@ -117,6 +117,7 @@ class TransformersModel:
                     return self._answer_batch(batch, max_new_tokens, stop)
                 return [self._answer(batch[0], max_new_tokens, stop)]
         except ModelError:
+            # Where memory ran out, the next request is to find all of it free.
             self._prefix.reset()
             self._features.clear()
             raise
@@ -133,7 +134,6 @@ class TransformersModel:
             max_new_tokens=max_new_tokens,
             finished=lambda ids: self._stopped(ids, stop),
         )
-        self._prefix.cut(len(units))
         return self._reply(ids, units, cached, stop)
 
     def _answer_batch(self, batch: Sequence[Sequence[Unit]], max_new_tokens: int, stop: Sequence[str]) -> list[Reply]:

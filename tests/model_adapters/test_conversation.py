@@ -255,6 +255,28 @@ def test_out_of_memory_names_the_size_and_the_model_goes_on(
     tiny._prefix.reset()
     with pytest.raises(ModelError, match=f"out of memory on a context of {talk.n_tokens} tokens"):
         talk.reply(NEW)
+    assert tiny._features._bytes == tiny._prefix.n_tokens == 0
+    monkeypatch.undo()
+    other = plain.conversation()
+    other.append(*talk.parts)
+    assert talk.reply(NEW).token_ids == other.reply(NEW).token_ids
+
+
+def test_an_interrupted_reply_leaves_nothing_half_encoded(
+    tiny: Any, plain: Any, frames: list[FrameRef], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    talk = tiny.conversation()
+    talk.append(*frames, "\nWhat?")
+    layers = tiny._loaded.model.model.language_model.layers
+
+    def interrupted(*args: Any, **kwargs: Any) -> Any:
+        raise KeyboardInterrupt
+
+    tiny._prefix.reset()
+    # The first layer has stored its keys when the second one fails.
+    monkeypatch.setattr(layers[1], "forward", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        talk.reply(NEW)
     monkeypatch.undo()
     other = plain.conversation()
     other.append(*talk.parts)

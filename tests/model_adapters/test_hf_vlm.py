@@ -1,6 +1,7 @@
 """hf-vlm on checkpoints that transformers' own `save_pretrained` wrote, of families this project has no code for."""
 
 import json
+import shutil
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -195,6 +196,20 @@ def test_what_is_refused_runs_without_sharing(checkpoints: dict[str, Path], fram
     assert list(reply.token_ids) == expected
     assert reply.n_cached_tokens == 0
     assert model.identity()["share_prefix"] is False
+
+
+def test_the_end_token_is_no_part_of_a_reply_without_sharing(
+    checkpoints: dict[str, Path], tmp_path: Path, frames: list[FrameRef]
+) -> None:
+    model = _load(checkpoints["llava"], share_prefix="false")
+    talk = model.conversation()
+    talk.append(frames[0], "\nWhat is it?")
+    whole = talk.reply(6).token_ids
+    folder = shutil.copytree(checkpoints["llava"], tmp_path / "llava")
+    (folder / "generation_config.json").write_text(json.dumps({"eos_token_id": whole[3]}))
+    ended = _load(folder, share_prefix="false").conversation()
+    ended.append(*talk.parts)
+    assert ended.reply(6).token_ids == whole[: whole.index(whole[3])]
 
 
 def test_known_families_need_no_processor(tmp_path: Path, frames: list[FrameRef]) -> None:
