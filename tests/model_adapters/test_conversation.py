@@ -267,14 +267,18 @@ def test_an_interrupted_reply_leaves_nothing_half_encoded(
 ) -> None:
     talk = tiny.conversation()
     talk.append(*frames, "\nWhat?")
-    layers = tiny._loaded.model.model.language_model.layers
+    last = tiny._loaded.model.model.language_model.layers[1]
+    forward, calls = last.forward, []
 
     def interrupted(*args: Any, **kwargs: Any) -> Any:
-        raise KeyboardInterrupt
+        calls.append(1)
+        if len(calls) == 2:
+            raise KeyboardInterrupt
+        return forward(*args, **kwargs)
 
     tiny._prefix.reset()
-    # The first layer has stored its keys when the second one fails.
-    monkeypatch.setattr(layers[1], "forward", interrupted)
+    # In the second chunk, the first layer has stored its keys when the last one fails.
+    monkeypatch.setattr(last, "forward", interrupted)
     with pytest.raises(KeyboardInterrupt):
         talk.reply(NEW)
     monkeypatch.undo()
