@@ -104,8 +104,8 @@ def _print(summary: Summary, output: Console) -> None:
         actions.add_row(name, str(counts["accepted"]), str(counts["refused"]), f"{share:.1%}")
     output.print(actions)
     if document["iou"]:
-        overlaps = Table("object type", "boxes", "median IoU", "mean IoU", box=box.SIMPLE_HEAD)
-        for kind, values in document["iou"].items():
+        overlaps = Table("action, object type", "boxes", "median IoU", "mean IoU", box=box.SIMPLE_HEAD)
+        for kind, values in {**document["iou_by_action"], **document["iou"]}.items():
             overlaps.add_row(kind, str(values["count"]), f"{values['median']:.2f}", f"{values['mean']:.2f}")
         output.print(overlaps)
     for item in document["diverged"][:_SHOWN]:

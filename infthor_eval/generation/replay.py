@@ -37,6 +37,7 @@ class Overlap(msgspec.Struct):
     """How well the rendered box of an object meets the recorded one, at the frame in which it is acted on."""
 
     step: int
+    action: str
     type: str
     iou: float
 
@@ -174,4 +175,4 @@ class _Run:
         shown = before.instances.get(target)
         iou = 0.0 if shown is None else box_iou(recorded, shown.box)
         kind = before.objects[target].object_type
-        self.report.overlaps.append(Overlap(index, kind, round(iou, 4)))
+        self.report.overlaps.append(Overlap(index, low.api_action.action, kind, round(iou, 4)))

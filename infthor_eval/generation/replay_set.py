@@ -20,7 +20,7 @@ import msgspec
 from infthor_eval.errors import DataError, InfthorError, SimulatorError
 from infthor_eval.formats.set_info import claim_for_simulator
 from infthor_eval.formats.trajectory import Source, Trajectory, folder_name, iter_sources
-from infthor_eval.generation.replay import Replayed, replay
+from infthor_eval.generation.replay import Overlap, Replayed, replay
 from infthor_eval.thor.simulator import Simulator
 
 __all__ = ["Failure", "Selection", "Summary", "replay_set", "select"]
@@ -71,12 +71,12 @@ class Summary:
         names = sorted(accepted | refused, key=lambda name: (-(accepted[name] + refused[name]), name))
         return {name: {"accepted": accepted[name], "refused": refused[name]} for name in names}
 
-    def overlaps(self) -> dict[str, dict[str, float]]:
-        """Number, median and mean of the box overlaps (IoU) by object type."""
+    def overlaps(self, by: Callable[[Overlap], str]) -> dict[str, dict[str, float]]:
+        """Number, median and mean of the box overlaps (IoU) by object type, or by action."""
         found: defaultdict[str, list[float]] = defaultdict(list)
         for report in self.reports:
             for overlap in report.overlaps:
-                found[overlap.type].append(overlap.iou)
+                found[by(overlap)].append(overlap.iou)
         return {
             kind: {
                 "count": len(values),
@@ -95,7 +95,8 @@ class Summary:
             "whole": sum(report.whole for report in self.reports),
             "floor_plans": len({report.floor_plan for report in self.reports}),
             "actions": self.actions(),
-            "iou": self.overlaps(),
+            "iou": self.overlaps(lambda overlap: overlap.type),
+            "iou_by_action": self.overlaps(lambda overlap: overlap.action),
             "seconds": round(self.seconds, 2),
             "diverged": [
                 {"traj_id": report.traj_id, **msgspec.to_builtins(report.refusals[0])}

@@ -1,4 +1,3 @@
-# ruff: noqa: SIM905 - tables of names read best as words
 """Rearranging a scene's loose objects: to recorded poses, or at random."""
 
 from collections import defaultdict
@@ -8,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from infthor_eval.sim.geometry import Array, object_id, to_array, yaw_matrix
+from infthor_eval.sim.geometry import Array, object_id, to_array
 from infthor_eval.sim.object_types import object_type
 from infthor_eval.sim.objects import SimObject
 from infthor_eval.sim.placement_rules import allowed_in
@@ -19,11 +18,8 @@ from infthor_eval.sim.world import World
 __all__ = ["Pose", "set_poses", "settle_parents", "spawn_randomly"]
 
 _SUNK = 0.2  # metres; what lies deeper is inside
-_TUBS = frozenset("Bathtub BathtubBasin GarbageCan LaundryHamper Sink SinkBasin".split())
-# ALFRED's AI2-THOR 2.1.0 differs from 5.x in names of types and in the axes of long things; the turns (degrees) are
-# those that fit the boxes recorded in ALFRED's training trajectories best.
-_RENAMED = {"Glassbottle": "Bottle"}
-_TURNED = {**dict.fromkeys("ButterKnife Fork Knife Ladle Pen Pencil Spoon SprayBottle".split(), 90.0), "Spatula": 270.0}
+_TUBS = frozenset(["Bathtub", "BathtubBasin", "GarbageCan", "LaundryHamper", "Sink", "SinkBasin"])
+_RENAMED = {"Glassbottle": "Bottle"}  # as ALFRED's AI2-THOR 2.1.0 calls it
 
 
 @dataclass(frozen=True)
@@ -61,8 +57,6 @@ def set_poses(world: World, poses: Iterable[Pose], keep_moveable: bool = False) 
                 world.set_pose(template, pose.position, pose.rotation)
             continue
         item = template.duplicate(_unused(world, pose.name.split("_", 1)[0], pose.position))
-        if template.name != pose.name:
-            _turn_box(item, _TURNED.get(item.object_type, 0.0))
         item.name, item.position, item.rotation = pose.name, pose.position.copy(), pose.rotation.copy()
         item.state.picked_up = False
         world.add(item)
@@ -81,13 +75,6 @@ def _lower_supports(world: World) -> None:
         if level - _SUNK < lowest < level - 0.002:
             item.support = lowest - 0.002 - float(item.bounds()[0][1])
             world.touch(item)
-
-
-def _turn_box(item: SimObject, degrees: float) -> None:
-    """Turns an object within its own frame by a multiple of 90 degrees."""
-    matrix = np.round(yaw_matrix(degrees))
-    item.box_center, item.box_size = matrix @ item.box_center, np.abs(matrix @ item.box_size)
-    item.front = (item.front + degrees) % 360
 
 
 def settle_parents(world: World) -> None:

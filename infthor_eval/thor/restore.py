@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from infthor_eval.formats.trajectory import ObjectPose, Scene
+from infthor_eval.thor.axes import modern_rotation
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import View
 
@@ -96,7 +97,9 @@ def _poses(recorded: list[ObjectPose], view: View) -> tuple[list[dict[str, Any]]
         if target is None:
             dropped.append(name)
         else:
-            poses.append({"objectName": target, "position": pose.position, "rotation": pose.rotation})
+            # A name that had to be replaced is another version's, and so are the axes of its object.
+            turned = modern_rotation(_type_of(name, spare), pose.rotation) if name in renamed else pose.rotation
+            poses.append({"objectName": target, "position": pose.position, "rotation": turned})
     return poses, dropped
 
 

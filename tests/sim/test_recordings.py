@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from infthor_eval.sim.scenes.catalogue import Catalogue
+from infthor_eval.thor.axes import modern_rotation
 
 from .conftest import need_data
 from .harness import INIT, Bench
@@ -77,13 +78,22 @@ def drawn_box(bench: Bench, object_id: str) -> list[int] | None:
     return [int(columns[0]), int(rows[0]), int(columns[-1]), int(rows[-1])]
 
 
+def modern(pose: dict[str, Any], known: set[str]) -> dict[str, Any]:
+    """A pose of AI2-THOR 2.1.0 as one of 5.0.0; names that both versions have are of things that did not change."""
+    if pose["objectName"] in known:
+        return pose
+    return {**pose, "rotation": modern_rotation(pose["objectName"].partition("_")[0], pose["rotation"])}
+
+
 def start(bench: Bench, scene: dict[str, Any]) -> None:
     init = scene["init_action"]
+    outcome = bench.peer.act({"action": "Reset", "sceneName": scene["floor_plan"]})[0]
+    assert not outcome.error, outcome.error
+    known = {item.name for item in bench.sim.world.objects.values()}
     calls: list[dict[str, Any]] = [
-        {"action": "Reset", "sceneName": scene["floor_plan"]},
         {"action": "Initialize", **INIT},
         {"action": "SetObjectToggles", "objectToggles": scene["object_toggles"]},
-        {"action": "SetObjectPoses", "objectPoses": scene["object_poses"]},
+        {"action": "SetObjectPoses", "objectPoses": [modern(pose, known) for pose in scene["object_poses"]]},
         {"action": "TeleportFull", "position": {k: init[k] for k in "xyz"}, "rotation": {"y": init["rotation"]},
          "horizon": init["horizon"], "standing": True, "forceAction": True},
     ]  # fmt: skip

@@ -1,0 +1,48 @@
+"""Axes of objects in AI2-THOR 2.1.0 against 5.x: some long things lie across where they lay along.
+
+A pose recorded in 2.1.0 (ALFRED, the published trajectories) is that of the same thing in 5.x only after a turn about
+the thing's own vertical axis. The turns are those that fit the boxes recorded in ALFRED's training trajectories best.
+"""
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["modern_rotation"]
+
+_ACROSS = ("ButterKnife", "Fork", "Knife", "Ladle", "Pen", "Pencil", "Spoon", "SprayBottle")
+_TURNS = {**dict.fromkeys(_ACROSS, 90.0), "Spatula": 270.0}  # degrees
+
+
+def modern_rotation(object_type: str, rotation: Mapping[str, float]) -> dict[str, float]:
+    """A rotation recorded in 2.1.0 as that of the 5.x object which looks the same.
+
+    Args:
+        object_type: AI2-THOR object type.
+        rotation: Unity's Euler angles x, y, z in degrees.
+    """
+    turn = _TURNS.get(object_type, 0.0)
+    if not turn:
+        return dict(rotation)
+    return _angles(_matrix(rotation) @ _matrix({"x": 0.0, "y": turn, "z": 0.0}))
+
+
+def _matrix(rotation: Mapping[str, float]) -> NDArray[np.float64]:
+    """Unity applies z, then x, then y."""
+    x, y, z = (math.radians(rotation[axis]) for axis in "xyz")
+    about_x = np.array([[1, 0, 0], [0, math.cos(x), -math.sin(x)], [0, math.sin(x), math.cos(x)]])
+    about_y = np.array([[math.cos(y), 0, math.sin(y)], [0, 1, 0], [-math.sin(y), 0, math.cos(y)]])
+    about_z = np.array([[math.cos(z), -math.sin(z), 0], [math.sin(z), math.cos(z), 0], [0, 0, 1]])
+    product: NDArray[np.float64] = about_y @ about_x @ about_z
+    return product
+
+
+def _angles(matrix: NDArray[np.float64]) -> dict[str, float]:
+    x = math.asin(max(-1.0, min(1.0, -matrix[1, 2])))
+    if abs(matrix[1, 2]) > 1 - 1e-9:  # straight up or down: y and z turn about one axis
+        y, z = math.atan2(-matrix[2, 0], matrix[0, 0]), 0.0
+    else:
+        y, z = math.atan2(matrix[0, 2], matrix[2, 2]), math.atan2(matrix[1, 0], matrix[1, 1])
+    return {axis: round(math.degrees(angle) % 360, 6) for axis, angle in zip("xyz", (x, y, z), strict=True)}
