@@ -15,6 +15,7 @@ from infthor_eval.sim.instances import class_color, instance_color
 from infthor_eval.sim.metadata import Outcome, agent_metadata, object_metadata
 from infthor_eval.sim.render.shell import SHELL_NAMES
 from infthor_eval.sim.simulation import Simulation
+from infthor_eval.sim.world import World
 
 __all__ = ["MetadataPacker"]
 
@@ -30,7 +31,7 @@ class MetadataPacker:
     def __init__(self) -> None:
         self._packed: dict[str, tuple[int, int, bytes]] = {}
         self._colors: tuple[tuple[str, ...], bytes] | None = None
-        self._world_id = -1
+        self._world: World | None = None  # whose objects are packed; held, so that no other can pass for it
 
     def message(self, sim: Simulation, outcome: Outcome, sequence: int, with_colors: bool) -> bytes:
         """The METADATA body of one reply."""
@@ -49,9 +50,9 @@ class MetadataPacker:
 
     def _objects(self, sim: Simulation) -> list[bytes]:
         world = sim.world
-        if self._world_id != id(world):
+        if self._world is not world:
             self._packed.clear()
-            self._world_id = id(world)
+            self._world = world
         seen = sim.visible()
         positions: Array = np.array([o.position for o in world.objects.values()]).reshape(-1, 3)
         away = np.linalg.norm(positions - world.agent.position, axis=1)

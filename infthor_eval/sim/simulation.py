@@ -1,5 +1,6 @@
 """One running simulator: the scene, the settings, the cameras, and the pictures of the present moment."""
 
+import copy
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -59,9 +60,30 @@ class Simulation:
 
     def load(self, world: World) -> None:
         """Makes `world` the present scene; settings stay until the next Initialize."""
-        self.world = world
         self.cameras.clear()
         self.random = np.random.default_rng(world.seed)
+        self._saved: tuple[World, np.random.Generator] | None = None
+        self._show(world)
+
+    def save(self) -> None:
+        """Keeps a copy of the present state of the scene, in place of an earlier one."""
+        self._saved = copy.deepcopy((self.world, self.random))
+
+    def restore(self) -> bool:
+        """Brings the kept state back, which stays kept; False where there is none of this scene."""
+        if self._saved is None:
+            return False
+        world, self.random = copy.deepcopy(self._saved)
+        # Nothing that was made of the abandoned state may pass for the restored one's.
+        newest = max((item.version for w in (self.world, world) for item in w.objects.values()), default=0)
+        for item in world.objects.values():
+            item.version = newest + 1
+        world.version = self.world.version + 1
+        self._show(world)
+        return True
+
+    def _show(self, world: World) -> None:
+        self.world = world
         self._model = SceneModel(world)
         self._key: tuple[object, ...] | None = None
         self._full: Picture | None = None

@@ -7,6 +7,7 @@ from infthor_eval.sim.actions import (  # noqa: F401 - imported to be registered
     queries,
     restoring,
     scenes,
+    snapshots,
     states,
 )
 from infthor_eval.sim.actions.registry import Action, bind, names
