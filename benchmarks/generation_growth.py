@@ -1,0 +1,54 @@
+"""Whether making a trajectory stays linear: time per step and memory of a short and a long one from the same scene.
+
+python benchmarks/generation_growth.py [--scene kitchen-1] [--steps 1000 10000] [--seed 1]
+"""
+
+import argparse
+import resource
+import tempfile
+import time
+from pathlib import Path
+
+from infthor_eval.formats.trajectory import iter_trajectories
+from infthor_eval.generation.factory import Settings
+from infthor_eval.generation.generate_set import generate_set
+from infthor_eval.thor.launch import embedded
+from infthor_eval.thor.simulator import Simulator
+
+
+def main() -> None:
+    """Make one trajectory of each length and print time per step and peak memory."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--scene", default="kitchen-1")
+    parser.add_argument("--steps", type=int, nargs="+", default=[1000, 10_000])
+    parser.add_argument("--seed", type=int, default=1)
+    chosen = parser.parse_args()
+    print(f"{'steps':>7} {'sub-goals':>9} {'seconds':>8} {'ms/step':>8} {'peak MB':>8} {'peak MB, simulator':>19}")
+    per_step = []
+    for steps in chosen.steps:
+        seconds, made, subgoals, simulator_mb = make(Settings(chosen.scene, chosen.seed, steps, 1))
+        per_step.append(1000 * seconds / made)
+        own_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+        print(
+            f"{made:7} {subgoals:9} {seconds:8.1f} {per_step[-1]:8.2f} {own_mb:8.0f} {simulator_mb:19.0f}", flush=True
+        )
+    print(f"time per step, longest over shortest: {per_step[-1] / per_step[0]:.2f} (aim <= 1.3)")
+
+
+def make(settings: Settings) -> tuple[float, int, int, float]:
+    """Seconds, low-level actions, sub-goals and the simulator's peak memory (MB) of one trajectory."""
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder)
+        with Simulator(embedded()) as simulator:
+            began = time.perf_counter()
+            result = generate_set([settings], simulator, out)
+            seconds = time.perf_counter() - began
+        if result.failures:
+            raise SystemExit(result.failures[0])
+        (trajectory,) = iter_trajectories(out)
+    peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
+    return seconds, len(trajectory.plan.low_actions), len(trajectory.plan.high_pddl), peak
+
+
+if __name__ == "__main__":
+    main()

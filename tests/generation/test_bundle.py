@@ -1,0 +1,60 @@
+import msgspec
+import pytest
+
+from infthor_eval.errors import DataError
+from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.packaged import packaged_folder
+from infthor_eval.generation.bundle import MANIFEST, make_bundle, read_manifest
+from infthor_eval.generation.questions.make import make_questions
+from infthor_eval.thor.launch import embedded
+from infthor_eval.thor.simulator import Simulator
+
+BUNDLED = packaged_folder("sets/nieh_mini")
+
+
+def test_the_bundled_set_is_small_and_has_every_type_and_number_of_clues():
+    data = NiehSet(BUNDLED)
+    assert data.left_out == ()
+    assert data.simulator == "embedded"
+    assert len({question.kind for question in data.questions}) == 8
+    assert {min(len(question.clues), 3) for question in data.questions} == {1, 2, 3}
+    assert len({question.traj_id for question in data.questions}) == 6
+    assert 130 <= len(data.questions) <= 170
+    assert sum(path.stat().st_size for path in BUNDLED.rglob("*") if path.is_file()) < 12e6
+
+
+def test_the_bundled_questions_follow_from_the_bundled_logs():
+    manifest = read_manifest(BUNDLED / MANIFEST)
+    made = make_questions(BUNDLED, seed=manifest.question_seed, per_trajectory=manifest.per_trajectory)
+    assert made.questions == list(NiehSet(BUNDLED).questions)
+
+
+def test_bundled_trajectories_come_out_again_bit_for_bit(tmp_path):
+    manifest = read_manifest(BUNDLED / MANIFEST)
+    part = msgspec.structs.replace(manifest, trajectories=(manifest.trajectories[0], manifest.trajectories[-1]))
+    with Simulator(embedded()) as simulator:
+        again, _ = make_bundle(part, simulator, tmp_path / "set")
+    files = {name: digest for name, digest in again.files.items() if name.startswith("metadata/")}
+    assert len(files) > 150
+    assert {name: manifest.files[name] for name in files} == files
+
+
+def test_a_folder_that_is_not_empty_and_a_scene_that_is_not_there_are_refused(tmp_path):
+    manifest = read_manifest(BUNDLED / MANIFEST)
+    (tmp_path / "file").write_text("")
+    with Simulator(embedded()) as simulator:
+        with pytest.raises(DataError, match="is not empty"):
+            make_bundle(manifest, simulator, tmp_path)
+        nowhere = msgspec.structs.replace(
+            manifest, trajectories=(msgspec.structs.replace(manifest.trajectories[0], scene="attic-1"),)
+        )
+        with pytest.raises(DataError, match="attic-1"):
+            make_bundle(nowhere, simulator, tmp_path / "set")
+
+
+@pytest.mark.parametrize("content", ["{", '{"name": "x"}', '{"name": "x", "trajectories": [], "more": 1}'])
+def test_what_is_no_manifest_is_named(tmp_path, content):
+    path = tmp_path / "manifest.json"
+    path.write_text(content)
+    with pytest.raises(DataError, match=r"manifest\.json: not a manifest"):
+        read_manifest(path)
