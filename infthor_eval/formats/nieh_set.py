@@ -164,7 +164,5 @@ def _read_frames(folder: Path) -> dict[int, FrameRef]:
 def _images(folder: Path) -> list[Path]:
     for name in _IMAGE_FOLDERS:
         if (folder / name).is_dir():
-            return sorted(
-                path for path in (folder / name).iterdir() if path.suffix.lower() in _IMAGE_SUFFIXES
-            )
+            return sorted(path for path in (folder / name).iterdir() if path.suffix.lower() in _IMAGE_SUFFIXES)
     raise DataError(f"trajectory {folder.name}: neither img/ nor img_768/ in {folder}; unpack it again")

@@ -30,9 +30,7 @@ def read_questions(path: Path) -> list[Question]:
             reader = csv.DictReader(file)
             missing = [name for name in _COLUMNS if name not in (reader.fieldnames or ())]
             if missing:
-                raise DataError(
-                    f"{path}: no column {', '.join(missing)}; a question file has {', '.join(_COLUMNS)}"
-                )
+                raise DataError(f"{path}: no column {', '.join(missing)}; a question file has {', '.join(_COLUMNS)}")
             return [_question(row, f"{path}, line {reader.line_num}") for row in reader]
     except OSError as error:
         raise DataError(f"{path}: cannot be read ({error.strerror}); give a question file") from error

@@ -90,11 +90,9 @@ def make_bundle(
         raise DataError(f"{out}: is not empty; give a new folder")
     jobs = [Settings(item.scene, item.seed, item.min_steps, item.min_subgoals) for item in manifest.trajectories]
     with tempfile.TemporaryDirectory(prefix="infthor-") as folder:
-        generated = generate_set(jobs, simulator, Path(folder), progress)
+        _refuse(generate_set(jobs, simulator, Path(folder), progress).failures)
         replayed = replay_set(select([Path(folder)]), simulator, out, progress)
-    failures = [*generated.failures, *(f"{item.place}: {item.message}" for item in replayed.failures)]
-    if failures:
-        raise DataError(f"the set cannot be made: {failures[0]}")
+    _refuse([f"{item.place}: {item.message}" for item in replayed.failures])
     made = make_questions(out, seed=manifest.question_seed, per_trajectory=manifest.per_trajectory)
     write_questions(out / f"qa_set_{manifest.name}.csv", made.questions)
     for frame in sorted(out.rglob("img/*.png")):
@@ -105,6 +103,11 @@ def make_bundle(
     finished = msgspec.structs.replace(manifest, files=_digests(out))
     (out / MANIFEST).write_bytes(msgspec.json.format(msgspec.json.encode(finished), indent=1) + b"\n")
     return finished, made
+
+
+def _refuse(failures: list[str]) -> None:
+    if failures:
+        raise DataError(f"the set cannot be made: {failures[0]}")
 
 
 def _store_small(path: Path, colors: int) -> None:
