@@ -22,6 +22,7 @@ __all__ = ["TaskPool", "tasks_of"]
 
 _TREATED = {TaskType.CLEAN: CLEANABLE, TaskType.HEAT: HEATABLE, TaskType.COOL: COOLABLE}
 _APPLIANCES = {TaskType.CLEAN: {"SinkBasin", "Faucet"}, TaskType.HEAT: {"Microwave"}, TaskType.COOL: {"Fridge"}}
+_HOPELESS = 100  # failures after which a task is as unlikely as it gets: a weight must not become 0
 _LIGHT_LOADS = {"Pan", "Pot", "Plate", "Bowl", "Cup", "Mug", "Laptop", "Box", "Pillow"}  # too big to be stacked
 
 
@@ -63,7 +64,7 @@ class TaskPool:
         self._failed[task] += 1
 
     def _weight(self, task: Task) -> float:
-        weight = 0.25 ** self._failed[task]
+        weight = 0.25 ** min(self._failed[task], _HOPELESS)
         for aspect in _aspects(task):
             weight /= 1 + self._used[aspect]
         return weight

@@ -50,3 +50,13 @@ def test_descriptions():
     assert words(Task(TaskType.EXAMINE, "Mug", light="DeskLamp")) == "look at a mug under the desk lamp"
     stack = Task(TaskType.STACK, "Apple", "CounterTop", movable="Plate")
     assert words(stack) == "put a plate with an apple on it on the counter top"
+
+
+def test_a_task_that_failed_a_thousand_times_does_not_stop_the_others():
+    pool = TaskPool(TaskType, random.Random(0))
+    first = next(pool.sample(ROOM))
+    for _ in range(1000):
+        pool.failed(first)
+    order = list(pool.sample(ROOM))
+    assert order[-1] == first
+    assert len(order) > 1
