@@ -7,7 +7,6 @@ import time
 
 import pytest
 
-from infthor_eval.cli import main
 from infthor_eval.formats.question import Question
 
 MANY = [
@@ -17,23 +16,14 @@ MANY = [
 ]
 
 
-def run(capfd, *arguments):
-    """The command in this process: its exit code, standard output and standard error."""
-    with pytest.raises(SystemExit) as ended:
-        main([str(argument) for argument in arguments])
-    return ended.value.code, *capfd.readouterr()
-
-
 def only(folder, pattern):
     (path,) = folder.rglob(pattern)
     return path
 
 
-def test_the_table_shows_every_model_task_and_scorer_beside_the_published_rows(make_nieh_set, tmp_path, capfd):
+def test_the_table_shows_every_model_task_and_scorer_beside_the_published_rows(make_nieh_set, tmp_path, run):
     data = make_nieh_set(size=56)
-    code, out, _ = run(
-        capfd, "--model", "oracle,blind", "--tasks", "nieh", "--data", data, "--output", tmp_path / "out"
-    )
+    code, out, _ = run("--model", "oracle,blind", "--tasks", "nieh", "--data", data, "--output", tmp_path / "out")
     assert code == 0
     rows = [line.split() for line in out.splitlines()]
     assert ["oracle", "nieh_gt", "strict", "100.00", "100.00", "100.00", "100.00", "0.00", "5", "0", "0"] in rows
@@ -46,19 +36,17 @@ def test_the_table_shows_every_model_task_and_scorer_beside_the_published_rows(m
         assert results["tasks"]["nieh_gt"]["by_clues"]["total"]["n"] == 5
 
 
-def test_frames_of_the_embedded_simulator_are_labelled(make_nieh_set, tmp_path, capfd):
+def test_frames_of_the_embedded_simulator_are_labelled(make_nieh_set, tmp_path, run):
     data = make_nieh_set(size=56)
     (data / "set.json").write_text('{"simulator": "embedded"}')
-    _, out, _ = run(
-        capfd, "run", "--model", "oracle", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out"
-    )
+    _, out, _ = run("run", "--model", "oracle", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out")
     assert "embedded simulator: not comparable" in " ".join(out.split())
 
 
-def test_the_haystack_is_shown_by_depth_and_counts_what_does_not_fit(make_nieh_set, tmp_path, capfd):
+def test_the_haystack_is_shown_by_depth_and_counts_what_does_not_fit(make_nieh_set, tmp_path, run):
     data = make_nieh_set([Question("t", "Is there a mug?", (70,), ("yes",))], n_frames=140, size=56)
     tasks = "nieh_haystack_8k,nieh_haystack_1m"
-    code, out, err = run(capfd, "--model", "oracle", "--tasks", tasks, "--data", data, "--output", tmp_path / "out")
+    code, out, err = run("--model", "oracle", "--tasks", tasks, "--data", data, "--output", tmp_path / "out")
     assert code == 0
     rows = [line.split() for line in out.splitlines()]
     # 8,000 // 121 = 66 frames: from frame 70, 57, 44, 31, 18; all inside 140 frames.
@@ -67,10 +55,10 @@ def test_the_haystack_is_shown_by_depth_and_counts_what_does_not_fit(make_nieh_s
     assert "nieh_haystack_1m: 5 question(s) left out: the window reaches outside the trajectory" in err
 
 
-def test_a_context_beyond_the_models_limit_is_told_before_it_is_refused(make_nieh_set, tmp_path, capfd):
+def test_a_context_beyond_the_models_limit_is_told_before_it_is_refused(make_nieh_set, tmp_path, run):
     data = make_nieh_set(n_frames=20)
     arguments = ["--model", "qwen2.5-vl-tiny", "--model-args", "max_tokens=1200", "--data", data]
-    code, _, err = run(capfd, *arguments, "--tasks", "nieh", "--output", tmp_path / "out")
+    code, _, err = run(*arguments, "--tasks", "nieh", "--output", tmp_path / "out")
     assert code == 1
     told, refused = (
         next(line for line in err.splitlines() if line.startswith(name)) for name in ("nieh_gt", "nieh_full")
@@ -81,9 +69,9 @@ def test_a_context_beyond_the_models_limit_is_told_before_it_is_refused(make_nie
     assert "is beyond the 1200 tokens of qwen2.5-vl-tiny" in err
 
 
-def test_limit_asks_only_so_many_of_each_task(make_nieh_set, tmp_path, capfd):
+def test_limit_asks_only_so_many_of_each_task(make_nieh_set, tmp_path, run):
     data = make_nieh_set(size=56)
-    run(capfd, "--model", "oracle", "--tasks", "nieh", "--data", data, "--output", tmp_path / "o", "--limit", 2)
+    run("--model", "oracle", "--tasks", "nieh", "--data", data, "--output", tmp_path / "o", "--limit", 2)
     results = json.loads(only(tmp_path / "o", "results.json").read_text())
     assert {name: task["n"] for name, task in results["tasks"].items()} == {"nieh_gt": 2, "nieh_full": 2}
 
@@ -141,10 +129,10 @@ BAD = [
 
 
 @pytest.mark.parametrize(("arguments", "said"), BAD, ids=[said for _, said in BAD])
-def test_misuse_ends_in_one_line_and_exit_code_2(make_nieh_set, tmp_path, capfd, arguments, said):
+def test_misuse_ends_in_one_line_and_exit_code_2(make_nieh_set, tmp_path, run, arguments, said):
     data = make_nieh_set(size=56)
     arguments = [str(data) if argument == "SET" else argument for argument in arguments]
-    code, out, err = run(capfd, *arguments, *(["--output", tmp_path / "out"] if "--model" in arguments else []))
+    code, out, err = run(*arguments, *(["--output", tmp_path / "out"] if "--model" in arguments else []))
     assert code == 2
     assert said in err
     assert out == ""
@@ -152,42 +140,42 @@ def test_misuse_ends_in_one_line_and_exit_code_2(make_nieh_set, tmp_path, capfd,
     assert not (tmp_path / "out").exists()
 
 
-def test_bad_data_ends_in_one_line_and_exit_code_2(make_nieh_set, tmp_path, capfd):
+def test_bad_data_ends_in_one_line_and_exit_code_2(make_nieh_set, tmp_path, run):
     data = make_nieh_set(size=56)
     (data / "metadata" / "traj_a" / "img" / "000000005.png").unlink()
-    code, _, err = run(capfd, "--model", "oracle", "--tasks", "nieh", "--data", data, "--output", tmp_path / "out")
+    code, _, err = run("--model", "oracle", "--tasks", "nieh", "--data", data, "--output", tmp_path / "out")
     assert code == 2
     assert "trajectory traj_a: 5 frames but 6 entries" in err
     assert len(err.strip().splitlines()) == 1
 
 
-def test_what_is_left_out_is_counted_and_named(make_nieh_set, tmp_path, capfd):
+def test_what_is_left_out_is_counted_and_named(make_nieh_set, tmp_path, run):
     data = make_nieh_set([*MANY, Question("traj_a", "Where is it?", (77,), ("Shelf",))], size=56)
-    code, _, err = run(capfd, "--model", "oracle", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out")
+    code, _, err = run("--model", "oracle", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out")
     assert code == 0
     assert "nieh_gt: 1 question(s) left out: clue 77 is outside trajectory traj_a (6 frames)" in err
 
 
-def test_a_frame_that_breaks_in_mid_run_is_counted_as_failed_and_the_exit_code_says_so(make_nieh_set, tmp_path, capfd):
+def test_a_frame_that_breaks_in_mid_run_is_counted_as_failed_and_the_exit_code_says_so(make_nieh_set, tmp_path, run):
     data = make_nieh_set(size=56)
     frame = data / "metadata" / "traj_a" / "img" / "000000001.png"
     frame.write_bytes(frame.read_bytes()[:50])
     arguments = ["--model", "qwen2.5-vl-tiny", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out"]
-    code, out, err = run(capfd, *arguments)
+    code, out, err = run(*arguments)
     assert code == 1
     assert "nieh_gt: 2 question(s) failed, counted as wrong" in err
     assert str(frame) in err
     assert next(line for line in out.splitlines() if "nieh_gt" in line).split()[-3:] == ["5", "0", "2"]
 
 
-def test_help_names_the_commands_and_the_version_is_told(capfd):
-    code, out, _ = run(capfd, "--help")
+def test_help_names_the_commands_and_the_version_is_told(run):
+    code, out, _ = run("--help")
     assert code == 0
     assert all(name in out for name in ("run", "ls", "generate", "replay", "questions"))
-    assert run(capfd, "--version")[1].startswith("infthor-eval, version ")
-    assert run(capfd, "run", "--help")[0] == 0
+    assert run("--version")[1].startswith("infthor-eval, version ")
+    assert run("run", "--help")[0] == 0
 
 
-def test_ls_lists_models_and_tasks(capfd):
-    assert "qwen2.5-vl-tiny" in run(capfd, "ls", "models")[1]
-    assert "nieh_mini" in run(capfd, "ls", "tasks")[1]
+def test_ls_lists_models_and_tasks(run):
+    assert "qwen2.5-vl-tiny" in run("ls", "models")[1]
+    assert "nieh_mini" in run("ls", "tasks")[1]

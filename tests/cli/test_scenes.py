@@ -5,20 +5,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from infthor_eval.cli import main
 
-
-def run(capfd, *arguments):
-    with pytest.raises(SystemExit) as ended:
-        main([str(argument) for argument in arguments])
-    return ended.value.code, *capfd.readouterr()
-
-
-def test_a_dumped_scene_runs_from_the_folder_and_keeps_its_objects(tmp_path, capfd):
+def test_a_dumped_scene_runs_from_the_folder_and_keeps_its_objects(tmp_path, run):
     folder = tmp_path / "data"
-    code, out, err = run(capfd, "scenes", "dump", "kitchen-2", "bedroom-1", "--embedded", "--out", folder)
+    code, out, err = run("scenes", "dump", "kitchen-2", "bedroom-1", "--embedded", "--out", folder)
     assert code == 0, err
-    assert run(capfd, "scenes", "dump", "kitchen-2", "--embedded", "--out", folder)[0] == 0
+    assert run("scenes", "dump", "kitchen-2", "--embedded", "--out", folder)[0] == 0
     with gzip.open(folder / "thor_scenes" / "objects.jsonl.gz", "rt") as file:
         lines = [json.loads(line) for line in file]
     assert [line["scene"] for line in lines] == ["bedroom-1", "kitchen-2"]
@@ -27,12 +19,12 @@ def test_a_dumped_scene_runs_from_the_folder_and_keeps_its_objects(tmp_path, cap
     cells = np.load(folder / "alfred" / "layouts" / "kitchen-2-layout.npy")
     assert cells.shape[1] == 2
     assert len(cells) > 10
-    assert "kitchen-2" in run(capfd, "ls", "scenes", "--data", folder)[1]
+    assert "kitchen-2" in run("ls", "scenes", "--data", folder)[1]
 
 
-def test_a_scene_is_drawn_from_above_and_from_the_agent(tmp_path, capfd):
+def test_a_scene_is_drawn_from_above_and_from_the_agent(tmp_path, run):
     path = tmp_path / "kitchen.png"
-    code, _, err = run(capfd, "scenes", "show", "kitchen-1", "--out", path, "--size", 100)
+    code, _, err = run("scenes", "show", "kitchen-1", "--out", path, "--size", 100)
     assert code == 0, err
     picture = np.asarray(Image.open(path))
     assert picture.shape == (100, 200, 3)
@@ -51,9 +43,9 @@ def test_a_scene_is_drawn_from_above_and_from_the_agent(tmp_path, capfd):
         (["ls", "scenes", "--data", "."], "not a file of recorded floor plans"),
     ],
 )
-def test_a_scene_that_is_not_there_is_one_line(arguments, said, capfd, tmp_path, monkeypatch):
+def test_a_scene_that_is_not_there_is_one_line(arguments, said, run, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    code, _, err = run(capfd, *arguments)
+    code, _, err = run(*arguments)
     assert code in (1, 2)
     assert said in err
     assert len(err.strip().splitlines()) == 1

@@ -3,7 +3,6 @@ import json
 
 import pytest
 
-from infthor_eval.cli import main
 from infthor_eval.formats.qa_csv import read_questions
 from infthor_eval.formats.question import Question
 from model_adapters import load
@@ -43,19 +42,13 @@ def data(make_nieh_set, monkeypatch):
     return make_nieh_set(QUESTIONS, size=56)
 
 
-def run(capfd, *arguments):
-    with pytest.raises(SystemExit) as ended:
-        main([str(argument) for argument in arguments])
-    return ended.value.code, *capfd.readouterr()
-
-
 def kept(folder):
     return [question.text for question in read_questions(folder / "qa_set_validated.csv")]
 
 
-def test_what_one_model_answers_stays_and_the_rest_is_rejected_or_shown_to_a_person(data, tmp_path, capfd):
+def test_what_one_model_answers_stays_and_the_rest_is_rejected_or_shown_to_a_person(data, tmp_path, run):
     out = tmp_path / "validated"
-    code, printed, err = run(capfd, "validate", data, "--models", "yes,none", "--out", out)
+    code, printed, err = run("validate", data, "--models", "yes,none", "--out", out)
     assert code == 0, err
     assert kept(out) == ["Is there a mug?", "Was it there?"]
     rejected = [json.loads(line) for line in (out / "rejected.jsonl").read_text().splitlines()]
@@ -68,12 +61,12 @@ def test_what_one_model_answers_stays_and_the_rest_is_rejected_or_shown_to_a_per
     assert next(line for line in printed.splitlines() if line.startswith("  yes")).split()[3:7] == [
         *("100.00", "100.00", "-", "100.00")
     ]
-    assert run(capfd, "--model", "oracle", "--tasks", "nieh_gt", "--data", out, "--output", tmp_path / "o")[0] == 0
+    assert run("--model", "oracle", "--tasks", "nieh_gt", "--data", out, "--output", tmp_path / "o")[0] == 0
 
 
-def test_the_page_shows_frames_and_lets_no_markup_through(data, tmp_path, capfd):
+def test_the_page_shows_frames_and_lets_no_markup_through(data, tmp_path, run):
     out = tmp_path / "validated"
-    run(capfd, "validate", data, "--models", "none", "--out", out)
+    run("validate", data, "--models", "none", "--out", out)
     page = (out / "inspection.html").read_text()
     assert "<script>wrong" not in page
     assert "&lt;script&gt;wrong" in page
@@ -82,15 +75,15 @@ def test_the_page_shows_frames_and_lets_no_markup_through(data, tmp_path, capfd)
     assert (out / source).resolve().is_file()
 
 
-def test_decisions_are_applied(data, tmp_path, capfd):
+def test_decisions_are_applied(data, tmp_path, run):
     out = tmp_path / "validated"
     arguments = ["validate", data, "--models", "one-clue,none", "--out", out]
-    run(capfd, *arguments)
+    run(*arguments)
     rows = list(csv.DictReader((out / "inspection.csv").open(newline="")))
     decisions = tmp_path / "decisions.csv"
     choices = zip(rows, ("keep", "drop", ""), strict=True)
     decisions.write_text("question_id,decision\n" + "".join(f"{row['question_id']},{c}\n" for row, c in choices))
-    code, printed, err = run(capfd, *arguments, "--decisions", decisions)
+    code, printed, err = run(*arguments, "--decisions", decisions)
     assert code == 0
     assert kept(out) == ["Is there a mug?", "What is <b>it</b>?", "Was it there?"]
     assert "3 kept, 1 rejected, 1 to inspect" in printed
@@ -105,10 +98,10 @@ def test_decisions_are_applied(data, tmp_path, capfd):
         ("question_id\nx\n", "no column question_id or decision"),
     ],
 )
-def test_decisions_that_do_not_fit_are_refused(data, tmp_path, capfd, content, said):
+def test_decisions_that_do_not_fit_are_refused(data, tmp_path, run, content, said):
     decisions = tmp_path / "decisions.csv"
     decisions.write_text(content)
-    code, _, err = run(capfd, "validate", data, "--models", "none", "--out", tmp_path / "v", "--decisions", decisions)
+    code, _, err = run("validate", data, "--models", "none", "--out", tmp_path / "v", "--decisions", decisions)
     assert code == 2
     assert said in err
     assert not (tmp_path / "v" / "qa_set_validated.csv").exists()
