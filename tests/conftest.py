@@ -1,6 +1,7 @@
 """Fixtures that several packages' tests share."""
 
 import json
+import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -9,6 +10,10 @@ from PIL import Image
 
 from infthor_eval.formats.qa_csv import write_questions
 from infthor_eval.formats.question import Question
+
+# Before torch is imported, here and in processes that tests start: on a busy machine two threads that wait for each
+# other take ten times as long as one.
+os.environ["OMP_NUM_THREADS"] = "1"
 
 QUESTIONS = (
     Question("traj_a", "Is there a mug?", (1,), ("yes",), "object_presence"),

@@ -11,16 +11,6 @@ from infthor_eval.formats.frames import FrameRef
 from model_adapters import load
 
 
-@pytest.fixture(autouse=True, scope="session")
-def _one_thread() -> Iterator[None]:
-    import torch
-
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(before)
-
-
 @pytest.fixture(scope="session")
 def make_frames(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., list[FrameRef]]:
     """Writes frames of coloured noise, all different, and returns references to them."""
