@@ -5,8 +5,18 @@ Importing this package imports neither torch nor transformers; they come with th
 
 from model_adapters.backend import Backend, BackendConversation, OneByOne
 from model_adapters.check import ContractError, check_adapter, check_bound
-from model_adapters.protocols import Adapter, BatchingConversation, Bound, Conversation, Mark, Model, Part, Reply
-from model_adapters.registry import load, names, options
+from model_adapters.protocols import (
+    Adapter,
+    BatchingConversation,
+    Bound,
+    Conversation,
+    ExtendableModel,
+    Mark,
+    Model,
+    Part,
+    Reply,
+)
+from model_adapters.registry import check_options, load, names, options
 from model_adapters.transcript import Transcript
 
 __all__ = [
@@ -17,6 +27,7 @@ __all__ = [
     "Bound",
     "ContractError",
     "Conversation",
+    "ExtendableModel",
     "Mark",
     "Model",
     "OneByOne",
@@ -25,6 +36,7 @@ __all__ = [
     "Transcript",
     "check_adapter",
     "check_bound",
+    "check_options",
     "load",
     "names",
     "options",

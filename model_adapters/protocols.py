@@ -11,7 +11,17 @@ from typing import Any, ClassVar, Protocol, runtime_checkable
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.question import Question
 
-__all__ = ["Adapter", "BatchingConversation", "Bound", "Conversation", "Mark", "Model", "Part", "Reply"]
+__all__ = [
+    "Adapter",
+    "BatchingConversation",
+    "Bound",
+    "Conversation",
+    "ExtendableModel",
+    "Mark",
+    "Model",
+    "Part",
+    "Reply",
+]
 
 Part = str | FrameRef
 
@@ -144,6 +154,16 @@ class Model(Protocol):
 
     def close(self) -> None:
         """Give the memory back; the model cannot be used afterwards."""
+        ...
+
+
+@runtime_checkable
+class ExtendableModel(Model, Protocol):
+    """A model whose context can be extended beyond what it was trained on."""
+
+    @property
+    def max_tokens_before_extension(self) -> int | None:
+        """The checkpoint's own limit where it is extended; None where nothing is extended."""
         ...
 
 

@@ -14,7 +14,7 @@ from infthor_eval.errors import ModelError, UsageError
 from model_adapters.options import describe, parse
 from model_adapters.protocols import Adapter, Bound, Model
 
-__all__ = ["ENTRY_POINTS", "load", "names", "options"]
+__all__ = ["ENTRY_POINTS", "check_options", "load", "names", "options"]
 
 ENTRY_POINTS = "infthor_eval.models"
 
@@ -47,6 +47,16 @@ def options(name: str) -> str:
         ModelError: the adapter cannot be imported.
     """
     return describe(_adapter(name).Options)
+
+
+def check_options(name: str, options: Mapping[str, str]) -> None:
+    """Refuse at once what `load` would refuse, as far as names and values of options go.
+
+    Raises:
+        UsageError: an unknown name or option, or a value that does not fit.
+        ModelError: the adapter cannot be imported.
+    """
+    parse(name, _adapter(name).Options, options)
 
 
 def load(name: str, options: Mapping[str, str], seed: int) -> Model | Bound:

@@ -11,7 +11,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from infthor_eval.report import depth_table, nieh_table, summarise
 from infthor_eval.runs import Budget, Observer, Plan, RunOutcome, RunRequest, UnitRecord, execute, plan
-from model_adapters import options
+from model_adapters import check_options
 
 __all__ = ["evaluate", "execute_with_progress"]
 
@@ -27,7 +27,7 @@ def evaluate(requests: Sequence[RunRequest]) -> int:
         Exit code: 1 where a question failed, else 0.
     """
     for request in requests:
-        options(request.model)  # an unknown model is refused before the data are read
+        check_options(request.model, request.model_options)  # refused before the data are read
     plans = [plan(request) for request in requests]
     summaries, outcomes = [], []
     for ready in plans:
@@ -78,6 +78,7 @@ def _say_what_is_left_out(ready: Plan) -> None:
 def _say_what_it_costs(budgets: list[Budget]) -> None:
     for budget in budgets:
         limit = "no limit" if budget.limit is None else f"limit {budget.limit:,}"
+        limit += "" if budget.limit_before is None else f", {budget.limit_before:,} before its extension"
         _notes.print(
             f"{budget.task}: {budget.n_contexts} contexts, the longest request {budget.longest:,} tokens ({limit}): "
             f"{budget.outcome}",

@@ -14,6 +14,14 @@ __all__ = ["command"]
 @click.option("--tasks", required=True, help="Task or group names with commas (see `ls tasks`).")
 @click.option("--data", type=click.Path(path_type=Path), help="Folder of the NIEH set to ask about.")
 @click.option("--model-args", default="", metavar="K=V,...", help="Options of the model (see `ls models`).")
+@click.option(
+    "--rope", metavar="KIND:FACTOR", help="Extend the model's context: yarn:4, linear:2, dynamic:4, longrope:8."
+)
+@click.option(
+    "--k-tokens",
+    type=click.Choice(["1000", "1024"]),
+    help="Tokens of a kilo-token where a context has a size; the published value of each context if not given.",
+)
 @click.option("--limit", type=click.IntRange(min=1), help="Ask only the first N questions of each task.")
 @click.option(
     "--output",
@@ -24,7 +32,15 @@ __all__ = ["command"]
 )
 @click.option("--seed", type=int, default=0, show_default=True, help="For whatever is random.")
 def command(
-    models: str, tasks: str, data: Path | None, model_args: str, limit: int | None, output: Path, seed: int
+    models: str,
+    tasks: str,
+    data: Path | None,
+    model_args: str,
+    rope: str | None,
+    k_tokens: str | None,
+    limit: int | None,
+    output: Path,
+    seed: int,
 ) -> int:
     """Evaluate MODEL on TASKS and print the results beside the published ones.
 
@@ -33,14 +49,20 @@ def command(
     from infthor_eval.cli.evaluate import evaluate
     from infthor_eval.runs import RunRequest
 
+    options = model_options_in(model_args)
+    if rope is not None:
+        if "rope" in options:
+            raise click.UsageError("--rope and rope= in --model-args are the same option; give one of them")
+        options["rope"] = rope
     requests = [
         RunRequest(
             model=model,
             tasks=names_in(tasks, "--tasks"),
             output=output,
             data=data,
-            model_options=model_options_in(model_args),
+            model_options=options,
             limit=limit,
+            k_tokens=int(k_tokens) if k_tokens else None,
             seed=seed,
         )
         for model in names_in(models, "--model")

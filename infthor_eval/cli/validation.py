@@ -16,7 +16,7 @@ from infthor_eval.nieh.scoring import Scorer
 from infthor_eval.nieh.validation import Judged, Verdicts, judge, read_decisions, write_inspection_list
 from infthor_eval.report import nieh_table, summarise, write_inspection_page
 from infthor_eval.runs import RunOutcome, RunRequest, plan
-from model_adapters import options
+from model_adapters import check_options
 
 __all__ = ["validate"]
 
@@ -36,7 +36,7 @@ def validate(requests: Sequence[RunRequest], out: Path, decisions_file: Path | N
         Exit code: 1 where a model failed on a question, else 0.
     """
     for request in requests:
-        options(request.model)  # an unknown model is refused before the data are read
+        check_options(request.model, request.model_options)  # refused before the data are read
     decisions = read_decisions(decisions_file) if decisions_file else {}
     plans = [plan(request) for request in requests]
     work = plans[0].tasks[0].resolved

@@ -8,7 +8,7 @@ from infthor_eval.formats.frames import FrameRef
 from infthor_eval.nieh.contexts import Case, context_named
 from infthor_eval.nieh.prompts import question_text
 from infthor_eval.nieh.work import Work
-from model_adapters import Model, Part
+from model_adapters import ExtendableModel, Model, Part
 
 __all__ = ["Budget", "budget_of"]
 
@@ -21,22 +21,31 @@ class Budget:
         task: the lm-eval task.
         longest: tokens of its longest request, room for the reply included.
         limit: the model's limit, None where it has none.
+        limit_before: the limit that a RoPE extension raised to this one, None where nothing is extended.
         n_contexts: different contexts that the task asks in.
-        n_refused: how many of them are beyond the limit; their questions will be recorded as failed.
+        n_truncated: how many of them leave out frames of their trajectory to keep their size.
+        n_extended: how many fit because of the extension alone.
+        n_refused: how many are beyond the limit; their questions will be recorded as failed.
     """
 
     task: str
     longest: int
     limit: int | None
+    limit_before: int | None
     n_contexts: int
+    n_truncated: int
+    n_extended: int
     n_refused: int
 
     @property
     def outcome(self) -> str:
         """What will happen, in words."""
-        if self.limit is None or self.n_refused == 0:
-            return "fits"
-        return f"{self.n_refused} of {self.n_contexts} contexts refused: longer than the model takes"
+        counted = [
+            (self.n_truncated, "truncated: frames cut off to keep the context's size"),
+            (self.n_extended, "extended: longer than the model takes without rope"),
+            (self.n_refused, "refused: longer than the model takes"),
+        ]
+        return "; ".join(f"{n} of {self.n_contexts} contexts {what}" for n, what in counted if n) or "fits"
 
 
 def budget_of(task: str, context: str, work: Work, model: Model, max_new_tokens: int) -> Budget:
@@ -52,9 +61,22 @@ def budget_of(task: str, context: str, work: Work, model: Model, max_new_tokens:
         max_new_tokens: room for the reply.
     """
     counts = [_tokens(model, parts) + max_new_tokens for parts in _requests(context, work)]
-    limit = model.max_tokens
-    refused = sum(count > limit for count in counts) if limit is not None else 0
-    return Budget(task, max(counts, default=0), limit, len(counts), refused)
+    limit, before = model.max_tokens, _limit_before(model)
+    fitting = [count for count in counts if limit is None or count <= limit]
+    return Budget(
+        task=task,
+        longest=max(counts, default=0),
+        limit=limit,
+        limit_before=before,
+        n_contexts=len(counts),
+        n_truncated=len({(question.traj_id, case.frames) for question, case in work.cases if case.n_cut}),
+        n_extended=sum(before is not None and count > before for count in fitting),
+        n_refused=len(counts) - len(fitting),
+    )
+
+
+def _limit_before(model: Model) -> int | None:
+    return model.max_tokens_before_extension if isinstance(model, ExtendableModel) else None
 
 
 def _requests(context: str, work: Work) -> list[list[Part]]:

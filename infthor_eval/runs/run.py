@@ -36,6 +36,7 @@ class RunRequest:
         model_options: the model's options as typed.
         limit: ask only the first so many questions of each task.
         seed: for whatever is random.
+        k_tokens: tokens of a kilo-token in contexts of a given size; None takes each context's published value.
     """
 
     model: str
@@ -45,6 +46,7 @@ class RunRequest:
     model_options: Mapping[str, str] = field(default_factory=dict)
     limit: int | None = None
     seed: int = 0
+    k_tokens: int | None = None
 
 
 @dataclass(frozen=True)
@@ -103,7 +105,8 @@ def plan(request: RunRequest) -> Plan:
     """Check a request before anything expensive is loaded.
 
     Raises:
-        UsageError: an unknown task, or a task without its data or with nothing that can be asked.
+        UsageError: an unknown task, a task without its data or with nothing that can be asked, or a kilo-token for
+            tasks of which none has a size.
         DataError: the set is not what the format says.
     """
     open_set.cache_clear()  # its files may have changed since an earlier run of this process
@@ -119,6 +122,7 @@ def plan(request: RunRequest) -> Plan:
             work = find_work(settings)
         tasks.append(TaskPlan(name, config, work))
     _refuse_nothing(tasks)
+    _refuse_unused(request, tasks)
     return Plan(request, tasks)
 
 
@@ -154,7 +158,11 @@ def execute(ready: Plan, begin: Callable[[Plan, list[Budget]], Observer]) -> Run
 
 def _metadata(request: RunRequest, tokens_per_frame: int | None = None) -> dict[str, Any]:
     """What this run tells its tasks beside their files' own settings."""
-    ours = {"data": str(request.data) if request.data else None, "tokens_per_frame": tokens_per_frame}
+    ours = {
+        "data": str(request.data) if request.data else None,
+        "k_tokens": request.k_tokens,
+        "tokens_per_frame": tokens_per_frame,
+    }
     return {"seed": request.seed} | {key: value for key, value in ours.items() if value is not None}
 
 
@@ -165,6 +173,17 @@ def _refuse_nothing(tasks: Sequence[TaskPlan]) -> None:
     reasons = {item.reason for task in tasks for item in task.resolved.left_out}
     said = "; ".join(sorted(reasons)[:3]) or "its files are empty"
     raise UsageError(f"no question of {tasks[0].resolved.data.root} can be asked ({said})")
+
+
+def _refuse_unused(request: RunRequest, tasks: Sequence[TaskPlan]) -> None:
+    """A kilo-token that no context is measured in would only give the run another identity."""
+    if request.k_tokens is None:
+        return
+    if not any(context_named(task.config["dataset_kwargs"]["context"]).needs_model for task in tasks):
+        raise UsageError(
+            f"--k-tokens {request.k_tokens}: no context of {', '.join(request.tasks)} has a size in kilo-tokens; "
+            "leave it out, or ask nieh_haystack or nieh_truncate_head"
+        )
 
 
 def _resolved(ready: Plan, model: Model | Bound) -> Plan:
@@ -210,6 +229,7 @@ def _identity(ready: Plan, model: Model | Bound) -> dict[str, Any]:
         "tasks": {task.name: _task_identity(task) for task in ready.tasks},
         "limit": request.limit,
         "seed": request.seed,
+        "k_tokens": request.k_tokens,
     }
     # As it is read back from the journal: tuples are lists, keys are strings.
     return dict(json.loads(json.dumps(identity)))

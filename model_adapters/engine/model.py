@@ -20,7 +20,14 @@ from model_adapters.engine.prompt import Frame, Prompter, Unit, n_common, n_toke
 from model_adapters.engine.rope import length_rope
 from model_adapters.protocols import Part, Reply
 
-__all__ = ["TransformersModel", "check_limit", "context_limit", "identity", "naming_memory_errors"]
+__all__ = [
+    "TransformersModel",
+    "check_limit",
+    "context_limit",
+    "identity",
+    "limit_before_extension",
+    "naming_memory_errors",
+]
 
 
 class TransformersModel:
@@ -57,6 +64,11 @@ class TransformersModel:
     def max_tokens(self) -> int | None:
         """The checkpoint's context limit, or the option's."""
         return context_limit(self._loaded, self._options)
+
+    @property
+    def max_tokens_before_extension(self) -> int | None:
+        """The checkpoint's own limit where an option extends it."""
+        return limit_before_extension(self._loaded, self._options)
 
     def identity(self) -> dict[str, Any]:
         """Checkpoint, precision, kernels, versions and generation settings, as JSON values."""
@@ -173,6 +185,14 @@ class TransformersModel:
 def context_limit(loaded: Loaded, options: EngineOptions) -> int | None:
     """The checkpoint's context limit, or the option's; None for none."""
     return (loaded.max_tokens if options.max_tokens is None else options.max_tokens) or None
+
+
+def limit_before_extension(loaded: Loaded, options: EngineOptions) -> int | None:
+    """The checkpoint's own limit where an option extends it; None where nothing is extended."""
+    if options.rope is None:
+        return None
+    limit: int = loaded.model.config.get_text_config().max_position_embeddings
+    return limit
 
 
 def identity(name: str, loaded: Loaded, options: EngineOptions) -> dict[str, Any]:

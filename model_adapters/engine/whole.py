@@ -16,7 +16,13 @@ from infthor_eval.formats.frames import FrameRef
 from model_adapters.backend import BackendConversation, OneByOne
 from model_adapters.engine.decoding import cut_at_stop
 from model_adapters.engine.loaded import Loaded
-from model_adapters.engine.model import check_limit, context_limit, identity, naming_memory_errors
+from model_adapters.engine.model import (
+    check_limit,
+    context_limit,
+    identity,
+    limit_before_extension,
+    naming_memory_errors,
+)
 from model_adapters.engine.options import EngineOptions
 from model_adapters.engine.prompt import begins, render
 from model_adapters.protocols import Part, Reply
@@ -95,6 +101,11 @@ class WholeModel(OneByOne):
     def max_tokens(self) -> int | None:
         """The checkpoint's context limit, or the option's."""
         return context_limit(self._loaded, self._options)
+
+    @property
+    def max_tokens_before_extension(self) -> int | None:
+        """The checkpoint's own limit where an option extends it."""
+        return limit_before_extension(self._loaded, self._options)
 
     def identity(self) -> dict[str, Any]:
         """Checkpoint, precision, kernels, versions and generation settings, as JSON values."""

@@ -38,7 +38,7 @@ def data(make_nieh_set, monkeypatch):
         return Scripted(name) if name in SKILLS else load(name, *arguments)
 
     monkeypatch.setattr("infthor_eval.runs.run.load", load_scripted)
-    monkeypatch.setattr("infthor_eval.cli.validation.options", lambda name: "")
+    monkeypatch.setattr("infthor_eval.cli.validation.check_options", lambda *_: None)
     return make_nieh_set(QUESTIONS, size=56)
 
 

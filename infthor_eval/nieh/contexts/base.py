@@ -21,10 +21,12 @@ class Case:
     Attributes:
         frames: the frames shown, as positions in the trajectory's time order.
         variant: which of the context's ways this is ("depth=0.4"); empty where there is one.
+        n_cut: frames of the trajectory that are cut off because the context has a size.
     """
 
     frames: tuple[int, ...]
     variant: str = ""
+    n_cut: int = 0
 
 
 @dataclass(frozen=True)

@@ -25,4 +25,5 @@ def truncate_head(data: NiehSet, question: Question, settings: Settings) -> list
     n_all, n = len(data.frames(question.traj_id)), settings.n_frames(_K_TOKENS)
     if n < 1:
         return [Unfit("no frame fits the context")]
-    return [Case(tuple(range(max(0, n_all - n), n_all)))]
+    n_cut = max(0, n_all - n)
+    return [Case(tuple(range(n_cut, n_all)), n_cut=n_cut)]

@@ -1,0 +1,140 @@
+"""Contexts of a given size, extended contexts, and what is told of both before the first answer."""
+
+import json
+
+import pytest
+
+from infthor_eval.formats.question import Question
+from infthor_eval.runs import read_journal
+from model_adapters.tiny.qwen2_5_vl import save_tiny_checkpoint
+
+ONE = [Question("t", "Is there a mug?", (40,), ("yes",))]
+
+
+def only(folder, pattern):
+    (path,) = folder.rglob(pattern)
+    return path
+
+
+def line_of(text, start):
+    """The one line of standard error that begins so, without the progress bars before it."""
+    (line,) = (line for line in text.splitlines() if line.startswith(start))
+    return line
+
+
+@pytest.fixture
+def short(tmp_path):
+    """A tiny checkpoint that takes 1,500 tokens."""
+    folder = tmp_path / "short"
+    save_tiny_checkpoint(folder, seed=0)
+    config = json.loads((folder / "config.json").read_text())
+    config["text_config"]["max_position_embeddings"] = 1500
+    (folder / "config.json").write_text(json.dumps(config))
+    return folder
+
+
+def n_frames(folder, task):
+    samples = only(folder, f"samples_{task}_*.jsonl").read_text().splitlines()
+    return [len(json.loads(line)["doc"]["frames"]) for line in samples]
+
+
+@pytest.mark.parametrize(
+    ("options", "haystack", "truncated"), [((), 66, 67), (("--k-tokens", 1000), 66, 66), (("--k-tokens", 1024), 67, 67)]
+)
+def test_a_kilo_token_is_each_contexts_own_or_the_one_given(make_nieh_set, tmp_path, run, options, haystack, truncated):
+    data = make_nieh_set(ONE, n_frames=80, size=56)
+    tasks = ["nieh_haystack_8k", "nieh_truncate_head_8k"]
+    arguments = ["--model", "oracle", "--tasks", ",".join(tasks), "--data", data, "--output", tmp_path / "out"]
+    code, _, err = run(*arguments, *options)
+    assert code == 0, err
+    # A bound is counted as Qwen2.5-VL: 121 tokens a frame.
+    assert [set(n_frames(tmp_path / "out", task)) for task in tasks] == [{haystack}, {truncated}]
+
+
+def test_the_kilo_token_and_the_extension_are_part_of_the_runs_identity(make_nieh_set, tmp_path, run):
+    data = make_nieh_set(ONE, n_frames=80, size=56)
+    tasks, out = "nieh_gt,nieh_haystack_8k", tmp_path / "out"
+    for options in ((), ("--k-tokens", 1024), ("--rope", "yarn:2")):
+        assert run("--model", "qwen2.5-vl-tiny", "--tasks", tasks, "--data", data, "--output", out, *options)[0] == 0
+    identities = [read_journal(path)[0] for path in sorted(out.rglob("journal.jsonl"))]
+    found = {(each["k_tokens"], each["model"]["rope"]["rope_type"], each["model"]["max_tokens"]) for each in identities}
+    assert found == {(None, "default", 128_000), (1024, "default", 128_000), (None, "yarn", 256_000)}
+
+
+def test_the_extension_is_the_same_run_whichever_way_it_is_given(make_nieh_set, tmp_path, run):
+    data = make_nieh_set(size=56)
+    arguments = ["--model", "qwen2.5-vl-tiny", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out"]
+    assert run(*arguments, "--rope", "linear:2")[0] == 0
+    _, _, err = run(*arguments, "--model-args", "rope=linear:2")
+    assert "0 answered now, 5 found in the journal" in err
+
+
+def test_what_fits_by_the_extension_alone_is_told_with_both_limits(make_nieh_set, tmp_path, short, run):
+    data = make_nieh_set(n_frames=20)
+    arguments = ["--model", "qwen2.5-vl", "--model-args", f"pretrained={short},device=cpu", "--tasks", "nieh"]
+    arguments += ["--data", data, "--output", tmp_path / "out"]
+    code, _, err = run(*arguments, "--rope", "yarn:4")
+    assert code == 0, err
+    assert line_of(err, "nieh_gt:").endswith("(limit 6,000, 1,500 before its extension): fits")
+    full = line_of(err, "nieh_full:")
+    assert full.endswith(": 2 of 2 contexts extended: longer than the model takes without rope")
+    assert "(limit 6,000, 1,500 before its extension)" in full
+    code, _, err = run(*arguments)
+    assert code == 1
+    assert line_of(err, "nieh_full: 2 contexts").endswith(
+        "(limit 1,500): 2 of 2 contexts refused: longer than the model takes"
+    )
+
+
+def test_an_extension_that_is_too_small_is_told_as_refused(make_nieh_set, tmp_path, short, run):
+    data = make_nieh_set(n_frames=20)
+    arguments = ["--model", "qwen2.5-vl", "--model-args", f"pretrained={short},device=cpu", "--rope", "linear:1.5"]
+    code, _, err = run(*arguments, "--tasks", "nieh_full", "--data", data, "--output", tmp_path / "out")
+    assert code == 1
+    full = line_of(err, "nieh_full: 2 contexts")
+    assert "(limit 2,250, 1,500 before its extension): 2 of 2 contexts refused" in full
+    assert "extended:" not in full
+
+
+def test_a_context_that_is_cut_to_its_size_is_told_as_truncated(make_nieh_set, tmp_path, run):
+    data = make_nieh_set([*ONE, Question("u", "Is there a mug?", (40,), ("yes",))], n_frames=80)
+    for number in range(60, 80):  # one of the two trajectories is short enough
+        (data / "metadata" / "u" / "img" / f"{number:09d}.png").unlink()
+    metadata = data / "metadata" / "u" / "metadata.json"
+    metadata.write_text(json.dumps(json.loads(metadata.read_text())[:60]))
+    arguments = ["--model", "qwen2.5-vl-tiny", "--tasks", "nieh_truncate_head_8k", "--data", data]
+    code, _, err = run(*arguments, "--output", tmp_path / "out")
+    assert code == 0, err
+    told = line_of(err, "nieh_truncate_head_8k: 2 contexts")
+    assert told.endswith("(limit 128,000): 1 of 2 contexts truncated: frames cut off to keep the context's size")
+    assert n_frames(tmp_path / "out", "nieh_truncate_head_8k") == [67, 60]
+
+
+def test_the_longest_request_that_is_told_is_the_one_that_is_made(make_nieh_set, tmp_path, run):
+    data = make_nieh_set(n_frames=20)
+    arguments = ["--model", "qwen2.5-vl-tiny", "--tasks", "nieh_full", "--data", data, "--output", tmp_path / "out"]
+    _, _, err = run(*arguments)
+    records = read_journal(only(tmp_path / "out", "journal.jsonl"))[1]
+    longest = max(record.n_context_tokens for record in records) + 50  # and the room for the reply
+    assert f"the longest request {longest:,} tokens" in line_of(err, "nieh_full: 2 contexts")
+
+
+BAD = [
+    (["--model", "oracle", "--rope", "yarn:4"], "oracle has no option rope"),
+    (["--model", "blind", "--rope", "yarn:4"], "blind has no option rope"),
+    (["--model", "qwen2.5-vl-tiny,oracle", "--rope", "yarn:4"], "oracle has no option rope"),
+    (["--model", "qwen2.5-vl-tiny", "--rope", "yarn"], "rope=yarn is not KIND:FACTOR"),
+    (["--model", "qwen2.5-vl-tiny", "--rope", "ntk:4"], "rope=ntk:4 is not KIND:FACTOR"),
+    (["--model", "qwen2.5-vl-tiny", "--rope", "yarn:4", "--model-args", "rope=yarn:4"], "give one of them"),
+    (["--model", "oracle", "--k-tokens", "1000"], "no context of nieh has a size in kilo-tokens"),
+    (["--model", "oracle", "--k-tokens", "1001"], "'1001' is not one of '1000', '1024'"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "said"), BAD, ids=[" ".join(arguments) for arguments, _ in BAD])
+def test_what_does_not_go_together_is_one_line_before_anything_is_run(make_nieh_set, tmp_path, run, arguments, said):
+    data = make_nieh_set(size=56)
+    code, out, err = run(*arguments, "--tasks", "nieh", "--data", data, "--output", tmp_path / "out")
+    assert (code, out, len(err.strip().splitlines())) == (2, "", 1)
+    assert said in err
+    assert not (tmp_path / "out").exists()
