@@ -28,7 +28,8 @@ def evaluate(requests: Sequence[RunRequest]) -> int:
     """
     for request in requests:
         check_options(request.model, request.model_options)  # refused before the data are read
-    plans = [plan(request) for request in requests]
+    with _notes.status("looking at the questions and their frames"):  # retrieval embeds every frame: minutes
+        plans = [plan(request) for request in requests]
     summaries, outcomes = [], []
     for ready in plans:
         outcome = execute_with_progress(ready)

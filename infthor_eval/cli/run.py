@@ -22,6 +22,8 @@ __all__ = ["command"]
     type=click.Choice(["1000", "1024"]),
     help="Tokens of a kilo-token where a context has a size; the published value of each context if not given.",
 )
+@click.option("--retriever", metavar="NAME", help="CLIP model of retrieval tasks, a hub id or a folder.")
+@click.option("--retriever-revision", metavar="REVISION", help="Branch, tag or commit of the retriever on the hub.")
 @click.option("--limit", type=click.IntRange(min=1), help="Ask only the first N questions of each task.")
 @click.option(
     "--output",
@@ -38,6 +40,8 @@ def command(
     model_args: str,
     rope: str | None,
     k_tokens: str | None,
+    retriever: str | None,
+    retriever_revision: str | None,
     limit: int | None,
     output: Path,
     seed: int,
@@ -63,6 +67,8 @@ def command(
             model_options=options,
             limit=limit,
             k_tokens=int(k_tokens) if k_tokens else None,
+            retriever=retriever,
+            retriever_revision=retriever_revision,
             seed=seed,
         )
         for model in names_in(models, "--model")

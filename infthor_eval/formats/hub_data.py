@@ -1,11 +1,11 @@
 """The published NIEH data: fetching it from the Hugging Face hub, and where it lies afterwards."""
 
-import os
 from pathlib import Path
 
 from infthor_eval.errors import DataError
 from infthor_eval.formats.archive import unpack_tar
 from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.user_cache import user_cache
 
 __all__ = ["NIEH_REPOSITORY", "default_folder", "fetch_nieh"]
 
@@ -15,8 +15,7 @@ _FILES = ["qa_set_nieh_single_clue.csv", "qa_set_nieh_multi_clue.csv", "metadata
 
 def default_folder() -> Path:
     """Where the published data is kept unless the user says otherwise (the user's cache folder)."""
-    cache = os.environ.get("XDG_CACHE_HOME")
-    return (Path(cache) if cache else Path.home() / ".cache") / "infthor-eval" / "nieh"
+    return user_cache("nieh")
 
 
 def fetch_nieh(folder: Path, token: str | None = None, endpoint: str | None = None) -> NiehSet:

@@ -1,7 +1,7 @@
 """An NIEH set: questions about long egocentric trajectories, and the frames they are asked on.
 
 The folder form is that of the published data (hub dataset `PEARLS-Lab/infini-thor-nieh`): `qa_set*.csv` beside
-`metadata/<traj_id>/` with `img/` (or `img_768/`) and `metadata.json`.
+`metadata/<traj_id>/` with `img/` (or `img_768/`), `metadata.json` and, in some sets, `<traj_id>_10fps.mp4`.
 """
 
 import hashlib
@@ -16,6 +16,7 @@ from infthor_eval.formats.qa_csv import read_questions
 from infthor_eval.formats.question import Question
 from infthor_eval.formats.set_info import simulator_of
 from infthor_eval.formats.step_log import read_steps
+from infthor_eval.formats.video import frames_per_second
 
 __all__ = ["LeftOut", "NiehSet"]
 
@@ -51,6 +52,7 @@ class NiehSet:
         self._read = tuple(question for file in self._files for question in read_questions(file))
         self._frames: dict[str, dict[int, FrameRef]] = {}
         self._whole: dict[str, tuple[FrameRef, ...]] = {}  # shared by all questions on the whole trajectory
+        self._videos: dict[str, tuple[FrameRef, ...] | DataError] = {}
 
     @cached_property
     def left_out(self) -> tuple[LeftOut, ...]:
@@ -115,6 +117,27 @@ class NiehSet:
         """The frames that hold a question's evidence, in the order of its clues."""
         frames = self._trajectory(question.traj_id)
         return tuple(frames[index] for index in question.clues)
+
+    def video(self, traj_id: str) -> Path | None:
+        """The trajectory's video; None where it has none."""
+        path = self.folder(traj_id) / f"{traj_id}_10fps.mp4"
+        return path if path.is_file() else None
+
+    def video_frames(self, traj_id: str) -> tuple[FrameRef, ...]:
+        """One frame per second of the trajectory's video, which there must be; decoded when first asked for.
+
+        Raises:
+            DataError: the video cannot be decoded.
+        """
+        if traj_id not in self._videos:
+            try:
+                self._videos[traj_id] = frames_per_second(self.folder(traj_id) / f"{traj_id}_10fps.mp4")
+            except DataError as error:
+                self._videos[traj_id] = error  # a broken video is not decoded again for every question on it
+        found = self._videos[traj_id]
+        if isinstance(found, DataError):
+            raise found
+        return found
 
     def _problem(self, question: Question) -> str | None:
         """Why a question cannot be asked; None where it can."""

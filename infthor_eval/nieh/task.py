@@ -13,8 +13,9 @@ from PIL import Image
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.question import Question
-from infthor_eval.nieh.contexts import context_named
-from infthor_eval.nieh.prompts import last_line, question_text
+from infthor_eval.nieh.contexts import Case, Part, context_named
+from infthor_eval.nieh.notes import Notes, Notetaking
+from infthor_eval.nieh.prompts import last_line
 from infthor_eval.nieh.scoring import SCORERS, score
 from infthor_eval.nieh.work import find_work, open_set
 
@@ -29,7 +30,7 @@ __all__ = [
 ]
 
 Doc = dict[str, Any]
-_PLACEHOLDER = "<image>"  # lm-eval's own mark for an image in a text
+_PLACEHOLDERS = {FrameRef: "<image>", Notes: "<notes>"}  # the first is lm-eval's own mark for an image in a text
 
 
 def dataset(pixels: bool = True, **config: Any) -> dict[str, Any]:
@@ -40,7 +41,7 @@ def dataset(pixels: bool = True, **config: Any) -> dict[str, Any]:
         config: see `find_work`; what else lm-eval passes to every task is not looked at.
 
     Raises:
-        UsageError: nothing can be asked, or as in `find_work`.
+        UsageError: nothing can be asked, the model would have to take notes, or as in `find_work`.
         DataError: the set cannot be read.
     """
     from datasets import Dataset
@@ -57,6 +58,7 @@ def dataset(pixels: bool = True, **config: Any) -> dict[str, Any]:
             "context": config["context"],
             "variant": case.variant,
             "frames": list(case.frames),
+            "notes": [case.notes.window, case.notes.max_new_tokens] if case.notes else [],
             "set": str(work.data.root),
             "pixels": pixels,
         }
@@ -66,6 +68,11 @@ def dataset(pixels: bool = True, **config: Any) -> dict[str, Any]:
         reasons = Counter(item.reason for item in work.left_out).most_common(3)
         said = "; ".join(f"{reason} ({n})" for reason, n in reasons) or "its files are empty"
         raise UsageError(f"{work.data.root}: no question of it can be asked: {said}")
+    if pixels and docs[0]["notes"]:
+        raise UsageError(
+            f"{config['context']}: shows notes that the model takes beforehand, which infthor-eval's runner alone has "
+            "it do; run the task with `infthor-eval run`"
+        )
     return {"test": Dataset.from_list(docs)}
 
 
@@ -80,17 +87,16 @@ def doc_question(doc: Doc) -> Question:
     )
 
 
-def doc_parts(doc: Doc) -> list[str | FrameRef]:
+def doc_parts(doc: Doc) -> list[Part]:
     """What a model is shown and told for a doc: the context's parts, and last the text with the question."""
-    data, question, context = open_set(doc["set"]), doc_question(doc), context_named(doc["context"])
-    frames = data.frames(question.traj_id)
-    shown = context.parts(data, question, [frames[position] for position in doc["frames"]])
-    return [*shown, question_text(context.intro, question)]
+    notes = Notetaking(*doc["notes"]) if doc["notes"] else None
+    case = Case(tuple(doc["frames"]), doc["variant"], notes=notes)
+    return context_named(doc["context"]).request(open_set(doc["set"]), doc_question(doc), case)
 
 
 def doc_to_text(doc: Doc) -> str:
-    """The request's text, with a placeholder where each frame goes."""
-    return "".join(_PLACEHOLDER if isinstance(part, FrameRef) else part for part in doc_parts(doc))
+    """The request's text, with a placeholder where each frame, and the model's notes, go."""
+    return "".join(part if isinstance(part, str) else _PLACEHOLDERS[type(part)] for part in doc_parts(doc))
 
 
 def doc_to_image(doc: Doc) -> list[Image.Image]:

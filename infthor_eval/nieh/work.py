@@ -34,11 +34,13 @@ class Work:
         data: the set.
         cases: what is asked.
         left_out: what is not.
+        sources: what the frames depend on besides the set and the settings (`Context.sources`).
     """
 
     data: NiehSet
     cases: list[tuple[Question, Case]] = field(default_factory=list)
     left_out: list[LeftOutCase] = field(default_factory=list)
+    sources: dict[str, Any] = field(default_factory=dict)
 
 
 @lru_cache(maxsize=8)
@@ -80,15 +82,16 @@ def find_work(config: Mapping[str, Any]) -> Work:
     """
     context, settings = context_named(config["context"]), Settings.read(config)
     work = Work(find_set(**config))
+    work.sources = context.sources(work.data, settings)
     work.left_out += [LeftOutCase(item.question, "", item.reason) for item in work.data.left_out]
     problems: dict[FrameRef, str | None] = {}
     for question in work.data.questions:
-        frames = work.data.frames(question.traj_id)
         for case in context.cases(work.data, question, settings):
-            reason = case.reason if isinstance(case, Unfit) else _problem([frames[i] for i in case.frames], problems)
-            if reason:
-                work.left_out.append(LeftOutCase(question, case.variant, reason))
-            elif isinstance(case, Case):
+            if isinstance(case, Unfit):
+                work.left_out.append(LeftOutCase(question, case.variant, case.reason))
+            elif problem := _problem(context.shown(work.data, question, case), problems):
+                work.left_out.append(LeftOutCase(question, case.variant, problem))
+            else:
                 work.cases.append((question, case))
     return work
 

@@ -3,8 +3,13 @@
 from collections.abc import Sequence
 from typing import Protocol
 
+from infthor_eval.formats.frames import FrameRef
+from infthor_eval.nieh.contexts import Part
+from infthor_eval.nieh.notes import Notes
+from infthor_eval.runs.journal import Journal
+from infthor_eval.runs.notebook import Notebook
 from infthor_eval.runs.units import Unit
-from model_adapters import BatchingConversation, Bound, Model, Part, Reply
+from model_adapters import BatchingConversation, Bound, Model, Reply
 
 __all__ = ["Answerer", "answerer_for"]
 
@@ -15,6 +20,14 @@ class Answerer(Protocol):
     @property
     def batch_size(self) -> int:
         """How many units are worth handing over at once."""
+
+    def read(self, context: Sequence[Part]) -> tuple[str | FrameRef, ...]:
+        """A context as it is shown: with the model's notes, which it takes now if it has not yet, as text.
+
+        Raises:
+            DataError: a frame cannot be read.
+            ModelError: the model cannot take notes on so many frames.
+        """
 
     def answer(self, units: Sequence[Unit]) -> list[Reply]:
         """The replies to units that share their context and decoding settings.
@@ -28,18 +41,22 @@ class Answerer(Protocol):
 class _ModelAnswerer:
     """Keeps one conversation, so that units in the same context share what the model has encoded of it."""
 
-    def __init__(self, model: Model) -> None:
+    def __init__(self, model: Model, journal: Journal) -> None:
+        self._notebook = Notebook(model, journal)
         self._conversation = model.conversation()
         self._start = self._conversation.mark()
         self._after_context = self._start
-        self._context: tuple[Part, ...] = ()
+        self._context: tuple[str | FrameRef, ...] = ()
 
     @property
     def batch_size(self) -> int:
         return self._conversation.batch_size if isinstance(self._conversation, BatchingConversation) else 1
 
+    def read(self, context: Sequence[Part]) -> tuple[str | FrameRef, ...]:
+        return tuple(self._notebook.text(part) if isinstance(part, Notes) else part for part in context)
+
     def answer(self, units: Sequence[Unit]) -> list[Reply]:
-        context, decoding = units[0].context, units[0].decoding
+        context, decoding = units[0].shown, units[0].decoding
         if context != self._context:
             self._conversation.rewind(self._start)
             self._context = ()
@@ -63,10 +80,18 @@ class _BoundAnswerer:
     def __init__(self, bound: Bound) -> None:
         self._bound = bound
 
+    def read(self, context: Sequence[Part]) -> tuple[str | FrameRef, ...]:
+        return tuple(part for part in context if not isinstance(part, Notes))  # it looks at nothing and notes nothing
+
     def answer(self, units: Sequence[Unit]) -> list[Reply]:
         return [Reply(self._bound.answer(unit.question), (), 0, 0) for unit in units]
 
 
-def answerer_for(model: Model | Bound) -> Answerer:
-    """The way to have this model, or this bound, answer."""
-    return _BoundAnswerer(model) if isinstance(model, Bound) else _ModelAnswerer(model)
+def answerer_for(model: Model | Bound, journal: Journal) -> Answerer:
+    """The way to have this model, or this bound, answer.
+
+    Args:
+        model: what answers.
+        journal: takes the notes of a model.
+    """
+    return _BoundAnswerer(model) if isinstance(model, Bound) else _ModelAnswerer(model, journal)

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 from infthor_eval.errors import DataError
 from infthor_eval.formats.frames import FrameRef
-from infthor_eval.nieh.contexts import Case, context_named
-from infthor_eval.nieh.prompts import question_text
+from infthor_eval.nieh.contexts import Part, context_named
+from infthor_eval.nieh.notes import Notes
 from infthor_eval.nieh.work import Work
-from model_adapters import ExtendableModel, Model, Part
+from model_adapters import ExtendableModel, Model
 
 __all__ = ["Budget", "budget_of"]
 
@@ -60,7 +60,7 @@ def budget_of(task: str, context: str, work: Work, model: Model, max_new_tokens:
         model: whose tokens.
         max_new_tokens: room for the reply.
     """
-    counts = [_tokens(model, parts) + max_new_tokens for parts in _requests(context, work)]
+    counts = [_most_tokens(model, parts, max_new_tokens) for parts in _requests(context, work)]
     limit, before = model.max_tokens, _limit_before(model)
     fitting = [count for count in counts if limit is None or count <= limit]
     return Budget(
@@ -86,17 +86,23 @@ def _requests(context: str, work: Work) -> list[list[Part]]:
     for question, case in work.cases:
         key = (question.traj_id, case.frames)
         if key not in longest or len(question.text) > longest[key][0]:
-            shown = chosen.parts(work.data, question, _frames(work, question.traj_id, case))
-            longest[key] = (len(question.text), [*shown, question_text(chosen.intro, question)])
+            longest[key] = (len(question.text), chosen.request(work.data, question, case))
     return [parts for _, parts in longest.values()]
 
 
-def _frames(work: Work, traj_id: str, case: Case) -> Sequence[FrameRef]:
-    frames = work.data.frames(traj_id)
-    return [frames[position] for position in case.frames]
+def _most_tokens(model: Model, parts: Sequence[Part], max_new_tokens: int) -> int:
+    """Tokens of a request and its reply, or of the longest one for a note that is shown in it, if that is longer.
+
+    Notes are not written yet; each is counted with all the tokens that it may have.
+    """
+    notes = [part for part in parts if isinstance(part, Notes)]
+    empty = [part.text([""] * len(part.windows)) if isinstance(part, Notes) else part for part in parts]
+    room = sum(len(item.windows) * item.taking.max_new_tokens for item in notes)
+    reading = [_tokens(model, window.request) + item.taking.max_new_tokens for item in notes for window in item.windows]
+    return max([_tokens(model, empty) + room + max_new_tokens, *reading])
 
 
-def _tokens(model: Model, parts: Sequence[Part]) -> int:
+def _tokens(model: Model, parts: Sequence[str | FrameRef]) -> int:
     conversation = model.conversation()
     conversation.append(*parts)
     try:

@@ -1,4 +1,5 @@
-"""The journal of a run: every finished unit, one JSON line each, on disk before it counts.
+"""The journal of a run: every finished unit, and every note that a model took, one JSON line each, on disk before
+it counts.
 
 The first line says what run it is. A unit is found again by its task, question and variant, and counts only if the
 fingerprint of its inputs is the same, so an answer given to other inputs is never taken for this one's. A line that
@@ -17,9 +18,10 @@ import msgspec
 from infthor_eval.errors import DataError, UsageError
 from infthor_eval.runs.identity import canonical_json
 
-__all__ = ["Journal", "Observer", "UnitRecord", "read_journal"]
+__all__ = ["Journal", "NoteRecord", "Observer", "UnitRecord", "read_journal"]
 
 _FORMAT = 1
+_NOTE = b'{"note":'  # how the line of a note begins, and no unit's
 
 
 class UnitRecord(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
@@ -65,6 +67,28 @@ class UnitRecord(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
         return self.task, self.question_id, self.variant
 
 
+class NoteRecord(msgspec.Struct, frozen=True, kw_only=True):
+    """What a model noted on a few frames of a trajectory, to be shown it later instead of them.
+
+    Attributes:
+        note: the text.
+        fingerprint: of the note's inputs: the prompt, the frames' content, the limit.
+        traj_id: the trajectory.
+        steps: which frames, as the model is told ("Steps 0-19").
+        n_context_tokens: length of the request in tokens.
+        n_reply_tokens: length of the note in tokens.
+        seconds: time that it took.
+    """
+
+    note: str
+    fingerprint: str
+    traj_id: str
+    steps: str
+    n_context_tokens: int
+    n_reply_tokens: int
+    seconds: float
+
+
 # Is told of each unit that is done, and whether it was found in the journal of an earlier, stopped run.
 Observer = Callable[[UnitRecord, bool], None]
 
@@ -89,7 +113,9 @@ class Journal:
         self._file: BinaryIO = path.open("a+b")
         try:
             self._lock()
-            self._records = {record.key: record for record in self._recover(identity)}
+            records, notes = self._recover(identity)
+            self._records = {record.key: record for record in records}
+            self._notes = {note.fingerprint: note for note in notes}
         except (DataError, UsageError):
             self._file.close()
             raise
@@ -119,13 +145,22 @@ class Journal:
         self._write(msgspec.json.encode(record))
         self._records[record.key] = record
 
+    def note(self, fingerprint: str) -> NoteRecord | None:
+        """The note that was taken from these inputs, if one was."""
+        return self._notes.get(fingerprint)
+
+    def append_note(self, record: NoteRecord) -> None:
+        """Record a note; it is on disk when this returns."""
+        self._write(msgspec.json.encode(record))
+        self._notes[record.fingerprint] = record
+
     def _lock(self) -> None:
         try:
             fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError as error:
             raise UsageError(f"{self.path}: another run is writing it; wait for it or stop it") from error
 
-    def _recover(self, identity: Mapping[str, Any]) -> list[UnitRecord]:
+    def _recover(self, identity: Mapping[str, Any]) -> tuple[list[UnitRecord], list[NoteRecord]]:
         self._file.seek(0)
         content = self._file.read()
         whole = content.rfind(b"\n") + 1
@@ -133,11 +168,11 @@ class Journal:
             self._file.truncate(whole)
         if not whole:
             self._write(msgspec.json.encode(_Header(_FORMAT, dict(identity))))
-            return []
-        header, records = _decode(content[:whole], self.path)
+            return [], []
+        header, records, notes = _decode(content[:whole], self.path)
         if canonical_json(header.identity) != canonical_json(identity):
             raise DataError(f"{self.path}: is the journal of another run; give another --output")
-        return records
+        return records, notes
 
     def _write(self, line: bytes) -> None:
         self._file.write(line + b"\n")
@@ -155,20 +190,24 @@ def read_journal(path: Path) -> tuple[dict[str, Any], list[UnitRecord]]:
         content = path.read_bytes()
     except OSError as error:
         raise DataError(f"{path}: cannot be read ({error.strerror})") from error
-    header, records = _decode(content[: content.rfind(b"\n") + 1], path)
+    header, records, _ = _decode(content[: content.rfind(b"\n") + 1], path)
     return header.identity, list({record.key: record for record in records}.values())
 
 
-def _decode(content: bytes, path: Path) -> tuple[_Header, list[UnitRecord]]:
+def _decode(content: bytes, path: Path) -> tuple[_Header, list[UnitRecord], list[NoteRecord]]:
     lines = content.splitlines()
     number = 1
     try:
         header = msgspec.json.decode(lines[0] if lines else b"", type=_Header)
-        records = []
+        records: list[UnitRecord] = []
+        notes: list[NoteRecord] = []
         for number, line in enumerate(lines[1:], 2):  # noqa: B007 - the number is for the error
-            records.append(msgspec.json.decode(line, type=UnitRecord))
+            if line.startswith(_NOTE):
+                notes.append(msgspec.json.decode(line, type=NoteRecord))
+            else:
+                records.append(msgspec.json.decode(line, type=UnitRecord))
     except (msgspec.DecodeError, msgspec.ValidationError) as error:
         raise DataError(f"{path}, line {number}: not a line of a journal ({error}); take it away") from error
     if header.format != _FORMAT:
         raise DataError(f"{path}: format {header.format} of another version of infthor-eval; start anew")
-    return header, records
+    return header, records, notes

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 from lm_eval.api.instance import Instance
 from lm_eval.api.model import LM
@@ -39,7 +40,7 @@ class JournaledLM(LM):
             observe: told of each record.
         """
         super().__init__()
-        self._answerer = answerer_for(model)
+        self._answerer = answerer_for(model, journal)
         self._name = model.name
         self._journal = journal
         self._observe = observe or (lambda *_: None)
@@ -52,11 +53,11 @@ class JournaledLM(LM):
     def generate_until(self, requests: Sequence[Instance]) -> list[str]:
         """One response per request; empty where the model could not answer (the journal has the reason)."""
         units = [_unit(request) for request in requests]
-        replies: dict[int, str | None] = {}
+        replies: dict[tuple[str, str, str], str | None] = {}
         for group in by_shared_context(units):
-            for unit, record in self._records(group):
-                replies[id(unit)] = record.reply
-        return [replies[id(unit)] or "" for unit in units]
+            for record in self._records(group):
+                replies[record.key] = record.reply
+        return [replies[unit.key] or "" for unit in units]
 
     def loglikelihood(self, requests: Sequence[Instance]) -> list[tuple[float, bool]]:
         """Not offered: no task of ours compares likelihoods."""
@@ -66,15 +67,20 @@ class JournaledLM(LM):
         """Not offered, see `loglikelihood`."""
         raise ModelError("infthor-eval models answer in words; use a task with output_type generate_until")
 
-    def _records(self, group: Sequence[Unit]) -> Iterator[tuple[Unit, UnitRecord]]:
+    def _records(self, group: Sequence[Unit]) -> Iterator[UnitRecord]:
         """The records of units in one context, found in the journal or made, several at a time where that pays."""
+        try:
+            context = self._answerer.read(group[0].context)
+        except (DataError, ModelError) as error:
+            yield from [self._keep(_as_record(unit, "", failure=str(error))) for unit in group]
+            return
         waiting = []
-        for unit in group:
+        for unit in [replace(unit, context=context) for unit in group]:
             record = self._known(unit)
             if record is None:
                 waiting.append(unit)
             else:
-                yield unit, record
+                yield record
         size = self._answerer.batch_size
         for at in range(0, len(waiting), size):
             yield from self._made(waiting[at : at + size])
@@ -82,14 +88,14 @@ class JournaledLM(LM):
     def _known(self, unit: Unit) -> UnitRecord | None:
         """The record of a unit that needs no answering: an earlier run's, or that of a frame that cannot be read."""
         try:
-            found = self._journal.answered((unit.task, unit.question.id, unit.variant), unit.fingerprint)
+            found = self._journal.answered(unit.key, unit.fingerprint)
         except DataError as error:
             return self._keep(_as_record(unit, "", failure=str(error)))
         if found is not None:
             self._observe(found, True)
         return found
 
-    def _made(self, units: Sequence[Unit]) -> Iterator[tuple[Unit, UnitRecord]]:
+    def _made(self, units: Sequence[Unit]) -> Iterator[UnitRecord]:
         began = time.perf_counter()
         try:
             replies = self._answerer.answer(units)
@@ -98,11 +104,11 @@ class JournaledLM(LM):
                 for unit in units:
                     yield from self._made([unit])
             else:
-                yield units[0], self._keep(_as_record(units[0], units[0].fingerprint, failure=str(error)))
+                yield self._keep(_as_record(units[0], units[0].fingerprint, failure=str(error)))
             return
         seconds = (time.perf_counter() - began) / len(units)
         for unit, reply in zip(units, replies, strict=True):
-            yield unit, self._keep(_as_record(unit, unit.fingerprint, reply=reply, seconds=seconds))
+            yield self._keep(_as_record(unit, unit.fingerprint, reply=reply, seconds=seconds))
 
     def _keep(self, record: UnitRecord) -> UnitRecord:
         self._journal.append(record)

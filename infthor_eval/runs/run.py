@@ -37,6 +37,8 @@ class RunRequest:
         limit: ask only the first so many questions of each task.
         seed: for whatever is random.
         k_tokens: tokens of a kilo-token in contexts of a given size; None takes each context's published value.
+        retriever: CLIP model of contexts that retrieve frames, a hub id or a folder; None takes the published one.
+        retriever_revision: branch, tag or commit of it on the hub; None is the default branch.
     """
 
     model: str
@@ -47,6 +49,8 @@ class RunRequest:
     limit: int | None = None
     seed: int = 0
     k_tokens: int | None = None
+    retriever: str | None = None
+    retriever_revision: str | None = None
 
 
 @dataclass(frozen=True)
@@ -105,8 +109,8 @@ def plan(request: RunRequest) -> Plan:
     """Check a request before anything expensive is loaded.
 
     Raises:
-        UsageError: an unknown task, a task without its data or with nothing that can be asked, or a kilo-token for
-            tasks of which none has a size.
+        UsageError: an unknown task, a task without its data or with nothing that can be asked, a retriever that cannot
+            be loaded, or an option that none of the tasks looks at.
         DataError: the set is not what the format says.
     """
     open_set.cache_clear()  # its files may have changed since an earlier run of this process
@@ -161,6 +165,8 @@ def _metadata(request: RunRequest, tokens_per_frame: int | None = None) -> dict[
     ours = {
         "data": str(request.data) if request.data else None,
         "k_tokens": request.k_tokens,
+        "retriever": request.retriever,
+        "retriever_revision": request.retriever_revision,
         "tokens_per_frame": tokens_per_frame,
     }
     return {"seed": request.seed} | {key: value for key, value in ours.items() if value is not None}
@@ -176,13 +182,19 @@ def _refuse_nothing(tasks: Sequence[TaskPlan]) -> None:
 
 
 def _refuse_unused(request: RunRequest, tasks: Sequence[TaskPlan]) -> None:
-    """A kilo-token that no context is measured in would only give the run another identity."""
-    if request.k_tokens is None:
-        return
-    if not any(context_named(task.config["dataset_kwargs"]["context"]).needs_model for task in tasks):
+    """A kilo-token that no context is measured in would only give the run another identity; a retriever mislead."""
+    named = ", ".join(request.tasks)
+    measured = any(context_named(task.config["dataset_kwargs"]["context"]).needs_model for task in tasks)
+    if request.k_tokens is not None and not measured:
         raise UsageError(
-            f"--k-tokens {request.k_tokens}: no context of {', '.join(request.tasks)} has a size in kilo-tokens; "
+            f"--k-tokens {request.k_tokens}: no context of {named} has a size in kilo-tokens; "
             "leave it out, or ask nieh_haystack or nieh_truncate_head"
+        )
+    retrieves = any(task.work is not None and "retriever" in task.work.sources for task in tasks)
+    if (request.retriever or request.retriever_revision) and not retrieves:
+        raise UsageError(
+            f"--retriever: no context of {named} retrieves frames; "
+            "leave it out, or ask nieh_clip_retrieval or nieh_memory_frames"
         )
 
 
@@ -242,6 +254,7 @@ def _task_identity(task: TaskPlan) -> dict[str, Any]:
         "config": dict(task.config),
         "data": work.data.fingerprint,
         "simulator": work.data.simulator,
+        "sources": work.sources,
         "n_cases": len(work.cases),
         "left_out": left_out,
     }

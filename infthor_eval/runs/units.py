@@ -8,6 +8,8 @@ from typing import Any
 
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.question import Question
+from infthor_eval.nieh.contexts import Part
+from infthor_eval.nieh.notes import Notes
 from infthor_eval.runs.identity import fingerprint
 
 __all__ = ["Unit", "by_shared_context"]
@@ -21,7 +23,7 @@ class Unit:
         task: the lm-eval task that asks.
         question: the question with its gold answers.
         variant: which of the task's ways of asking this is; empty where there is one.
-        context: what the model is shown before the question's text.
+        context: what the model is shown before the question's text; notes in it are taken before the unit is asked.
         text: the text with the question.
         decoding: lm-eval's generation settings (`max_gen_toks`, `until`, ...).
     """
@@ -29,9 +31,22 @@ class Unit:
     task: str
     question: Question
     variant: str
-    context: tuple[str | FrameRef, ...]
+    context: tuple[Part, ...]
     text: str
     decoding: Mapping[str, Any]
+
+    @property
+    def key(self) -> tuple[str, str, str]:
+        """Which unit of the run this is."""
+        return self.task, self.question.id, self.variant
+
+    @property
+    def shown(self) -> tuple[str | FrameRef, ...]:
+        """The context as the model is shown it, once its notes are taken."""
+        shown = tuple(part for part in self.context if not isinstance(part, Notes))
+        if len(shown) < len(self.context):
+            raise ValueError("the context holds notes that are not taken yet")
+        return shown
 
     @cached_property
     def fingerprint(self) -> str:
@@ -42,7 +57,7 @@ class Unit:
         """
         return fingerprint(
             {
-                "context": [[part.digest] if isinstance(part, FrameRef) else part for part in self.context],
+                "context": [[part.digest] if isinstance(part, FrameRef) else part for part in self.shown],
                 "text": self.text,
                 "answers": list(self.question.answers),
                 "decoding": dict(self.decoding),
@@ -66,4 +81,10 @@ def by_shared_context(units: Iterable[Unit]) -> list[list[Unit]]:
 
 
 def _names(unit: Unit) -> list[str]:
-    return [part.path.name if isinstance(part, FrameRef) else part for part in unit.context]
+    return [name for part in unit.context for name in _names_in(part)]
+
+
+def _names_in(part: Part) -> list[str]:
+    if isinstance(part, Notes):
+        return [f"notes of {part.taking}", *(frame.path.name for frame in part.frames)]
+    return [part.path.name if isinstance(part, FrameRef) else part]

@@ -27,7 +27,17 @@ from model_adapters.engine.loaded import Loaded
 from model_adapters.engine.options import CheckpointOptions, EngineOptions
 from model_adapters.engine.rope import apply_rope
 
-__all__ = ["Source", "assemble", "load_checkpoint", "loading", "locate", "resolve_device", "resolve_dtype"]
+__all__ = [
+    "Source",
+    "assemble",
+    "load_checkpoint",
+    "loading",
+    "locate",
+    "origin",
+    "resolve_device",
+    "resolve_dtype",
+    "versions",
+]
 
 _FINGERPRINTED = {".bin", ".jinja", ".json", ".model", ".safetensors", ".txt"}
 
@@ -89,7 +99,7 @@ def load_checkpoint(source: Source, family: MakeFamily) -> Loaded:
         template=template,
         family=family(model, image_processor, tokenizer),
         max_tokens=max_tokens,
-        origin=_origin(source),
+        origin=origin(source.folder, source.commit, options.pretrained),
     )
 
 
@@ -126,12 +136,7 @@ def assemble(
         "rope": getattr(model.config.get_text_config(), "rope_parameters", None),
         "image_processor": json.loads(image_processor.to_json_string()),
         "chat_template": _digest(template.encode()),
-        "versions": {
-            "torch": torch.__version__,
-            "transformers": transformers.__version__,
-            "tokenizers": tokenizers.__version__,
-            "pillow": PIL.__version__,
-        },
+        "versions": versions(),
     }
     return Loaded(
         model=model.eval(),
@@ -142,6 +147,30 @@ def assemble(
         max_tokens=max_tokens,
         identity=identity,
     )
+
+
+def origin(folder: Path, commit: str | None, pretrained: str) -> dict[str, Any]:
+    """Where weights come from, for an identity.
+
+    Args:
+        folder: where the checkpoint lies.
+        commit: of the hub's repository; None for a folder of the user's.
+        pretrained: what was asked for.
+    """
+    if commit is not None:
+        return {"checkpoint": pretrained, "revision": commit}
+    # The folder's name, not its place: a checkpoint that was moved is the same checkpoint.
+    return {"checkpoint": folder.resolve().name, "fingerprint": _fingerprint(folder)}
+
+
+def versions() -> dict[str, str]:
+    """Versions of the libraries that numbers hang on, for an identity."""
+    return {
+        "torch": torch.__version__,
+        "transformers": transformers.__version__,
+        "tokenizers": tokenizers.__version__,
+        "pillow": PIL.__version__,
+    }
 
 
 def resolve_device(options: EngineOptions) -> torch.device:
@@ -234,13 +263,6 @@ def _chat_template(folder: Path, tokenizer: Any) -> str:
     if not isinstance(template, str):
         raise ModelError(f"{folder} has no chat template; add a chat_template.jinja to it")
     return template
-
-
-def _origin(source: Source) -> dict[str, Any]:
-    if source.commit is not None:
-        return {"checkpoint": source.options.pretrained, "revision": source.commit}
-    # The folder's name, not its place: a checkpoint that was moved is the same checkpoint.
-    return {"checkpoint": source.folder.resolve().name, "fingerprint": _fingerprint(source.folder)}
 
 
 def _fingerprint(folder: Path) -> str:

@@ -1,5 +1,6 @@
 """From the name of a checkpoint to a folder that holds it."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from huggingface_hub import HfApi, snapshot_download
@@ -13,7 +14,9 @@ _FILES = ["*.json", "*.jinja", "*.model", "*.py", "*.safetensors", "*.txt"]
 _TIMEOUT_S = 10.0
 
 
-def fetch(pretrained: str, revision: str | None) -> tuple[Path, str | None]:
+def fetch(
+    pretrained: str, revision: str | None, *, option: str = "pretrained=", also: Sequence[str] = ()
+) -> tuple[Path, str | None]:
     """Find a checkpoint, downloading it where it is not in the hub's cache.
 
     The hub is asked once, without retries, and only for the commit; where it cannot be reached, the cache serves. So a
@@ -22,6 +25,8 @@ def fetch(pretrained: str, revision: str | None) -> tuple[Path, str | None]:
     Args:
         pretrained: a folder, or a hub id.
         revision: branch, tag or commit on the hub; the default branch where None.
+        option: how users write the option that names the checkpoint, for the message.
+        also: patterns of files that are downloaded beside the usual ones.
 
     Returns:
         The folder, and the commit it holds (None for a folder of the user's).
@@ -33,27 +38,27 @@ def fetch(pretrained: str, revision: str | None) -> tuple[Path, str | None]:
     if path.is_dir():
         return path, None
     if pretrained.startswith((".", "/", "~")) or pretrained.count("/") != 1:
-        raise ModelError(f"pretrained={pretrained}: there is no such folder, and hub ids have the form owner/name")
+        raise ModelError(f"{option}{pretrained}: there is no such folder, and hub ids have the form owner/name")
     at = f"{pretrained} at revision {revision}" if revision else pretrained
     try:
         commit = HfApi().model_info(pretrained, revision=revision, timeout=_TIMEOUT_S).sha
-        folder = Path(snapshot_download(pretrained, revision=commit, allow_patterns=_FILES))
+        folder = Path(snapshot_download(pretrained, revision=commit, allow_patterns=[*_FILES, *also]))
     except (HfHubHTTPError, HFValidationError) as error:
         raise ModelError(
             f"the hub does not give out {at} ({_first_line(error)}); check the name, or log in with `hf auth login`"
         ) from error
     except (HTTPError, OSError) as error:
-        folder = _cached(pretrained, revision, at, error)
+        folder = _cached(pretrained, revision, at, option, error)
     return folder, folder.name
 
 
-def _cached(pretrained: str, revision: str | None, at: str, reason: Exception) -> Path:
+def _cached(pretrained: str, revision: str | None, at: str, option: str, reason: Exception) -> Path:
     try:
         return Path(snapshot_download(pretrained, revision=revision, local_files_only=True))
     except LocalEntryNotFoundError as error:
         raise ModelError(
             f"{at} is not in the local cache and the hub cannot be reached ({_first_line(reason)}); download it where "
-            f"there is network with `hf download {pretrained} --local-dir DIR` and give pretrained=DIR"
+            f"there is network with `hf download {pretrained} --local-dir DIR` and give {option}DIR"
         ) from error
 
 

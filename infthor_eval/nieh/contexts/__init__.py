@@ -1,11 +1,11 @@
 """Contexts by the names that task files use."""
 
 from infthor_eval.errors import UsageError
-from infthor_eval.nieh.contexts import sequence, views
-from infthor_eval.nieh.contexts.base import Case, Context, Settings, Unfit
+from infthor_eval.nieh.contexts import memory, retrieval, sequence, video, views
+from infthor_eval.nieh.contexts.base import Case, Context, Part, Settings, Unfit
 from infthor_eval.nieh.contexts.haystack import haystack
 
-__all__ = ["CONTEXTS", "Case", "Context", "Settings", "Unfit", "context_named"]
+__all__ = ["CONTEXTS", "Case", "Context", "Part", "Settings", "Unfit", "context_named"]
 
 CONTEXTS = {
     "clues": Context(views.clues),
@@ -21,6 +21,19 @@ CONTEXTS = {
         sequence.last_state,
         intro="Answer the question given the description of the environment and the agent's state (the last image).",
         parts=sequence.state_parts,
+    ),
+    "clip_retrieval": Context(retrieval.clip_retrieval, sources=retrieval.retriever_identity),
+    "video": Context(
+        video.video,
+        intro="Answer the question given the video showing the agent's trajectory over time.",
+        frames=video.video_frames,
+        sources=video.video_identity,
+    ),
+    "memory_frames": Context(retrieval.memory_frames, sources=retrieval.retriever_identity),
+    "memory_notes": Context(
+        memory.memory_notes,
+        intro="Answer the question given your notes on the agent's views in time order and its last view (the image).",
+        parts=memory.notes_parts,
     ),
 }
 

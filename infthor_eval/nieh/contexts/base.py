@@ -8,10 +8,12 @@ from infthor_eval.errors import UsageError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question
+from infthor_eval.nieh.notes import Notes, Notetaking
+from infthor_eval.nieh.prompts import question_text
 
-__all__ = ["Case", "Context", "Settings", "Unfit", "clue_positions"]
+__all__ = ["Case", "Context", "Part", "Settings", "Unfit", "clue_positions"]
 
-Part = str | FrameRef
+Part = str | FrameRef | Notes
 
 
 @dataclass(frozen=True)
@@ -22,11 +24,13 @@ class Case:
         frames: the frames shown, as positions in the trajectory's time order.
         variant: which of the context's ways this is ("depth=0.4"); empty where there is one.
         n_cut: frames of the trajectory that are cut off because the context has a size.
+        notes: how the model takes notes on the frames, where it is shown its notes instead of them.
     """
 
     frames: tuple[int, ...]
     variant: str = ""
     n_cut: int = 0
+    notes: Notetaking | None = None
 
 
 @dataclass(frozen=True)
@@ -47,6 +51,10 @@ class Settings:
         tokens_per_frame: tokens of one frame with the model at hand, from its own processor.
         depths: where in the window the needle lies, 0 at its start.
         top_k: how many frames are retrieved.
+        retriever: CLIP model that retrieves them, a hub id or a folder.
+        retriever_revision: branch, tag or commit on the hub; the default branch where None.
+        note_window: how many frames the model reads for one note.
+        note_tokens: most tokens of one note.
         seed: for what is sampled.
     """
 
@@ -55,6 +63,10 @@ class Settings:
     tokens_per_frame: int | None = None
     depths: tuple[float, ...] = (0.0, 0.2, 0.4, 0.6, 0.8)
     top_k: int = 10
+    retriever: str = "openai/clip-vit-base-patch32"
+    retriever_revision: str | None = None
+    note_window: int = 20
+    note_tokens: int = 64
     seed: int = 0
 
     @classmethod
@@ -68,6 +80,10 @@ class Settings:
         settings = cls(**{key: value for key, value in given.items() if key in known and value is not None})
         if settings.k_tokens not in (None, 1000, 1024):
             raise UsageError(f"k_tokens is {settings.k_tokens}; a kilo-token is 1000 or 1024 tokens")
+        for name in ("top_k", "note_window", "note_tokens"):
+            value = getattr(settings, name)
+            if not isinstance(value, int) or value < 1:
+                raise UsageError(f"{name} is {value!r}; it is a whole number from 1 on")
         return settings
 
     def n_frames(self, k_tokens: int) -> int:
@@ -86,8 +102,16 @@ class Settings:
         return int(self.ctx_size * (self.k_tokens or k_tokens)) // self.tokens_per_frame
 
 
-def _frames_alone(_data: NiehSet, _question: Question, frames: Sequence[FrameRef]) -> list[Part]:
+def _frames_alone(_data: NiehSet, _question: Question, _case: Case, frames: Sequence[FrameRef]) -> list[Part]:
     return list(frames)
+
+
+def _every_frame(data: NiehSet, traj_id: str) -> Sequence[FrameRef]:
+    return data.frames(traj_id)
+
+
+def _nothing_else(_data: NiehSet, _settings: Settings) -> dict[str, Any]:
+    return {}
 
 
 @dataclass(frozen=True)
@@ -97,14 +121,28 @@ class Context:
     Attributes:
         cases: the ways in which a question is asked, or why it cannot be.
         needs_model: whether the frames depend on the model's tokens per frame.
-        intro: the published sentence that tells the model what it sees.
+        intro: the sentence that tells the model what it sees, as published where the context is.
         parts: what the model sees before that sentence, given the frames of a case.
+        frames: the frames that the positions of a case refer to.
+        sources: what the frames depend on besides the set's own fingerprint and the settings, as JSON values.
     """
 
     cases: Callable[[NiehSet, Question, Settings], list[Case | Unfit]]
     needs_model: bool = False
     intro: str = "Answer the question given the agent's views in time order."
-    parts: Callable[[NiehSet, Question, Sequence[FrameRef]], list[Part]] = field(default=_frames_alone)
+    parts: Callable[[NiehSet, Question, Case, Sequence[FrameRef]], list[Part]] = field(default=_frames_alone)
+    frames: Callable[[NiehSet, str], Sequence[FrameRef]] = field(default=_every_frame)
+    sources: Callable[[NiehSet, Settings], dict[str, Any]] = field(default=_nothing_else)
+
+    def shown(self, data: NiehSet, question: Question, case: Case) -> list[FrameRef]:
+        """The frames of a case."""
+        frames = self.frames(data, question.traj_id)
+        return [frames[position] for position in case.frames]
+
+    def request(self, data: NiehSet, question: Question, case: Case) -> list[Part]:
+        """All that a model is shown and told: the context, and last the text with the question."""
+        shown = self.parts(data, question, case, self.shown(data, question, case))
+        return [*shown, question_text(self.intro, question)]
 
 
 def clue_positions(data: NiehSet, question: Question) -> tuple[int, ...]:

@@ -39,7 +39,7 @@ def _actions_before_marks(text: str) -> list[int]:
     return done
 
 
-def interleaved_parts(data: NiehSet, question: Question, frames: Sequence[FrameRef]) -> list[Part]:
+def interleaved_parts(data: NiehSet, question: Question, _case: Case, frames: Sequence[FrameRef]) -> list[Part]:
     """The texts of traj.txt with the frames in their places."""
     texts = _sequence_text(data.folder(question.traj_id)).strip().split(_MARK)
     parts = (part for pair in zip_longest(texts, frames) for part in pair)
@@ -53,7 +53,7 @@ def last_state(data: NiehSet, question: Question, _settings: Settings) -> list[C
     return [Case((len(data.frames(question.traj_id)) - 1,))]
 
 
-def state_parts(data: NiehSet, question: Question, frames: Sequence[FrameRef]) -> list[Part]:
+def state_parts(data: NiehSet, question: Question, _case: Case, frames: Sequence[FrameRef]) -> list[Part]:
     """The text of the last state, then the last frame."""
     states = _states(data.folder(question.traj_id))
     return [states[max(states, key=int)], *frames]

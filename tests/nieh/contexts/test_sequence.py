@@ -17,8 +17,7 @@ def shown(context, root):
     (case,) = CONTEXTS[context].cases(data, QUESTION, Settings())
     if isinstance(case, Unfit):
         return case.reason
-    frames = [data.frames("t")[position] for position in case.frames]
-    parts = CONTEXTS[context].parts(data, QUESTION, frames)
+    *parts, _ = CONTEXTS[context].request(data, QUESTION, case)
     return [int(part.path.stem) if isinstance(part, FrameRef) else part for part in parts]
 
 

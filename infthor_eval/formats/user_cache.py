@@ -1,0 +1,12 @@
+"""Where things are kept for the user across runs: fetched data, frames taken from videos."""
+
+import os
+from pathlib import Path
+
+__all__ = ["user_cache"]
+
+
+def user_cache(name: str) -> Path:
+    """The folder of this name in the user's cache (`$XDG_CACHE_HOME`, else `~/.cache`); it may not exist yet."""
+    cache = os.environ.get("XDG_CACHE_HOME")
+    return (Path(cache) if cache else Path.home() / ".cache") / "infthor-eval" / name

@@ -1,0 +1,86 @@
+"""Frames of videos, as references like any other frame.
+
+A model wants single frames, some of them again and again, and a video can only be decoded from its start. So the
+frames that are sampled from it are decoded in one pass and kept in the user's cache under the video's digest.
+"""
+
+import hashlib
+import os
+import tempfile
+from pathlib import Path
+
+from PIL import Image
+
+from infthor_eval.errors import DataError
+from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.user_cache import user_cache
+
+__all__ = ["frames_per_second"]
+
+_MEND = "make it again, or take it away to show the frames instead"
+
+
+def frames_per_second(path: Path) -> tuple[FrameRef, ...]:
+    """One frame per second of a video, from its first on: the nearest to each second.
+
+    Decoded by OpenCV on the first call for a video's content; the name of the folder that the frames are in tells
+    content and decoder apart.
+
+    Raises:
+        DataError: the video cannot be decoded to its end, or its frames cannot be kept.
+    """
+    import cv2
+
+    try:
+        with path.open("rb") as file:
+            digest = hashlib.file_digest(file, lambda: hashlib.blake2b(digest_size=16)).hexdigest()
+    except OSError as error:
+        raise DataError(f"{path}: cannot be read ({error.strerror}); {_MEND}") from error
+    folder = user_cache("video_frames") / f"{digest}-1fps-opencv{cv2.__version__}"
+    if not folder.is_dir():
+        try:
+            _extract(path, folder)
+        except OSError as error:
+            raise DataError(
+                f"{folder}: cannot be written ({error.strerror}); make room, or set XDG_CACHE_HOME"
+            ) from error
+    return tuple(FrameRef(file) for file in sorted(folder.glob("*.png")))
+
+
+def _extract(path: Path, folder: Path) -> None:
+    """Decode into a folder that appears only when it is whole."""
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=folder.parent, prefix="partial-") as partial:
+        made = Path(partial) / "frames"
+        made.mkdir()
+        _decode(path, made)
+        try:
+            made.rename(folder)
+        except OSError:
+            if not folder.is_dir():  # another process was faster
+                raise
+
+
+def _decode(path: Path, folder: Path) -> None:
+    import cv2
+
+    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # FFmpeg's own words on a broken file; ours are one line
+    video = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
+    try:
+        fps, promised = video.get(cv2.CAP_PROP_FPS), int(video.get(cv2.CAP_PROP_FRAME_COUNT))
+        if not video.isOpened() or not fps > 0:
+            raise DataError(f"{path}: not a video that OpenCV can decode; {_MEND}")
+        n_frames = n_sampled = 0
+        while video.grab():
+            if n_frames >= n_sampled * fps - 0.5:
+                _save(video.retrieve()[1], folder / f"{n_sampled:09d}.png")
+                n_sampled += 1
+            n_frames += 1
+    finally:
+        video.release()
+    if not n_sampled or n_frames < promised - fps:
+        raise DataError(f"{path}: only {n_frames} of its {promised} frames can be decoded; {_MEND}")
+
+
+def _save(pixels: "cv2.typing.MatLike", path: Path) -> None:  # type: ignore[name-defined]  # noqa: F821
+    Image.fromarray(pixels[:, :, ::-1]).save(path)

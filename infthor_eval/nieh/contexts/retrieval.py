@@ -1,0 +1,67 @@
+"""Contexts that show the frames that a CLIP model finds nearest, to the question or to the agent's current view."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from infthor_eval.errors import DataError
+from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.question import Question
+from infthor_eval.nieh.contexts.base import Case, Settings, Unfit
+
+if TYPE_CHECKING:
+    from model_adapters.retrieval import Retriever
+
+__all__ = ["clip_retrieval", "memory_frames", "retriever_identity"]
+
+_DIGITS = 6  # of a similarity; what is beyond is rounding, which must not decide between equal frames
+
+
+def clip_retrieval(data: NiehSet, question: Question, settings: Settings) -> list[Case | Unfit]:
+    """The `top_k` frames most similar to the question, in time order (published under the same name, k = 10).
+
+    Of equally similar frames the earlier ones are taken; a trajectory of fewer frames is shown whole.
+    """
+    retriever = _retriever(settings)
+    try:
+        vectors = retriever.frames(data.frames(question.traj_id))
+    except DataError as error:
+        return [Unfit(str(error))]
+    return [Case(_nearest(vectors, retriever.text(question.text), settings.top_k))]
+
+
+def memory_frames(data: NiehSet, question: Question, settings: Settings) -> list[Case | Unfit]:
+    """The `top_k` earlier frames most similar to the last one, which is the agent's current view, then that one.
+
+    The paper reports such a memory with the top 20 images (long-horizon tasks). The current view is shown beside the
+    k, not counted among them.
+    """
+    try:
+        vectors = _retriever(settings).frames(data.frames(question.traj_id))
+    except DataError as error:
+        return [Unfit(str(error))]
+    return [Case((*_nearest(vectors[:-1], vectors[-1], settings.top_k), len(vectors) - 1))]
+
+
+def retriever_identity(_data: NiehSet, settings: Settings) -> dict[str, Any]:
+    """Which model retrieves: another one finds other frames."""
+    return {"retriever": _retriever(settings).identity()}
+
+
+def _retriever(settings: Settings) -> "Retriever":
+    from model_adapters.retrieval import open_retriever
+
+    return open_retriever(settings.retriever, settings.retriever_revision)
+
+
+def _nearest(vectors: np.ndarray, wanted: np.ndarray, top_k: int) -> tuple[int, ...]:
+    """Rows with the largest cosine, ascending.
+
+    Args:
+        vectors: (rows, dimensions), of length 1.
+        wanted: (dimensions,), of length 1.
+        top_k: how many.
+    """
+    similarity = np.round(vectors.astype(np.float64) @ wanted.astype(np.float64), _DIGITS)
+    order = np.argsort(-similarity, kind="stable")
+    return tuple(sorted(order[:top_k].tolist()))

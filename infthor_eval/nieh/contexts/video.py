@@ -1,0 +1,54 @@
+"""The trajectory as a video."""
+
+import hashlib
+from collections.abc import Sequence
+from typing import Any
+
+from infthor_eval.errors import DataError
+from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.question import Question
+from infthor_eval.nieh.contexts.base import Case, Settings, Unfit
+
+__all__ = ["video", "video_frames", "video_identity"]
+
+
+def video(data: NiehSet, question: Question, _settings: Settings) -> list[Case | Unfit]:
+    """The trajectory's mp4 at one frame per second, or every frame where it has none (published: `video`).
+
+    Models are given the frames as images, also those that have an input for videos of their own, so that all of them
+    answer from the same frames. The variant says which it was, for the two must not be mixed up in a result.
+    """
+    try:
+        frames = video_frames(data, question.traj_id)
+    except DataError as error:
+        return [Unfit(str(error), "source=mp4")]
+    is_video = data.video(question.traj_id) is not None
+    return [Case(tuple(range(len(frames))), "source=mp4" if is_video else "source=frames")]
+
+
+def video_frames(data: NiehSet, traj_id: str) -> Sequence[FrameRef]:
+    """The frames that are shown.
+
+    Raises:
+        DataError: the trajectory has a video that cannot be decoded.
+    """
+    path = data.video(traj_id)
+    return data.frames(traj_id) if path is None else data.video_frames(traj_id)
+
+
+def video_identity(data: NiehSet, _settings: Settings) -> dict[str, Any]:
+    """Hash of the videos and how they are decoded: the set's own fingerprint knows nothing of videos."""
+    digest = hashlib.blake2b(digest_size=16)
+    for traj_id in sorted({question.traj_id for question in data.questions}):
+        if data.video(traj_id) is not None:
+            digest.update(f"{traj_id}:{_name(data, traj_id)}\n".encode())
+    return {"videos": digest.hexdigest()}
+
+
+def _name(data: NiehSet, traj_id: str) -> str:
+    """What tells a video's sampled frames from others."""
+    try:
+        return data.video_frames(traj_id)[0].path.parent.name
+    except DataError:
+        return "broken"  # its questions are left out, with the reason
