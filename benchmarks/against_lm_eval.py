@@ -16,15 +16,11 @@ import tempfile
 import time
 from pathlib import Path
 
-import numpy as np
-from PIL import Image
+from noise_set import write_set
 
 from infthor_eval.formats.packaged import packaged_folder
-from infthor_eval.formats.qa_csv import write_questions
-from infthor_eval.formats.question import Question
 from model_adapters.tiny.qwen2_5_vl import save_tiny_checkpoint
 
-OBJECTS = ("mug", "plate", "apple", "pillow", "laptop", "candle", "bowl", "book")
 SHIM = Path(__file__).parents[1] / "tests" / "peers"
 PEERS = Path(sys.prefix) / "test-peers"
 
@@ -48,23 +44,6 @@ def main() -> None:
     print(f"lm-eval hf-multimodal   {theirs:8.1f} s")
     print(f"factor                  {theirs / ours:8.1f}")
     print(f"replies equal           {equal} of {len(their_replies)}")
-
-
-def write_set(root: Path, n_frames: int, n_questions: int) -> None:
-    """An NIEH set of one trajectory of coarse coloured noise."""
-    draw = np.random.default_rng(0)
-    images = root / "metadata" / "t" / "img"
-    images.mkdir(parents=True)
-    for index in range(n_frames):
-        coarse = draw.integers(0, 256, (10, 10, 3), dtype=np.uint8)
-        Image.fromarray(coarse).resize((300, 300), Image.Resampling.BICUBIC).save(images / f"{index:09d}.png")
-    entries = [{"img_idx": i, "img_filename": f"{i:09d}.png", "step": i, "object_log": {}} for i in range(n_frames)]
-    (root / "metadata" / "t" / "metadata.json").write_text(json.dumps(entries))
-    asked = [
-        Question("t", f"Did you see {i} {OBJECTS[i % 8]}s?", (i % n_frames,), ("yes",), "object_presence")
-        for i in range(n_questions)
-    ]
-    write_questions(root / "qa_set.csv", asked)
 
 
 def run_ours(folder: Path) -> float:

@@ -23,9 +23,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import torch
-from PIL import Image
+from noise_set import question_texts, write_frames
 from transformers import DynamicCache, Qwen2_5_VLConfig
 
 from infthor_eval.errors import ModelError
@@ -38,9 +37,6 @@ PROMPT = (
     "\nAnswer the question given the agent's views in time order. Do not include explanation or reasoning in the "
     "answer. Answer with a single word or words.\nQuestion: "
 )
-OBJECTS = ("mug", "plate", "apple", "pillow", "laptop", "candle", "bowl", "book")
-
-
 Replies = list[tuple[int, ...]]
 Timed = tuple[float, Replies]
 
@@ -49,9 +45,9 @@ def main() -> None:
     """Run the four ways and print seconds, factors and whether the replies are equal."""
     options = _arguments()
     torch.set_num_threads(options.threads)
-    questions = [f"Did you see {number} {OBJECTS[number % 8]}s?" for number in range(options.questions)]
+    questions = question_texts(options.questions)
     with tempfile.TemporaryDirectory() as folder:
-        frames = synthetic_trajectory(Path(folder), options.frames, options.seed)
+        frames = [FrameRef(path) for path in write_frames(Path(folder), options.frames, options.seed)]
         sharing = build(options)
         not_sharing = TransformersModel("plain", sharing._loaded, replace(sharing._options, share_prefix=False))
         conversation(sharing, frames[:1], questions[:1], 2)  # imports, threads and kernels warm up here
@@ -160,18 +156,6 @@ def report(measured: dict[str, list[Timed]], options: argparse.Namespace) -> Non
     print(f"plain / shared   {best['plain'] / best['shared']:6.2f}")
     print(f"shared / floor   {best['shared'] / best['floor']:6.2f}")
     print(f"replies equal    {'yes' if all(reply == replies[0] for reply in replies) else 'NO'}")
-
-
-def synthetic_trajectory(folder: Path, n_frames: int, seed: int) -> list[FrameRef]:
-    """Frames of 300x300 with coarse coloured noise, all different."""
-    draw = np.random.default_rng(seed)
-    refs = []
-    for index in range(n_frames):
-        path = folder / f"{index:09d}.png"
-        coarse = draw.integers(0, 256, (10, 10, 3), dtype=np.uint8)
-        Image.fromarray(coarse).resize((300, 300), Image.Resampling.BICUBIC).save(path)
-        refs.append(FrameRef(path))
-    return refs
 
 
 def conversation(model: Any, frames: Sequence[FrameRef], questions: Sequence[str], new_tokens: int) -> Replies:

@@ -1,0 +1,85 @@
+"""Memory that a run takes beside its model, for a trajectory of thousands of frames.
+
+A whole run in one process: an NIEH set of noise frames, `nieh_full`, lm-eval, the journal, and the engine with a
+Qwen2.5-VL that has a vision tower and no language layer. Every frame is decoded, cut into patches and embedded, and
+every prompt is laid out token by token, as for a real model; attention, keys and values, which are the model's own
+affair, cost nothing. A run on three frames comes first: what the process holds after it, everything imported and a
+model loaded and used, is what the peak of the second run is compared with. Linux only (VmHWM).
+
+    python benchmarks/data_path_memory.py [--frames 2300] [--questions 24]
+"""
+
+import argparse
+import gc
+import tempfile
+import time
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import torch
+from noise_set import write_set
+
+from infthor_eval.runs import RunRequest, UnitRecord, execute, plan
+from model_adapters.tiny.qwen2_5_vl import Qwen25VLTiny
+
+PROCESS = Path("/proc/self")
+
+
+def main() -> None:
+    """Run twice and print tokens, seconds and memory."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--frames", type=int, default=2300)
+    parser.add_argument("--questions", type=int, default=24)
+    chosen = parser.parse_args()
+    torch.set_num_threads(1)
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        replace(Qwen25VLTiny.twin, config=_without_layers).save(folder / "checkpoint", seed=0)
+        write_set(folder / "small", 3, 2)
+        write_set(folder / "large", chosen.frames, chosen.questions)
+        answer(folder, "small")
+        gc.collect()
+        before = megabytes("VmRSS")
+        (PROCESS / "clear_refs").write_text("5")  # the peak counts from here on
+        began = time.perf_counter()
+        records = answer(folder, "large")
+        seconds = time.perf_counter() - began
+        peak = megabytes("VmHWM")
+    print(f"{chosen.frames} frames, {chosen.questions} questions of {records[0].n_context_tokens:,} tokens, nieh_full")
+    print(f"run             {seconds:8.1f} s")
+    print(f"process before  {before:8.0f} MB")
+    print(f"peak            {peak:8.0f} MB")
+    print(f"growth          {peak - before:8.0f} MB")
+
+
+def _without_layers(ids: Mapping[str, int], vocab_size: int) -> Any:
+    config = Qwen25VLTiny.twin.config(ids, vocab_size)
+    config.text_config.num_hidden_layers, config.text_config.layer_types = 0, []
+    return config
+
+
+def answer(folder: Path, data: str) -> list[UnitRecord]:
+    """The records of a run on one of the sets.
+
+    Raises:
+        RuntimeError: a question failed, so that the numbers would be those of something else.
+    """
+    options = {"pretrained": str(folder / "checkpoint"), "device": "cpu", "max_tokens": "0"}
+    request = RunRequest("qwen2.5-vl", ("nieh_full",), folder / "out", folder / data, options)
+    records = execute(plan(request), lambda *_: lambda *_: None).records
+    failures = [record.failure for record in records if record.failure]
+    if failures:
+        raise RuntimeError(failures[0])
+    return records
+
+
+def megabytes(field: str) -> float:
+    """A field of the process's status in MB (10^6 bytes)."""
+    line = next(line for line in (PROCESS / "status").read_text().splitlines() if line.startswith(f"{field}:"))
+    return int(line.split()[1]) * 1024 / 1e6
+
+
+if __name__ == "__main__":
+    main()
