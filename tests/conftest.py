@@ -50,3 +50,55 @@ def make_nieh_set(tmp_path: Path) -> Callable[..., Path]:
         return root
 
     return make
+
+
+@pytest.fixture(scope="session")
+def make_clip(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
+    """Writes a tiny CLIP checkpoint with random weights and returns its folder."""
+
+    def make(seed: int = 0) -> Path:
+        import torch
+        from tokenizers.processors import TemplateProcessing
+        from transformers import CLIPConfig, CLIPModel
+        from transformers.models.clip.image_processing_pil_clip import CLIPImageProcessorPil
+
+        from model_adapters.tiny.tokenizer import train_tokenizer
+
+        folder = tmp_path_factory.mktemp("clip")
+        begin, end = "<|startoftext|>", "<|endoftext|>"
+        tokenizer = train_tokenizer([begin, end], begin=begin, end=end, pad=end, named={}, n_merged=300)
+        tokenizer.backend_tokenizer.post_processor = TemplateProcessing(
+            single=f"{begin} $A {end}", special_tokens=[(begin, 300), (end, 301)]
+        )
+        tokenizer.save_pretrained(folder)
+        CLIPImageProcessorPil(size={"shortest_edge": 32}, crop_size=32).save_pretrained(folder)
+        tower = {"hidden_size": 32, "intermediate_size": 64, "num_hidden_layers": 2, "num_attention_heads": 2}
+        ids = {"bos_token_id": 300, "eos_token_id": 301, "pad_token_id": 301, "max_position_embeddings": 77}
+        config = CLIPConfig(
+            text_config={**tower, **ids, "vocab_size": len(tokenizer)},
+            vision_config={**tower, "image_size": 32, "patch_size": 8},
+            projection_dim=16,
+            initializer_factor=20.0,  # so that similarities of different frames differ
+        )
+        with torch.random.fork_rng(devices=[]):
+            torch.manual_seed(seed)
+            CLIPModel(config).save_pretrained(folder)
+        return folder
+
+    return make
+
+
+@pytest.fixture
+def write_video() -> Callable[..., None]:
+    """Writes an mp4 of plain frames, each of the given grey level (0 to 255)."""
+
+    def write(path: Path, greys: Sequence[int], fps: float = 10.0, size: int = 64) -> None:
+        import cv2
+        import numpy as np
+
+        video = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"mp4v"), fps, (size, size))
+        for grey in greys:
+            video.write(np.full((size, size, 3), grey, np.uint8))
+        video.release()
+
+    return write

@@ -17,6 +17,10 @@ from infthor_eval.formats.user_cache import user_cache
 
 __all__ = ["frames_per_second"]
 
+# FFmpeg would say on standard error what is wrong with a video, in lines of its own; ours says it in one. OpenCV reads
+# the level when it first uses FFmpeg, so it is set before anything here can.
+os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
+
 _MEND = "make it again, or take it away to show the frames instead"
 
 
@@ -64,8 +68,7 @@ def _extract(path: Path, folder: Path) -> None:
 def _decode(path: Path, folder: Path) -> None:
     import cv2
 
-    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # FFmpeg's own words on a broken file; ours are one line
-    video = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
+    video = cv2.VideoCapture(str(path))
     try:
         fps, promised = video.get(cv2.CAP_PROP_FPS), int(video.get(cv2.CAP_PROP_FRAME_COUNT))
         if not video.isOpened() or not fps > 0:

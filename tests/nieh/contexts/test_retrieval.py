@@ -1,0 +1,165 @@
+import shutil
+
+import numpy as np
+import pytest
+import torch
+from PIL import Image
+from transformers import AutoImageProcessor, AutoTokenizer, CLIPModel
+
+from infthor_eval.errors import UsageError
+from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.question import Question
+from infthor_eval.nieh.contexts import CONTEXTS, Settings, Unfit
+
+TEXTS = ("Is there a mug?", "Where was the plate?", "What did you put on the table?")
+QUESTIONS = [Question("t", text, (1,), ("yes",)) for text in TEXTS]
+
+
+@pytest.fixture(scope="module")
+def clip(make_clip):
+    return make_clip()
+
+
+@pytest.fixture
+def noise(make_nieh_set):
+    """A set of one trajectory whose frames are noise, each another."""
+
+    def make(n_frames):
+        root = make_nieh_set(QUESTIONS, n_frames=n_frames, size=8)
+        draw = np.random.default_rng(0)
+        for path in sorted((root / "metadata" / "t" / "img").iterdir()):
+            Image.fromarray(draw.integers(0, 256, (8, 8, 3), dtype=np.uint8)).resize((40, 40)).save(path)
+        return root
+
+    return make
+
+
+def shown(context, root, question=QUESTIONS[0], **settings):
+    (case,) = CONTEXTS[context].cases(NiehSet(root), question, Settings(**settings))
+    return case if isinstance(case, Unfit) else list(case.frames)
+
+
+@torch.inference_mode()
+def similarities(clip, root):
+    """Cosines of (texts, frames) and (frames, frames), by transformers alone, all frames in one batch."""
+    model = CLIPModel.from_pretrained(clip)
+    images = [Image.open(path).convert("RGB") for path in sorted((root / "metadata" / "t" / "img").iterdir())]
+    pixels = AutoImageProcessor.from_pretrained(clip, backend="pil")(images=images, return_tensors="pt")
+    texts = AutoTokenizer.from_pretrained(clip)(list(TEXTS), padding=True, return_tensors="pt")
+    found = model(**pixels, **texts)
+    between = found.image_embeds @ found.image_embeds.T
+    return (found.logits_per_text / model.logit_scale.exp()).numpy(), between.numpy()
+
+
+def largest(row, k):
+    ranked = sorted(range(len(row)), key=lambda position: -row[position])
+    gap = row[ranked[k - 1]] - row[ranked[k]]
+    assert gap > 1e-5, "a tie would make the expectation arbitrary"
+    return sorted(ranked[:k])
+
+
+def test_the_frames_nearest_to_each_question_are_those_of_plain_transformers(noise, clip):
+    root = noise(40)
+    to_texts, _ = similarities(clip, root)
+    found = [shown("clip_retrieval", root, question, retriever=str(clip)) for question in QUESTIONS]
+    assert found == [largest(row, 10) for row in to_texts]
+    assert len({tuple(frames) for frames in found}) == len(QUESTIONS)
+    assert shown("clip_retrieval", root, retriever=str(clip), top_k=3) == largest(to_texts[0], 3)
+
+
+def test_memory_frames_are_those_nearest_to_the_last_view_which_comes_after_them(noise, clip):
+    root = noise(40)
+    _, between = similarities(clip, root)
+    assert shown("memory_frames", root, retriever=str(clip), top_k=20) == [*largest(between[-1, :-1], 20), 39]
+
+
+def test_a_short_trajectory_is_shown_whole(noise, clip):
+    root = noise(4)
+    assert shown("clip_retrieval", root, retriever=str(clip)) == [0, 1, 2, 3]
+    assert shown("memory_frames", root, retriever=str(clip)) == [0, 1, 2, 3]
+    assert shown("memory_frames", root, retriever=str(clip), top_k=2)[-1] == 3
+
+
+def test_of_equal_frames_the_earlier_are_taken(noise, clip):
+    root = noise(40)
+    images = sorted((root / "metadata" / "t" / "img").iterdir())
+    for path in images[1:]:
+        shutil.copy(images[0], path)
+    assert shown("clip_retrieval", root, retriever=str(clip), top_k=5) == [0, 1, 2, 3, 4]
+    assert shown("memory_frames", root, retriever=str(clip), top_k=3) == [0, 1, 2, 39]
+
+
+def test_each_frame_is_decoded_once_and_few_at_a_time(noise, make_clip, monkeypatch):
+    root, clip = noise(70), make_clip(seed=3)
+    loaded, load = [], FrameRef.load
+    monkeypatch.setattr(FrameRef, "load", lambda frame: loaded.append(frame.path.name) or load(frame))
+    batches, features = [], CLIPModel.get_image_features
+
+    def counted(model, **inputs):
+        batches.append(len(inputs["pixel_values"]))
+        return features(model, **inputs)
+
+    monkeypatch.setattr(CLIPModel, "get_image_features", counted)
+    for question in QUESTIONS:
+        first = shown("clip_retrieval", root, question, retriever=str(clip))
+        assert shown("clip_retrieval", root, question, retriever=str(clip)) == first
+        shown("memory_frames", root, question, retriever=str(clip))
+    assert loaded == [f"{index:09d}.png" for index in range(70)]
+    assert batches == [32, 32, 6]
+
+
+def test_a_frame_that_cannot_be_decoded_leaves_the_question_out(noise, clip):
+    root = noise(12)
+    broken = root / "metadata" / "t" / "img" / "000000007.png"
+    broken.write_bytes(broken.read_bytes()[:60])
+    for context in ("clip_retrieval", "memory_frames"):
+        assert f"{broken}: not a readable image" in shown(context, root, retriever=str(clip)).reason
+
+
+def test_a_question_beyond_clips_limit_is_cut(noise, clip):
+    question = Question("t", "Is there a mug on the table? " * 40, (1,), ("yes",))
+    assert len(shown("clip_retrieval", noise(12), question, retriever=str(clip))) == 10
+
+
+def test_the_identity_tells_weights_apart_and_not_places(noise, make_clip, clip, tmp_path):
+    data = NiehSet(noise(4))
+
+    def identity(folder):
+        return CONTEXTS["clip_retrieval"].sources(data, Settings(retriever=str(folder)))["retriever"]
+
+    moved = tmp_path / "elsewhere" / clip.name
+    shutil.copytree(clip, moved)
+    assert identity(clip) == identity(moved)
+    assert identity(clip)["fingerprint"] != identity(make_clip(seed=1))["fingerprint"]
+    assert CONTEXTS["trajectory"].sources(data, Settings()) == {}
+
+
+def test_a_retriever_that_cannot_be_had_says_what_to_do(noise, clip, tmp_path, monkeypatch):
+    root = noise(4)
+    monkeypatch.setattr("huggingface_hub.constants.HF_HUB_OFFLINE", True)
+    monkeypatch.setattr("huggingface_hub.constants.HF_HUB_CACHE", str(tmp_path / "hub"))
+    with pytest.raises(UsageError, match=r"not in the local cache .* `hf download .*` and give --retriever DIR"):
+        shown("clip_retrieval", root)
+    with pytest.raises(UsageError, match=r"--retriever \./nowhere: there is no such folder"):
+        shown("clip_retrieval", root, retriever="./nowhere")
+    half = tmp_path / "half"
+    shutil.copytree(clip, half)
+    (half / "model.safetensors").write_bytes(b"no weights")
+    with pytest.raises(UsageError, match="half cannot be loaded"):
+        shown("clip_retrieval", root, retriever=str(half))
+
+
+def test_a_checkpoint_of_another_kind_is_refused(noise, tmp_path):
+    from model_adapters.tiny.qwen2_5_vl import save_tiny_checkpoint
+
+    save_tiny_checkpoint(tmp_path / "qwen", seed=0)
+    with pytest.raises(UsageError, match="is a qwen2_5_vl checkpoint; retrieval takes one of CLIP"):
+        shown("clip_retrieval", noise(4), retriever=str(tmp_path / "qwen"))
+
+
+def test_so_many_frames_cannot_be():
+    for name in ("top_k", "note_window", "note_tokens"):
+        for value in (0, -1, 2.5, "ten"):
+            with pytest.raises(UsageError, match=f"{name} is .*whole number"):
+                Settings.read({name: value})
