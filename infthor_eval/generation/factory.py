@@ -30,6 +30,7 @@ from infthor_eval.generation.recorder import object_log
 from infthor_eval.generation.rollout import Rollout, RolloutError
 from infthor_eval.generation.sampling import TaskPool, tasks_of
 from infthor_eval.generation.scout import reachable
+from infthor_eval.generation.setbacks import Setbacks
 from infthor_eval.generation.symbolic import Operator, Room, room_of
 from infthor_eval.generation.tasks import Task, TaskType, sub_task
 from infthor_eval.thor.restore import restore
@@ -132,6 +133,7 @@ class _Factory:
         self._simulator = simulator
         self._rng = random.Random(f"{settings.scene}/{settings.seed}")
         self._pool = TaskPool(settings.kinds, self._rng)
+        self._setbacks = Setbacks()
         self._low: list[LowAction] = []
         self._high: list[HighAction] = []
         self._log: list[dict[str, Any]] = []
@@ -190,11 +192,16 @@ class _Factory:
 
     def _first_that_works(self, allowed: Callable[[Task], bool], trials: int | None) -> Task | None:
         """Try sampled tasks until one becomes part of the trajectory; None where none does."""
+        task = self._try_sampled(allowed, trials)
+        if task is None and self._setbacks:
+            self._setbacks.forget()  # before giving up: they may be outdated
+            task = self._try_sampled(allowed, trials)
+        return task
+
+    def _try_sampled(self, allowed: Callable[[Task], bool], trials: int | None) -> Task | None:
         view = self._simulator.view
         kinds = {item.object_type for item in view.objects.values()}
-        blocked: set[str] = set()  # what turned out to be out of reach, as things are
-        refused: set[tuple[str, str]] = set()  # what turned out to find no room in what
-        room = room_of(view)
+        room = self._setbacks.room(view)
         possible = set(tasks_of(room, kinds))
         tried = 0
         for task in self._pool.sample(room, kinds):
@@ -207,11 +214,9 @@ class _Factory:
             failure = self._try(task, room, operators)
             if failure is None:
                 return task
-            if failure.item is not None and failure.receptacle is not None:
-                refused.add((failure.item, failure.receptacle))
-            elif failure.item is not None:
-                blocked.add(failure.item)
-            room = room_of(view, blocked, refused)
+            if failure.item is not None:
+                self._setbacks.note(view, failure.item, failure.receptacle)
+            room = self._setbacks.room(view)
             possible = set(tasks_of(room, kinds))
         return None
 
@@ -259,6 +264,7 @@ class _Factory:
             return failure
         self.statistics.accepted[name] += 1
         self._pool.used(task)
+        self._setbacks.task_done()
         self.problems.append(problem(task, room, f"task-{len(self.problems):03d}"))
         described = sub_task(task, self._settings.scene)
         self._sub_trajs.append(

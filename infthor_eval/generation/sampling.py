@@ -22,7 +22,7 @@ __all__ = ["TaskPool", "tasks_of"]
 
 _TREATED = {TaskType.CLEAN: CLEANABLE, TaskType.HEAT: HEATABLE, TaskType.COOL: COOLABLE}
 _APPLIANCES = {TaskType.CLEAN: {"SinkBasin", "Faucet"}, TaskType.HEAT: {"Microwave"}, TaskType.COOL: {"Fridge"}}
-_HOPELESS = 100  # failures after which a task is as unlikely as it gets: a weight must not become 0
+_DOUBTED = 3  # failures that count: rooms change, and tasks that never failed must not crowd out the others
 _LIGHT_LOADS = {"Pan", "Pot", "Plate", "Bowl", "Cup", "Mug", "Laptop", "Box", "Pillow"}  # too big to be stacked
 
 
@@ -50,10 +50,11 @@ class TaskPool:
         """
         kinds = set(self._kinds)
         found = [task for task in tasks_of(room, extra_types) if task.kind in kinds]
-        # Efraimidis and Spirakis: sorting by u ** (1 / weight) is weighted sampling without replacement.
+        # Efraimidis and Spirakis: sorting by u ** (1 / weight) is weighted sampling without replacement. In its
+        # logarithm, as the power itself is 0 for all tasks alike once weights are small.
         share = Counter(task.kind for task in found)
-        keys = {task: self._rng.random() ** (share[task.kind] / self._weight(task)) for task in found}
-        yield from sorted(found, key=lambda task: keys[task], reverse=True)
+        waits = {task: self._rng.expovariate(self._weight(task) / share[task.kind]) for task in found}
+        yield from sorted(found, key=lambda task: waits[task])
 
     def used(self, task: Task) -> None:
         """Note that a task became part of the trajectory."""
@@ -64,7 +65,7 @@ class TaskPool:
         self._failed[task] += 1
 
     def _weight(self, task: Task) -> float:
-        weight = 0.25 ** min(self._failed[task], _HOPELESS)
+        weight = 0.5 ** min(self._failed[task], _DOUBTED)
         for aspect in _aspects(task):
             weight /= 1 + self._used[aspect]
         return weight
@@ -111,4 +112,4 @@ def _placements(
 def _aspects(task: Task) -> list[str]:
     """What of a task shall not recur too often."""
     receptacle = task.receptacle or task.light
-    return [f"kind {task.kind} {task.sliced}", f"pickup {task.pickup}", f"to {receptacle}"]
+    return [f"kind {task.kind} {task.sliced}", f"pickup {task.pickup}", f"to {receptacle}", str(task)]

@@ -52,11 +52,29 @@ def test_descriptions():
     assert words(stack) == "put a plate with an apple on it on the counter top"
 
 
-def test_a_task_that_failed_a_thousand_times_does_not_stop_the_others():
+def test_the_choice_stays_diverse_however_long_the_trajectory():
     pool = TaskPool(TaskType, random.Random(0))
-    first = next(pool.sample(ROOM))
-    for _ in range(1000):
-        pool.failed(first)
-    order = list(pool.sample(ROOM))
-    assert order[-1] == first
-    assert len(order) > 1
+    chosen = []
+    for _ in range(3000):
+        task = next(pool.sample(ROOM, {"Faucet"}))
+        pool.used(task)
+        chosen.append(task)
+    late = Counter(chosen[-300:])
+    assert {task.kind for task in late} == set(TaskType)
+    assert max(late.values()) <= 30
+    assert len(late) > 60
+
+
+def test_a_task_that_failed_comes_later_but_is_not_given_up():
+    failing = next(TaskPool(TaskType, random.Random(0)).sample(ROOM))
+
+    def mean_rank(failures):
+        ranks = []
+        for seed in range(60):
+            pool = TaskPool(TaskType, random.Random(seed))
+            for _ in range(failures):
+                pool.failed(failing)
+            ranks.append(list(pool.sample(ROOM)).index(failing))
+        return sum(ranks) / len(ranks)
+
+    assert mean_rank(0) < mean_rank(1) < mean_rank(3) == mean_rank(1000) < len(list(tasks_of(ROOM))) - 1

@@ -1,0 +1,73 @@
+"""What turned out not to work in a room, so that it is not tried again while things are as they were."""
+
+from infthor_eval.generation.symbolic import Room, direct_parent, room_of
+from infthor_eval.thor.view import View
+
+__all__ = ["Setbacks"]
+
+_BELIEVED = 8  # tasks that a setback is believed for: other things move too and may clear the way
+_NEAR = 0.02  # metres within which an object has not moved
+
+
+class Setbacks:
+    """Objects out of reach, and receptacles without room for an object."""
+
+    def __init__(self) -> None:
+        self._tasks = 0
+        self._blocked: dict[str, tuple[int, tuple[float, float, float]]] = {}
+        self._refused: dict[tuple[str, str], tuple[int, frozenset[str]]] = {}
+
+    def __bool__(self) -> bool:
+        return bool(self._blocked or self._refused)
+
+    def note(self, view: View, item: str, receptacle: str | None) -> None:
+        """Remember that an object cannot be acted on, or finds no room in a receptacle, as things are.
+
+        Args:
+            view: as things are.
+            item: the object.
+            receptacle: where it was to go; None where the object itself is out of reach.
+        """
+        if receptacle is not None:
+            self._refused[item, receptacle] = self._tasks, _contents(view, receptacle)
+        elif item in view.objects:
+            self._blocked[item] = self._tasks, _position(view, item)
+
+    def task_done(self) -> None:
+        """One more task changed the room."""
+        self._tasks += 1
+
+    def forget(self) -> None:
+        """Believe that everything may work again."""
+        self._blocked.clear()
+        self._refused.clear()
+
+    def room(self, view: View) -> Room:
+        """The room without what is not believed to work."""
+        oldest = self._tasks - _BELIEVED
+        self._blocked = {
+            item: (since, position)
+            for item, (since, position) in self._blocked.items()
+            if since > oldest and item in view.objects and _is_near(position, _position(view, item))
+        }
+        # A receptacle that has lost something may have room now.
+        self._refused = {
+            pair: (since, contents)
+            for pair, (since, contents) in self._refused.items()
+            if since > oldest and contents <= _contents(view, pair[1])
+        }
+        return room_of(view, self._blocked.keys(), self._refused.keys())
+
+
+def _position(view: View, item: str) -> tuple[float, float, float]:
+    at = view.objects[item].position
+    return at.x, at.y, at.z
+
+
+def _is_near(one: tuple[float, float, float], other: tuple[float, float, float]) -> bool:
+    return all(abs(a - b) <= _NEAR for a, b in zip(one, other, strict=True))
+
+
+def _contents(view: View, receptacle: str) -> frozenset[str]:
+    objects = view.objects
+    return frozenset(key for key, item in objects.items() if direct_parent(item, objects) == receptacle)
