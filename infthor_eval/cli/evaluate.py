@@ -15,7 +15,7 @@ from model_adapters import check_options
 
 __all__ = ["evaluate", "execute_with_progress"]
 
-_TABLE_WIDTH = 130  # on a narrower terminal lines wrap; cut-off numbers would be worse
+_TABLE_WIDTH = 150  # on a narrower terminal lines wrap; cut-off numbers would be worse
 _notes = Console(stderr=True, soft_wrap=True)
 _output = Console(soft_wrap=True, width=max(Console().width, _TABLE_WIDTH))
 

@@ -1,7 +1,8 @@
 """Question files: `qa_set*.csv` of an NIEH set.
 
 Columns `traj_id`, `question`, `gt_img_idx`, `answer`; the last two are Python-literal lists (`[12, 13]`, `['yes']`).
-`question_type` is ours and optional; other columns are left unread.
+`question_type` and `absence` (`yes` where the answer is that something is nowhere, so that the frames are a sample and
+no evidence) are ours and optional; other columns are left unread.
 """
 
 import ast
@@ -17,6 +18,7 @@ __all__ = ["read_questions", "write_questions"]
 
 _COLUMNS = ("traj_id", "question", "gt_img_idx", "answer")
 _TYPE = "question_type"
+_ABSENCE = "absence"
 
 
 def read_questions(path: Path) -> list[Question]:
@@ -43,9 +45,10 @@ def write_questions(path: Path, questions: Iterable[Question]) -> None:
     partial = path.with_name(path.name + ".partial")
     with partial.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow([*_COLUMNS, _TYPE])
+        writer.writerow([*_COLUMNS, _TYPE, _ABSENCE])
         for item in questions:
-            writer.writerow([item.traj_id, item.text, list(item.clues), list(item.answers), item.kind or ""])
+            absence = "yes" if item.absence else ""
+            writer.writerow([item.traj_id, item.text, list(item.clues), list(item.answers), item.kind or "", absence])
     partial.replace(path)
 
 
@@ -53,6 +56,9 @@ def _question(row: dict[str, str | None], place: str) -> Question:
     for name in _COLUMNS:
         if not (row[name] or "").strip():
             raise DataError(f"{place}: {name} is empty; fill it or take the row out")
+    absence = (row.get(_ABSENCE) or "").strip().lower()
+    if absence not in {"", "yes", "no"}:
+        raise DataError(f"{place}: {_ABSENCE} is {_short(absence)}; it is yes, no or empty")
     clues = _literal_list(row["gt_img_idx"], f"{place}: gt_img_idx", int)
     answers = _literal_list(row["answer"], f"{place}: answer", (str, int, float))
     return Question(
@@ -61,6 +67,7 @@ def _question(row: dict[str, str | None], place: str) -> Question:
         clues=tuple(clues),
         answers=tuple(answers),
         kind=(row.get(_TYPE) or "").strip() or None,
+        absence=absence == "yes",
     )
 
 

@@ -19,6 +19,7 @@ class Question:
         clues: frame numbers (`img_idx`) that hold the evidence, in the order of the file.
         answers: the gold answers; one, or several of which all are asked for.
         kind: the question type where the file names one (a `question_type` column), else None.
+        absence: whether the answer is that something is nowhere. No frame proves that: the clues are then a sample.
     """
 
     traj_id: str
@@ -26,6 +27,12 @@ class Question:
     clues: tuple[int, ...]
     answers: tuple[Answer, ...]
     kind: str | None = None
+    absence: bool = False
+
+    @property
+    def n_clues(self) -> int:
+        """How many frames are evidence."""
+        return 0 if self.absence else len(self.clues)
 
     @cached_property
     def id(self) -> str:

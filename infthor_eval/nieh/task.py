@@ -53,6 +53,7 @@ def dataset(pixels: bool = True, **config: Any) -> dict[str, Any]:
             "traj_id": question.traj_id,
             "question": question.text,
             "question_type": question.kind or "",
+            "absence": question.absence,
             "clues": list(question.clues),
             "answers": json.dumps(question.answers),
             "context": config["context"],
@@ -84,6 +85,7 @@ def doc_question(doc: Doc) -> Question:
         clues=tuple(doc["clues"]),
         answers=tuple(json.loads(doc["answers"])),
         kind=doc["question_type"] or None,
+        absence=doc["absence"],
     )
 
 

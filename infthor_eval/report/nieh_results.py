@@ -13,10 +13,11 @@ from infthor_eval.errors import DataError
 from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.nieh.prompts import last_line
 from infthor_eval.nieh.scoring import SCORERS, Scorer, score
-from infthor_eval.nieh.statistics import Estimate, clustered_mean
+from infthor_eval.nieh.statistics import Estimate, bootstrap_interval, clustered_mean
 from infthor_eval.runs.journal import UnitRecord
 
 __all__ = [
+    "ABSENCE",
     "CLUE_COLUMNS",
     "Accuracy",
     "PublishedRow",
@@ -28,6 +29,7 @@ __all__ = [
 ]
 
 CLUE_COLUMNS = ("1", "2", ">=3", "total")  # the columns of the paper's Table 4
+ABSENCE = "absence"  # of questions that no frame proves: apart from those with clues, and in the total
 
 
 @dataclass(frozen=True)
@@ -38,11 +40,13 @@ class Accuracy:
         n: questions asked; a failed one counts as wrong.
         n_failed: questions that the model could not answer.
         scores: mean score in [0, 1] by scorer, with its interval; empty where no question was asked.
+        bootstrap: 95 % interval over resampled trajectories by scorer; empty with fewer than two trajectories.
     """
 
     n: int
     n_failed: int
     scores: dict[Scorer, Estimate]
+    bootstrap: dict[Scorer, tuple[float, float]]
 
 
 @dataclass(frozen=True)
@@ -66,13 +70,16 @@ class PublishedTable:
 
 def clue_column(n_clues: int) -> str:
     """The column of Table 4 that a question with so many clues belongs to."""
+    if n_clues == 0:
+        return ABSENCE
     return str(n_clues) if n_clues < 3 else ">=3"
 
 
 def accuracies(records: Sequence[UnitRecord]) -> dict[str, Accuracy]:
-    """Accuracy by column of Table 4."""
-    columns = {name: [record for record in records if clue_column(record.n_clues) == name] for name in CLUE_COLUMNS}
-    return {name: _accuracy(records if name == "total" else columns[name]) for name in CLUE_COLUMNS}
+    """Accuracy by column of Table 4, and of absence questions."""
+    names = (*CLUE_COLUMNS, ABSENCE)
+    columns = {name: [record for record in records if clue_column(record.n_clues) == name] for name in names}
+    return {name: _accuracy(records if name == "total" else columns[name]) for name in names}
 
 
 def summarise(identity: dict[str, Any], records: Iterable[UnitRecord]) -> dict[str, Any]:
@@ -133,11 +140,14 @@ def _grouped(records: Sequence[UnitRecord], name_of: Callable[[UnitRecord], str]
 
 def _accuracy(records: Sequence[UnitRecord]) -> Accuracy:
     trajectories = [record.traj_id for record in records]
-    scores: dict[Scorer, Estimate] = {
-        scorer: clustered_mean([record_score(record, scorer) for record in records], trajectories)
-        for scorer in (SCORERS if records else ())
-    }
-    return Accuracy(len(records), sum(record.failure is not None for record in records), scores)
+    scores: dict[Scorer, Estimate] = {}
+    bootstrap: dict[Scorer, tuple[float, float]] = {}
+    for scorer in SCORERS if records else ():
+        found = [record_score(record, scorer) for record in records]
+        scores[scorer] = clustered_mean(found, trajectories)
+        if scores[scorer].n_clusters > 1:
+            bootstrap[scorer] = bootstrap_interval(found, trajectories)
+    return Accuracy(len(records), sum(record.failure is not None for record in records), scores, bootstrap)
 
 
 def record_score(record: UnitRecord, scorer: Scorer) -> float:
@@ -147,7 +157,14 @@ def record_score(record: UnitRecord, scorer: Scorer) -> float:
 
 def _as_json(accuracy: Accuracy) -> dict[str, Any]:
     scores: dict[str, Any] = {
-        scorer: {"mean": e.mean, "stderr": e.stderr, "low": e.low, "high": e.high, "n_trajectories": e.n_clusters}
+        scorer: {
+            "mean": e.mean,
+            "stderr": e.stderr,
+            "low": e.low,
+            "high": e.high,
+            "bootstrap": accuracy.bootstrap.get(scorer),
+            "n_trajectories": e.n_clusters,
+        }
         for scorer, e in accuracy.scores.items()
     }
     return {"n": accuracy.n, "n_failed": accuracy.n_failed, **scores}

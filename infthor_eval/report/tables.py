@@ -8,7 +8,7 @@ from rich.table import Table
 
 from infthor_eval.nieh.scoring import SCORERS
 from infthor_eval.report.comparison import Comparison
-from infthor_eval.report.nieh_results import CLUE_COLUMNS, PublishedRow, PublishedTable, published_table4
+from infthor_eval.report.nieh_results import ABSENCE, CLUE_COLUMNS, PublishedRow, PublishedTable, published_table4
 
 __all__ = ["comparison_table", "depth_table", "nieh_table"]
 
@@ -22,7 +22,7 @@ def nieh_table(summaries: Sequence[dict[str, Any]]) -> Table:
     table = Table(box=box.SIMPLE_HEAD, title="NIEH accuracy, % by number of clues", title_justify="left")
     for name in ("model", "task", "scorer"):
         table.add_column(name, no_wrap=True, overflow="fold")
-    for name in (*CLUE_COLUMNS, "± 95 %", "n", "left out", "failed"):
+    for name in (*CLUE_COLUMNS, "± 95 %", "bootstrap", ABSENCE, "n", "left out", "failed"):
         table.add_column(name, justify="right")
     for summary in summaries:
         for task, result in summary["tasks"].items():
@@ -48,11 +48,18 @@ def nieh_table(summaries: Sequence[dict[str, Any]]) -> Table:
 def _cells(result: dict[str, Any], scorer: str) -> list[str]:
     by_clues = result["by_clues"]
     total = by_clues["total"]
-    means = [f"{100 * by_clues[name][scorer]['mean']:.2f}" if by_clues[name]["n"] else "-" for name in CLUE_COLUMNS]
+    means = [_mean(by_clues[name], scorer) for name in CLUE_COLUMNS]
     # One trajectory alone tells nothing about others: no interval.
     known = total["n"] > 0 and total[scorer]["high"] is not None
     reach = f"{100 * (total[scorer]['high'] - total[scorer]['mean']):.2f}" if known else "-"
-    return [*means, reach, str(total["n"]), str(result["left_out"]["n"]), str(total["n_failed"])]
+    resampled = total[scorer]["bootstrap"] if total["n"] else None
+    interval = "{:.1f}–{:.1f}".format(*(100 * end for end in resampled)) if resampled else "-"
+    counts = [str(total["n"]), str(result["left_out"]["n"]), str(total["n_failed"])]
+    return [*means, reach, interval, _mean(by_clues[ABSENCE], scorer), *counts]
+
+
+def _mean(cell: dict[str, Any], scorer: str) -> str:
+    return f"{100 * cell[scorer]['mean']:.2f}" if cell["n"] else "-"
 
 
 def _differences(

@@ -35,7 +35,7 @@ class UnitRecord(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
         traj_id: the trajectory that the question is about; intervals cluster by it.
         question: the question's text.
         question_type: its type, empty where the set names none.
-        n_clues: number of frames that hold the evidence.
+        n_clues: number of frames that hold the evidence; 0 for an absence, which no frame proves.
         answers: the gold answers.
         reply: what the model said; None where it failed.
         failure: why there is no reply; None where there is one.

@@ -135,7 +135,7 @@ def _as_record(
         traj_id=unit.question.traj_id,
         question=unit.question.text,
         question_type=unit.question.kind or "",
-        n_clues=len(unit.question.clues),
+        n_clues=unit.question.n_clues,
         answers=unit.question.answers,
         reply=reply.text if reply else None,
         failure=failure,

@@ -14,6 +14,7 @@ questions = st.builds(
     clues=st.lists(st.integers(0, 3000), max_size=5).map(tuple),
     answers=st.lists(words | st.integers(), max_size=3).map(tuple),
     kind=words | st.none(),
+    absence=st.booleans(),
 )
 
 
@@ -40,6 +41,7 @@ def test_the_published_columns_suffice_and_others_are_left_unread(tmp_path):
         ("traj_id,question,gt_img_idx,answer\nt,q,[1],__import__('os')\n", "line 2: answer is not a list"),
         ("traj_id,question,gt_img_idx,answer\nt,q,['x'],['a']\n", "line 2: gt_img_idx has an entry of the wrong type"),
         ("traj_id,question,gt_img_idx,answer\nt,q,[True],['a']\n", "wrong type"),
+        ("traj_id,question,gt_img_idx,answer,absence\nt,q,[1],['no'],maybe\n", "line 2: absence is 'maybe'"),
         ("traj_id,question,gt_img_idx,answer\nt,,[1],['a']\n", "line 2: question is empty"),
         ("traj_id,question,gt_img_idx,answer\nt,q\n", "line 2: gt_img_idx is empty"),
         ("traj_id,question,gt_img_idx,answer\nt,q," + "[" * 5000 + ",['a']\n", "gt_img_idx is not a list"),

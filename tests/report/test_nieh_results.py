@@ -29,7 +29,7 @@ def identity(model="qwen2.5-vl", simulator=None, left_out=()):
 
 
 def shown(summary):
-    console = Console(width=140, record=True, file=open("/dev/null", "w"))  # noqa: SIM115, PTH123
+    console = Console(width=150, record=True, file=open("/dev/null", "w"))  # noqa: SIM115, PTH123
     console.print(nieh_table([summary]))
     return [line.split() for line in console.export_text().splitlines()]
 
@@ -41,11 +41,12 @@ def test_the_same_records_in_another_order_give_the_same_summary():
 
 def test_columns_are_those_of_table_4_and_both_denominators_are_told():
     records = [record(0, "mug"), record(1, "cup"), record(2, "mug", n_clues=2), record(3, "mug", n_clues=7)]
+    records.append(record(4, "no", answers=("no",), n_clues=0))
     result = summarise(identity(left_out=["no clue frame", "no clue frame"]), records)["tasks"]["nieh_gt"]
     by_clues = {name: (cell["n"], cell.get("strict", {}).get("mean")) for name, cell in result["by_clues"].items()}
-    assert by_clues == {"1": (2, 0.5), "2": (1, 1.0), ">=3": (1, 1.0), "total": (4, 0.75)}
+    assert by_clues == {"1": (2, 0.5), "2": (1, 1.0), ">=3": (1, 1.0), "total": (5, 0.8), "absence": (1, 1.0)}
     assert result["left_out"]["by_reason"] == {"no clue frame": 2}
-    assert result["left_out"]["mean_counting_them_wrong"]["strict"] == 0.5
+    assert result["left_out"]["mean_counting_them_wrong"]["strict"] == 4 / 7
     assert result["below_full_marks"]["strict"] == ["q1"]
 
 

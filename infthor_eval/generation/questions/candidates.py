@@ -1,15 +1,17 @@
 """What question rules make, before some of it is chosen."""
 
 import difflib
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from infthor_eval.formats.question import Answer, Question
+from infthor_eval.generation.affordances import preposition
 from infthor_eval.generation.questions.history import canonical
 from infthor_eval.generation.wording import compact, noun
 
-__all__ = ["Candidate", "answer_of", "distinct", "the"]
+__all__ = ["MANY", "Candidate", "answer_of", "distinct", "listing", "the", "within"]
 
+MANY = 6  # gold answers; longer lists are a test of writing, not of seeing
 _SIMILAR = 0.75  # the published scorer takes answers alike from 0.8 on
 _ALIKE = (
     {"Pen", "Pencil"},
@@ -26,26 +28,46 @@ class Candidate:
 
     Attributes:
         kind: its type.
-        text: the question.
+        form: the question with "{}" where it names things; balance is kept within a form.
+        names: what stands there.
         clues: the frames that show the answer, in order.
         answers: the gold answers.
         subjects: object types that it is about, for balance.
+        absence: whether the answer is that something is not there, which no frame proves.
     """
 
     kind: str
-    text: str
+    form: str
+    names: tuple[str, ...]
     clues: tuple[int, ...]
     answers: tuple[Answer, ...]
     subjects: tuple[str, ...]
+    absence: bool = False
+
+    @property
+    def text(self) -> str:
+        """The question."""
+        return self.form.format(*self.names)
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether the answer is yes, no or a number: few answers, which must not be guessed from the form."""
+        answer = str(self.answers[0])
+        return len(self.answers) == 1 and (answer in {"yes", "no"} or answer.isdecimal())
 
     def question(self, traj_id: str) -> Question:
         """The question as sets hold it."""
-        return Question(traj_id, self.text, self.clues, self.answers, self.kind)
+        return Question(traj_id, self.text, self.clues, self.answers, self.kind, self.absence)
 
 
 def the(kind: str) -> str:
     """ "the coffee table" for an object type."""
     return f"the {noun(canonical(kind))}"
+
+
+def within(kind: str) -> str:
+    """ "on the coffee table", "in the fridge" for a receptacle type."""
+    return f"{preposition(kind)} {the(kind)}"
 
 
 def answer_of(kind: str) -> str:
@@ -68,3 +90,25 @@ def distinct(kinds: Sequence[str]) -> bool:
             if any({canonical(kind), canonical(kinds[index])} <= group for group in _ALIKE):
                 return False
     return True
+
+
+def listing(kind: str, form: str, occasions: Iterable[tuple[str | None, int | None]]) -> Iterator[Candidate]:
+    """A question on all types that something happened with, each with the first frame that shows it happen.
+
+    Args:
+        kind: the question's type.
+        form: the question; it names nothing.
+        occasions: of each, the object type (None where that is not clear) and the frame (None where none shows it).
+
+    Yields:
+        The question, if every type is shown and the types can be a gold answer.
+    """
+    everything = list(occasions)
+    first: dict[str, int] = {}
+    for name, frame in everything:
+        if name is not None and frame is not None:
+            first.setdefault(canonical(name), frame)
+    complete = all(name is not None and canonical(name) in first for name, _ in everything)
+    if first and complete and len(first) <= MANY and distinct(list(first)):
+        answers = tuple(answer_of(name) for name in first)
+        yield Candidate(kind, form, (), tuple(first.values()), answers, tuple(first))

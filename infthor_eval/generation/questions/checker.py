@@ -149,8 +149,15 @@ def _names(glimpse: Glimpse, keys: set[str]) -> list[str]:
 
 
 def _events(seen: Sequence[Glimpse], action: str, words: str | None = None) -> list[Glimpse]:
-    """The moments right after an action on an object of a type."""
-    return [item for item in seen if item.action == action and (words is None or _target_is(item, words))]
+    """The moments right after an action on an object of a type, of which the moment itself tells."""
+    moments = [item for item in seen if item.action == action and _is_told(item)]
+    return [item for item in moments if words is None or _target_is(item, words)]
+
+
+def _is_told(item: Glimpse) -> bool:
+    """Whether what was acted on is among the objects that are known, or what became of it where it was cut."""
+    target = item.target or ""
+    return target in item.objects or any(key.startswith(f"{target}|") for key in item.objects)
 
 
 def _target_name(item: Glimpse) -> str:
@@ -211,6 +218,23 @@ def _put_into(seen: Sequence[Glimpse], _preposition: str, words: str) -> list[st
         if item.target in item.objects and _place(item, item.target) == _said(words):
             found.setdefault(item.target, _target_name(item))
     return list(found.values())
+
+
+def _put_down(seen: Sequence[Glimpse]) -> list[str]:
+    found: dict[str, str] = {}
+    for item in _events(seen, "PutObject"):
+        if _place(item, item.target or "") is not None:
+            found.setdefault(item.target or "", _target_name(item))
+    return list(found.values())
+
+
+def _put_places(seen: Sequence[Glimpse]) -> list[str]:
+    places = (_place(item, item.target or "") for item in _events(seen, "PutObject"))
+    return list(dict.fromkeys(place for place in places if place is not None))
+
+
+def _opened(seen: Sequence[Glimpse]) -> list[str]:
+    return list(dict.fromkeys(_target_name(item) for item in _events(seen, "OpenObject")))
 
 
 def _open(item: Glimpse, words: str) -> list[str]:
@@ -311,6 +335,16 @@ def _openings(seen: Sequence[Glimpse], words: str) -> list[str]:
     return [str(count)] if count else []
 
 
+def _puts(seen: Sequence[Glimpse], _preposition: str, words: str) -> list[str]:
+    puts = [item for item in _events(seen, "PutObject") if _place(item, item.target or "") == _said(words)]
+    return [str(len(puts))] if puts else []
+
+
+def _picked(seen: Sequence[Glimpse]) -> list[str]:
+    count = len({item.target for item in _events(seen, "PickupObject")})
+    return [str(count)] if count else []
+
+
 _SOLVERS: tuple[tuple[str, Callable[..., list[str]]], ...] = (
     (r"Did you see (.+)\?", _presence),
     (r"Where was the (.+) before you (?:first )?picked it up\?", _before),
@@ -318,6 +352,9 @@ _SOLVERS: tuple[tuple[str, Callable[..., list[str]]], ...] = (
     (r"Where is the (.+) now\?", _now),
     (r"In which places was the (.+), from first to last\?", _journey),
     (r"What did you put (in|on) the (.+)\?", _put_into),
+    (r"What did you put down\?", _put_down),
+    (r"Where did you put things\?", _put_places),
+    (r"What did you open\?", _opened),
     (r"Is the (.+) open now\?", _open_now),
     (r"Was the (.+) open when you (picked up|sliced|turned on) the (.+)\?", _open_then),
     (r"Was the (.+) open when you put the (.+) (in|on) the (.+)\?", _open_at_put),
@@ -328,6 +365,8 @@ _SOLVERS: tuple[tuple[str, Callable[..., list[str]]], ...] = (
     (r"Is the (.+) (in|on) the (.+) now\?", _is_in),
     (r"What is (in|on) the (.+) now\?", _what_now),
     (r"How many objects are (?:in|on) the (.+) now\?", lambda seen, place: _how_many(seen, "", place)),
-    (r"How many times did you open the (.+)\?", _openings),
+    (r"How many times did you open (?:the|an?) (.+)\?", _openings),
+    (r"How many times did you put something (in|on) the (.+)\?", _puts),
+    (r"How many different objects did you pick up\?", _picked),
     (r"How many times did you pick up the (.+) and put it down again\?", _moves),
 )

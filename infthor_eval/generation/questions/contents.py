@@ -3,8 +3,7 @@
 from collections import Counter
 from collections.abc import Iterator
 
-from infthor_eval.generation.affordances import preposition
-from infthor_eval.generation.questions.candidates import Candidate, answer_of, distinct, the
+from infthor_eval.generation.questions.candidates import MANY, Candidate, answer_of, distinct, the, within
 from infthor_eval.generation.questions.evidence import cover
 from infthor_eval.generation.questions.history import Event, History, canonical
 
@@ -12,7 +11,7 @@ __all__ = ["CONTENT", "SLICING", "at_opening", "at_pickup", "at_slicing", "slici
 
 CONTENT = "container_content"
 SLICING = "slicing"
-_MANY = 6  # longer lists are a test of writing, not of seeing
+Asked = tuple[str, tuple[str, ...]]  # a form and its names
 
 
 def slicings(history: History) -> Iterator[Candidate]:
@@ -22,7 +21,8 @@ def slicings(history: History) -> Iterator[Candidate]:
     shown = all(history.shows_slices(event.frame, event.target) for event in events)
     if events and shown and len(set(kinds)) == len(kinds) and distinct(kinds):
         answers = tuple(answer_of(kind) for kind in kinds)
-        yield Candidate(SLICING, "What did you slice?", tuple(event.frame for event in events), answers, tuple(kinds))
+        clues = tuple(event.frame for event in events)
+        yield Candidate(SLICING, "What did you slice?", (), clues, answers, tuple(kinds))
 
 
 def at_slicing(history: History) -> Iterator[Candidate]:
@@ -33,9 +33,9 @@ def at_slicing(history: History) -> Iterator[Candidate]:
         place = history.parent(event.frame - 1, event.target)
         if count[event.kind] == 1 and place is not None and history.shows_slices(event.frame, event.target):
             kind = history.world(event.frame)[place].type
-            text = f"What else was {preposition(kind)} {the(kind)} when you sliced {the(event.kind)}?"
+            asked = "What else was {} when you sliced {}?", (within(kind), the(event.kind))
             leave_out = frozenset({event.kind, f"{event.kind}Sliced"})
-            yield from _contents(history, SLICING, text, event, place, leave_out)
+            yield from _contents(history, SLICING, asked, event, place, leave_out)
 
 
 def at_opening(history: History) -> Iterator[Candidate]:
@@ -45,8 +45,8 @@ def at_opening(history: History) -> Iterator[Candidate]:
         first = event.action == "OpenObject" and event.target not in opened
         opened |= {event.target} if event.action == "OpenObject" else set()
         if first and history.only_one(event.frame, event.target):
-            text = f"What was {preposition(event.kind)} {the(event.kind)} when you first opened it?"
-            yield from _contents(history, CONTENT, text, event, event.target, frozenset())
+            asked = "What was {} when you first opened it?", (within(event.kind),)
+            yield from _contents(history, CONTENT, asked, event, event.target, frozenset())
 
 
 def at_pickup(history: History) -> Iterator[Candidate]:
@@ -57,27 +57,27 @@ def at_pickup(history: History) -> Iterator[Candidate]:
         place = history.parent(event.frame - 1, event.target)
         if count[event.kind] == 1 and place is not None and place in history.world(event.frame):
             kind = history.world(event.frame)[place].type
-            text = f"What else was {preposition(kind)} {the(kind)} when you picked up {the(event.kind)} from it?"
-            yield from _contents(history, CONTENT, text, event, place, frozenset())
+            asked = "What else was {} when you picked up {} from it?", (within(kind), the(event.kind))
+            yield from _contents(history, CONTENT, asked, event, place, frozenset())
 
 
 def _contents(
-    history: History, kind: str, text: str, event: Event, place: str, leave_out: frozenset[str]
+    history: History, kind: str, asked: Asked, event: Event, place: str, leave_out: frozenset[str]
 ) -> Iterator[Candidate]:
     """A question on what a receptacle holds right after an event, shown while that does not change."""
     inside = history.contents(event.frame, place)
-    asked = {key for key in inside if history.world(event.frame)[key].type not in leave_out}
+    wanted = {key for key in inside if history.world(event.frame)[key].type not in leave_out}
     shown = {}
     for frame in range(event.frame, len(history)):
         if history.contents(frame, place) != inside:
             break
         if history.shows(frame, place) and not _others(history, frame, place):
-            shown[frame] = frozenset(key for key in asked if history.shows(frame, key))
-    clues = cover(asked, shown) if asked else None
-    kinds = sorted(history.world(event.frame)[key].type for key in asked)
-    if clues is not None and len(set(kinds)) == len(kinds) <= _MANY and distinct(kinds):
+            shown[frame] = frozenset(key for key in wanted if history.shows(frame, key))
+    clues = cover(wanted, shown) if wanted else None
+    kinds = sorted(history.world(event.frame)[key].type for key in wanted)
+    if clues is not None and len(set(kinds)) == len(kinds) <= MANY and distinct(kinds):
         place_kind = history.world(event.frame)[place].type
-        yield Candidate(kind, text, clues, tuple(answer_of(item) for item in kinds), (place_kind, *kinds))
+        yield Candidate(kind, *asked, clues, tuple(answer_of(item) for item in kinds), (place_kind, *kinds))
 
 
 def _others(history: History, frame: int, place: str) -> bool:

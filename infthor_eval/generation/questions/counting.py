@@ -1,9 +1,11 @@
-"""Movement counting: how often something was moved, and how often a door or a drawer was."""
+"""Movement counting: how often something was moved, opened or put somewhere, and how many things were moved."""
 
+from collections import defaultdict
 from collections.abc import Iterator
 
-from infthor_eval.generation.questions.candidates import Candidate, the
-from infthor_eval.generation.questions.history import History
+from infthor_eval.generation.questions.candidates import Candidate, the, within
+from infthor_eval.generation.questions.history import Event, History, Move
+from infthor_eval.generation.wording import an, noun
 
 __all__ = ["KIND", "counts"]
 
@@ -11,28 +13,57 @@ KIND = "movement_counting"
 
 
 def counts(history: History) -> Iterator[Candidate]:
-    """One question on every object that alone of its type was handled, and on every receptacle that was opened."""
+    """Every count whose occasions are all shown, a frame each."""
     yield from _moves(history)
     yield from _openings(history)
+    yield from _puts(history)
+    yield from _items(history)
 
 
 def _moves(history: History) -> Iterator[Candidate]:
-    """A move ends when the object is put down."""
+    """Of every object that alone of its type was handled. A move ends when the object is put down."""
     for kind, items in sorted(history.handled.items()):
         moves = history.moves_of(next(iter(items))) if len(items) == 1 else ()
         if moves and all(history.shows(move.after, move.item, move.target) for move in moves):
-            text = f"How many times did you pick up {the(kind)} and put it down again?"
-            yield Candidate(KIND, text, tuple(move.after for move in moves), (str(len(moves)),), (kind,))
+            frames = [move.after for move in moves]
+            yield _count("How many times did you pick up {} and put it down again?", (the(kind),), frames, kind)
 
 
 def _openings(history: History) -> Iterator[Candidate]:
-    """Of receptacles that alone are of their type."""
-    opened: dict[str, list[int]] = {}
+    """Of every type: "the fridge" where there is one, "a drawer" where there are several."""
+    by_kind: dict[str, list[Event]] = defaultdict(list)
     for event in history.events:
-        if event.action == "OpenObject" and history.only_one(event.frame, event.target):
-            opened.setdefault(event.target, []).append(event.frame)
-    for key, frames in sorted(opened.items()):
-        if all(history.shows(frame, key) for frame in frames):
-            kind = history.world(frames[0])[key].type
-            text = f"How many times did you open {the(kind)}?"
-            yield Candidate(KIND, text, tuple(frames), (str(len(frames)),), (kind,))
+        if event.action == "OpenObject":
+            by_kind[event.kind].append(event)
+    for kind, events in sorted(by_kind.items()):
+        if all(history.shows(event.frame, event.target) for event in events):
+            single = all(history.only_one(event.frame, event.target) for event in events)
+            name = the(kind) if single else an(noun(kind))
+            yield _count("How many times did you open {}?", (name,), [event.frame for event in events], kind)
+
+
+def _puts(history: History) -> Iterator[Candidate]:
+    """Of every receptacle that alone is of its type."""
+    by_target: dict[str, list[Move]] = defaultdict(list)
+    for move in history.moves:
+        by_target[move.target].append(move)
+    for target, moves in sorted(by_target.items()):
+        shown = all(history.shows_put(move) for move in moves)
+        if shown and all(history.only_one(move.after, target) for move in moves):
+            kind = history.world(moves[0].after)[target].type
+            frames = [move.after for move in moves]
+            yield _count("How many times did you put something {}?", (within(kind),), frames, kind)
+
+
+def _items(history: History) -> Iterator[Candidate]:
+    """Of the different objects, each with the frame in which it is first held."""
+    first: dict[str, int] = {}
+    for event in history.events:
+        if event.action == "PickupObject":
+            first.setdefault(event.target, event.frame)
+    if first and all(history.shows(frame, item) for item, frame in first.items()):
+        yield _count("How many different objects did you pick up?", (), sorted(first.values()), "#")
+
+
+def _count(form: str, names: tuple[str, ...], frames: list[int], subject: str) -> Candidate:
+    return Candidate(KIND, form, names, tuple(frames), (str(len(frames)),), (subject,))

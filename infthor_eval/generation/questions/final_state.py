@@ -2,15 +2,13 @@
 
 from collections.abc import Iterator
 
-from infthor_eval.generation.affordances import preposition
-from infthor_eval.generation.questions.candidates import Candidate, answer_of, distinct, the
+from infthor_eval.generation.questions.candidates import MANY, Candidate, answer_of, distinct, the, within
 from infthor_eval.generation.questions.evidence import cover
 from infthor_eval.generation.questions.history import History, canonical
 
 __all__ = ["KIND", "final_states"]
 
 KIND = "final_state"
-_MANY = 6
 
 
 def final_states(history: History) -> Iterator[Candidate]:
@@ -33,11 +31,11 @@ def _inside(history: History, receptacle: str) -> Iterator[Candidate]:
         alone = item in world and history.only_one(last, item) and len(history.handled[move.kind]) == 1
         if not alone or here != move.target:
             continue
-        if history.shows(move.after, item, move.target) and history.parent(move.after, item) == here:
+        if history.shows_put(move):
             kind = world[receptacle].type
-            text = f"Is {the(world[item].type)} {preposition(kind)} {the(kind)} now?"
+            names = (the(world[item].type), within(kind))
             answer = "yes" if here == receptacle else "no"
-            yield Candidate(KIND, text, (move.after,), (answer,), (world[item].type, kind))
+            yield Candidate(KIND, "Is {} {} now?", names, (move.after,), (answer,), (world[item].type, kind))
 
 
 def _what(history: History, receptacle: str) -> Iterator[Candidate]:
@@ -55,15 +53,14 @@ def _what(history: History, receptacle: str) -> Iterator[Candidate]:
         if history.shows(frame, receptacle) and stays:
             shown[frame] = frozenset(key for key in held if history.shows(frame, key))
     clues = cover(inside, shown) if inside else None
-    if clues is None or len(inside) > _MANY:
+    if clues is None or len(inside) > MANY:
         return
     kind = world[receptacle].type
     kinds = sorted(world[key].type for key in inside)
-    where = f"{preposition(kind)} {the(kind)}"
-    yield Candidate(KIND, f"How many objects are {where} now?", clues, (str(len(inside)),), (kind, "#"))
+    yield Candidate(KIND, "How many objects are {} now?", (within(kind),), clues, (str(len(inside)),), (kind, "#"))
     if len({canonical(item) for item in kinds}) == len(kinds) and distinct(kinds):
         answers = tuple(answer_of(item) for item in kinds)
-        yield Candidate(KIND, f"What is {where} now?", clues, answers, (kind, *kinds))
+        yield Candidate(KIND, "What is {} now?", (within(kind),), clues, answers, (kind, *kinds))
 
 
 def _arrival(history: History, item: str, receptacle: str) -> int:

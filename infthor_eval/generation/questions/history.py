@@ -102,6 +102,11 @@ class History:
         seen = self.seen(frame)
         return all(key in seen and seen[key].pixels >= self.least for key in ids)
 
+    def shows_put(self, move: Move) -> bool:
+        """Whether the frame after a move shows the object where it was put."""
+        shown = self.shows(move.after, move.item, move.target)
+        return shown and self.parent(move.after, move.item) == move.target
+
     def shows_slices(self, frame: int, whole: str) -> bool:
         """Whether a frame shows a slice of an object."""
         world = self.world(frame)

@@ -27,35 +27,35 @@ def _origin(history: History, kind: str, moves: tuple[Move, ...]) -> Iterator[Ca
         return
     when = "first picked it up" if len(moves) > 1 else "picked it up"
     place = history.world(move.before)[move.origin or ""].type
-    yield _candidate(f"Where was {the(kind)} before you {when}?", (move.before,), [place], kind)
+    yield _candidate(f"Where was {{}} before you {when}?", (move.before,), [place], kind)
 
 
 def _destination(history: History, kind: str, moves: tuple[Move, ...]) -> Iterator[Candidate]:
     move = moves[0]
-    if len(moves) == 1 and _arrived(history, move):
+    if len(moves) == 1 and history.shows_put(move):
         place = history.world(move.after)[move.target].type
-        yield _candidate(f"Where did you move {the(kind)} to?", (move.after,), [place], kind)
+        yield _candidate("Where did you move {} to?", (move.after,), [place], kind)
 
 
 def _now(history: History, kind: str, moves: tuple[Move, ...]) -> Iterator[Candidate]:
     move, last = moves[-1], len(history) - 1
     alone = move.item in history.world(last) and history.only_one(last, move.item)
-    if alone and _arrived(history, move) and history.parent(last, move.item) == move.target:
+    if alone and history.shows_put(move) and history.parent(last, move.item) == move.target:
         place = history.world(last)[move.target].type
-        yield _candidate(f"Where is {the(kind)} now?", (move.after,), [place], kind)
+        yield _candidate("Where is {} now?", (move.after,), [place], kind)
 
 
 def _journey(history: History, kind: str, moves: tuple[Move, ...]) -> Iterator[Candidate]:
     first = moves[0]
     if not _left(history, first):
         return
-    if not all(_arrived(history, move) for move in moves):
+    if not all(history.shows_put(move) for move in moves):
         return
     places = [history.world(first.before)[first.origin or ""].type]
     places += [history.world(move.after)[move.target].type for move in moves]
     if distinct(places):
         clues = (first.before, *(move.after for move in moves))
-        yield _candidate(f"In which places was {the(kind)}, from first to last?", clues, places, kind)
+        yield _candidate("In which places was {}, from first to last?", clues, places, kind)
 
 
 def _left(history: History, move: Move) -> bool:
@@ -64,13 +64,6 @@ def _left(history: History, move: Move) -> bool:
     return shown and history.alone(move.before, move.item)
 
 
-def _arrived(history: History, move: Move) -> bool:
-    """Whether the frame after the put shows the object where it was put."""
-    shown = history.shows(move.after, move.item, move.target)
-    parent = history.parent(move.after, move.item)
-    return shown and parent == move.target
-
-
-def _candidate(text: str, clues: tuple[int, ...], places: list[str], kind: str) -> Candidate:
+def _candidate(form: str, clues: tuple[int, ...], places: list[str], kind: str) -> Candidate:
     answers = tuple(answer_of(place) for place in places)
-    return Candidate(KIND, text, clues, answers, (kind, *places))
+    return Candidate(KIND, form, (the(kind),), clues, answers, (kind, *places))

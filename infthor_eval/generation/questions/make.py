@@ -110,36 +110,58 @@ def _candidates(history: History, vocabulary: frozenset[str], rng: random.Random
 
 
 class _Chooser:
-    """Chooses so that question types, yes and no, numbers of clues and object types are even over the whole set."""
+    """Chooses so that types, forms, answers, numbers of clues and what is asked about are even over the whole set."""
 
     def __init__(self) -> None:
         self._groups: Counter[str] = Counter()
         self._clues: Counter[tuple[str, int]] = Counter()
+        self._answers: Counter[tuple[str, str]] = Counter()
         self._subjects: Counter[tuple[str, str]] = Counter()
 
     def choose(self, candidates: Iterable[Candidate], number: int, rng: random.Random) -> list[Candidate]:
         left = list(candidates)
         rng.shuffle(left)
         chosen: list[Candidate] = []
+        # Where little happened, presence questions must not fill the place of all others.
         room = Counter({_group(item): max(2, number // 5) for item in left})
-        while left and len(chosen) < number:
-            best = min(left, key=self._use)
+        while len(chosen) < number:
+            open_to = [item for item in left if room[_group(item)] and not self._gives_away(item)]
+            if not open_to:
+                break
+            best = min(open_to, key=self._use)
             left.remove(best)
             room[_group(best)] -= 1
-            if room[_group(best)] < 0:
-                continue  # where little happened, presence questions must not fill the place of all others
             chosen.append(best)
-            self._groups[_group(best)] += 1
-            self._clues[_group(best), min(len(best.clues), 3)] += 1
-            self._subjects.update((_group(best), subject) for subject in best.subjects)
+            self._note(best)
         return sorted(chosen, key=lambda item: (item.clues, item.text))
+
+    def _gives_away(self, item: Candidate) -> bool:
+        """Whether an answer would become the one to guess from the question's form alone."""
+        if not item.is_closed:
+            return False
+        same = self._answers[item.form, str(item.answers[0])]
+        others = sum(count for (form, _), count in self._answers.items() if form == item.form) - same
+        return same > others
+
+    def _note(self, item: Candidate) -> None:
+        group = _group(item)
+        self._groups[group] += 1
+        self._clues[group, _clue_class(item)] += 1
+        self._subjects.update((group, subject) for subject in item.subjects)
+        if item.is_closed:
+            self._answers[item.form, str(item.answers[0])] += 1
 
     def _use(self, item: Candidate) -> tuple[int, int, int]:
         group = _group(item)
         subjects = sum(self._subjects[group, subject] for subject in item.subjects)
-        return self._groups[group], self._clues[group, min(len(item.clues), 3)], subjects
+        return self._groups[group], self._clues[group, _clue_class(item)], subjects
 
 
 def _group(item: Candidate) -> str:
     """What is to be even: question types, and yes and no within one."""
     return f"{item.kind} {item.answers[0]}" if item.answers[0] in {"yes", "no"} else item.kind
+
+
+def _clue_class(item: Candidate) -> int:
+    """1, 2, or 3 for more."""
+    return min(len(item.clues), 3)

@@ -1,10 +1,9 @@
-"""Open state: "Was the fridge open when you picked up the mug?", "Is the fridge open now?" """
+"""Open state: "Was the fridge open when you picked up the mug?", "Is the fridge open now?", "What did you open?" """
 
 from collections import Counter
 from collections.abc import Iterator
 
-from infthor_eval.generation.affordances import preposition
-from infthor_eval.generation.questions.candidates import Candidate, the
+from infthor_eval.generation.questions.candidates import Candidate, listing, the, within
 from infthor_eval.generation.questions.history import Event, History
 
 __all__ = ["KIND", "open_states", "phrase"]
@@ -30,13 +29,14 @@ def open_states(history: History) -> Iterator[Candidate]:
             about = key in {event.target, event.receptacle}
             if event.action in _ASKED_AT and phrases[told] == 1 and not about:
                 yield from _then(history, key, event, told)
+    yield from _opened(history)
 
 
 def phrase(history: History, event: Event) -> str:
     """What the agent did, as the end of a "when you ..." """
     if event.action == "PutObject" and event.receptacle is not None:
         kind = history.world(event.frame)[event.receptacle].type
-        return f"put {the(event.kind)} {preposition(kind)} {the(kind)}"
+        return f"put {the(event.kind)} {within(kind)}"
     verbs = {"PickupObject": "picked up", "SliceObject": "sliced", "ToggleObjectOn": "turned on"}
     return f"{verbs.get(event.action, event.action)} {the(event.kind)}"
 
@@ -45,8 +45,10 @@ def _then(history: History, key: str, event: Event, told: str) -> Iterator[Candi
     world = history.world(event.frame)
     if key in world and history.shows(event.frame, key) and _shows_event(history, event):
         answer = "yes" if world[key].is_open else "no"
-        text = f"Was {the(world[key].type)} open when you {told}?"
-        yield Candidate(KIND, text, (event.frame,), (answer,), (world[key].type, event.kind))
+        names = (the(world[key].type), told)
+        yield Candidate(
+            KIND, "Was {} open when you {}?", names, (event.frame,), (answer,), (world[key].type, event.kind)
+        )
 
 
 def _shows_event(history: History, event: Event) -> bool:
@@ -65,4 +67,17 @@ def _now(history: History, key: str) -> Iterator[Candidate]:
     frame = next((frame for frame in range(last, -1, -1) if history.shows(frame, key)), None)
     if frame is not None and history.world(frame)[key].is_open == state.is_open:
         answer = "yes" if state.is_open else "no"
-        yield Candidate(KIND, f"Is {the(state.type)} open now?", (frame,), (answer,), (state.type,))
+        yield Candidate(KIND, "Is {} open now?", (the(state.type),), (frame,), (answer,), (state.type,))
+
+
+def _opened(history: History) -> Iterator[Candidate]:
+    """Everything that was opened."""
+    yield from listing(
+        KIND,
+        "What did you open?",
+        (
+            (event.kind, event.frame if history.shows(event.frame, event.target) else None)
+            for event in history.events
+            if event.action == "OpenObject"
+        ),
+    )

@@ -16,7 +16,7 @@ __all__ = ["KIND", "absent", "present"]
 
 KIND = "object_presence"
 _BUSY = 3  # objects that a sampled frame shows at least, where the trajectory has such frames
-_TEMPLATE = "Did you see {item}?"
+_FORM = "Did you see {}?"
 
 # Not asked about: surroundings, parts, and what people would not call by that name.
 _UNASKED = frozenset(
@@ -59,7 +59,7 @@ def present(history: History) -> Iterator[Candidate]:
                     best[kind] = (seen.pixels, frame)
     for kind, (_, frame) in sorted(best.items()):
         if _asked(kind):
-            yield Candidate(KIND, _text(kind), (frame,), ("yes",), (kind,))
+            yield Candidate(KIND, _FORM, (an(noun(kind)),), (frame,), ("yes",), (kind,))
 
 
 def absent(history: History, vocabulary: frozenset[str], rng: random.Random) -> Iterator[Candidate]:
@@ -68,7 +68,8 @@ def absent(history: History, vocabulary: frozenset[str], rng: random.Random) -> 
     frames = [frame for frame in range(len(history)) if _shown(history, frame) >= _BUSY] or [0]
     for kind in sorted(vocabulary - there):
         if _asked(kind) and not any(kind in group and group & there for group in _TAKEN_FOR_EACH_OTHER):
-            yield Candidate(KIND, _text(kind), (rng.choice(frames),), ("no",), (kind,))
+            frame = rng.choice(frames)
+            yield Candidate(KIND, _FORM, (an(noun(kind)),), (frame,), ("no",), (kind,), absence=True)
 
 
 def _shown(history: History, frame: int) -> int:
@@ -77,7 +78,3 @@ def _shown(history: History, frame: int) -> int:
 
 def _asked(kind: str) -> bool:
     return kind not in _UNASKED and not kind.endswith(("Basin", "Sliced", "Cracked"))
-
-
-def _text(kind: str) -> str:
-    return _TEMPLATE.format(item=an(noun(kind)))

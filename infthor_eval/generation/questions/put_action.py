@@ -1,9 +1,8 @@
-"""Put action: "What did you put in the fridge?" """
+"""Put action: "What did you put in the fridge?", "What did you put down?", "Where did you put things?" """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
-from infthor_eval.generation.affordances import preposition
-from infthor_eval.generation.questions.candidates import Candidate, answer_of, distinct, the
+from infthor_eval.generation.questions.candidates import MANY, Candidate, answer_of, distinct, listing, within
 from infthor_eval.generation.questions.history import History, Move
 
 __all__ = ["KIND", "puts"]
@@ -12,17 +11,35 @@ KIND = "put_action"
 
 
 def puts(history: History) -> Iterator[Candidate]:
-    """One question for every receptacle type of which one instance alone was put into."""
+    """One question for every receptacle type of which one instance alone was put into, and one on all of them."""
     by_kind: dict[str, list[Move]] = {}
     for move in history.moves:
         by_kind.setdefault(history.world(move.after)[move.target].type, []).append(move)
     for kind, moves in sorted(by_kind.items()):
-        first_puts = list({move.item: move for move in reversed(moves)}.values())[::-1]
-        items = [move.kind for move in first_puts]
-        one_target = len({move.target for move in moves}) == 1
-        shown = all(history.shows(move.after, move.item, move.target) for move in first_puts)
-        if one_target and shown and len(set(items)) == len(items) and distinct(items):
-            text = f"What did you put {preposition(kind)} {the(kind)}?"
-            answers = tuple(answer_of(item) for item in items)
-            clues = tuple(move.after for move in first_puts)
-            yield Candidate(KIND, text, clues, answers, (kind, *items))
+        if len({move.target for move in moves}) == 1:
+            yield from _what(history, "What did you put {}?", (kind,), moves)
+    yield from _what(history, "What did you put down?", (), history.moves)
+    yield from _where(history)
+
+
+def _what(history: History, form: str, places: tuple[str, ...], moves: Sequence[Move]) -> Iterator[Candidate]:
+    """Which objects were moved, each with the frame after its first put."""
+    first_puts = list({move.item: move for move in reversed(moves)}.values())[::-1]
+    items = [move.kind for move in first_puts]
+    shown = all(history.shows_put(move) for move in first_puts)
+    if shown and len(set(items)) == len(items) and 0 < len(items) <= MANY and distinct(items):
+        answers = tuple(answer_of(item) for item in items)
+        clues = tuple(move.after for move in first_puts)
+        yield Candidate(KIND, form, tuple(map(within, places)), clues, answers, (*places, *items))
+
+
+def _where(history: History) -> Iterator[Candidate]:
+    """The places that something was put into or onto."""
+    yield from listing(
+        KIND,
+        "Where did you put things?",
+        (
+            (history.world(move.after)[move.target].type, move.after if history.shows_put(move) else None)
+            for move in history.moves
+        ),
+    )

@@ -1,5 +1,6 @@
 """The rules on a replayed trajectory, judged by the checker and by the scorers."""
 
+from collections import Counter, defaultdict
 from dataclasses import replace
 
 import pytest
@@ -76,6 +77,31 @@ def test_choice_is_balanced_and_seeded(replayed):
     no = [question for question in made[0].questions if question.answers == ("no",)]
     assert abs(len(yes) - len(no)) <= 5
     assert set(made[0].by_kind()) == KINDS
+
+
+def test_absences_are_flagged_and_look_like_presences(everything):
+    presence = [question for question in everything.questions if question.kind == "object_presence"]
+    assert {question.absence for question in presence} == {True, False}
+    for question in everything.questions:
+        assert question.absence == (question.kind == "object_presence" and question.answers == ("no",))
+    assert {len(question.clues) for question in presence} == {1}
+
+
+def test_no_answer_follows_from_the_form_of_a_question(replayed):
+    made = make_questions(replayed, per_trajectory=60)
+    answers = defaultdict(Counter)
+    for question in made.questions:
+        if str(question.answers[0]) in {"yes", "no"} or str(question.answers[0]).isdecimal():
+            answers[_form(question.text)][question.answers[0]] += 1
+    assert len(answers) > 4
+    for form, counts in answers.items():
+        most = counts.most_common(1)[0][1]
+        assert most <= counts.total() - most + 1, (form, counts)
+
+
+def _form(text):
+    words = text.split()
+    return " ".join(words[:5]) if words[0] == "How" else f"{words[0]} ... {text[-9:] if 'open now' in text else ''}"
 
 
 def test_texts_are_english(everything):
