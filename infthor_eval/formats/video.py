@@ -6,6 +6,7 @@ frames that are sampled from it are decoded in one pass and kept in the user's c
 
 import hashlib
 import os
+import shutil
 import tempfile
 from pathlib import Path
 
@@ -21,6 +22,7 @@ __all__ = ["frames_per_second"]
 # the level when it first uses FFmpeg, so it is set before anything here can.
 os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
 
+_COUNT = "n_frames"  # the file with the number of frames beside them
 _MEND = "make it again, or take it away to show the frames instead"
 
 
@@ -41,7 +43,7 @@ def frames_per_second(path: Path) -> tuple[FrameRef, ...]:
     except OSError as error:
         raise DataError(f"{path}: cannot be read ({error.strerror}); {_MEND}") from error
     folder = user_cache("video_frames") / f"{digest}-1fps-opencv{cv2.__version__}"
-    if not folder.is_dir():
+    if not _is_whole(folder):
         try:
             _extract(path, folder)
         except OSError as error:
@@ -51,8 +53,15 @@ def frames_per_second(path: Path) -> tuple[FrameRef, ...]:
     return tuple(FrameRef(file) for file in sorted(folder.glob("*.png")))
 
 
+def _is_whole(folder: Path) -> bool:
+    """Whether no frame was taken away since; caches are cleaned by all sorts of programs."""
+    count = folder / _COUNT
+    return count.is_file() and count.read_text() == str(len(list(folder.glob("*.png"))))
+
+
 def _extract(path: Path, folder: Path) -> None:
     """Decode into a folder that appears only when it is whole."""
+    shutil.rmtree(folder, ignore_errors=True)
     folder.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=folder.parent, prefix="partial-") as partial:
         made = Path(partial) / "frames"
@@ -61,7 +70,7 @@ def _extract(path: Path, folder: Path) -> None:
         try:
             made.rename(folder)
         except OSError:
-            if not folder.is_dir():  # another process was faster
+            if not _is_whole(folder):  # another process was faster
                 raise
 
 
@@ -83,6 +92,7 @@ def _decode(path: Path, folder: Path) -> None:
         video.release()
     if not n_sampled or n_frames < promised - fps:
         raise DataError(f"{path}: only {n_frames} of its {promised} frames can be decoded; {_MEND}")
+    (folder / _COUNT).write_text(str(n_sampled))
 
 
 def _save(pixels: "cv2.typing.MatLike", path: Path) -> None:  # type: ignore[name-defined]  # noqa: F821

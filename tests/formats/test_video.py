@@ -34,6 +34,16 @@ def test_a_video_is_decoded_once_and_again_only_when_it_has_changed(write_video,
     assert {frame.digest for frame in changed}.isdisjoint(frame.digest for frame in first)
 
 
+def test_frames_that_were_cleaned_away_are_decoded_again(write_video, tmp_path):
+    write_video(tmp_path / "a.mp4", range(0, 250, 5))
+    first = frames_per_second(tmp_path / "a.mp4")
+    first[-1].path.unlink()
+    again = frames_per_second(tmp_path / "a.mp4")
+    assert len(first) == 5
+    assert [frame.digest for frame in again[:-1]] == [frame.digest for frame in first[:-1]]
+    assert again[-1].path.is_file()
+
+
 def damaged(content):
     """Zeros where the last two thirds of the pictures are, the index behind them whole."""
     start, end = content.find(b"mdat") + 4, content.find(b"moov")

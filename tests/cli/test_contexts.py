@@ -1,0 +1,115 @@
+"""Contexts that retrieve, watch and remember, by the command as users type it."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from infthor_eval.formats.question import Question
+from infthor_eval.runs import read_journal
+
+QUESTIONS = [
+    Question(traj_id, f"Is there a {name}?", (index,), ("yes",), "object_presence")
+    for traj_id in ("traj_a", "traj_b")
+    for index, name in enumerate(("mug", "plate", "sink"))
+]
+
+
+def only(folder, pattern):
+    (path,) = folder.rglob(pattern)
+    return path
+
+
+def docs(folder, task):
+    return [json.loads(line)["doc"] for line in only(folder, f"samples_{task}_*.jsonl").read_text().splitlines()]
+
+
+@pytest.fixture
+def data(make_nieh_set):
+    return make_nieh_set(QUESTIONS, n_frames=45, size=56)
+
+
+def test_retrieval_runs_through_and_the_retriever_is_part_of_the_run(data, make_clip, tmp_path, run):
+    tasks, out = "nieh_clip_retrieval,nieh_memory_frames", tmp_path / "out"
+    arguments = ["--model", "qwen2.5-vl-tiny", "--tasks", tasks, "--data", data, "--output", out]
+    first, second = make_clip(seed=0), make_clip(seed=1)
+    code, _, err = run(*arguments, "--retriever", first)
+    assert code == 0, err
+    assert [len(doc["frames"]) for doc in docs(out, "nieh_clip_retrieval")] == [10] * 6
+    assert [(len(doc["frames"]), doc["frames"][-1]) for doc in docs(out, "nieh_memory_frames")] == [(21, 44)] * 6
+    results = only(out, "results.json").read_bytes()
+    code, _, err = run(*arguments, "--retriever", first)
+    assert "0 answered now, 12 found" in err
+    assert only(out, "results.json").read_bytes() == results
+    assert run(*arguments, "--retriever", second)[0] == 0
+    identities = [read_journal(path)[0] for path in out.rglob("journal.jsonl")]
+    retrievers = {
+        each["tasks"][task]["sources"]["retriever"]["fingerprint"] for each in identities for task in each["tasks"]
+    }
+    assert (len(identities), len(retrievers)) == (2, 2)
+
+
+def test_a_retriever_that_cannot_be_had_ends_in_one_line(data, tmp_path, run, monkeypatch):
+    monkeypatch.setattr("huggingface_hub.constants.HF_HUB_OFFLINE", True)
+    monkeypatch.setattr("huggingface_hub.constants.HF_HUB_CACHE", str(tmp_path / "hub"))
+    arguments = ["--model", "oracle", "--data", data, "--output", tmp_path / "out"]
+    for tasks, options, said in (
+        ("nieh_clip_retrieval", (), "and give --retriever DIR"),
+        ("nieh_memory_frames", ("--retriever", "./nowhere"), "there is no such folder"),
+        ("nieh_gt", ("--retriever", "./nowhere"), "no context of nieh_gt retrieves frames"),
+    ):
+        code, out, err = run(*arguments, "--tasks", tasks, *options)
+        assert (code, out) == (2, "")
+        assert said in err
+        assert len(err.strip().splitlines()) == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_videos_are_shown_where_they_are_and_a_broken_one_is_counted(data, write_video, tmp_path, run):
+    metadata, out = data / "metadata", tmp_path / "out"
+    write_video(metadata / "traj_a" / "traj_a_10fps.mp4", range(0, 250, 10))
+    (metadata / "traj_b" / "traj_b_10fps.mp4").write_bytes(b"no video")
+    arguments = ["--model", "qwen2.5-vl-tiny", "--tasks", "nieh_video", "--data", data, "--output", out]
+    code, _, err = run(*arguments)
+    assert code == 0, err
+    assert "nieh_video: 3 question(s) left out: " in err
+    assert "traj_b_10fps.mp4: not a video that OpenCV can decode" in err
+    results = json.loads(only(out, "results.json").read_text())["tasks"]["nieh_video"]
+    assert (results["n"], results["left_out"]["n"], list(results["by_variant"])) == (3, 3, ["source=mp4"])
+    assert [len(doc["frames"]) for doc in docs(out, "nieh_video")] == [3] * 3
+    (metadata / "traj_b" / "traj_b_10fps.mp4").unlink()
+    assert run(*arguments)[0] == 0
+    variants = [json.loads(path.read_text())["tasks"]["nieh_video"]["by_variant"] for path in out.rglob("results.json")]
+    assert sorted(map(sorted, variants)) == [["source=frames", "source=mp4"], ["source=mp4"]]
+
+
+def test_a_run_killed_while_it_takes_notes_ends_as_an_undisturbed_one(data, tmp_path):
+    def start(output):
+        arguments = ["--model", "qwen2.5-vl-tiny", "--tasks", "nieh_memory_notes", "--data", data, "--output", output]
+        code = "from infthor_eval.cli import main; main()"
+        return subprocess.Popen([sys.executable, "-c", code, *map(str, arguments)], stderr=subprocess.PIPE, text=True)
+
+    killed, deadline = start(tmp_path / "killed"), time.monotonic() + 120
+    while not any(path.read_bytes().count(b"\n") > 2 for path in (tmp_path / "killed").rglob("journal.jsonl")):
+        assert killed.poll() is None, killed.stderr.read()
+        assert time.monotonic() < deadline
+        time.sleep(0.005)
+    os.kill(killed.pid, signal.SIGKILL)
+    killed.communicate()
+    journal = only(tmp_path / "killed", "journal.jsonl")
+    before = journal.read_bytes().count(b'\n{"note":')
+    assert 0 < before < 6  # three windows of twenty frames in each of two trajectories
+
+    for name in ("killed", "whole"):
+        process = start(tmp_path / name)
+        _, said = process.communicate(timeout=120)
+        assert process.returncode == 0, said
+    assert journal.read_bytes().count(b'\n{"note":') == 6
+    results = [only(tmp_path / name, "results.json").read_bytes() for name in ("killed", "whole")]
+    assert results[0] == results[1]
+    records = [read_journal(only(tmp_path / name, "journal.jsonl"))[1] for name in ("killed", "whole")]
+    assert [r.fingerprint for r in records[0]] == [r.fingerprint for r in records[1]]
