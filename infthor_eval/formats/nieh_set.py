@@ -33,13 +33,18 @@ class LeftOut:
 
 
 class NiehSet:
-    """Questions and frames of one folder. Trajectories are read when first asked for, and then kept."""
+    """Questions and frames of one folder. Trajectories are read when first asked for, and then kept.
+
+    Attributes:
+        root: the folder.
+        simulator: what rendered the frames ("embedded", "unity"); None where the set does not say.
+    """
 
     def __init__(self, root: Path) -> None:
         """Read the questions of the set in `root`.
 
         Raises:
-            DataError: there is no such set, or a question file is not what the format says.
+            DataError: there is no such set, it is of another version, or a question file is not what the format says.
         """
         if not root.is_dir():
             raise DataError(f"{root}: no such folder; give an NIEH set with --data")
@@ -49,6 +54,7 @@ class NiehSet:
             raise DataError(f"{root}: no qa_set*.csv in it; an NIEH set has question files beside metadata/")
         if not (root / "metadata").is_dir():
             raise DataError(f"{root}: no metadata/ in it; unpack the set's metadata.tar there")
+        self.simulator = simulator_of(root)
         self._read = tuple(question for file in self._files for question in read_questions(file))
         self._frames: dict[str, dict[int, FrameRef]] = {}
         self._whole: dict[str, tuple[FrameRef, ...]] = {}  # shared by all questions on the whole trajectory
@@ -85,15 +91,6 @@ class NiehSet:
             for index, frame in self._trajectory(traj_id).items():
                 digest.update(f"{traj_id}/{index}:{frame.path.name}:{frame.path.stat().st_size}\n".encode())
         return digest.hexdigest()
-
-    @property
-    def simulator(self) -> str | None:
-        """What rendered the frames ("embedded", "unity"); None where the set does not say.
-
-        Raises:
-            DataError: `set.json` is not a JSON object.
-        """
-        return simulator_of(self.root)
 
     def reasons(self) -> Counter[str]:
         """How many questions were left out, by reason."""

@@ -1,12 +1,15 @@
-"""`set.json` of an NIEH set: what rendered its frames."""
+"""`set.json` of an NIEH set: the format of its files, and what rendered its frames."""
 
 import json
 from pathlib import Path
+from typing import Any
 
+import infthor_eval
 from infthor_eval.errors import DataError
 
-__all__ = ["claim_for_simulator", "simulator_of"]
+__all__ = ["FORMAT", "claim_for_simulator", "simulator_of"]
 
+FORMAT = 1  # rises when files of a set that we write change their meaning
 _FILE = "set.json"
 
 
@@ -14,26 +17,47 @@ def simulator_of(root: Path) -> str | None:
     """What rendered the frames of the set ("embedded", "unity"); None where it does not say, as published sets.
 
     Raises:
-        DataError: `set.json` is not a JSON object.
+        DataError: `set.json` is not a JSON object, or is of another version than this one reads.
     """
     path = root / _FILE
-    if not path.is_file():
-        return None
-    try:
-        info = json.loads(path.read_text(encoding="utf-8"))
-        return str(info["simulator"]) if "simulator" in info else None
-    except (ValueError, TypeError) as error:
-        raise DataError(f"{path}: not a JSON object ({error}); write the set again") from error
+    simulator = _read(path).get("simulator") if path.is_file() else None
+    return None if simulator is None else str(simulator)
 
 
 def claim_for_simulator(root: Path, simulator: str) -> None:
     """Say what renders the frames of a set that is about to be written or continued.
 
     Raises:
-        DataError: another simulator has rendered the frames that are there.
+        DataError: another simulator, or another version of this one, has rendered the frames that are there.
     """
-    known = simulator_of(root)
-    if known is None:
-        (root / _FILE).write_text(json.dumps({"simulator": simulator}) + "\n", encoding="utf-8")
-    elif known != simulator:
-        raise DataError(f"{root}: its frames are of the {known} simulator; give another folder for the {simulator} one")
+    path, version = root / _FILE, infthor_eval.__version__
+    if not path.is_file():
+        info = {"format": FORMAT, "simulator": simulator, "infthor_eval": version}
+        path.write_text(json.dumps(info) + "\n", encoding="utf-8")
+        return
+    known = _read(path)
+    if known.get("simulator") != simulator:
+        raise DataError(
+            f"{root}: its frames are of the {known.get('simulator')} simulator; "
+            f"give another folder for the {simulator} one"
+        )
+    if known.get("infthor_eval") != version:
+        raise DataError(
+            f"{root}: its frames were made by version {known.get('infthor_eval')}, this is {version}; "
+            "give another folder"
+        )
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        info = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise DataError(f"{path}: not JSON ({error}); write the set again") from error
+    if not isinstance(info, dict):
+        raise DataError(f"{path}: not a JSON object; write the set again")
+    if info.get("format", FORMAT) != FORMAT:
+        raise DataError(
+            f"{path}: the set is of format {info['format']}, this version reads {FORMAT}; "
+            "use the version that made it, or make the set again"
+        )
+    return info

@@ -1,5 +1,6 @@
 """generate, replay and questions, one after the other as a person types them."""
 
+import gzip
 import json
 import shutil
 
@@ -70,6 +71,53 @@ def test_bad_input_is_one_line(arguments, words, tmp_path, monkeypatch, run):
     assert code in {1, 2}
     assert words in err
     assert "Traceback" not in err
+
+
+def test_an_action_on_an_object_that_is_not_there_is_told_by_its_step(made, tmp_path, run):
+    document = json.loads(next((made / "trajectories").glob("*.json")).read_text())
+    actions = document["plan"]["low_actions"]
+    step = next(index for index, low in enumerate(actions) if low["api_action"]["action"] == "PickupObject")
+    actions[step]["api_action"]["objectId"] = "Teapot|+00.00|+01.00|+00.00"
+    (tmp_path / "odd.json").write_text(json.dumps(document))
+    code, out, err = run("replay", tmp_path / "odd.json", "--out", tmp_path / "set")
+    assert code == 0, err
+    line = next(line for line in out.splitlines() if line.startswith("diverged: "))
+    assert f"step {step}: PickupObject" in line
+    assert "Teapot" in line
+
+
+def test_a_scene_in_which_no_task_can_be_done_is_one_line_and_leaves_no_file(tmp_path, run):
+    data = tmp_path / "data"
+    assert run("scenes", "dump", "kitchen-5", "--embedded", "--out", data)[0] == 0
+    path = data / "thor_scenes" / "objects.jsonl.gz"
+    scene = json.loads(gzip.decompress(path.read_bytes()))
+    bare = [item for item in scene["objects"] if not item["pickupable"]]
+    path.write_bytes(gzip.compress(json.dumps(scene | {"scene": "FloorPlan7", "objects": bare}).encode()))
+    for layout in (data / "alfred" / "layouts").iterdir():
+        layout.rename(layout.with_name(layout.name.replace("kitchen-5", "FloorPlan7")))
+    code, _, err = run("generate", "--scene", "FloorPlan7", "--data", data, "--out", tmp_path / "out")
+    assert code == 1
+    (line,) = err.strip().splitlines()
+    assert line.startswith("not made: scene FloorPlan7, seed 0: no further task works after 0 steps")
+    assert line.endswith("choose another scene or seed")
+    assert not list((tmp_path / "out").iterdir())
+
+
+def test_a_set_of_another_version_is_neither_continued_nor_asked_about(made, tmp_path, run):
+    shutil.copytree(made / "set", tmp_path / "set")
+    (tmp_path / "set/set.json").write_text('{"format": 2, "simulator": "embedded"}')
+    before = sorted((tmp_path / "set").rglob("*"))
+    for arguments in (
+        ("replay", made / "trajectories", "--out", tmp_path / "set"),
+        ("questions", tmp_path / "set", "--out", tmp_path / "set/qa_set_new.csv"),
+        ("--model", "oracle", "--tasks", "nieh_gt", "--data", tmp_path / "set", "--output", tmp_path / "runs"),
+    ):
+        code, _, err = run(*arguments)
+        assert code == 2
+        (line,) = err.strip().splitlines()
+        assert "set.json: the set is of format 2, this version reads 1" in line
+    assert sorted((tmp_path / "set").rglob("*")) == before
+    assert not (tmp_path / "runs").exists()
 
 
 def test_bathrooms_are_left_out_of_test_sets(tmp_path, run):

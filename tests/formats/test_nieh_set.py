@@ -5,6 +5,7 @@ import pytest
 from infthor_eval.errors import DataError
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question
+from infthor_eval.formats.set_info import claim_for_simulator
 
 SOUND = Question("t", "Is there a mug?", (1,), ("yes",))
 
@@ -113,6 +114,24 @@ def test_the_simulator_is_what_the_set_says(make_nieh_set):
     assert NiehSet(root).simulator is None
     (root / "set.json").write_text('{"simulator": "embedded"}')
     assert NiehSet(root).simulator == "embedded"
-    (root / "set.json").write_text("[")
+    (root / "set.json").write_text("[]")
     with pytest.raises(DataError, match="not a JSON object"):
-        _ = NiehSet(root).simulator
+        NiehSet(root)
+
+
+def test_a_set_of_another_version_is_refused(make_nieh_set):
+    root = make_nieh_set([SOUND])
+    (root / "set.json").write_text('{"format": 99, "simulator": "embedded"}')
+    with pytest.raises(DataError, match=r"set\.json: the set is of format 99, this version reads 1; use the version"):
+        NiehSet(root)
+
+
+def test_a_set_is_continued_by_the_same_simulator_of_the_same_version_alone(tmp_path):
+    claim_for_simulator(tmp_path, "embedded")
+    claim_for_simulator(tmp_path, "embedded")
+    with pytest.raises(DataError, match="of the embedded simulator; give another folder for the unity one"):
+        claim_for_simulator(tmp_path, "unity")
+    info = json.loads((tmp_path / "set.json").read_text())
+    (tmp_path / "set.json").write_text(json.dumps(info | {"infthor_eval": "0.0.1"}))
+    with pytest.raises(DataError, match=r"made by version 0\.0\.1, this is"):
+        claim_for_simulator(tmp_path, "embedded")

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from infthor_eval.errors import DataError
 from infthor_eval.formats.question import Question
+from infthor_eval.formats.set_info import simulator_of
 from infthor_eval.formats.step_log import read_steps
 from infthor_eval.generation.questions import (
     contents,
@@ -64,8 +65,9 @@ def make_questions(folder: Path, *, seed: int = 0, per_trajectory: int = 25, sha
         The questions; trajectories whose log cannot be read are named in it.
 
     Raises:
-        DataError: the set has no trajectory.
+        DataError: the set has no trajectory, or is of another version.
     """
+    simulator_of(folder)
     made = Made()
     histories = []
     for path in _folders(folder):

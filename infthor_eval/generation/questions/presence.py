@@ -1,8 +1,9 @@
 """Object presence: "Is there a mug in this place?"
 
-A no-question names a type that nowhere exists in the trajectory's scene and is not easily taken for one that does. No
-frame proves an absence, so it carries a sampled frame instead of evidence: one, as a yes-question has one, because
-else the number of frames would give the answer away.
+A no-question names a type that nowhere exists in the trajectory's scene and is not easily taken for one that does:
+one that other trajectories of the set have, so that its name does not give the answer away, and where there are few
+of these, another of AI2-THOR's. No frame proves an absence, so it carries a sampled frame instead of evidence: one, as
+a yes-question has one, because else the number of frames would give the answer away.
 """
 
 import random
@@ -15,6 +16,7 @@ from infthor_eval.generation.wording import an, noun
 __all__ = ["KIND", "absent", "present"]
 
 KIND = "object_presence"
+_FEW = 8  # types of other trajectories below which AI2-THOR's join them
 _BUSY = 3  # objects that a sampled frame shows at least, where the trajectory has such frames
 _FORM = "Did you see {}?"
 
@@ -23,6 +25,17 @@ _UNASKED = frozenset(
     {"Floor", "Wall", "Ceiling", "Window", "Door", "Doorway", "DoorFrame", "StoveBurner", "StoveKnob", "LightSwitch"}
     | {"Faucet", "ShowerHead", "ShowerGlass", "ShowerDoor", "Undefined", "Shelf", "ShelvingUnit", "Stool", "Curtains"}
     | {"Blinds", "ToiletPaperHanger", "TowelHolder", "HandTowelHolder", "TargetCircle", "Cart", "Desktop", "RoomDecor"}
+)
+_COMMON = frozenset(
+    {"AlarmClock", "Apple", "ArmChair", "BaseballBat", "BasketBall", "Bed", "Book", "Boots", "Bottle", "Bowl", "Box"}
+    | {"Bread", "Cabinet", "Candle", "CellPhone", "Chair", "Cloth", "CoffeeMachine", "CoffeeTable", "CounterTop", "CD"}
+    | {"CreditCard", "Cup", "Desk", "DeskLamp", "DiningTable", "DishSponge", "DogBed", "Drawer", "Dresser", "Dumbbell"}
+    | {"Egg", "FloorLamp", "Fork", "Fridge", "GarbageCan", "HousePlant", "Kettle", "KeyChain", "Knife", "Ladle"}
+    | {"Laptop", "Lettuce", "Microwave", "Mirror", "Mug", "Newspaper", "Ottoman", "Painting", "Pan", "Pencil"}
+    | {"PepperShaker", "Pillow", "Plate", "Plunger", "Pot", "Potato", "RemoteControl", "Safe", "SideTable", "Sink"}
+    | {"SoapBar", "SoapBottle", "Sofa", "Spatula", "SprayBottle", "Statue", "TeddyBear", "Television", "TennisRacket"}
+    | {"TissueBox", "Toaster", "Toilet", "ToiletPaper", "Tomato", "Towel", "TVStand", "VacuumCleaner", "Vase", "Watch"}
+    | {"WateringCan", "WineBottle"}
 )
 _TAKEN_FOR_EACH_OTHER = (
     {"Cup", "Mug", "Bowl", "Vase"},
@@ -63,13 +76,26 @@ def present(history: History) -> Iterator[Candidate]:
 
 
 def absent(history: History, vocabulary: frozenset[str], rng: random.Random) -> Iterator[Candidate]:
-    """No-questions on types of a vocabulary that the scene does not have."""
-    there = history.all_kinds
+    """No-questions on types that the scene does not have.
+
+    Args:
+        history: the trajectory.
+        vocabulary: types of the whole set.
+        rng: samples the frames.
+    """
     frames = [frame for frame in range(len(history)) if _shown(history, frame) >= _BUSY] or [0]
-    for kind in sorted(vocabulary - there):
-        if _asked(kind) and not any(kind in group and group & there for group in _TAKEN_FOR_EACH_OTHER):
-            frame = rng.choice(frames)
-            yield Candidate(KIND, _FORM, (an(noun(kind)),), (frame,), ("no",), (kind,), absence=True)
+    kinds = _missing(history, vocabulary)
+    if len(kinds) < _FEW:
+        kinds |= _missing(history, _COMMON)
+    for kind in sorted(kinds):
+        frame = rng.choice(frames)
+        yield Candidate(KIND, _FORM, (an(noun(kind)),), (frame,), ("no",), (kind,), absence=True)
+
+
+def _missing(history: History, vocabulary: frozenset[str]) -> set[str]:
+    there = history.all_kinds
+    alike = set().union(*(group for group in _TAKEN_FOR_EACH_OTHER if group & there))
+    return {kind for kind in vocabulary - there - alike if _asked(kind)}
 
 
 def _shown(history: History, frame: int) -> int:
