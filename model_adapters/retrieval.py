@@ -1,12 +1,12 @@
 """How near frames and texts are to each other, by a CLIP model: what retrieval contexts choose frames with.
 
 A set has hundreds of thousands of frames, and every question on a trajectory ranks the same ones. So each frame is
-embedded once per process, in batches of a few frames' pixels, and the vectors lie in a temporary file: memory stays
-flat however large the set is.
+embedded once, in batches of a few frames' pixels, and the vectors lie in a file of the user's cache: memory stays flat
+however large the set is, and the next run finds them there.
 """
 
+import hashlib
 import json
-import tempfile
 from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
@@ -18,9 +18,11 @@ import transformers
 
 from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.user_cache import user_cache
 from model_adapters.engine.checkpoint import loading, origin, resolve_device, versions
 from model_adapters.engine.hub import fetch
 from model_adapters.engine.options import CheckpointOptions, EngineOptions
+from model_adapters.vectors import VectorFile
 
 __all__ = ["Retriever", "open_retriever"]
 
@@ -42,6 +44,7 @@ class Retriever:
 
         Raises:
             UsageError: there is none, it cannot be had, or it is not CLIP's.
+            DataError: the user's cache cannot be written.
         """
         try:
             # Old CLIP checkpoints on the hub have no safetensors.
@@ -54,7 +57,8 @@ class Retriever:
             raise UsageError(str(error)) from error
         self._model: Any = model.to(resolve_device(EngineOptions())).eval()
         self._origin = origin(folder, commit, name)
-        self._vectors = _Vectors(model.config.projection_dim)
+        file = user_cache("clip_vectors") / f"{_digest(json.dumps(self.identity(), sort_keys=True))}.f32"
+        self._vectors = VectorFile(file, model.config.projection_dim)
 
     def identity(self) -> dict[str, Any]:
         """All that can change a ranking, as JSON values."""
@@ -80,7 +84,7 @@ class Retriever:
 
     def text(self, text: str) -> np.ndarray:
         """The vector of a text, (dimensions,); what is beyond CLIP's limit (77 tokens) is cut off."""
-        key = f"text: {text}"  # no digest of a frame looks like this
+        key = _digest(f"text: {text}")
         if key not in self._vectors:
             limit = self._model.config.text_config.max_position_embeddings
             inputs = self._tokenizer([text], truncation=True, max_length=limit, return_tensors="pt")
@@ -93,6 +97,10 @@ class Retriever:
         self._vectors.add(keys, torch.nn.functional.normalize(vectors, dim=-1).cpu().numpy())
 
 
+def _digest(text: str) -> str:
+    return hashlib.blake2b(text.encode(), digest_size=16).hexdigest()
+
+
 def _load_model(folder: Path) -> Any:
     kind = transformers.AutoConfig.from_pretrained(folder).model_type
     if kind != "clip":
@@ -102,30 +110,6 @@ def _load_model(folder: Path) -> Any:
     if report["missing_keys"]:  # transformers would leave them random and only warn
         raise ModelError(f"--retriever {folder} lacks {len(report['missing_keys'])} weights; give a whole checkpoint")
     return model
-
-
-class _Vectors:
-    """Vectors by key, in a file that goes when the process ends."""
-
-    def __init__(self, width: int) -> None:
-        self._width = width
-        self._rows: dict[str, int] = {}
-        self._file = tempfile.TemporaryFile()  # noqa: SIM115 - open as long as the vectors are used
-
-    def __contains__(self, key: str) -> bool:
-        return key in self._rows
-
-    def add(self, keys: Sequence[str], vectors: np.ndarray) -> None:
-        """Keep vectors, (keys, width)."""
-        self._file.write(vectors.astype(np.float32).tobytes())
-        self._file.flush()
-        for key in keys:
-            self._rows[key] = len(self._rows)
-
-    def get(self, keys: Sequence[str]) -> np.ndarray:
-        """The vectors of known keys, (keys, width)."""
-        kept = np.memmap(self._file, np.float32, mode="r", shape=(len(self._rows), self._width))
-        return np.asarray(kept[[self._rows[key] for key in keys]])
 
 
 @lru_cache(maxsize=2)

@@ -1,4 +1,4 @@
-"""Where things are kept for the user across runs: fetched data, frames taken from videos."""
+"""Where things are kept for the user across runs: fetched data, frames of videos, vectors of frames."""
 
 import os
 from pathlib import Path

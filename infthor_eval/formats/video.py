@@ -85,7 +85,10 @@ def _decode(path: Path, folder: Path) -> None:
         n_frames = n_sampled = 0
         while video.grab():
             if n_frames >= n_sampled * fps - 0.5:
-                _save(video.retrieve()[1], folder / f"{n_sampled:09d}.png")
+                decoded, pixels = video.retrieve()
+                if not decoded:
+                    raise DataError(f"{path}: frame {n_frames} cannot be decoded; {_MEND}")
+                Image.fromarray(pixels[:, :, ::-1]).save(folder / f"{n_sampled:09d}.png")
                 n_sampled += 1
             n_frames += 1
     finally:
@@ -93,7 +96,3 @@ def _decode(path: Path, folder: Path) -> None:
     if not n_sampled or n_frames < promised - fps:
         raise DataError(f"{path}: only {n_frames} of its {promised} frames can be decoded; {_MEND}")
     (folder / _COUNT).write_text(str(n_sampled))
-
-
-def _save(pixels: "cv2.typing.MatLike", path: Path) -> None:  # type: ignore[name-defined]  # noqa: F821
-    Image.fromarray(pixels[:, :, ::-1]).save(path)

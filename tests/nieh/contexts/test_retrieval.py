@@ -11,6 +11,7 @@ from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question
 from infthor_eval.nieh.contexts import CONTEXTS, Settings, Unfit
+from model_adapters.retrieval import open_retriever
 
 TEXTS = ("Is there a mug?", "Where was the plate?", "What did you put on the table?")
 QUESTIONS = [Question("t", text, (1,), ("yes",)) for text in TEXTS]
@@ -107,6 +108,9 @@ def test_each_frame_is_decoded_once_and_few_at_a_time(noise, make_clip, monkeypa
         shown("memory_frames", root, question, retriever=str(clip))
     assert loaded == [f"{index:09d}.png" for index in range(70)]
     assert batches == [32, 32, 6]
+    open_retriever.cache_clear()  # as in the next process
+    assert shown("clip_retrieval", root, question, retriever=str(clip)) == first
+    assert len(loaded) == 70
 
 
 def test_a_frame_that_cannot_be_decoded_leaves_the_question_out(noise, clip):
