@@ -1,0 +1,113 @@
+"""Whether what the factory makes holds: trajectories with final tasks, replayed in a fresh simulator and checked.
+
+python benchmarks/replayed_trajectories.py --data FOLDER [--procedural 20] [--recorded 20] [--count 100]
+    [--min-steps 300] [--out FOLDER]
+
+Uses the commands as a person does: `generate --test-set`, then `replay`. A trajectory holds if every action of it is
+carried out again, the object log comes out the same in every step, and its final task is about types seen at both ends
+of the log. Stopped and started again with the same --out it goes on.
+"""
+
+import argparse
+import json
+import subprocess
+import sys
+import tempfile
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from infthor_eval.formats.floor_plans import floor_plan_names
+from infthor_eval.formats.step_log import read_steps
+from infthor_eval.formats.trajectory import Trajectory, folder_name, iter_trajectories
+from infthor_eval.generation.final_task import violation
+
+_ROOMS = ("kitchen", "living-room", "bedroom")
+_BATHROOMS = range(401, 431)
+
+
+def main() -> None:
+    """Make, replay and check, and print the counts."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--data", type=Path, required=True, help="folder with recorded floor plans")
+    parser.add_argument("--procedural", type=int, default=20, help="procedural scenes")
+    parser.add_argument("--recorded", type=int, default=20, help="recorded floor plans")
+    parser.add_argument("--count", type=int, default=100, help="trajectories")
+    parser.add_argument("--min-steps", type=int, default=300)
+    parser.add_argument("--out", type=Path, help="kept there; else in a folder that is removed")
+    chosen = parser.parse_args()
+    with tempfile.TemporaryDirectory() as scratch:
+        out = chosen.out or Path(scratch)
+        scenes = procedural(chosen.procedural) + recorded(chosen.data, chosen.recorded)
+        generated = make(scenes, chosen, out / "trajectories")
+        command = ["replay", out / "trajectories", "--data", chosen.data, "--out", out / "set", "--json"]
+        replayed = run(command)
+        trajectories = list(iter_trajectories(out / "trajectories"))
+        same = sum(has_same_log(item, out / "set" / "metadata" / folder_name(item.traj_id)) for item in trajectories)
+    show(generated, replayed, trajectories, same)
+
+
+def procedural(number: int) -> list[str]:
+    """Names of so many procedural scenes, room by room."""
+    return [f"{_ROOMS[index % len(_ROOMS)]}-{1 + index // len(_ROOMS)}" for index in range(number)]
+
+
+def recorded(data: Path, number: int) -> list[str]:
+    """Names of so many recorded floor plans without the bathrooms, evenly out of all."""
+    names = [name for name in floor_plan_names(data) if int(name.removeprefix("FloorPlan")) not in _BATHROOMS]
+    return [names[index * len(names) // number] for index in range(number)]
+
+
+def make(scenes: list[str], chosen: argparse.Namespace, out: Path) -> dict[str, Any]:
+    """Generate: each scene as often as it takes, with another seed each time."""
+    per_scene, more = divmod(chosen.count, len(scenes))
+    total: dict[str, Any] = {"failures": []}
+    for names, count in ((scenes[:more], per_scene + 1), (scenes[more:], per_scene)):
+        if not names or not count:
+            continue
+        options = [word for name in names for word in ("--scene", name)]
+        options += ["--min-steps", str(chosen.min_steps), "--count", str(count), "--test-set", "--data", chosen.data]
+        document = run(["generate", *options, "--out", out, "--json"])
+        total["failures"] += document["failures"]
+    return total
+
+
+def run(arguments: list[Any]) -> dict[str, Any]:
+    """What a command prints with --json."""
+    command = [str(Path(sys.executable).with_name("infthor-eval")), *map(str, arguments)]
+    ended = subprocess.run(command, stdout=subprocess.PIPE, check=False)
+    if not ended.stdout:
+        raise SystemExit(f"{' '.join(command)}: ended with {ended.returncode} and printed nothing")
+    document: dict[str, Any] = json.loads(ended.stdout)
+    return document
+
+
+def has_same_log(trajectory: Trajectory, folder: Path) -> bool:
+    """Whether the replay saw in every step what the making did."""
+    made = [{key: value for key, value in entry.items() if key != "step"} for entry in trajectory.object_log]
+    return made == [msgspec.to_builtins(step.object_log) for step in read_steps(folder)]
+
+
+def show(generated: dict[str, Any], replayed: dict[str, Any], trajectories: list[Trajectory], same: int) -> None:
+    """Print the counts."""
+    tried, accepted = Counter[str](), Counter[str]()
+    for item in trajectories:
+        tried.update((item.gen_info or {})["tried"])
+        accepted.update((item.gen_info or {})["accepted"])
+    print(f"{'task type':45} {'tried':>6} {'accepted':>9} {'retries':>8}")
+    for name in sorted(tried):
+        print(f"{name:45} {tried[name]:6} {accepted[name]:9} {tried[name] - accepted[name]:8}")
+    steps = [len(item.plan.low_actions) for item in trajectories]
+    broken = [found for item in trajectories if (found := violation(item))]
+    print(f"made: {len(trajectories)}, {len({item.scene.floor_plan for item in trajectories})} scenes; ", end="")
+    print(f"{min(steps)} to {max(steps)} steps, {sum(steps)} together; not made: {len(generated['failures'])}")
+    print(f"replayed whole, action for action: {replayed['whole']} of {len(trajectories)}; same object log: {same}")
+    print(f"final tasks that meet the rule of both ends: {len(trajectories) - len(broken)} of {len(trajectories)}")
+    for line in [*generated["failures"], *broken, *map(str, replayed["diverged"]), *map(str, replayed["failures"])]:
+        print(f"  {line}")
+
+
+if __name__ == "__main__":
+    main()
