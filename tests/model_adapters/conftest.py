@@ -1,6 +1,11 @@
-"""Frames and tiny models for the tests of adapters."""
+"""Frames, tiny models and their checkpoints for the tests of adapters, and transformers' own way of running these."""
 
-from collections.abc import Callable, Iterator
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -8,7 +13,44 @@ import pytest
 from PIL import Image
 
 from infthor_eval.formats.frames import FrameRef
-from model_adapters import load
+from model_adapters import Part, load
+
+from .checkpoints import FAMILIES, OTHERS, save
+
+PEERS = Path(sys.prefix) / "test-peers"  # torchvision's Python half, kept out of the environment
+
+# Runs in a process of its own, because the stand-ins for torchvision's compiled half must come before transformers.
+PLAINLY = """
+import json, sys
+import torch
+library = torch.library.Library("torchvision", "DEF")
+for name in ("nms", "qnms"):
+    library.define(name + "(Tensor dets, Tensor scores, float iou_threshold) -> Tensor")
+from PIL import Image
+from transformers import AutoImageProcessor, AutoModelForImageTextToText, AutoProcessor
+
+def answer(processor, model, parts, new):
+    content = [{"type": kind, "text": value} if kind == "text" else {"type": kind} for kind, value in parts]
+    text = processor.apply_chat_template([{"role": "user", "content": content}], add_generation_prompt=True)
+    images = [Image.open(value) for kind, value in parts if kind == "image"]
+    begin = processor.tokenizer.bos_token
+    begun = begin is not None and text.startswith(begin)
+    inputs = processor(text=[text], images=images, add_special_tokens=not begun, return_tensors="pt")
+    output = model.generate(**inputs, do_sample=False, max_new_tokens=new)
+    ids = inputs["input_ids"][0].tolist()
+    return ids, output[0, len(ids):].tolist()
+
+asked, found = json.load(sys.stdin), {}
+for folder, prompts in asked["prompts"].items():
+    processor = AutoProcessor.from_pretrained(folder)
+    processor.image_processor = AutoImageProcessor.from_pretrained(folder, backend="pil")
+    assert type(processor).__name__.endswith("Processor")
+    model = AutoModelForImageTextToText.from_pretrained(folder)
+    found[folder] = [answer(processor, model, parts, asked["new"]) for parts in prompts]
+print(json.dumps(found))
+"""
+
+Answers = Callable[[Mapping[Path, Sequence[Sequence[Part]]], int], dict[Path, list[tuple[list[int], list[int]]]]]
 
 
 @pytest.fixture(scope="session")
@@ -49,3 +91,41 @@ def plain() -> Iterator[Any]:
     model = load("qwen2.5-vl-tiny", {"share_prefix": "false", "chunk_tokens": "1000000"}, seed=0)
     yield model
     model.close()  # type: ignore[union-attr]
+
+
+@pytest.fixture(scope="session")
+def checkpoints(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """Folders of tiny checkpoints by family."""
+    root = tmp_path_factory.mktemp("checkpoints")
+    for name in (*FAMILIES, *OTHERS):
+        save(name, root / name)
+    return {name: root / name for name in (*FAMILIES, *OTHERS)}
+
+
+@pytest.fixture(scope="session")
+def answer_plainly() -> Answers:
+    """Has checkpoints answer by their own whole processor and `generate`, every prompt from its beginning.
+
+    Takes prompts by checkpoint and the number of new tokens; gives token ids of prompt and reply, end token included.
+    """
+
+    def answer(prompts: Mapping[Path, Sequence[Sequence[Part]]], new: int) -> dict[Path, list[Any]]:
+        if not PEERS.is_dir():
+            pytest.skip("torchvision is not set aside in test-peers (make test does it)")
+        asked = {str(folder): [_as_json(parts) for parts in listed] for folder, listed in prompts.items()}
+        run = subprocess.run(
+            [sys.executable, "-c", PLAINLY],
+            input=json.dumps({"new": new, "prompts": asked}),
+            check=True,
+            capture_output=True,
+            text=True,
+            env=os.environ | {"PYTHONPATH": str(PEERS)},
+        )
+        found = json.loads(run.stdout.splitlines()[-1])
+        return {folder: found[str(folder)] for folder in prompts}
+
+    return answer
+
+
+def _as_json(parts: Sequence[Part]) -> list[tuple[str, str]]:
+    return [("text", part) if isinstance(part, str) else ("image", str(part.path)) for part in parts]
