@@ -21,6 +21,7 @@ _REACH = 1.5  # the simulator's visibility distance, metres
 _SIDEWAYS = 32.0  # degrees off the camera's axis; half the field of view is 30
 _TOO_NEAR = 0.5  # closer than this a door may hit the agent and an object fills the frame
 _TRIALS = 30
+_UNSEEN = {"renderImage": False}  # nobody looks at the colours; what is in the frame is told by its id image
 
 
 @dataclass(frozen=True)
@@ -67,7 +68,7 @@ def find_viewpoint(
 
 def reachable(simulator: Simulator) -> Grid:
     """The cells that the agent can reach as things are now."""
-    positions = simulator.query("GetReachablePositions").result or ()
+    positions = simulator.query("GetReachablePositions", **_UNSEEN).result or ()
     return Grid((position["x"], position["z"]) for position in positions)
 
 
@@ -86,11 +87,11 @@ def _shows(view: View, shown: list[str], min_pixels: int) -> bool:
 
 def _comes_into_view(simulator: Simulator, holder: str, inside: str, min_pixels: int) -> bool:
     """Whether opening a receptacle shows an object in it; it is closed again."""
-    opened = simulator.query("OpenObject", objectId=holder)
+    opened = simulator.query("OpenObject", objectId=holder, **_UNSEEN)
     if not opened.success:
         return False
     shown = _shows(opened, [inside], min_pixels)
-    return simulator.query("CloseObject", objectId=holder).success and shown
+    return simulator.query("CloseObject", objectId=holder, **_UNSEEN).success and shown
 
 
 def _candidates(view: View, grid: Grid, focus: ThorObject, distances: dict[Stand, int]) -> Iterator[Viewpoint]:
@@ -132,6 +133,7 @@ def _teleport(simulator: Simulator, grid: Grid, here: View, viewpoint: Viewpoint
         position={"x": x, "y": here.agent.position.y, "z": z},
         rotation={"x": 0.0, "y": float(viewpoint.stand.facing), "z": 0.0},
         horizon=float(viewpoint.horizon),
+        **_UNSEEN,
     )
 
 
@@ -143,4 +145,5 @@ def _return(simulator: Simulator, here: View) -> None:
         rotation={"x": 0.0, "y": here.agent.rotation, "z": 0.0},
         horizon=here.agent.horizon,
         forceAction=True,
+        **_UNSEEN,
     )

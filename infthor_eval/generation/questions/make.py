@@ -23,7 +23,7 @@ from infthor_eval.generation.questions.candidates import Candidate
 from infthor_eval.generation.questions.checker import Checker
 from infthor_eval.generation.questions.history import DEFAULT_SHARE, History
 
-__all__ = ["Made", "make_questions"]
+__all__ = ["Made", "candidates_of", "make_questions"]
 
 
 @dataclass
@@ -80,7 +80,7 @@ def make_questions(folder: Path, *, seed: int = 0, per_trajectory: int = 25, sha
     chooser = _Chooser()
     for history in histories:
         rng = random.Random(f"{seed}/{history.traj_id}")
-        chosen = chooser.choose(_candidates(history, vocabulary, rng), per_trajectory, rng)
+        chosen = chooser.choose(candidates_of(history, vocabulary, rng), per_trajectory, rng)
         checker = Checker(history.steps, share)
         for question in (item.question(history.traj_id) for item in chosen):
             (made.questions if checker.verdict(question).sound else made.doubted).append(question)
@@ -95,7 +95,14 @@ def _folders(folder: Path) -> list[Path]:
     return found
 
 
-def _candidates(history: History, vocabulary: frozenset[str], rng: random.Random) -> list[Candidate]:
+def candidates_of(history: History, vocabulary: frozenset[str], rng: random.Random) -> list[Candidate]:
+    """All questions that the rules make on one trajectory.
+
+    Args:
+        history: the trajectory.
+        vocabulary: object types of the whole set, for what is asked about in vain.
+        rng: samples the frames of absences.
+    """
     return [
         *presence.present(history),
         *presence.absent(history, vocabulary, rng),

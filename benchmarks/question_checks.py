@@ -1,0 +1,65 @@
+"""How far the questions of a set can be trusted: a second opinion on all of them, and what can be had without looking.
+
+python benchmarks/question_checks.py SET [--per-trajectory 25] [--seed 0]
+
+The checker answers every question that the rules can make, from the log, by another way than the rules; then once from
+the entries of the clue frames alone, and once with each clue left out. The bounds are those of the chosen questions.
+"""
+
+import argparse
+import random
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+
+from infthor_eval.formats.question import Question
+from infthor_eval.formats.step_log import read_steps
+from infthor_eval.generation.questions.checker import Checker
+from infthor_eval.generation.questions.history import DEFAULT_SHARE, History
+from infthor_eval.generation.questions.make import candidates_of, make_questions
+from infthor_eval.nieh.scoring import score
+from model_adapters.bounds import Blind, Oracle
+
+_YES_NO = {"yes", "no"}
+
+
+def main() -> None:
+    """Print the checker's verdicts and the bounds."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("set", type=Path)
+    parser.add_argument("--per-trajectory", type=int, default=25)
+    parser.add_argument("--seed", type=int, default=0)
+    chosen = parser.parse_args()
+    check_all(chosen.set)
+    made = make_questions(chosen.set, seed=chosen.seed, per_trajectory=chosen.per_trajectory)
+    print(f"chosen: {len(made.questions)}, by number of clues {made.by_clues()}, by type {made.by_kind()}")
+    yes_no = [item for item in made.questions if item.answers[0] in _YES_NO]
+    for bound in (Oracle(), Blind()):
+        bound.study(made.questions)
+        print(f"{bound.name}, strict: {mean(bound, made.questions):.3f}; yes/no alone {mean(bound, yes_no):.3f}")
+
+
+def check_all(folder: Path) -> None:
+    """Print how often the checker agrees with every candidate, and why not."""
+    histories = [History(path.name, read_steps(path)) for path in sorted((folder / "metadata").iterdir())]
+    vocabulary = frozenset[str]().union(*(history.all_kinds for history in histories))
+    found: Counter[str] = Counter()
+    for history in histories:
+        checker = Checker(history.steps, DEFAULT_SHARE)
+        for candidate in candidates_of(history, vocabulary, random.Random(history.traj_id)):
+            question = candidate.question(history.traj_id)
+            verdict = checker.verdict(question)
+            found.update(["all", *(name for name in ("right", "sufficient", "minimal") if getattr(verdict, name))])
+            if not verdict.sound:
+                print(f"  {question.traj_id}: {question.text} {question.answers} {question.clues}: {verdict}")
+    shares = ", ".join(f"{name} {found[name]}" for name in ("right", "sufficient", "minimal"))
+    print(f"{len(histories)} trajectories, {found['all']} candidates: {shares}")
+
+
+def mean(bound: Oracle | Blind, questions: Sequence[Question]) -> float:
+    """A bound's mean under the strict scorer."""
+    return sum(score(bound.answer(item), item.answers, "strict") for item in questions) / len(questions)
+
+
+if __name__ == "__main__":
+    main()
