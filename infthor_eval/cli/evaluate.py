@@ -13,11 +13,11 @@ from infthor_eval.report import depth_table, nieh_table, summarise
 from infthor_eval.runs import Budget, Observer, Plan, RunOutcome, RunRequest, UnitRecord, execute, plan
 from model_adapters import check_options
 
-__all__ = ["evaluate", "execute_with_progress"]
+__all__ = ["TABLE_WIDTH", "evaluate", "execute_with_progress"]
 
-_TABLE_WIDTH = 150  # on a narrower terminal lines wrap; cut-off numbers would be worse
+TABLE_WIDTH = 150  # on a narrower terminal lines wrap; cut-off numbers would be worse
 _notes = Console(stderr=True, soft_wrap=True)
-_output = Console(soft_wrap=True, width=max(Console().width, _TABLE_WIDTH))
+_output = Console(soft_wrap=True, width=max(Console().width, TABLE_WIDTH))
 
 
 def evaluate(requests: Sequence[RunRequest]) -> int:

@@ -3,12 +3,19 @@ import json
 
 import pytest
 
+from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.formats.qa_csv import read_questions
 from infthor_eval.formats.question import Question
 from model_adapters import load
 
 # Of known skill: which answers each scripted model gets right.
-SKILLS = {"one-clue": lambda q: len(q.clues) == 1, "yes": lambda q: q.answers == ("yes",), "none": lambda q: False}
+SKILLS = {
+    "one-clue": lambda q: len(q.clues) == 1,
+    "yes": lambda q: q.answers == ("yes",),
+    "counter": lambda q: str(q.answers[0]).isdecimal(),
+    "places": lambda q: q.kind in {"location_tracing", "put_action"} and len(q.clues) < 3,
+    "none": lambda q: False,
+}
 QUESTIONS = [
     Question("t", "Is there a mug?", (1,), ("yes",)),
     Question("t", "What is <b>it</b>?", (2,), ("mug",)),
@@ -62,6 +69,27 @@ def test_what_one_model_answers_stays_and_the_rest_is_rejected_or_shown_to_a_per
         *("100.00", "100.00", "-", "100.00")
     ]
     assert run("--model", "oracle", "--tasks", "nieh_gt", "--data", out, "--output", tmp_path / "o")[0] == 0
+
+
+def test_the_bundled_set_keeps_exactly_what_a_model_of_four_can_answer(data, tmp_path, run):
+    bundled, out, models = (
+        packaged_folder("sets/nieh_mini"),
+        tmp_path / "validated",
+        ("yes", "counter", "places", "none"),
+    )
+    code, printed, err = run("validate", bundled, "--models", ",".join(models), "--out", out)
+    assert code == 0, err
+    questions = [item for path in sorted(bundled.glob("qa_set*.csv")) for item in read_questions(path)]
+    known = [item for item in questions if any(SKILLS[name](item) for name in models)]
+    unknown = [item for item in questions if item not in known]
+    alone = {name: [q for q in known if [m for m in models if SKILLS[m](q)] == [name]] for name in models}
+    assert len(known) > 50 and len(unknown) > 20 and all(alone[name] for name in models[:3])
+    assert read_questions(out / "qa_set_validated.csv") == known
+    rejected = {json.loads(line)["question_id"] for line in (out / "rejected.jsonl").read_text().splitlines()}
+    assert rejected == {item.id for item in unknown if len(item.clues) == 1}
+    with (out / "inspection.csv").open(newline="") as file:
+        assert {row["question_id"] for row in csv.DictReader(file)} == {q.id for q in unknown if len(q.clues) > 1}
+    assert f"{len(questions)} questions: {len(known)} kept" in printed
 
 
 def test_the_page_shows_frames_and_lets_no_markup_through(data, tmp_path, run):
