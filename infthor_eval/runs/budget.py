@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from infthor_eval.errors import DataError
+from infthor_eval.errors import DataError, ModelError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.nieh.contexts import Part, context_named
 from infthor_eval.nieh.notes import Notes
@@ -59,8 +59,11 @@ def budget_of(task: str, context: str, work: Work, model: Model, max_new_tokens:
         work: what it asks.
         model: whose tokens.
         max_new_tokens: room for the reply.
+
+    Raises:
+        ModelError: the model can take none of the requests, whatever their length.
     """
-    counts = [_most_tokens(model, parts, max_new_tokens) for parts in _requests(context, work)]
+    counts = _counts(model, _requests(context, work), max_new_tokens)
     limit, before = model.max_tokens, _limit_before(model)
     fitting = [count for count in counts if limit is None or count <= limit]
     return Budget(
@@ -73,6 +76,19 @@ def budget_of(task: str, context: str, work: Work, model: Model, max_new_tokens:
         n_extended=sum(before is not None and count > before for count in fitting),
         n_refused=len(counts) - len(fitting),
     )
+
+
+def _counts(model: Model, requests: Sequence[Sequence[Part]], max_new_tokens: int) -> list[int]:
+    counts: list[int] = []
+    refusals: list[ModelError] = []
+    for parts in requests:
+        try:
+            counts.append(_most_tokens(model, parts, max_new_tokens))
+        except ModelError as error:  # one question's text may be to blame; the run records it as failed
+            refusals.append(error)
+    if refusals and not counts:
+        raise refusals[0]
+    return counts + [0] * len(refusals)
 
 
 def _limit_before(model: Model) -> int | None:

@@ -1,14 +1,20 @@
 """Adapters of families whose checkpoints are loaded: a class per family with nothing but its settings."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import ClassVar
 
+from PIL import Image
+
 from infthor_eval.errors import ModelError
-from model_adapters.engine.checkpoint import load_checkpoint, locate
+from model_adapters.engine.checkpoint import Source, load_checkpoint, locate
 from model_adapters.engine.family import MakeFamily
 from model_adapters.engine.model import TransformersModel
 from model_adapters.engine.options import CheckpointOptions
 
-__all__ = ["CheckpointAdapter"]
+__all__ = ["CheckpointAdapter", "fitting", "load_model"]
+
+_SAMPLE = (300, 300)  # a frame's width and height in the published data
 
 
 class CheckpointAdapter:
@@ -29,7 +35,7 @@ class CheckpointAdapter:
         """Load a checkpoint; nothing in it is random.
 
         Raises:
-            ModelError: it cannot be loaded.
+            ModelError: it cannot be loaded, or is not of one piece.
         """
         source = locate(options)
         found = source.config.model_type
@@ -37,4 +43,44 @@ class CheckpointAdapter:
             raise ModelError(
                 f"{options.pretrained} is a {found} checkpoint, not {' or '.join(cls.model_types)}; try hf-vlm"
             )
-        return TransformersModel(name, load_checkpoint(source, cls.family), options)
+        return load_model(name, source, cls.family)
+
+
+def load_model(name: str, source: Source, family: MakeFamily) -> TransformersModel:
+    """Load a checkpoint of a known family and try it on one frame.
+
+    Args:
+        name: the registry's name.
+        source: the checkpoint.
+        family: makes the family of a model, an image processor and a tokenizer.
+
+    Raises:
+        ModelError: it cannot be loaded, or its processor makes of a frame what its model does not.
+    """
+    loaded, pretrained = load_checkpoint(source, family), source.options.pretrained
+    with fitting(pretrained):
+        n_slots = loaded.family.frame_ids(_SAMPLE).count(loaded.family.slot_id)
+        n_features = len(loaded.family.features([Image.new("RGB", _SAMPLE)])[0])
+    if n_slots != n_features:
+        raise ModelError(
+            f"{pretrained}: the processor makes {n_slots} image tokens of one frame and the model {n_features} "
+            "features; they do not belong to one checkpoint"
+        )
+    return TransformersModel(name, loaded, source.options)
+
+
+@contextmanager
+def fitting(pretrained: str) -> Iterator[None]:
+    """Turn what a model says to the pixels or tokens of another checkpoint's processor into one line.
+
+    Raises:
+        ModelError: the model failed on them.
+    """
+    try:
+        yield
+    except (RuntimeError, ValueError, IndexError) as error:
+        reason = " ".join(str(error).split())[:200]
+        raise ModelError(
+            f"{pretrained}: the model fails on what the processor makes of a frame ({reason}); "
+            "do they belong to one checkpoint?"
+        ) from error

@@ -119,8 +119,9 @@ class Prompter:
         placeholder = self._family.placeholder_id
         if ids.count(placeholder) != len(frames):
             raise ModelError(
-                f"the chat template gives {ids.count(placeholder)} image placeholders for {len(frames)} frames; "
-                "a text must not contain the model's image token, and the template must show every frame"
+                f"the chat template gives {ids.count(placeholder)} image placeholders for {len(frames)} frames; a text "
+                "must not contain the model's image token, and the template must show every frame by it "
+                f"({self._tokenizer.convert_ids_to_tokens(placeholder)})"
             )
         rest = iter(frames)
         return [next(rest) if token == placeholder else token for token in ids]

@@ -3,7 +3,8 @@
 Models of the known families run as these. Of others, the processor tells what a frame's placeholder expands to, and the
 model's `get_image_features` what goes into the slots; before the first reply, token ids and logits are compared with
 what the processor and the plain model make of a sample, so that an architecture that works in another way is refused
-instead of being run wrongly. With share_prefix=false it is run by its own processor and `generate`.
+instead of being run wrongly. With share_prefix=false it is run by its own processor and `generate`; the sample then
+shows only that the two fit each other.
 """
 
 import functools
@@ -22,6 +23,7 @@ from transformers.models.auto.modeling_auto import MODEL_FOR_IMAGE_TEXT_TO_TEXT_
 
 from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.formats.frames import FrameRef
+from model_adapters.engine.adapter import fitting, load_model
 from model_adapters.engine.checkpoint import Source, load_checkpoint, loading, locate
 from model_adapters.engine.family import MakeFamily, Size
 from model_adapters.engine.loaded import Loaded
@@ -94,7 +96,7 @@ class HfVlm:
 
         Raises:
             UsageError: no checkpoint was named.
-            ModelError: it cannot be loaded, sees no images, or cannot share prefixes.
+            ModelError: it cannot be loaded, sees no images, is not of one piece, or cannot share prefixes.
         """
         if not options.pretrained:
             raise UsageError(f"{name} needs pretrained=..., a hub id or a folder")
@@ -105,14 +107,16 @@ class HfVlm:
             raise ModelError(f"{options.pretrained} is a {kind} checkpoint, which sees no images")
         known = _known(source.config)
         if known is not None:
-            return TransformersModel(name, load_checkpoint(source, known), options)
+            return load_model(name, source, known)
         processor = _processor(source)
-        family = functools.partial(ProcessorFamily, processor=processor)
-        if not options.share_prefix:
-            return WholeModel(name, load_checkpoint(source, PlainFamily), processor, options)
-        loaded = load_checkpoint(source, family)
-        model = TransformersModel(name, loaded, options)
-        _compare(model, loaded, processor)
+        model: TransformersModel | WholeModel
+        if options.share_prefix:
+            loaded = load_checkpoint(source, functools.partial(ProcessorFamily, processor=processor))
+            model = TransformersModel(name, loaded, options)
+        else:
+            loaded = load_checkpoint(source, PlainFamily)
+            model = WholeModel(name, loaded, processor, options)
+        _try(model, loaded, processor, options.pretrained)
         return model
 
 
@@ -142,25 +146,26 @@ def _processor(source: Source) -> Any:
 
 
 @torch.inference_mode()
-def _compare(model: TransformersModel, loaded: Loaded, processor: Any) -> None:
-    """Run a sample by the shared machinery and by the processor and the plain model.
+def _try(model: TransformersModel | WholeModel, loaded: Loaded, processor: Any, pretrained: str) -> None:
+    """Run a sample by the processor and the plain model, and see that shared machinery makes the same of it.
 
     Raises:
-        ModelError: they differ in token ids or logits.
+        ModelError: model and processor do not fit, or the shared machinery gives other token ids or logits.
     """
-    kind = loaded.model.config.model_type
-    mend = f"{kind} cannot be run with shared prefixes; use share_prefix=false"
-    with tempfile.TemporaryDirectory() as folder:
+    mend = f"{loaded.model.config.model_type} cannot be run with shared prefixes; use share_prefix=false"
+    shared = None
+    with tempfile.TemporaryDirectory() as folder, fitting(pretrained):
         parts = _sample(Path(folder))
         inputs = processed(processor, loaded.template, parts)
-        units = model.units(parts)
-        if list(token_ids(units)) != inputs["input_ids"][0].tolist():
-            raise ModelError(f"token ids differ from the processor's: {mend}")
-        logits = model.encode(units)
-    weight = loaded.model.get_input_embeddings().weight
-    expected = loaded.model(**inputs.to(weight.device, loaded.model.dtype)).logits[0, -1]
-    difference = (logits - expected).abs().max() / expected.abs().max()
-    if difference > _TOLERANCE.get(loaded.model.dtype, _HALF_TOLERANCE):
+        if isinstance(model, TransformersModel):
+            units = model.units(parts)
+            if list(token_ids(units)) != inputs["input_ids"][0].tolist():
+                raise ModelError(f"token ids differ from the processor's: {mend}")
+            shared = model.encode(units)
+        weight = loaded.model.get_input_embeddings().weight
+        plain = loaded.model(**inputs.to(weight.device, loaded.model.dtype)).logits[0, -1]
+    tolerance = _TOLERANCE.get(loaded.model.dtype, _HALF_TOLERANCE) * plain.abs().max()
+    if shared is not None and (shared - plain).abs().max() > tolerance:
         raise ModelError(f"logits differ from the plain model's: {mend}")
 
 

@@ -110,9 +110,10 @@ def test_a_context_that_is_cut_to_its_size_is_told_as_truncated(make_nieh_set, t
     assert n_frames(tmp_path / "out", "nieh_truncate_head_8k") == [67, 60]
 
 
-def test_the_longest_request_that_is_told_is_the_one_that_is_made(make_nieh_set, tmp_path, run):
-    data = make_nieh_set(n_frames=20)
-    arguments = ["--model", "qwen2.5-vl-tiny", "--tasks", "nieh_full", "--data", data, "--output", tmp_path / "out"]
+@pytest.mark.parametrize("family", ["qwen2.5-vl", "llava-onevision", "deepseek-vl", "pixtral"])
+def test_the_longest_request_that_is_told_is_the_one_that_is_made(make_nieh_set, tmp_path, run, family):
+    data = make_nieh_set()
+    arguments = ["--model", f"{family}-tiny", "--tasks", "nieh_full", "--data", data, "--output", tmp_path / "out"]
     _, _, err = run(*arguments)
     records = read_journal(only(tmp_path / "out", "journal.jsonl"))[1]
     longest = max(record.n_context_tokens for record in records) + 50  # and the room for the reply
