@@ -118,7 +118,7 @@ class DiscreteAction(_Fields, omit_defaults=False):
         return tuple(box) if isinstance(box, list) and len(box) == 4 else None
 
 
-class LowAction(_Fields):
+class LowAction(_Fields, omit_defaults=False):
     """One low-level action."""
 
     api_action: ApiAction

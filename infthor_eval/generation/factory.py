@@ -245,6 +245,7 @@ class _Factory:
             sub_trajs=self._sub_trajs,
             long_horizon_task=self._final,
             object_log=self._log,
+            images=[_image(low) for low in self._low],
             gen_info={
                 "generator": f"infthor-eval {__version__}",
                 "ai2thor": version("ai2thor"),
@@ -298,6 +299,12 @@ class _Factory:
 def _number(scene: str) -> int:
     digits = "".join(letter for letter in scene if letter.isdigit())
     return int(digits) if digits else 0
+
+
+def _image(low: LowAction) -> dict[str, Any]:
+    """The frame after an action, by the name that a replay gives it; frame 0 is before the first action."""
+    assert low.low_idx is not None
+    return {"high_idx": low.high_idx, "low_idx": low.low_idx, "image_name": f"{low.low_idx + 1:09d}.png"}
 
 
 def _vector(value: Any) -> dict[str, float]:

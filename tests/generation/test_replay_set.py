@@ -46,6 +46,11 @@ def test_a_generated_trajectory_replays_whole(generated, tmp_path):
     assert last and all(state.type for state in last.values())
     images = json.loads((folder / "expert_log.json").read_text())["images"]
     assert [image["low_idx"] for image in images[:4]] == [0, 0, 1, 2]
+    document = json.loads(generated.read_text())
+    assert [(image["low_idx"], image["image_name"]) for image in document["images"]] == [
+        (image["low_idx"], image["image_name"]) for image in images[1:]
+    ]
+    assert all({"low_idx", "high_idx", "api_action"} <= set(low) for low in document["plan"]["low_actions"])
     assert (folder / "traj.txt").read_text().startswith("<|goal|>Your main goal: ")
     assert not list((tmp_path / "metadata").glob(".*"))
 
