@@ -136,7 +136,7 @@ class _Factory:
         self._setbacks = Setbacks()
         self._low: list[LowAction] = []
         self._high: list[HighAction] = []
-        self._log: list[dict[str, Any]] = []
+        self._log: list[bytes] = []  # encoded: what is kept of every step must not weigh on the garbage collector
         self._sub_tasks: list[SubTask] = []
         self._sub_trajs: list[SubTrajectory] = []
         self._final: SubTask | None = None
@@ -182,7 +182,7 @@ class _Factory:
     def finish(self) -> None:
         """Add the final task; where none works, another ordinary one comes before it."""
         for _ in range(_LONGER):
-            task = self._first_that_works(ends_of(self._log).allow_task, None)
+            task = self._first_that_works(ends_of(self._decoded_log()).allow_task, None)
             if task is not None:
                 self._final = self._sub_tasks.pop()
                 return
@@ -244,7 +244,7 @@ class _Factory:
             sub_tasks=self._sub_tasks,
             sub_trajs=self._sub_trajs,
             long_horizon_task=self._final,
-            object_log=self._log,
+            object_log=self._decoded_log(),
             images=[_image(low) for low in self._low],
             gen_info={
                 "generator": f"infthor-eval {__version__}",
@@ -293,7 +293,10 @@ class _Factory:
 
     def _note(self, step: int, view: Any = None) -> None:
         entry = object_log(view or self._simulator.view)
-        self._log.append({"step": step, **msgspec.to_builtins(entry)})
+        self._log.append(msgspec.json.encode({"step": step, **msgspec.to_builtins(entry)}))
+
+    def _decoded_log(self) -> list[dict[str, Any]]:
+        return [msgspec.json.decode(entry) for entry in self._log]
 
 
 def _number(scene: str) -> int:

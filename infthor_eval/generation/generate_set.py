@@ -7,6 +7,7 @@ from typing import Any
 
 from infthor_eval.errors import InfthorError, UsageError
 from infthor_eval.formats.trajectory import encode_trajectory, iter_sources
+from infthor_eval.generation.collecting import libraries_set_aside
 from infthor_eval.generation.factory import Settings, Statistics, generate
 from infthor_eval.generation.pddl import DOMAIN
 from infthor_eval.thor.simulator import Simulator
@@ -62,7 +63,8 @@ def generate_set(
         path = out / f"{job.traj_id}.json"
         try:
             there = path.exists()
-            result.steps += _earlier(path, job) if there else _make(path, job, simulator, result.statistics)
+            with libraries_set_aside():
+                result.steps += _earlier(path, job) if there else _make(path, job, simulator, result.statistics)
         except InfthorError as error:
             result.failures.append(str(error))
         else:

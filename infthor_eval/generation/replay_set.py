@@ -20,6 +20,7 @@ import msgspec
 from infthor_eval.errors import DataError, InfthorError, SimulatorError
 from infthor_eval.formats.set_info import claim_for_simulator
 from infthor_eval.formats.trajectory import Source, Trajectory, folder_name, iter_sources
+from infthor_eval.generation.collecting import libraries_set_aside
 from infthor_eval.generation.replay import Overlap, Replayed, replay
 from infthor_eval.thor.simulator import Simulator
 
@@ -161,7 +162,8 @@ def replay_set(
     summary = Summary(failures=list(selection.failures))
     for source, trajectory in selection.items:
         try:
-            report, new = _one(source, trajectory, simulator, metadata, frames)
+            with libraries_set_aside():
+                report, new = _one(source, trajectory, simulator, metadata, frames)
         except InfthorError as error:
             summary.failures.append(Failure(source.place, f"{trajectory.traj_id}: {error}"))
         else:

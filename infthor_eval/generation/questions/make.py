@@ -123,7 +123,7 @@ class _Chooser:
 
     def __init__(self) -> None:
         self._groups: Counter[str] = Counter()
-        self._clues: Counter[tuple[str, int]] = Counter()
+        self._clues: Counter[int] = Counter()
         self._answers: Counter[tuple[str, str]] = Counter()
         self._subjects: Counter[tuple[str, str]] = Counter()
 
@@ -155,7 +155,7 @@ class _Chooser:
     def _note(self, item: Candidate) -> None:
         group = _group(item)
         self._groups[group] += 1
-        self._clues[group, _clue_class(item)] += 1
+        self._clues[_clue_class(item)] += 1
         self._subjects.update((group, subject) for subject in item.subjects)
         if item.is_closed:
             self._answers[item.form, str(item.answers[0])] += 1
@@ -163,7 +163,7 @@ class _Chooser:
     def _use(self, item: Candidate) -> tuple[int, int, int]:
         group = _group(item)
         subjects = sum(self._subjects[group, subject] for subject in item.subjects)
-        return self._groups[group], self._clues[group, _clue_class(item)], subjects
+        return self._groups[group], self._clues[_clue_class(item)], subjects
 
 
 def _group(item: Candidate) -> str:
