@@ -62,12 +62,33 @@ def token_ids(units: Iterable[Unit]) -> Iterator[int]:
             yield from unit.ids
 
 
-def render(tokenizer: Any, template: str, parts: Sequence[Part]) -> str:
+def render(tokenizer: Any, template: str, parts: Sequence[Part], image_token: str) -> str:
     """The chat template over one user turn of these parts, asking for the reply.
+
+    Some templates (LLaVA's) write all images before all texts. Where that would take frames out of the places between
+    texts, the turn is given to them as one text with the image's token in it.
+
+    Args:
+        tokenizer: the checkpoint's.
+        template: its chat template (Jinja).
+        parts: the turn.
+        image_token: what the template writes for an image.
 
     Raises:
         ModelError: the template leaves a text out.
     """
+    text = _rendered(tokenizer, template, parts)
+    for part in parts:
+        if isinstance(part, str) and part.strip() not in text:
+            raise ModelError(f"the chat template leaves out the text {part.strip()[:40]!r}; it cannot be used")
+    n_frames = sum(isinstance(part, FrameRef) for part in parts)
+    if text.count(image_token) != n_frames or _keeps_order(text, parts, image_token):
+        return text
+    inline = "".join(part if isinstance(part, str) else image_token for part in parts)
+    return _rendered(tokenizer, template, [inline])
+
+
+def _rendered(tokenizer: Any, template: str, parts: Sequence[Part]) -> str:
     # Most templates read a text under "text", a few under "content".
     content = [
         {"type": "text", "text": part, "content": part} if isinstance(part, str) else {"type": "image"}
@@ -79,10 +100,19 @@ def render(tokenizer: Any, template: str, parts: Sequence[Part]) -> str:
         tokenize=False,
         add_generation_prompt=True,
     )
-    for part in parts:
-        if isinstance(part, str) and part.strip() not in text:
-            raise ModelError(f"the chat template leaves out the text {part.strip()[:40]!r}; it cannot be used")
     return text
+
+
+def _keeps_order(text: str, parts: Sequence[Part], image_token: str) -> bool:
+    """Whether the parts stand in a rendered text one after the other."""
+    at = 0
+    for part in parts:
+        written = part.strip() if isinstance(part, str) else image_token
+        at = text.find(written, at)
+        if at < 0:
+            return False
+        at += len(written)
+    return True
 
 
 def begins(tokenizer: Any, text: str) -> bool:
@@ -103,6 +133,7 @@ class Prompter:
         self._tokenizer = tokenizer
         self._template = template
         self._family = family
+        self._image_token: str = tokenizer.convert_ids_to_tokens(family.placeholder_id)
         self._frames: dict[str, Frame] = {}
         self._ids: dict[Size, tuple[int, ...]] = {}
 
@@ -114,14 +145,14 @@ class Prompter:
             ModelError: the tokenised template does not hold one placeholder per frame.
         """
         frames = [self._frame(part) for part in parts if isinstance(part, FrameRef)]
-        text = render(self._tokenizer, self._template, parts)
+        text = render(self._tokenizer, self._template, parts, self._image_token)
         ids: list[int] = self._tokenizer(text, add_special_tokens=not begins(self._tokenizer, text))["input_ids"]
         placeholder = self._family.placeholder_id
         if ids.count(placeholder) != len(frames):
             raise ModelError(
                 f"the chat template gives {ids.count(placeholder)} image placeholders for {len(frames)} frames; a text "
                 "must not contain the model's image token, and the template must show every frame by it "
-                f"({self._tokenizer.convert_ids_to_tokens(placeholder)})"
+                f"({self._image_token})"
             )
         rest = iter(frames)
         return [next(rest) if token == placeholder else token for token in ids]

@@ -38,7 +38,7 @@ def processed(processor: Any, template: str, parts: Sequence[Part]) -> Any:
     Raises:
         DataError: a frame cannot be read.
     """
-    text = render(processor.tokenizer, template, parts)
+    text = render(processor.tokenizer, template, parts, image_token(processor))
     images = [part.load() for part in parts if isinstance(part, FrameRef)]
     return processor(
         text=[text],

@@ -30,7 +30,13 @@ from PIL import Image
 from transformers import AutoImageProcessor, AutoModelForImageTextToText, AutoProcessor
 
 def answer(processor, model, parts, new):
-    content = [{"type": kind, "text": value} if kind == "text" else {"type": kind} for kind, value in parts]
+    kinds = [kind for kind, value in parts]
+    if model.config.model_type == "llava_onevision" and kinds != sorted(kinds):
+        # Its template writes images before texts; who wants them in between writes their token into the text.
+        inline = "".join(value if kind == "text" else processor.image_token for kind, value in parts)
+        content = [{"type": "text", "text": inline}]
+    else:
+        content = [{"type": kind, "text": value} if kind == "text" else {"type": kind} for kind, value in parts]
     text = processor.apply_chat_template([{"role": "user", "content": content}], add_generation_prompt=True)
     images = [Image.open(value) for kind, value in parts if kind == "image"]
     begin = processor.tokenizer.bos_token

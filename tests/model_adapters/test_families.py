@@ -84,3 +84,19 @@ def test_pixtral_refuses_another_llava(checkpoints: dict[str, Path], tmp_path: P
     model.config.vision_config.model_type = "clip_vision_model"
     with pytest.raises(ModelError, match="without Pixtral's vision tower"):
         pixtral.family(model, pixtral.image_processor(), tokenizer)
+
+
+def test_frames_stay_between_texts_though_the_template_writes_images_first(frames: list[FrameRef]) -> None:
+    model = load("llava-onevision-tiny", {}, seed=0)
+    units = model.units(("Goal: wash. ", frames[0], "MoveAhead. ", frames[1], "What now?"))
+    ids = [
+        unit if isinstance(unit, int) else model._loaded.tokenizer.convert_tokens_to_ids("<image>") for unit in units
+    ]
+    written = model._loaded.tokenizer.decode(ids)
+    assert "Goal: wash. <image>MoveAhead. <image>What now?" in written
+    talk = model.conversation()
+    talk.append("Goal: wash. ", frames[0], "MoveAhead. ")
+    talk.reply(1)
+    talk.append(frames[1], "What now?")
+    assert talk.reply(1).n_cached_tokens > model.tokens_per_frame(frames[0])
+    model.close()
