@@ -1,8 +1,7 @@
 """A small kitchen made by hand, for tests that need no simulator."""
 
 from infthor_eval.thor.view import Box, Vector
-
-from .views import thing, view
+from tests.thor.views import thing, view
 
 SIZE = Box(Vector(), Vector(1.0, 1.0, 1.0))
 COUNTER = thing("CounterTop|+00.00|+00.90|+00.00", receptacle=True, axis_aligned_bounding_box=SIZE)
