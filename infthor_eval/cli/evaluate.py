@@ -9,7 +9,7 @@ import msgspec
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from infthor_eval.report import depth_table, nieh_table, summarise
+from infthor_eval.report import answers_table, depth_table, nieh_table, summarise
 from infthor_eval.runs import Budget, Observer, Plan, RunOutcome, RunRequest, UnitRecord, execute, plan
 from model_adapters import check_options
 
@@ -37,7 +37,7 @@ def evaluate(requests: Sequence[RunRequest]) -> int:
         _write_json(outcome.folder / "results.json", summary)
         outcomes.append(outcome)
         summaries.append(summary)
-    for table in (depth_table(summaries), nieh_table(summaries)):
+    for table in (depth_table(summaries), nieh_table(summaries), answers_table(summaries)):
         if table is not None:
             _output.print(table)
     for outcome in outcomes:

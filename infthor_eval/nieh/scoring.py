@@ -23,7 +23,7 @@ from word2number import w2n
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.question import Answer
 
-__all__ = ["SCORERS", "Scorer", "score"]
+__all__ = ["SCORERS", "Scorer", "says_number", "says_yes_or_no", "score"]
 
 Scorer = Literal["reference", "strict"]
 SCORERS: tuple[Scorer, ...] = ("reference", "strict")
@@ -52,6 +52,16 @@ def score(response: str, answers: Sequence[Answer], scorer: Scorer = "reference"
     if not answers:
         raise UsageError("cannot score against an empty list of gold answers; give at least one")
     return (_reference if scorer == "reference" else _strict)(response, answers)
+
+
+def says_yes_or_no(response: str) -> str | None:
+    """ "yes" or "no" where the strict scorer takes a response for one; None where it is neither, or both."""
+    return next((answer for answer in _YES_NO if _matches_strict(response, answer)), None)
+
+
+def says_number(response: str) -> bool:
+    """Whether both scorers read a response as a number."""
+    return _is_number(_normalise(response))
 
 
 def _reference(response: str, answers: Sequence[Answer]) -> float:

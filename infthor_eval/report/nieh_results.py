@@ -14,6 +14,7 @@ from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.nieh.prompts import last_line
 from infthor_eval.nieh.scoring import SCORERS, Scorer, score
 from infthor_eval.nieh.statistics import Estimate, bootstrap_interval, clustered_mean
+from infthor_eval.report.answer_form import format_failures, yes_no
 from infthor_eval.runs.journal import UnitRecord
 
 __all__ = [
@@ -99,7 +100,8 @@ def _task(records: Sequence[UnitRecord], task: str, identity: Mapping[str, Any])
         "by_question_type": _grouped(of_task, lambda record: record.question_type or "untyped"),
         "by_variant": _grouped(of_task, lambda record: record.variant or "-"),
         "left_out": _left_out(of_task, identity["left_out"]),
-        "yes_no": _yes_no(of_task),
+        "yes_no": yes_no(of_task),
+        "format_failures": format_failures(of_task, identity["config"]["generation_kwargs"]["max_gen_toks"]),
         "below_full_marks": {
             scorer: [_name(record) for record in of_task if record_score(record, scorer) < 1.0] for scorer in SCORERS
         },
@@ -117,20 +119,6 @@ def _left_out(records: Sequence[UnitRecord], left_out: Sequence[Mapping[str, str
     means = {str(s): math.fsum(record_score(r, s) for r in records) / n if n else None for s in SCORERS}
     reasons = Counter(item["reason"] for item in left_out)
     return {"n": len(left_out), "by_reason": dict(sorted(reasons.items())), "mean_counting_them_wrong": means}
-
-
-def _yes_no(records: Sequence[UnitRecord]) -> dict[str, Any]:
-    """Bias and form on yes/no questions: a model that always says yes shows here, as does one that says neither."""
-    asked = [record for record in records if [str(answer).lower() for answer in record.answers] in (["yes"], ["no"])]
-    said = [score(last_line(record.reply or ""), ["yes"], "strict") for record in asked]
-    denied = [score(last_line(record.reply or ""), ["no"], "strict") for record in asked]
-    n = len(asked)
-    return {
-        "n": n,
-        "share_gold_yes": sum(str(record.answers[0]).lower() == "yes" for record in asked) / n if n else None,
-        "share_said_yes": sum(said) / n if n else None,
-        "n_neither": n - int(sum(said) + sum(denied)),
-    }
 
 
 def _grouped(records: Sequence[UnitRecord], name_of: Callable[[UnitRecord], str]) -> dict[str, Any]:

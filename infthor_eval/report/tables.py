@@ -10,7 +10,7 @@ from infthor_eval.nieh.scoring import SCORERS
 from infthor_eval.report.comparison import Comparison
 from infthor_eval.report.nieh_results import ABSENCE, CLUE_COLUMNS, PublishedRow, PublishedTable, published_table4
 
-__all__ = ["comparison_table", "depth_table", "nieh_table"]
+__all__ = ["answers_table", "comparison_table", "depth_table", "nieh_table"]
 
 
 def nieh_table(summaries: Sequence[dict[str, Any]]) -> Table:
@@ -116,6 +116,26 @@ def depth_table(summaries: Sequence[dict[str, Any]]) -> Table | None:
 
 def _at_depth(found: dict[str, Any] | None, scorer: str) -> str:
     return f"{100 * found[scorer]['mean']:.2f} ({found['n']})" if found else "-"
+
+
+def answers_table(summaries: Sequence[dict[str, Any]]) -> Table:
+    """The form of the replies: a leaning to yes, and replies that are no answer; a row per run and task."""
+    table = Table(box=box.SIMPLE_HEAD, title="Form of the replies", title_justify="left")
+    for name in ("model", "task"):
+        table.add_column(name, no_wrap=True, overflow="fold")
+    for name in ("yes/no questions", "gold yes, %", "said yes, %", "not in the form asked for"):
+        table.add_column(name, justify="right")
+    for summary in summaries:
+        for task, result in summary["tasks"].items():
+            asked, failures = result["yes_no"], result["format_failures"]
+            shares = [_percent(asked[name]) for name in ("share_gold_yes", "share_said_yes")]
+            said = ", ".join(f"{n} {reason}" for reason, n in failures.items()) or "-"
+            table.add_row(summary["run"]["model"]["name"], task, str(asked["n"]), *shares, said)
+    return table
+
+
+def _percent(share: float | None) -> str:
+    return "-" if share is None else f"{100 * share:.1f}"
 
 
 def comparison_table(rows: Sequence[Comparison], first: str, second: str) -> Table:

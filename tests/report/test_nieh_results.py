@@ -1,6 +1,6 @@
 from rich.console import Console
 
-from infthor_eval.report import nieh_table, summarise
+from infthor_eval.report import answers_table, nieh_table, summarise
 from infthor_eval.runs import UnitRecord
 
 
@@ -21,7 +21,7 @@ def record(number, reply, answers=("mug",), n_clues=1, **changes):
 
 def identity(model="qwen2.5-vl", simulator=None, left_out=()):
     about = {
-        "config": {"dataset_kwargs": {"context": "clues"}},
+        "config": {"dataset_kwargs": {"context": "clues"}, "generation_kwargs": {"max_gen_toks": 50}},
         "simulator": simulator,
         "left_out": [{"question_id": f"x{i}", "variant": "", "reason": reason} for i, reason in enumerate(left_out)],
     }
@@ -29,8 +29,12 @@ def identity(model="qwen2.5-vl", simulator=None, left_out=()):
 
 
 def shown(summary):
+    return lines(nieh_table([summary]))
+
+
+def lines(table):
     console = Console(width=150, record=True, file=open("/dev/null", "w"))  # noqa: SIM115, PTH123
-    console.print(nieh_table([summary]))
+    console.print(table)
     return [line.split() for line in console.export_text().splitlines()]
 
 
@@ -62,6 +66,27 @@ def test_a_leaning_to_yes_and_a_reply_that_is_neither_show():
     records = [record(i, reply, answers=("yes",) if i < 1 else ("no",)) for i, reply in enumerate(replies)]
     found = summarise(identity(), [*records, record(9, "mug")])["tasks"]["nieh_gt"]["yes_no"]
     assert found == {"n": 4, "share_gold_yes": 0.25, "share_said_yes": 0.75, "n_neither": 1}
+
+
+def test_replies_that_are_not_of_the_form_asked_for_are_counted_by_reason():
+    records = [
+        record(0, "yes", answers=("yes",)),
+        record(1, "perhaps", answers=("no",)),
+        record(2, "four", answers=("4",)),
+        record(3, "many", answers=("4",)),
+        record(4, "some text\n", answers=("mug", "plate"), n_reply_tokens=50),
+        record(5, " \n", answers=("no",)),
+        record(6, None, answers=("no",), failure="too long"),
+    ]
+    summary = summarise(identity(), records)
+    assert summary["tasks"]["nieh_gt"]["format_failures"] == {
+        "cut off at the token limit": 1,
+        "empty": 1,
+        "neither yes nor no": 1,
+        "no number": 1,
+    }
+    (row,) = [row for row in lines(answers_table([summary])) if row[:1] == ["qwen2.5-vl"]]
+    assert row[1:5] == ["nieh_gt", "4", "25.0", "25.0"]
 
 
 def test_a_run_of_a_published_model_is_set_against_its_row_unless_its_frames_are_simulated():
