@@ -34,7 +34,7 @@ from infthor_eval.generation.setbacks import Setbacks
 from infthor_eval.generation.symbolic import Operator, Room, room_of
 from infthor_eval.generation.tasks import Task, TaskType, sub_task
 from infthor_eval.thor.restore import restore
-from infthor_eval.thor.simulator import Simulator
+from infthor_eval.thor.simulator import Mark, Simulator
 
 __all__ = ["Made", "Settings", "Statistics", "generate"]
 
@@ -118,7 +118,6 @@ def generate(settings: Settings, simulator: Simulator) -> Made:
     factory.begin()
     while not factory.long_enough():
         factory.extend()
-        factory.put_down()
     if settings.final_task:
         factory.finish()
     return Made(factory.trajectory(), factory.statistics, factory.problems)
@@ -171,7 +170,10 @@ class _Factory:
         return len(self._low) >= settings.min_steps and len(self._high) >= settings.min_subgoals
 
     def extend(self) -> None:
-        """Add one task: the first sampled one that can be planned and carried out."""
+        """Add one task: the first sampled one that can be planned and carried out.
+
+        What it leaves in the hand is put down, as a sub-goal of its own behind the task.
+        """
         if self._first_that_works(lambda _: True, _TRIALS) is None:
             reasons = "; ".join(f"{reason} ({count})" for reason, count in self.statistics.reasons.most_common(3))
             raise UsageError(
@@ -182,23 +184,24 @@ class _Factory:
     def finish(self) -> None:
         """Add the final task; where none works, another ordinary one comes before it."""
         for _ in range(_LONGER):
-            task = self._first_that_works(ends_of(self._decoded_log()).allow_task, None)
+            task = self._first_that_works(ends_of(self._decoded_log()).allow_task, None, is_last=True)
             if task is not None:
                 self._final = self._sub_tasks.pop()
                 return
             self.extend()
-            self.put_down()
         raise UsageError(f"{self._name}: no final task works; choose another scene or seed")
 
-    def _first_that_works(self, allowed: Callable[[Task], bool], trials: int | None) -> Task | None:
+    def _first_that_works(
+        self, allowed: Callable[[Task], bool], trials: int | None, is_last: bool = False
+    ) -> Task | None:
         """Try sampled tasks until one becomes part of the trajectory; None where none does."""
-        task = self._try_sampled(allowed, trials)
+        task = self._try_sampled(allowed, trials, is_last)
         if task is None and self._setbacks:
             self._setbacks.forget()  # before giving up: they may be outdated
-            task = self._try_sampled(allowed, trials)
+            task = self._try_sampled(allowed, trials, is_last)
         return task
 
-    def _try_sampled(self, allowed: Callable[[Task], bool], trials: int | None) -> Task | None:
+    def _try_sampled(self, allowed: Callable[[Task], bool], trials: int | None, is_last: bool) -> Task | None:
         view = self._simulator.view
         kinds = {item.object_type for item in view.objects.values()}
         room = self._setbacks.room(view)
@@ -211,7 +214,7 @@ class _Factory:
             if tried == trials:
                 return None
             tried += 1
-            failure = self._try(task, room, operators)
+            failure = self._try(task, room, operators, is_last)
             if failure is None:
                 return task
             if failure.item is not None:
@@ -219,20 +222,6 @@ class _Factory:
             room = self._setbacks.room(view)
             possible = set(tasks_of(room, kinds))
         return None
-
-    def put_down(self) -> None:
-        """Put a held object down, as a sub-goal of its own outside any task, wherever there is room for it."""
-        room = room_of(self._simulator.view)
-        held = room.start.held
-        if held is None:
-            return
-        places = [
-            place for place in sorted(room.places & room.receptacles) if goes_into(room.types[held], room.types[place])
-        ]
-        self._rng.shuffle(places)
-        for place in places:
-            if self._carry_out([Operator("PutObject", held, place)]) is None:
-                return
 
     def trajectory(self) -> Trajectory:
         """What was made so far."""
@@ -255,12 +244,16 @@ class _Factory:
             },
         )
 
-    def _try(self, task: Task, room: Room, operators: Sequence[Operator]) -> RolloutError | None:
+    def _try(self, task: Task, room: Room, operators: Sequence[Operator], is_last: bool) -> RolloutError | None:
         name = f"{task.kind}{' sliced' if task.sliced else ''}"
         self.statistics.tried[name] += 1
-        low, high = len(self._low), len(self._high)
+        before, low, high = self._simulator.mark(), len(self._low), len(self._high)
         failure = self._carry_out(operators)
+        ends = len(self._low), len(self._high)
+        if failure is None and not is_last:
+            failure = self._put_down()
         if failure is not None:
+            self._go_back(before, low, high)
             self._pool.failed(task)
             return failure
         self.statistics.accepted[name] += 1
@@ -269,10 +262,33 @@ class _Factory:
         self.problems.append(problem(task, room, f"task-{len(self.problems):03d}"))
         described = sub_task(task, self._settings.scene)
         self._sub_trajs.append(
-            SubTrajectory(len(self._sub_tasks), (high, len(self._high)), (low, len(self._low)), described.task_desc)
+            SubTrajectory(len(self._sub_tasks), (high, ends[1]), (low, ends[0]), described.task_desc)
         )
         self._sub_tasks.append(described)
         return None
+
+    def _put_down(self) -> RolloutError | None:
+        """Put a held object down, wherever there is room for it."""
+        room = room_of(self._simulator.view)
+        held = room.start.held
+        if held is None:
+            return None
+        places = [
+            place for place in sorted(room.places & room.receptacles) if goes_into(room.types[held], room.types[place])
+        ]
+        self._rng.shuffle(places)
+        for place in places:
+            if self._carry_out([Operator("PutObject", held, place)]) is None:
+                return None
+        error = RolloutError(f"no place takes {room.types[held]}", held)
+        self.statistics.reasons[str(error)] += 1
+        return error
+
+    def _go_back(self, before: Mark, low: int, high: int) -> None:
+        """Take back what was added since a mark at which there were so many actions and sub-goals."""
+        if len(self._low) > low:
+            self._simulator.rewind(before)
+            del self._low[low:], self._high[high:], self._log[low + 1 :]
 
     def _carry_out(self, operators: Sequence[Operator]) -> RolloutError | None:
         """Run operators; where that fails, the simulator is as it was before and nothing is added."""

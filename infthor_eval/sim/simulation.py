@@ -62,18 +62,18 @@ class Simulation:
         """Makes `world` the present scene; settings stay until the next Initialize."""
         self.cameras.clear()
         self.random = np.random.default_rng(world.seed)
-        self._saved: tuple[World, np.random.Generator] | None = None
+        self._saved: dict[int, tuple[World, np.random.Generator]] = {}
         self._show(world)
 
-    def save(self) -> None:
-        """Keeps a copy of the present state of the scene, in place of an earlier one."""
-        self._saved = copy.deepcopy((self.world, self.random))
+    def save(self, slot: int) -> None:
+        """Keeps a copy of the present state of the scene, in place of an earlier one of this slot."""
+        self._saved[slot] = copy.deepcopy((self.world, self.random))
 
-    def restore(self) -> bool:
-        """Brings the kept state back, which stays kept; False where there is none of this scene."""
-        if self._saved is None:
+    def restore(self, slot: int) -> bool:
+        """Brings the kept state back, which stays kept; False where the slot has none of this scene."""
+        if slot not in self._saved:
             return False
-        world, self.random = copy.deepcopy(self._saved)
+        world, self.random = copy.deepcopy(self._saved[slot])
         # Nothing that was made of the abandoned state may pass for the restored one's.
         newest = max((item.version for w in (self.world, world) for item in w.objects.values()), default=0)
         for item in world.objects.values():

@@ -22,6 +22,7 @@ _LOG = logging.getLogger(__name__)
 _INITIAL = {"gridSize": 0.25, "fieldOfView": 60, "visibilityDistance": 1.5, "snapToGrid": True}
 
 
+_SLOTS = 2  # states that the embedded simulator is asked to keep
 _WALKING = {"MoveAhead", "MoveBack", "MoveLeft", "MoveRight", "RotateLeft", "RotateRight", "LookUp", "LookDown"}
 
 
@@ -77,7 +78,7 @@ class Simulator:
         self._scene: str | dict[str, Any] | None = None
         self._episode: list[tuple[dict[str, Any], bool]] = []
         self._failures = 0
-        self._saved: int | None = None  # length of the episode of which the process keeps a copy
+        self._saved: dict[int, int] = {}  # by slot: length of the episode of which the process keeps a copy
         self._view: View | None = None
         self.restarts = 0
 
@@ -127,7 +128,7 @@ class Simulator:
             SimulatorError: the simulator cannot be started, or refuses the scene.
         """
         self._scene, self._episode, self._failures = scene or self._scene, [], 0
-        self._saved = None
+        self._saved = {}
         while True:
             try:
                 self._view = self._load()
@@ -169,13 +170,16 @@ class Simulator:
         return answer
 
     def mark(self) -> Mark:
-        """Remember where the episode is now, for `rewind`; the last mark is cheap to go back to.
+        """Remember where the episode is now, for `rewind`; the last two marks are cheap to go back to.
 
         The embedded simulator keeps a copy of its state. Unity cannot: there `rewind` may repeat the episode.
         """
-        saved = self.query("SaveState").success
-        self._saved = len(self._episode) if saved else None
-        return Mark(len(self._episode), self.view)
+        length = len(self._episode)
+        if length not in self._saved.values():
+            slot = min(range(_SLOTS), key=lambda slot: self._saved.get(slot, -1))
+            if self.query("SaveState", slot=slot).success:
+                self._saved[slot] = length
+        return Mark(length, self.view)
 
     def rewind(self, mark: Mark) -> View:
         """Bring the world back to where it was at a mark of this episode.
@@ -183,9 +187,10 @@ class Simulator:
         Raises:
             SimulatorError: as `step`.
         """
+        self._saved = {slot: length for slot, length in self._saved.items() if length <= mark.length}
         since = self._episode[mark.length :]
         walked = all(call["action"] in _WALKING for call, _ in since)
-        if (walked and self._walk_back(mark)) or (self._saved == mark.length and self._restore()):
+        if (walked and self._walk_back(mark)) or self._restore(mark.length):
             del self._episode[mark.length :]
             self._view = mark.view
             return mark.view
@@ -195,8 +200,9 @@ class Simulator:
             self.step(**call)
         return self.view
 
-    def _restore(self) -> bool:
-        return self.query("RestoreState").success
+    def _restore(self, length: int) -> bool:
+        slot = next((slot for slot, known in self._saved.items() if known == length), None)
+        return slot is not None and self.query("RestoreState", slot=slot).success
 
     def _walk_back(self, mark: Mark) -> bool:
         """Put the agent where it was; enough where it only walked and looked about since."""
@@ -212,7 +218,7 @@ class Simulator:
 
     def close(self) -> None:
         """Stop the simulator; a later `reset` starts it again."""
-        self._saved = None
+        self._saved = {}
         if self._controller is not None:
             self._controller.stop()
             self._controller = None

@@ -71,3 +71,17 @@ def test_nothing_saved_and_a_saved_state_of_another_scene_are_refused(bench: Ben
     act(bench, action="SaveState")
     act(bench, action="Reset", sceneName="kitchen-3")
     assert "no saved state" in bench.peer.act({"action": "RestoreState"})[0].error
+
+
+def test_slots_are_kept_apart(bench: Bench) -> None:
+    act(bench, action="SaveState", slot=0)
+    first = state(bench)
+    change(bench)
+    act(bench, action="SaveState", slot=1)
+    second = state(bench)
+    assert first != second
+    act(bench, action="RestoreState", slot=0)
+    assert state(bench) == first
+    act(bench, action="RestoreState", slot=1)
+    assert state(bench) == second
+    assert "no saved state" in bench.peer.act({"action": "RestoreState", "slot": 2})[0].error

@@ -60,6 +60,25 @@ def test_rewinding_brings_the_world_back(actions):
         assert all(np.mean(one.frame != other.frame) < 1e-3 for one, other in zip(after, again, strict=True))
 
 
+def test_the_last_two_marks_are_gone_back_to_without_repeating_the_episode(monkeypatch):
+    with Simulator(embedded()) as simulator:
+        simulator.reset(SCENE)
+        monkeypatch.setattr(simulator, "reset", lambda _: pytest.fail("the episode was repeated"))
+        marks, views = [], []
+        for action in ("Crouch", "RotateRight"):
+            simulator.step(action)
+            views.append(simulator.step("MoveAhead"))
+            marks.append(simulator.mark())
+        simulator.step("Stand")
+        for mark, view in reversed(list(zip(marks, views, strict=True))):
+            simulator.rewind(mark)
+            again = simulator.query("Pass")
+            assert again.agent == view.agent
+            assert np.array_equal(again.frame, view.frame)
+            simulator.step("RotateLeft")
+        assert simulator.rewind(marks[0]).agent == views[0].agent
+
+
 @pytest.mark.parametrize("scene", ["FloorPlan9999", "nowhere"])
 def test_an_unknown_scene_is_one_line(scene):
     with Simulator(embedded()) as simulator, pytest.raises(SimulatorError, match=scene) as caught:

@@ -1,0 +1,60 @@
+"""Algorithm 1 on the embedded simulator: what holds between tasks and at the end."""
+
+import pytest
+
+from infthor_eval.errors import UsageError
+from infthor_eval.generation.factory import Settings, generate
+from infthor_eval.generation.final_task import violation
+from infthor_eval.generation.tasks import TaskType
+from infthor_eval.thor.launch import embedded
+from infthor_eval.thor.simulator import Simulator
+
+
+@pytest.fixture(scope="module")
+def simulator():
+    with Simulator(embedded()) as simulator:
+        yield simulator
+
+
+def test_every_task_begins_with_an_empty_hand(simulator):
+    # This room's first lit object, a bowl, finds no place to be put down: the task is taken back.
+    settings = Settings("bedroom-3", 0, 80, 1, kinds=(TaskType.EXAMINE, TaskType.PLACE))
+    made = generate(settings, simulator)
+    trajectory = made.trajectory
+    assert {task.task_info.goal for task in trajectory.sub_tasks} == {"look_at_obj_in_light", "pick_and_place_simple"}
+    assert [entry["step"] for entry in trajectory.object_log] == list(range(len(trajectory.plan.low_actions) + 1))
+    for part in trajectory.sub_trajs:
+        assert trajectory.object_log[part.low_pddl_idx[0]]["inven_obj"] == []
+    assert trajectory.object_log[-1]["inven_obj"] == []
+    assert sum(made.statistics.tried.values()) > sum(made.statistics.accepted.values()) == len(made.problems)
+
+
+def test_sub_goals_and_actions_are_numbered_through(simulator):
+    trajectory = generate(Settings("living-room-2", 5, 60, 4), simulator).trajectory
+    plan = trajectory.plan
+    assert [high.high_idx for high in plan.high_pddl] == list(range(len(plan.high_pddl))) and len(plan.high_pddl) >= 4
+    assert [low.low_idx for low in plan.low_actions] == list(range(len(plan.low_actions))) and len(
+        plan.low_actions
+    ) >= 60
+    owners = [low.high_idx for low in plan.low_actions]
+    assert owners == sorted(owners) and set(owners) == set(range(len(plan.high_pddl)))
+    ends = [0]
+    for part in trajectory.sub_trajs:
+        first, end = part.low_pddl_idx
+        assert ends[-1] <= first < end <= len(plan.low_actions)
+        assert all(part.high_pddl_idx[0] <= owner < part.high_pddl_idx[1] for owner in owners[first:end])
+        ends.append(end)
+
+
+def test_the_final_task_is_about_both_ends_and_comes_last(simulator):
+    trajectory = generate(Settings("kitchen-2", 3, 60, 1, final_task=True), simulator).trajectory
+    assert violation(trajectory) is None
+    assert len(trajectory.sub_trajs) == len(trajectory.sub_tasks) + 1
+    assert trajectory.sub_trajs[-1].subgoal == trajectory.long_horizon_task.task_desc
+    assert trajectory.sub_trajs[-1].low_pddl_idx[1] == len(trajectory.plan.low_actions)
+
+
+def test_a_task_type_that_the_room_offers_nothing_for_is_one_line(simulator):
+    with pytest.raises(UsageError, match=r"scene living-room-1, seed 0: no further task works after 0 steps") as error:
+        generate(Settings("living-room-1", 0, 10, 1, kinds=(TaskType.HEAT,)), simulator)
+    assert "\n" not in str(error.value)
