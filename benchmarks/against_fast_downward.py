@@ -1,0 +1,74 @@
+"""Whether our plans are optimal: their length against the cost that Fast Downward finds for the PDDL we write.
+
+python benchmarks/against_fast_downward.py --fast-downward PATH/fast-downward.py [--problems 60] [--seed 0]
+
+Fast Downward is no dependency: `pip install up-fast-downward` in an environment of its own brings the script
+(`up_fast_downward/downward/fast-downward.py`). It searches with A* and the LM-cut heuristic, which is optimal.
+"""
+
+import argparse
+import random
+import re
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+from infthor_eval.generation.pddl import DOMAIN, problem
+from infthor_eval.generation.planner import plan
+from infthor_eval.generation.sampling import TaskPool
+from infthor_eval.generation.symbolic import Room, room_of
+from infthor_eval.generation.tasks import Task, TaskType
+from infthor_eval.thor.launch import embedded
+from infthor_eval.thor.simulator import Simulator
+
+_SCENES = ("kitchen-1", "kitchen-2", "kitchen-3", "living-room-1", "living-room-2", "bedroom-1", "bedroom-2")
+
+
+def main() -> None:
+    """Plan sampled tasks both ways and print how many costs are equal."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--fast-downward", type=Path, required=True)
+    parser.add_argument("--problems", type=int, default=60)
+    parser.add_argument("--seed", type=int, default=0)
+    chosen = parser.parse_args()
+    equal = 0
+    for number, (task, room) in enumerate(sampled(chosen.problems, chosen.seed)):
+        ours, theirs = len(plan(task, room) or ()), cost(chosen.fast_downward, problem(task, room, f"p{number}"))
+        equal += ours == theirs
+        if ours != theirs:
+            print(f"  {task}: {ours} against {theirs}")
+    print(f"{equal} of {chosen.problems} plans have the cost that Fast Downward finds")
+
+
+def sampled(number: int, seed: int) -> Iterator[tuple[Task, Room]]:
+    """Tasks of all types in the rooms as they are at first, that have a plan and are not done yet."""
+    rng = random.Random(seed)
+    with Simulator(embedded()) as simulator:
+        rooms = []
+        for scene in _SCENES:
+            view = simulator.reset(scene)
+            kinds = {item.object_type for item in view.objects.values()}
+            rooms.append((room_of(view), kinds, TaskPool(TaskType, rng)))
+    for index in range(number):
+        room, kinds, pool = rooms[index % len(rooms)]
+        task = next(task for task in pool.sample(room, kinds) if plan(task, room))
+        pool.used(task)
+        yield task, room
+
+
+def cost(script: Path, text: str) -> int | None:
+    """The cost of an optimal plan for a problem; None where Fast Downward finds none."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        (folder / "domain.pddl").write_text(DOMAIN)
+        (folder / "problem.pddl").write_text(text)
+        command = [sys.executable, script, "domain.pddl", "problem.pddl", "--search", "astar(lmcut())"]
+        ended = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    found = re.search(r"Plan cost: (\d+)", ended.stdout)
+    return int(found[1]) if found else None
+
+
+if __name__ == "__main__":
+    main()
