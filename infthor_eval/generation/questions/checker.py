@@ -134,6 +134,11 @@ def _holder(glimpse: Glimpse, key: str) -> str | None:
     return max(parents, key=depth)
 
 
+def _whole(key: str | None) -> str | None:
+    """Of a part's id ("Sink|x|y|z|SinkBasin") that of the whole."""
+    return None if key is None else "|".join(key.split("|")[:4])
+
+
 def _place(glimpse: Glimpse, key: str) -> str | None:
     holder = _holder(glimpse, key)
     return None if holder is None else _name(glimpse.objects[holder].type)
@@ -285,8 +290,8 @@ def _left_at(seen: Sequence[Glimpse], action: str, place: str, item: str) -> lis
         return _listed(seen, place)
     for previous, moment in pairwise(seen):
         if moment.action == action and moment.target is not None and _target_is(moment, item):
-            holder = _holder(previous, moment.target)
-            return _names(moment, {key for key in moment.objects if _holder(moment, key) == holder})
+            holder = _whole(_holder(previous, moment.target))
+            return _names(moment, {key for key in moment.objects if _whole(_holder(moment, key)) == holder})
     return []
 
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 from infthor_eval.generation.questions.candidates import MANY, Candidate, answer_of, distinct, the, within
 from infthor_eval.generation.questions.evidence import cover
-from infthor_eval.generation.questions.history import Event, History, canonical
+from infthor_eval.generation.questions.history import Event, History, canonical, is_same
 
 __all__ = ["CONTENT", "SLICING", "at_opening", "at_pickup", "at_slicing", "slicings"]
 
@@ -72,7 +72,7 @@ def _contents(
         if history.contents(frame, place) != inside:
             break
         if history.shows(frame, place) and not _others(history, frame, place):
-            shown[frame] = frozenset(key for key in wanted if history.shows(frame, key))
+            shown[frame] = frozenset(key for key in wanted if history.shows_inside(frame, key))
     clues = cover(wanted, shown) if wanted else None
     kinds = sorted(history.world(event.frame)[key].type for key in wanted)
     if clues is not None and len(set(kinds)) == len(kinds) <= MANY and distinct(kinds):
@@ -84,5 +84,6 @@ def _others(history: History, frame: int, place: str) -> bool:
     """Whether a frame shows contents of another receptacle that people would call the same."""
     world = history.world(frame)
     kind = canonical(world[place].type)
-    parents = {history.parent(frame, key) for key in history.seen(frame) if key in world} - {None, place}
-    return any(canonical(world[parent].type) == kind for parent in parents if parent is not None)
+    parents = {history.parent(frame, key) for key in history.seen(frame) if key in world} - {None}
+    others = (parent for parent in parents if parent is not None and not is_same(parent, place))
+    return any(canonical(world[parent].type) == kind for parent in others)

@@ -51,7 +51,7 @@ def _what(history: History, receptacle: str) -> Iterator[Candidate]:
         # A frame that shows something there that left later, even if it came back, tells another story.
         stays = held <= inside and all(frame >= since[key] for key in held)
         if history.shows(frame, receptacle) and stays:
-            shown[frame] = frozenset(key for key in held if history.shows(frame, key))
+            shown[frame] = frozenset(key for key in held if history.shows_inside(frame, key))
     clues = cover(inside, shown) if inside else None
     if clues is None or len(inside) > MANY:
         return
@@ -66,6 +66,6 @@ def _what(history: History, receptacle: str) -> Iterator[Candidate]:
 def _arrival(history: History, item: str, receptacle: str) -> int:
     """The frame from which on the object stays in the receptacle."""
     frame = len(history) - 1
-    while frame > 0 and history.parent(frame - 1, item) == receptacle:
+    while frame > 0 and item in history.contents(frame - 1, receptacle):
         frame -= 1
     return frame

@@ -7,7 +7,7 @@ from functools import cached_property
 from infthor_eval.errors import DataError
 from infthor_eval.formats.step_log import ObjectState, Seen, Step, worlds
 
-__all__ = ["DEFAULT_SHARE", "FRAME_PIXELS", "Event", "History", "Move", "canonical"]
+__all__ = ["DEFAULT_SHARE", "FRAME_PIXELS", "Event", "History", "Move", "canonical", "is_same"]
 
 FRAME_PIXELS = 300 * 300
 DEFAULT_SHARE = 0.001  # of the frame: 90 pixels, about a fork on a table an arm's length away
@@ -175,20 +175,23 @@ class History:
         kind = canonical(self._kind(frame, item))
         world = self.world(frame)
         others = (key for key in self.seen(frame) if key != item and key in world)
-        return not any(canonical(world[key].type) == kind and not _parts(key, item) for key in others)
+        return not any(canonical(world[key].type) == kind and not is_same(key, item) for key in others)
 
     def only_one(self, frame: int, item: str) -> bool:
         """Whether the scene has no other object that people would call the same."""
         world = self.world(frame)
         kind = canonical(world[item].type)
-        return not any(
-            canonical(state.type) == kind and key != item and not _parts(key, item) for key, state in world.items()
-        )
+        return not any(canonical(state.type) == kind and not is_same(key, item) for key, state in world.items())
 
     def contents(self, frame: int, receptacle: str) -> frozenset[str]:
-        """The objects directly in or on a receptacle."""
-        world = self.world(frame)
-        return frozenset(key for key in world if self.parent(frame, key) == receptacle)
+        """The objects directly in or on a receptacle; a sink and its basin are one to people."""
+        parents = {key: self.parent(frame, key) for key in self.world(frame)}
+        return frozenset(key for key, parent in parents.items() if parent is not None and is_same(parent, receptacle))
+
+    def shows_inside(self, frame: int, item: str) -> bool:
+        """Whether a frame shows an object and what it is directly in or on."""
+        parent = self.parent(frame, item)
+        return parent is not None and self.shows(frame, item, parent)
 
     def _kind(self, frame: int, item: str) -> str:
         """The type of an object; one that the action used up was there the frame before."""
@@ -196,9 +199,9 @@ class History:
         return state.type
 
 
-def _parts(one: str, other: str) -> bool:
-    """Whether one is a part of the other, as a basin is of its sink."""
-    return one.startswith(f"{other}|") or other.startswith(f"{one}|")
+def is_same(one: str, other: str) -> bool:
+    """Whether two ids mean one thing, or one of them a part of the other, as a basin is of its sink."""
+    return one == other or one.startswith(f"{other}|") or other.startswith(f"{one}|")
 
 
 def _snapshots(steps: list[Step]) -> Iterator[dict[str, ObjectState]]:
