@@ -8,6 +8,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from infthor_eval.errors import SimulatorError
 from infthor_eval.generation.navigation import Grid, Stand
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import ThorObject, Vector, View
@@ -86,12 +87,17 @@ def _shows(view: View, shown: list[str], min_pixels: int) -> bool:
 
 
 def _comes_into_view(simulator: Simulator, holder: str, inside: str, min_pixels: int) -> bool:
-    """Whether opening a receptacle shows an object in it; it is closed again."""
+    """Whether opening a receptacle shows an object in it, and it can be closed from here; it is closed again."""
     opened = simulator.query("OpenObject", objectId=holder, **_UNSEEN)
     if not opened.success:
         return False
     shown = _shows(opened, [inside], min_pixels)
-    return simulator.query("CloseObject", objectId=holder, **_UNSEEN).success and shown
+    if simulator.query("CloseObject", objectId=holder, **_UNSEEN).success:
+        return shown
+    # Where an open drawer is out of sight it must not stay open: a trajectory has no action that opened it.
+    if not simulator.query("CloseObject", objectId=holder, forceAction=True, **_UNSEEN).success:
+        raise SimulatorError(f"{holder} was opened to look into it and cannot be closed again; choose another scene")
+    return False
 
 
 def _candidates(view: View, grid: Grid, focus: ThorObject, distances: dict[Stand, int]) -> Iterator[Viewpoint]:

@@ -1,13 +1,22 @@
 """Algorithm 1 on the embedded simulator: what holds between tasks and at the end."""
 
+from pathlib import Path
+
+import msgspec
 import pytest
 
 from infthor_eval.errors import UsageError
+from infthor_eval.formats.step_log import read_steps
+from infthor_eval.formats.trajectory import iter_trajectories
 from infthor_eval.generation.factory import Settings, generate
 from infthor_eval.generation.final_task import violation
+from infthor_eval.generation.generate_set import generate_set
+from infthor_eval.generation.replay_set import replay_set, select
 from infthor_eval.generation.tasks import TaskType
 from infthor_eval.thor.launch import embedded
 from infthor_eval.thor.simulator import Simulator
+
+SHARED = Path(__file__).parents[2] / "../shared/data"
 
 
 @pytest.fixture(scope="module")
@@ -50,6 +59,23 @@ def test_the_final_task_is_about_both_ends_and_comes_last(simulator):
     assert len(trajectory.sub_trajs) == len(trajectory.sub_tasks) + 1
     assert trajectory.sub_trajs[-1].subgoal == trajectory.long_horizon_task.task_desc
     assert trajectory.sub_trajs[-1].low_pddl_idx[1] == len(trajectory.plan.low_actions)
+
+
+@pytest.mark.parametrize(("scene", "seed"), [("living-room-3", 2), ("FloorPlan317", 0)])
+def test_looking_for_places_leaves_no_trace(scene, seed, tmp_path):
+    # In the floor plan an open drawer is out of sight from where it was opened to look into it.
+    data = SHARED if scene.startswith("FloorPlan") else None
+    if data is not None and not data.is_dir():
+        pytest.skip("recorded floor plans not at ../shared/data")
+    with Simulator(embedded(data)) as simulator:
+        (path,) = generate_set([Settings(scene, seed, 150, 1)], simulator, tmp_path / "trajectories").paths
+    with Simulator(embedded(data)) as simulator:
+        summary = replay_set(select([path]), simulator, tmp_path / "set").document()
+    assert summary["whole"] == 1, summary["diverged"]
+    trajectory = next(iter_trajectories(path))
+    made = [{key: value for key, value in entry.items() if key != "step"} for entry in trajectory.object_log]
+    steps = read_steps(tmp_path / "set" / "metadata" / trajectory.traj_id)
+    assert made == [msgspec.to_builtins(step.object_log) for step in steps]
 
 
 def test_a_task_type_that_the_room_offers_nothing_for_is_one_line(simulator):
