@@ -122,6 +122,7 @@ class _Chooser:
     """Chooses so that types, forms, answers, numbers of clues and what is asked about are even over the whole set."""
 
     def __init__(self) -> None:
+        self._kinds: Counter[str] = Counter()
         self._groups: Counter[str] = Counter()
         self._clues: Counter[int] = Counter()
         self._answers: Counter[tuple[str, str]] = Counter()
@@ -154,20 +155,21 @@ class _Chooser:
 
     def _note(self, item: Candidate) -> None:
         group = _group(item)
+        self._kinds[item.kind] += 1
         self._groups[group] += 1
         self._clues[_clue_class(item)] += 1
         self._subjects.update((group, subject) for subject in item.subjects)
         if item.is_closed:
             self._answers[item.form, str(item.answers[0])] += 1
 
-    def _use(self, item: Candidate) -> tuple[int, int, int]:
+    def _use(self, item: Candidate) -> tuple[int, int, int, int]:
         group = _group(item)
         subjects = sum(self._subjects[group, subject] for subject in item.subjects)
-        return self._groups[group], self._clues[_clue_class(item)], subjects
+        return self._kinds[item.kind], self._groups[group], self._clues[_clue_class(item)], subjects
 
 
 def _group(item: Candidate) -> str:
-    """What is to be even: question types, and yes and no within one."""
+    """What is to be even within a question type: yes, no, and the rest."""
     return f"{item.kind} {item.answers[0]}" if item.answers[0] in {"yes", "no"} else item.kind
 
 
