@@ -15,7 +15,7 @@ from model_adapters import check_options
 
 __all__ = ["TABLE_WIDTH", "evaluate", "execute_with_progress"]
 
-TABLE_WIDTH = 150  # on a narrower terminal lines wrap; cut-off numbers would be worse
+TABLE_WIDTH = 180  # on a narrower terminal lines wrap; cut-off numbers would be worse
 _notes = Console(stderr=True, soft_wrap=True)
 _output = Console(soft_wrap=True, width=max(Console().width, TABLE_WIDTH))
 

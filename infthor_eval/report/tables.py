@@ -23,7 +23,7 @@ def nieh_table(summaries: Sequence[dict[str, Any]]) -> Table:
     for name in ("model", "task", "scorer"):
         table.add_column(name, no_wrap=True, overflow="fold")
     for name in (*CLUE_COLUMNS, "± 95 %", "bootstrap", ABSENCE, "n", "left out", "failed"):
-        table.add_column(name, justify="right")
+        table.add_column(name, justify="right", overflow="fold")
     for summary in summaries:
         for task, result in summary["tasks"].items():
             for scorer in SCORERS:
