@@ -47,9 +47,10 @@ class Made:
         return dict(sorted(Counter(item.kind or "" for item in self.questions).items()))
 
     def by_clues(self) -> dict[str, int]:
-        """Number of questions by number of clues: 1, 2, >=3."""
-        found = Counter(str(len(item.clues)) if len(item.clues) < 3 else ">=3" for item in self.questions)
-        return {name: found[name] for name in ("1", "2", ">=3")}
+        """Number of questions by number of clues: 1, 2, >=3, and of absences, which have none."""
+        names = ("absence", "1", "2", ">=3")
+        found = Counter(names[min(item.n_clues, 3)] for item in self.questions)
+        return {name: found[name] for name in (*names[1:], names[0])}
 
 
 def make_questions(folder: Path, *, seed: int = 0, per_trajectory: int = 25, share: float = DEFAULT_SHARE) -> Made:
