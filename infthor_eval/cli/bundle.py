@@ -29,7 +29,7 @@ def command(manifest: Path, out: Path) -> int:
         finished, made = make_bundle(wanted, simulator, out, lambda: progress.advance(bar))
     size = sum(path.stat().st_size for path in out.rglob("*") if path.is_file())
     click.echo(f"{len(made.questions)} questions on {made.trajectories} trajectories, {size / 1e6:.1f} MB: {out}")
-    click.echo(f"by type: {made.by_kind()}\nby number of clues: {made.by_clues()}")
+    click.echo(made.words())
     if not wanted.files:
         return 0
     names = wanted.files.keys() | finished.files.keys()

@@ -4,6 +4,8 @@ from pathlib import Path
 
 import click
 
+from infthor_eval.cli.options import table_console
+
 __all__ = ["command"]
 
 
@@ -15,11 +17,9 @@ def command(first: Path, second: Path) -> None:
 
     Questions are paired, intervals and p values are clustered by trajectory.
     """
-    from rich.console import Console
-
     from infthor_eval.report import compare, comparison_table
     from infthor_eval.runs import read_journal
 
     identities, records = zip(*(read_journal(folder / "journal.jsonl") for folder in (first, second)), strict=True)
     names = [identity.get("model", {}).get("name", "?") for identity in identities]
-    Console(soft_wrap=True, width=max(Console().width, 110)).print(comparison_table(compare(*records), *names))
+    table_console().print(comparison_table(compare(*records), *names))

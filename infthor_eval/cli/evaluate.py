@@ -9,15 +9,15 @@ import msgspec
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+from infthor_eval.cli.options import table_console
 from infthor_eval.report import answers_table, depth_table, nieh_table, summarise
 from infthor_eval.runs import Budget, Observer, Plan, RunOutcome, RunRequest, UnitRecord, execute, plan
 from model_adapters import check_options
 
-__all__ = ["TABLE_WIDTH", "evaluate", "execute_with_progress"]
+__all__ = ["evaluate", "execute_with_progress"]
 
-TABLE_WIDTH = 180  # on a narrower terminal lines wrap; cut-off numbers would be worse
 _notes = Console(stderr=True, soft_wrap=True)
-_output = Console(soft_wrap=True, width=max(Console().width, TABLE_WIDTH))
+_output = table_console()
 
 
 def evaluate(requests: Sequence[RunRequest]) -> int:

@@ -3,12 +3,8 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
-
-if TYPE_CHECKING:
-    from infthor_eval.generation.questions.make import Made
 
 __all__ = ["command"]
 
@@ -39,7 +35,8 @@ def command(context: click.Context, folder: Path, out: Path, seed: int, per_traj
     out.parent.mkdir(parents=True, exist_ok=True)
     write_questions(out, made.questions)
     output = Console(soft_wrap=True)
-    output.print(_words(made, out), highlight=False, markup=False)
+    told = f"{len(made.questions)} questions on {made.trajectories} trajectories: {out}\n{made.words()}"
+    output.print(told, highlight=False, markup=False)
     notes = Console(stderr=True, soft_wrap=True)
     for question in made.doubted:
         notes.print(
@@ -48,12 +45,3 @@ def command(context: click.Context, folder: Path, out: Path, seed: int, per_traj
     for line in made.skipped:
         notes.print(f"skipped: {line}", style="red", highlight=False, markup=False)
     context.exit(1 if made.skipped else 0)
-
-
-def _words(made: Made, out: Path) -> str:
-    kinds = ", ".join(f"{name} {count}" for name, count in made.by_kind().items())
-    clues = ", ".join(f"{name}: {count}" for name, count in made.by_clues().items())
-    return (
-        f"{len(made.questions)} questions on {made.trajectories} trajectories: {out}\n"
-        f"by type: {kinds}\nby number of clues: {clues}"
-    )

@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
-from rich.console import Console
 
-from infthor_eval.cli.evaluate import TABLE_WIDTH, execute_with_progress
+from infthor_eval.cli.evaluate import execute_with_progress
+from infthor_eval.cli.options import table_console
 from infthor_eval.errors import DataError
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.qa_csv import write_questions
@@ -20,7 +20,7 @@ from model_adapters import check_options
 
 __all__ = ["validate"]
 
-_output = Console(soft_wrap=True, width=max(Console().width, TABLE_WIDTH))
+_output = table_console()
 
 
 def validate(requests: Sequence[RunRequest], out: Path, decisions_file: Path | None, scorer: Scorer) -> int:

@@ -4,9 +4,10 @@ import hashlib
 from dataclasses import dataclass
 from functools import cached_property
 
-__all__ = ["Answer", "Question"]
+__all__ = ["ABSENCE", "Answer", "Question", "clue_column"]
 
 Answer = str | int | float
+ABSENCE = "absence"  # the column of questions that no frame proves
 
 
 @dataclass(frozen=True)
@@ -39,3 +40,10 @@ class Question:
         """Name of the question, stable under reordering of the file: `<traj_id>/<12 hex digits>`."""
         key = repr((self.text, self.clues, self.answers)).encode()
         return f"{self.traj_id}/{hashlib.blake2b(key, digest_size=6).hexdigest()}"
+
+
+def clue_column(n_clues: int) -> str:
+    """The column of the paper's Table 4 that a question with so many clues belongs to, or that of absences."""
+    if n_clues == 0:
+        return ABSENCE
+    return str(n_clues) if n_clues < 3 else ">=3"

@@ -11,6 +11,7 @@ import yaml
 
 from infthor_eval.errors import DataError
 from infthor_eval.formats.packaged import packaged_folder
+from infthor_eval.formats.question import ABSENCE, clue_column
 from infthor_eval.nieh.prompts import last_line
 from infthor_eval.nieh.scoring import SCORERS, Scorer, score
 from infthor_eval.nieh.statistics import Estimate, bootstrap_interval, clustered_mean
@@ -18,7 +19,6 @@ from infthor_eval.report.answer_form import format_failures, yes_no
 from infthor_eval.runs.journal import UnitRecord
 
 __all__ = [
-    "ABSENCE",
     "CLUE_COLUMNS",
     "Accuracy",
     "PublishedRow",
@@ -30,7 +30,6 @@ __all__ = [
 ]
 
 CLUE_COLUMNS = ("1", "2", ">=3", "total")  # the columns of the paper's Table 4
-ABSENCE = "absence"  # of questions that no frame proves: apart from those with clues, and in the total
 
 
 @dataclass(frozen=True)
@@ -69,15 +68,8 @@ class PublishedTable:
     rows: dict[str, PublishedRow]
 
 
-def clue_column(n_clues: int) -> str:
-    """The column of Table 4 that a question with so many clues belongs to."""
-    if n_clues == 0:
-        return ABSENCE
-    return str(n_clues) if n_clues < 3 else ">=3"
-
-
 def accuracies(records: Sequence[UnitRecord]) -> dict[str, Accuracy]:
-    """Accuracy by column of Table 4, and of absence questions."""
+    """Accuracy by column of Table 4, and of absence questions: apart from those with clues, and in the total."""
     names = (*CLUE_COLUMNS, ABSENCE)
     columns = {name: [record for record in records if clue_column(record.n_clues) == name] for name in names}
     return {name: _accuracy(records if name == "total" else columns[name]) for name in names}

@@ -6,9 +6,10 @@ from typing import Any
 from rich import box
 from rich.table import Table
 
+from infthor_eval.formats.question import ABSENCE
 from infthor_eval.nieh.scoring import SCORERS
 from infthor_eval.report.comparison import Comparison
-from infthor_eval.report.nieh_results import ABSENCE, CLUE_COLUMNS, PublishedRow, PublishedTable, published_table4
+from infthor_eval.report.nieh_results import CLUE_COLUMNS, PublishedRow, PublishedTable, published_table4
 
 __all__ = ["answers_table", "comparison_table", "depth_table", "nieh_table"]
 

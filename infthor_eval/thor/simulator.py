@@ -20,8 +20,6 @@ __all__ = ["Mark", "Simulator"]
 
 _LOG = logging.getLogger(__name__)
 _INITIAL = {"gridSize": 0.25, "fieldOfView": 60, "visibilityDistance": 1.5, "snapToGrid": True}
-
-
 _SLOTS = 2  # states that the embedded simulator is asked to keep
 _WALKING = {"MoveAhead", "MoveBack", "MoveLeft", "MoveRight", "RotateLeft", "RotateRight", "LookUp", "LookDown"}
 

@@ -10,6 +10,17 @@ from .rooms import KITCHEN
 ROOM = room_of(KITCHEN)
 
 
+def drawn(number):
+    """So many tasks one after the other, each used."""
+    pool = TaskPool(TaskType, random.Random(0))
+    chosen = []
+    for _ in range(number):
+        task = next(pool.sample(ROOM, {"Faucet"}))
+        pool.used(task)
+        chosen.append(task)
+    return chosen
+
+
 def test_every_type_with_and_without_slicing_is_in_the_pool():
     tasks = tasks_of(ROOM, {"Faucet"})
     assert {task.kind for task in tasks} == set(TaskType)
@@ -22,12 +33,7 @@ def test_no_washing_without_a_faucet():
 
 
 def test_use_keeps_the_choice_diverse():
-    pool = TaskPool(TaskType, random.Random(0))
-    chosen = []
-    for _ in range(28):
-        task = next(pool.sample(ROOM, {"Faucet"}))
-        pool.used(task)
-        chosen.append(task)
+    chosen = drawn(28)
     kinds = Counter(task.kind for task in chosen)
     assert set(kinds) == set(TaskType) and max(kinds.values()) <= 8
     assert len(set(chosen)) > 20
@@ -53,13 +59,7 @@ def test_descriptions():
 
 
 def test_the_choice_stays_diverse_however_long_the_trajectory():
-    pool = TaskPool(TaskType, random.Random(0))
-    chosen = []
-    for _ in range(3000):
-        task = next(pool.sample(ROOM, {"Faucet"}))
-        pool.used(task)
-        chosen.append(task)
-    late = Counter(chosen[-300:])
+    late = Counter(drawn(3000)[-300:])
     assert {task.kind for task in late} == set(TaskType)
     assert max(late.values()) <= 30
     assert len(late) > 60

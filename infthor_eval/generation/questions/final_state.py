@@ -66,6 +66,6 @@ def _what(history: History, receptacle: str) -> Iterator[Candidate]:
 def _arrival(history: History, item: str, receptacle: str) -> int:
     """The frame from which on the object stays in the receptacle."""
     frame = len(history) - 1
-    while frame > 0 and item in history.contents(frame - 1, receptacle):
+    while frame > 0 and history.is_inside(frame - 1, item, receptacle):
         frame -= 1
     return frame

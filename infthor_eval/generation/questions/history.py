@@ -184,9 +184,13 @@ class History:
         return not any(canonical(state.type) == kind and not is_same(key, item) for key, state in world.items())
 
     def contents(self, frame: int, receptacle: str) -> frozenset[str]:
-        """The objects directly in or on a receptacle; a sink and its basin are one to people."""
-        parents = {key: self.parent(frame, key) for key in self.world(frame)}
-        return frozenset(key for key, parent in parents.items() if parent is not None and is_same(parent, receptacle))
+        """The objects directly in or on a receptacle."""
+        return frozenset(key for key in self.world(frame) if self.is_inside(frame, key, receptacle))
+
+    def is_inside(self, frame: int, item: str, receptacle: str) -> bool:
+        """Whether an object is directly in or on a receptacle; a sink and its basin are one to people."""
+        parent = self.parent(frame, item)
+        return parent is not None and is_same(parent, receptacle)
 
     def shows_inside(self, frame: int, item: str) -> bool:
         """Whether a frame shows an object and what it is directly in or on."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from infthor_eval.errors import DataError
-from infthor_eval.formats.question import Question
+from infthor_eval.formats.question import ABSENCE, Question, clue_column
 from infthor_eval.formats.set_info import simulator_of
 from infthor_eval.formats.step_log import read_steps
 from infthor_eval.generation.questions import (
@@ -48,9 +48,14 @@ class Made:
 
     def by_clues(self) -> dict[str, int]:
         """Number of questions by number of clues: 1, 2, >=3, and of absences, which have none."""
-        names = ("absence", "1", "2", ">=3")
-        found = Counter(names[min(item.n_clues, 3)] for item in self.questions)
-        return {name: found[name] for name in (*names[1:], names[0])}
+        found = Counter(clue_column(item.n_clues) for item in self.questions)
+        return {name: found[name] for name in ("1", "2", ">=3", ABSENCE)}
+
+    def words(self) -> str:
+        """The counts by type and by number of clues, a line each, for people."""
+        kinds = ", ".join(f"{name} {count}" for name, count in self.by_kind().items())
+        clues = ", ".join(f"{name}: {count}" for name, count in self.by_clues().items())
+        return f"by type: {kinds}\nby number of clues: {clues}"
 
 
 def make_questions(folder: Path, *, seed: int = 0, per_trajectory: int = 25, share: float = DEFAULT_SHARE) -> Made:
