@@ -10,7 +10,7 @@ import argparse
 
 import numpy as np
 
-from infthor_eval.nieh.statistics import clustered_mean
+from infthor_eval.statistics import clustered_mean
 
 
 def coverage(

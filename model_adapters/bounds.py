@@ -17,7 +17,7 @@ _LEADING_WORDS = 2
 
 def question_type(question: Question) -> str:
     """The question's own type, or its leading words in lower case where the file names no type."""
-    return question.kind or " ".join(question.text.lower().split()[:_LEADING_WORDS])
+    return question.question_type or " ".join(question.text.lower().split()[:_LEADING_WORDS])
 
 
 def _key(question: Question) -> str:

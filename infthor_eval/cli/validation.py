@@ -90,7 +90,7 @@ def _as_json(item: Judged) -> dict[str, Any]:
         "question": question.text,
         "gt_img_idx": question.clues,
         "answer": question.answers,
-        "question_type": question.kind,
+        "question_type": question.question_type,
         "replies": item.replies,
         "decision": item.decision,
     }

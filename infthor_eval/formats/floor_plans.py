@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from infthor_eval.errors import DataError
+from infthor_eval.formats.files import written_whole
 
 __all__ = ["floor_plan_names", "write_floor_plan"]
 
@@ -52,17 +53,15 @@ def write_floor_plan(
     """
     path = root / _OBJECTS
     layouts = root / "alfred" / "layouts"
-    partial = path.with_name(path.name + ".partial")
     line = json.dumps({"scene": scene, "objects": [_without_corners(item) for item in objects]})
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         layouts.mkdir(parents=True, exist_ok=True)
-        with gzip.open(partial, "wt", encoding="utf-8") as file:
-            file.writelines(f"{kept}\n" for kept in [*_others(path, scene), line])
         np.save(layouts / f"{scene}-layout.npy", np.array(cells, dtype=np.float64).reshape(-1, 2))
         types = sorted({item["objectType"] for item in objects})
         (layouts / f"{scene}-objects.json").write_text(json.dumps(types, indent=1) + "\n", encoding="utf-8")
-        partial.replace(path)
+        with written_whole(path) as partial, gzip.open(partial, "wt", encoding="utf-8") as file:
+            file.writelines(f"{kept}\n" for kept in [*_others(path, scene), line])
     except (OSError, EOFError, ValueError, KeyError) as error:
         raise DataError(f"{path}: {scene} cannot be added ({error}); give another folder with --data") from error
 

@@ -4,7 +4,6 @@ A trajectory has thousands of frames and a question refers to many of them, so r
 model's adapter decodes. A reference knows the digest of its file's content, by which caches recognise a frame.
 """
 
-import hashlib
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -12,6 +11,7 @@ from pathlib import Path
 from PIL import Image, UnidentifiedImageError
 
 from infthor_eval.errors import DataError
+from infthor_eval.formats.digests import digest_of_file
 
 __all__ = ["FrameRef"]
 
@@ -32,7 +32,7 @@ class FrameRef:
             DataError: the file cannot be read.
         """
         try:
-            return hashlib.blake2b(self.path.read_bytes(), digest_size=16).hexdigest()
+            return digest_of_file(self.path)
         except OSError as error:
             raise DataError(f"{self.path}: cannot be read ({error.strerror}); restore the frame") from error
 

@@ -18,14 +18,14 @@ from infthor_eval.formats.set_info import simulator_of
 from infthor_eval.formats.step_log import read_steps
 from infthor_eval.formats.video import frames_per_second
 
-__all__ = ["LeftOut", "NiehSet"]
+__all__ = ["NiehSet", "Skipped"]
 
 _IMAGE_FOLDERS = ("img", "img_768")
 _IMAGE_SUFFIXES = {".png", ".jpg", ".jpeg"}
 
 
 @dataclass(frozen=True)
-class LeftOut:
+class Skipped:
     """A question that cannot be asked, and why."""
 
     question: Question
@@ -61,20 +61,20 @@ class NiehSet:
         self._videos: dict[str, tuple[FrameRef, ...] | DataError] = {}
 
     @cached_property
-    def left_out(self) -> tuple[LeftOut, ...]:
+    def skipped(self) -> tuple[Skipped, ...]:
         """Questions that cannot be asked, in the order of the files."""
         found, seen = [], set()
         for question in self._read:
             reason = "stands in the files twice" if question.id in seen else self._problem(question)
             seen.add(question.id)
             if reason:
-                found.append(LeftOut(question, reason))
+                found.append(Skipped(question, reason))
         return tuple(found)
 
     @cached_property
     def questions(self) -> tuple[Question, ...]:
         """The questions that can be asked, in the order of the files."""
-        unusable = {id(item.question) for item in self.left_out}
+        unusable = {id(item.question) for item in self.skipped}
         return tuple(question for question in self._read if id(question) not in unusable)
 
     @cached_property
@@ -94,7 +94,7 @@ class NiehSet:
 
     def reasons(self) -> Counter[str]:
         """How many questions were left out, by reason."""
-        return Counter(item.reason for item in self.left_out)
+        return Counter(item.reason for item in self.skipped)
 
     def folder(self, traj_id: str) -> Path:
         """Where the trajectory's frames and metadata lie."""

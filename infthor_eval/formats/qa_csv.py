@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from infthor_eval.errors import DataError
+from infthor_eval.formats.files import written_whole
 from infthor_eval.formats.question import Question
 
 __all__ = ["read_questions", "write_questions"]
@@ -42,14 +43,14 @@ def read_questions(path: Path) -> list[Question]:
 
 def write_questions(path: Path, questions: Iterable[Question]) -> None:
     """Write a question file, whole or not at all."""
-    partial = path.with_name(path.name + ".partial")
-    with partial.open("w", newline="", encoding="utf-8") as file:
+    with written_whole(path) as partial, partial.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow([*_COLUMNS, _TYPE, _ABSENCE])
         for item in questions:
             absence = "yes" if item.absence else ""
-            writer.writerow([item.traj_id, item.text, list(item.clues), list(item.answers), item.kind or "", absence])
-    partial.replace(path)
+            writer.writerow(
+                [item.traj_id, item.text, list(item.clues), list(item.answers), item.question_type or "", absence]
+            )
 
 
 def _question(row: dict[str, str | None], place: str) -> Question:
@@ -66,7 +67,7 @@ def _question(row: dict[str, str | None], place: str) -> Question:
         text=(row["question"] or "").strip(),
         clues=tuple(clues),
         answers=tuple(answers),
-        kind=(row.get(_TYPE) or "").strip() or None,
+        question_type=(row.get(_TYPE) or "").strip() or None,
         absence=absence == "yes",
     )
 

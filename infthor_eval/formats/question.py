@@ -1,8 +1,9 @@
 """One NIEH question, as every room of the project passes it on."""
 
-import hashlib
 from dataclasses import dataclass
 from functools import cached_property
+
+from infthor_eval.formats.digests import digest
 
 __all__ = ["ABSENCE", "Answer", "Question", "clue_column"]
 
@@ -19,7 +20,7 @@ class Question:
         text: the question as put to the model.
         clues: frame numbers (`img_idx`) that hold the evidence, in the order of the file.
         answers: the gold answers; one, or several of which all are asked for.
-        kind: the question type where the file names one (a `question_type` column), else None.
+        question_type: the question type where the file names one (a `question_type` column), else None.
         absence: whether the answer is that something is nowhere. No frame proves that: the clues are then a sample.
     """
 
@@ -27,7 +28,7 @@ class Question:
     text: str
     clues: tuple[int, ...]
     answers: tuple[Answer, ...]
-    kind: str | None = None
+    question_type: str | None = None
     absence: bool = False
 
     @property
@@ -38,8 +39,8 @@ class Question:
     @cached_property
     def id(self) -> str:
         """Name of the question, stable under reordering of the file: `<traj_id>/<12 hex digits>`."""
-        key = repr((self.text, self.clues, self.answers)).encode()
-        return f"{self.traj_id}/{hashlib.blake2b(key, digest_size=6).hexdigest()}"
+        key = repr((self.text, self.clues, self.answers))
+        return f"{self.traj_id}/{digest(key, 6)}"
 
 
 def clue_column(n_clues: int) -> str:

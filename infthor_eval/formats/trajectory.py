@@ -6,7 +6,6 @@ whose x and z are grid cells of 0.25 m; angles are degrees.
 """
 
 import gzip
-import hashlib
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -16,6 +15,7 @@ from typing import Any
 import msgspec
 
 from infthor_eval.errors import DataError
+from infthor_eval.formats.digests import digest
 
 __all__ = [
     "ApiAction",
@@ -284,7 +284,7 @@ def folder_name(traj_id: str) -> str:
     name = re.sub(r"[^A-Za-z0-9_.-]+", "_", traj_id).lstrip(".")[:150]
     if name == traj_id and name:
         return name
-    return f"{name}-{hashlib.blake2b(traj_id.encode(), digest_size=4).hexdigest()}"
+    return f"{name}-{digest(traj_id, 4)}"
 
 
 def _is_trajectory_file(path: Path) -> bool:

@@ -4,7 +4,6 @@ A model wants single frames, some of them again and again, and a video can only 
 frames that are sampled from it are decoded in one pass and kept in the user's cache under the video's digest.
 """
 
-import hashlib
 import os
 import shutil
 import tempfile
@@ -13,6 +12,7 @@ from pathlib import Path
 from PIL import Image
 
 from infthor_eval.errors import DataError
+from infthor_eval.formats.digests import digest_of_file
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.user_cache import user_cache
 
@@ -38,8 +38,7 @@ def frames_per_second(path: Path) -> tuple[FrameRef, ...]:
     import cv2
 
     try:
-        with path.open("rb") as file:
-            digest = hashlib.file_digest(file, lambda: hashlib.blake2b(digest_size=16)).hexdigest()
+        digest = digest_of_file(path)
     except OSError as error:
         raise DataError(f"{path}: cannot be read ({error.strerror}); {_MEND}") from error
     folder = user_cache("video_frames") / f"{digest}-1fps-opencv{cv2.__version__}"

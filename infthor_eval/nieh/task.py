@@ -52,7 +52,7 @@ def dataset(pixels: bool = True, **config: Any) -> dict[str, Any]:
             "question_id": question.id,
             "traj_id": question.traj_id,
             "question": question.text,
-            "question_type": question.kind or "",
+            "question_type": question.question_type or "",
             "absence": question.absence,
             "clues": list(question.clues),
             "answers": json.dumps(question.answers),
@@ -84,7 +84,7 @@ def doc_question(doc: Doc) -> Question:
         text=doc["question"],
         clues=tuple(doc["clues"]),
         answers=tuple(json.loads(doc["answers"])),
-        kind=doc["question_type"] or None,
+        question_type=doc["question_type"] or None,
         absence=doc["absence"],
     )
 

@@ -83,7 +83,7 @@ def find_work(config: Mapping[str, Any]) -> Work:
     context, settings = context_named(config["context"]), Settings.read(config)
     work = Work(find_set(**config))
     work.sources = context.sources(work.data, settings)
-    work.left_out += [LeftOutCase(item.question, "", item.reason) for item in work.data.left_out]
+    work.left_out += [LeftOutCase(item.question, "", item.reason) for item in work.data.skipped]
     problems: dict[FrameRef, str | None] = {}
     for question in work.data.questions:
         for case in context.cases(work.data, question, settings):

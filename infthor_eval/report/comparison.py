@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 from infthor_eval.errors import DataError
 from infthor_eval.nieh.scoring import SCORERS, Scorer
-from infthor_eval.nieh.statistics import Difference, paired_difference
 from infthor_eval.report.nieh_results import record_score
 from infthor_eval.runs.journal import UnitRecord
+from infthor_eval.statistics import Difference, paired_difference
 
 __all__ = ["Comparison", "compare"]
 

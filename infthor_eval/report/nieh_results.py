@@ -14,9 +14,9 @@ from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.formats.question import ABSENCE, clue_column
 from infthor_eval.nieh.prompts import last_line
 from infthor_eval.nieh.scoring import SCORERS, Scorer, score
-from infthor_eval.nieh.statistics import Estimate, bootstrap_interval, clustered_mean
 from infthor_eval.report.answer_form import format_failures, yes_no
 from infthor_eval.runs.journal import UnitRecord
+from infthor_eval.statistics import Estimate, bootstrap_interval, clustered_mean
 
 __all__ = [
     "CLUE_COLUMNS",

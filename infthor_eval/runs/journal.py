@@ -16,7 +16,7 @@ from typing import Any, BinaryIO, Self
 import msgspec
 
 from infthor_eval.errors import DataError, UsageError
-from infthor_eval.runs.identity import canonical_json
+from infthor_eval.formats.digests import canonical_json
 
 __all__ = ["Journal", "NoteRecord", "Observer", "UnitRecord", "read_journal"]
 

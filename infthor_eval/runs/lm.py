@@ -134,7 +134,7 @@ def _as_record(
         fingerprint=inputs,
         traj_id=unit.question.traj_id,
         question=unit.question.text,
-        question_type=unit.question.kind or "",
+        question_type=unit.question.question_type or "",
         n_clues=unit.question.n_clues,
         answers=unit.question.answers,
         reply=reply.text if reply else None,

@@ -2,8 +2,8 @@
 
 import time
 
+from infthor_eval.formats.digests import fingerprint
 from infthor_eval.nieh.notes import Notes, Window
-from infthor_eval.runs.identity import fingerprint
 from infthor_eval.runs.journal import Journal, NoteRecord
 from model_adapters import Model
 

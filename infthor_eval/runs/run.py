@@ -9,12 +9,12 @@ from typing import Any
 
 import infthor_eval
 from infthor_eval.errors import UsageError
+from infthor_eval.formats.digests import fingerprint
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.nieh.contexts import context_named
 from infthor_eval.nieh.work import Work, find_set, find_work, open_set
 from infthor_eval.runs.budget import Budget, budget_of
 from infthor_eval.runs.catalog import Catalog
-from infthor_eval.runs.identity import fingerprint
 from infthor_eval.runs.journal import Journal, Observer, UnitRecord
 from model_adapters import Bound, Model, load
 

@@ -6,11 +6,11 @@ from functools import cached_property
 from itertools import groupby
 from typing import Any
 
+from infthor_eval.formats.digests import fingerprint
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.question import Question
 from infthor_eval.nieh.contexts import Part
 from infthor_eval.nieh.notes import Notes
-from infthor_eval.runs.identity import fingerprint
 
 __all__ = ["Unit", "by_shared_context"]
 

@@ -11,7 +11,7 @@ SOUND = Question("t", "Is there a mug?", (1,), ("yes",))
 
 
 def reasons(root):
-    return [item.reason for item in NiehSet(root).left_out]
+    return [item.reason for item in NiehSet(root).skipped]
 
 
 def test_frames_come_in_time_order_and_clues_in_theirs(make_nieh_set):
@@ -19,7 +19,7 @@ def test_frames_come_in_time_order_and_clues_in_theirs(make_nieh_set):
     data = NiehSet(root)
     assert [frame.path.stem for frame in data.frames("t")] == [f"{index:09d}" for index in range(6)]
     assert [frame.path.stem for frame in data.clue_frames(data.questions[0])] == ["000000004", "000000001"]
-    assert data.left_out == ()
+    assert data.skipped == ()
 
 
 def test_columnar_metadata_without_file_names_is_read(make_nieh_set):

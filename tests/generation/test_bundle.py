@@ -14,9 +14,9 @@ BUNDLED = packaged_folder("sets/nieh_mini")
 
 def test_the_bundled_set_is_small_and_has_every_type_and_number_of_clues():
     data = NiehSet(BUNDLED)
-    assert data.left_out == ()
+    assert data.skipped == ()
     assert data.simulator == "embedded"
-    assert len({question.kind for question in data.questions}) == 8
+    assert len({question.question_type for question in data.questions}) == 8
     assert {min(len(question.clues), 3) for question in data.questions} == {1, 2, 3}
     assert len({question.traj_id for question in data.questions}) == 6
     assert 130 <= len(data.questions) <= 170

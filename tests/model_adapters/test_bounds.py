@@ -13,10 +13,10 @@ def _question(text: str, *answers: str, kind: str | None = None, traj: str = "t"
 
 
 KEY = [
-    _question("Did you see a mug?", "yes", kind="presence"),
-    _question("Did you see a cup?", "no", kind="presence"),
-    _question("Did you see a pan?", "no", kind="presence"),
-    _question("What did you put on the desk?", "Mug", "Plate", kind="put"),
+    _question("Did you see a mug?", "yes", question_type="presence"),
+    _question("Did you see a cup?", "no", question_type="presence"),
+    _question("Did you see a pan?", "no", question_type="presence"),
+    _question("What did you put on the desk?", "Mug", "Plate", question_type="put"),
     _question("How many plates are there?", "2"),
     _question("How many mugs are there?", "3"),
     _question("How MANY cups are there?", "3"),

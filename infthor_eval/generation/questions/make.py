@@ -44,7 +44,7 @@ class Made:
 
     def by_kind(self) -> dict[str, int]:
         """Number of questions by type."""
-        return dict(sorted(Counter(item.kind or "" for item in self.questions).items()))
+        return dict(sorted(Counter(item.question_type or "" for item in self.questions).items()))
 
     def by_clues(self) -> dict[str, int]:
         """Number of questions by number of clues: 1, 2, >=3, and of absences, which have none."""

@@ -46,7 +46,7 @@ def everything(replayed):
 
 def test_the_checker_agrees_with_every_question(everything):
     assert not everything.doubted and not everything.skipped
-    assert {question.kind for question in everything.questions} == KINDS
+    assert {question.question_type for question in everything.questions} == KINDS
     assert all(everything.by_clues().values())
 
 
@@ -59,7 +59,7 @@ def test_gold_answers_score_full_marks(everything):
 
 def test_the_checker_notices_what_is_wrong(everything, replayed):
     checkers = {folder.name: Checker(read_steps(folder), DEFAULT_SHARE) for folder in (replayed / "metadata").iterdir()}
-    presence = [question for question in everything.questions if question.kind != "object_presence"]
+    presence = [question for question in everything.questions if question.question_type != "object_presence"]
     for question in presence:
         checker = checkers[question.traj_id]
         assert not checker.verdict(replace(question, answers=("teapot",))).right
@@ -80,10 +80,10 @@ def test_choice_is_balanced_and_seeded(replayed):
 
 
 def test_absences_are_flagged_and_look_like_presences(everything):
-    presence = [question for question in everything.questions if question.kind == "object_presence"]
+    presence = [question for question in everything.questions if question.question_type == "object_presence"]
     assert {question.absence for question in presence} == {True, False}
     for question in everything.questions:
-        assert question.absence == (question.kind == "object_presence" and question.answers == ("no",))
+        assert question.absence == (question.question_type == "object_presence" and question.answers == ("no",))
     assert {len(question.clues) for question in presence} == {1}
 
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from infthor_eval.errors import DataError
-from infthor_eval.nieh.statistics import bootstrap_interval, clustered_mean, paired_difference
+from infthor_eval.statistics import bootstrap_interval, clustered_mean, paired_difference
 
 scores = st.lists(st.tuples(st.sampled_from([0.0, 0.5, 1.0]), st.integers(0, 6)), min_size=2, max_size=60)
 
