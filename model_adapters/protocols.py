@@ -1,29 +1,94 @@
 """What a model is to the harness.
 
-A conversation is an append-only list of parts with marks. Whoever evaluates appends what the model is to see, asks
-for a reply, and rewinds to a mark; how a back end avoids encoding the same parts twice is its own business.
+A conversation is an append-only list of turns with marks. Whoever evaluates appends what the model is to see, asks for
+a reply, and rewinds to a mark; how a back end avoids encoding the same parts twice is its own business. A policy is
+simpler: a frame and an instruction in, a chunk of arm movements out.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any, ClassVar, Protocol, runtime_checkable
+from dataclasses import asdict, dataclass
+from typing import Any, ClassVar, Literal, Protocol, runtime_checkable
 
+from infthor_eval.errors import UsageError
 from infthor_eval.formats.frames import FrameRef
-from infthor_eval.formats.question import Question
 
 __all__ = [
+    "ROLES",
     "Adapter",
-    "BatchingConversation",
-    "Bound",
+    "ArmDelta",
+    "Capabilities",
     "Conversation",
-    "ExtendableModel",
+    "Decoding",
     "Mark",
     "Model",
     "Part",
+    "Policy",
     "Reply",
+    "Role",
+    "Turn",
 ]
 
 Part = str | FrameRef
+Role = Literal["system", "user", "assistant"]
+ROLES: tuple[Role, ...] = ("system", "user", "assistant")
+
+
+@dataclass(frozen=True)
+class Turn:
+    """What one side of a conversation says at a time.
+
+    Attributes:
+        role: who speaks.
+        parts: texts and frames; texts that touch are joined to one, empty ones left out.
+    """
+
+    role: Role
+    parts: tuple[Part, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Decoding:
+    """How a reply is decoded.
+
+    Attributes:
+        max_new_tokens: limit of the reply, at least 1.
+        temperature: 0 decodes greedily; above it tokens are drawn.
+        top_p: draw from the most likely tokens that together have this probability; of no account when greedy.
+        seed: of the draws; the same request with the same seed is answered the same way.
+        stop: strings that end the reply; the first to appear is cut off with what follows.
+        choices: where there are any, the reply is one of these texts.
+    """
+
+    max_new_tokens: int
+    temperature: float = 0.0
+    top_p: float = 1.0
+    seed: int = 0
+    stop: tuple[str, ...] = ()
+    choices: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Refuse values that mean nothing.
+
+        Raises:
+            UsageError: names the value.
+        """
+        if self.max_new_tokens < 1:
+            raise UsageError(f"max_new_tokens must be at least 1, not {self.max_new_tokens}")
+        if not 0 <= self.temperature < float("inf"):
+            raise UsageError(f"temperature must be 0 (greedy) or above, not {self.temperature}")
+        if not 0 < self.top_p <= 1:
+            raise UsageError(f"top_p must be above 0 and at most 1, not {self.top_p}")
+        if "" in self.stop or "" in self.choices:
+            raise UsageError("an empty text can neither stop a reply nor be one of its choices; leave it out")
+
+    @property
+    def greedy(self) -> bool:
+        """Whether nothing is drawn."""
+        return self.temperature == 0
+
+    def document(self) -> dict[str, Any]:
+        """All of it as JSON values, for fingerprints."""
+        return {name: list(value) if isinstance(value, tuple) else value for name, value in asdict(self).items()}
 
 
 @dataclass(frozen=True)
@@ -32,16 +97,47 @@ class Reply:
 
     Attributes:
         text: the reply without end-of-turn tokens, cut before the first stop string.
+        n_reply_tokens: length of the reply in tokens; None where the model does not tell.
+        n_context_tokens: tokens of the whole context that the reply was made from, frames expanded; None likewise.
+        n_cached_tokens: how many of them were not encoded again; None likewise.
         token_ids: the generated ids without the end-of-turn token; where a stop string ended the reply, up to the
-            token that completed it.
-        n_context_tokens: tokens of the whole context that the reply was made from, frames expanded.
-        n_cached_tokens: how many of them were not encoded again; 0 where the back end does not know.
+            token that completed it; None where the model does not tell.
+        faults: what went wrong and was survived on the way (a request sent again, say), a line each.
     """
 
     text: str
-    token_ids: tuple[int, ...]
-    n_context_tokens: int
-    n_cached_tokens: int
+    n_reply_tokens: int | None = None
+    n_context_tokens: int | None = None
+    n_cached_tokens: int | None = None
+    token_ids: tuple[int, ...] | None = None
+    faults: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Capabilities:
+    """What a model can do and how it wants to be asked; `check_adapter` holds it to this, and to no more.
+
+    Attributes:
+        counts_tokens: `n_tokens` and `tokens_per_frame` are exact; None is given for both where not.
+        token_ids: replies have their ids.
+        deterministic: the same request is answered the same way, greedily or with the same seed.
+        sampling: a temperature above 0 is taken.
+        choices: a reply can be held to some texts.
+        batch_size: how many continuations of a conversation are worth handing over at once.
+        max_in_flight: how many conversations may be asked at the same time, from as many threads.
+        max_tokens: limit of context and reply together, in tokens; None where there is none, or none is known.
+        max_tokens_before_extension: the checkpoint's own limit where `max_tokens` extends it, else None.
+    """
+
+    counts_tokens: bool = True
+    token_ids: bool = True
+    deterministic: bool = True
+    sampling: bool = False
+    choices: bool = False
+    batch_size: int = 1
+    max_in_flight: int = 1
+    max_tokens: int | None = None
+    max_tokens_before_extension: int | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,18 +153,26 @@ class Mark:
 
 @runtime_checkable
 class Conversation(Protocol):
-    """What a model has seen so far, as one user turn of texts and frames."""
+    """What a model has seen so far, as turns of texts and frames."""
 
     @property
-    def n_tokens(self) -> int:
-        """Tokens that `reply` would give the model now, chat template included and frames expanded."""
+    def n_tokens(self) -> int | None:
+        """Tokens that `reply` would give the model now, chat template included; None where it counts none.
+
+        Raises:
+            DataError: a frame cannot be read.
+            ModelError: the model cannot take the turns as they stand.
+        """
         ...
 
-    def append(self, *parts: Part) -> None:
-        """Add parts at the end. Texts that touch are read as one text, without anything between them.
+    def append(self, *parts: Part, role: Role = "user") -> None:
+        """Add parts at the end, to the last turn where the role is the same, else as a turn of their own.
+
+        Texts of a turn that touch are read as one text, without anything between them.
 
         Raises:
             TypeError: a part is neither text nor a frame reference.
+            ValueError: there is no such role.
         """
         ...
 
@@ -84,40 +188,26 @@ class Conversation(Protocol):
         """
         ...
 
-    def reply(self, max_new_tokens: int, stop: Sequence[str] = ()) -> Reply:
-        """Answer greedily; the conversation stays as it was (append the reply's text if it is to be remembered).
-
-        Args:
-            max_new_tokens: at least 1.
-            stop: strings that end the reply; the first to appear is cut off with what follows.
+    def reply(self, decoding: Decoding) -> Reply:
+        """The assistant's next turn; the conversation stays as it was (append the text if it is to be remembered).
 
         Raises:
-            ModelError: the context does not fit (the message gives its tokens and the limit) or memory ran out.
+            ModelError: the context does not fit (the message gives its tokens and the limit), memory ran out, or the
+                model has no such turns or no such decoding.
             DataError: a frame cannot be read.
         """
         ...
 
-
-@runtime_checkable
-class BatchingConversation(Conversation, Protocol):
-    """A conversation that can answer several endings at once, which saves time where the back end works in batches."""
-
-    @property
-    def batch_size(self) -> int:
-        """How many endings are worth handing over at once: as many are computed together."""
-        ...
-
-    def replies(self, endings: Sequence[Sequence[Part]], max_new_tokens: int, stop: Sequence[str] = ()) -> list[Reply]:
-        """What append, reply, rewind would give for each ending; the conversation stays as it was.
+    def replies(self, continuations: Sequence[Sequence[Part]], decoding: Decoding) -> list[Reply]:
+        """What append (as user), reply, rewind would give for each continuation; the conversation stays as it was.
 
         Args:
-            endings: the parts to append, one sequence per question.
-            max_new_tokens: at least 1, for each.
-            stop: strings that end a reply.
+            continuations: the parts to append, one sequence per reply.
+            decoding: for each.
 
         Raises:
-            ModelError: one of the contexts does not fit, or memory ran out; nothing is answered then.
-            DataError: a frame cannot be read; nothing is answered then.
+            ModelError: as `reply`; nothing is answered then.
+            DataError: as `reply`; nothing is answered then.
         """
         ...
 
@@ -132,15 +222,15 @@ class Model(Protocol):
         ...
 
     @property
-    def max_tokens(self) -> int | None:
-        """Limit of context and reply together, in tokens; None where there is none."""
+    def capabilities(self) -> Capabilities:
+        """What it can do."""
         ...
 
     def identity(self) -> dict[str, Any]:
         """All that can change a number, as JSON values; two models of equal identity answer alike."""
         ...
 
-    def tokens_per_frame(self, frame: FrameRef) -> int:
+    def tokens_per_frame(self, frame: FrameRef) -> int | None:
         """How many of the model's tokens one frame becomes, its surroundings in the chat template not counted.
 
         Raises:
@@ -157,35 +247,58 @@ class Model(Protocol):
         ...
 
 
+@dataclass(frozen=True)
+class ArmDelta:
+    """One step of a robot arm's end effector, in the frame of the robot's base (x forward, y left, z up).
+
+    Attributes:
+        translation: along x, y, z, in metres.
+        rotation: roll, pitch, yaw, in radians.
+        gripper: 0 (closed) to 1 (open).
+    """
+
+    translation: tuple[float, float, float]
+    rotation: tuple[float, float, float]
+    gripper: float
+
+
 @runtime_checkable
-class ExtendableModel(Model, Protocol):
-    """A model whose context can be extended beyond what it was trained on."""
-
-    @property
-    def max_tokens_before_extension(self) -> int | None:
-        """The checkpoint's own limit where it is extended; None where nothing is extended."""
-        ...
-
-
-@runtime_checkable
-class Bound(Protocol):
-    """A yardstick that answers from the answer key and the question's text; it never sees a frame."""
+class Policy(Protocol):
+    """A vision-language-action model that drives an arm."""
 
     @property
     def name(self) -> str:
         """Its name in the registry."""
         ...
 
+    @property
+    def capabilities(self) -> Capabilities:
+        """What it can do; only `deterministic` and `max_in_flight` matter to a policy."""
+        ...
+
     def identity(self) -> dict[str, Any]:
-        """All that can change a number, as JSON values."""
+        """All that can change a number, as JSON values; two policies of equal identity act alike."""
         ...
 
-    def study(self, questions: Sequence[Question]) -> None:
-        """Read the whole answer key, once, before the first answer."""
+    def reset(self) -> None:
+        """Begin a new episode: whatever was remembered of the last one is forgotten."""
         ...
 
-    def answer(self, question: Question) -> str:
-        """The answer to one question."""
+    def act(self, frame: FrameRef, instruction: str) -> tuple[ArmDelta, ...]:
+        """The next steps, at least one, to be carried out in order.
+
+        Args:
+            frame: the agent's present view.
+            instruction: what is to be done, in words ("pick up the mug").
+
+        Raises:
+            ModelError: the policy cannot act, or memory ran out.
+            DataError: the frame cannot be read.
+        """
+        ...
+
+    def close(self) -> None:
+        """Give the memory back; the policy cannot be used afterwards."""
         ...
 
 
@@ -195,8 +308,8 @@ class Adapter(Protocol):
     Options: ClassVar[type]
 
     @classmethod
-    def build(cls, name: str, options: Any, seed: int) -> Model | Bound:
-        """Make the model.
+    def build(cls, name: str, options: Any, seed: int) -> Model | Policy:
+        """Make the model or the policy.
 
         Args:
             name: the name it was asked for.
