@@ -6,7 +6,7 @@ repeats is the trajectory. Every interval here resamples or sums over trajectori
 
 import math
 from collections.abc import Hashable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import stats
@@ -25,7 +25,7 @@ class Estimate:
     Attributes:
         mean: the mean score.
         stderr: its standard error, clustered; None with fewer than two clusters.
-        low: lower end of the 95 % interval, None as above.
+        low: lower end of the 95 % interval, which need not be symmetric; None as above.
         high: upper end.
         n: number of scores.
         n_clusters: number of clusters.
@@ -53,7 +53,11 @@ class Difference:
 
 
 def clustered_mean(scores: Sequence[float], clusters: Sequence[Hashable]) -> Estimate:
-    """The mean with a cluster-robust standard error and a t interval (clusters minus one degrees of freedom).
+    """The mean with a cluster-robust standard error, and an interval that stays honest near all right and all wrong.
+
+    Scores from 0 to 1 get Wilson's interval on the effective sample size, which is not zero wide where all are equal;
+    others (the reference scorer can exceed 1) and differences a t interval. Both take the t quantile of clusters minus
+    one degrees of freedom.
 
     Args:
         scores: one per question.
@@ -63,6 +67,14 @@ def clustered_mean(scores: Sequence[float], clusters: Sequence[Hashable]) -> Est
         DataError: there is no score, or a score without its cluster.
     """
     totals, sizes = _partition(scores, clusters)
+    estimate = _with_t_interval(totals, sizes)
+    if estimate.stderr is None or min(scores) < 0 or max(scores) > 1:
+        return estimate
+    low, high = _wilson(estimate.mean, _effective_size(estimate), _quantile(len(sizes)))
+    return replace(estimate, low=low, high=high)
+
+
+def _with_t_interval(totals: np.ndarray, sizes: np.ndarray) -> Estimate:
     n, n_clusters = int(sizes.sum()), len(sizes)
     mean = float(totals.sum() / n)
     if n_clusters < 2:
@@ -70,8 +82,34 @@ def clustered_mean(scores: Sequence[float], clusters: Sequence[Hashable]) -> Est
     # Residual of each cluster's total: the ratio estimator's linearisation, as clusters differ in size.
     residuals = totals - mean * sizes
     stderr = math.sqrt(n_clusters / (n_clusters - 1) * float(residuals @ residuals)) / n
-    reach = float(stats.t.ppf(0.5 + _LEVEL / 2, n_clusters - 1)) * stderr
+    reach = _quantile(n_clusters) * stderr
     return Estimate(mean, stderr, mean - reach, mean + reach, n, n_clusters)
+
+
+def _quantile(n_clusters: int) -> float:
+    return float(stats.t.ppf(0.5 + _LEVEL / 2, n_clusters - 1))
+
+
+def _effective_size(estimate: Estimate) -> float:
+    """How many independent questions tell as much.
+
+    The design effect says how much clustering inflates the variance. It is seen in the questions that are not like the
+    others; the fewer there are, the more weight its worst value gets, that of clusters which are right or wrong as a
+    whole. (`benchmarks/interval_coverage.py` shows what comes of it.)
+    """
+    worst = estimate.n / estimate.n_clusters
+    variance, stderr = estimate.mean * (1 - estimate.mean), estimate.stderr or 0.0
+    measured = max(1.0, stderr**2 * estimate.n / variance) if variance > 0 else worst
+    n_unlike = estimate.n * min(estimate.mean, 1 - estimate.mean)
+    return estimate.n / ((n_unlike * measured + worst) / (n_unlike + 1))
+
+
+def _wilson(mean: float, n: float, quantile: float) -> tuple[float, float]:
+    """Wilson's score interval of a share."""
+    spread = quantile**2 / n
+    centre = (mean + spread / 2) / (1 + spread)
+    reach = quantile / (1 + spread) * math.sqrt(mean * (1 - mean) / n + spread / (4 * n))
+    return max(0.0, min(mean, centre - reach)), min(1.0, max(mean, centre + reach))
 
 
 def bootstrap_interval(
@@ -102,7 +140,8 @@ def paired_difference(first: Sequence[float], second: Sequence[float], clusters:
     """
     if len(first) != len(second):
         raise DataError(f"{len(first)} and {len(second)} scores cannot be paired; compare runs on the same questions")
-    estimate = clustered_mean([b - a for a, b in zip(first, second, strict=True)], clusters)
+    totals, sizes = _partition([b - a for a, b in zip(first, second, strict=True)], clusters)
+    estimate = _with_t_interval(totals, sizes)
     if estimate.stderr is None:
         return Difference(estimate, None)
     if estimate.stderr == 0:

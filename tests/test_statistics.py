@@ -31,6 +31,28 @@ def test_repeating_every_question_of_a_trajectory_adds_no_certainty(pairs):
         assert thrice.stderr == pytest.approx(once.stderr)
 
 
+@pytest.mark.parametrize("right", [0.0, 1.0])
+def test_scores_that_are_all_alike_leave_doubt_that_shrinks_with_the_trajectories(right):
+    few, many = (clustered_mean([right] * 5 * n, list(range(n)) * 5) for n in (6, 60))
+    for estimate in (few, many):
+        assert estimate.low <= right <= estimate.high
+        assert 0.0 <= estimate.low < estimate.high <= 1.0
+    assert many.high - many.low < few.high - few.low
+
+
+@given(scores)
+def test_intervals_of_shares_hold_the_mean_and_stay_among_shares(pairs):
+    estimate = clustered_mean([value for value, _ in pairs], [cluster for _, cluster in pairs])
+    if estimate.stderr is not None:
+        assert 0.0 <= estimate.low <= estimate.mean <= estimate.high <= 1.0
+
+
+def test_scores_beyond_one_get_a_t_interval():
+    estimate = clustered_mean([1.5, 1.0, 1.5, 1.0], ["a", "b", "c", "d"])
+    assert estimate.high - estimate.mean == pytest.approx(estimate.mean - estimate.low)
+    assert estimate.high > 1.25
+
+
 def test_one_trajectory_gives_no_interval():
     estimate = clustered_mean([1.0, 0.0], ["t", "t"])
     assert (estimate.mean, estimate.stderr, estimate.low, estimate.high) == (0.5, None, None, None)
@@ -70,10 +92,12 @@ def test_a_paired_difference_is_surer_than_two_separate_runs():
 
 
 def test_the_interval_covers_the_truth_as_often_as_it_says():
-    path = Path(__file__).parents[2] / "benchmarks" / "interval_coverage.py"
+    path = Path(__file__).parents[1] / "benchmarks" / "interval_coverage.py"
     spec = importlib.util.spec_from_file_location("interval_coverage", path)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     clustered, independent = module.coverage(600, 60, 0.7)
     assert 0.92 <= clustered <= 0.98
     assert independent < 0.8
+    few_wrong, _ = module.coverage(300, 12, 0.98)
+    assert few_wrong >= 0.93

@@ -1,10 +1,8 @@
-"""`infthor-eval compare`: two runs on the same questions."""
+"""`infthor-eval compare`: two runs on the same data."""
 
 from pathlib import Path
 
 import click
-
-from infthor_eval.cli.options import table_console
 
 __all__ = ["command"]
 
@@ -15,11 +13,19 @@ __all__ = ["command"]
 def command(first: Path, second: Path) -> None:
     """Say by how much the run in folder SECOND is better than that in FIRST.
 
-    Questions are paired, intervals and p values are clustered by trajectory.
+    What both evaluated is paired; intervals and p values are clustered by trajectory.
     """
-    from infthor_eval.report import compare, comparison_table
-    from infthor_eval.runs import read_journal
+    from infthor_eval.errors import UsageError
+    from infthor_eval.report import compare, comparison_table, print_table, table_console
+    from infthor_eval.runs import read_header, read_run
+    from infthor_eval.suites import suite_named
 
-    identities, records = zip(*(read_journal(folder / "journal.jsonl") for folder in (first, second)), strict=True)
-    names = [identity.get("model", {}).get("name", "?") for identity in identities]
-    table_console().print(comparison_table(compare(*records), *names))
+    headers = [read_header(folder) for folder in (first, second)]
+    if headers[0].suite != headers[1].suite:
+        raise UsageError(f"{first} is a run of {headers[0].suite}, {second} of {headers[1].suite}; compare like runs")
+    suite = suite_named(headers[0].suite)
+    records = [read_run(folder, suite.records)[1] for folder in (first, second)]
+    names = [header.name for header in headers]
+    if names[0] == names[1]:  # the folders' names tell them apart
+        names = [f"{name} ({folder.name})" for name, folder in zip(names, (first, second), strict=True)]
+    print_table(comparison_table(compare(suite, *records), *names), table_console())

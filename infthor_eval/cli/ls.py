@@ -22,9 +22,12 @@ def command(what: str, data: Path | None) -> None:
 
 
 def _models() -> Table:
+    from infthor_eval.suites import baseline_names
     from model_adapters import names, options
 
     table = Table("model", "options and defaults (--model-args)", box=box.SIMPLE_HEAD)
+    for name, suites in baseline_names().items():
+        table.add_row(name, f"no options; a baseline of {suites}")
     for name in names():
         try:
             table.add_row(name, options(name))
@@ -40,10 +43,10 @@ def _tasks() -> Table:
     table = Table("task", "what it is", box=box.SIMPLE_HEAD)
     for name, members in catalog.groups.items():
         table.add_row(name, f"group of {', '.join(members)}")
-    for name, config in catalog.tasks.items():
-        settings = config["dataset_kwargs"]
+    for name, task in catalog.tasks.items():
+        settings = task.settings.get("dataset_kwargs", {})
         data = f"the bundled set {settings['bundled']}" if "bundled" in settings else "the set given with --data"
-        table.add_row(name, f"context {settings['context']}, {data}")
+        table.add_row(name, f"{task.suite}: context {settings.get('context')}, {data}")
     return table
 
 
@@ -51,8 +54,8 @@ def _scenes(data: Path | None) -> Table:
     from infthor_eval.formats.floor_plans import floor_plan_names
 
     table = Table("scene", "what it is", box=box.SIMPLE_HEAD)
-    for kind in ("kitchen", "living-room", "bedroom", "bathroom"):
-        table.add_row(f"{kind}-<seed>", f"a {kind.replace('-', ' ')} made from the seed")
+    for room in ("kitchen", "living-room", "bedroom", "bathroom"):
+        table.add_row(f"{room}-<seed>", f"a {room.replace('-', ' ')} made from the seed")
     table.add_row("house-<seed>", "a house of several rooms made from the seed")
     for name in floor_plan_names(data) if data else ():
         table.add_row(name, f"recorded, in {data}")

@@ -10,18 +10,19 @@ from infthor_eval.errors import InfthorError
 
 __all__ = ["main"]
 
-# Name, and the one line that the overview shows; the module infthor_eval.cli.<name> has the command.
+# Name, and the one line that the overview shows; the module infthor_eval.cli.<name, with _ for -> has the command.
 _COMMANDS = {
     "run": "Evaluate a model on tasks (the default command).",
     "fetch": "Download the published data.",
     "validate": "Keep the questions of a set that one of several models answers.",
-    "compare": "Compare two runs on the same questions.",
+    "compare": "Compare two runs on the same data.",
     "ls": "List the models, the tasks or the scenes.",
     "scenes": "Look at a scene, or carry it to machines without Unity.",
     "generate": "Make long-horizon trajectories in a scene.",
     "replay": "Replay trajectories in the simulator into frames and metadata.",
     "bundle": "Make a question set from a manifest of scenes and seeds.",
     "questions": "Make NIEH questions from replayed trajectories.",
+    "lm-eval": "Run lm-eval's own command, with these models known to it.",
 }
 _DEFAULT = "run"
 
@@ -35,7 +36,7 @@ class _Commands(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in _COMMANDS:
             return None
-        command = importlib.import_module(f"infthor_eval.cli.{cmd_name}").command
+        command = importlib.import_module(f"infthor_eval.cli.{cmd_name.replace('-', '_')}").command
         assert isinstance(command, click.Command)
         return command
 

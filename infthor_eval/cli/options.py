@@ -1,16 +1,10 @@
-"""What several commands share: options, how their values are written, and where tables are printed."""
+"""What several commands share: options, and how their values are written."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
-if TYPE_CHECKING:
-    from rich.console import Console
-
-__all__ = ["floor_plans_option", "model_options_in", "names_in", "table_console"]
-
-_TABLE_WIDTH = 180  # on a narrower terminal lines wrap; cut-off numbers would be worse
+__all__ = ["floor_plans_option", "model_options_in", "names_in"]
 
 floor_plans_option = click.option(
     "--data",
@@ -46,10 +40,3 @@ def model_options_in(text: str) -> dict[str, str]:
             raise click.UsageError(f"--model-args: {key.strip()!r} is given twice")
         options[key.strip()] = value.strip()
     return options
-
-
-def table_console() -> "Console":
-    """Standard output for tables of results."""
-    from rich.console import Console
-
-    return Console(soft_wrap=True, width=max(Console().width, _TABLE_WIDTH))

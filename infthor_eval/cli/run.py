@@ -1,10 +1,12 @@
 """`infthor-eval run`: evaluate a model on tasks."""
 
 from pathlib import Path
+from typing import Any
 
 import click
 
 from infthor_eval.cli.options import model_options_in, names_in
+from infthor_eval.cli.suite_options import suite_options
 
 __all__ = ["command"]
 
@@ -12,18 +14,14 @@ __all__ = ["command"]
 @click.command("run")
 @click.option("--model", "models", required=True, help="Model name, or several with commas (see `ls models`).")
 @click.option("--tasks", required=True, help="Task or group names with commas (see `ls tasks`).")
-@click.option("--data", type=click.Path(path_type=Path), help="Folder of the NIEH set to ask about.")
+@click.option("--data", type=click.Path(path_type=Path), help="Folder of the data set to ask about.")
 @click.option("--model-args", default="", metavar="K=V,...", help="Options of the model (see `ls models`).")
 @click.option(
-    "--rope", metavar="KIND:FACTOR", help="Extend the model's context: yarn:4, linear:2, dynamic:4, longrope:8."
+    "--rope",
+    metavar="METHOD:FACTOR",
+    help="Extend the model's context: yarn:4, linear:2, dynamic:4, longrope:8.",
 )
-@click.option(
-    "--k-tokens",
-    type=click.Choice(["1000", "1024"]),
-    help="Tokens of a kilo-token where a context has a size; the published value of each context if not given.",
-)
-@click.option("--retriever", metavar="NAME", help="CLIP model of retrieval tasks, a hub id or a folder.")
-@click.option("--retriever-revision", metavar="REVISION", help="Branch, tag or commit of the retriever on the hub.")
+@click.option("--name", help="What the run is called in tables and folders; else by its checkpoint, or its model.")
 @click.option("--limit", type=click.IntRange(min=1), help="Ask only the first N questions of each task.")
 @click.option(
     "--output",
@@ -33,44 +31,46 @@ __all__ = ["command"]
     help="Results folder.",
 )
 @click.option("--seed", type=int, default=0, show_default=True, help="For whatever is random.")
+@click.option("--fresh", is_flag=True, help="Start anew; the journal of an earlier run is set aside.")
+@click.option("--recover", is_flag=True, help="Go on without the bad lines of a damaged journal.")
+@suite_options
 def command(
     models: str,
     tasks: str,
     data: Path | None,
     model_args: str,
     rope: str | None,
-    k_tokens: str | None,
-    retriever: str | None,
-    retriever_revision: str | None,
+    name: str | None,
     limit: int | None,
     output: Path,
     seed: int,
+    fresh: bool,
+    recover: bool,
+    **given: Any,
 ) -> int:
     """Evaluate MODEL on TASKS and print the results beside the published ones.
 
     Stop it whenever you like: the same command goes on where it was.
     """
     from infthor_eval.cli.evaluate import evaluate
-    from infthor_eval.runs import RunRequest
+    from infthor_eval.cli.requests import Asked, requests_for
 
     options = model_options_in(model_args)
     if rope is not None:
         if "rope" in options:
             raise click.UsageError("--rope and rope= in --model-args are the same option; give one of them")
         options["rope"] = rope
-    requests = [
-        RunRequest(
-            model=model,
-            tasks=names_in(tasks, "--tasks"),
-            output=output,
-            data=data,
-            model_options=options,
-            limit=limit,
-            k_tokens=int(k_tokens) if k_tokens else None,
-            retriever=retriever,
-            retriever_revision=retriever_revision,
-            seed=seed,
-        )
-        for model in names_in(models, "--model")
-    ]
-    return evaluate(requests)
+    asked = Asked(
+        tasks=names_in(tasks, "--tasks"),
+        data=data,
+        limit=limit,
+        seed=seed,
+        output=output,
+        fresh=fresh,
+        recover=recover,
+        suite_options=given,
+    )
+    named = names_in(models, "--model")
+    if name is not None and len(named) > 1:
+        raise click.UsageError(f"--name {name}: names one run, and {len(named)} models are asked")
+    return evaluate([request for model in named for request in requests_for(asked, model, options, name)])

@@ -32,20 +32,15 @@ def command(
     Rejected questions go to rejected.jsonl with every reply. Those with several clues that no model answers go to
     inspection.csv and inspection.html; decide, and pass the decisions back. Stopped, the same command goes on.
     """
+    from infthor_eval.cli.requests import Asked, requests_for
     from infthor_eval.cli.validation import validate
-    from infthor_eval.runs import RunRequest
 
     options = dict(item.partition(":")[::2] for item in model_args)
+    asked = Asked(tasks=("nieh_gt",), data=set_folder, output=out / "runs", seed=seed)
     requests = [
-        RunRequest(
-            model=model,
-            tasks=("nieh_gt",),
-            output=out / "runs",
-            data=set_folder,
-            model_options=model_options_in(options.pop(model, "")),
-            seed=seed,
-        )
+        request
         for model in names_in(models, "--models")
+        for request in requests_for(asked, model, model_options_in(options.pop(model, "")))
     ]
     if options:
         raise click.UsageError(f"--model-args is about {', '.join(options)}, which --models does not name")

@@ -18,18 +18,25 @@ from infthor_eval.formats.set_info import simulator_of
 from infthor_eval.formats.step_log import read_steps
 from infthor_eval.formats.video import frames_per_second
 
-__all__ = ["NiehSet", "Skipped"]
+__all__ = ["NiehSet", "SkippedQuestion"]
 
 _IMAGE_FOLDERS = ("img", "img_768")
 _IMAGE_SUFFIXES = {".png", ".jpg", ".jpeg"}
 
 
 @dataclass(frozen=True)
-class Skipped:
-    """A question that cannot be asked, and why."""
+class SkippedQuestion:
+    """A question that cannot be asked, and why.
+
+    Attributes:
+        question: the question.
+        reason: why not.
+        variant: of several ways of asking it, the one that is meant; empty where all are, or there is one.
+    """
 
     question: Question
     reason: str
+    variant: str = ""
 
 
 class NiehSet:
@@ -61,21 +68,25 @@ class NiehSet:
         self._videos: dict[str, tuple[FrameRef, ...] | DataError] = {}
 
     @cached_property
-    def skipped(self) -> tuple[Skipped, ...]:
-        """Questions that cannot be asked, in the order of the files."""
-        found, seen = [], set()
+    def rows(self) -> tuple[Question | SkippedQuestion, ...]:
+        """Every question, in the order of the files; one that cannot be asked with the reason."""
+        found: list[Question | SkippedQuestion] = []
+        seen = set()
         for question in self._read:
             reason = "stands in the files twice" if question.id in seen else self._problem(question)
             seen.add(question.id)
-            if reason:
-                found.append(Skipped(question, reason))
+            found.append(SkippedQuestion(question, reason) if reason else question)
         return tuple(found)
+
+    @cached_property
+    def skipped(self) -> tuple[SkippedQuestion, ...]:
+        """Questions that cannot be asked, in the order of the files."""
+        return tuple(row for row in self.rows if isinstance(row, SkippedQuestion))
 
     @cached_property
     def questions(self) -> tuple[Question, ...]:
         """The questions that can be asked, in the order of the files."""
-        unusable = {id(item.question) for item in self.skipped}
-        return tuple(question for question in self._read if id(question) not in unusable)
+        return tuple(row for row in self.rows if isinstance(row, Question))
 
     @cached_property
     def fingerprint(self) -> str:

@@ -22,8 +22,9 @@ from word2number import w2n
 
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.question import Answer
+from infthor_eval.nieh.prompts import last_line
 
-__all__ = ["SCORERS", "Scorer", "says_number", "says_yes_or_no", "score"]
+__all__ = ["SCORERS", "Scorer", "says_number", "says_yes_or_no", "score", "scores"]
 
 Scorer = Literal["reference", "strict"]
 SCORERS: tuple[Scorer, ...] = ("reference", "strict")
@@ -52,6 +53,12 @@ def score(response: str, answers: Sequence[Answer], scorer: Scorer = "reference"
     if not answers:
         raise UsageError("cannot score against an empty list of gold answers; give at least one")
     return (_reference if scorer == "reference" else _strict)(response, answers)
+
+
+def scores(reply: str, answers: Sequence[Answer]) -> dict[str, float]:
+    """What a whole reply, of which the last line counts, scores under each scorer."""
+    said = last_line(reply)
+    return {scorer: score(said, answers, scorer) for scorer in SCORERS}
 
 
 def says_yes_or_no(response: str) -> str | None:

@@ -1,55 +1,86 @@
-"""Two runs on the same questions: by how much the second is better, and how surely."""
+"""Two runs of one suite on the same units: by how much the second is better, and how surely."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from infthor_eval.errors import DataError
-from infthor_eval.nieh.scoring import SCORERS, Scorer
-from infthor_eval.report.nieh_results import record_score
-from infthor_eval.runs.journal import UnitRecord
+from infthor_eval.runs import Column, Row, Suite, Table, UnitRecord
 from infthor_eval.statistics import Difference, paired_difference
 
-__all__ = ["Comparison", "compare"]
+__all__ = ["Comparison", "compare", "comparison_table"]
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """One task, one scorer.
+    """One task, one metric.
 
     Attributes:
-        task: the lm-eval task.
-        scorer: which scorer.
-        first: mean score of the first run on the shared questions.
+        task: the task.
+        metric: which metric of the suite.
+        first: mean score of the first run on the shared units.
         second: that of the second run.
-        difference: second minus first, paired by question and clustered by trajectory.
-        n_unshared: questions that only one of the runs asked; they are not compared.
+        difference: second minus first, paired by unit and clustered.
+        n_unshared: units that only one of the runs evaluated; they are not compared.
     """
 
     task: str
-    scorer: Scorer
+    metric: str
     first: float
     second: float
     difference: Difference
     n_unshared: int
 
 
-def compare(first: Iterable[UnitRecord], second: Iterable[UnitRecord]) -> list[Comparison]:
-    """Compare two runs on the questions that both were asked, from the same gold answers.
+def compare(suite: Suite, first: Iterable[UnitRecord[Any]], second: Iterable[UnitRecord[Any]]) -> list[Comparison]:
+    """Compare two runs on the units that both evaluated.
 
     Raises:
-        DataError: they share no question.
+        DataError: they share no unit.
     """
     ours, theirs = ({record.key: record for record in records} for records in (first, second))
-    shared = [key for key in ours if key in theirs]
-    if not shared:
-        raise DataError("the two runs share no question of the same task; compare runs on the same set")
+    if not ours.keys() & theirs.keys():
+        raise DataError("the two runs share no unit of the same task; compare runs on the same data")
     found = []
-    for task in sorted({key[0] for key in shared}):
-        keys = [key for key in shared if key[0] == task]
-        unshared = sum(key[0] == task for key in ours.keys() ^ theirs.keys())
-        for scorer in SCORERS:
-            a = [record_score(ours[key], scorer) for key in keys]
-            b = [record_score(theirs[key], scorer) for key in keys]
-            difference = paired_difference(a, b, [ours[key].traj_id for key in keys])
-            found.append(Comparison(task, scorer, sum(a) / len(a), sum(b) / len(b), difference, unshared))
+    for task in sorted({key.task for key in ours.keys() & theirs.keys()}):
+        pairs = [(ours[key], theirs[key]) for key in ours if key in theirs and key.task == task]
+        unshared = sum(key.task == task for key in ours.keys() ^ theirs.keys())
+        found += _of_task(suite, task, pairs, unshared)
     return found
+
+
+def _of_task(
+    suite: Suite, task: str, pairs: Sequence[tuple[UnitRecord[Any], UnitRecord[Any]]], unshared: int
+) -> list[Comparison]:
+    scores = [(suite.scores(a), suite.scores(b)) for a, b in pairs]
+    clusters = [a.cluster for a, _ in pairs]
+    found = []
+    for metric in dict.fromkeys(name for a, b in scores for name in (*a, *b)):
+        first, second = [a.get(metric, 0.0) for a, _ in scores], [b.get(metric, 0.0) for _, b in scores]
+        difference = paired_difference(first, second, clusters)
+        means = sum(first) / len(first), sum(second) / len(second)
+        found.append(Comparison(task, metric, *means, difference, unshared))
+    return found
+
+
+def comparison_table(rows: Sequence[Comparison], first: str, second: str) -> Table:
+    """Differences in percentage points: a row per task and metric.
+
+    Args:
+        rows: what `compare` found.
+        first: the first run's name.
+        second: the second run's name.
+    """
+    numbers = ("first", "second", "difference", "95 % interval", "p", "units", "only in one")
+    columns = (Column("task", False), Column("metric", False), *map(Column, numbers))
+    return Table(f"{second} against {first}, in %", columns, tuple(map(_row, rows)))
+
+
+def _row(found: Comparison) -> Row:
+    estimate, p = found.difference.estimate, found.difference.p
+    interval = significance = "-"  # one cluster alone tells nothing about others
+    if estimate.low is not None and estimate.high is not None and p is not None:
+        interval, significance = f"[{100 * estimate.low:+.2f}, {100 * estimate.high:+.2f}]", f"{p:.4f}"
+    means = (f"{100 * found.first:.2f}", f"{100 * found.second:.2f}", f"{100 * estimate.mean:+.2f}")
+    counts = (str(estimate.n), str(found.n_unshared))
+    return Row((found.task, found.metric, *means, interval, significance, *counts))

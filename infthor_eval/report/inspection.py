@@ -8,6 +8,7 @@ from urllib.parse import quote
 
 from jinja2 import Environment
 
+from infthor_eval.errors import DataError
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.nieh.validation import DECISIONS, Judged
 
@@ -21,11 +22,18 @@ def write_inspection_page(path: Path, items: Sequence[Judged], data: NiehSet) ->
         path: the HTML file; open it in a browser, decide, and save the decisions as CSV.
         items: the questions.
         data: the set that their frames lie in.
+
+    Raises:
+        DataError: it cannot be written.
     """
     template = resources.files(__package__).joinpath("inspection.html").read_text(encoding="utf-8")
     # Questions and replies come from data files and models: whatever they hold is shown as text.
     page = Environment(autoescape=True).from_string(template)
-    path.write_text(page.render(items=[_shown(item, data, path.parent) for item in items], choices=DECISIONS))
+    text = page.render(items=[_shown(item, data, path.parent) for item in items], choices=DECISIONS)
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise DataError(f"{path}: cannot be written ({error.strerror}); give another --out") from error
 
 
 def _shown(item: Judged, data: NiehSet, folder: Path) -> dict[str, object]:

@@ -1,21 +1,54 @@
-"""One run: its identity, its journal, and the order of its work."""
+"""One run of any suite: its identity, its journal, and the order of its work."""
 
-from infthor_eval.runs.budget import Budget
-from infthor_eval.runs.catalog import Catalog
-from infthor_eval.runs.journal import Journal, Observer, UnitRecord, read_journal
-from infthor_eval.runs.run import Plan, RunOutcome, RunRequest, TaskPlan, execute, plan
+from infthor_eval.runs.catalog import Catalog, TaskFile
+from infthor_eval.runs.driver import Observer, PreparedRun, RunOutcome, RunRequest, Silent, execute, prepare
+from infthor_eval.runs.journal import read_header, read_run
+from infthor_eval.runs.records import RecordTypes, RunHeader, Tokens, Unit, UnitKey, UnitRecord
+from infthor_eval.runs.suite import (
+    Cost,
+    Evaluation,
+    Group,
+    RunSummary,
+    SampleView,
+    Session,
+    Skipped,
+    Subject,
+    Suite,
+    TaskRequest,
+    Work,
+)
+from infthor_eval.runs.tables import Column, Row, Table
 
 __all__ = [
-    "Budget",
     "Catalog",
-    "Journal",
+    "Column",
+    "Cost",
+    "Evaluation",
+    "Group",
     "Observer",
-    "Plan",
+    "PreparedRun",
+    "RecordTypes",
+    "Row",
+    "RunHeader",
     "RunOutcome",
     "RunRequest",
-    "TaskPlan",
+    "RunSummary",
+    "SampleView",
+    "Session",
+    "Silent",
+    "Skipped",
+    "Subject",
+    "Suite",
+    "Table",
+    "TaskFile",
+    "TaskRequest",
+    "Tokens",
+    "Unit",
+    "UnitKey",
     "UnitRecord",
+    "Work",
     "execute",
-    "plan",
-    "read_journal",
+    "prepare",
+    "read_header",
+    "read_run",
 ]

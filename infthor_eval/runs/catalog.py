@@ -1,7 +1,7 @@
 """The tasks that the package brings: what `--tasks` can name.
 
-The files are lm-eval's own format. lm-eval passes over a broken file without a word, so they are read and checked
-here first, without importing lm-eval.
+The files are lm-eval's own format, and say which suite evaluates them (`metadata: {suite: NAME}`). lm-eval passes over
+a broken file without a word, so they are read and checked here first, without importing lm-eval.
 """
 
 import difflib
@@ -16,16 +16,7 @@ import yaml
 from infthor_eval.errors import DataError, UsageError
 from infthor_eval.formats.packaged import packaged_folder
 
-__all__ = ["Catalog"]
-
-_NEEDED = (
-    "custom_dataset",
-    "dataset_kwargs",
-    "doc_to_text",
-    "generation_kwargs",
-    "process_results",
-    "test_split",
-)
+__all__ = ["Catalog", "TaskFile"]
 
 
 class _Loader(yaml.SafeLoader):
@@ -40,6 +31,33 @@ _Loader.add_constructor("!function", _function_name)
 
 
 @dataclass(frozen=True)
+class TaskFile:
+    """A single task.
+
+    Attributes:
+        name: the task.
+        suite: the kind of evaluation that it belongs to.
+        path: its file.
+        settings: what the file says, with the included ones merged in; functions by name.
+    """
+
+    name: str
+    suite: str
+    path: Path
+    settings: Mapping[str, Any]
+
+    def require(self, *keys: str) -> None:
+        """Refuse a file that lacks a key which its suite needs.
+
+        Raises:
+            DataError: names the missing ones.
+        """
+        missing = [key for key in keys if key not in self.settings]
+        if missing:
+            raise DataError(f"{self.path}: no {', '.join(missing)}; tasks of {self.suite} need {', '.join(keys)}")
+
+
+@dataclass(frozen=True)
 class Catalog:
     """The task files below one folder."""
 
@@ -51,30 +69,31 @@ class Catalog:
         return cls(packaged_folder("tasks"))
 
     @cached_property
-    def tasks(self) -> dict[str, dict[str, Any]]:
-        """Every single task by name, its file's settings with the included ones merged in."""
-        return {name: config for name, config in self._entries.items() if "group" not in config}
+    def tasks(self) -> dict[str, TaskFile]:
+        """Every single task by name."""
+        single = {name: entry for name, entry in self._entries.items() if "group" not in entry[1]}
+        return {name: _task(name, path, settings) for name, (path, settings) in single.items()}
 
     @cached_property
     def groups(self) -> dict[str, list[str]]:
         """Every group by name, with the names in it."""
-        return {name: config["task"] for name, config in self._entries.items() if "group" in config}
+        return {name: settings["task"] for name, (_, settings) in self._entries.items() if "group" in settings}
 
-    def expand(self, names: Sequence[str]) -> list[str]:
+    def expand(self, names: Sequence[str]) -> list[TaskFile]:
         """The single tasks behind names of tasks and groups, each once, in the order given.
 
         Raises:
             UsageError: a name is unknown; the nearest known one is named.
         """
-        found: dict[str, None] = {}
+        found: dict[str, TaskFile] = {}
         for name in names:
             if name in self.groups:
-                found.update(dict.fromkeys(self.expand(self.groups[name])))
+                found.update((task.name, task) for task in self.expand(self.groups[name]))
             elif name in self.tasks:
-                found[name] = None
+                found[name] = self.tasks[name]
             else:
                 raise UsageError(self._unknown(name))
-        return list(found)
+        return list(found.values())
 
     def _unknown(self, name: str) -> str:
         known = [*self.groups, *self.tasks]
@@ -83,30 +102,29 @@ class Catalog:
         return f"unknown task {name!r}; {hint}"
 
     @cached_property
-    def _entries(self) -> dict[str, dict[str, Any]]:
-        entries: dict[str, dict[str, Any]] = {}
+    def _entries(self) -> dict[str, tuple[Path, dict[str, Any]]]:
+        entries: dict[str, tuple[Path, dict[str, Any]]] = {}
         for path in sorted(self.folder.rglob("*.yaml")):
             if path.name.startswith("_"):
                 continue
-            config = _read(path)
-            name = config.get("group") or config.get("task")
+            settings = _read(path)
+            name = settings.get("group") or settings.get("task")
             if not isinstance(name, str):
                 raise DataError(f"{path}: neither a task nor a group name; a task file has a key 'task' or 'group'")
             if name in entries:
                 raise DataError(f"{path}: {name!r} is the name of another task file too; rename one")
-            _check(config, path)
-            entries[name] = config
+            if "group" in settings and not isinstance(settings.get("task"), list):
+                raise DataError(f"{path}: 'task' of a group must be a list of task names")
+            entries[name] = path, settings
         return entries
 
 
-def _check(config: Mapping[str, Any], path: Path) -> None:
-    if "group" in config:
-        if not isinstance(config.get("task"), list):
-            raise DataError(f"{path}: 'task' of a group must be a list of task names")
-        return
-    missing = [key for key in _NEEDED if key not in config]
-    if missing:
-        raise DataError(f"{path}: no {', '.join(missing)}; a task file needs them (include _nieh.yaml)")
+def _task(name: str, path: Path, settings: Mapping[str, Any]) -> TaskFile:
+    metadata = settings.get("metadata")
+    suite = metadata.get("suite") if isinstance(metadata, Mapping) else None
+    if not isinstance(suite, str):
+        raise DataError(f"{path}: no suite; write it as metadata: {{suite: NAME}} (NIEH tasks include _nieh.yaml)")
+    return TaskFile(name, suite, path, settings)
 
 
 def _read(path: Path) -> dict[str, Any]:

@@ -1,15 +1,17 @@
-"""The journal of a run: every finished unit, and every note that a model took, one JSON line each, on disk before
-it counts.
+"""The journal of a run: every finished unit, one JSON line each, on disk before it counts.
 
-The first line says what run it is. A unit is found again by its task, question and variant, and counts only if the
-fingerprint of its inputs is the same, so an answer given to other inputs is never taken for this one's. A line that
-a killed process left unfinished is cut off when the journal is opened again.
+A run's journal is a folder of shards, one per worker, that are read together. The first line of each says what run it
+is. A unit is found again by its key, and counts only if the fingerprint of its inputs is the same, so a result of other
+inputs is never taken for this one's. A line that a killed process left unfinished is cut off when its shard is opened
+again.
 """
 
 import fcntl
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Iterable
+from dataclasses import dataclass, field
 from pathlib import Path
+from threading import Lock
 from types import TracebackType
 from typing import Any, BinaryIO, Self
 
@@ -17,105 +19,78 @@ import msgspec
 
 from infthor_eval.errors import DataError, UsageError
 from infthor_eval.formats.digests import canonical_json
+from infthor_eval.formats.files import written_whole
+from infthor_eval.runs.records import FORMAT, MemoRecord, RecordTypes, RunHeader, UnitKey, UnitRecord
 
-__all__ = ["Journal", "NoteRecord", "Observer", "UnitRecord", "read_journal"]
+__all__ = ["FOLDER", "Journal", "RunLog", "read_header", "read_run", "recover", "set_aside"]
 
-_FORMAT = 1
-_NOTE = b'{"note":'  # how the line of a note begins, and no unit's
+FOLDER = "journal"  # of a run's folder
+_SHARD = "worker-{:d}.jsonl"
+_BAD_LINES = "bad_lines.txt"
+_OLD = "journal.jsonl"  # the one file of format 1, in the run's folder
+_MEND = "run the same command with --recover to go on without such lines, or with --fresh to start anew"
 
 
-class UnitRecord(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """One question answered in one context, or the reason why it could not be.
+@dataclass
+class RunLog:
+    """What the shards of a run hold together.
 
     Attributes:
-        task: the lm-eval task.
-        question_id: see `Question.id`.
-        variant: which of the task's ways of asking it this is ("depth=0.4"); empty where there is one.
-        fingerprint: of the unit's inputs: the prompt, the frames' content, the gold answers, the decoding settings.
-        traj_id: the trajectory that the question is about; intervals cluster by it.
-        question: the question's text.
-        question_type: its type, empty where the set names none.
-        n_clues: number of frames that hold the evidence; 0 for an absence, which no frame proves.
-        answers: the gold answers.
-        reply: what the model said; None where it failed.
-        failure: why there is no reply; None where there is one.
-        n_context_tokens: length of the request in tokens, 0 where the model counts none.
-        n_cached_tokens: how many of them were not encoded again.
-        n_reply_tokens: length of the reply in tokens.
-        seconds: time that the reply took, the encoding of its context included.
+        header: who the run is; None where there is no shard yet.
+        units: the latest record of each unit.
+        memos: by fingerprint.
     """
 
-    task: str
-    question_id: str
-    fingerprint: str
-    traj_id: str
-    question: str
-    question_type: str
-    n_clues: int
-    answers: tuple[str | int | float, ...]
-    variant: str = ""
-    reply: str | None = None
-    failure: str | None = None
-    n_context_tokens: int = 0
-    n_cached_tokens: int = 0
-    n_reply_tokens: int = 0
-    seconds: float = 0.0
+    header: RunHeader | None = None
+    units: dict[UnitKey, UnitRecord[Any]] = field(default_factory=dict)
+    memos: dict[str, MemoRecord[Any]] = field(default_factory=dict)
+
+    def add(self, record: UnitRecord[Any] | MemoRecord[Any]) -> None:
+        """Take up a record; of a unit that was tried several times the last try counts, and of two the successful."""
+        if isinstance(record, MemoRecord):
+            self.memos[record.fingerprint] = record
+            return
+        known = self.units.get(record.key)
+        if known is None or _rank(record) >= _rank(known):
+            self.units[record.key] = record
 
     @property
-    def key(self) -> tuple[str, str, str]:
-        """Which unit of the run this is."""
-        return self.task, self.question_id, self.variant
+    def records(self) -> list[UnitRecord[Any]]:
+        """The latest record of each unit, in the order of the units' keys."""
+        return [self.units[key] for key in sorted(self.units)]
 
 
-class NoteRecord(msgspec.Struct, frozen=True, kw_only=True):
-    """What a model noted on a few frames of a trajectory, to be shown it later instead of them.
-
-    Attributes:
-        note: the text.
-        fingerprint: of the note's inputs: the prompt, the frames' content, the limit.
-        traj_id: the trajectory.
-        steps: which frames, as the model is told ("Steps 0-19").
-        n_context_tokens: length of the request in tokens.
-        n_reply_tokens: length of the note in tokens.
-        seconds: time that it took.
-    """
-
-    note: str
-    fingerprint: str
-    traj_id: str
-    steps: str
-    n_context_tokens: int
-    n_reply_tokens: int
-    seconds: float
-
-
-# Is told of each unit that is done, and whether it was found in the journal of an earlier, stopped run.
-Observer = Callable[[UnitRecord, bool], None]
-
-
-class _Header(msgspec.Struct, frozen=True):
-    format: int
-    identity: dict[str, Any]
+def _rank(record: UnitRecord[Any]) -> tuple[int, bool]:
+    return record.attempt, record.failure is None
 
 
 class Journal:
-    """Append-only record of one run, held by one process at a time."""
+    """Append-only record of one run; this process holds one shard of it."""
 
-    def __init__(self, path: Path, identity: Mapping[str, Any]) -> None:
-        """Open the journal of the run with this identity, or begin it.
+    def __init__(self, run: Path, header: RunHeader, types: RecordTypes, worker: int = 0) -> None:
+        """Open this worker's shard, or begin it, and read all others.
+
+        Args:
+            run: the run's folder.
+            header: who the run is.
+            types: payloads of the suite.
+            worker: number of the shard.
 
         Raises:
-            UsageError: another process is writing it.
-            DataError: the file is no journal, or that of another run.
+            UsageError: another process is writing the shard, or it cannot be written.
+            DataError: a shard is no journal, has a bad line, or is another run's.
         """
-        path.parent.mkdir(parents=True, exist_ok=True)
-        self.path = path
-        self._file: BinaryIO = path.open("a+b")
+        path = run / FOLDER / _SHARD.format(worker)
         try:
-            self._lock()
-            records, notes = self._recover(identity)
-            self._records = {record.key: record for record in records}
-            self._notes = {note.fingerprint: note for note in notes}
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._file: BinaryIO = path.open("a+b")
+        except OSError as error:
+            raise UsageError(f"{path}: cannot be written ({error.strerror}); give another --output") from error
+        self._writing = Lock()
+        try:
+            _lock(self._file, path)
+            self._log = _read_shards(run, types)
+            self._begin(path, header)
         except (DataError, UsageError):
             self._file.close()
             raise
@@ -124,90 +99,199 @@ class Journal:
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+        self, error_type: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._file.close()
 
     @property
-    def records(self) -> list[UnitRecord]:
-        """Everything recorded, the latest of a unit where it was tried again."""
-        return list(self._records.values())
+    def records(self) -> list[UnitRecord[Any]]:
+        """The latest record of each unit, of all shards."""
+        return self._log.records
 
-    def answered(self, key: tuple[str, str, str], fingerprint: str) -> UnitRecord | None:
-        """The record of a unit that was answered from these inputs; a failed one is tried again by the next run."""
-        record = self._records.get(key)
+    def known(self, key: UnitKey, fingerprint: str) -> UnitRecord[Any] | None:
+        """The record of a unit with a result from these inputs; a failed one is tried again by the next run."""
+        record = self._log.units.get(key)
         if record is None or record.failure is not None or record.fingerprint != fingerprint:
             return None
         return record
 
-    def append(self, record: UnitRecord) -> None:
-        """Record a unit; it is on disk when this returns."""
-        self._write(msgspec.json.encode(record))
-        self._records[record.key] = record
+    def holds(self, record: UnitRecord[Any]) -> bool:
+        """Whether this very record is in it already."""
+        return self._log.units.get(record.key) is record
 
-    def note(self, fingerprint: str) -> NoteRecord | None:
-        """The note that was taken from these inputs, if one was."""
-        return self._notes.get(fingerprint)
+    def append(self, record: UnitRecord[Any]) -> UnitRecord[Any]:
+        """Record a unit; the record is on disk when this returns, numbered as the attempt that it is."""
+        known = self._log.units.get(record.key)
+        if known is not None:
+            record = msgspec.structs.replace(record, attempt=known.attempt + 1)
+        self._write(record)
+        self._log.add(record)
+        return record
 
-    def append_note(self, record: NoteRecord) -> None:
-        """Record a note; it is on disk when this returns."""
-        self._write(msgspec.json.encode(record))
-        self._notes[record.fingerprint] = record
+    def memo(self, fingerprint: str) -> Any | None:
+        """The payload that was kept under these inputs, if one was."""
+        record = self._log.memos.get(fingerprint)
+        return None if record is None else record.payload
 
-    def _lock(self) -> None:
-        try:
-            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
-            raise UsageError(f"{self.path}: another run is writing it; wait for it or stop it") from error
+    def keep(self, fingerprint: str, payload: Any) -> None:
+        """Keep a payload; it is on disk when this returns."""
+        record: MemoRecord[Any] = MemoRecord(fingerprint=fingerprint, payload=payload)
+        self._write(record)
+        self._log.add(record)
 
-    def _recover(self, identity: Mapping[str, Any]) -> tuple[list[UnitRecord], list[NoteRecord]]:
-        self._file.seek(0)
-        content = self._file.read()
+    def _begin(self, path: Path, header: RunHeader) -> None:
+        if self._log.header is not None and canonical_json(self._log.header.identity) != canonical_json(
+            header.identity
+        ):
+            raise DataError(f"{path.parent}: is the journal of another run; give another --output")
+        content = path.read_bytes()
         whole = content.rfind(b"\n") + 1
         if whole < len(content):
             self._file.truncate(whole)
         if not whole:
-            self._write(msgspec.json.encode(_Header(_FORMAT, dict(identity))))
-            return [], []
-        header, records, notes = _decode(content[:whole], self.path)
-        if canonical_json(header.identity) != canonical_json(identity):
-            raise DataError(f"{self.path}: is the journal of another run; give another --output")
-        return records, notes
+            self._write(header)
 
-    def _write(self, line: bytes) -> None:
-        self._file.write(line + b"\n")
-        self._file.flush()
-        os.fsync(self._file.fileno())
+    def _write(self, record: msgspec.Struct) -> None:
+        with self._writing:
+            self._file.write(msgspec.json.encode(record) + b"\n")
+            self._file.flush()
+            os.fsync(self._file.fileno())
 
 
-def read_journal(path: Path) -> tuple[dict[str, Any], list[UnitRecord]]:
-    """The identity of a run and its records, the latest of each unit.
+def _lock(file: BinaryIO, path: Path) -> None:
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        raise UsageError(f"{path}: another run is writing it; wait for it or stop it") from error
+
+
+def read_header(run: Path) -> RunHeader:
+    """Who the run in a folder is.
 
     Raises:
-        DataError: the file cannot be read or is no journal.
+        DataError: there is no journal, or of another format.
     """
+    shards = _shards(run)
+    if not shards:
+        raise DataError(f"{run}: {_no_journal(run)}")
+    return _header(shards[0], _lines(shards[0]))
+
+
+def read_run(run: Path, types: RecordTypes) -> tuple[RunHeader, list[UnitRecord[Any]]]:
+    """The run in a folder: who it is, and the latest record of each unit of all shards.
+
+    Raises:
+        DataError: there is no journal, or one with a bad line, or of another format.
+    """
+    header = read_header(run)
+    return header, _read_shards(run, types).records
+
+
+def _no_journal(run: Path) -> str:
+    if (run / _OLD).is_file():
+        return f"its journal is of format 1, this version reads {FORMAT}; run the evaluation again"
+    return "no journal in it; give the folder of a run"
+
+
+def _shards(run: Path) -> list[Path]:
+    return sorted((run / FOLDER).glob("worker-*.jsonl"))
+
+
+def _read_shards(run: Path, types: RecordTypes) -> RunLog:
+    log = RunLog()
+    decoder = types.decoder()
+    for path in _shards(run):
+        lines = _lines(path)
+        if not lines:
+            continue  # begun by a worker that was killed before it said who it is
+        header = _header(path, lines)
+        if log.header is not None and canonical_json(header.identity) != canonical_json(log.header.identity):
+            raise DataError(f"{path}: belongs to another run than the shards beside it; take it out of the folder")
+        log.header = header
+        for number, line in enumerate(lines[1:], 2):
+            try:
+                log.add(decoder.decode(line))
+            except msgspec.DecodeError as error:
+                raise DataError(f"{path}, line {number}: not a line of a journal ({error}); {_MEND}") from error
+    return log
+
+
+def _lines(path: Path) -> list[bytes]:
+    """The whole lines of a shard; one that is not finished is none yet."""
     try:
         content = path.read_bytes()
     except OSError as error:
-        raise DataError(f"{path}: cannot be read ({error.strerror})") from error
-    header, records, _ = _decode(content[: content.rfind(b"\n") + 1], path)
-    return header.identity, list({record.key: record for record in records}.values())
+        raise DataError(f"{path}: cannot be read ({error.strerror}); restore the file") from error
+    return content[: content.rfind(b"\n") + 1].splitlines()
 
 
-def _decode(content: bytes, path: Path) -> tuple[_Header, list[UnitRecord], list[NoteRecord]]:
-    lines = content.splitlines()
-    number = 1
+class _AnyFormat(msgspec.Struct):
+    format: int
+
+
+def _header(path: Path, lines: list[bytes]) -> RunHeader:
+    first = lines[0] if lines else b""
     try:
-        header = msgspec.json.decode(lines[0] if lines else b"", type=_Header)
-        records: list[UnitRecord] = []
-        notes: list[NoteRecord] = []
-        for number, line in enumerate(lines[1:], 2):  # noqa: B007 - the number is for the error
-            if line.startswith(_NOTE):
-                notes.append(msgspec.json.decode(line, type=NoteRecord))
-            else:
-                records.append(msgspec.json.decode(line, type=UnitRecord))
-    except (msgspec.DecodeError, msgspec.ValidationError) as error:
-        raise DataError(f"{path}, line {number}: not a line of a journal ({error}); take it away") from error
-    if header.format != _FORMAT:
-        raise DataError(f"{path}: format {header.format} of another version of infthor-eval; start anew")
-    return header, records, notes
+        version = msgspec.json.decode(first, type=_AnyFormat).format
+    except msgspec.DecodeError as error:
+        raise DataError(f"{path}, line 1: not the first line of a journal ({error}); {_MEND}") from error
+    if version != FORMAT:
+        raise DataError(f"{path}: a journal of format {version}, this version reads {FORMAT}; start anew with --fresh")
+    try:
+        return msgspec.json.decode(first, type=RunHeader)
+    except msgspec.DecodeError as error:
+        raise DataError(f"{path}, line 1: not the first line of a journal ({error}); {_MEND}") from error
+
+
+def recover(run: Path, header: RunHeader, types: RecordTypes) -> int:
+    """Take the bad lines out of a run's shards and keep them beside; the units that they told of are tried again.
+
+    Args:
+        run: the run's folder.
+        header: who the run is; takes the place of a first line that is bad.
+        types: payloads of the suite.
+
+    Returns:
+        How many lines were bad.
+
+    Raises:
+        UsageError: another process is writing a shard.
+        DataError: a shard is another run's, or of another format.
+    """
+    return sum(_recover_shard(path, header, types) for path in _shards(run))
+
+
+def _recover_shard(path: Path, header: RunHeader, types: RecordTypes) -> int:
+    with path.open("rb") as file:
+        _lock(file, path)
+        decoder = types.decoder()
+        bad: list[bytes] = []
+        good: list[bytes] = []
+        for line in _lines(path):
+            (good if _is_record(line, decoder) else bad).append(line)
+        if not bad:
+            return 0
+        if not (good and isinstance(decoder.decode(good[0]), RunHeader)):
+            good.insert(0, msgspec.json.encode(header))
+        with (path.parent / _BAD_LINES).open("ab") as kept:
+            kept.write(b"".join(line + b"\n" for line in bad))
+        with written_whole(path) as partial:
+            partial.write_bytes(b"".join(line + b"\n" for line in good))
+        return len(bad)
+
+
+def _is_record(line: bytes, decoder: msgspec.json.Decoder[Any]) -> bool:
+    try:
+        decoder.decode(line)
+    except msgspec.DecodeError:
+        return False
+    return True
+
+
+def set_aside(run: Path, names: Iterable[str] = (FOLDER,)) -> None:
+    """Give the journal of a run another name, so that the run starts anew and nothing is lost."""
+    for name in names:
+        path = run / name
+        if path.exists():
+            number = next(n for n in range(1, 10**6) if not (run / f"{name}.{n}").exists())
+            path.rename(run / f"{name}.{number}")

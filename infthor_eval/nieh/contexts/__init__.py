@@ -2,10 +2,10 @@
 
 from infthor_eval.errors import UsageError
 from infthor_eval.nieh.contexts import memory, retrieval, sequence, video, views
-from infthor_eval.nieh.contexts.base import Case, Context, Part, Settings, Unfit
+from infthor_eval.nieh.contexts.base import Context, ContextPart, ContextSettings, Sample
 from infthor_eval.nieh.contexts.haystack import haystack
 
-__all__ = ["CONTEXTS", "Case", "Context", "Part", "Settings", "Unfit", "context_named"]
+__all__ = ["CONTEXTS", "Context", "ContextPart", "ContextSettings", "Sample", "context_named"]
 
 CONTEXTS = {
     "clues": Context(views.clues),

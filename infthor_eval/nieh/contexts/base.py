@@ -6,43 +6,37 @@ from typing import Any
 
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.frames import FrameRef
-from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.nieh_set import NiehSet, SkippedQuestion
 from infthor_eval.formats.question import Question
 from infthor_eval.nieh.notes import Notes, Notetaking
 from infthor_eval.nieh.prompts import question_text
 
-__all__ = ["Case", "Context", "Part", "Settings", "Unfit", "clue_positions"]
+__all__ = ["Context", "ContextPart", "ContextSettings", "Sample", "clue_positions"]
 
-Part = str | FrameRef | Notes
+ContextPart = str | FrameRef | Notes
 
 
 @dataclass(frozen=True)
-class Case:
-    """One way in which a question is asked.
+class Sample:
+    """A question, asked in one way.
 
     Attributes:
+        question: the question.
         frames: the frames shown, as positions in the trajectory's time order.
         variant: which of the context's ways this is ("depth=0.4"); empty where there is one.
         n_cut: frames of the trajectory that are cut off because the context has a size.
         notes: how the model takes notes on the frames, where it is shown its notes instead of them.
     """
 
+    question: Question
     frames: tuple[int, ...]
     variant: str = ""
     n_cut: int = 0
     notes: Notetaking | None = None
 
 
-@dataclass(frozen=True)
-class Unfit:
-    """A way in which the question cannot be asked, and why."""
-
-    reason: str
-    variant: str = ""
-
-
 @dataclass(frozen=True, kw_only=True)
-class Settings:
+class ContextSettings:
     """What contexts can be told, under `dataset_kwargs` of a task file or in lm-eval's metadata.
 
     Attributes:
@@ -70,8 +64,8 @@ class Settings:
     seed: int = 0
 
     @classmethod
-    def read(cls, given: Mapping[str, Any]) -> "Settings":
-        """Settings from a mapping; what they do not know is not theirs.
+    def read(cls, given: Mapping[str, Any]) -> "ContextSettings":
+        """ContextSettings from a mapping; what they do not know is not theirs.
 
         Raises:
             UsageError: a value that cannot be.
@@ -102,7 +96,7 @@ class Settings:
         return int(self.ctx_size * (self.k_tokens or k_tokens)) // self.tokens_per_frame
 
 
-def _frames_alone(_data: NiehSet, _question: Question, _case: Case, frames: Sequence[FrameRef]) -> list[Part]:
+def _frames_alone(_data: NiehSet, _sample: Sample, frames: Sequence[FrameRef]) -> list[ContextPart]:
     return list(frames)
 
 
@@ -110,7 +104,7 @@ def _every_frame(data: NiehSet, traj_id: str) -> Sequence[FrameRef]:
     return data.frames(traj_id)
 
 
-def _nothing_else(_data: NiehSet, _settings: Settings) -> dict[str, Any]:
+def _nothing_else(_data: NiehSet, _settings: ContextSettings) -> dict[str, Any]:
     return {}
 
 
@@ -119,30 +113,30 @@ class Context:
     """A context.
 
     Attributes:
-        cases: the ways in which a question is asked, or why it cannot be.
+        samples: the ways in which a question is asked, or why it cannot be.
         needs_model: whether the frames depend on the model's tokens per frame.
         intro: the sentence that tells the model what it sees, as published where the context is.
-        parts: what the model sees before that sentence, given the frames of a case.
-        frames: the frames that the positions of a case refer to.
+        parts: what the model sees before that sentence, given the frames of a sample.
+        frames: the frames that the positions of a sample refer to.
         sources: what the frames depend on besides the set's own fingerprint and the settings, as JSON values.
     """
 
-    cases: Callable[[NiehSet, Question, Settings], list[Case | Unfit]]
+    samples: Callable[[NiehSet, Question, ContextSettings], list[Sample | SkippedQuestion]]
     needs_model: bool = False
     intro: str = "Answer the question given the agent's views in time order."
-    parts: Callable[[NiehSet, Question, Case, Sequence[FrameRef]], list[Part]] = field(default=_frames_alone)
+    parts: Callable[[NiehSet, Sample, Sequence[FrameRef]], list[ContextPart]] = field(default=_frames_alone)
     frames: Callable[[NiehSet, str], Sequence[FrameRef]] = field(default=_every_frame)
-    sources: Callable[[NiehSet, Settings], dict[str, Any]] = field(default=_nothing_else)
+    sources: Callable[[NiehSet, ContextSettings], dict[str, Any]] = field(default=_nothing_else)
 
-    def shown(self, data: NiehSet, question: Question, case: Case) -> list[FrameRef]:
-        """The frames of a case."""
-        frames = self.frames(data, question.traj_id)
-        return [frames[position] for position in case.frames]
+    def shown(self, data: NiehSet, sample: Sample) -> list[FrameRef]:
+        """The frames of a sample."""
+        frames = self.frames(data, sample.question.traj_id)
+        return [frames[position] for position in sample.frames]
 
-    def request(self, data: NiehSet, question: Question, case: Case) -> list[Part]:
-        """All that a model is shown and told: the context, and last the text with the question."""
-        shown = self.parts(data, question, case, self.shown(data, question, case))
-        return [*shown, question_text(self.intro, question)]
+    def request(self, data: NiehSet, sample: Sample) -> tuple[list[ContextPart], str]:
+        """All that a model is shown and told: the context, and the text with the question that follows it."""
+        shown = self.parts(data, sample, self.shown(data, sample))
+        return shown, question_text(self.intro, sample.question)
 
 
 def clue_positions(data: NiehSet, question: Question) -> tuple[int, ...]:

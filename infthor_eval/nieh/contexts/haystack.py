@@ -7,9 +7,9 @@ clues and frames sampled between them, then around them, in time order. The publ
 
 import random
 
-from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.nieh_set import NiehSet, SkippedQuestion
 from infthor_eval.formats.question import Question
-from infthor_eval.nieh.contexts.base import Case, Settings, Unfit, clue_positions
+from infthor_eval.nieh.contexts.base import ContextSettings, Sample, clue_positions
 
 __all__ = ["haystack"]
 
@@ -17,13 +17,13 @@ _K_TOKENS = 1000  # the published kilo-token
 _STEPS = 5  # depths of the published grid
 
 
-def haystack(data: NiehSet, question: Question, settings: Settings) -> list[Case | Unfit]:
+def haystack(data: NiehSet, question: Question, settings: ContextSettings) -> list[Sample | SkippedQuestion]:
     """The windows for one question: one per depth for one needle, a single one for several."""
     clues = clue_positions(data, question)
     n_all, n = len(data.frames(question.traj_id)), settings.n_frames(_K_TOKENS)
     if _is_one_needle(clues):
-        return [_at_depth(clues, n_all, n, depth) for depth in settings.depths]
-    return [_around_several(clues, n_all, n, random.Random(f"{settings.seed}/{question.id}/{n}"))]
+        return [_at_depth(question, clues, n_all, n, depth) for depth in settings.depths]
+    return [_around_several(question, clues, n_all, n, random.Random(f"{settings.seed}/{question.id}/{n}"))]
 
 
 def _is_one_needle(clues: tuple[int, ...]) -> bool:
@@ -31,26 +31,30 @@ def _is_one_needle(clues: tuple[int, ...]) -> bool:
     return len(clues) == 1 or (len(clues) == 2 and clues[1] - clues[0] == 1)
 
 
-def _at_depth(clues: tuple[int, ...], n_all: int, n: int, depth: float) -> Case | Unfit:
+def _at_depth(
+    question: Question, clues: tuple[int, ...], n_all: int, n: int, depth: float
+) -> Sample | SkippedQuestion:
     variant = f"depth={depth:g}"
     if n < len(clues):
-        return Unfit("the clues do not fit the window", variant)
+        return SkippedQuestion(question, "the clues do not fit the window", variant)
     start = clues[0] - round(depth * _STEPS) * (n // _STEPS)
     if start < 0 or start + n > n_all:
-        return Unfit("the window reaches outside the trajectory", variant)
+        return SkippedQuestion(question, "the window reaches outside the trajectory", variant)
     if clues[-1] >= start + n:
-        return Unfit("the second of two adjacent clues lies behind the window", variant)
-    return Case(tuple(range(start, start + n)), variant)
+        return SkippedQuestion(question, "the second of two adjacent clues lies behind the window", variant)
+    return Sample(question, tuple(range(start, start + n)), variant)
 
 
-def _around_several(clues: tuple[int, ...], n_all: int, n: int, draw: random.Random) -> Case | Unfit:
+def _around_several(
+    question: Question, clues: tuple[int, ...], n_all: int, n: int, draw: random.Random
+) -> Sample | SkippedQuestion:
     if n < len(clues):
-        return Unfit("the clues do not fit the window")
+        return SkippedQuestion(question, "the clues do not fit the window")
     if n > n_all:
-        return Unfit("the window reaches outside the trajectory")
+        return SkippedQuestion(question, "the window reaches outside the trajectory")
     between = [position for position in range(clues[0], clues[-1]) if position not in clues]
     around = [*range(clues[0]), *range(clues[-1] + 1, n_all)]
     missing = n - len(clues)
     chosen = draw.sample(between, min(missing, len(between)))
     chosen += draw.sample(around, missing - len(chosen))
-    return Case(tuple(sorted([*clues, *chosen])))
+    return Sample(question, tuple(sorted([*clues, *chosen])))

@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from infthor_eval.errors import DataError
-from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.nieh_set import NiehSet, SkippedQuestion
 from infthor_eval.formats.question import Question
-from infthor_eval.nieh.contexts.base import Case, Settings, Unfit
+from infthor_eval.nieh.contexts.base import ContextSettings, Sample
 
 if TYPE_CHECKING:
     from model_adapters.retrieval import Retriever
@@ -17,7 +17,7 @@ __all__ = ["clip_retrieval", "memory_frames", "retriever_identity"]
 _DIGITS = 6  # of a similarity; what is beyond is rounding, which must not decide between equal frames
 
 
-def clip_retrieval(data: NiehSet, question: Question, settings: Settings) -> list[Case | Unfit]:
+def clip_retrieval(data: NiehSet, question: Question, settings: ContextSettings) -> list[Sample | SkippedQuestion]:
     """The `top_k` frames most similar to the question, in time order (published under the same name, k = 10).
 
     Of equally similar frames the earlier ones are taken; a trajectory of fewer frames is shown whole.
@@ -26,11 +26,11 @@ def clip_retrieval(data: NiehSet, question: Question, settings: Settings) -> lis
     try:
         vectors = retriever.frames(data.frames(question.traj_id))
     except DataError as error:
-        return [Unfit(str(error))]
-    return [Case(_nearest(vectors, retriever.text(question.text), settings.top_k))]
+        return [SkippedQuestion(question, str(error))]
+    return [Sample(question, _nearest(vectors, retriever.text(question.text), settings.top_k))]
 
 
-def memory_frames(data: NiehSet, question: Question, settings: Settings) -> list[Case | Unfit]:
+def memory_frames(data: NiehSet, question: Question, settings: ContextSettings) -> list[Sample | SkippedQuestion]:
     """The `top_k` earlier frames most similar to the last one, which is the agent's current view, then that one.
 
     The paper reports such a memory with the top 20 images (long-horizon tasks). The current view is shown beside the
@@ -39,16 +39,16 @@ def memory_frames(data: NiehSet, question: Question, settings: Settings) -> list
     try:
         vectors = _retriever(settings).frames(data.frames(question.traj_id))
     except DataError as error:
-        return [Unfit(str(error))]
-    return [Case((*_nearest(vectors[:-1], vectors[-1], settings.top_k), len(vectors) - 1))]
+        return [SkippedQuestion(question, str(error))]
+    return [Sample(question, (*_nearest(vectors[:-1], vectors[-1], settings.top_k), len(vectors) - 1))]
 
 
-def retriever_identity(_data: NiehSet, settings: Settings) -> dict[str, Any]:
+def retriever_identity(_data: NiehSet, settings: ContextSettings) -> dict[str, Any]:
     """Which model retrieves: another one finds other frames."""
     return {"retriever": _retriever(settings).identity()}
 
 
-def _retriever(settings: Settings) -> "Retriever":
+def _retriever(settings: ContextSettings) -> "Retriever":
     from model_adapters.retrieval import open_retriever
 
     return open_retriever(settings.retriever, settings.retriever_revision)

@@ -7,9 +7,9 @@ from pathlib import Path
 
 from infthor_eval.errors import DataError
 from infthor_eval.formats.frames import FrameRef
-from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.nieh_set import NiehSet, SkippedQuestion
 from infthor_eval.formats.question import Question
-from infthor_eval.nieh.contexts.base import Case, Part, Settings, Unfit
+from infthor_eval.nieh.contexts.base import ContextPart, ContextSettings, Sample
 
 __all__ = ["interleaved", "interleaved_parts", "last_state", "state_parts"]
 
@@ -17,17 +17,18 @@ _MARK = "<image>"  # where a frame stands in traj.txt
 _ACT = "<|act|>"  # what ends an action there
 
 
-def interleaved(data: NiehSet, question: Question, _settings: Settings) -> list[Case | Unfit]:
+def interleaved(data: NiehSet, question: Question, _settings: ContextSettings) -> list[Sample | SkippedQuestion]:
     """Goals, frames and actions of the whole trajectory in time order (published: `interleaved`)."""
     n_frames = len(data.frames(question.traj_id))
     done = _actions_before_marks(_sequence_text(data.folder(question.traj_id)))
     n_actions = max(done, default=0)
     if n_actions + 1 == n_frames:
-        return [Case(tuple(done))]
+        return [Sample(question, tuple(done))]
     after_actions = [0, *_frames_after_actions(data, question.traj_id)]
     if n_actions + 1 != len(after_actions):
-        return [Unfit(f"traj.txt has {n_actions} actions, which fit neither the frames nor expert_log.json")]
-    return [Case(tuple(after_actions[number] for number in done))]
+        reason = f"traj.txt has {n_actions} actions, which fit neither the frames nor expert_log.json"
+        return [SkippedQuestion(question, reason)]
+    return [Sample(question, tuple(after_actions[number] for number in done))]
 
 
 def _actions_before_marks(text: str) -> list[int]:
@@ -39,23 +40,23 @@ def _actions_before_marks(text: str) -> list[int]:
     return done
 
 
-def interleaved_parts(data: NiehSet, question: Question, _case: Case, frames: Sequence[FrameRef]) -> list[Part]:
+def interleaved_parts(data: NiehSet, sample: Sample, frames: Sequence[FrameRef]) -> list[ContextPart]:
     """The texts of traj.txt with the frames in their places."""
-    texts = _sequence_text(data.folder(question.traj_id)).strip().split(_MARK)
+    texts = _sequence_text(data.folder(sample.question.traj_id)).strip().split(_MARK)
     parts = (part for pair in zip_longest(texts, frames) for part in pair)
     return [part for part in parts if part]
 
 
-def last_state(data: NiehSet, question: Question, _settings: Settings) -> list[Case | Unfit]:
+def last_state(data: NiehSet, question: Question, _settings: ContextSettings) -> list[Sample | SkippedQuestion]:
     """The last frame, beside the text of the last state (published: `text_state`)."""
     if not _states(data.folder(question.traj_id)):
-        return [Unfit("the trajectory has no state_summary")]
-    return [Case((len(data.frames(question.traj_id)) - 1,))]
+        return [SkippedQuestion(question, "the trajectory has no state_summary")]
+    return [Sample(question, (len(data.frames(question.traj_id)) - 1,))]
 
 
-def state_parts(data: NiehSet, question: Question, _case: Case, frames: Sequence[FrameRef]) -> list[Part]:
+def state_parts(data: NiehSet, sample: Sample, frames: Sequence[FrameRef]) -> list[ContextPart]:
     """The text of the last state, then the last frame."""
-    states = _states(data.folder(question.traj_id))
+    states = _states(data.folder(sample.question.traj_id))
     return [states[max(states, key=int)], *frames]
 
 

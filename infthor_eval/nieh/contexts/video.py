@@ -6,14 +6,14 @@ from typing import Any
 
 from infthor_eval.errors import DataError
 from infthor_eval.formats.frames import FrameRef
-from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.nieh_set import NiehSet, SkippedQuestion
 from infthor_eval.formats.question import Question
-from infthor_eval.nieh.contexts.base import Case, Settings, Unfit
+from infthor_eval.nieh.contexts.base import ContextSettings, Sample
 
 __all__ = ["video", "video_frames", "video_identity"]
 
 
-def video(data: NiehSet, question: Question, _settings: Settings) -> list[Case | Unfit]:
+def video(data: NiehSet, question: Question, _settings: ContextSettings) -> list[Sample | SkippedQuestion]:
     """The trajectory's mp4 at one frame per second, or every frame where it has none (published: `video`).
 
     Models are given the frames as images, also those that have an input for videos of their own, so that all of them
@@ -22,9 +22,9 @@ def video(data: NiehSet, question: Question, _settings: Settings) -> list[Case |
     try:
         frames = video_frames(data, question.traj_id)
     except DataError as error:
-        return [Unfit(str(error), "source=mp4")]
+        return [SkippedQuestion(question, str(error), "source=mp4")]
     is_video = data.video(question.traj_id) is not None
-    return [Case(tuple(range(len(frames))), "source=mp4" if is_video else "source=frames")]
+    return [Sample(question, tuple(range(len(frames))), "source=mp4" if is_video else "source=frames")]
 
 
 def video_frames(data: NiehSet, traj_id: str) -> Sequence[FrameRef]:
@@ -37,7 +37,7 @@ def video_frames(data: NiehSet, traj_id: str) -> Sequence[FrameRef]:
     return data.frames(traj_id) if path is None else data.video_frames(traj_id)
 
 
-def video_identity(data: NiehSet, _settings: Settings) -> dict[str, Any]:
+def video_identity(data: NiehSet, _settings: ContextSettings) -> dict[str, Any]:
     """Hash of the videos and how they are decoded: the set's own fingerprint knows nothing of videos."""
     digest = hashlib.blake2b(digest_size=16)
     for traj_id in sorted({question.traj_id for question in data.questions}):

@@ -1,29 +1,29 @@
 """Contexts that show frames of the trajectory without choosing by the needle: clues, whole, its end."""
 
-from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.nieh_set import NiehSet, SkippedQuestion
 from infthor_eval.formats.question import Question
-from infthor_eval.nieh.contexts.base import Case, Settings, Unfit
+from infthor_eval.nieh.contexts.base import ContextSettings, Sample
 
 __all__ = ["clues", "trajectory", "truncate_head"]
 
 _K_TOKENS = 1024  # truncate_head's published kilo-token
 
 
-def clues(data: NiehSet, question: Question, _settings: Settings) -> list[Case | Unfit]:
+def clues(data: NiehSet, question: Question, _settings: ContextSettings) -> list[Sample | SkippedQuestion]:
     """The frames that hold the evidence and no others, in the order of the file (the paper's Table 4)."""
     order = {frame: position for position, frame in enumerate(data.frames(question.traj_id))}
-    return [Case(tuple(order[frame] for frame in data.clue_frames(question)))]
+    return [Sample(question, tuple(order[frame] for frame in data.clue_frames(question)))]
 
 
-def trajectory(data: NiehSet, question: Question, _settings: Settings) -> list[Case | Unfit]:
+def trajectory(data: NiehSet, question: Question, _settings: ContextSettings) -> list[Sample | SkippedQuestion]:
     """Every frame of the trajectory (published: `full_traj`)."""
-    return [Case(tuple(range(len(data.frames(question.traj_id)))))]
+    return [Sample(question, tuple(range(len(data.frames(question.traj_id)))))]
 
 
-def truncate_head(data: NiehSet, question: Question, settings: Settings) -> list[Case | Unfit]:
+def truncate_head(data: NiehSet, question: Question, settings: ContextSettings) -> list[Sample | SkippedQuestion]:
     """The last frames that fit the context (published under the same name); clues before them are lost."""
     n_all, n = len(data.frames(question.traj_id)), settings.n_frames(_K_TOKENS)
     if n < 1:
-        return [Unfit("no frame fits the context")]
+        return [SkippedQuestion(question, "no frame fits the context")]
     n_cut = max(0, n_all - n)
-    return [Case(tuple(range(n_cut, n_all)), n_cut=n_cut)]
+    return [Sample(question, tuple(range(n_cut, n_all)), n_cut=n_cut)]

@@ -4,8 +4,9 @@ import time
 
 from infthor_eval.formats.digests import fingerprint
 from infthor_eval.nieh.notes import Notes, Window
-from infthor_eval.runs.journal import Journal, NoteRecord
-from model_adapters import Model
+from infthor_eval.nieh.records import NiehNote
+from infthor_eval.runs import Session
+from model_adapters import Decoding, Model
 
 __all__ = ["Notebook"]
 
@@ -13,10 +14,10 @@ __all__ = ["Notebook"]
 class Notebook:
     """A model's notes, kept in the run's journal: a stopped run goes on with the same ones."""
 
-    def __init__(self, model: Model, journal: Journal) -> None:
+    def __init__(self, model: Model, session: Session) -> None:
         self._conversation = model.conversation()
         self._start = self._conversation.mark()
-        self._journal = journal
+        self._session = session
 
     def text(self, notes: Notes) -> str:
         """The notes as they are shown; the missing ones are taken first.
@@ -28,24 +29,25 @@ class Notebook:
         return notes.text([self._note(notes, window) for window in notes.windows])
 
     def _note(self, notes: Notes, window: Window) -> str:
-        limit = notes.taking.max_new_tokens
+        decoding = Decoding(max_new_tokens=notes.taking.max_new_tokens)
         digests = [frame.digest for frame in window.frames]
-        inputs = fingerprint({"frames": digests, "text": window.request[-1], "limit": limit})
-        known = self._journal.note(inputs)
-        if known is not None:
-            return known.note
+        inputs = fingerprint({"frames": digests, "text": window.request[-1], "decoding": decoding.document()})
+        note = self._session.memo(inputs)
+        if note is None:
+            note = self._taken(notes, window, decoding)
+            self._session.keep(inputs, note)
+        return str(note.note)
+
+    def _taken(self, notes: Notes, window: Window, decoding: Decoding) -> NiehNote:
         began = time.perf_counter()
         self._conversation.rewind(self._start)
         self._conversation.append(*window.request)
-        reply = self._conversation.reply(limit)
-        record = NoteRecord(
+        reply = self._conversation.reply(decoding)
+        return NiehNote(
             note=reply.text,
-            fingerprint=inputs,
             traj_id=notes.traj_id,
             steps=window.steps,
             n_context_tokens=reply.n_context_tokens,
-            n_reply_tokens=len(reply.token_ids),
+            n_reply_tokens=reply.n_reply_tokens,
             seconds=round(time.perf_counter() - began, 4),
         )
-        self._journal.append_note(record)
-        return record.note

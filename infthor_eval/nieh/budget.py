@@ -1,14 +1,14 @@
-"""What the requests of a run cost in tokens, told before the first of them is computed."""
+"""What the requests of a task cost in tokens, told before the first of them is computed."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from infthor_eval.errors import DataError, ModelError
 from infthor_eval.formats.frames import FrameRef
-from infthor_eval.nieh.contexts import Part, context_named
+from infthor_eval.nieh.answering import TaskPlan
+from infthor_eval.nieh.contexts import ContextPart, Sample
 from infthor_eval.nieh.notes import Notes
-from infthor_eval.nieh.work import Work
-from model_adapters import ExtendableModel, Model
+from model_adapters import Model
 
 __all__ = ["Budget", "budget_of"]
 
@@ -18,7 +18,6 @@ class Budget:
     """Tokens of one task's requests against the model's limit.
 
     Attributes:
-        task: the lm-eval task.
         longest: tokens of its longest request, room for the reply included.
         limit: the model's limit, None where it has none.
         limit_before: the limit that a RoPE extension raised to this one, None where nothing is extended.
@@ -28,7 +27,6 @@ class Budget:
         n_refused: how many are beyond the limit; their questions will be recorded as failed.
     """
 
-    task: str
     longest: int
     limit: int | None
     limit_before: int | None
@@ -38,8 +36,14 @@ class Budget:
     n_refused: int
 
     @property
-    def outcome(self) -> str:
-        """What will happen, in words."""
+    def description(self) -> str:
+        """What it costs and what will happen, in words."""
+        limit = "no limit" if self.limit is None else f"limit {self.limit:,}"
+        limit += "" if self.limit_before is None else f", {self.limit_before:,} before its extension"
+        return f"{self.n_contexts} contexts, the longest request {self.longest:,} tokens ({limit}): {self._outcome}"
+
+    @property
+    def _outcome(self) -> str:
         counted = [
             (self.n_truncated, "truncated: frames cut off to keep the context's size"),
             (self.n_extended, "extended: longer than the model takes without rope"),
@@ -48,42 +52,51 @@ class Budget:
         return "; ".join(f"{n} of {self.n_contexts} contexts {what}" for n, what in counted if n) or "fits"
 
 
-def budget_of(task: str, context: str, work: Work, model: Model, max_new_tokens: int) -> Budget:
+def budget_of(plan: TaskPlan, model: Model) -> Budget:
     """Count the tokens of a task's requests as the model's own processor does.
 
     Questions in one context differ by a few words, so each context is counted once, with its longest question.
 
     Args:
-        task: the lm-eval task.
-        context: the name of its context.
-        work: what it asks.
-        model: whose tokens.
-        max_new_tokens: room for the reply.
+        plan: the task's.
+        model: whose tokens; one that counts them.
 
     Raises:
         ModelError: the model can take none of the requests, whatever their length.
     """
-    counts = _counts(model, _requests(context, work), max_new_tokens)
-    limit, before = model.max_tokens, _limit_before(model)
+    capabilities = model.capabilities
+    limit, before = capabilities.max_tokens, capabilities.max_tokens_before_extension
+    longest = _longest_questions(plan.found.samples)
+    counts = _counts(model, plan, longest)
     fitting = [count for count in counts if limit is None or count <= limit]
     return Budget(
-        task=task,
         longest=max(counts, default=0),
         limit=limit,
         limit_before=before,
         n_contexts=len(counts),
-        n_truncated=len({(question.traj_id, case.frames) for question, case in work.cases if case.n_cut}),
+        n_truncated=sum(sample.n_cut > 0 for sample in longest),
         n_extended=sum(before is not None and count > before for count in fitting),
         n_refused=len(counts) - len(fitting),
     )
 
 
-def _counts(model: Model, requests: Sequence[Sequence[Part]], max_new_tokens: int) -> list[int]:
+def _longest_questions(samples: Iterable[Sample]) -> list[Sample]:
+    """One sample per context: that of its longest question."""
+    longest: dict[tuple[str, tuple[int, ...]], Sample] = {}
+    for sample in samples:
+        key = sample.question.traj_id, sample.frames
+        if key not in longest or len(sample.question.text) > len(longest[key].question.text):
+            longest[key] = sample
+    return list(longest.values())
+
+
+def _counts(model: Model, plan: TaskPlan, samples: Sequence[Sample]) -> list[int]:
     counts: list[int] = []
     refusals: list[ModelError] = []
-    for parts in requests:
+    for sample in samples:
+        context, text = plan.found.request(sample)
         try:
-            counts.append(_most_tokens(model, parts, max_new_tokens))
+            counts.append(_most_tokens(model, [*context, text], plan.decoding.max_new_tokens))
         except ModelError as error:  # one question's text may be to blame; the run records it as failed
             refusals.append(error)
     if refusals and not counts:
@@ -91,22 +104,7 @@ def _counts(model: Model, requests: Sequence[Sequence[Part]], max_new_tokens: in
     return counts + [0] * len(refusals)
 
 
-def _limit_before(model: Model) -> int | None:
-    return model.max_tokens_before_extension if isinstance(model, ExtendableModel) else None
-
-
-def _requests(context: str, work: Work) -> list[list[Part]]:
-    """One request per context: that of its longest question."""
-    longest: dict[tuple[str, tuple[int, ...]], tuple[int, list[Part]]] = {}
-    chosen = context_named(context)
-    for question, case in work.cases:
-        key = (question.traj_id, case.frames)
-        if key not in longest or len(question.text) > longest[key][0]:
-            longest[key] = (len(question.text), chosen.request(work.data, question, case))
-    return [parts for _, parts in longest.values()]
-
-
-def _most_tokens(model: Model, parts: Sequence[Part], max_new_tokens: int) -> int:
+def _most_tokens(model: Model, parts: Sequence[ContextPart], max_new_tokens: int) -> int:
     """Tokens of a request and its reply, or of the longest one for a note that is shown in it, if that is longer.
 
     Notes are not written yet; each is counted with all the tokens that it may have.
@@ -122,6 +120,6 @@ def _tokens(model: Model, parts: Sequence[str | FrameRef]) -> int:
     conversation = model.conversation()
     conversation.append(*parts)
     try:
-        return conversation.n_tokens
+        return conversation.n_tokens or 0
     except DataError:  # a frame that cannot be read costs nothing; the run records its questions as failed
         return 0

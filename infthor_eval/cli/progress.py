@@ -1,0 +1,52 @@
+"""What people see of a run while it goes, on standard error."""
+
+from collections import Counter
+from typing import Any
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from infthor_eval.runs import PreparedRun, RunOutcome, UnitRecord, Work, execute
+
+__all__ = ["NOTES", "execute_with_progress", "say"]
+
+NOTES = Console(stderr=True, soft_wrap=True)
+
+
+class _Bar:
+    """Observes a run: what is skipped and what it costs beforehand, then a bar."""
+
+    def __init__(self, name: str, progress: Progress) -> None:
+        self._name = name
+        self._progress = progress
+        self.n_found = self.n_made = 0
+
+    def begin(self, work: Work, n_recovered: int) -> None:
+        """See `Observer`."""
+        if n_recovered:
+            say(f"{self._name}: {n_recovered} bad line(s) of the journal set aside; those units are tried again")
+        for (task, reason), n in sorted(Counter((item.key.task, item.reason) for item in work.skipped).items()):
+            say(f"{task}: {n} sample(s) skipped: {reason}", "yellow")
+        for cost in work.costs:
+            say(f"{cost.task}: {cost.description}")
+        self._bar = self._progress.add_task(self._name, total=work.n_units)
+
+    def done(self, record: UnitRecord[Any], resumed: bool) -> None:
+        """See `Observer`."""
+        self.n_found, self.n_made = self.n_found + resumed, self.n_made + (not resumed)
+        self._progress.advance(self._bar)
+
+
+def execute_with_progress(run: PreparedRun) -> RunOutcome:
+    """Execute one prepared run, with a progress bar, and with what is skipped and what failed."""
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=NOTES, transient=True) as progress:
+        bar = _Bar(run.request.label, progress)
+        outcome = execute(run, bar)
+    say(f"{run.request.label}: {bar.n_made} answered now, {bar.n_found} found in the journal of an earlier run")
+    return outcome
+
+
+def say(text: str, style: str = "") -> None:
+    """A line on standard error; whatever is in it is shown as text."""
+    NOTES.print(text, style=style, highlight=False, markup=False)

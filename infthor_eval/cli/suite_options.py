@@ -1,0 +1,54 @@
+"""Options of suites on the command line, made from their dataclasses."""
+
+import typing
+from collections.abc import Callable, Mapping
+from dataclasses import fields
+from types import NoneType
+from typing import Any
+
+import click
+
+from infthor_eval.errors import UsageError
+from infthor_eval.suites import options_of, suite_names
+
+__all__ = ["chosen_options", "suite_options"]
+
+
+def suite_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add every suite's options to a command; a value that is not given is None."""
+    for suite in reversed(suite_names()):
+        hints = typing.get_type_hints(options_of(suite))
+        for item in reversed(fields(options_of(suite))):
+            choices = item.metadata.get("choices")
+            command = click.option(
+                f"--{item.name.replace('_', '-')}",
+                type=click.Choice(choices) if choices else _type(hints[item.name]),
+                metavar=item.metadata.get("metavar"),
+                help=f"{item.metadata['help']} [{suite}]",
+            )(command)
+    return command
+
+
+def chosen_options(suite: str, given: Mapping[str, Any], asked: typing.Collection[str]) -> Any:
+    """The options of one suite, of all that a command was given.
+
+    Args:
+        suite: the suite.
+        given: option names to values, of all suites; None where not given.
+        asked: the suites that are asked.
+
+    Raises:
+        UsageError: an option belongs to a suite that is not asked.
+    """
+    for other in suite_names():
+        unused = [item.name for item in fields(options_of(other)) if given.get(item.name) is not None]
+        if unused and other not in asked:
+            raise UsageError(f"--{unused[0].replace('_', '-')} is for tasks of {other}; none of them is asked")
+    known = typing.get_type_hints(options_of(suite))
+    values = {name: given[name] for name in known if given.get(name) is not None}
+    return options_of(suite)(**{name: _type(known[name])(value) for name, value in values.items()})
+
+
+def _type(hint: Any) -> type:
+    """The type behind `int | None`."""
+    return next(kept for kept in (typing.get_args(hint) or (hint,)) if kept is not NoneType)

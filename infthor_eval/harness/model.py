@@ -1,0 +1,127 @@
+"""Our models under lm-eval's own command: `lm-eval run --model infthor --model_args adapter=qwen2.5-vl-tiny,...`."""
+
+import tempfile
+from collections.abc import Sequence
+from itertools import groupby
+from pathlib import Path
+
+from lm_eval.api.instance import Instance
+from lm_eval.api.model import LM
+
+from infthor_eval.errors import ModelError, UsageError
+from infthor_eval.harness.registration import NAME, say_model_takes_references
+from infthor_eval.nieh.answering import ModelAnswerer, NiehUnit, TaskPlan, answered
+from infthor_eval.nieh.baselines import BASELINES
+from infthor_eval.nieh.docs import sample_of, samples_around
+from infthor_eval.nieh.records import RECORDS
+from infthor_eval.runs import RunHeader
+from infthor_eval.runs.generation_kwargs import decoding_of
+from infthor_eval.runs.identity import identity_of
+from infthor_eval.runs.journal import Journal
+from infthor_eval.runs.records import UnitKey
+from infthor_eval.runs.session import JournalSession
+from model_adapters import Model, adapter_identity, label, load, takes
+
+__all__ = ["InfthorLM"]
+
+_DEFAULT_DEVICE = "cuda:0"  # what lm-eval says where nobody said anything
+
+
+class InfthorLM(LM):
+    """Any model of ours, by name, for a command that is not ours.
+
+    Requests are answered in the order that shares most, and each is recorded before the next is begun: lm-eval sorts
+    them by the length of their text, which scatters the questions on one trajectory; here they are grouped again.
+    Requests refer to their frames through the doc; images in them are not looked at.
+    """
+
+    MULTIMODAL = True  # lm-eval asks before it hands over a task with images
+
+    def __init__(
+        self,
+        adapter: str,
+        journal: str | None = None,
+        seed: int = 0,
+        batch_size: int | str | None = None,
+        max_batch_size: int | None = None,
+        device: str | None = None,
+        **options: object,
+    ) -> None:
+        """Load a model.
+
+        Args:
+            adapter: name of the model (`infthor-eval ls models`).
+            journal: folder of a run, to go on where an earlier one stopped; None keeps it for this process only.
+            seed: for whatever is random in the model.
+            batch_size: lm-eval's; passed on to models that take one.
+            max_batch_size: lm-eval's; not looked at.
+            device: lm-eval's; passed on to models that take one, unless it is what lm-eval says by default.
+            options: the model's options.
+
+        Raises:
+            UsageError: an unknown name or option, or a baseline, which needs the answer key that lm-eval does not give.
+            ModelError: the model cannot be loaded.
+        """
+        super().__init__()
+        if adapter in BASELINES:
+            raise UsageError(f"{adapter} reads the answer key; run it with infthor-eval --model {adapter}")
+        given = {key: str(value) for key, value in options.items()}
+        theirs = {"device": None if device == _DEFAULT_DEVICE else device, "batch_size": _number(batch_size)}
+        given |= {key: value for key, value in theirs.items() if value is not None and takes(adapter, key)}
+        model = load(adapter, given, seed)
+        if not isinstance(model, Model):
+            raise UsageError(f"{adapter} cannot be talked to; it is a policy")
+        say_model_takes_references()
+        self._model = model
+        self._seed = seed
+        self._scratch = None if journal else tempfile.TemporaryDirectory(prefix="infthor-")
+        identity = identity_of("nieh", model, adapter_identity(adapter), {"host": "lm-eval"}, None, seed)
+        header = RunHeader(suite="nieh", name=label(adapter, given), identity=identity)
+        folder = Path(journal or str(self._scratch and self._scratch.name))
+        self._session = JournalSession(model, Journal(folder, header, RECORDS))
+
+    @property
+    def tokenizer_name(self) -> str:
+        """The model's name; lm-eval keys its caches by it."""
+        return self._model.name
+
+    def get_model_info(self) -> dict[str, str]:
+        """What lm-eval writes of a model beside its results."""
+        return {"model_source": NAME, "model_name": self._model.name}
+
+    def generate_until(self, requests: Sequence[Instance]) -> list[str]:
+        """One response per request; empty where the model could not answer (the journal has the reason)."""
+        replies: dict[UnitKey, str] = {}
+        units = [_unit(request) for request in requests]
+        order = sorted(range(len(units)), key=lambda number: (units[number].key.task, units[number].cluster))
+        for _, numbers in groupby(order, key=lambda number: (units[number].key.task, units[number].cluster)):
+            replies |= self._replies([(units[number], requests[number]) for number in numbers])
+        return [replies[unit.key] for unit in units]
+
+    def loglikelihood(self, requests: Sequence[Instance]) -> list[tuple[float, bool]]:
+        """Not offered: no task of ours compares likelihoods."""
+        raise ModelError("infthor-eval models answer in words; use a task with output_type generate_until")
+
+    def loglikelihood_rolling(self, requests: Sequence[Instance]) -> list[float]:
+        """Not offered, see `loglikelihood`."""
+        raise ModelError("infthor-eval models answer in words; use a task with output_type generate_until")
+
+    def _replies(self, group: Sequence[tuple[NiehUnit, Instance]]) -> dict[UnitKey, str]:
+        """Replies to the requests of one task on one trajectory."""
+        unit, request = group[0]
+        decoding = decoding_of(request.args[1], self._seed, unit.key.task)
+        plan = TaskPlan(samples_around(request.doc), decoding)
+        answerer = ModelAnswerer(self._model, self._session)
+        records = answered([unit for unit, _ in group], plan, answerer, self._session)
+        return {record.key: self._session.recorded(record)[0].payload.reply or "" for record in records}
+
+
+def _unit(request: Instance) -> NiehUnit:
+    if request.task_name is None or not isinstance(request.doc, dict) or "question_id" not in request.doc:
+        raise ModelError(f"{request.task_name}: infthor-eval's models answer its own tasks (tasks/nieh) under lm-eval")
+    return NiehUnit.of(request.task_name, sample_of(request.doc))
+
+
+def _number(batch_size: int | str | None) -> str | None:
+    """lm-eval's batch size where it is one: "auto" is nothing to us, and 1 is what every model takes by itself."""
+    return str(batch_size) if str(batch_size).isdigit() and int(str(batch_size)) > 1 else None

@@ -1,0 +1,79 @@
+"""The form of replies, apart from whether they are right: a leaning to yes, and replies that are no answer at all."""
+
+from collections import Counter
+from collections.abc import Sequence
+
+import msgspec
+
+from infthor_eval.nieh.prompts import last_line
+from infthor_eval.nieh.records import NiehAnswer
+from infthor_eval.nieh.scoring import says_number, says_yes_or_no
+from infthor_eval.runs import UnitRecord
+
+__all__ = ["YesNo", "format_failures", "yes_no"]
+
+Record = UnitRecord[NiehAnswer]
+
+
+class YesNo(msgspec.Struct, frozen=True):
+    """Yes/no questions.
+
+    Attributes:
+        n: how many were asked.
+        share_gold_yes: to how many of them the answer is yes; None without any.
+        share_said_yes: how often yes was said; None without any.
+        n_neither: replies that are neither, or both.
+    """
+
+    n: int
+    share_gold_yes: float | None
+    share_said_yes: float | None
+    n_neither: int
+
+
+def yes_no(records: Sequence[Record]) -> YesNo:
+    """Bias on yes/no questions: a model that always says yes shows here, as does one that says neither.
+
+    Args:
+        records: of one task; those of other questions are passed over.
+    """
+    asked = [record for record in records if _gold(record) in ({"yes"}, {"no"})]
+    said = Counter(says_yes_or_no(last_line(record.payload.reply or "")) for record in asked)
+    n = len(asked)
+    return YesNo(
+        n=n,
+        share_gold_yes=sum(_gold(record) == {"yes"} for record in asked) / n if n else None,
+        share_said_yes=said["yes"] / n if n else None,
+        n_neither=said[None],
+    )
+
+
+def format_failures(records: Sequence[Record], max_new_tokens: int) -> dict[str, int]:
+    """How many replies are not of the form asked for, by reason; one that fails in two ways counts in both.
+
+    Args:
+        records: of one task; questions that the model failed on have no reply and are not counted.
+        max_new_tokens: limit of a reply.
+    """
+    found: Counter[str] = Counter()
+    for record in records:
+        if record.payload.reply is not None:
+            found.update(_failures(record, last_line(record.payload.reply), max_new_tokens))
+    return dict(sorted(found.items()))
+
+
+def _failures(record: Record, said: str, max_new_tokens: int) -> list[str]:
+    gold, found = _gold(record), []
+    if not said:
+        found.append("empty")
+    elif gold in ({"yes"}, {"no"}) and says_yes_or_no(said) is None:
+        found.append("neither yes nor no")
+    elif len(gold) == 1 and says_number(next(iter(gold))) and not says_number(said):
+        found.append("no number")
+    if (record.tokens.reply or 0) >= max_new_tokens:
+        found.append("cut off at the token limit")
+    return found
+
+
+def _gold(record: Record) -> set[str]:
+    return {str(answer).lower() for answer in record.payload.answers}

@@ -1,0 +1,259 @@
+"""Having questions answered, by a model through its conversation or by a baseline from the answer key.
+
+This is the one way from a sample to its record, whoever drives it: our own run, or lm-eval as the host.
+"""
+
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import groupby
+from typing import Protocol
+
+from infthor_eval.errors import DataError, ModelError
+from infthor_eval.formats.digests import fingerprint
+from infthor_eval.formats.frames import FrameRef
+from infthor_eval.nieh.baselines import Predict
+from infthor_eval.nieh.contexts import ContextPart, Sample
+from infthor_eval.nieh.metrics import PUBLISHED, Metrics
+from infthor_eval.nieh.notebook import Notebook
+from infthor_eval.nieh.notes import Notes
+from infthor_eval.nieh.records import NiehAnswer
+from infthor_eval.nieh.samples import TaskSamples
+from infthor_eval.runs import Session, Tokens, Unit, UnitKey, UnitRecord
+from model_adapters import Decoding, Model, Reply
+
+__all__ = ["Answerer", "BaselineAnswerer", "ModelAnswerer", "NiehUnit", "TaskPlan", "answered"]
+
+
+@dataclass(frozen=True)
+class NiehUnit(Unit[NiehAnswer]):
+    """A unit that asks a question.
+
+    Attributes:
+        sample: the question, and how it is asked.
+    """
+
+    sample: Sample
+
+    @classmethod
+    def of(cls, task: str, sample: Sample) -> "NiehUnit":
+        """The unit of a task's sample."""
+        question = sample.question
+        return cls(UnitKey(task, question.id, sample.variant), question.traj_id, NiehAnswer.of(question), sample)
+
+
+@dataclass(frozen=True)
+class TaskPlan:
+    """How a task's samples become records.
+
+    Attributes:
+        found: what it asks.
+        decoding: how replies are decoded.
+        metrics: what is made of them.
+    """
+
+    found: TaskSamples
+    decoding: Decoding
+    metrics: Metrics = PUBLISHED
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """A unit with its request.
+
+    Attributes:
+        unit: the unit.
+        plan: its task's.
+        context: what the model is shown before the question's text; notes in it are taken before the unit is asked.
+        text: the text with the question.
+    """
+
+    unit: NiehUnit
+    plan: TaskPlan
+    context: tuple[ContextPart, ...]
+    text: str
+
+    @classmethod
+    def of(cls, unit: NiehUnit, plan: TaskPlan) -> "_Asked":
+        context, text = plan.found.request(unit.sample)
+        return cls(unit, plan, tuple(context), text)
+
+    @property
+    def shown(self) -> tuple[str | FrameRef, ...]:
+        """The context as the model is shown it, once its notes are taken."""
+        shown = tuple(part for part in self.context if not isinstance(part, Notes))
+        if len(shown) < len(self.context):
+            raise ValueError("the context holds notes that are not taken yet")
+        return shown
+
+    @cached_property
+    def fingerprint(self) -> str:
+        """Hash of the inputs: context with the frames' content, text, gold answers, decoding.
+
+        Raises:
+            DataError: a frame cannot be read.
+        """
+        return fingerprint(
+            {
+                "context": [[part.digest] if isinstance(part, FrameRef) else part for part in self.shown],
+                "text": self.text,
+                "answers": list(self.unit.payload.answers),
+                "decoding": self.plan.decoding.document(),
+            }
+        )
+
+    def record(self, reply: Reply, seconds: float, faults: tuple[str, ...]) -> UnitRecord[NiehAnswer]:
+        """The record of its reply."""
+        scores = self.plan.metrics.scores(self.plan.found, self.unit.sample, reply.text)
+        return self.unit.record(
+            self.fingerprint,
+            self.unit.payload.with_reply(reply.text, scores),
+            faults=(*faults, *reply.faults),
+            seconds=round(seconds, 4),
+            tokens=Tokens(reply.n_context_tokens, reply.n_cached_tokens, reply.n_reply_tokens),
+        )
+
+
+class Answerer(Protocol):
+    """Gives the replies to units."""
+
+    @property
+    def batch_size(self) -> int:
+        """How many units are worth handing over at once."""
+        ...
+
+    def read(self, context: Sequence[ContextPart]) -> tuple[str | FrameRef, ...]:
+        """A context as it is shown: with the model's notes, which it takes now if it has not yet, as text.
+
+        Raises:
+            DataError: a frame cannot be read.
+            ModelError: the model cannot take notes on so many frames.
+        """
+        ...
+
+    def answer(self, asked: Sequence[_Asked]) -> list[Reply]:
+        """The replies to units that share their context and decoding.
+
+        Raises:
+            DataError: a frame cannot be read; nothing is answered then.
+            ModelError: the model cannot take one of the requests; nothing is answered then.
+        """
+        ...
+
+
+class ModelAnswerer:
+    """Keeps one conversation, so that units in the same context share what the model has encoded of it."""
+
+    def __init__(self, model: Model, session: Session) -> None:
+        self.batch_size = model.capabilities.batch_size
+        self._notebook = Notebook(model, session)
+        self._conversation = model.conversation()
+        self._start = self._conversation.mark()
+        self._after_context = self._start
+        self._context: tuple[str | FrameRef, ...] | None = None
+
+    def read(self, context: Sequence[ContextPart]) -> tuple[str | FrameRef, ...]:
+        """See `Answerer`."""
+        return tuple(self._notebook.text(part) if isinstance(part, Notes) else part for part in context)
+
+    def answer(self, asked: Sequence[_Asked]) -> list[Reply]:
+        """See `Answerer`."""
+        context = asked[0].shown
+        if context != self._context:
+            self._conversation.rewind(self._start)
+            self._context = None
+            self._conversation.append(*context)
+            self._context, self._after_context = context, self._conversation.mark()
+        self._conversation.rewind(self._after_context)
+        return self._conversation.replies([[item.text] for item in asked], asked[0].plan.decoding)
+
+
+class BaselineAnswerer:
+    """Looks at no context and notes nothing."""
+
+    batch_size = 1
+
+    def __init__(self, predict: Predict) -> None:
+        self._predict = predict
+
+    def read(self, context: Sequence[ContextPart]) -> tuple[str | FrameRef, ...]:
+        """See `Answerer`."""
+        return tuple(part for part in context if not isinstance(part, Notes))
+
+    def answer(self, asked: Sequence[_Asked]) -> list[Reply]:
+        """See `Answerer`."""
+        return [Reply(self._predict(item.unit.sample.question)) for item in asked]
+
+
+def answered(
+    units: Sequence[NiehUnit], plan: TaskPlan, answerer: Answerer, session: Session
+) -> Iterator[UnitRecord[NiehAnswer]]:
+    """The records of units on one trajectory: those in the same context together, several at a time where that pays.
+
+    Neighbours share as long a prefix as there is, which a model's conversation encodes once. The order depends on the
+    units alone, so it is the same when a run is resumed.
+    """
+    asked = sorted((_Asked.of(unit, plan) for unit in units), key=_names)
+    for _, in_one_context in groupby(asked, key=_names):
+        yield from _in_context(list(in_one_context), answerer, session)
+
+
+def _names(asked: _Asked) -> list[str]:
+    return [name for part in asked.context for name in _names_in(part)]
+
+
+def _names_in(part: ContextPart) -> list[str]:
+    if isinstance(part, Notes):
+        return [f"notes of {part.taking}", *(frame.path.name for frame in part.frames)]
+    return [part.path.name if isinstance(part, FrameRef) else part]
+
+
+def _in_context(asked: Sequence[_Asked], answerer: Answerer, session: Session) -> Iterator[UnitRecord[NiehAnswer]]:
+    try:
+        context = answerer.read(asked[0].context)
+    except (DataError, ModelError) as error:
+        yield from [item.unit.failed(str(error)) for item in asked]
+        return
+    waiting = []
+    for item in [replace(item, context=context) for item in asked]:
+        record = _known(item, session)
+        if record is None:
+            waiting.append(item)
+        else:
+            yield record
+    for at in range(0, len(waiting), answerer.batch_size):
+        yield from _made(waiting[at : at + answerer.batch_size], answerer)
+
+
+def _known(asked: _Asked, session: Session) -> UnitRecord[NiehAnswer] | None:
+    """The record of a unit that needs no answering: an earlier run's, or that of a frame that cannot be read."""
+    try:
+        return session.known(asked.unit, asked.fingerprint)
+    except DataError as error:
+        return asked.unit.failed(str(error))
+
+
+def _made(
+    asked: Sequence[_Asked], answerer: Answerer, faults: tuple[str, ...] = ()
+) -> Iterator[UnitRecord[NiehAnswer]]:
+    began = time.perf_counter()
+    try:
+        replies = answerer.answer(asked)
+    except (DataError, ModelError) as error:
+        if len(asked) == 1:
+            yield asked[0].unit.failed(str(error), asked[0].fingerprint, faults=faults)
+            return
+        for item in asked:  # one of them may be to blame; the others are answered
+            yield from _made([item], answerer, (f"asked with {len(asked) - 1} others: {error}",))
+        return
+    seconds = (time.perf_counter() - began) / len(asked)
+    for item, reply in zip(asked, replies, strict=True):
+        yield _scored(item, reply, seconds, faults)
+
+
+def _scored(asked: _Asked, reply: Reply, seconds: float, faults: tuple[str, ...]) -> UnitRecord[NiehAnswer]:
+    try:
+        return asked.record(reply, seconds, faults)
+    except DataError as error:  # the task's own metrics fail on this reply
+        return asked.unit.failed(str(error), asked.fingerprint, faults=faults)

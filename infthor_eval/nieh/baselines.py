@@ -1,0 +1,128 @@
+"""Yardsticks that see no frame: the answer key itself, the best guess from the question alone, and chance."""
+
+import random
+from collections import Counter, defaultdict
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Protocol, runtime_checkable
+
+from infthor_eval.errors import ModelError
+from infthor_eval.formats.digests import seed_of
+from infthor_eval.formats.question import Question
+from infthor_eval.nieh.docs import doc_target
+from model_adapters import Capabilities
+
+__all__ = ["BASELINES", "Baseline", "Predict", "question_type"]
+
+Predict = Callable[[Question], str]
+_LEADING_WORDS = 2
+
+
+def question_type(question: Question) -> str:
+    """The question's own type, or its leading words in lower case where the file names no type."""
+    return question.question_type or " ".join(question.text.lower().split()[:_LEADING_WORDS])
+
+
+@runtime_checkable
+class Baseline(Protocol):
+    """What answers from the answer key and the question's text, and never sees a frame."""
+
+    name: str
+    capabilities: Capabilities
+
+    def identity(self) -> dict[str, Any]:
+        """All that can change a number, as JSON values; the key is part of the data's own fingerprint."""
+        ...
+
+    def fit(self, questions: Sequence[Question]) -> Predict:
+        """Read the whole answer key of one task; what comes of it answers that task's questions."""
+        ...
+
+    def close(self) -> None:
+        """Nothing is held."""
+        ...
+
+
+class _KeyReader:
+    """What baselines have in common.
+
+    Args:
+        seed: of the run.
+    """
+
+    name = ""
+    capabilities = Capabilities(counts_tokens=False, token_ids=False)
+
+    def __init__(self, seed: int) -> None:
+        self._seed = seed
+
+    def identity(self) -> dict[str, Any]:
+        """The name alone: a baseline has no options."""
+        return {"baseline": self.name}
+
+    def close(self) -> None:
+        """Nothing is held."""
+
+
+class Oracle(_KeyReader):
+    """Reads the answer key: what a perfect model would score."""
+
+    name = "oracle"
+
+    def fit(self, questions: Sequence[Question]) -> Predict:
+        """Nothing to learn: every question carries its key."""
+        return doc_target
+
+
+class Blind(_KeyReader):
+    """The most frequent answer of the question's type: what can be had without looking."""
+
+    name = "blind"
+
+    def fit(self, questions: Sequence[Question]) -> Predict:
+        """Of equally frequent answers the first in the alphabet."""
+        seen = _answers_by_type(questions)
+
+        def predict(question: Question) -> str:
+            counts = _counts(seen, question)
+            return min(counts, key=lambda text: (-counts[text], text))
+
+        return predict
+
+
+class Random(_KeyReader):
+    """An answer drawn from those of the question's type, each as likely as it is frequent."""
+
+    name = "random"
+
+    def identity(self) -> dict[str, Any]:
+        """Name and seed."""
+        return {"baseline": self.name, "seed": self._seed}
+
+    def fit(self, questions: Sequence[Question]) -> Predict:
+        """The draw depends on the seed and the question alone, not on the order of asking."""
+        seen = _answers_by_type(questions)
+
+        def predict(question: Question) -> str:
+            counts = _counts(seen, question)
+            draw, answers = random.Random(seed_of(f"{self._seed}\n{question.id}")), sorted(counts)
+            return draw.choices(answers, weights=[counts[text] for text in answers])[0]
+
+        return predict
+
+
+def _answers_by_type(questions: Sequence[Question]) -> dict[str, Counter[str]]:
+    """How often each answer (several golds joined by commas) is right, by question type."""
+    seen: dict[str, Counter[str]] = defaultdict(Counter)
+    for question in questions:
+        seen[question_type(question)][doc_target(question)] += 1
+    return dict(seen)
+
+
+def _counts(seen: Mapping[str, Counter[str]], question: Question) -> Counter[str]:
+    asked = question_type(question)
+    if asked not in seen:
+        raise ModelError(f"no question of type {asked!r} was in the answer key; fit the baseline to the whole key")
+    return seen[asked]
+
+
+BASELINES: Mapping[str, Callable[[int], Baseline]] = {made.name: made for made in (Oracle, Blind, Random)}

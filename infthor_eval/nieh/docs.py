@@ -1,0 +1,81 @@
+"""Samples as the docs that lm-eval's task functions pass around, and back.
+
+A doc refers to its frames by their places in the trajectory; the set is opened once per process. So docs stay small for
+trajectories of thousands of frames.
+"""
+
+import json
+from typing import Any
+
+from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.question import Question
+from infthor_eval.nieh.contexts import ContextPart, Sample, context_named
+from infthor_eval.nieh.notes import Notes, Notetaking
+from infthor_eval.nieh.samples import TaskSamples, open_set
+
+__all__ = ["Doc", "doc_of", "doc_parts", "doc_prompt", "doc_target", "sample_of", "samples_around"]
+
+Doc = dict[str, Any]
+_PLACEHOLDERS = {FrameRef: "<image>", Notes: "<notes>"}  # the first is lm-eval's own mark for an image in a text
+
+
+def doc_of(found: TaskSamples, sample: Sample, pixels: bool = False) -> Doc:
+    """The doc of a sample.
+
+    Args:
+        found: what the task asks.
+        sample: one of it.
+        pixels: whether requests hold decoded images, as lm-eval's own models want them.
+    """
+    question = sample.question
+    return {
+        "question_id": question.id,
+        "traj_id": question.traj_id,
+        "question": question.text,
+        "question_type": question.question_type or "",
+        "absence": question.absence,
+        "clues": list(question.clues),
+        "answers": json.dumps(question.answers),
+        "context": found.context_name,
+        "variant": sample.variant,
+        "frames": list(sample.frames),
+        "notes": [sample.notes.window, sample.notes.max_new_tokens] if sample.notes else [],
+        "set": str(found.data.root),
+        "pixels": pixels,
+    }
+
+
+def sample_of(doc: Doc) -> Sample:
+    """The sample of a doc."""
+    question = Question(
+        traj_id=doc["traj_id"],
+        text=doc["question"],
+        clues=tuple(doc["clues"]),
+        answers=tuple(json.loads(doc["answers"])),
+        question_type=doc["question_type"] or None,
+        absence=doc["absence"],
+    )
+    notes = Notetaking(*doc["notes"]) if doc["notes"] else None
+    return Sample(question, tuple(doc["frames"]), doc["variant"], notes=notes)
+
+
+def samples_around(doc: Doc) -> TaskSamples:
+    """The task's samples as far as one doc tells of them: that one."""
+    context = context_named(doc["context"])
+    return TaskSamples(open_set(doc["set"]), doc["context"], context, [sample_of(doc)], [], {})
+
+
+def doc_parts(doc: Doc) -> list[ContextPart]:
+    """All that a model is shown and told for a doc, the text with the question last."""
+    context, text = samples_around(doc).request(sample_of(doc))
+    return [*context, text]
+
+
+def doc_prompt(doc: Doc) -> str:
+    """The request's text, with a placeholder where each frame, and the model's notes, go."""
+    return "".join(part if isinstance(part, str) else _PLACEHOLDERS[type(part)] for part in doc_parts(doc))
+
+
+def doc_target(question: Question) -> str:
+    """The gold answers as one reply would give them."""
+    return ", ".join(map(str, question.answers))

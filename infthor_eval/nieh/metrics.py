@@ -1,0 +1,96 @@
+"""Which numbers a task makes of a reply: both scorers, or what its file says of its own.
+
+A task file may name a function of its own under `process_results`, with `metric_list` for its metrics, as lm-eval reads
+them; our runs honour both.
+"""
+
+import importlib
+import importlib.util
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from infthor_eval.errors import DataError
+from infthor_eval.formats.digests import digest_of_file
+from infthor_eval.nieh.contexts import Sample
+from infthor_eval.nieh.docs import Doc, doc_of
+from infthor_eval.nieh.samples import TaskSamples
+from infthor_eval.nieh.scoring import SCORERS, scores
+from infthor_eval.runs.catalog import TaskFile
+
+__all__ = ["PUBLISHED", "Metrics", "metrics_of"]
+
+_OURS = "infthor_eval.harness.nieh_task.process_results"
+ProcessResults = Callable[[Doc, list[str]], Mapping[str, Any]]
+
+
+@dataclass(frozen=True)
+class Metrics:
+    """The metrics of a task.
+
+    Attributes:
+        names: in the order shown.
+        process: the task's own function; None takes both scorers.
+        identity: of that function, as JSON values.
+    """
+
+    names: tuple[str, ...]
+    process: ProcessResults | None = None
+    identity: Mapping[str, str] = field(default_factory=dict)
+
+    def scores(self, found: TaskSamples, sample: Sample, reply: str) -> dict[str, float]:
+        """The metrics of a reply.
+
+        Raises:
+            DataError: the task's own function fails on it, or lacks a metric.
+        """
+        if self.process is None:
+            return scores(reply, sample.question.answers)
+        try:
+            made = self.process(doc_of(found, sample), [reply])
+            return {name: float(made[name]) for name in self.names}
+        except Exception as error:  # noqa: BLE001 - anybody's code; its sample fails by name
+            raise DataError(f"process_results fails on {sample.question.id}: {type(error).__name__}: {error}") from error
+
+
+PUBLISHED = Metrics(SCORERS)
+
+
+def metrics_of(task: TaskFile) -> Metrics:
+    """The metrics of a task file.
+
+    Raises:
+        DataError: its function cannot be imported, or a metric is not averaged.
+    """
+    name = task.settings["process_results"]
+    if name == _OURS:
+        return PUBLISHED
+    listed = task.settings.get("metric_list") or []
+    for item in listed:
+        if item.get("aggregation", "mean") != "mean":
+            raise DataError(f"{task.path}: metric {item['metric']} is not averaged (aggregation: mean); use lm-eval")
+    if not listed:
+        raise DataError(f"{task.path}: a task with its own process_results names its metrics under metric_list")
+    module, attribute = _imported(task.path, name)
+    source = {"process_results": name, "source": digest_of_file(Path(str(module.__file__)))}
+    return Metrics(tuple(item["metric"] for item in listed), getattr(module, attribute), source)
+
+
+def _imported(task_file: Path, name: str) -> tuple[ModuleType, str]:
+    """The module of a function, found as lm-eval finds it: beside the file first, then on the path."""
+    module, _, attribute = name.rpartition(".")
+    beside = task_file.parent / f"{module.replace('.', '/')}.py"
+    try:
+        if beside.is_file():
+            spec = importlib.util.spec_from_file_location(module, beside)
+            assert spec is not None and spec.loader is not None  # a .py file has both
+            found = importlib.util.module_from_spec(spec)
+            spec.loader.exec_module(found)
+        else:
+            found = importlib.import_module(module)
+        getattr(found, attribute)
+    except (ImportError, AttributeError, SyntaxError, ValueError) as error:
+        raise DataError(f"{task_file}: process_results {name} cannot be imported ({error})") from error
+    return found, attribute

@@ -1,0 +1,35 @@
+"""What NIEH can be told on the command line, beside its task files."""
+
+from dataclasses import dataclass, field
+
+__all__ = ["NiehOptions"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class NiehOptions:
+    """Options of the suite; the help that people see stands with each.
+
+    Attributes:
+        k_tokens: tokens of a kilo-token in contexts of a given size; None takes each context's published value.
+        tokens_per_frame: tokens of one frame for such contexts; None asks the model.
+        retriever: CLIP model of contexts that retrieve frames, a hub id or a folder; None takes the published one.
+        retriever_revision: branch, tag or commit of it on the hub; None is the default branch.
+    """
+
+    k_tokens: int | None = field(
+        default=None,
+        metadata={
+            "choices": ("1000", "1024"),
+            "help": "Tokens of a kilo-token where a context has a size; each context's published value if not given.",
+        },
+    )
+    tokens_per_frame: int | None = field(
+        default=None,
+        metadata={"help": "Tokens of one frame where a context has a size, for models that count none.", "metavar": "N"},
+    )
+    retriever: str | None = field(
+        default=None, metadata={"help": "CLIP model of retrieval tasks, a hub id or a folder.", "metavar": "NAME"}
+    )
+    retriever_revision: str | None = field(
+        default=None, metadata={"help": "Branch, tag or commit of the retriever on the hub.", "metavar": "REVISION"}
+    )

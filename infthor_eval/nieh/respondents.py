@@ -1,0 +1,95 @@
+"""Who answers the questions of a run: a model through its conversation, or a baseline from the answer key."""
+
+from collections.abc import Mapping
+from typing import Protocol
+
+from infthor_eval.errors import UsageError
+from infthor_eval.formats.frames import FrameRef
+from infthor_eval.nieh.answering import Answerer, BaselineAnswerer, ModelAnswerer, TaskPlan
+from infthor_eval.nieh.baselines import Baseline, Predict
+from infthor_eval.nieh.budget import budget_of
+from infthor_eval.runs import Session, Subject
+from model_adapters import Model
+
+__all__ = ["Respondent", "respondent"]
+
+# Baselines read no frames; contexts that are measured in tokens are cut for them as for Qwen2.5-VL (published count).
+_BASELINE_TOKENS_PER_FRAME = 121
+
+
+class Respondent(Protocol):
+    """What NIEH wants of a subject."""
+
+    def tokens_per_frame(self, frame: FrameRef) -> int:
+        """The size of a frame in contexts that are measured in tokens.
+
+        Raises:
+            UsageError: the subject counts no tokens.
+        """
+        ...
+
+    def read_tasks(self, plans: Mapping[str, TaskPlan]) -> None:
+        """What will be asked, by task, once, before the first question."""
+        ...
+
+    def cost(self, plan: TaskPlan) -> str | None:
+        """What a task costs, in words; None where that is not known."""
+        ...
+
+    def answerer(self, task: str, session: Session) -> Answerer:
+        """Answers the questions of one task on one trajectory."""
+        ...
+
+
+class _ModelRespondent:
+    def __init__(self, model: Model) -> None:
+        self._model = model
+
+    def tokens_per_frame(self, frame: FrameRef) -> int:
+        tokens = self._model.tokens_per_frame(frame)
+        if tokens is None:
+            raise UsageError(
+                f"the context has a size in tokens, which {self._model.name} does not count; give --tokens-per-frame"
+            )
+        return tokens
+
+    def read_tasks(self, plans: Mapping[str, TaskPlan]) -> None:
+        """A model learns nothing beforehand."""
+
+    def cost(self, plan: TaskPlan) -> str | None:
+        return budget_of(plan, self._model).description if self._model.capabilities.counts_tokens else None
+
+    def answerer(self, task: str, session: Session) -> Answerer:
+        return ModelAnswerer(self._model, session)
+
+
+class _BaselineRespondent:
+    def __init__(self, baseline: Baseline) -> None:
+        self._baseline = baseline
+        self._predictions: dict[str, Predict] = {}
+
+    def tokens_per_frame(self, frame: FrameRef) -> int:
+        return _BASELINE_TOKENS_PER_FRAME
+
+    def read_tasks(self, plans: Mapping[str, TaskPlan]) -> None:
+        """Fitted to each task apart: what one task asks is no clue to another."""
+        self._predictions = {task: self._baseline.fit(plan.found.data.questions) for task, plan in plans.items()}
+
+    def cost(self, plan: TaskPlan) -> str | None:
+        return None
+
+    def answerer(self, task: str, session: Session) -> Answerer:
+        return BaselineAnswerer(self._predictions[task])
+
+
+def respondent(subject: Subject) -> Respondent:
+    """The respondent that a subject makes.
+
+    Raises:
+        TypeError: it is neither a model nor a baseline; the run sees to that before.
+    """
+    if isinstance(subject, Baseline):
+        return _BaselineRespondent(subject)
+    if isinstance(subject, Model):
+        return _ModelRespondent(subject)
+    raise TypeError(f"{subject.name} is neither a model nor a baseline of NIEH")

@@ -1,0 +1,130 @@
+"""What a task asks: every question of its set in every way its context knows, and what cannot be asked."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from infthor_eval.errors import UsageError
+from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.hub_data import default_folder
+from infthor_eval.formats.nieh_set import NiehSet, SkippedQuestion
+from infthor_eval.formats.packaged import packaged_folder
+from infthor_eval.formats.question import Question
+from infthor_eval.nieh.contexts import Context, ContextPart, ContextSettings, Sample, context_named
+
+__all__ = ["TaskSamples", "find_samples", "find_set", "open_set"]
+
+
+@dataclass(frozen=True)
+class TaskSamples:
+    """What one task asks.
+
+    Attributes:
+        data: the set.
+        context_name: name of the context that questions are asked in.
+        context: the context.
+        samples: what is asked, in the order of the set.
+        skipped: what is not, and why.
+        sources: what the frames depend on besides the set and the settings (`Context.sources`).
+    """
+
+    data: NiehSet
+    context_name: str
+    context: Context
+    samples: Sequence[Sample]
+    skipped: Sequence[SkippedQuestion]
+    sources: Mapping[str, Any]
+
+    def request(self, sample: Sample) -> tuple[list[ContextPart], str]:
+        """All that a model is shown and told: the context, and the text with the question that follows it."""
+        return self.context.request(self.data, sample)
+
+
+@lru_cache(maxsize=8)
+def open_set(root: str) -> NiehSet:
+    """The set in a folder, read once per process; `open_set.cache_clear()` has it read again."""
+    return NiehSet(Path(root))
+
+
+def find_set(data: str | None = None, bundled: str | None = None, **_: object) -> NiehSet:
+    """The set of a task.
+
+    Args:
+        data: folder of an NIEH set; None is the published set where `infthor-eval fetch nieh` put it.
+        bundled: name of a set that comes with the package; `data` is not looked at then.
+
+    Raises:
+        UsageError: there is none.
+        DataError: it cannot be read.
+    """
+    if bundled:
+        return open_set(str(packaged_folder(f"sets/{bundled}")))
+    if data is None and not default_folder().is_dir():
+        raise UsageError(
+            "no NIEH set to ask about; give its folder with --data, or fetch the published one: fetch nieh"
+        )
+    return open_set(str(data or default_folder()))
+
+
+def find_samples(config: Mapping[str, Any], limit: int | None = None) -> TaskSamples:
+    """Everything that a task asks.
+
+    Args:
+        config: `dataset_kwargs` of the task file and what the run tells beside it: the name of the context, what
+            `find_set` takes, and the context's settings (`infthor_eval.nieh.contexts.ContextSettings`).
+        limit: stop behind the first so many questions that can be asked.
+
+    Raises:
+        UsageError: there is no set, the context is unknown, or it lacks a setting.
+        DataError: the set cannot be read.
+    """
+    context, settings, data = context_named(config["context"]), ContextSettings.read(config), find_set(**config)
+    samples: list[Sample] = []
+    skipped: list[SkippedQuestion] = []
+    for n_asked, found in enumerate(_asked(_by_question(data, context, settings)), 1):
+        samples += [item for item in found if isinstance(item, Sample)]
+        skipped += [item for item in found if isinstance(item, SkippedQuestion)]
+        if n_asked == limit:
+            break
+    return TaskSamples(data, config["context"], context, samples, skipped, context.sources(data, settings))
+
+
+_Found = list[Sample | SkippedQuestion]
+
+
+def _by_question(data: NiehSet, context: Context, settings: ContextSettings) -> Iterator[_Found]:
+    """What comes of each question."""
+    problems: dict[FrameRef, str | None] = {}
+
+    def checked(sample: Sample) -> Sample | SkippedQuestion:
+        problem = _problem(context.shown(data, sample), problems)
+        return SkippedQuestion(sample.question, problem, sample.variant) if problem else sample
+
+    for row in data.rows:
+        found = context.samples(data, row, settings) if isinstance(row, Question) else [row]
+        yield [checked(item) if isinstance(item, Sample) else item for item in found]
+
+
+def _asked(questions: Iterator[_Found]) -> Iterator[_Found]:
+    """Questions that can be asked, each with those before it that cannot; at the end those that are left."""
+    waiting: _Found = []
+    for found in questions:
+        waiting += found
+        if any(isinstance(item, Sample) for item in found):
+            yield waiting
+            waiting = []
+    if waiting:
+        yield waiting
+
+
+def _problem(frames: list[FrameRef], known: dict[FrameRef, str | None]) -> str | None:
+    """Why one of the frames cannot be shown; None where all can. Each frame's file is looked at once."""
+    for frame in frames:
+        if frame not in known:
+            known[frame] = frame.problem()
+        if known[frame]:
+            return known[frame]
+    return None
+

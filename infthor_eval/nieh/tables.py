@@ -1,0 +1,171 @@
+"""NIEH results as tables: accuracy by clues beside the published rows, by depth of the needle, and form of replies."""
+
+from collections.abc import Iterator, Sequence
+
+from infthor_eval.formats.published import PublishedRow, PublishedTable, published_tables
+from infthor_eval.formats.question import ABSENCE
+from infthor_eval.nieh.summary import CLUE_COLUMNS, Cell, NiehSummary, TaskSummary
+from infthor_eval.runs import Column, Row, RunSummary, Table
+
+__all__ = ["clues_table", "tables"]
+
+_NAMES = (Column("model", False), Column("task", False))
+_METRIC = Column("scorer", False)
+
+
+def tables(runs: Sequence[RunSummary]) -> list[Table]:
+    """The tables of some runs: by depth where a task has depths, by clues, and the form of the replies.
+
+    A published table by clues stands below our numbers; one by anything else (question types, depths) is a table of its
+    own with ours in it.
+    """
+    by_depth = _depth_table(runs)
+    others = [_beside(table, runs) for table in published_tables("nieh") if not _is_by_clues(table)]
+    return [*([by_depth] if by_depth else []), *others, clues_table(runs), _replies_table(runs)]
+
+
+def _is_by_clues(table: PublishedTable) -> bool:
+    return set(table.columns) <= set(CLUE_COLUMNS)
+
+
+def _tasks(runs: Sequence[RunSummary]) -> Iterator[tuple[str, str, TaskSummary]]:
+    """Run's name, task's name and the task, of all runs."""
+    for run in runs:
+        assert isinstance(run.summary, NiehSummary)
+        for name, task in run.summary.tasks.items():
+            yield run.header.name, name, task
+
+
+# -- by number of clues
+
+
+def clues_table(runs: Sequence[RunSummary]) -> Table:
+    """Accuracy by number of clues: a row per run, task and metric, then the published rows."""
+    numbers = (*CLUE_COLUMNS, "95 %", "bootstrap", ABSENCE, "n", "skipped", "failed")
+    rows = [row for run in runs for row in _rows_of(run)]
+    for table in filter(_is_by_clues, published_tables("nieh")):
+        rows += _published_rows(table, runs)
+    notes = []
+    if any(task.simulator == "embedded" for _, _, task in _tasks(runs)):
+        notes.append(
+            "Questions on frames of the embedded simulator: not comparable with the published rows, which are on "
+            "AI2-THOR's own frames."
+        )
+    columns = (*_NAMES, _METRIC, *map(Column, numbers))
+    return Table("NIEH accuracy, % by number of clues", columns, tuple(rows), tuple(notes))
+
+
+def _rows_of(run: RunSummary) -> list[Row]:
+    found = [(name, task, metric) for _, name, task in _tasks([run]) for metric in task.metrics]
+    return [
+        Row((run.header.name, name, metric, *_cells(task, metric)), ends_section=number == len(found))
+        for number, (name, task, metric) in enumerate(found, 1)
+    ]
+
+
+def _cells(task: TaskSummary, metric: str) -> list[str]:
+    total = task.by_clues["total"]
+    means = [_mean(task.by_clues[name], metric) for name in CLUE_COLUMNS]
+    score = total.scores.get(metric)
+    # One trajectory alone tells nothing about others: no interval.
+    interval = _range(score.low, score.high) if score else "-"
+    resampled = _range(*score.bootstrap) if score and score.bootstrap else "-"
+    counts = [str(total.n), str(task.skipped.n), str(total.n_failed)]
+    return [*means, interval, resampled, _mean(task.by_clues[ABSENCE], metric), *counts]
+
+
+def _mean(cell: Cell, metric: str) -> str:
+    return f"{100 * cell.scores[metric].mean:.2f}" if cell.n else "-"
+
+
+def _range(low: float | None, high: float | None) -> str:
+    return "-" if low is None or high is None else f"{100 * low:.1f}–{100 * high:.1f}"
+
+
+def _published_rows(table: PublishedTable, runs: Sequence[RunSummary]) -> Iterator[Row]:
+    """The published rows, each followed by how far runs of its checkpoint are from it."""
+    for row in table.rows:
+        values = dict(zip(table.columns, row.values, strict=True))
+        cells = [f"{values[name]:.2f}" if name in values else "" for name in CLUE_COLUMNS]
+        yield Row((row.name, f"{table.title}, {table.context}", table.metric, *cells), is_published=True)
+        for run in runs:
+            yield from _differences(run, row, table)
+
+
+def _differences(run: RunSummary, row: PublishedRow, table: PublishedTable) -> Iterator[Row]:
+    """How far a run of the published model is from its row, and whether its interval (=) holds the published value."""
+    if not row.is_of(run.header.identity["model"]):
+        return
+    for _, name, task in _tasks([run]):
+        # Frames that a simulator of ours rendered are another data set.
+        if task.context != table.context or task.simulator is not None or table.metric not in task.metrics:
+            continue
+        values = dict(zip(table.columns, row.values, strict=True))
+        cells = [_difference(task.by_clues[column], values.get(column), table.metric) for column in CLUE_COLUMNS]
+        yield Row(("  ours minus published", name, table.metric, *cells))
+
+
+def _difference(cell: Cell, value: float | None, metric: str) -> str:
+    if not cell.n or value is None:
+        return "-"
+    ours = cell.scores[metric]
+    within = ours.low is not None and ours.high is not None and 100 * ours.low <= value <= 100 * ours.high
+    return f"{100 * ours.mean - value:+.2f}{' =' if within else ''}"
+
+
+# -- published, by anything else
+
+
+def _beside(table: PublishedTable, runs: Sequence[RunSummary]) -> Table:
+    """Published rows, and the runs that asked in the same context."""
+    rows = [
+        Row((row.name, table.context, table.metric, *(f"{value:.2f}" for value in row.values)), is_published=True)
+        for row in table.rows
+    ]
+    for run, name, task in _tasks(runs):
+        if task.context == table.context and table.metric in task.metrics:
+            cells = task.by_clues | task.by_question_type | task.by_variant
+            means = [_mean(cells[column], table.metric) if column in cells else "-" for column in table.columns]
+            rows.append(Row((run, name, table.metric, *means)))
+    return Table(f"{table.title}: {table.source}", (*_NAMES, _METRIC, *map(Column, table.columns)), tuple(rows))
+
+
+# -- by depth
+
+
+def _depth_table(runs: Sequence[RunSummary]) -> Table | None:
+    """None where no task has depths."""
+    variants = {variant for _, _, task in _tasks(runs) for variant in task.by_variant}
+    depths = sorted(variant for variant in variants if variant.startswith("depth="))
+    if not depths:
+        return None
+    rows = [
+        Row((run, name, metric, *(_at_depth(task.by_variant.get(depth), metric) for depth in depths)))
+        for run, name, task in _tasks(runs)
+        if set(depths) & set(task.by_variant)
+        for metric in task.metrics
+    ]
+    columns = (*_NAMES, _METRIC, *map(Column, depths))
+    return Table("Accuracy, % by depth of the needle (questions)", columns, tuple(rows))
+
+
+def _at_depth(cell: Cell | None, metric: str) -> str:
+    return f"{100 * cell.scores[metric].mean:.2f} ({cell.n})" if cell else "-"
+
+
+# -- form of the replies
+
+
+def _replies_table(runs: Sequence[RunSummary]) -> Table:
+    """A leaning to yes, and replies that are no answer: a row per run and task."""
+    numbers = ("yes/no questions", "gold yes, %", "said yes, %", "not in the form asked for")
+    rows = []
+    for run, name, task in _tasks(runs):
+        shares = [_percent(share) for share in (task.yes_no.share_gold_yes, task.yes_no.share_said_yes)]
+        said = ", ".join(f"{n} {reason}" for reason, n in task.format_failures.items()) or "-"
+        rows.append(Row((run, name, str(task.yes_no.n), *shares, said)))
+    return Table("Form of the replies", (*_NAMES, *map(Column, numbers)), tuple(rows))
+
+
+def _percent(share: float | None) -> str:
+    return "-" if share is None else f"{100 * share:.1f}"

@@ -1,0 +1,56 @@
+"""How a task file's `generation_kwargs`, in lm-eval's words, decode a reply."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from infthor_eval.errors import UsageError
+from model_adapters.protocols import Decoding
+
+__all__ = ["decoding_of"]
+
+_KNOWN = ("until", "max_gen_toks", "do_sample", "temperature", "top_p", "choices")
+
+
+def decoding_of(given: Mapping[str, Any], seed: int, place: str) -> Decoding:
+    """The decoding that settings ask for; each of them acts, or is refused.
+
+    Args:
+        given: `generation_kwargs` of a task, or of one request of lm-eval's.
+        seed: of what is sampled.
+        place: the task, for messages.
+
+    Raises:
+        UsageError: a setting that is not known, or that contradicts another.
+    """
+    unknown = sorted(set(given) - set(_KNOWN))
+    if unknown:
+        raise UsageError(f"{place}: generation_kwargs: {unknown[0]} is not known; there are {', '.join(_KNOWN)}")
+    limit = given.get("max_gen_toks")
+    if not isinstance(limit, int) or isinstance(limit, bool):
+        raise UsageError(f"{place}: generation_kwargs: max_gen_toks is {limit!r}; it is a whole number of tokens")
+    return Decoding(
+        max_new_tokens=limit,
+        temperature=_temperature(given, place),
+        top_p=float(given.get("top_p", 1.0)),
+        seed=seed,
+        stop=_texts(given.get("until", ()), "until", place),
+        choices=_texts(given.get("choices", ()), "choices", place),
+    )
+
+
+def _temperature(given: Mapping[str, Any], place: str) -> float:
+    """As lm-eval reads it: a temperature above 0 samples unless told otherwise, and sampling alone means 1."""
+    temperature = given.get("temperature")
+    samples = given.get("do_sample", bool(temperature))
+    if samples and temperature == 0:
+        raise UsageError(f"{place}: generation_kwargs: do_sample with temperature 0 contradict each other")
+    if not samples and temperature:
+        raise UsageError(f"{place}: generation_kwargs: temperature {temperature} without do_sample has no effect")
+    return float(1.0 if temperature is None else temperature) if samples else 0.0
+
+
+def _texts(given: str | Sequence[str] | None, name: str, place: str) -> tuple[str, ...]:
+    texts = (given,) if isinstance(given, str) else tuple(given or ())
+    if not all(isinstance(text, str) for text in texts):
+        raise UsageError(f"{place}: generation_kwargs: {name} is {given!r}; it is a text or a list of texts")
+    return texts

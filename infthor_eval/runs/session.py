@@ -1,0 +1,34 @@
+"""A subject at work, and the journal that its results go to."""
+
+from typing import Any
+
+from infthor_eval.runs.journal import Journal
+from infthor_eval.runs.records import Unit, UnitRecord
+from infthor_eval.runs.suite import Subject
+
+__all__ = ["JournalSession"]
+
+
+class JournalSession:
+    """The `Session` of a run with a journal."""
+
+    def __init__(self, subject: Subject, journal: Journal) -> None:
+        self.subject = subject
+        self.journal = journal
+
+    def known(self, unit: Unit[Any], fingerprint: str) -> UnitRecord[Any] | None:
+        """See `Session`."""
+        return self.journal.known(unit.key, fingerprint)
+
+    def memo(self, fingerprint: str) -> Any | None:
+        """See `Session`."""
+        return self.journal.memo(fingerprint)
+
+    def keep(self, fingerprint: str, payload: Any) -> None:
+        """See `Session`."""
+        self.journal.keep(fingerprint, payload)
+
+    def recorded(self, record: UnitRecord[Any]) -> tuple[UnitRecord[Any], bool]:
+        """A record that a suite gave, on disk; and whether it was there already."""
+        resumed = self.journal.holds(record)
+        return (record if resumed else self.journal.append(record)), resumed
