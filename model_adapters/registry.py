@@ -20,15 +20,15 @@ ENTRY_POINTS = "infthor_eval.models"
 
 _BUILT_IN = {
     "blind": "model_adapters.bounds:Blind",
-    "deepseek-vl": "model_adapters.families.deepseek_vl:DeepseekVL",
+    "deepseek-vl": "model_adapters.hf.families.deepseek_vl:DeepseekVL",
     "deepseek-vl-tiny": "model_adapters.tiny.deepseek_vl:DeepseekVLTiny",
-    "hf-vlm": "model_adapters.families.hf_vlm:HfVlm",
-    "llava-onevision": "model_adapters.families.llava_onevision:LlavaOnevision",
+    "hf-vlm": "model_adapters.hf.families.hf_vlm:HfVlm",
+    "llava-onevision": "model_adapters.hf.families.llava_onevision:LlavaOnevision",
     "llava-onevision-tiny": "model_adapters.tiny.llava_onevision:LlavaOnevisionTiny",
     "oracle": "model_adapters.bounds:Oracle",
-    "pixtral": "model_adapters.families.pixtral:Pixtral",
+    "pixtral": "model_adapters.hf.families.pixtral:Pixtral",
     "pixtral-tiny": "model_adapters.tiny.pixtral:PixtralTiny",
-    "qwen2.5-vl": "model_adapters.families.qwen2_5_vl:Qwen25VL",
+    "qwen2.5-vl": "model_adapters.hf.families.qwen2_5_vl:Qwen25VL",
     "qwen2.5-vl-tiny": "model_adapters.tiny.qwen2_5_vl:Qwen25VLTiny",
     "random": "model_adapters.bounds:Random",
 }
