@@ -1,20 +1,20 @@
 """Several continuations of one encoded prefix, answered together: one row each, decoded in step."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import torch
 
-from model_adapters.hf.decoding import Generation, penalised
+from model_adapters.hf.decoding import Writing, write
 from model_adapters.hf.embedding import Embedder
 from model_adapters.hf.prefix import Prefix
-from model_adapters.hf.prompt import Piece, token_ids
+from model_adapters.hf.prompt import Piece
 
 __all__ = ["answer_together"]
 
 
 class _Rows:
-    """Continuations of different length behind the same prefix, padded on the left so that all end at the same column."""
+    """Continuations of one prefix, of different length, padded on the left so that all end at the same column."""
 
     def __init__(self, model: Any, embed: Embedder, prefix: Prefix) -> None:
         self._model = model
@@ -30,10 +30,16 @@ class _Rows:
         self._cache = self._prefix.spread(len(stretches), width + reserve)
         gaps = [width - len(stretch.embeds) for stretch in stretches]
         embeds = torch.stack(
-            [torch.nn.functional.pad(stretch.embeds, (0, 0, gap, 0)) for stretch, gap in zip(stretches, gaps, strict=True)]
+            [
+                torch.nn.functional.pad(stretch.embeds, (0, 0, gap, 0))
+                for stretch, gap in zip(stretches, gaps, strict=True)
+            ]
         )
         positions = torch.cat(
-            [torch.nn.functional.pad(stretch.positions, (gap, 0)) for stretch, gap in zip(stretches, gaps, strict=True)],
+            [
+                torch.nn.functional.pad(stretch.positions, (gap, 0))
+                for stretch, gap in zip(stretches, gaps, strict=True)
+            ],
             dim=-2,
         )
         n_prefix = self._prefix.n_tokens
@@ -49,7 +55,8 @@ class _Rows:
         self._ends = [stretch.end for stretch in stretches]
         self._seen = torch.nn.functional.pad(self._seen, (0, 1), value=1)
         return self._forward(
-            torch.stack([stretch.embeds for stretch in stretches]), torch.cat([stretch.positions for stretch in stretches], dim=-2)
+            torch.stack([stretch.embeds for stretch in stretches]),
+            torch.cat([stretch.positions for stretch in stretches], dim=-2),
         )
 
     def _forward(self, embeds: torch.Tensor, positions: torch.Tensor) -> torch.Tensor:
@@ -72,10 +79,8 @@ def answer_together(
     prefix: Prefix,
     prompts: Sequence[Sequence[Piece]],
     n_shared: int,
-    settings: Generation,
-    max_new_tokens: int,
-    finished: Callable[[list[int]], bool],
-) -> list[list[int]]:
+    replies: Sequence[Writing],
+) -> None:
     """Answer prompts that begin with the same pieces.
 
     Args:
@@ -84,31 +89,9 @@ def answer_together(
         prefix: holds the shared pieces and nothing more.
         prompts: what to answer; each is longer than what is shared.
         n_shared: pieces that all prompts have in common.
-        settings: end tokens and penalty.
-        max_new_tokens: limit for each.
-        finished: looks at a reply's ids so far after each token.
-
-    Returns:
-        The ids of each reply without the end token.
+        replies: the reply to each, begun.
     """
     rows = _Rows(model, embed, prefix)
-    logits = rows.feed([prompt[n_shared:] for prompt in prompts], max_new_tokens)
-    penalty = settings.repetition_penalty
-    seen = [set(token_ids(prompt)) if penalty != 1.0 else set() for prompt in prompts]
-    replies: list[list[int]] = [[] for _ in prompts]
-    going = set(range(len(prompts)))
-    while True:
-        tokens = [0] * len(prompts)  # rows that are done are fed something, which nobody reads
-        for row in sorted(going):
-            token = int(penalised(logits[row].float(), seen[row], penalty).argmax())
-            if token in settings.end_ids:
-                going.discard(row)
-                continue
-            tokens[row] = token
-            replies[row].append(token)
-            seen[row].add(token)
-            if len(replies[row]) == max_new_tokens or finished(replies[row]):
-                going.discard(row)
-        if not going:
-            return replies
-        logits = rows.step(tokens)
+    room = max(reply.decoding.max_new_tokens for reply in replies)
+    logits = rows.feed([prompt[n_shared:] for prompt in prompts], room)
+    write(logits, rows.step, replies)

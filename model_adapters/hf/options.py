@@ -35,8 +35,8 @@ class HfOptions:
         attn_implementation: sdpa, eager, flash_attention_2, ...
         share_prefix: encode what two replies have in common once; false encodes everything for every reply.
         chunk_tokens: most tokens encoded in one forward pass.
-        batch_size: most continuations of one prefix that are answered together; each has its own copy of the prefix's keys
-            and values.
+        batch_size: most continuations of one prefix that are answered together; each has its own copy of the prefix's
+            keys and values.
         kv_offload: keep keys and values in CPU memory; slower, for contexts that do not fit on the GPU.
         feature_cache_mb: memory for vision features of frames seen before, in MiB.
         max_tokens: context limit instead of the checkpoint's; 0 for none.

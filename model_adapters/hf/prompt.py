@@ -1,4 +1,4 @@
-"""From the parts of a conversation to what the model is fed.
+"""From the turns of a conversation to what the model is fed.
 
 The checkpoint's own chat template is rendered over the whole conversation and the result is tokenised as a whole, with
 one placeholder per frame; placeholders are expanded afterwards, id by id. So merges over the joints of parts come out
@@ -14,9 +14,10 @@ from PIL import Image, UnidentifiedImageError
 from infthor_eval.errors import DataError, ModelError
 from infthor_eval.formats.frames import FrameRef
 from model_adapters.hf.family import Family, Size
-from model_adapters.protocols import Part
+from model_adapters.hf.rendering import begins, render
+from model_adapters.protocols import Turn
 
-__all__ = ["Frame", "Prompter", "Piece", "begins", "n_common", "n_tokens", "render", "token_ids"]
+__all__ = ["Frame", "Piece", "Prompter", "n_common", "n_tokens", "token_ids"]
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,7 @@ def n_tokens(pieces: Sequence[Piece]) -> int:
 
 
 def n_common(prompts: Sequence[Sequence[Piece]]) -> int:
-    """Units that all prompts begin with; at least one piece of each is left over."""
+    """Pieces that all prompts begin with; at least one piece of each is left over."""
     first = min(prompts, key=len)
     for at, piece in enumerate(first[:-1]):
         if any(prompt[at] is not piece and prompt[at] != piece for prompt in prompts):
@@ -60,64 +61,6 @@ def token_ids(pieces: Iterable[Piece]) -> Iterator[int]:
             yield piece
         else:
             yield from piece.ids
-
-
-def render(tokenizer: Any, template: str, parts: Sequence[Part], image_token: str) -> str:
-    """The chat template over one user turn of these parts, asking for the reply.
-
-    Some templates (LLaVA's) write all images before all texts. Where that would take frames out of the places between
-    texts, the turn is given to them as one text with the image's token in it.
-
-    Args:
-        tokenizer: the checkpoint's.
-        template: its chat template (Jinja).
-        parts: the turn.
-        image_token: what the template writes for an image.
-
-    Raises:
-        ModelError: the template leaves a text out.
-    """
-    text = _rendered(tokenizer, template, parts)
-    for part in parts:
-        if isinstance(part, str) and part.strip() not in text:
-            raise ModelError(f"the chat template leaves out the text {part.strip()[:40]!r}; it cannot be used")
-    n_frames = sum(isinstance(part, FrameRef) for part in parts)
-    if text.count(image_token) != n_frames or _keeps_order(text, parts, image_token):
-        return text
-    inline = "".join(part if isinstance(part, str) else image_token for part in parts)
-    return _rendered(tokenizer, template, [inline])
-
-
-def _rendered(tokenizer: Any, template: str, parts: Sequence[Part]) -> str:
-    # Most templates read a text under "text", a few under "content".
-    content = [
-        {"type": "text", "text": part, "content": part} if isinstance(part, str) else {"type": "image"}
-        for part in parts
-    ]
-    text: str = tokenizer.apply_chat_template(
-        [{"role": "user", "content": content}],
-        chat_template=template,
-        tokenize=False,
-        add_generation_prompt=True,
-    )
-    return text
-
-
-def _keeps_order(text: str, parts: Sequence[Part], image_token: str) -> bool:
-    """Whether the parts stand in a rendered text one after the other."""
-    at = 0
-    for part in parts:
-        written = part.strip() if isinstance(part, str) else image_token
-        at = text.find(written, at)
-        if at < 0:
-            return False
-        at += len(written)
-    return True
-
-
-def begins(tokenizer: Any, text: str) -> bool:
-    """Whether the template wrote the token that begins every text; where not, processors let the tokenizer add it."""
-    return tokenizer.bos_token is not None and text.startswith(tokenizer.bos_token)
 
 
 class Prompter:
@@ -137,15 +80,15 @@ class Prompter:
         self._frames: dict[str, Frame] = {}
         self._ids: dict[Size, tuple[int, ...]] = {}
 
-    def pieces(self, parts: Sequence[Part]) -> list[Piece]:
-        """The prompt that asks for the reply to one user turn of these parts.
+    def pieces(self, turns: Sequence[Turn]) -> list[Piece]:
+        """The prompt that asks for the reply to these turns.
 
         Raises:
             DataError: a frame cannot be read.
-            ModelError: the tokenised template does not hold one placeholder per frame.
+            ModelError: the template refuses the turns, or does not hold one placeholder per frame.
         """
-        frames = [self._frame(part) for part in parts if isinstance(part, FrameRef)]
-        text = render(self._tokenizer, self._template, parts, self._image_token)
+        frames = [self.frame(part) for turn in turns for part in turn.parts if isinstance(part, FrameRef)]
+        text = render(self._tokenizer, self._template, turns, self._image_token)
         ids: list[int] = self._tokenizer(text, add_special_tokens=not begins(self._tokenizer, text))["input_ids"]
         placeholder = self._family.placeholder_id
         if ids.count(placeholder) != len(frames):
@@ -157,7 +100,12 @@ class Prompter:
         rest = iter(frames)
         return [next(rest) if token == placeholder else token for token in ids]
 
-    def _frame(self, ref: FrameRef) -> Frame:
+    def frame(self, ref: FrameRef) -> Frame:
+        """A frame as a piece of any prompt.
+
+        Raises:
+            DataError: it cannot be read.
+        """
         frame = self._frames.get(ref.digest)
         if frame is None:
             size = _size(ref)

@@ -9,37 +9,34 @@ from typing import Any
 
 import torch
 from PIL import Image
-from transformers import StoppingCriteria, StoppingCriteriaList
+from transformers import LogitsProcessor, LogitsProcessorList, StoppingCriteria, StoppingCriteriaList
 
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
-from model_adapters.backend import BackendConversation, OneByOne
-from model_adapters.hf.decoding import cut_at_stop
+from model_adapters.backend import BackendConversation
+from model_adapters.hf.decoding import Writing
+from model_adapters.hf.description import capabilities, identity
+from model_adapters.hf.limits import check_limit, naming_memory_errors
 from model_adapters.hf.loaded import Loaded
-from model_adapters.hf.model import (
-    check_limit,
-    context_limit,
-    identity,
-    limit_before_extension,
-    naming_memory_errors,
-)
 from model_adapters.hf.options import HfOptions
-from model_adapters.hf.prompt import begins, render
-from model_adapters.protocols import Part, Reply
+from model_adapters.hf.rendering import begins, render
+from model_adapters.hf.replies import begin_reply, end_reply
+from model_adapters.protocols import Capabilities, Decoding, Reply, Turn
 
 __all__ = ["UncachedModel", "expanded", "image_token", "processed"]
 
 
-def processed(processor: Any, template: str, parts: Sequence[Part]) -> Any:
-    """What transformers' processor makes of one user turn, as tensors.
+def processed(processor: Any, template: str, turns: Sequence[Turn]) -> Any:
+    """What transformers' processor makes of a conversation, as tensors.
 
     Frames are given as a flat list: that is what published results come from.
 
     Raises:
         DataError: a frame cannot be read.
+        ModelError: the template refuses the turns.
     """
-    text = render(processor.tokenizer, template, parts, image_token(processor))
-    images = [part.load() for part in parts if isinstance(part, FrameRef)]
+    text = render(processor.tokenizer, template, turns, image_token(processor))
+    images = [part.load() for turn in turns for part in turn.parts if isinstance(part, FrameRef)]
     return processor(
         text=[text],
         images=images or None,
@@ -67,21 +64,30 @@ def expanded(processor: Any, image: Image.Image) -> list[int]:
     return ids
 
 
-class _StopAt(StoppingCriteria):
-    """Ends generation as soon as the reply's text has a stop string."""
+class _Dictate(LogitsProcessor):
+    """Has `generate` take the tokens that a reply chooses."""
 
-    def __init__(self, tokenizer: Any, n_context: int, stop: Sequence[str]) -> None:
-        self._tokenizer = tokenizer
-        self._n_context = n_context
-        self._stop = stop
+    def __init__(self, reply: Writing) -> None:
+        self._reply = reply
+
+    def __call__(self, input_ids: torch.LongTensor, scores: torch.FloatTensor) -> torch.FloatTensor:
+        self._reply.extend(scores[0])
+        if not self._reply.done:
+            scores[0, self._reply.ids[-1]] = torch.inf
+        return scores
+
+
+class _Done(StoppingCriteria):
+    """Ends `generate` with the reply."""
+
+    def __init__(self, reply: Writing) -> None:
+        self._reply = reply
 
     def __call__(self, input_ids: torch.Tensor, scores: torch.Tensor, **kwargs: Any) -> torch.Tensor:
-        text = self._tokenizer.decode(input_ids[0, self._n_context :], skip_special_tokens=True)
-        done = cut_at_stop(text, self._stop) is not None
-        return torch.tensor([done], device=input_ids.device)
+        return torch.tensor([self._reply.done], device=input_ids.device)
 
 
-class UncachedModel(OneByOne):
+class UncachedModel:
     """A loaded checkpoint behind the `Model` protocol, without any sharing.
 
     Args:
@@ -98,14 +104,9 @@ class UncachedModel(OneByOne):
         self._options = options
 
     @property
-    def max_tokens(self) -> int | None:
-        """The checkpoint's context limit, or the option's."""
-        return context_limit(self._loaded, self._options)
-
-    @property
-    def max_tokens_before_extension(self) -> int | None:
-        """The checkpoint's own limit where an option extends it."""
-        return limit_before_extension(self._loaded, self._options)
+    def capabilities(self) -> Capabilities:
+        """Sampling and choices, one request at a time."""
+        return capabilities(self._loaded, self._options, batch_size=1)
 
     def identity(self) -> dict[str, Any]:
         """Checkpoint, precision, kernels, versions and generation settings, as JSON values."""
@@ -125,27 +126,29 @@ class UncachedModel(OneByOne):
         if torch.cuda.is_available():
             torch.cuda.empty_cache()
 
-    def count(self, parts: Sequence[Part]) -> int:
-        """Tokens that a reply to these parts would be made from."""
-        return int(processed(self._processor, self._loaded.template, parts)["input_ids"].shape[1])
+    def count(self, turns: Sequence[Turn]) -> int:
+        """Tokens that a reply to these turns would be made from."""
+        return int(processed(self._processor, self._loaded.template, turns)["input_ids"].shape[1])
+
+    def answer_each(self, conversations: Sequence[Sequence[Turn]], decoding: Decoding) -> list[Reply]:
+        """Answer several conversations, one after the other; see `Conversation.replies`."""
+        return [self.answer(turns, decoding) for turns in conversations]
 
     @torch.inference_mode()
-    def answer(self, parts: Sequence[Part], max_new_tokens: int, stop: Sequence[str]) -> Reply:
-        """Answer one user turn; see `Conversation.reply`."""
-        inputs = processed(self._processor, self._loaded.template, parts)
+    def answer(self, turns: Sequence[Turn], decoding: Decoding) -> Reply:
+        """Answer a conversation; see `Conversation.reply`."""
+        inputs = processed(self._processor, self._loaded.template, turns)
         n_context = int(inputs["input_ids"].shape[1])
-        check_limit(self.name, n_context, max_new_tokens, self.max_tokens)
-        model, tokenizer = self._loaded.model, self._loaded.tokenizer
-        weight = model.get_input_embeddings().weight
+        check_limit(self.name, n_context, decoding.max_new_tokens, self.capabilities.max_tokens)
+        reply = begin_reply(self._loaded, decoding, inputs["input_ids"][0].tolist())
+        weight = self._loaded.model.get_input_embeddings().weight
         with naming_memory_errors(self.name, n_context):
-            output = model.generate(
-                **inputs.to(weight.device, model.dtype),
+            self._loaded.model.generate(
+                **inputs.to(weight.device, self._loaded.model.dtype),
                 do_sample=False,
-                max_new_tokens=max_new_tokens,
-                stopping_criteria=StoppingCriteriaList([_StopAt(tokenizer, n_context, stop)]),
+                repetition_penalty=1.0,
+                max_new_tokens=decoding.max_new_tokens,
+                logits_processor=LogitsProcessorList([_Dictate(reply)]),
+                stopping_criteria=StoppingCriteriaList([_Done(reply)]),
             )
-        ends = self._loaded.generation.end_ids
-        ids = [token for token in output[0, n_context:].tolist() if token not in ends]
-        text = tokenizer.decode(ids, skip_special_tokens=True)
-        before_stop = cut_at_stop(text, stop)
-        return Reply(text if before_stop is None else before_stop, tuple(ids), n_context, 0)
+        return end_reply(self._loaded, reply, n_context, n_cached=0)

@@ -25,18 +25,18 @@ from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.formats.frames import FrameRef
 from model_adapters.hf.adapter import fitting, load_model
 from model_adapters.hf.checkpoint import LocatedCheckpoint, load_checkpoint, loading, locate
+from model_adapters.hf.families.deepseek_vl import DeepseekVLFamily
+from model_adapters.hf.families.llava_onevision import LlavaOnevisionFamily
+from model_adapters.hf.families.pixtral import PixtralFamily
+from model_adapters.hf.families.plain import PlainFamily
+from model_adapters.hf.families.qwen2_5_vl import Qwen25VLFamily
 from model_adapters.hf.family import MakeFamily, Size
 from model_adapters.hf.loaded import Loaded
 from model_adapters.hf.model import TransformersModel
 from model_adapters.hf.options import CheckpointOptions
 from model_adapters.hf.prompt import token_ids
 from model_adapters.hf.uncached import UncachedModel, expanded, image_token, processed
-from model_adapters.hf.families.deepseek_vl import DeepseekVLFamily
-from model_adapters.hf.families.llava_onevision import LlavaOnevisionFamily
-from model_adapters.hf.families.pixtral import PixtralFamily
-from model_adapters.hf.families.plain import PlainFamily
-from model_adapters.hf.families.qwen2_5_vl import Qwen25VLFamily
-from model_adapters.protocols import Model, Part
+from model_adapters.protocols import Model, Part, Turn
 
 __all__ = ["HfVlm", "ProcessorFamily"]
 
@@ -155,10 +155,10 @@ def _try(model: TransformersModel | UncachedModel, loaded: Loaded, processor: An
     mend = f"{loaded.model.config.model_type} cannot be run with shared prefixes; use share_prefix=false"
     shared = None
     with tempfile.TemporaryDirectory() as folder, fitting(pretrained):
-        parts = _sample(Path(folder))
-        inputs = processed(processor, loaded.template, parts)
+        turns = [Turn("user", _sample(Path(folder)))]
+        inputs = processed(processor, loaded.template, turns)
         if isinstance(model, TransformersModel):
-            pieces = model.pieces(parts)
+            pieces = model.pieces(turns)
             if list(token_ids(pieces)) != inputs["input_ids"][0].tolist():
                 raise ModelError(f"token ids differ from the processor's: {mend}")
             shared = model.encode(pieces)
@@ -169,11 +169,11 @@ def _try(model: TransformersModel | UncachedModel, loaded: Loaded, processor: An
         raise ModelError(f"logits differ from the plain model's: {mend}")
 
 
-def _sample(folder: Path) -> list[Part]:
+def _sample(folder: Path) -> tuple[Part, ...]:
     draw = np.random.default_rng(0)
     frames = []
     for number, (height, width) in enumerate([(300, 300), (200, 280)]):
         path = folder / f"{number}.png"
         Image.fromarray(draw.integers(0, 256, (height, width, 3), dtype=np.uint8)).save(path)
         frames.append(FrameRef(path))
-    return ["The first view:\n", frames[0], "RotateLeft", frames[1], frames[0], "\nWhat do you see?"]
+    return "The first view:\n", frames[0], "RotateLeft", frames[1], frames[0], "\nWhat do you see?"

@@ -7,8 +7,8 @@ import torch
 from PIL import Image
 
 from model_adapters.hf.adapter import CheckpointAdapter
-from model_adapters.hf.options import CheckpointOptions
 from model_adapters.hf.families.plain import PlainFamily
+from model_adapters.hf.options import CheckpointOptions
 
 __all__ = ["LlavaOnevision", "LlavaOnevisionFamily"]
 

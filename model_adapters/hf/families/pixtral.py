@@ -9,9 +9,9 @@ from PIL import Image
 
 from infthor_eval.errors import ModelError
 from model_adapters.hf.adapter import CheckpointAdapter
+from model_adapters.hf.families.plain import PlainFamily
 from model_adapters.hf.family import Size
 from model_adapters.hf.options import CheckpointOptions
-from model_adapters.hf.families.plain import PlainFamily
 
 __all__ = ["Pixtral", "PixtralFamily"]
 

@@ -9,9 +9,9 @@ import torch
 from PIL import Image
 
 from model_adapters.hf.adapter import CheckpointAdapter
+from model_adapters.hf.families.plain import PlainFamily
 from model_adapters.hf.family import Size
 from model_adapters.hf.options import CheckpointOptions
-from model_adapters.hf.families.plain import PlainFamily
 
 __all__ = ["PixelLimits", "Qwen25VL", "Qwen25VLFamily"]
 
