@@ -12,7 +12,7 @@ from PIL import Image
 from infthor_eval.formats.frames import FrameRef
 from model_adapters.protocols import Model, Policy
 
-__all__ = ["ContractError", "check_identity", "frames_of_one_colour", "raises", "require"]
+__all__ = ["ContractError", "check_identity", "check_members", "frames_of_one_colour", "raises", "require"]
 
 
 class ContractError(AssertionError):
@@ -36,6 +36,16 @@ def raises(error_type: type[Exception], call: Callable[..., Any], *args: Any, **
     except error_type:
         return True
     return False
+
+
+def check_members(found: object, protocol: type) -> None:
+    """Check that an object has all that a protocol has, without asking for any of it.
+
+    Raises:
+        ContractError: names what is missing.
+    """
+    missing = sorted(name for name in vars(protocol) if not name.startswith("_") and name not in dir(found))
+    require(not missing, f"{type(found).__name__} lacks a member of {protocol.__name__}: {', '.join(missing)}")
 
 
 def check_identity(adapter: Model | Policy) -> None:

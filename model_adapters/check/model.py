@@ -1,7 +1,7 @@
 """The contract of models and their conversations."""
 
 from model_adapters.check.claims import check_choices, check_flight, check_sampling
-from model_adapters.check.clauses import check_identity, frames_of_one_colour, require
+from model_adapters.check.clauses import check_identity, check_members, frames_of_one_colour
 from model_adapters.check.conversation import check_counts, check_marks, check_parts, check_turns
 from model_adapters.check.replies import check_continuations, check_frames, check_reply, check_sharing
 from model_adapters.protocols import Conversation, Model
@@ -21,8 +21,8 @@ def check_adapter(model: Model, frame_size: tuple[int, int] = (300, 300)) -> Non
     Raises:
         ContractError: names the clause that does not hold.
     """
-    require(isinstance(model, Model), "the object lacks a member of the Model protocol")
-    require(isinstance(model.conversation(), Conversation), "conversation() lacks a member of the protocol")
+    check_members(model, Model)
+    check_members(model.conversation(), Conversation)
     check_identity(model)
     with frames_of_one_colour(frame_size) as (black, white):
         check_parts(model, black)

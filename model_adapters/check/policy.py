@@ -3,7 +3,7 @@
 import math
 
 from infthor_eval.formats.frames import FrameRef
-from model_adapters.check.clauses import check_identity, frames_of_one_colour, require
+from model_adapters.check.clauses import check_identity, check_members, frames_of_one_colour, require
 from model_adapters.protocols import ArmDelta, Policy
 
 __all__ = ["check_policy"]
@@ -21,7 +21,7 @@ def check_policy(policy: Policy, frame_size: tuple[int, int] = (300, 300)) -> No
     Raises:
         ContractError: names the clause that does not hold.
     """
-    require(isinstance(policy, Policy), "the object lacks a member of the Policy protocol")
+    check_members(policy, Policy)
     check_identity(policy)
     with frames_of_one_colour(frame_size) as frames:
         episodes = [_episode(policy, frames) for _ in range(2)]

@@ -16,6 +16,8 @@ from infthor_eval.formats.frames import FrameRef
 from model_adapters import Part, check_adapter, load
 from model_adapters.hf.prompt import token_ids
 
+from ..asking import up_to, user
+
 NEW = 6
 
 
@@ -37,8 +39,8 @@ def _inputs(model: Any, parts: Sequence[Part]) -> dict[str, torch.Tensor]:
     for index, count in enumerate(counts):
         pieces[index] += "<|image_pad|>" * count
     ids = loaded.tokenizer("".join(pieces), add_special_tokens=False, return_tensors="pt")["input_ids"]
-    kinds = (ids == loaded.model.config.image_token_id).int()
-    return inputs | {"input_ids": ids, "attention_mask": torch.ones_like(ids), "mm_token_type_ids": kinds}
+    token_types = (ids == loaded.model.config.image_token_id).int()
+    return inputs | {"input_ids": ids, "attention_mask": torch.ones_like(ids), "mm_token_type_ids": token_types}
 
 
 def _parts(frames: Sequence[FrameRef]) -> list[list[Part]]:
@@ -57,7 +59,7 @@ def test_ids_are_those_of_the_chat_template_on_the_whole(tiny: Any, frames: list
     talk = tiny.conversation()
     talk.append(*parts)
     expected = _inputs(tiny, parts)["input_ids"][0].tolist()
-    assert list(token_ids(tiny.units(talk.parts))) == expected
+    assert list(token_ids(tiny.pieces(talk.turns))) == expected
     assert talk.n_tokens == len(expected)
 
 
@@ -71,17 +73,17 @@ def test_replies_are_those_of_generate(tiny: Any, frames: list[FrameRef], case: 
     new = output[0, inputs["input_ids"].shape[1] :].tolist()
     ends = tiny._loaded.generation.end_ids
     expected = next((new[:at] for at, token in enumerate(new) if token in ends), new)
-    assert list(talk.reply(NEW).token_ids) == expected
+    assert list(talk.reply(up_to(NEW)).token_ids) == expected
 
 
 def test_logits_are_those_of_a_plain_forward_pass(tiny: Any, frames: list[FrameRef]) -> None:
     parts: list[Part] = ["Goal.", *frames[:3], "\nWhat now?", frames[3], "so?"]
-    units = tiny.units(parts)
+    pieces = tiny.pieces(user(*parts))
     prefix = tiny._prefix
     prefix.reset()
-    prefix.feed(units[:30])
+    prefix.feed(pieces[:30])
     prefix.cut(17)
-    logits = prefix.feed(units[17:])
+    logits = prefix.feed(pieces[17:])
     with torch.inference_mode():
         expected = tiny._loaded.model(**_inputs(tiny, parts)).logits[0, -1]
     torch.testing.assert_close(logits, expected, atol=1e-4, rtol=1e-4)
@@ -98,7 +100,7 @@ def test_a_penalised_reply_is_that_of_generate(frames: list[FrameRef]) -> None:
     model._loaded = replace(model._loaded, generation=replace(model._loaded.generation, repetition_penalty=1.3))
     talk = model.conversation()
     talk.append(*parts)
-    assert list(talk.reply(12).token_ids) == output[0, inputs["input_ids"].shape[1] :].tolist()
+    assert list(talk.reply(up_to(12)).token_ids) == output[0, inputs["input_ids"].shape[1] :].tolist()
     assert model.identity()["generation"]["repetition_penalty"] == 1.3
 
 
@@ -121,20 +123,22 @@ STEPS = st.lists(
 def test_sharing_changes_no_reply(tiny: Any, plain: Any, frames: list[FrameRef], steps: list[Any]) -> None:
     def play(model: Any) -> list[Any]:
         talk, marks, heard = model.conversation(), [], []
-        for kind, value in [*steps, ("reply", 3)]:
-            if kind == "text":
+        for step, value in [*steps, ("reply", 3)]:
+            if step == "text":
                 talk.append(value)
-            elif kind == "frame":
+            elif step == "frame":
                 talk.append(frames[value])
-            elif kind == "mark":
+            elif step == "mark":
                 marks.append(talk.mark())
-            elif kind == "rewind" and marks:
+            elif step == "rewind" and marks:
                 del marks[value + 1 :]
                 talk.rewind(marks[-1])
-            elif kind == "fresh":
+            elif step == "fresh":
                 talk, marks = model.conversation(), []
-            elif kind == "reply":
-                reply = talk.reply(value)
+            elif step == "reply" and not talk.turns:
+                heard.append("nothing to reply to")
+            elif step == "reply":
+                reply = talk.reply(up_to(value))
                 heard.append((reply.text, reply.token_ids, reply.n_context_tokens))
         return heard
 
@@ -146,10 +150,10 @@ def test_the_second_question_pays_for_itself_only(tiny: Any, frames: list[FrameR
     talk.append(*frames)
     start = talk.mark()
     talk.append("\nWhere is it?")
-    talk.reply(NEW)
+    talk.reply(up_to(NEW))
     talk.rewind(start)
     talk.append("\nHow many?")
-    again = talk.reply(NEW)
+    again = talk.reply(up_to(NEW))
     assert again.n_cached_tokens > len(frames) * (9 + 2)
     assert again.n_context_tokens - again.n_cached_tokens < 20
 
@@ -158,13 +162,13 @@ def test_other_conversations_share_frames_too(tiny: Any, frames: list[FrameRef])
     for expected in (False, True):
         talk = tiny.conversation()
         talk.append(*frames[::-1], "\nAgain?")
-        assert (talk.reply(1).n_cached_tokens > 50) is expected
+        assert (talk.reply(up_to(1)).n_cached_tokens > 50) is expected
 
 
 def test_without_sharing_nothing_is_cached(plain: Any, frames: list[FrameRef]) -> None:
     talk = plain.conversation()
     talk.append(*frames)
-    assert [talk.reply(1).n_cached_tokens for _ in range(2)] == [0, 0]
+    assert [talk.reply(up_to(1)).n_cached_tokens for _ in range(2)] == [0, 0]
 
 
 def test_features_are_computed_once_per_frame(frames: list[FrameRef], monkeypatch: pytest.MonkeyPatch) -> None:
@@ -180,7 +184,7 @@ def test_features_are_computed_once_per_frame(frames: list[FrameRef], monkeypatc
     for order in ([0, 1, 2], [2, 1, 0], [0, 0, 1]):
         talk = model.conversation()
         talk.append(*(frames[index] for index in order), "?")
-        talk.reply(1)
+        talk.reply(up_to(1))
     assert sorted(decoded) == [frames[index].path for index in range(3)]
 
 
@@ -191,7 +195,7 @@ def test_any_size_of_the_feature_cache_gives_the_same_reply(plain: Any, frames: 
     for each in (model, plain):
         talk = each.conversation()
         talk.append(*frames, "\nWhat?")
-        replies.append(talk.reply(NEW).token_ids)
+        replies.append(talk.reply(up_to(NEW)).token_ids)
     assert replies[0] == replies[1]
     assert model._features._bytes <= int(megabytes) * 2**20
 
@@ -199,9 +203,9 @@ def test_any_size_of_the_feature_cache_gives_the_same_reply(plain: Any, frames: 
 def test_stop_strings_end_the_reply(tiny: Any, frames: list[FrameRef]) -> None:
     talk = tiny.conversation()
     talk.append(frames[0], "\nSay something.")
-    whole = talk.reply(20)
+    whole = talk.reply(up_to(20))
     stop = whole.text[4:6]
-    cut = talk.reply(20, stop=("never there", stop))
+    cut = talk.reply(up_to(20, stop=("never there", stop)))
     assert cut.text == whole.text[: whole.text.index(stop)]
     assert len(cut.token_ids) < len(whole.token_ids)
     assert cut.token_ids == whole.token_ids[: len(cut.token_ids)]
@@ -211,22 +215,22 @@ def test_too_long_a_context_gives_tokens_and_limit(frames: list[FrameRef]) -> No
     model: Any = load("qwen2.5-vl-tiny", {"max_tokens": "60"}, seed=0)
     talk = model.conversation()
     talk.append(frames[0])
-    talk.reply(4)
+    talk.reply(up_to(4))
     talk.append(*frames)
     with pytest.raises(ModelError, match=f"context of {talk.n_tokens} tokens and 4 new ones .* 60 tokens"):
-        talk.reply(4)
+        talk.reply(up_to(4))
 
 
 def test_max_tokens_is_the_checkpoints_or_the_options(tiny: Any) -> None:
-    assert tiny.max_tokens == 128_000
-    assert load("qwen2.5-vl-tiny", {"max_tokens": "0"}, seed=0).max_tokens is None  # type: ignore[union-attr]
+    assert tiny.capabilities.max_tokens == 128_000
+    assert load("qwen2.5-vl-tiny", {"max_tokens": "0"}, seed=0).capabilities.max_tokens is None  # type: ignore[union-attr]
 
 
 def test_a_text_with_the_image_token_is_refused(tiny: Any, frames: list[FrameRef]) -> None:
     talk = tiny.conversation()
     talk.append(frames[0], "<|image_pad|>")
     with pytest.raises(ModelError, match="2 image placeholders for 1 frames"):
-        talk.reply(1)
+        talk.reply(up_to(1))
 
 
 ERRORS = [
@@ -254,12 +258,12 @@ def test_out_of_memory_names_the_size_and_the_model_goes_on(
     monkeypatch.setattr(tiny._loaded.model, "forward", failing)
     tiny._prefix.reset()
     with pytest.raises(ModelError, match=f"out of memory on a context of {talk.n_tokens} tokens"):
-        talk.reply(NEW)
+        talk.reply(up_to(NEW))
     assert tiny._features._bytes == tiny._prefix.n_tokens == 0
     monkeypatch.undo()
     other = plain.conversation()
-    other.append(*talk.parts)
-    assert talk.reply(NEW).token_ids == other.reply(NEW).token_ids
+    other.append(*talk.turns[0].parts)
+    assert talk.reply(up_to(NEW)).token_ids == other.reply(up_to(NEW)).token_ids
 
 
 def test_an_interrupted_reply_leaves_nothing_half_encoded(
@@ -280,11 +284,11 @@ def test_an_interrupted_reply_leaves_nothing_half_encoded(
     # In the second chunk, the first layer has stored its keys when the last one fails.
     monkeypatch.setattr(last, "forward", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        talk.reply(NEW)
+        talk.reply(up_to(NEW))
     monkeypatch.undo()
     other = plain.conversation()
-    other.append(*talk.parts)
-    assert talk.reply(NEW).token_ids == other.reply(NEW).token_ids
+    other.append(*talk.turns[0].parts)
+    assert talk.reply(up_to(NEW)).token_ids == other.reply(up_to(NEW)).token_ids
 
 
 @pytest.mark.parametrize("content", [b"not an image", None])
@@ -297,12 +301,12 @@ def test_a_frame_that_cannot_be_read_is_a_data_error_and_the_model_goes_on(
     talk = tiny.conversation()
     talk.append(frames[0])
     start = talk.mark()
-    before = talk.reply(NEW)
+    before = talk.reply(up_to(NEW))
     talk.append(FrameRef(path))
     with pytest.raises(DataError, match=r"broken\.png"):
-        talk.reply(NEW)
+        talk.reply(up_to(NEW))
     talk.rewind(start)
-    assert talk.reply(NEW).token_ids == before.token_ids
+    assert talk.reply(up_to(NEW)).token_ids == before.token_ids
 
 
 def test_a_frame_cut_off_in_the_middle_is_a_data_error(tiny: Any, frames: list[FrameRef], tmp_path: Path) -> None:
@@ -311,7 +315,7 @@ def test_a_frame_cut_off_in_the_middle_is_a_data_error(tiny: Any, frames: list[F
     talk = tiny.conversation()
     talk.append(frames[1], FrameRef(path))
     with pytest.raises(DataError, match=r"cut\.png"):
-        talk.reply(NEW)
+        talk.reply(up_to(NEW))
 
 
 def test_the_tiny_models_keep_their_contract(tiny: Any, plain: Any) -> None:

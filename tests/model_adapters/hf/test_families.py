@@ -11,6 +11,7 @@ from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
 from model_adapters import Part, check_adapter, load
 
+from ..asking import up_to, user
 from ..checkpoints import FAMILIES, twin
 
 TOKENS = {"qwen2.5-vl": 121 + 2, "llava-onevision": 1485, "deepseek-vl": 576, "pixtral": 380}
@@ -41,7 +42,7 @@ def _parts(scene: Sequence[FrameRef]) -> list[Part]:
 def _ask(model: Any, parts: Sequence[Part]) -> Any:
     talk = model.conversation()
     talk.append(*parts)
-    return talk.reply(NEW)
+    return talk.reply(up_to(NEW))
 
 
 def test_a_frame_takes_the_published_number_of_tokens(family: str, model: Any, scene: list[FrameRef]) -> None:
@@ -63,8 +64,8 @@ def test_the_tiny_model_is_the_saved_one_and_keeps_its_contract(family: str, mod
 def test_half_precision_works(family: str, checkpoints: dict[str, Path], scene: list[FrameRef]) -> None:
     options = {"pretrained": str(checkpoints[family]), "dtype": "bfloat16", "device": "cpu"}
     model: Any = load(family, options, seed=0)
-    units = model.units((scene[0], "?"))
-    assert model._prefix.feed(units).dtype == torch.bfloat16
+    pieces = model.pieces(user(scene[0], "?"))
+    assert model._prefix.feed(pieces).dtype == torch.bfloat16
 
 
 def test_a_family_refuses_the_others_checkpoints(family: str, checkpoints: dict[str, Path]) -> None:
@@ -88,15 +89,16 @@ def test_pixtral_refuses_another_llava(checkpoints: dict[str, Path], tmp_path: P
 
 def test_frames_stay_between_texts_though_the_template_writes_images_first(frames: list[FrameRef]) -> None:
     model = load("llava-onevision-tiny", {}, seed=0)
-    units = model.units(("Goal: wash. ", frames[0], "MoveAhead. ", frames[1], "What now?"))
+    pieces = model.pieces(user("Goal: wash. ", frames[0], "MoveAhead. ", frames[1], "What now?"))
     ids = [
-        unit if isinstance(unit, int) else model._loaded.tokenizer.convert_tokens_to_ids("<image>") for unit in units
+        piece if isinstance(piece, int) else model._loaded.tokenizer.convert_tokens_to_ids("<image>")
+        for piece in pieces
     ]
     written = model._loaded.tokenizer.decode(ids)
     assert "Goal: wash. <image>MoveAhead. <image>What now?" in written
     talk = model.conversation()
     talk.append("Goal: wash. ", frames[0], "MoveAhead. ")
-    talk.reply(1)
+    talk.reply(up_to(1))
     talk.append(frames[1], "What now?")
-    assert talk.reply(1).n_cached_tokens > model.tokens_per_frame(frames[0])
+    assert talk.reply(up_to(1)).n_cached_tokens > model.tokens_per_frame(frames[0])
     model.close()

@@ -20,6 +20,8 @@ from model_adapters.hf.uncached import UncachedModel, processed
 from model_adapters.tiny.pixtral import PixtralTiny
 from model_adapters.tiny.qwen2_5_vl import Qwen25VLTiny, save_tiny_checkpoint
 
+from ..asking import up_to, user
+
 
 def _load(folder: Path, **options: str) -> Any:
     return load("hf-vlm", {"pretrained": str(folder), "device": "cpu", **options}, seed=0)
@@ -41,7 +43,7 @@ def test_an_unknown_family_shares_prefixes_and_replies_as_generate(
         start, heard = talk.mark(), []
         for question in ("\nWhat is it?", frames[4]):
             talk.append(question)
-            heard.append((talk.n_tokens, talk.reply(6).token_ids))
+            heard.append((talk.n_tokens, talk.reply(up_to(6)).token_ids))
             talk.rewind(start)
         replies.append(heard)
     assert replies[0] == replies[1]
@@ -58,10 +60,10 @@ def test_what_is_refused_runs_without_sharing(checkpoints: dict[str, Path], fram
     parts = (frames[0], "\nWhat is it?")
     talk = model.conversation()
     talk.append(*parts)
-    inputs = processed(model._processor, model._loaded.template, parts)
+    inputs = processed(model._processor, model._loaded.template, talk.turns)
     output = model._loaded.model.generate(**inputs, do_sample=False, max_new_tokens=6)
     expected = [token for token in output[0, talk.n_tokens :].tolist() if token not in model._loaded.generation.end_ids]
-    reply = talk.reply(6)
+    reply = talk.reply(up_to(6))
     assert list(reply.token_ids) == expected
     assert reply.n_cached_tokens == 0
     assert model.identity()["share_prefix"] is False
@@ -73,12 +75,12 @@ def test_the_end_token_is_no_part_of_a_reply_without_sharing(
     model = _load(checkpoints["llava"], share_prefix="false")
     talk = model.conversation()
     talk.append(frames[0], "\nWhat is it?")
-    whole = talk.reply(6).token_ids
+    whole = talk.reply(up_to(6)).token_ids
     folder = shutil.copytree(checkpoints["llava"], tmp_path / "llava")
     (folder / "generation_config.json").write_text(json.dumps({"eos_token_id": whole[3]}))
     ended = _load(folder, share_prefix="false").conversation()
-    ended.append(*talk.parts)
-    assert ended.reply(6).token_ids == whole[: whole.index(whole[3])]
+    ended.append(*talk.turns[0].parts)
+    assert ended.reply(up_to(6)).token_ids == whole[: whole.index(whole[3])]
 
 
 def test_known_families_need_no_processor(tmp_path: Path, frames: list[FrameRef]) -> None:
@@ -90,7 +92,7 @@ def test_known_families_need_no_processor(tmp_path: Path, frames: list[FrameRef]
         assert isinstance(model, TransformersModel)
         talk = model.conversation()
         talk.append(*frames[:2], "?")
-        assert talk.reply(2).n_context_tokens == talk.n_tokens
+        assert talk.reply(up_to(2)).n_context_tokens == talk.n_tokens
 
 
 def _qwen2_vl_config(ids: Mapping[str, int], vocab_size: int) -> Qwen2VLConfig:
@@ -109,13 +111,13 @@ def test_qwen2_vl_runs_as_its_successor_and_as_transformers_has_it(tmp_path: Pat
     replace(Qwen25VLTiny.twin, config=_qwen2_vl_config).save(tmp_path, seed=0)
     model = _load(tmp_path, chunk_tokens="30")
     parts = ("Goal.", *frames[:3], "\nWhat is it?")
-    units = model.units(parts)
-    ids = torch.tensor([list(token_ids(units))])
+    pieces = model.pieces(user(*parts))
+    ids = torch.tensor([list(token_ids(pieces))])
     pixels = model._loaded.family._image_processor(images=[ref.load() for ref in frames[:3]], return_tensors="pt")
     bare = model._loaded.model
     with torch.inference_mode():
         plain = bare(input_ids=ids, mm_token_type_ids=(ids == bare.config.image_token_id).int(), **pixels)
-    torch.testing.assert_close(model.encode(units), plain.logits[0, -1], atol=1e-4, rtol=1e-4)
+    torch.testing.assert_close(model.encode(pieces), plain.logits[0, -1], atol=1e-4, rtol=1e-4)
     assert type(bare).__name__ == "Qwen2VLForConditionalGeneration"
 
 

@@ -19,6 +19,8 @@ from infthor_eval.formats.frames import FrameRef
 from model_adapters import check_adapter, load
 from model_adapters.tiny.qwen2_5_vl import save_tiny_checkpoint
 
+from ..asking import up_to
+
 
 @pytest.fixture(scope="module")
 def checkpoint(tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -39,7 +41,7 @@ def _load(folder: Path, **options: str) -> Any:
 def _ask(model: Any, frames: list[FrameRef], text: str = "\nWhat do you see?") -> Any:
     talk = model.conversation()
     talk.append(*frames, text)
-    return talk.reply(8)
+    return talk.reply(up_to(8))
 
 
 def test_a_published_frame_takes_121_tokens_and_two_markers(
@@ -143,7 +145,7 @@ def test_without_network_the_mend_is_named(monkeypatch: pytest.MonkeyPatch) -> N
     _one_line(caught.value)
 
 
-def test_a_checkpoint_of_another_kind_is_refused(copy: Path) -> None:
+def test_a_checkpoint_of_another_model_type_is_refused(copy: Path) -> None:
     (copy / "config.json").write_text('{"model_type": "llama"}')
     with pytest.raises(ModelError, match="is a llama checkpoint, not qwen2_5_vl"):
         _load(copy)

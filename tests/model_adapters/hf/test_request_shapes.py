@@ -10,9 +10,10 @@ import torch
 from PIL import Image
 
 from infthor_eval.formats.frames import FrameRef
-from model_adapters import Conversation, Part, Transcript, load
+from model_adapters import Conversation, Part, Transcript, Turn, load
 from model_adapters.hf.prompt import token_ids
 
+from ..asking import up_to, user
 from ..checkpoints import FAMILIES
 
 NEW = 5
@@ -74,29 +75,29 @@ def alone(build: Callable[[Mapping[str, str]], Any]) -> Iterator[Any]:
 
 @pytest.fixture(scope="module")
 def expected(alone: Any, shapes: dict[str, list[Shape]]) -> dict[str, list[Any]]:
-    return {name: _ask(alone.conversation(), listed) for name, listed in shapes.items()}
+    return {name: _ask(alone, alone.conversation(), listed) for name, listed in shapes.items()}
 
 
-def _prompt(shape: Shape) -> tuple[Part, ...]:
+def _prompt(shape: Shape) -> tuple[Turn, ...]:
     """The context with its first question, as a conversation has it: texts that touch are one."""
     talk = Transcript()
     talk.append(*shape.context, shape.questions[0])
-    return talk.parts
+    return talk.turns
 
 
-def _ask(talk: Any, shapes: Sequence[Shape]) -> list[Any]:
+def _ask(model: Any, talk: Any, shapes: Sequence[Shape]) -> list[Any]:
     """Ids and context tokens of all replies, asked for as a run asks: one conversation, rewound."""
     start, heard = talk.mark(), []
     for shape in shapes:
         talk.append(*shape.context)
         after = talk.mark()
-        if talk.batch_size > 1:
-            heard += talk.replies([[text] for text in shape.questions], NEW)
+        if model.capabilities.batch_size > 1:
+            heard += talk.replies([[text] for text in shape.questions], up_to(NEW))
         else:
             for text in shape.questions:
                 talk.rewind(after)
                 talk.append(text)
-                heard.append(talk.reply(NEW))
+                heard.append(talk.reply(up_to(NEW)))
         talk.rewind(start)
     return [(reply.token_ids, reply.n_context_tokens) for reply in heard]
 
@@ -107,7 +108,7 @@ def test_replies_are_those_of_encoding_everything_for_each(
 ) -> None:
     model = build(MODES[mode])
     talk = model.conversation()
-    assert {name: _ask(talk, listed) for name, listed in shapes.items()} == expected
+    assert {name: _ask(model, talk, listed) for name, listed in shapes.items()} == expected
     model.close()
 
 
@@ -133,10 +134,10 @@ def test_ids_and_replies_are_those_of_transformers_own_processor_and_generate(
     model = build({"chunk_tokens": "50"})
     for listed, (ids, reply) in zip(shapes.values(), plainly[checkpoints[family]], strict=True):
         prompt = _prompt(listed[0])
-        assert list(token_ids(model.units(prompt))) == ids
+        assert list(token_ids(model.pieces(prompt))) == ids
         talk = model.conversation()
-        talk.append(*prompt)
-        got = list(talk.reply(NEW).token_ids)
+        talk.append(*prompt[0].parts)
+        got = list(talk.reply(up_to(NEW)).token_ids)
         assert got == reply[: len(got)]
         assert reply[len(got) :] == [] or reply[len(got)] in model._loaded.generation.end_ids
 
@@ -146,7 +147,7 @@ def _received(model: Any, talk: Conversation) -> tuple[int, int, int]:
     fed: list[dict[str, Any]] = []
     text_model = model._loaded.model.get_decoder()
     hook = text_model.register_forward_pre_hook(lambda _, args, kwargs: fed.append(kwargs), with_kwargs=True)
-    reply = talk.reply(1)
+    reply = talk.reply(up_to(1))
     hook.remove()
     n_positions = sum(call["position_ids"].shape[-1] for call in fed)
     return reply.n_cached_tokens, sum(call["inputs_embeds"].shape[1] for call in fed), n_positions
@@ -159,7 +160,7 @@ def test_the_model_receives_as_many_tokens_as_were_counted(
     model = alone if mode == "alone" else build(MODES[mode])
     for listed in shapes.values():
         talk = model.conversation()
-        talk.append(*_prompt(listed[0]))
+        talk.append(*_prompt(listed[0])[0].parts)
         n_cached, n_fed, n_positions = _received(model, talk)
         assert n_cached + n_fed == talk.n_tokens
         assert n_positions == n_fed
@@ -174,6 +175,6 @@ def test_a_black_and_a_white_frame_give_different_logits(
     for colour in ("black", "white"):
         path = tmp_path / f"{colour}.png"
         Image.new("RGB", (300, 300), colour).save(path)
-        logits.append(model.encode(model.units((FrameRef(path), "\nIs it bright?"))))
+        logits.append(model.encode(model.pieces(user(FrameRef(path), "\nIs it bright?"))))
     assert (logits[0] - logits[1]).abs().max() > 1e-3
     assert torch.isfinite(torch.stack(logits)).all()

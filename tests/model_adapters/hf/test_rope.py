@@ -18,8 +18,10 @@ from model_adapters.hf.options import HfOptions
 from model_adapters.hf.prompt import token_ids
 from model_adapters.hf.rope import apply_rope
 
+from ..asking import up_to, user
+
 ORIGINAL = 64
-KINDS = ["linear:2", "dynamic:4", "yarn:4", "longrope:8"]
+ROPES = ["linear:2", "dynamic:4", "yarn:4", "longrope:8"]
 TWINS = {"qwen2_5_vl": "Qwen25VLTiny", "pixtral": "PixtralTiny"}  # multimodal and plain RoPE
 
 
@@ -53,7 +55,7 @@ def _model(name: str, rope: str | None, **options: Any) -> tuple[TransformersMod
 
 def _plain_logits(model: TransformersModel, peer: Any, parts: Sequence[Part]) -> torch.Tensor:
     """One forward pass of transformers' own model over the whole prompt, pixels and all."""
-    ids = torch.tensor([list(token_ids(model.units(parts)))])
+    ids = torch.tensor([list(token_ids(model.pieces(user(*parts))))])
     processor = model._loaded.family._image_processor  # type: ignore[attr-defined]
     images = [part.load() for part in parts if isinstance(part, FrameRef)]
     inputs = dict(processor(images=images, return_tensors="pt"))
@@ -63,7 +65,7 @@ def _plain_logits(model: TransformersModel, peer: Any, parts: Sequence[Part]) ->
         return peer(input_ids=ids, **inputs).logits[0, -1]
 
 
-@pytest.mark.parametrize("rope", KINDS)
+@pytest.mark.parametrize("rope", ROPES)
 @pytest.mark.parametrize("name", TWINS)
 def test_chunks_and_prefixes_see_the_frequencies_of_one_pass(name: str, rope: str, frames: list[FrameRef]) -> None:
     model, peer = _model(name, rope, chunk_tokens=20)
@@ -71,9 +73,9 @@ def test_chunks_and_prefixes_see_the_frequencies_of_one_pass(name: str, rope: st
     long: list[Part] = [*frames, *frames, "RotateLeft " * 30, "\nWhere?"]
     longer: list[Part] = [*long[:-1], "MoveAhead " * 5, "\nWhere is it?"]
     for parts in (long, longer, short, long):
-        units = model.units(parts)
-        shared = model._prefix.rewind_to(units)
-        logits = model._prefix.feed(units[shared:])
+        pieces = model.pieces(user(*parts))
+        shared = model._prefix.rewind_to(pieces)
+        logits = model._prefix.feed(pieces[shared:])
         torch.testing.assert_close(logits, _plain_logits(model, peer, parts), atol=1e-3, rtol=1e-3)
 
 
@@ -86,18 +88,18 @@ def test_prefixes_are_shared_where_frequencies_are_equal(rope: str, shares: bool
     cached = []
     for question in ("What?", "Where was the mug?"):
         talk.append(question)
-        cached.append(talk.reply(2).n_cached_tokens)
+        cached.append(talk.reply(up_to(2)).n_cached_tokens)
         talk.rewind(start)
     assert (cached[1] > 50) is shares
 
 
-@pytest.mark.parametrize("rope", KINDS)
+@pytest.mark.parametrize("rope", ROPES)
 def test_an_extension_changes_long_prompts(rope: str, frames: list[FrameRef]) -> None:
     parts: list[Part] = [*frames, "RotateLeft " * 40]
     logits = []
     for each in (None, rope):
         model, _ = _model("qwen2_5_vl", each)
-        logits.append(model.encode(model.units(parts)))
+        logits.append(model.encode(model.pieces(user(*parts))))
     assert (logits[0] - logits[1]).abs().max() > 1e-2
 
 
@@ -148,12 +150,14 @@ def test_a_model_with_several_ropes_is_refused() -> None:
 
 @pytest.mark.parametrize("rope", ["yarn", "yarn:x", "yarn:1", "yarn:-2", "other:4", "yarn:nan", "yarn:inf", ":4"])
 def test_a_malformed_extension_is_a_usage_error(rope: str) -> None:
-    with pytest.raises(UsageError, match=f"rope={rope} is not KIND:FACTOR"):
+    with pytest.raises(UsageError, match=f"rope={rope} is not TYPE:FACTOR"):
         load("qwen2.5-vl-tiny", {"rope": rope}, seed=0)
 
 
 def test_limit_and_identity_tell_the_extension() -> None:
     plain, extended = (load("qwen2.5-vl-tiny", options, seed=0) for options in ({}, {"rope": "yarn:4"}))
-    assert (plain.max_tokens, extended.max_tokens) == (128_000, 512_000)  # type: ignore[union-attr]
+    assert (plain.capabilities.max_tokens, extended.capabilities.max_tokens) == (128_000, 512_000)
+    assert extended.capabilities.max_tokens_before_extension == 128_000
+    assert plain.capabilities.max_tokens_before_extension is None
     assert plain.identity() != extended.identity()
     assert extended.identity()["rope"]["factor"] == 4.0
