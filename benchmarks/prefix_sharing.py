@@ -29,7 +29,7 @@ from transformers import DynamicCache, Qwen2_5_VLConfig
 
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
-from model_adapters.engine.model import TransformersModel
+from model_adapters.hf.model import TransformersModel
 from model_adapters.tiny.qwen2_5_vl import Qwen25VLTiny
 from model_adapters.tiny.twin import TinyAdapter, TinyOptions
 

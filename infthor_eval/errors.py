@@ -4,7 +4,10 @@ Every message is one line that says what is wrong, where, and the mend. The comm
 traceback and exits with the error's `exit_code`.
 """
 
-__all__ = ["DataError", "InfthorError", "ModelError", "SimulatorError", "UsageError"]
+import difflib
+from collections.abc import Iterable
+
+__all__ = ["DataError", "InfthorError", "ModelError", "SimulatorError", "UsageError", "unknown_name"]
 
 
 class InfthorError(Exception):
@@ -29,3 +32,17 @@ class SimulatorError(InfthorError):
     """The simulator cannot be started, died, hung, or answered with something that is not its protocol."""
 
     exit_code = 1
+
+
+def unknown_name(what: str, name: str, known: Iterable[str]) -> UsageError:
+    """The error of a name that there is not: with the nearest known one, or all of them.
+
+    Args:
+        what: what it should name ("task").
+        name: as typed.
+        known: the names that there are.
+    """
+    names = sorted(known)
+    near = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
+    hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(names)}"
+    return UsageError(f"unknown {what} {name!r}; {hint}")

@@ -7,7 +7,7 @@ import importlib
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
-from infthor_eval.errors import UsageError
+from infthor_eval.errors import unknown_name
 
 if TYPE_CHECKING:
     from infthor_eval.runs import Suite, TaskFile
@@ -30,7 +30,7 @@ def suite_named(name: str) -> "Suite":
         UsageError: there is none.
     """
     if name not in _SUITES:
-        raise UsageError(f"there is no suite {name!r}; suites: {', '.join(_SUITES)}")
+        raise unknown_name("suite", name, _SUITES)
     made: Suite = _imported(_SUITES[name][0])()
     return made
 

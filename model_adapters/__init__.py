@@ -3,41 +3,54 @@
 Importing this package imports neither torch nor transformers; they come with the first model that needs them.
 """
 
-from model_adapters.backend import Backend, BackendConversation, OneByOne
-from model_adapters.check import ContractError, check_adapter, check_bound
+from model_adapters.backend import Backend, BackendConversation
+from model_adapters.check import ContractError, check_adapter, check_policy
 from model_adapters.protocols import (
+    ROLES,
     Adapter,
-    BatchingConversation,
-    Bound,
+    ArmDelta,
+    Capabilities,
     Conversation,
-    ExtendableModel,
+    Decoding,
     Mark,
     Model,
     Part,
+    Policy,
     Reply,
+    Role,
+    Turn,
 )
-from model_adapters.registry import check_options, load, names, options
+from model_adapters.refusals import check_decoding, check_turns
+from model_adapters.registry import adapter_identity, check_options, label, load, names, options, takes
 from model_adapters.transcript import Transcript
 
 __all__ = [
+    "ROLES",
     "Adapter",
+    "ArmDelta",
     "Backend",
     "BackendConversation",
-    "BatchingConversation",
-    "Bound",
+    "Capabilities",
     "ContractError",
     "Conversation",
-    "ExtendableModel",
+    "Decoding",
     "Mark",
     "Model",
-    "OneByOne",
     "Part",
+    "Policy",
     "Reply",
+    "Role",
     "Transcript",
+    "Turn",
+    "adapter_identity",
     "check_adapter",
-    "check_bound",
+    "check_decoding",
     "check_options",
+    "check_policy",
+    "check_turns",
+    "label",
     "load",
     "names",
     "options",
+    "takes",
 ]

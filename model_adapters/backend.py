@@ -1,74 +1,72 @@
-"""A conversation on top of whatever answers one user turn at a time."""
+"""A conversation on top of whatever answers a whole conversation at a time."""
 
 from collections.abc import Sequence
 from typing import Protocol
 
-from model_adapters.protocols import Part, Reply
+from model_adapters.protocols import Capabilities, Decoding, Part, Reply, Turn
+from model_adapters.refusals import check_decoding, check_turns
 from model_adapters.transcript import Transcript
 
-__all__ = ["Backend", "BackendConversation", "OneByOne"]
+__all__ = ["Backend", "BackendConversation"]
 
 
 class Backend(Protocol):
-    """What answers: it gets all parts every time and finds out by itself what it has seen before."""
+    """What answers: it gets all turns every time and finds out by itself what it has seen before.
 
-    def count(self, parts: Sequence[Part]) -> int:
-        """Tokens that a reply to these parts would be made from."""
+    The last turn is always the user's, and nothing is asked that the capabilities rule out.
+    """
+
+    @property
+    def name(self) -> str:
+        """Its name, for messages."""
         ...
 
-    def answer(self, parts: Sequence[Part], max_new_tokens: int, stop: Sequence[str]) -> Reply:
-        """Answer one user turn of these parts; see `Conversation.reply`."""
+    @property
+    def capabilities(self) -> Capabilities:
+        """What it can do."""
         ...
 
-    def answer_each(self, prompts: Sequence[Sequence[Part]], max_new_tokens: int, stop: Sequence[str]) -> list[Reply]:
-        """Answer several user turns, each for itself; `OneByOne` has this for back ends that gain nothing by it."""
+    def count(self, turns: Sequence[Turn]) -> int | None:
+        """Tokens that a reply to these turns would be made from; None where it counts none."""
         ...
 
+    def answer(self, turns: Sequence[Turn], decoding: Decoding) -> Reply:
+        """Answer a conversation; see `Conversation.reply`."""
+        ...
 
-class OneByOne:
-    """Base of back ends that answer several turns one after the other."""
-
-    def answer_each(
-        self: Backend, prompts: Sequence[Sequence[Part]], max_new_tokens: int, stop: Sequence[str]
-    ) -> list[Reply]:
-        """Answer several user turns, each for itself."""
-        return [self.answer(parts, max_new_tokens, stop) for parts in prompts]
+    def answer_each(self, conversations: Sequence[Sequence[Turn]], decoding: Decoding) -> list[Reply]:
+        """Answer several conversations, each for itself; see `Conversation.replies`."""
+        ...
 
 
 class BackendConversation(Transcript):
-    """A conversation that keeps the parts and leaves the rest to a back end.
+    """A conversation that keeps the turns and leaves the rest to a back end."""
 
-    Attributes:
-        batch_size: how many endings the back end answers together.
-    """
-
-    def __init__(self, backend: Backend, batch_size: int = 1) -> None:
+    def __init__(self, backend: Backend) -> None:
         super().__init__()
-        self.batch_size = batch_size
         self._backend = backend
 
     @property
-    def n_tokens(self) -> int:
-        """Tokens that `reply` would give the model now."""
-        return self._backend.count(self.parts)
+    def n_tokens(self) -> int | None:
+        """Tokens that `reply` would give the model now.
 
-    def reply(self, max_new_tokens: int, stop: Sequence[str] = ()) -> Reply:
-        """Answer greedily; see `Conversation.reply`."""
-        _check(max_new_tokens)
-        return self._backend.answer(self.parts, max_new_tokens, stop)
+        Raises:
+            DataError: a frame cannot be read.
+            ModelError: there is nothing to reply to, or the model cannot take the turns as they stand.
+        """
+        return self._backend.count(self._asked())
 
-    def replies(self, endings: Sequence[Sequence[Part]], max_new_tokens: int, stop: Sequence[str] = ()) -> list[Reply]:
-        """Answer several endings, each appended to what is here; see `BatchingConversation.replies`."""
-        _check(max_new_tokens)
-        prompts = []
-        for ending in endings:
-            here = self.mark()
-            self.append(*ending)
-            prompts.append(self.parts)
-            self.rewind(here)
-        return self._backend.answer_each(prompts, max_new_tokens, stop)
+    def reply(self, decoding: Decoding) -> Reply:
+        """The assistant's next turn; see `Conversation.reply`."""
+        check_decoding(self._backend.name, self._backend.capabilities, decoding)
+        return self._backend.answer(self._asked(), decoding)
 
+    def replies(self, continuations: Sequence[Sequence[Part]], decoding: Decoding) -> list[Reply]:
+        """The replies to several continuations; see `Conversation.replies`."""
+        check_decoding(self._backend.name, self._backend.capabilities, decoding)
+        return self._backend.answer_each([self._asked(parts) for parts in continuations], decoding)
 
-def _check(max_new_tokens: int) -> None:
-    if max_new_tokens < 1:
-        raise ValueError(f"max_new_tokens must be at least 1, not {max_new_tokens}")
+    def _asked(self, continuation: Sequence[Part] = ()) -> tuple[Turn, ...]:
+        turns = self.turns_with(continuation)
+        check_turns(self._backend.name, turns)
+        return turns

@@ -52,14 +52,14 @@ def parse(model: str, options: type, given: Mapping[str, str]) -> Any:
 
 
 def _value(name: str, hint: Any, text: str) -> Any:
-    kinds = typing.get_args(hint) if isinstance(hint, types.UnionType) else (hint,)
-    if types.NoneType in kinds and text.lower() in ("none", ""):
+    taken = typing.get_args(hint) if isinstance(hint, types.UnionType) else (hint,)
+    if types.NoneType in taken and text.lower() in ("none", ""):
         return None
-    kind = next(kind for kind in kinds if kind is not types.NoneType)
+    convert = next(each for each in taken if each is not types.NoneType)
     try:
-        return _BOOLEANS[text.lower()] if kind is bool else kind(text)
+        return _BOOLEANS[text.lower()] if convert is bool else convert(text)
     except (KeyError, ValueError) as error:
-        wanted = "true or false" if kind is bool else kind.__name__
+        wanted = "true or false" if convert is bool else convert.__name__
         raise ValueError(f"option {name}={text} is not {wanted}") from error
 
 

@@ -4,33 +4,33 @@ Targets are "module:Class" strings that are imported only when a model is asked 
 nothing. Packages add their own through the entry point group `infthor_eval.models`.
 """
 
-import difflib
+import dataclasses
 import importlib
+import re
 from collections.abc import Mapping
-from importlib.metadata import entry_points
-from typing import cast
+from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
+from typing import Any, cast
 
-from infthor_eval.errors import ModelError, UsageError
+from infthor_eval.errors import ModelError, unknown_name
+from model_adapters.adapter_identity import identity_of
 from model_adapters.options import describe, parse
-from model_adapters.protocols import Adapter, Bound, Model
+from model_adapters.protocols import Adapter, Model, Policy
 
-__all__ = ["ENTRY_POINTS", "check_options", "load", "names", "options"]
+__all__ = ["ENTRY_POINTS", "adapter_identity", "check_options", "label", "load", "names", "options", "takes"]
 
 ENTRY_POINTS = "infthor_eval.models"
 
 _BUILT_IN = {
-    "blind": "model_adapters.bounds:Blind",
-    "deepseek-vl": "model_adapters.families.deepseek_vl:DeepseekVL",
+    "deepseek-vl": "model_adapters.hf.families.deepseek_vl:DeepseekVL",
     "deepseek-vl-tiny": "model_adapters.tiny.deepseek_vl:DeepseekVLTiny",
-    "hf-vlm": "model_adapters.families.hf_vlm:HfVlm",
-    "llava-onevision": "model_adapters.families.llava_onevision:LlavaOnevision",
+    "hf-vlm": "model_adapters.hf.families.hf_vlm:HfVlm",
+    "llava-onevision": "model_adapters.hf.families.llava_onevision:LlavaOnevision",
     "llava-onevision-tiny": "model_adapters.tiny.llava_onevision:LlavaOnevisionTiny",
-    "oracle": "model_adapters.bounds:Oracle",
-    "pixtral": "model_adapters.families.pixtral:Pixtral",
+    "pixtral": "model_adapters.hf.families.pixtral:Pixtral",
     "pixtral-tiny": "model_adapters.tiny.pixtral:PixtralTiny",
-    "qwen2.5-vl": "model_adapters.families.qwen2_5_vl:Qwen25VL",
+    "qwen2.5-vl": "model_adapters.hf.families.qwen2_5_vl:Qwen25VL",
     "qwen2.5-vl-tiny": "model_adapters.tiny.qwen2_5_vl:Qwen25VLTiny",
-    "random": "model_adapters.bounds:Random",
 }
 
 
@@ -59,13 +59,13 @@ def check_options(name: str, options: Mapping[str, str]) -> None:
     parse(name, _adapter(name).Options, options)
 
 
-def load(name: str, options: Mapping[str, str], seed: int) -> Model | Bound:
-    """Build the model of this name.
+def load(name: str, options: Mapping[str, str], seed: int) -> Model | Policy:
+    """Build the model or the policy of this name.
 
     Args:
         name: one of `names()`.
         options: the adapter's options as typed, `{"dtype": "float32"}`; what is left out takes its default.
-        seed: for whatever is random in the model (random weights, random answers).
+        seed: for whatever is random in it (random weights).
 
     Raises:
         UsageError: an unknown name or option, or a value that does not fit; the message has the nearest name.
@@ -75,22 +75,75 @@ def load(name: str, options: Mapping[str, str], seed: int) -> Model | Bound:
     return adapter.build(name, parse(name, adapter.Options, options), seed)
 
 
+def adapter_identity(name: str) -> dict[str, Any]:
+    """What distinguishes this adapter's code from other versions of it, as JSON values.
+
+    Nothing for a built-in one, whose version is the harness's own; else package, version and a digest of the source.
+
+    Raises:
+        UsageError: there is no model of this name.
+        ModelError: the adapter's source cannot be read.
+    """
+    _target(name)
+    return {} if name in _BUILT_IN else identity_of(_entry_points()[name])
+
+
+def takes(name: str, option: str) -> bool:
+    """Whether a model has an option.
+
+    Raises:
+        UsageError: there is no model of this name.
+        ModelError: the adapter cannot be imported.
+    """
+    return option in {field.name for field in dataclasses.fields(_adapter(name).Options)}
+
+
+def label(name: str, options: Mapping[str, str]) -> str:
+    """What a run of this model is called where nobody named it, fit to be a folder's name.
+
+    Args:
+        name: of the model.
+        options: as typed; where they name a checkpoint, so does the label: `Qwen2.5-VL-3B-Instruct@main`.
+    """
+    checkpoint = options.get("pretrained")
+    if not checkpoint:
+        return _as_component(name)
+    revision = options.get("revision")
+    return _as_component(_last_component(checkpoint) + (f"@{revision}" if revision else "")) or _as_component(name)
+
+
+def _last_component(pretrained: str) -> str:
+    name = Path(pretrained).name
+    return Path(pretrained).resolve().name if name in ("", "..") else name
+
+
+def _as_component(text: str) -> str:
+    return re.sub(r"[^\w.@+-]+", "-", text).strip(".-")
+
+
+def _entry_points() -> dict[str, EntryPoint]:
+    return {point.name: point for point in entry_points(group=ENTRY_POINTS)}
+
+
 def _targets() -> dict[str, str]:
     # Built-in names win: a package cannot change what a known name means.
-    return {point.name: point.value for point in entry_points(group=ENTRY_POINTS)} | _BUILT_IN
+    return {name: point.value for name, point in _entry_points().items()} | _BUILT_IN
+
+
+def _target(name: str) -> str:
+    targets = _targets()
+    if name not in targets:
+        raise unknown_name("model", name, targets)
+    return targets[name]
 
 
 def _adapter(name: str) -> type[Adapter]:
-    targets = _targets()
-    if name not in targets:
-        near = difflib.get_close_matches(name, targets, n=1, cutoff=0.5)
-        hint = f"did you mean {near[0]}? " if near else ""
-        raise UsageError(f"there is no model {name}; {hint}models: {', '.join(sorted(targets))}")
-    module, _, attribute = targets[name].partition(":")
+    target = _target(name)
+    module, _, attribute = target.partition(":")
     try:
         found = getattr(importlib.import_module(module), attribute)
     except (ImportError, AttributeError) as error:
-        raise ModelError(f"model {name} cannot be imported from {targets[name]} ({error})") from error
+        raise ModelError(f"model {name} cannot be imported from {target} ({error})") from error
     if not (hasattr(found, "Options") and hasattr(found, "build")):
-        raise ModelError(f"model {name}: {targets[name]} has no Options and build; see model_adapters.Adapter")
+        raise ModelError(f"model {name}: {target} has no Options and build; see model_adapters.Adapter")
     return cast(type[Adapter], found)

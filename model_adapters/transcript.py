@@ -1,46 +1,53 @@
-"""The parts of a conversation and its marks: what every back end's conversation keeps."""
+"""The turns of a conversation and its marks: what every back end's conversation keeps."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import groupby
 
 from infthor_eval.formats.frames import FrameRef
-from model_adapters.protocols import Mark, Part
+from model_adapters.protocols import ROLES, Conversation, Decoding, Mark, Part, Reply, Role, Turn
 
 __all__ = ["Transcript"]
 
 
 class Transcript:
-    """An append-only list of parts with marks to rewind to.
+    """An append-only list of turns with marks to rewind to.
 
-    Adapters inherit from it and add `reply` and `n_tokens`.
+    Adapters inherit from it and add `reply` and `n_tokens`; who can answer several continuations faster than one by
+    one overrides `replies`.
     """
 
     def __init__(self) -> None:
-        self._parts: list[Part] = []
+        self._items: list[tuple[Role, Part]] = []
         self._marks: list[Mark] = []
 
     @property
-    def parts(self) -> tuple[Part, ...]:
-        """All parts, texts that touch joined to one, empty texts left out."""
-        joined: list[Part] = []
-        for part in self._parts:
-            if isinstance(part, str) and joined and isinstance(joined[-1], str):
-                joined[-1] += part
-            elif part:
-                joined.append(part)
-        return tuple(joined)
+    def turns(self) -> tuple[Turn, ...]:
+        """All turns: texts that touch are one, empty texts are left out, and so is a turn of nothing else."""
+        return self.turns_with(())
 
-    def append(self, *parts: Part) -> None:
-        """Add parts at the end; all or, where one of them is no part, none.
+    def turns_with(self, continuation: Sequence[Part]) -> tuple[Turn, ...]:
+        """The turns as they would be with these parts appended; the conversation stays as it was.
 
         Raises:
             TypeError: a part is neither text nor a frame reference.
         """
-        for part in parts:
-            if not isinstance(part, str | FrameRef):
-                raise TypeError(f"a part is a str or a FrameRef, not {type(part).__name__}")
-        self._parts.extend(parts)
+        said = [item for item in (*self._items, *_items(continuation, "user")) if item[1] != ""]
+        return tuple(
+            Turn(role, tuple(_joined(part for _, part in items))) for role, items in groupby(said, lambda item: item[0])
+        )
+
+    def append(self, *parts: Part, role: Role = "user") -> None:
+        """Add parts at the end; all or, where one of them is no part, none.
+
+        Raises:
+            TypeError: a part is neither text nor a frame reference.
+            ValueError: there is no such role.
+        """
+        self._items.extend(_items(parts, role))
 
     def mark(self) -> Mark:
         """The present end, to come back to."""
-        mark = Mark(len(self._parts))
+        mark = Mark(len(self._items))
         self._marks.append(mark)
         return mark
 
@@ -52,5 +59,35 @@ class Transcript:
         """
         if mark not in self._marks:
             raise ValueError("the mark belongs to another conversation or to a part that was rewound")
-        del self._parts[mark.n_parts :]
+        del self._items[mark.n_parts :]
         del self._marks[self._marks.index(mark) + 1 :]
+
+    def replies(self: Conversation, continuations: Sequence[Sequence[Part]], decoding: Decoding) -> list[Reply]:
+        """Append, reply and rewind, one continuation after the other; see `Conversation.replies`."""
+        here = self.mark()
+        found = []
+        for parts in continuations:
+            try:
+                self.append(*parts)
+                found.append(self.reply(decoding))
+            finally:
+                self.rewind(here)
+        return found
+
+
+def _items(parts: Sequence[Part], role: Role) -> list[tuple[Role, Part]]:
+    if role not in ROLES:
+        raise ValueError(f"there is no role {role!r}; roles: {', '.join(ROLES)}")
+    for part in parts:
+        if not isinstance(part, str | FrameRef):
+            raise TypeError(f"a part is a str or a FrameRef, not {type(part).__name__}")
+    return [(role, part) for part in parts]
+
+
+def _joined(parts: Iterable[Part]) -> Iterator[Part]:
+    """The parts, each run of texts as one."""
+    for is_text, run in groupby(parts, lambda part: isinstance(part, str)):
+        if is_text:
+            yield "".join(map(str, run))
+        else:
+            yield from run

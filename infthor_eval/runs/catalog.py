@@ -4,7 +4,6 @@ The files are lm-eval's own format, and say which suite evaluates them (`metadat
 a broken file without a word, so they are read and checked here first, without importing lm-eval.
 """
 
-import difflib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,7 +12,7 @@ from typing import Any
 
 import yaml
 
-from infthor_eval.errors import DataError, UsageError
+from infthor_eval.errors import DataError, unknown_name
 from infthor_eval.formats.packaged import packaged_folder
 
 __all__ = ["Catalog", "TaskFile"]
@@ -92,14 +91,8 @@ class Catalog:
             elif name in self.tasks:
                 found[name] = self.tasks[name]
             else:
-                raise UsageError(self._unknown(name))
+                raise unknown_name("task", name, [*self.groups, *self.tasks])
         return list(found.values())
-
-    def _unknown(self, name: str) -> str:
-        known = [*self.groups, *self.tasks]
-        near = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
-        hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(sorted(known))}"
-        return f"unknown task {name!r}; {hint}"
 
     @cached_property
     def _entries(self) -> dict[str, tuple[Path, dict[str, Any]]]:

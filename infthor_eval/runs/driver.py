@@ -7,7 +7,7 @@ from typing import Any, Protocol
 
 import msgspec
 
-from infthor_eval.errors import DataError, InfthorError, UsageError
+from infthor_eval.errors import DataError, InfthorError, UsageError, unknown_name
 from infthor_eval.formats.digests import fingerprint
 from infthor_eval.formats.files import written_whole
 from infthor_eval.runs import journal as journals
@@ -17,7 +17,7 @@ from infthor_eval.runs.journal import Journal
 from infthor_eval.runs.records import RunHeader, UnitRecord
 from infthor_eval.runs.session import JournalSession
 from infthor_eval.runs.suite import Evaluation, Group, RunSummary, Subject, Suite, TaskRequest, Work
-from model_adapters import Model, Policy, adapter_identity, check_options, label, load
+from model_adapters import Model, Policy, adapter_identity, check_options, label, load, names
 
 __all__ = ["Observer", "PreparedRun", "RunOutcome", "RunRequest", "Silent", "execute", "prepare"]
 
@@ -109,10 +109,12 @@ def prepare(request: RunRequest, suite: Suite) -> PreparedRun:
         UsageError: an unknown model or option, or what the suite refuses.
         DataError: the suite's data are not what their format says.
     """
+    if request.model not in {*suite.baselines, *names()}:
+        raise unknown_name("model", request.model, [*suite.baselines, *names()])
     if request.model not in suite.baselines:
         check_options(request.model, request.model_options)  # refused before the data are read
     elif request.model_options:
-        raise UsageError(f"{request.model} has no options; leave --model-args out")
+        raise UsageError(f"{request.model} has no option {next(iter(request.model_options))}, nor any other")
     return PreparedRun(request, suite, suite.prepare(request.tasks))
 
 

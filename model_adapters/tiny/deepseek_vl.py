@@ -11,7 +11,7 @@ from transformers.models.deepseek_vl_hybrid.image_processing_pil_deepseek_vl_hyb
     DeepseekVLHybridImageProcessorPil,
 )
 
-from model_adapters.families.deepseek_vl import DeepseekVLFamily
+from model_adapters.hf.families.deepseek_vl import DeepseekVLFamily
 from model_adapters.tiny.twin import SPREAD, TinyAdapter, Twin
 
 __all__ = ["DeepseekVLTiny"]

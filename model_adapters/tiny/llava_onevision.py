@@ -8,7 +8,7 @@ from transformers.models.llava_onevision.image_processing_pil_llava_onevision im
     LlavaOnevisionImageProcessorPil,
 )
 
-from model_adapters.families.llava_onevision import LlavaOnevisionFamily
+from model_adapters.hf.families.llava_onevision import LlavaOnevisionFamily
 from model_adapters.tiny.twin import SPREAD, TinyAdapter, Twin
 
 __all__ = ["LlavaOnevisionTiny"]

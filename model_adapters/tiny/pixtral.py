@@ -6,7 +6,7 @@ from typing import Any
 from transformers import LlavaConfig
 from transformers.models.pixtral.image_processing_pil_pixtral import PixtralImageProcessorPil
 
-from model_adapters.families.pixtral import PixtralFamily
+from model_adapters.hf.families.pixtral import PixtralFamily
 from model_adapters.tiny.twin import SPREAD, TinyAdapter, Twin
 
 __all__ = ["PixtralTiny"]

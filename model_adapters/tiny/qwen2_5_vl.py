@@ -8,7 +8,7 @@ from typing import Any
 from transformers import Qwen2_5_VLConfig
 from transformers.models.qwen2_vl.image_processing_pil_qwen2_vl import Qwen2VLImageProcessorPil
 
-from model_adapters.families.qwen2_5_vl import PixelLimits, Qwen25VLFamily
+from model_adapters.hf.families.qwen2_5_vl import PixelLimits, Qwen25VLFamily
 from model_adapters.tiny.twin import SPREAD, TinyAdapter, TinyOptions, Twin
 
 __all__ = ["Qwen25VLTiny", "save_tiny_checkpoint"]

@@ -9,11 +9,11 @@ from typing import Any, ClassVar, cast
 import torch
 from transformers import AutoModelForImageTextToText, GenerationConfig, PreTrainedTokenizerBase
 
-from model_adapters.engine.checkpoint import assemble, resolve_device, resolve_dtype
-from model_adapters.engine.family import MakeFamily
-from model_adapters.engine.model import TransformersModel
-from model_adapters.engine.options import EngineOptions
-from model_adapters.engine.rope import apply_rope
+from model_adapters.hf.checkpoint import assemble, resolve_device, resolve_dtype
+from model_adapters.hf.family import MakeFamily
+from model_adapters.hf.model import TransformersModel
+from model_adapters.hf.options import HfOptions
+from model_adapters.hf.rope import apply_rope
 from model_adapters.tiny.tokenizer import train_tokenizer
 
 __all__ = ["SPREAD", "TinyAdapter", "TinyOptions", "Twin"]
@@ -98,7 +98,7 @@ def _ids(tokens: Sequence[str], tokenizer: PreTrainedTokenizerBase) -> dict[str,
 
 
 @dataclass(frozen=True, kw_only=True)
-class TinyOptions(EngineOptions):
+class TinyOptions(HfOptions):
     """Options of tiny models; their weights come from the run's seed.
 
     Attributes:

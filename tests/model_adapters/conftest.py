@@ -13,7 +13,7 @@ import pytest
 from PIL import Image
 
 from infthor_eval.formats.frames import FrameRef
-from model_adapters import Part, load
+from model_adapters import Part, Turn, load
 
 from .checkpoints import FAMILIES, OTHERS, save
 
@@ -29,16 +29,18 @@ for name in ("nms", "qnms"):
 from PIL import Image
 from transformers import AutoImageProcessor, AutoModelForImageTextToText, AutoProcessor
 
-def answer(processor, model, parts, new):
-    kinds = [kind for kind, value in parts]
-    if model.config.model_type == "llava_onevision" and kinds != sorted(kinds):
+def content(processor, model, parts):
+    types = [type for type, value in parts]
+    if model.config.model_type == "llava_onevision" and types != sorted(types):
         # Its template writes images before texts; who wants them in between writes their token into the text.
-        inline = "".join(value if kind == "text" else processor.image_token for kind, value in parts)
-        content = [{"type": "text", "text": inline}]
-    else:
-        content = [{"type": kind, "text": value} if kind == "text" else {"type": kind} for kind, value in parts]
-    text = processor.apply_chat_template([{"role": "user", "content": content}], add_generation_prompt=True)
-    images = [Image.open(value) for kind, value in parts if kind == "image"]
+        inline = "".join(value if type == "text" else processor.image_token for type, value in parts)
+        return [{"type": "text", "text": inline}]
+    return [{"type": type, "text": value} if type == "text" else {"type": type} for type, value in parts]
+
+def answer(processor, model, turns, new):
+    messages = [{"role": role, "content": content(processor, model, parts)} for role, parts in turns]
+    text = processor.apply_chat_template(messages, add_generation_prompt=True)
+    images = [Image.open(value) for role, parts in turns for type, value in parts if type == "image"]
     begin = processor.tokenizer.bos_token
     begun = begin is not None and text.startswith(begin)
     inputs = processor(text=[text], images=images, add_special_tokens=not begun, return_tensors="pt")
@@ -52,11 +54,11 @@ for folder, prompts in asked["prompts"].items():
     processor.image_processor = AutoImageProcessor.from_pretrained(folder, backend="pil")
     assert type(processor).__name__.endswith("Processor")
     model = AutoModelForImageTextToText.from_pretrained(folder)
-    found[folder] = [answer(processor, model, parts, asked["new"]) for parts in prompts]
+    found[folder] = [answer(processor, model, turns, asked["new"]) for turns in prompts]
 print(json.dumps(found))
 """
 
-Answers = Callable[[Mapping[Path, Sequence[Sequence[Part]]], int], dict[Path, list[tuple[list[int], list[int]]]]]
+Answers = Callable[[Mapping[Path, Sequence[Sequence[Turn]]], int], dict[Path, list[tuple[list[int], list[int]]]]]
 
 
 @pytest.fixture(scope="session")
@@ -112,13 +114,14 @@ def checkpoints(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 def answer_plainly() -> Answers:
     """Has checkpoints answer by their own whole processor and `generate`, every prompt from its beginning.
 
-    Takes prompts by checkpoint and the number of new tokens; gives token ids of prompt and reply, end token included.
+    Takes conversations by checkpoint and the number of new tokens; gives token ids of prompt and reply, end
+    token included.
     """
 
-    def answer(prompts: Mapping[Path, Sequence[Sequence[Part]]], new: int) -> dict[Path, list[Any]]:
+    def answer(prompts: Mapping[Path, Sequence[Sequence[Turn]]], new: int) -> dict[Path, list[Any]]:
         if not PEERS.is_dir():
             pytest.skip("torchvision is not set aside in test-peers (make test does it)")
-        asked = {str(folder): [_as_json(parts) for parts in listed] for folder, listed in prompts.items()}
+        asked = {str(folder): [_as_json(turns) for turns in listed] for folder, listed in prompts.items()}
         run = subprocess.run(
             [sys.executable, "-c", PLAINLY],
             input=json.dumps({"new": new, "prompts": asked}),
@@ -133,5 +136,9 @@ def answer_plainly() -> Answers:
     return answer
 
 
-def _as_json(parts: Sequence[Part]) -> list[tuple[str, str]]:
-    return [("text", part) if isinstance(part, str) else ("image", str(part.path)) for part in parts]
+def _as_json(turns: Sequence[Turn]) -> list[tuple[str, list[tuple[str, str]]]]:
+    return [(turn.role, [_part_as_json(part) for part in turn.parts]) for turn in turns]
+
+
+def _part_as_json(part: Part) -> tuple[str, str]:
+    return ("text", part) if isinstance(part, str) else ("image", str(part.path))

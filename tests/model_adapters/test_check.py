@@ -1,14 +1,31 @@
 """The contract check passes good adapters and names the clause that a bad one breaks."""
 
 import hashlib
+import random
+import threading
+import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import pytest
 
+from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
-from infthor_eval.formats.question import Question
-from model_adapters import ContractError, Mark, Model, Part, Reply, Transcript, check_adapter, check_bound
+from model_adapters import (
+    Capabilities,
+    ContractError,
+    Decoding,
+    Mark,
+    Model,
+    Part,
+    Reply,
+    Transcript,
+    Turn,
+    check_adapter,
+    check_decoding,
+    check_turns,
+)
 
 Method = Callable[..., Any]
 
@@ -17,39 +34,80 @@ class HashModel:
     """A model that keeps every clause of the contract and looks at frames through their digests."""
 
     name = "hash"
-    max_tokens = None
+    capabilities = Capabilities()
 
-    def tokens_per_frame(self, frame: FrameRef) -> int:
-        return 10
+    def tokens_per_frame(self, frame: FrameRef) -> int | None:
+        return 10 if self.capabilities.counts_tokens else None
 
     def identity(self) -> dict[str, Any]:
         return {"model": self.name}
 
     def conversation(self) -> "HashConversation":
-        return HashConversation()
+        return HashConversation(self.capabilities)
 
     def close(self) -> None:
         pass
 
 
 class HashConversation(Transcript):
+    def __init__(self, capabilities: Capabilities = Capabilities()) -> None:  # noqa: B008 - it is frozen
+        super().__init__()
+        self.capabilities = capabilities
+
     @property
-    def n_tokens(self) -> int:
-        return sum(len(part) if isinstance(part, str) else 10 for part in self.parts) + 1
+    def n_tokens(self) -> int | None:
+        return _size(self.turns) if self.capabilities.counts_tokens else None
 
-    def reply(self, max_new_tokens: int, stop: Sequence[str] = ()) -> Reply:
-        if max_new_tokens < 1:
-            raise ValueError("max_new_tokens")
-        key = "\n".join(part if isinstance(part, str) else part.digest for part in self.parts)
-        text = hashlib.sha256(key.encode()).hexdigest()[:max_new_tokens]
+    def reply(self, decoding: Decoding) -> Reply:
+        check_decoding("hash", self.capabilities, decoding)
+        check_turns("hash", self.turns)
+        return self.said(decoding)
+
+    def said(self, decoding: Decoding) -> Reply:
+        """The reply, whatever is asked."""
+        text = self.text(decoding)
         ids = tuple(map(ord, text))
-        for string in stop:
+        for string in decoding.stop:
             text = text.split(string)[0]
-        return Reply(text, ids, self.n_tokens, 0)
+        counted = (len(ids), _size(self.turns), 0) if self.capabilities.counts_tokens else (None, None, None)
+        return Reply(text, *counted, ids if self.capabilities.token_ids else None)
+
+    def text(self, decoding: Decoding) -> str:
+        key = "\n".join(
+            f"{turn.role}:{part if isinstance(part, str) else part.digest}"
+            for turn in self.turns
+            for part in turn.parts
+        )
+        if not decoding.greedy:
+            key += f"\n{decoding.seed}"
+        if not self.capabilities.deterministic:
+            key += f"\n{random.random()}"
+        whole = hashlib.sha256(key.encode()).hexdigest()
+        if decoding.choices:
+            return decoding.choices[int(whole, 16) % len(decoding.choices)]
+        return whole[: decoding.max_new_tokens]
 
 
-def test_a_good_model_passes() -> None:
-    check_adapter(HashModel())
+def _size(turns: Sequence[Turn]) -> int:
+    return sum(len(part) if isinstance(part, str) else 10 for turn in turns for part in turn.parts) + len(turns)
+
+
+def _able(**capabilities: Any) -> Model:
+    return type("Able", (HashModel,), {"capabilities": Capabilities(**capabilities)})()
+
+
+@pytest.mark.parametrize(
+    "capabilities",
+    [
+        {},
+        {"counts_tokens": False, "token_ids": False},
+        {"counts_tokens": False, "token_ids": False, "deterministic": False},
+        {"deterministic": False, "sampling": True},
+        {"sampling": True, "choices": True, "max_in_flight": 8, "batch_size": 4},
+    ],
+)
+def test_a_good_model_passes(capabilities: dict[str, Any]) -> None:
+    check_adapter(_able(**capabilities))
 
 
 def _model(**methods: Any) -> Model:
@@ -57,38 +115,78 @@ def _model(**methods: Any) -> Model:
     return type("Broken", (HashModel,), {"conversation": lambda self: talk()})()
 
 
-def _reply_that_appends(self: Any, max_new_tokens: int, stop: Sequence[str] = ()) -> Reply:
-    reply = HashConversation.reply(self, max_new_tokens, stop)
+def _reply_that_appends(self: Any, decoding: Decoding) -> Reply:
+    reply = HashConversation.reply(self, decoding)
     self.append(reply.text)
     return reply
 
 
-def _reply_without_frames(self: Any, max_new_tokens: int, stop: Sequence[str] = ()) -> Reply:
+def _reply_without_frames(self: Any, decoding: Decoding) -> Reply:
     blind = HashConversation()
-    blind.append(*(part for part in self.parts if isinstance(part, str)))
-    reply = blind.reply(max_new_tokens, stop)
-    return Reply(reply.text, reply.token_ids, self.n_tokens, 0)
+    for turn in self.turns:
+        blind.append(*(part for part in turn.parts if isinstance(part, str)), role=turn.role)
+    return replace(blind.reply(decoding), n_context_tokens=self.n_tokens)
 
 
-def _reply_without_stop(self: Any, max_new_tokens: int, stop: Sequence[str] = ()) -> Reply:
-    return HashConversation.reply(self, max_new_tokens)
+def _reply_without_stop(self: Any, decoding: Decoding) -> Reply:
+    return HashConversation.reply(self, replace(decoding, stop=()))
 
 
-def _reply_with_a_memory(self: Any, max_new_tokens: int, stop: Sequence[str] = ()) -> Reply:
+def _reply_with_a_memory(self: Any, decoding: Decoding) -> Reply:
     self.calls = getattr(self, "calls", 0) + 1
-    reply = HashConversation.reply(self, max_new_tokens, stop)
-    return Reply(reply.text + str(self.calls), reply.token_ids, reply.n_context_tokens, 0)
+    reply = HashConversation.reply(self, decoding)
+    return replace(reply, text=reply.text + str(self.calls))
 
 
-def _reply_that_miscounts(self: Any, max_new_tokens: int, stop: Sequence[str] = ()) -> Reply:
-    reply = HashConversation.reply(self, max_new_tokens, stop)
-    return Reply(reply.text, reply.token_ids, reply.n_context_tokens + 1, 0)
+def _reply_that_miscounts(self: Any, decoding: Decoding) -> Reply:
+    reply = HashConversation.reply(self, decoding)
+    return replace(reply, n_context_tokens=(reply.n_context_tokens or 0) + 1)
 
 
-def _reply_that_remembers_what_was_rewound(self: Any, max_new_tokens: int, stop: Sequence[str] = ()) -> Reply:
-    reply = HashConversation.reply(self, max_new_tokens, stop)
-    text = reply.text + "x" * getattr(self, "rewound", 0)
-    return Reply(text, reply.token_ids, reply.n_context_tokens, 0)
+def _reply_that_remembers_what_was_rewound(self: Any, decoding: Decoding) -> Reply:
+    reply = HashConversation.reply(self, decoding)
+    return replace(reply, text=reply.text + "x" * getattr(self, "rewound", 0))
+
+
+def _reply_to_anything(self: Any, decoding: Decoding) -> Reply:
+    check_decoding("hash", self.capabilities, decoding)
+    return self.said(decoding)
+
+
+def _reply_to_the_assistant(self: Any, decoding: Decoding) -> Reply:
+    check_decoding("hash", self.capabilities, decoding)
+    if not self.turns:
+        raise ModelError("nothing")
+    return self.said(decoding)
+
+
+def _reply_without_ids(self: Any, decoding: Decoding) -> Reply:
+    return replace(HashConversation.reply(self, decoding), token_ids=None)
+
+
+def _reply_with_more_ids(self: Any, decoding: Decoding) -> Reply:
+    return replace(HashConversation.reply(self, decoding), n_reply_tokens=0)
+
+
+def _reply_at_any_temperature(self: Any, decoding: Decoding) -> Reply:
+    return HashConversation.reply(self, replace(decoding, temperature=0.0))
+
+
+def _reply_with_any_choices(self: Any, decoding: Decoding) -> Reply:
+    return HashConversation.reply(self, replace(decoding, choices=()))
+
+
+def _replies_to_the_first(self: Any, continuations: Sequence[Sequence[Part]], decoding: Decoding) -> list[Reply]:
+    return Transcript.replies(self, continuations[:1], decoding)
+
+
+def _replies_backwards(self: Any, continuations: Sequence[Sequence[Part]], decoding: Decoding) -> list[Reply]:
+    return Transcript.replies(self, continuations, decoding)[::-1]
+
+
+def _replies_that_append(self: Any, continuations: Sequence[Sequence[Part]], decoding: Decoding) -> list[Reply]:
+    self.append(*continuations[0])
+    return Transcript.replies(self, continuations, decoding)
 
 
 def _rewind_that_counts(self: Any, mark: Mark) -> None:
@@ -96,12 +194,20 @@ def _rewind_that_counts(self: Any, mark: Mark) -> None:
     HashConversation.rewind(self, mark)
 
 
-def _append_anything(self: Any, *parts: Part) -> None:
-    self._parts.extend(part for part in parts if not isinstance(part, int))
+def _append_anything(self: Any, *parts: Part, role: Any = "user") -> None:
+    HashConversation.append(self, *(part for part in parts if not isinstance(part, int)), role=role)
+
+
+def _append_in_any_role(self: Any, *parts: Part, role: Any = "user") -> None:
+    HashConversation.append(self, *parts, role="user" if role == "narrator" else role)
+
+
+def _turns_without_joints(self: Any, continuation: Sequence[Part]) -> tuple[Turn, ...]:
+    return tuple(Turn(role, (part,)) for role, part in self._items)
 
 
 def _rewind_anywhere(self: Any, mark: Mark) -> None:
-    del self._parts[mark.n_parts :]
+    del self._items[mark.n_parts :]
 
 
 @pytest.mark.parametrize(
@@ -120,6 +226,17 @@ def _rewind_anywhere(self: Any, mark: Mark) -> None:
         ({"rewind": _rewind_anywhere}, "behind the point rewound to"),
         ({"rewind": lambda self, mark: None}, "does not bring back n_tokens"),
         ({"n_tokens": 7}, "n_tokens does not grow"),
+        ({"append": _append_in_any_role}, "in an unknown role does not raise"),
+        ({"turns_with": _turns_without_joints}, "in two pieces differs from the same text in one"),
+        ({"reply": _reply_to_anything}, "reply.. to an empty conversation does not raise ModelError"),
+        ({"reply": _reply_to_the_assistant}, "whose last turn is the assistant's does not raise ModelError"),
+        ({"reply": _reply_without_ids}, "a reply has no token_ids"),
+        ({"reply": _reply_with_more_ids}, "n_reply_tokens is not the number of token_ids"),
+        ({"reply": _reply_at_any_temperature}, "a temperature that is not taken does not raise ModelError"),
+        ({"reply": _reply_with_any_choices}, "choices that are not taken do not raise ModelError"),
+        ({"replies": _replies_to_the_first}, "one reply per continuation"),
+        ({"replies": _replies_backwards}, "replies.. differs from asking one by one"),
+        ({"replies": _replies_that_append}, "replies.. changes the conversation"),
     ],
 )
 def test_a_broken_conversation_is_named(methods: dict[str, Any], clause: str) -> None:
@@ -144,27 +261,84 @@ def test_a_wrong_count_of_a_frames_tokens_is_named(count: int) -> None:
         check_adapter(broken)
 
 
-def test_something_else_is_no_model() -> None:
-    with pytest.raises(ContractError, match="lacks a member"):
+@pytest.mark.parametrize(
+    ("told", "clause"),
+    [
+        ({"counts_tokens": False}, "n_tokens is not None though it counts no tokens"),
+        ({"token_ids": False}, "a reply has token_ids though the model tells none"),
+        ({"batch_size": 0}, "batch_size is below 1"),
+        ({"max_in_flight": 0}, "max_in_flight is below 1"),
+    ],
+)
+def test_capabilities_that_are_not_the_models_are_named(told: dict[str, Any], clause: str) -> None:
+    broken = type("Broken", (HashModel,), {"capabilities": Capabilities(**told)})()
+    broken.conversation = HashConversation
+    with pytest.raises(ContractError, match=clause):
+        check_adapter(broken)
+
+
+def test_a_count_of_a_frames_tokens_by_a_model_that_counts_none_is_named() -> None:
+    broken = _able(counts_tokens=False)
+    broken.tokens_per_frame = lambda frame: 10  # type: ignore[method-assign]
+    with pytest.raises(ContractError, match=r"tokens_per_frame\(\) is not None"):
+        check_adapter(broken)
+
+
+def _talking(capabilities: Capabilities, **methods: Any) -> Model:
+    talk = type("Talk", (HashConversation,), methods)
+    return type(
+        "Broken",
+        (HashModel,),
+        {"capabilities": capabilities, "conversation": lambda self: talk(capabilities)},
+    )()
+
+
+def _text_of_no_seed(self: Any, decoding: Decoding) -> str:
+    return HashConversation.text(self, replace(decoding, temperature=0.0))
+
+
+def _text_of_no_choice(self: Any, decoding: Decoding) -> str:
+    return HashConversation.text(self, replace(decoding, choices=()))
+
+
+def _text_drawn_anew(self: Any, decoding: Decoding) -> str:
+    return HashConversation.text(self, replace(decoding, seed=decoding.seed + random.getrandbits(60)))
+
+
+@pytest.mark.parametrize(
+    ("capabilities", "text", "clause"),
+    [
+        (Capabilities(sampling=True), _text_of_no_seed, "no seed changes a reply at temperature 2"),
+        (Capabilities(sampling=True), _text_drawn_anew, "the same seed does not draw the same reply"),
+        (Capabilities(choices=True), _text_of_no_choice, "a reply is none of its choices"),
+    ],
+)
+def test_a_claim_that_does_not_hold_is_named(capabilities: Capabilities, text: Method, clause: str) -> None:
+    with pytest.raises(ContractError, match=clause):
+        check_adapter(_talking(capabilities, text=text))
+
+
+def test_replies_that_hang_on_who_else_asks_are_named() -> None:
+    flying = []
+    lock = threading.Lock()
+
+    def text(self: Any, decoding: Decoding) -> str:
+        with lock:
+            flying.append(1)
+        time.sleep(0.05)
+        crowd = len(flying)
+        with lock:
+            flying.pop()
+        return HashConversation.text(self, decoding)[:-1] + ("x" if crowd > 1 else "y")
+
+    check_adapter(_talking(Capabilities(), text=text))
+    with pytest.raises(ContractError, match="at the same time differ"):
+        check_adapter(_talking(Capabilities(max_in_flight=4), text=text))
+
+
+def test_what_is_missing_is_named() -> None:
+    with pytest.raises(ContractError, match="object lacks a member of Model: .*tokens_per_frame"):
         check_adapter(object())  # type: ignore[arg-type]
-
-
-def test_a_bound_that_depends_on_the_order_is_named() -> None:
-    class Counting:
-        name = "counting"
-
-        def __init__(self) -> None:
-            self.asked = 0
-
-        def identity(self) -> dict[str, Any]:
-            return {}
-
-        def study(self, questions: Sequence[Question]) -> None:
-            pass
-
-        def answer(self, question: Question) -> str:
-            self.asked += 1
-            return str(self.asked)
-
-    with pytest.raises(ContractError, match="order of asking"):
-        check_bound(Counting(), [Question("t", str(i), (0,), ("a",)) for i in range(2)])
+    silent = type("Silent", (HashModel,), {"conversation": lambda self: Transcript()})()
+    with pytest.raises(ContractError, match="Transcript lacks a member of Conversation: n_tokens, reply"):
+        check_adapter(silent)

@@ -3,27 +3,29 @@ import sys
 import types
 from dataclasses import dataclass
 from importlib.metadata import EntryPoint
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from infthor_eval.errors import ModelError, UsageError
-from model_adapters import Bound, load, names, options, registry
+from model_adapters import Capabilities, Policy, adapter_identity, label, load, names, options, registry
+from model_adapters.options import NoOptions
 
 
 def test_names_and_help_need_neither_torch_nor_transformers() -> None:
     code = (
-        "import sys, model_adapters as m; m.names(); m.load('oracle', {}, 0);"
+        "import sys, model_adapters as m; m.names(); m.label('hf-vlm', {});"
         "sys.exit(bool({'torch', 'transformers'} & set(sys.modules)))"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
 def test_built_in_names() -> None:
-    assert {"oracle", "blind", "random", "qwen2.5-vl", "qwen2.5-vl-tiny"} <= set(names())
+    assert {"hf-vlm", "pixtral", "qwen2.5-vl", "qwen2.5-vl-tiny"} <= set(names())
 
 
-@pytest.mark.parametrize(("typed", "meant"), [("qwen2.5vl", "qwen2.5-vl"), ("oracel", "oracle")])
+@pytest.mark.parametrize(("typed", "meant"), [("qwen2.5vl", "qwen2.5-vl"), ("pixtrall", "pixtral")])
 def test_unknown_model_names_the_nearest(typed: str, meant: str) -> None:
     with pytest.raises(UsageError, match=f"no model {typed}; did you mean {meant}"):
         load(typed, {}, 0)
@@ -39,9 +41,11 @@ def test_unknown_option_names_the_nearest_and_all_with_defaults() -> None:
         load("qwen2.5-vl-tiny", {"dtyp": "float32"}, 0)
 
 
-def test_an_adapter_without_options_says_so() -> None:
+def test_an_adapter_without_options_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    _install(monkeypatch, "outside_package:Outside")
+    _import_as_outside(monkeypatch, type("Bare", (Outside,), {"Options": NoOptions}))
     with pytest.raises(UsageError, match="it takes: no options"):
-        load("oracle", {"dtype": "float32"}, 0)
+        load("outside", {"dtype": "float32"}, 0)
 
 
 def test_options_are_listed_with_their_defaults() -> None:
@@ -58,6 +62,7 @@ class Outside:
 
     def __init__(self, name: str, sure: bool, seed: int) -> None:
         self.name, self.sure, self.seed = name, sure, seed
+        self.capabilities = Capabilities()
 
     @classmethod
     def build(cls, name: str, options: _Options, seed: int) -> "Outside":
@@ -66,11 +71,14 @@ class Outside:
     def identity(self) -> dict[str, Any]:
         return {}
 
-    def study(self, questions: Any) -> None:
+    def reset(self) -> None:
         pass
 
-    def answer(self, question: Any) -> str:
-        return ""
+    def act(self, frame: Any, instruction: str) -> Any:
+        return ()
+
+    def close(self) -> None:
+        pass
 
 
 def _install(monkeypatch: pytest.MonkeyPatch, target: str, name: str = "outside") -> None:
@@ -78,13 +86,17 @@ def _install(monkeypatch: pytest.MonkeyPatch, target: str, name: str = "outside"
     monkeypatch.setattr(registry, "entry_points", lambda group: [point] if group == point.group else [])
 
 
+def _import_as_outside(monkeypatch: pytest.MonkeyPatch, adapter: type) -> None:
+    monkeypatch.setitem(sys.modules, "outside_package", types.ModuleType("outside_package"))
+    monkeypatch.setattr("outside_package.Outside", adapter, raising=False)
+
+
 def test_models_of_other_packages_come_through_entry_points(monkeypatch: pytest.MonkeyPatch) -> None:
     _install(monkeypatch, "outside_package:Outside")
-    monkeypatch.setitem(sys.modules, "outside_package", types.ModuleType("outside_package"))
-    monkeypatch.setattr("outside_package.Outside", Outside, raising=False)
+    _import_as_outside(monkeypatch, Outside)
     model: Any = load("outside", {"sure": "yes"}, 7)
     assert "outside" in names()
-    assert isinstance(model, Bound)
+    assert isinstance(model, Policy)
     assert (model.name, model.sure, model.seed) == ("outside", True, 7)
 
 
@@ -103,5 +115,83 @@ def test_a_broken_entry_point_is_one_line(monkeypatch: pytest.MonkeyPatch, targe
 
 
 def test_no_package_can_take_a_built_in_name(monkeypatch: pytest.MonkeyPatch) -> None:
-    _install(monkeypatch, "json:loads", name="oracle")
-    assert load("oracle", {}, 0).name == "oracle"
+    _install(monkeypatch, "json:loads", name="qwen2.5-vl-tiny")
+    assert load("qwen2.5-vl-tiny", {}, 0).name == "qwen2.5-vl-tiny"
+    assert adapter_identity("qwen2.5-vl-tiny") == {}
+
+
+@pytest.fixture
+def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A distribution with an adapter, as pip would leave it."""
+    package = tmp_path / "dummy_robot"
+    (package / "arms").mkdir(parents=True)
+    (package / "__init__.py").write_text("")
+    (package / "arms" / "left.py").write_text("SPEED = 1\n")
+    (tmp_path / "dummy_module.py").write_text("A = 1\n")
+    info = tmp_path / "Dummy_Robot-1.2.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: Dummy-Robot\nVersion: 1.2\n")
+    (info / "entry_points.txt").write_text(
+        f"[{registry.ENTRY_POINTS}]\ndummy = dummy_robot.arms.left:Arm\nsingle = dummy_module:A\nlost = no_such:A\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    return tmp_path
+
+
+def test_an_adapter_of_another_package_has_its_version_and_source_in_its_identity(installed: Path) -> None:
+    before = adapter_identity("dummy")
+    assert before.keys() == {"package", "version", "source"}
+    assert (before["package"], before["version"]) == ("Dummy-Robot", "1.2")
+    assert adapter_identity("dummy") == before
+    (installed / "dummy_robot" / "arms" / "left.py").write_text("SPEED = 2\n")
+    assert adapter_identity("dummy")["source"] != before["source"]
+    assert "dummy_robot" not in sys.modules
+
+
+@pytest.mark.parametrize("change", ["arms/right.py", "other.py"])
+def test_a_new_module_of_the_package_is_another_source(installed: Path, change: str) -> None:
+    before = adapter_identity("dummy")["source"]
+    (installed / "dummy_robot" / change).write_text("")
+    assert adapter_identity("dummy")["source"] != before
+
+
+def test_an_adapter_in_a_single_module_has_the_source_of_that(installed: Path) -> None:
+    before = adapter_identity("single")["source"]
+    (installed / "dummy_robot" / "__init__.py").write_text("B = 2\n")
+    assert adapter_identity("single")["source"] == before
+    (installed / "dummy_module.py").write_text("A = 2\n")
+    assert adapter_identity("single")["source"] != before
+
+
+def test_the_source_of_an_adapter_that_is_not_there_is_one_line(installed: Path) -> None:
+    with pytest.raises(ModelError, match="no module no_such; install the package"):
+        adapter_identity("lost")
+    with pytest.raises(UsageError, match="there is no model losst; did you mean lost"):
+        adapter_identity("losst")
+
+
+@pytest.mark.parametrize(
+    ("given", "expected"),
+    [
+        ({}, "qwen2.5-vl"),
+        ({"dtype": "float32"}, "qwen2.5-vl"),
+        ({"pretrained": "Qwen/Qwen2.5-VL-3B-Instruct"}, "Qwen2.5-VL-3B-Instruct"),
+        ({"pretrained": "Qwen/Qwen2.5-VL-3B-Instruct", "revision": "refs/pr/1"}, "Qwen2.5-VL-3B-Instruct@refs-pr-1"),
+        ({"pretrained": "/data/my models/step 10/"}, "step-10"),
+        ({"pretrained": "~/.hidden"}, "hidden"),
+        ({"pretrained": ""}, "qwen2.5-vl"),
+    ],
+)
+def test_a_run_is_called_by_its_checkpoint(given: dict[str, str], expected: str) -> None:
+    assert label("qwen2.5-vl", given) == expected
+
+
+@pytest.mark.parametrize("pretrained", [".", "..", "/", "./", "../.."])
+def test_any_label_is_one_component_of_a_path(pretrained: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = tmp_path / "here" / "there"
+    folder.mkdir(parents=True)
+    monkeypatch.chdir(folder)
+    found = label("hf-vlm", {"pretrained": pretrained})
+    assert Path(found).name == found
+    assert found not in ("", ".", "..")
+    assert pretrained != "." or found == "there"

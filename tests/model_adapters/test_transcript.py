@@ -1,7 +1,15 @@
-import pytest
+from itertools import pairwise
+from typing import Any
 
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
-from model_adapters import Transcript
+from model_adapters import ROLES, Decoding, Part, Reply, Role, Transcript, Turn
+
+from .asking import up_to, user
 
 
 def test_touching_texts_are_one(frames: list[FrameRef]) -> None:
@@ -9,7 +17,67 @@ def test_touching_texts_are_one(frames: list[FrameRef]) -> None:
     talk.append("a", "b", "", frames[0])
     talk.append("", "c")
     talk.append("d")
-    assert talk.parts == ("ab", frames[0], "cd")
+    assert talk.turns == user("ab", frames[0], "cd")
+
+
+def test_turns_are_told_apart_by_who_speaks(frames: list[FrameRef]) -> None:
+    talk = Transcript()
+    talk.append("Be brief.", role="system")
+    talk.append(frames[0])
+    talk.append("What", " is it?")
+    talk.append("A mug", role="assistant")
+    talk.append(".", role="assistant")
+    talk.append("Sure?")
+    assert talk.turns == (
+        Turn("system", ("Be brief.",)),
+        Turn("user", (frames[0], "What is it?")),
+        Turn("assistant", ("A mug.",)),
+        Turn("user", ("Sure?",)),
+    )
+
+
+def test_a_turn_of_nothing_is_none_and_its_neighbours_touch() -> None:
+    talk = Transcript()
+    talk.append("a")
+    talk.append("", role="assistant")
+    talk.append("b")
+    assert talk.turns == user("ab")
+
+
+SAID = st.lists(
+    st.tuples(st.sampled_from(ROLES), st.lists(st.one_of(st.text("ab", max_size=2), st.integers(0, 5)), max_size=3)),
+    max_size=8,
+)
+
+
+def _append(talk: Transcript, said: Any, frames: list[FrameRef]) -> None:
+    for role, numbered in said:
+        talk.append(*(frames[part] if isinstance(part, int) else part for part in numbered), role=role)
+
+
+def _letters(said: Any) -> list[tuple[Role, str | int]]:
+    whole = [(role, part if isinstance(part, str) else [part]) for role, parts in said for part in parts]
+    return [(role, each) for role, part in whole for each in part]
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(said=SAID, more=SAID)
+def test_turns_hold_what_was_said_and_leave_no_joint(frames: list[FrameRef], said: Any, more: Any) -> None:
+    talk = Transcript()
+    _append(talk, said, frames)
+    turns, here = talk.turns, talk.mark()
+    numbered = [
+        (turn.role, [part if isinstance(part, str) else frames.index(part) for part in turn.parts]) for turn in turns
+    ]
+    assert _letters(numbered) == _letters(said)
+    assert all(turn.parts for turn in turns)
+    assert all(one.role != other.role for one, other in pairwise(turns))
+    assert not any(
+        isinstance(one, str) and isinstance(other, str) for turn in turns for one, other in pairwise(turn.parts)
+    )
+    _append(talk, more, frames)
+    talk.rewind(here)
+    assert talk.turns == turns
 
 
 def test_a_mark_serves_many_rewinds() -> None:
@@ -18,9 +86,9 @@ def test_a_mark_serves_many_rewinds() -> None:
     mark = talk.mark()
     for text in "bc":
         talk.append(text)
-        assert talk.parts == ("a" + text,)
+        assert talk.turns == user("a" + text)
         talk.rewind(mark)
-        assert talk.parts == ("a",)
+        assert talk.turns == user("a")
 
 
 def test_nested_marks_unwind_in_order() -> None:
@@ -28,10 +96,10 @@ def test_nested_marks_unwind_in_order() -> None:
     outer = talk.mark()
     talk.append("a")
     inner = talk.mark()
-    talk.append("b")
+    talk.append("b", role="assistant")
     talk.rewind(inner)
     talk.rewind(outer)
-    assert talk.parts == ()
+    assert talk.turns == ()
     with pytest.raises(ValueError, match="mark"):
         talk.rewind(inner)
 
@@ -58,4 +126,35 @@ def test_a_refused_part_leaves_nothing_behind() -> None:
     talk = Transcript()
     with pytest.raises(TypeError, match="int"):
         talk.append("a", 3)  # type: ignore[arg-type]
-    assert talk.parts == ()
+    with pytest.raises(ValueError, match="no role 'narrator'; roles: system, user, assistant"):
+        talk.append("a", role="narrator")  # type: ignore[arg-type]
+    assert talk.turns == ()
+
+
+class Echo(Transcript):
+    """Says how many letters it has heard, and nothing to a question mark."""
+
+    n_tokens = None
+
+    def reply(self, decoding: Decoding) -> Reply:
+        heard = "".join(str(part) for turn in self.turns for part in turn.parts)
+        if "?" in heard:
+            raise ModelError("no questions")
+        return Reply(str(len(heard))[: decoding.max_new_tokens])
+
+
+@pytest.mark.parametrize("continuations", [[], [["b"]], [["b", "c"], ["dddd"], []]])
+def test_continuations_are_answered_one_by_one(continuations: list[list[Part]]) -> None:
+    talk = Echo()
+    talk.append("a")
+    expected = [str(1 + sum(len(str(part)) for part in parts)) for parts in continuations]
+    assert [reply.text for reply in talk.replies(continuations, up_to(3))] == expected
+    assert talk.turns == user("a")
+
+
+def test_a_continuation_that_is_refused_is_forgotten() -> None:
+    talk = Echo()
+    talk.append("a")
+    with pytest.raises(ModelError, match="no questions"):
+        talk.replies([["b"], ["c?"]], up_to(3))
+    assert talk.turns == user("a")

@@ -10,7 +10,7 @@ from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.nieh.prompts import note_text
 from infthor_eval.runs import Catalog, execute, plan, read_journal
 from model_adapters import load
-from model_adapters.engine.model import TransformersModel
+from model_adapters.hf.model import TransformersModel
 
 TASK = "nieh_memory_notes"
 

@@ -10,7 +10,7 @@ from infthor_eval.formats.question import Question
 from infthor_eval.nieh.contexts.base import ContextSettings, Sample
 
 if TYPE_CHECKING:
-    from model_adapters.retrieval import Retriever
+    from model_adapters.hf.retrieval import Retriever
 
 __all__ = ["clip_retrieval", "memory_frames", "retriever_identity"]
 
@@ -49,7 +49,7 @@ def retriever_identity(_data: NiehSet, settings: ContextSettings) -> dict[str, A
 
 
 def _retriever(settings: ContextSettings) -> "Retriever":
-    from model_adapters.retrieval import open_retriever
+    from model_adapters.hf.retrieval import open_retriever
 
     return open_retriever(settings.retriever, settings.retriever_revision)
 

@@ -11,7 +11,7 @@ from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question
 from infthor_eval.nieh.contexts import CONTEXTS, Settings, Unfit
-from model_adapters.retrieval import open_retriever
+from model_adapters.hf.retrieval import open_retriever
 
 TEXTS = ("Is there a mug?", "Where was the plate?", "What did you put on the table?")
 QUESTIONS = [Question("t", text, (1,), ("yes",)) for text in TEXTS]

@@ -1,0 +1,48 @@
+"""The contract of policies."""
+
+import math
+
+from infthor_eval.formats.frames import FrameRef
+from model_adapters.check.clauses import check_identity, check_members, frames_of_one_colour, require
+from model_adapters.protocols import ArmDelta, Policy
+
+__all__ = ["check_policy"]
+
+_INSTRUCTION = "pick up the mug"
+
+
+def check_policy(policy: Policy, frame_size: tuple[int, int] = (300, 300)) -> None:
+    """Check a policy against the contract of `Policy`; it acts a few times on frames of one colour.
+
+    Args:
+        policy: the adapter to check; it stays open.
+        frame_size: width and height of the frames to show it, in pixels.
+
+    Raises:
+        ContractError: names the clause that does not hold.
+    """
+    check_members(policy, Policy)
+    check_identity(policy)
+    with frames_of_one_colour(frame_size) as frames:
+        episodes = [_episode(policy, frames) for _ in range(2)]
+    alike = episodes[0] == episodes[1] or not policy.capabilities.deterministic
+    require(alike, "after reset() the same frames are not acted on the same way")
+
+
+def _episode(policy: Policy, frames: tuple[FrameRef, ...]) -> list[tuple[ArmDelta, ...]]:
+    policy.reset()
+    chunks = [policy.act(frame, _INSTRUCTION) for frame in frames]
+    for chunk in chunks:
+        _check_chunk(chunk)
+    return chunks
+
+
+def _check_chunk(chunk: tuple[ArmDelta, ...]) -> None:
+    require(isinstance(chunk, tuple) and len(chunk) > 0, "act() does not return a tuple of at least one ArmDelta")
+    for step in chunk:
+        require(isinstance(step, ArmDelta), "a step of act() is no ArmDelta")
+        require(len(step.translation) == len(step.rotation) == 3, "a translation or rotation has not three numbers")
+        numbers = (*step.translation, *step.rotation, step.gripper)
+        finite = all(isinstance(number, float) and math.isfinite(number) for number in numbers)
+        require(finite, f"a step of act() is not made of finite floats: {step}")
+        require(0 <= step.gripper <= 1, f"the gripper is not between 0 (closed) and 1 (open): {step.gripper}")

@@ -1,0 +1,107 @@
+"""What replies have to be, whatever the model says."""
+
+from infthor_eval.formats.frames import FrameRef
+from model_adapters.check.asking import GREEDY, NEW_TOKENS, QUESTION, ask, opened, same
+from model_adapters.check.clauses import require
+from model_adapters.protocols import Conversation, Decoding, Model, Part, Reply
+
+__all__ = ["check_continuations", "check_frames", "check_reply", "check_sharing"]
+
+
+def check_reply(model: Model, frame: FrameRef) -> None:
+    """Check one reply: its counts and ids, its length, its stop strings.
+
+    Raises:
+        ContractError: names the clause that does not hold.
+    """
+    talk = opened(model, frame, QUESTION)
+    size = talk.n_tokens
+    first = talk.reply(GREEDY)
+    require(isinstance(first, Reply), "reply() does not return a Reply")
+    if model.capabilities.counts_tokens:
+        _check_counted(first, size)
+    _check_ids(model, first)
+    require(talk.n_tokens == size, "reply() changes the conversation")
+    if model.capabilities.deterministic:
+        require(same(first, talk.reply(GREEDY)), "the same question is not answered the same way twice")
+        _check_short(talk, first)
+        _check_stop(talk, first)
+
+
+def check_frames(model: Model, black: FrameRef, white: FrameRef) -> None:
+    """Check that the model sees the frames.
+
+    Raises:
+        ContractError: it does not.
+    """
+    # One reply could be the same by chance; of several questions on the two frames, one must differ.
+    asked = [QUESTION, "\nIs it bright or dark?", "\nWhat colour is it?", "\nDescribe the picture."]
+    differ = any(not same(ask(model, black, text), ask(model, white, text)) for text in asked)
+    require(differ, "a black and a white frame get the same replies: the model does not see the frames")
+
+
+def check_sharing(model: Model, black: FrameRef, white: FrameRef) -> None:
+    """Check that a reply does not depend on what was asked before.
+
+    Raises:
+        ContractError: it does.
+    """
+    talk = opened(model, black, white)
+    start = talk.mark()
+    shared = []
+    for text in (QUESTION, "\nWhat colour was the first frame?"):
+        talk.append(text)
+        shared.append(talk.reply(GREEDY))
+        talk.rewind(start)
+    ask(model, white, "\nSomething else.")  # whatever the back end has kept is of no use after this
+    fresh = ask(model, black, white, "\nWhat colour was the first frame?")
+    alike = same(shared[1], fresh) or not model.capabilities.deterministic
+    require(alike, "a reply after a rewind differs from that of a fresh conversation")
+
+
+def check_continuations(model: Model, black: FrameRef, white: FrameRef) -> None:
+    """Check that several continuations are answered as each of them alone.
+
+    Raises:
+        ContractError: names the clause that does not hold.
+    """
+    talk = opened(model, black)
+    continuations: list[list[Part]] = [[QUESTION], [white, "\nWhat colours are the frames?"], ["\nWhy?"]]
+    size, together = talk.n_tokens, talk.replies(continuations, GREEDY)
+    require(talk.n_tokens == size, "replies() changes the conversation")
+    require(len(together) == len(continuations), "replies() does not give one reply per continuation")
+    alone = [ask(model, black, *parts) for parts in continuations]
+    alike = all(map(same, together, alone)) or not model.capabilities.deterministic
+    require(alike, "replies() differs from asking one by one")
+    require(talk.replies([], GREEDY) == [], "replies() to no continuation are not none")
+
+
+def _check_counted(reply: Reply, size: int | None) -> None:
+    require(reply.n_context_tokens == size, "n_tokens before a reply is not the reply's n_context_tokens")
+    cached, n_new = reply.n_cached_tokens, reply.n_reply_tokens
+    require(cached is not None and 0 <= cached < (size or 0), "n_cached_tokens is not between 0 and the context")
+    require(n_new is not None and 0 <= n_new <= NEW_TOKENS, "n_reply_tokens is not between 0 and max_new_tokens")
+
+
+def _check_ids(model: Model, reply: Reply) -> None:
+    if not model.capabilities.token_ids:
+        require(reply.token_ids is None, "a reply has token_ids though the model tells none")
+        return
+    require(reply.token_ids is not None, "a reply has no token_ids")
+    n_ids = len(reply.token_ids or ())
+    require(n_ids <= NEW_TOKENS, "a reply has more tokens than max_new_tokens")
+    require(reply.n_reply_tokens == n_ids, "n_reply_tokens is not the number of token_ids")
+
+
+def _check_short(talk: Conversation, whole: Reply) -> None:
+    if whole.token_ids is not None:
+        short = talk.reply(Decoding(max_new_tokens=1))
+        require(short.token_ids == whole.token_ids[:1], "a shorter reply is not the start of a longer one")
+
+
+def _check_stop(talk: Conversation, whole: Reply) -> None:
+    if len(whole.text) < 2:
+        return
+    stop = whole.text[len(whole.text) // 2 :]
+    cut = talk.reply(Decoding(max_new_tokens=NEW_TOKENS, stop=(stop,))).text
+    require(cut == whole.text[: whole.text.index(stop)], "a stop string and what follows it are not cut off")

@@ -1,1 +1,0 @@
-"""The transformers back end: one KV-cached conversation for every model family."""

@@ -1,0 +1,1 @@
+"""transformers in this process: one KV-cached conversation for every model family."""

@@ -1,0 +1,273 @@
+"""Loading a checkpoint from the hub or a folder, without torchvision and without remote code.
+
+transformers' processor classes of video-capable families cannot be built without torchvision, so the parts that a
+conversation needs (image processor, tokenizer, chat template) are loaded one by one. Image processors are always the
+PIL ones: torchvision's resize gives other pixels, and the numbers must not depend on what else is installed.
+"""
+
+import contextlib
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, cast
+
+import PIL
+import tokenizers
+import torch
+import transformers
+from safetensors import SafetensorError
+
+from infthor_eval.errors import ModelError, UsageError
+from infthor_eval.formats.digests import digest, digest_of_files
+from model_adapters.hf.decoding import read_generation
+from model_adapters.hf.family import Family, MakeFamily
+from model_adapters.hf.hub import fetch
+from model_adapters.hf.loaded import Loaded
+from model_adapters.hf.options import CheckpointOptions, HfOptions
+from model_adapters.hf.rope import apply_rope
+
+__all__ = [
+    "LocatedCheckpoint",
+    "assemble",
+    "load_checkpoint",
+    "loading",
+    "locate",
+    "origin",
+    "resolve_device",
+    "resolve_dtype",
+    "versions",
+]
+
+_FINGERPRINTED = {".bin", ".jinja", ".json", ".model", ".safetensors", ".txt"}
+
+
+@dataclass(frozen=True)
+class LocatedCheckpoint:
+    """A checkpoint that was found, not yet loaded.
+
+    Attributes:
+        folder: where it lies.
+        commit: of the hub's repository; None for a folder of the user's.
+        config: its config.
+        options: what was asked for.
+    """
+
+    folder: Path
+    commit: str | None
+    config: Any
+    options: CheckpointOptions
+
+
+def locate(options: CheckpointOptions) -> LocatedCheckpoint:
+    """Find a checkpoint and read its config.
+
+    Raises:
+        ModelError: there is none, or it cannot be had.
+    """
+    folder, commit = fetch(options.pretrained, options.revision)
+    with loading(options):
+        config = transformers.AutoConfig.from_pretrained(folder, trust_remote_code=options.trust_remote_code)
+    return LocatedCheckpoint(folder, commit, config, options)
+
+
+def load_checkpoint(located: LocatedCheckpoint, family: MakeFamily) -> Loaded:
+    """Load everything a conversation needs.
+
+    Args:
+        located: the checkpoint.
+        family: makes the family of a model, an image processor and a tokenizer.
+
+    Raises:
+        ModelError: the checkpoint is incomplete or damaged.
+        UsageError: there is no such dtype or device.
+    """
+    options, folder = located.options, located.folder
+    remote = {"trust_remote_code": options.trust_remote_code}
+    with loading(options):
+        image_processor = transformers.AutoImageProcessor.from_pretrained(
+            folder, backend="pil", **remote, **options.image_settings()
+        )
+        tokenizer = transformers.AutoTokenizer.from_pretrained(folder, **remote)
+        template = _chat_template(folder, tokenizer)
+        max_tokens = apply_rope(located.config, options.rope)
+        model = _load_model(located)
+    return assemble(
+        model,
+        tokenizer,
+        image_processor,
+        template=template,
+        family=family(model, image_processor, tokenizer),
+        max_tokens=max_tokens,
+        origin=origin(located.folder, located.commit, options.pretrained),
+    )
+
+
+def assemble(
+    model: Any,
+    tokenizer: Any,
+    image_processor: Any,
+    *,
+    template: str,
+    family: Family,
+    max_tokens: int | None,
+    origin: Mapping[str, Any],
+) -> Loaded:
+    """Put loaded parts together and write down what identifies them.
+
+    Args:
+        model: the transformers model.
+        tokenizer: its tokenizer.
+        image_processor: its image processor.
+        template: its chat template.
+        family: its family.
+        max_tokens: its context limit.
+        origin: where the weights come from, for the identity.
+
+    Raises:
+        ModelError: its generation settings are not supported.
+    """
+    identity = dict(origin) | {
+        "class": type(model).__name__,
+        "n_parameters": model.num_parameters(),
+        "dtype": str(model.dtype).removeprefix("torch."),
+        "device": model.device.type,
+        "quantization": _quantized(model),
+        "attn_implementation": model.config._attn_implementation,
+        "rope": getattr(model.config.get_text_config(), "rope_parameters", None),
+        "image_processor": json.loads(image_processor.to_json_string()),
+        "chat_template": digest(template),
+        "versions": versions(),
+    }
+    return Loaded(
+        model=model.eval(),
+        tokenizer=tokenizer,
+        template=template,
+        family=family,
+        generation=read_generation(model.generation_config),
+        max_tokens=max_tokens,
+        identity=identity,
+    )
+
+
+def origin(folder: Path, commit: str | None, pretrained: str) -> dict[str, Any]:
+    """Where weights come from, for an identity.
+
+    Args:
+        folder: where the checkpoint lies.
+        commit: of the hub's repository; None for a folder of the user's.
+        pretrained: what was asked for.
+    """
+    if commit is not None:
+        return {"checkpoint": pretrained, "revision": commit}
+    # The folder's name, not its place: a checkpoint that was moved is the same checkpoint.
+    return {"checkpoint": folder.resolve().name, "fingerprint": _fingerprint(folder)}
+
+
+def versions() -> dict[str, str]:
+    """Versions of the libraries that numbers hang on, for an identity."""
+    return {
+        "torch": torch.__version__,
+        "transformers": transformers.__version__,
+        "tokenizers": tokenizers.__version__,
+        "pillow": PIL.__version__,
+    }
+
+
+def resolve_device(options: HfOptions) -> torch.device:
+    """The device asked for; auto is the GPU where there is one.
+
+    Raises:
+        UsageError: torch knows no such device.
+        ModelError: there is no GPU here.
+    """
+    name = options.device
+    if name == "auto":
+        name = "cuda" if torch.cuda.is_available() else "cpu"
+    try:
+        device = torch.device(name)
+    except RuntimeError as error:
+        raise UsageError(f"device={name} is not a torch device; use cpu, cuda, cuda:1, ...") from error
+    if device.type == "cuda" and not torch.cuda.is_available():
+        raise ModelError(f"device={name}: torch {torch.__version__} finds no GPU here; use device=cpu")
+    return device
+
+
+def resolve_dtype(options: HfOptions) -> torch.dtype | str:
+    """The type asked for, or "auto".
+
+    Raises:
+        UsageError: torch has no such type.
+    """
+    dtype = "auto" if options.dtype == "auto" else getattr(torch, options.dtype, None)
+    if not (dtype == "auto" or isinstance(dtype, torch.dtype)):
+        raise UsageError(f"dtype={options.dtype} is not a torch type; use auto, bfloat16, float16 or float32")
+    return dtype
+
+
+@contextlib.contextmanager
+def loading(options: CheckpointOptions) -> Iterator[None]:
+    """Turn the errors of transformers' loading into one line.
+
+    Raises:
+        ModelError: something could not be loaded.
+    """
+    try:
+        yield
+    except (OSError, ValueError, ImportError, KeyError, SafetensorError) as error:
+        reason = " ".join(str(error).split())[:200]
+        raise ModelError(f"the checkpoint {options.pretrained} cannot be loaded: {reason}") from error
+
+
+def _load_model(located: LocatedCheckpoint) -> Any:
+    options = located.options
+    device = resolve_device(options)
+    model, report = cast(Any, transformers.AutoModelForImageTextToText).from_pretrained(
+        located.folder,
+        config=located.config,
+        dtype=resolve_dtype(options),
+        attn_implementation=options.attn_implementation,
+        device_map=options.device_map or ({"": device} if options.quantization else None),
+        quantization_config=_quantization(options),
+        trust_remote_code=options.trust_remote_code,
+        output_loading_info=True,
+    )
+    missing = sorted(report["missing_keys"])
+    if missing:  # transformers would leave them random and only warn
+        raise ModelError(f"{options.pretrained} lacks {len(missing)} weights of its model ({missing[0]}, ...)")
+    return model if options.device_map or options.quantization else model.to(device)
+
+
+def _quantization(options: CheckpointOptions) -> Any:
+    if options.quantization is None:
+        return None
+    switch = {"bnb4": "load_in_4bit", "bnb8": "load_in_8bit"}[options.quantization]
+    return transformers.BitsAndBytesConfig(**{switch: True})
+
+
+def _quantized(model: Any) -> str | None:
+    """Method of quantisation, asked for or the checkpoint's own."""
+    settings = getattr(model.config, "quantization_config", None)
+    method = settings.get("quant_method") if isinstance(settings, dict) else getattr(settings, "quant_method", None)
+    return None if method is None else str(getattr(method, "value", method))
+
+
+def _chat_template(folder: Path, tokenizer: Any) -> str:
+    """The processor's template if the checkpoint has one of its own, else the tokenizer's."""
+    jinja, legacy = folder / "chat_template.jinja", folder / "chat_template.json"
+    if jinja.is_file():
+        return jinja.read_text(encoding="utf-8")
+    if legacy.is_file():
+        template = json.loads(legacy.read_text(encoding="utf-8")).get("chat_template")
+    else:
+        template = tokenizer.chat_template
+    if not isinstance(template, str):
+        raise ModelError(f"{folder} has no chat template; add a chat_template.jinja to it")
+    return template
+
+
+def _fingerprint(folder: Path) -> str:
+    """Hash of names and contents of the checkpoint's files (hex, 32 characters)."""
+    return digest_of_files(
+        path for path in sorted(folder.iterdir()) if path.suffix in _FINGERPRINTED and path.is_file()
+    )

@@ -1,0 +1,167 @@
+"""Decoding, token by token, with the checkpoint's own end tokens and repetition penalty.
+
+Draws are transformers' own: temperature, then the most likely tokens (`top_p`), in float32.
+"""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any, cast
+
+import torch
+from transformers import (
+    GenerationConfig,
+    RepetitionPenaltyLogitsProcessor,
+    TemperatureLogitsWarper,
+    TopPLogitsWarper,
+)
+
+from infthor_eval.errors import ModelError
+from model_adapters.hf.choices import Choices
+from model_adapters.protocols import Decoding
+
+__all__ = ["Generation", "Writing", "cut_at_stop", "read_generation", "write"]
+
+# Settings that change what is decoded and that this decoder does not have, with the values that switch them off.
+_UNSUPPORTED: dict[str, tuple[Any, ...]] = {
+    "num_beams": (None, 1),
+    "no_repeat_ngram_size": (None, 0),
+    "min_length": (None, 0),
+    "min_new_tokens": (None, 0),
+    "bad_words_ids": (None, []),
+    "suppress_tokens": (None, []),
+    "begin_suppress_tokens": (None, []),
+    "forced_bos_token_id": (None,),
+    "forced_eos_token_id": (None,),
+}
+
+
+@dataclass(frozen=True)
+class Generation:
+    """What of a checkpoint's generation settings matters; how much is drawn is the request's own affair.
+
+    Attributes:
+        end_ids: tokens that end the turn.
+        repetition_penalty: as in the checkpoint (1.05 in Qwen2.5-VL); over context and reply, as transformers does.
+    """
+
+    end_ids: frozenset[int]
+    repetition_penalty: float = 1.0
+
+
+def read_generation(config: GenerationConfig) -> Generation:
+    """The settings that matter.
+
+    Raises:
+        ModelError: the checkpoint asks for something that changes what is decoded and is not supported.
+    """
+    for name, off in _UNSUPPORTED.items():
+        if getattr(config, name, None) not in off:
+            raise ModelError(f"the checkpoint's generation config sets {name}, which is not supported; remove it")
+    ends = config.eos_token_id
+    listed = [] if ends is None else [ends] if isinstance(ends, int) else list(ends)
+    return Generation(frozenset(listed), config.repetition_penalty or 1.0)
+
+
+class Writing:
+    """One reply in the making: every token of every reply is chosen here.
+
+    Args:
+        generation: the checkpoint's end tokens and penalty.
+        decoding: how the reply is decoded.
+        context: all ids before the reply; read only where there is a repetition penalty.
+        choices: what the reply is held to; None where it is free.
+        finished: looks at the ids of a free reply after each token.
+
+    Attributes:
+        decoding: how the reply is decoded.
+        ids: the reply so far, without the end token.
+        done: whether it has ended.
+    """
+
+    def __init__(
+        self,
+        generation: Generation,
+        decoding: Decoding,
+        *,
+        context: Iterable[int],
+        choices: Choices | None,
+        finished: Callable[[list[int]], bool],
+    ) -> None:
+        self.decoding = decoding
+        self.ids: list[int] = []
+        self.done = False
+        self._generation = generation
+        self._choices = choices
+        self._finished = finished
+        # How often a token was seen does not matter.
+        self._seen = set(context) if generation.repetition_penalty != 1.0 else set()
+        self._draws = torch.Generator().manual_seed(decoding.seed)
+
+    @property
+    def choice(self) -> str | None:
+        """The choice that the reply is; None where it is free."""
+        return None if self._choices is None else self._choices.text(self.ids)
+
+    def extend(self, logits: torch.Tensor) -> None:
+        """Choose the next token by its logits, (vocabulary,), or end the reply."""
+        scores = _penalised(logits.float(), self._seen, self._generation.repetition_penalty)
+        token = self._chosen(self._held(scores))
+        if token in self._generation.end_ids:
+            self.done = True
+            return
+        self.ids.append(token)
+        self._seen.add(token)
+        self.done = len(self.ids) == self.decoding.max_new_tokens or self._complete()
+
+    def _held(self, scores: torch.Tensor) -> torch.Tensor:
+        """Scores of what may come next; of a reply that is held to choices, nothing else has any."""
+        if self._choices is None:
+            return scores
+        allowed = self._choices.after(self.ids) | (self._generation.end_ids if self.choice is not None else set())
+        held = torch.full_like(scores, -torch.inf)
+        at = torch.tensor(sorted(allowed), device=scores.device)
+        held[at] = scores[at]
+        return held
+
+    def _chosen(self, scores: torch.Tensor) -> int:
+        if self.decoding.greedy:
+            return int(scores.argmax())
+        rows = scores[None].cpu()  # on the CPU a seed draws the same everywhere
+        for warp in (TemperatureLogitsWarper(float(self.decoding.temperature)), TopPLogitsWarper(self.decoding.top_p)):
+            rows = warp(cast(Any, None), cast(Any, rows))
+        return int(torch.multinomial(rows[0].softmax(dim=-1), 1, generator=self._draws))
+
+    def _complete(self) -> bool:
+        return self._finished(self.ids) if self._choices is None else not self._choices.after(self.ids)
+
+
+def write(logits: torch.Tensor, step: Callable[[Sequence[int]], torch.Tensor], replies: Sequence[Writing]) -> None:
+    """Write replies token by token, all in step, until each of them is done.
+
+    Args:
+        logits: (replies, vocabulary), of each one's first token.
+        step: feeds one token to each and returns the logits of the next, (replies, vocabulary).
+        replies: what is written.
+    """
+    while True:
+        for row, reply in enumerate(replies):
+            if not reply.done:
+                reply.extend(logits[row])
+        if all(reply.done for reply in replies):
+            return
+        # Those that are done are fed something, which nobody reads.
+        logits = step([0 if reply.done else reply.ids[-1] for reply in replies])
+
+
+def _penalised(logits: torch.Tensor, seen: set[int], penalty: float) -> torch.Tensor:
+    """Logits, (vocabulary,), with those of seen tokens lowered as transformers' repetition penalty does."""
+    if penalty == 1.0:
+        return logits
+    ids = torch.tensor([list(seen)], device=logits.device)
+    return RepetitionPenaltyLogitsProcessor(penalty)(cast(Any, ids), cast(Any, logits[None]))[0]
+
+
+def cut_at_stop(text: str, stop: Sequence[str]) -> str | None:
+    """The text before the first stop string in it, or None where there is none."""
+    found = [text.index(string) for string in stop if string in text]
+    return text[: min(found)] if found else None

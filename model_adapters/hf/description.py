@@ -1,0 +1,48 @@
+"""What is told about a checkpoint, whichever way it is run."""
+
+from typing import Any
+
+from model_adapters.hf.loaded import Loaded
+from model_adapters.hf.options import HfOptions
+from model_adapters.protocols import Capabilities
+
+__all__ = ["capabilities", "identity"]
+
+
+def capabilities(loaded: Loaded, options: HfOptions, batch_size: int) -> Capabilities:
+    """What a checkpoint can do, run like this.
+
+    Args:
+        loaded: the checkpoint.
+        options: how it is run.
+        batch_size: how many continuations are answered together.
+    """
+    text_config = loaded.model.config.get_text_config()
+    return Capabilities(
+        sampling=True,
+        choices=True,
+        batch_size=batch_size,
+        max_tokens=_context_limit(loaded, options),
+        max_tokens_before_extension=None if options.rope is None else text_config.max_position_embeddings,
+    )
+
+
+def identity(name: str, loaded: Loaded, options: HfOptions) -> dict[str, Any]:
+    """What distinguishes this model, run like this, from others, as JSON values."""
+    generation = loaded.generation
+    return loaded.identity | {
+        "adapter": name,
+        "max_tokens": _context_limit(loaded, options),
+        "share_prefix": options.share_prefix,
+        "chunk_tokens": options.chunk_tokens,
+        "batch_size": options.batch_size,
+        "generation": {
+            "repetition_penalty": generation.repetition_penalty,
+            "end_ids": sorted(generation.end_ids),
+        },
+    }
+
+
+def _context_limit(loaded: Loaded, options: HfOptions) -> int | None:
+    """The checkpoint's context limit, or the option's; None for none."""
+    return (loaded.max_tokens if options.max_tokens is None else options.max_tokens) or None

@@ -1,0 +1,39 @@
+"""DeepSeek-VL 7B (hybrid: SAM at high and SigLIP at low resolution): any frame takes 576 tokens."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import torch
+from PIL import Image
+
+from model_adapters.hf.adapter import CheckpointAdapter
+from model_adapters.hf.families.plain import PlainFamily
+from model_adapters.hf.options import CheckpointOptions
+
+__all__ = ["DeepseekVL", "DeepseekVLFamily"]
+
+
+class DeepseekVLFamily(PlainFamily):
+    """Frames of DeepSeek-VL hybrid."""
+
+    @torch.inference_mode()
+    def features(self, images: Sequence[Image.Image]) -> list[torch.Tensor]:
+        """Aligned features of both vision towers, (tokens, hidden), for each image."""
+        inputs = self._inputs(images)
+        output = self._model.model.get_image_features(
+            inputs["pixel_values"], inputs["high_res_pixel_values"], return_dict=True
+        )
+        return list(output.pooler_output)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Options(CheckpointOptions):
+    pretrained: str = "deepseek-community/deepseek-vl-7b-chat"
+
+
+class DeepseekVL(CheckpointAdapter):
+    """The adapter `deepseek-vl`."""
+
+    Options = _Options
+    family = DeepseekVLFamily
+    model_types = ("deepseek_vl_hybrid",)

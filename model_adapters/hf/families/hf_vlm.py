@@ -1,0 +1,179 @@
+"""Any model of `AutoModelForImageTextToText` with a chat template, so that next month's model needs no code.
+
+Models of the known families run as these. Of others, the processor tells what a frame's placeholder expands to, and the
+model's `get_image_features` what goes into the slots; before the first reply, token ids and logits are compared with
+what the processor and the plain model make of a sample, so that an architecture that works in another way is refused
+instead of being run wrongly. With share_prefix=false it is run by its own processor and `generate`; the sample then
+shows only that the two fit each other.
+"""
+
+import functools
+import inspect
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+import transformers
+from PIL import Image
+from transformers.models.auto.modeling_auto import MODEL_FOR_IMAGE_TEXT_TO_TEXT_MAPPING_NAMES
+
+from infthor_eval.errors import ModelError, UsageError
+from infthor_eval.formats.frames import FrameRef
+from model_adapters.hf.adapter import fitting, load_model
+from model_adapters.hf.checkpoint import LocatedCheckpoint, load_checkpoint, loading, locate
+from model_adapters.hf.families.deepseek_vl import DeepseekVLFamily
+from model_adapters.hf.families.llava_onevision import LlavaOnevisionFamily
+from model_adapters.hf.families.pixtral import PixtralFamily
+from model_adapters.hf.families.plain import PlainFamily
+from model_adapters.hf.families.qwen2_5_vl import Qwen25VLFamily
+from model_adapters.hf.family import MakeFamily, Size
+from model_adapters.hf.loaded import Loaded
+from model_adapters.hf.model import TransformersModel
+from model_adapters.hf.options import CheckpointOptions
+from model_adapters.hf.prompt import token_ids
+from model_adapters.hf.uncached import UncachedModel, expanded, image_token, processed
+from model_adapters.protocols import Model, Part, Turn
+
+__all__ = ["HfVlm", "ProcessorFamily"]
+
+_TOLERANCE = {torch.float32: 1e-3, torch.float64: 1e-3}  # of the largest logit; half precision is compared more loosely
+_HALF_TOLERANCE = 0.1
+
+
+class ProcessorFamily(PlainFamily):
+    """Frames of a model whose processor knows what they expand to.
+
+    Args:
+        model: a transformers model with `get_image_features`.
+        image_processor: its image processor.
+        tokenizer: its tokenizer.
+        processor: its processor.
+
+    Raises:
+        ModelError: the processor names no image token.
+    """
+
+    def __init__(self, model: Any, image_processor: Any, tokenizer: Any, processor: Any) -> None:
+        super().__init__(model, image_processor, tokenizer)
+        self._processor = processor
+        self.placeholder_id = tokenizer.convert_tokens_to_ids(image_token(processor))
+        self._image_features = getattr(model, "get_image_features", None) or model.model.get_image_features
+
+    def frame_ids(self, size: Size) -> tuple[int, ...]:
+        """What the processor expands the placeholder of one image to."""
+        return tuple(expanded(self._processor, Image.new("RGB", size, "gray")))
+
+    @torch.inference_mode()
+    def features(self, images: Sequence[Image.Image]) -> list[torch.Tensor]:
+        """The model's own features, (slots, hidden), for each image."""
+        takes = inspect.signature(self._image_features).parameters
+        found = []
+        for image in images:
+            inputs = {name: value for name, value in self._inputs([image]).items() if name in takes}
+            pooled = self._image_features(**inputs, return_dict=True).pooler_output
+            parts = pooled if isinstance(pooled, list | tuple) else [pooled]
+            found.append(torch.cat([part.reshape(-1, part.shape[-1]) for part in parts]))
+        return found
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Options(CheckpointOptions):
+    pretrained: str = ""
+
+
+class HfVlm:
+    """The adapter `hf-vlm`."""
+
+    Options = _Options
+
+    @classmethod
+    def build(cls, name: str, options: _Options, seed: int) -> Model:  # noqa: ARG003
+        """Load a checkpoint; nothing in it is random.
+
+        Raises:
+            UsageError: no checkpoint was named.
+            ModelError: it cannot be loaded, sees no images, is not of one piece, or cannot share prefixes.
+        """
+        if not options.pretrained:
+            raise UsageError(f"{name} needs pretrained=..., a hub id or a folder")
+        located = locate(options)
+        model_type = located.config.model_type
+        remote = options.trust_remote_code and "AutoModelForImageTextToText" in getattr(located.config, "auto_map", {})
+        if model_type not in MODEL_FOR_IMAGE_TEXT_TO_TEXT_MAPPING_NAMES and not remote:
+            raise ModelError(f"{options.pretrained} is a {model_type} checkpoint, which sees no images")
+        known = _known(located.config)
+        if known is not None:
+            return load_model(name, located, known)
+        processor = _processor(located)
+        model: TransformersModel | UncachedModel
+        if options.share_prefix:
+            loaded = load_checkpoint(located, functools.partial(ProcessorFamily, processor=processor))
+            model = TransformersModel(name, loaded, options)
+        else:
+            loaded = load_checkpoint(located, PlainFamily)
+            model = UncachedModel(name, loaded, processor, options)
+        _try(model, loaded, processor, options.pretrained)
+        return model
+
+
+def _known(config: Any) -> MakeFamily | None:
+    """The family made for this architecture, if there is one."""
+    families: dict[str, MakeFamily] = {
+        "qwen2_5_vl": Qwen25VLFamily,
+        "qwen2_vl": Qwen25VLFamily,
+        "llava_onevision": LlavaOnevisionFamily,
+        "deepseek_vl_hybrid": DeepseekVLFamily,
+    }
+    if config.model_type == "llava" and config.vision_config.model_type == "pixtral":
+        return PixtralFamily
+    return families.get(config.model_type)
+
+
+def _processor(located: LocatedCheckpoint) -> Any:
+    remote = {"trust_remote_code": located.options.trust_remote_code}
+    with loading(located.options):
+        processor = transformers.AutoProcessor.from_pretrained(located.folder, **remote)
+        processor.image_processor = transformers.AutoImageProcessor.from_pretrained(
+            located.folder, backend="pil", **remote
+        )
+    if not hasattr(processor, "tokenizer"):
+        raise ModelError(f"{located.options.pretrained} has no processor of images and text together")
+    return processor
+
+
+@torch.inference_mode()
+def _try(model: TransformersModel | UncachedModel, loaded: Loaded, processor: Any, pretrained: str) -> None:
+    """Run a sample by the processor and the plain model, and see that shared machinery makes the same of it.
+
+    Raises:
+        ModelError: model and processor do not fit, or the shared machinery gives other token ids or logits.
+    """
+    mend = f"{loaded.model.config.model_type} cannot be run with shared prefixes; use share_prefix=false"
+    shared = None
+    with tempfile.TemporaryDirectory() as folder, fitting(pretrained):
+        turns = [Turn("user", _sample(Path(folder)))]
+        inputs = processed(processor, loaded.template, turns)
+        if isinstance(model, TransformersModel):
+            pieces = model.pieces(turns)
+            if list(token_ids(pieces)) != inputs["input_ids"][0].tolist():
+                raise ModelError(f"token ids differ from the processor's: {mend}")
+            shared = model.encode(pieces)
+        weight = loaded.model.get_input_embeddings().weight
+        plain = loaded.model(**inputs.to(weight.device, loaded.model.dtype)).logits[0, -1]
+    tolerance = _TOLERANCE.get(loaded.model.dtype, _HALF_TOLERANCE) * plain.abs().max()
+    if shared is not None and (shared - plain).abs().max() > tolerance:
+        raise ModelError(f"logits differ from the plain model's: {mend}")
+
+
+def _sample(folder: Path) -> tuple[Part, ...]:
+    draw = np.random.default_rng(0)
+    frames = []
+    for number, (height, width) in enumerate([(300, 300), (200, 280)]):
+        path = folder / f"{number}.png"
+        Image.fromarray(draw.integers(0, 256, (height, width, 3), dtype=np.uint8)).save(path)
+        frames.append(FrameRef(path))
+    return "The first view:\n", frames[0], "RotateLeft", frames[1], frames[0], "\nWhat do you see?"

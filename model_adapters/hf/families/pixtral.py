@@ -1,0 +1,74 @@
+"""Pixtral 12B: a frame of 300x300 takes 19 rows of 19 tokens, a break after each row but the last, and an end: 380."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import torch
+from PIL import Image
+
+from infthor_eval.errors import ModelError
+from model_adapters.hf.adapter import CheckpointAdapter
+from model_adapters.hf.families.plain import PlainFamily
+from model_adapters.hf.family import Size
+from model_adapters.hf.options import CheckpointOptions
+
+__all__ = ["Pixtral", "PixtralFamily"]
+
+
+class PixtralFamily(PlainFamily):
+    """Frames of a LLaVA model with Pixtral's vision tower.
+
+    Args:
+        model: a `LlavaForConditionalGeneration`.
+        image_processor: a `PixtralImageProcessor`.
+        tokenizer: has the tokens that end rows and frames.
+
+    Raises:
+        ModelError: the checkpoint is another LLaVA, or its tokenizer lacks the tokens.
+    """
+
+    def __init__(self, model: Any, image_processor: Any, tokenizer: Any) -> None:
+        super().__init__(model, image_processor, tokenizer)
+        if model.config.vision_config.model_type != "pixtral":
+            raise ModelError("the checkpoint is a LLaVA without Pixtral's vision tower; use hf-vlm for it")
+        vocabulary = tokenizer.get_vocab()
+        if not {"[IMG_BREAK]", "[IMG_END]"} <= set(vocabulary):
+            raise ModelError("the checkpoint's tokenizer has no [IMG_BREAK] or no [IMG_END]; it is not Pixtral's")
+        self._break_id, self._end_id = vocabulary["[IMG_BREAK]"], vocabulary["[IMG_END]"]
+
+    def frame_ids(self, size: Size) -> tuple[int, ...]:
+        """Rows of slots, each with a break behind it, the last one with the end."""
+        height, width = self._inputs([Image.new("RGB", size)])["image_sizes"][0].tolist()
+        side = self._model.model.vision_tower.patch_size
+        row = (self.slot_id,) * (width // side) + (self._break_id,)
+        return (*(row * (height // side))[:-1], self._end_id)
+
+    @torch.inference_mode()
+    def features(self, images: Sequence[Image.Image]) -> list[torch.Tensor]:
+        """Projected patches, (tokens, hidden), for each image.
+
+        The vision tower joins a batch to one sequence with a mask over all pairs of patches, so that two frames cost
+        four times one: they go in one by one.
+        """
+        found = []
+        for image in images:
+            inputs = self._inputs([image])
+            output = self._model.get_image_features(
+                inputs["pixel_values"], image_sizes=inputs["image_sizes"], return_dict=True
+            )
+            found.extend(output.pooler_output)
+        return found
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Options(CheckpointOptions):
+    pretrained: str = "mistral-community/pixtral-12b"
+
+
+class Pixtral(CheckpointAdapter):
+    """The adapter `pixtral`."""
+
+    Options = _Options
+    family = PixtralFamily
+    model_types = ("llava",)

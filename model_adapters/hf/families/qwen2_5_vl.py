@@ -1,0 +1,95 @@
+"""Qwen2.5-VL: a frame of 300x300 takes 121 tokens between two markers, with three-axis (multimodal) positions."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import torch
+from PIL import Image
+
+from model_adapters.hf.adapter import CheckpointAdapter
+from model_adapters.hf.families.plain import PlainFamily
+from model_adapters.hf.family import Size
+from model_adapters.hf.options import CheckpointOptions
+
+__all__ = ["PixelLimits", "Qwen25VL", "Qwen25VLFamily"]
+
+
+class Qwen25VLFamily(PlainFamily):
+    """Frames of Qwen2.5-VL.
+
+    Args:
+        model: a `Qwen2_5_VLForConditionalGeneration`.
+        image_processor: a `Qwen2VLImageProcessor`.
+        tokenizer: the checkpoint's tokenizer.
+    """
+
+    def __init__(self, model: Any, image_processor: Any, tokenizer: Any) -> None:
+        super().__init__(model, image_processor, tokenizer)
+        self._grids: dict[Size, tuple[int, int, int]] = {}
+
+    def frame_ids(self, size: Size) -> tuple[int, ...]:
+        """One token for each square of merged patches."""
+        return (self.slot_id,) * (math.prod(self._grid(size)) // self._image_processor.merge_size**2)
+
+    @torch.inference_mode()
+    def features(self, images: Sequence[Image.Image]) -> list[torch.Tensor]:
+        """The vision tower's merged patches, (tokens, hidden), for each image."""
+        inputs = self._inputs(images)
+        output = self._model.get_image_features(inputs["pixel_values"], inputs["image_grid_thw"], return_dict=True)
+        return list(output.pooler_output)
+
+    def positions(self, ids: torch.Tensor, sizes: Sequence[Size], start: int) -> torch.Tensor:
+        """Temporal, height and width positions, (3, 1, tokens).
+
+        The model's own rule counts from the first token on, and every position in it moves along with the first one:
+        so a stretch of the sequence that begins with a whole frame or a text token is numbered alone and shifted.
+        """
+        if not sizes:
+            return torch.arange(start, start + len(ids), device=ids.device).expand(3, 1, -1)
+        positions, _ = self._model.model.get_rope_index(
+            ids[None],
+            mm_token_type_ids=(ids == self.slot_id).int()[None],
+            image_grid_thw=torch.tensor([self._grid(size) for size in sizes]),
+        )
+        return positions + start
+
+    def _grid(self, size: Size) -> tuple[int, int, int]:
+        """Patches along time, height and width, as the image processor makes them of an image of this size."""
+        if size not in self._grids:
+            inputs = self._image_processor(images=[Image.new("RGB", size)], return_tensors="pt")
+            time, height, width = inputs["image_grid_thw"][0].tolist()
+            self._grids[size] = (time, height, width)
+        return self._grids[size]
+
+
+@dataclass(frozen=True, kw_only=True)
+class PixelLimits:
+    """Limits of a frame's area.
+
+    Attributes:
+        min_pixels: smaller frames are enlarged to this area; the checkpoint's setting where None.
+        max_pixels: larger frames are reduced to this area; the checkpoint's setting where None.
+    """
+
+    min_pixels: int | None = None
+    max_pixels: int | None = None
+
+    def image_settings(self) -> dict[str, int]:
+        """Settings of the image processor that differ from the checkpoint's."""
+        limits = {"min_pixels": self.min_pixels, "max_pixels": self.max_pixels}
+        return {name: value for name, value in limits.items() if value is not None}
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Options(PixelLimits, CheckpointOptions):
+    pretrained: str = "Qwen/Qwen2.5-VL-7B-Instruct"
+
+
+class Qwen25VL(CheckpointAdapter):
+    """The adapter `qwen2.5-vl`."""
+
+    Options = _Options
+    family = Qwen25VLFamily
+    model_types = ("qwen2_5_vl",)

@@ -1,0 +1,41 @@
+"""What does not fit, in one line."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import torch
+
+from infthor_eval.errors import ModelError
+
+__all__ = ["check_limit", "naming_memory_errors"]
+
+
+def check_limit(name: str, n_context: int, max_new_tokens: int, limit: int | None) -> None:
+    """Refuse what does not fit.
+
+    Raises:
+        ModelError: context and reply are beyond the limit.
+    """
+    if limit is not None and n_context + max_new_tokens > limit:
+        raise ModelError(
+            f"a context of {n_context} tokens and {max_new_tokens} new ones is beyond the {limit} tokens "
+            f"of {name}; use fewer frames, or set max_tokens if the model can take more"
+        )
+
+
+@contextmanager
+def naming_memory_errors(name: str, n_context: int) -> Iterator[None]:
+    """Turn errors of memory into one line with the size of the context.
+
+    Raises:
+        ModelError: memory ran out.
+    """
+    try:
+        yield
+    except (RuntimeError, MemoryError) as error:
+        # torch has an exception of its own for GPUs only; on CPU the allocator's name in the message tells.
+        cpu = isinstance(error, MemoryError) or "DefaultCPUAllocator" in str(error)
+        if not (cpu or isinstance(error, torch.OutOfMemoryError)):
+            raise
+        mend = "use fewer frames, kv_offload=true, or a smaller chunk_tokens"
+        raise ModelError(f"out of memory on a context of {n_context} tokens ({name}); {mend}") from error

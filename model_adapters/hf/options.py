@@ -1,0 +1,91 @@
+"""Options that every transformers model takes."""
+
+from dataclasses import dataclass
+from typing import Any
+
+__all__ = ["CheckpointOptions", "HfOptions", "parse_rope"]
+
+
+_ROPES = ("dynamic", "linear", "longrope", "yarn")
+
+
+def parse_rope(text: str) -> tuple[str, float]:
+    """Type and factor of a context extension `TYPE:FACTOR`.
+
+    Raises:
+        ValueError: it has another form, or a factor that extends nothing.
+    """
+    rope_type, _, number = text.partition(":")
+    try:
+        factor = float(number)
+    except ValueError:
+        factor = 0.0
+    if rope_type not in _ROPES or not 1 < factor < 1000:
+        raise ValueError(f"rope={text} is not TYPE:FACTOR with TYPE one of {', '.join(_ROPES)} and FACTOR above 1")
+    return rope_type, factor
+
+
+@dataclass(frozen=True, kw_only=True)
+class HfOptions:
+    """How a model is run.
+
+    Attributes:
+        dtype: torch's name of the weights' type, or auto: as in the checkpoint.
+        device: cpu, cuda, cuda:1, ..., or auto: a GPU where there is one.
+        attn_implementation: sdpa, eager, flash_attention_2, ...
+        share_prefix: encode what two replies have in common once; false encodes everything for every reply.
+        chunk_tokens: most tokens encoded in one forward pass.
+        batch_size: most continuations of one prefix that are answered together; each has its own copy of the prefix's
+            keys and values.
+        kv_offload: keep keys and values in CPU memory; slower, for contexts that do not fit on the GPU.
+        feature_cache_mb: memory for vision features of frames seen before, in MiB.
+        max_tokens: context limit instead of the checkpoint's; 0 for none.
+        rope: context extension TYPE:FACTOR (yarn:4, linear:2, dynamic:4, longrope:8) instead of the checkpoint's RoPE.
+    """
+
+    dtype: str = "auto"
+    device: str = "auto"
+    attn_implementation: str = "sdpa"
+    share_prefix: bool = True
+    chunk_tokens: int = 1024
+    batch_size: int = 1
+    kv_offload: bool = False
+    feature_cache_mb: int = 128
+    max_tokens: int | None = None
+    rope: str | None = None
+
+    def image_settings(self) -> dict[str, Any]:
+        """Settings of the image processor that differ from the checkpoint's; families with options for it override."""
+        return {}
+
+    def __post_init__(self) -> None:
+        if self.chunk_tokens < 1 or self.batch_size < 1 or self.feature_cache_mb < 0 or (self.max_tokens or 0) < 0:
+            raise ValueError(
+                "chunk_tokens and batch_size must be positive, feature_cache_mb and max_tokens not negative"
+            )
+        if self.rope is not None:
+            parse_rope(self.rope)
+
+
+@dataclass(frozen=True, kw_only=True)
+class CheckpointOptions(HfOptions):
+    """Where a checkpoint comes from.
+
+    Attributes:
+        pretrained: hub id or folder.
+        revision: branch, tag or commit on the hub; the default branch where None.
+        device_map: transformers' device map (auto, balanced, ...) instead of one device.
+        quantization: bnb4 or bnb8 for bitsandbytes with 4 or 8 bits per weight; none for the checkpoint's own.
+        trust_remote_code: run code that comes with the checkpoint.
+    """
+
+    pretrained: str
+    revision: str | None = None
+    device_map: str | None = None
+    quantization: str | None = None
+    trust_remote_code: bool = False
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.quantization not in (None, "bnb4", "bnb8"):
+            raise ValueError(f"quantization={self.quantization} is not bnb4, bnb8 or none")

@@ -1,0 +1,124 @@
+"""From the turns of a conversation to what the model is fed.
+
+The checkpoint's own chat template is rendered over the whole conversation and the result is tokenised as a whole, with
+one placeholder per frame; placeholders are expanded afterwards, id by id. So merges over the joints of parts come out
+as the checkpoint means them, and the cost per reply is that of a short text even where frames take 100,000 tokens.
+"""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from PIL import Image, UnidentifiedImageError
+
+from infthor_eval.errors import DataError, ModelError
+from infthor_eval.formats.frames import FrameRef
+from model_adapters.hf.family import Family, Size
+from model_adapters.hf.rendering import begins, render
+from model_adapters.protocols import Turn
+
+__all__ = ["Frame", "Piece", "Prompter", "n_common", "n_tokens", "token_ids"]
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A frame as a piece of a prompt; two are equal when the files' contents are.
+
+    Attributes:
+        digest: hash of the file's content.
+        size: width and height in pixels.
+        ids: what it expands to.
+        ref: where its pixels are.
+    """
+
+    digest: str
+    size: Size = field(compare=False)
+    ids: tuple[int, ...] = field(compare=False)
+    ref: FrameRef = field(compare=False)
+
+
+Piece = int | Frame  # what is encoded, compared and cut as a whole: a token of text, or a frame with all its tokens
+
+
+def n_tokens(pieces: Sequence[Piece]) -> int:
+    """Tokens of a prompt, frames expanded."""
+    return sum(1 if isinstance(piece, int) else len(piece.ids) for piece in pieces)
+
+
+def n_common(prompts: Sequence[Sequence[Piece]]) -> int:
+    """Pieces that all prompts begin with; at least one piece of each is left over."""
+    first = min(prompts, key=len)
+    for at, piece in enumerate(first[:-1]):
+        if any(prompt[at] is not piece and prompt[at] != piece for prompt in prompts):
+            return at
+    return len(first) - 1
+
+
+def token_ids(pieces: Iterable[Piece]) -> Iterator[int]:
+    """All ids of a prompt, frames expanded."""
+    for piece in pieces:
+        if isinstance(piece, int):
+            yield piece
+        else:
+            yield from piece.ids
+
+
+class Prompter:
+    """Renders and tokenises conversations for one model.
+
+    Args:
+        tokenizer: the checkpoint's tokenizer.
+        template: the checkpoint's chat template (Jinja).
+        family: how frames are expanded.
+    """
+
+    def __init__(self, tokenizer: Any, template: str, family: Family) -> None:
+        self._tokenizer = tokenizer
+        self._template = template
+        self._family = family
+        self._image_token: str = tokenizer.convert_ids_to_tokens(family.placeholder_id)
+        self._frames: dict[str, Frame] = {}
+        self._ids: dict[Size, tuple[int, ...]] = {}
+
+    def pieces(self, turns: Sequence[Turn]) -> list[Piece]:
+        """The prompt that asks for the reply to these turns.
+
+        Raises:
+            DataError: a frame cannot be read.
+            ModelError: the template refuses the turns, or does not hold one placeholder per frame.
+        """
+        frames = [self.frame(part) for turn in turns for part in turn.parts if isinstance(part, FrameRef)]
+        text = render(self._tokenizer, self._template, turns, self._image_token)
+        ids: list[int] = self._tokenizer(text, add_special_tokens=not begins(self._tokenizer, text))["input_ids"]
+        placeholder = self._family.placeholder_id
+        if ids.count(placeholder) != len(frames):
+            raise ModelError(
+                f"the chat template gives {ids.count(placeholder)} image placeholders for {len(frames)} frames; a text "
+                "must not contain the model's image token, and the template must show every frame by it "
+                f"({self._image_token})"
+            )
+        rest = iter(frames)
+        return [next(rest) if token == placeholder else token for token in ids]
+
+    def frame(self, ref: FrameRef) -> Frame:
+        """A frame as a piece of any prompt.
+
+        Raises:
+            DataError: it cannot be read.
+        """
+        frame = self._frames.get(ref.digest)
+        if frame is None:
+            size = _size(ref)
+            if size not in self._ids:
+                self._ids[size] = self._family.frame_ids(size)
+            frame = self._frames[ref.digest] = Frame(ref.digest, size, self._ids[size], ref)
+        return frame
+
+
+def _size(ref: FrameRef) -> Size:
+    """Width and height from the file's header; the pixels are decoded only when the frame is encoded."""
+    try:
+        with Image.open(ref.path) as image:
+            return image.size
+    except (UnidentifiedImageError, OSError, SyntaxError) as error:
+        raise DataError(f"{ref.path}: not a readable image ({error}); restore the frame") from error

@@ -1,0 +1,127 @@
+"""From the turns of a conversation to the text that the checkpoint's own chat template makes of them."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+from jinja2 import TemplateError
+
+from infthor_eval.errors import ModelError
+from infthor_eval.formats.frames import FrameRef
+from model_adapters.protocols import Part, Turn
+
+__all__ = ["begins", "render"]
+
+_PRINTED = "{'type': 'text'"  # how a content looks where a template that wants a string writes a list
+
+
+def render(tokenizer: Any, template: str, turns: Sequence[Turn], image_token: str) -> str:
+    """The chat template over all turns, asking for the reply.
+
+    Some templates (LLaVA's) write all images of a turn before its texts. Where that would take frames out of the places
+    between texts, the turn is given to them as one text with the image's token in it. Some (Pixtral's) want what the
+    system says as a string instead of a list of texts, and get it so.
+
+    Args:
+        tokenizer: the checkpoint's.
+        template: its chat template (Jinja).
+        turns: the conversation.
+        image_token: what the template writes for an image.
+
+    Raises:
+        ModelError: the template refuses the turns, or leaves a text out.
+    """
+    shown = [_inline(tokenizer, template, turn, image_token) for turn in turns]
+    listed = [_message(turn) for turn in shown]
+    try:
+        return _written(tokenizer, template, shown, listed)
+    except ModelError:
+        strings = [_string_message(turn) for turn in shown]
+        if strings == listed:
+            raise
+    return _written(tokenizer, template, shown, strings)
+
+
+def begins(tokenizer: Any, text: str) -> bool:
+    """Whether the template wrote the token that begins every text; where not, processors let the tokenizer add it."""
+    return tokenizer.bos_token is not None and text.startswith(tokenizer.bos_token)
+
+
+def _inline(tokenizer: Any, template: str, turn: Turn, image_token: str) -> Turn:
+    """The turn with its image tokens in one text, where the template would not leave frames in their places.
+
+    Every turn is tried alone and as the user's, so that what comes after it does not change how it is written.
+    """
+    n_frames = sum(isinstance(part, FrameRef) for part in turn.parts)
+    if n_frames in (0, len(turn.parts)):
+        return turn
+    alone = replace(turn, role="user")
+    text = _written(tokenizer, template, [alone], [_message(alone)])
+    if text.count(image_token) != n_frames or _keeps_order(text, turn.parts, image_token):
+        return turn
+    return replace(turn, parts=("".join(part if isinstance(part, str) else image_token for part in turn.parts),))
+
+
+def _message(turn: Turn) -> dict[str, Any]:
+    # Most templates read a text under "text", a few under "content".
+    content = [
+        {"type": "text", "text": part, "content": part} if isinstance(part, str) else {"type": "image"}
+        for part in turn.parts
+    ]
+    return {"role": turn.role, "content": content}
+
+
+def _string_message(turn: Turn) -> dict[str, Any]:
+    text = turn.parts[0]
+    if turn.role == "user" or len(turn.parts) > 1 or not isinstance(text, str):
+        return _message(turn)
+    return {"role": turn.role, "content": text}
+
+
+def _written(tokenizer: Any, template: str, turns: Sequence[Turn], messages: Sequence[dict[str, Any]]) -> str:
+    try:
+        text: str = tokenizer.apply_chat_template(
+            list(messages), chat_template=template, tokenize=False, add_generation_prompt=True
+        )
+    except (TemplateError, TypeError) as error:  # TypeError: a list where the template joins strings
+        reason = " ".join(str(error).split())[:200]
+        raise ModelError(f"the chat template refuses {_roles(turns)} ({reason}); ask in other turns") from error
+    _check_texts(text, turns)
+    return text
+
+
+def _check_texts(text: str, turns: Sequence[Turn]) -> None:
+    """See that a rendered text has every text of every turn.
+
+    Raises:
+        ModelError: one is left out.
+    """
+    said = Counter(
+        (part.strip() for turn in turns for part in turn.parts if isinstance(part, str)),
+    )
+    for part, count in said.items():
+        if text.count(part) < count:
+            roles = {turn.role for turn in turns if any(isinstance(p, str) and p.strip() == part for p in turn.parts)}
+            raise ModelError(
+                f"the chat template leaves out the text {part[:40]!r} of a turn ({' or '.join(sorted(roles))}); "
+                "it cannot be used"
+            )
+    if _PRINTED in text and not any(_PRINTED in part for part in said):
+        raise ModelError(f"the chat template writes lists instead of texts for {_roles(turns)}; ask in other turns")
+
+
+def _roles(turns: Sequence[Turn]) -> str:
+    return "the turns " + ", ".join(turn.role for turn in turns)
+
+
+def _keeps_order(text: str, parts: Sequence[Part], image_token: str) -> bool:
+    """Whether the parts stand in a rendered text one after the other."""
+    at = 0
+    for part in parts:
+        written = part.strip() if isinstance(part, str) else image_token
+        at = text.find(written, at)
+        if at < 0:
+            return False
+        at += len(written)
+    return True

@@ -1,0 +1,114 @@
+"""How near frames and texts are to each other, by a CLIP model: what retrieval contexts choose frames with.
+
+A set has hundreds of thousands of frames, and every question on a trajectory ranks the same ones. So each frame is
+embedded once, in batches of a few frames' pixels, and the vectors lie in a file of the user's cache: memory stays flat
+however large the set is, and the next run finds them there.
+"""
+
+import json
+from collections.abc import Sequence
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+import transformers
+
+from infthor_eval.errors import ModelError, UsageError
+from infthor_eval.formats.digests import digest
+from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.user_cache import user_cache
+from model_adapters.hf.checkpoint import loading, origin, resolve_device, versions
+from model_adapters.hf.hub import fetch
+from model_adapters.hf.options import CheckpointOptions, HfOptions
+from model_adapters.hf.vectors import VectorFile
+
+__all__ = ["Retriever", "open_retriever"]
+
+_BATCH = 32  # frames whose pixels are held at once
+
+
+class Retriever:
+    """A CLIP model in float32, on a GPU where there is one.
+
+    Its vectors have length 1, so that their dot product is the cosine.
+    """
+
+    def __init__(self, name: str, revision: str | None = None) -> None:
+        """Load a checkpoint.
+
+        Args:
+            name: hub id or folder.
+            revision: branch, tag or commit on the hub; the default branch where None.
+
+        Raises:
+            UsageError: there is none, it cannot be had, or it is not CLIP's.
+            DataError: the user's cache cannot be written.
+        """
+        try:
+            # Old CLIP checkpoints on the hub have no safetensors.
+            folder, commit = fetch(name, revision, option="--retriever ", also=["pytorch_model.bin"])
+            with loading(CheckpointOptions(pretrained=name)):
+                model = _load_model(folder)
+                self._tokenizer = transformers.AutoTokenizer.from_pretrained(folder)
+                self._image_processor = transformers.AutoImageProcessor.from_pretrained(folder, backend="pil")
+        except ModelError as error:
+            raise UsageError(str(error)) from error
+        self._model: Any = model.to(resolve_device(HfOptions())).eval()
+        self._origin = origin(folder, commit, name)
+        file = user_cache("clip_vectors") / f"{digest(json.dumps(self.identity(), sort_keys=True))}.f32"
+        self._vectors = VectorFile(file, model.config.projection_dim)
+
+    def identity(self) -> dict[str, Any]:
+        """All that can change a ranking, as JSON values."""
+        return self._origin | {
+            "device": self._model.device.type,
+            "image_processor": json.loads(self._image_processor.to_json_string()),
+            "versions": versions(),
+        }
+
+    def frames(self, frames: Sequence[FrameRef]) -> np.ndarray:
+        """Vectors of frames, (frames, dimensions).
+
+        Raises:
+            DataError: a frame cannot be decoded.
+        """
+        missing = {frame.digest: frame for frame in frames if frame.digest not in self._vectors}
+        keys = list(missing)
+        for at in range(0, len(keys), _BATCH):
+            batch = keys[at : at + _BATCH]
+            inputs = self._image_processor(images=[missing[key].load() for key in batch], return_tensors="pt")
+            self._embed(self._model.get_image_features, inputs, batch)
+        return self._vectors.get([frame.digest for frame in frames])
+
+    def text(self, text: str) -> np.ndarray:
+        """The vector of a text, (dimensions,); what is beyond CLIP's limit (77 tokens) is cut off."""
+        key = digest(f"text: {text}")
+        if key not in self._vectors:
+            limit = self._model.config.text_config.max_position_embeddings
+            inputs = self._tokenizer([text], truncation=True, max_length=limit, return_tensors="pt")
+            self._embed(self._model.get_text_features, inputs, [key])
+        return self._vectors.get([key])[0]
+
+    @torch.inference_mode()
+    def _embed(self, features: Any, inputs: Any, keys: Sequence[str]) -> None:
+        vectors = features(**inputs.to(self._model.device)).pooler_output
+        self._vectors.add(keys, torch.nn.functional.normalize(vectors, dim=-1).cpu().numpy())
+
+
+def _load_model(folder: Path) -> Any:
+    model_type = transformers.AutoConfig.from_pretrained(folder).model_type
+    if model_type != "clip":
+        raise ModelError(f"--retriever {folder} is a {model_type} checkpoint; retrieval takes one of CLIP")
+    clip: Any = transformers.CLIPModel
+    model, report = clip.from_pretrained(folder, dtype=torch.float32, output_loading_info=True)
+    if report["missing_keys"]:  # transformers would leave them random and only warn
+        raise ModelError(f"--retriever {folder} lacks {len(report['missing_keys'])} weights; give a whole checkpoint")
+    return model
+
+
+@lru_cache(maxsize=2)
+def open_retriever(name: str, revision: str | None = None) -> Retriever:
+    """The retriever of a checkpoint, loaded once per process; see `Retriever`."""
+    return Retriever(name, revision)

@@ -1,0 +1,103 @@
+"""Longer contexts by another scaling of rotary positions (RoPE), written as transformers 5 wants it.
+
+transformers recomputes the frequencies of `dynamic` and `longrope` inside the forward pass, from the largest position
+it has seen: what a chunked prefill or a cached prefix holds would then belong to other frequencies than what follows.
+Here they are set once per request, from the prompt's full length, as one pass over the whole prompt sets them.
+"""
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from transformers.modeling_rope_utils import ROPE_INIT_FUNCTIONS
+
+from infthor_eval.errors import ModelError
+from model_adapters.hf.options import parse_rope
+
+__all__ = ["LengthRope", "apply_rope", "length_rope"]
+
+_FIXED = "fixed"  # a rope_type that transformers' forward pass leaves alone
+
+
+def apply_rope(config: Any, rope: str | None) -> int | None:
+    """Write an extension into a model's config.
+
+    The original length is the config's `max_position_embeddings`, as in the published evaluation. `longrope` takes
+    the checkpoint's own factors where it has some; else all frequencies are divided by the factor once a prompt is
+    longer than the original length.
+
+    Args:
+        config: the model's config; its text config is changed.
+        rope: `TYPE:FACTOR`, or None for the checkpoint's own.
+
+    Returns:
+        The context limit in tokens; None where the config names none.
+
+    Raises:
+        ModelError: the model has no RoPE that could be scaled, or several.
+    """
+    text = config.get_text_config()
+    limit: int | None = getattr(text, "max_position_embeddings", None)
+    if rope is None:
+        return limit
+    rope_type, factor = parse_rope(rope)
+    present = getattr(text, "rope_parameters", None)
+    if limit is None or not isinstance(present, dict) or "rope_theta" not in present:
+        raise ModelError(f"rope={rope}: a {config.model_type} model has no single RoPE with a length to extend")
+    kept = {name: present[name] for name in ("mrope_section", "partial_rotary_factor") if name in present}
+    new: dict[str, Any] = {"rope_type": rope_type, "rope_theta": present["rope_theta"], "factor": factor, **kept}
+    if rope_type in ("yarn", "longrope"):
+        new["original_max_position_embeddings"] = limit
+    if rope_type == "longrope":
+        head = getattr(text, "head_dim", None) or text.hidden_size // text.num_attention_heads
+        n_frequencies = int(head * kept.get("partial_rotary_factor", 1.0)) // 2
+        new["short_factor"] = present.get("short_factor", [1.0] * n_frequencies)
+        new["long_factor"] = present.get("long_factor", [factor] * n_frequencies)
+    text.rope_parameters = new
+    return int(limit * factor)
+
+
+@dataclass(frozen=True)
+class LengthRope:
+    """Rotary embeddings whose frequencies depend on the length of the prompt.
+
+    Attributes:
+        modules: the model's rotary embeddings.
+        compute: transformers' function for the frequencies.
+        original: length up to which the original frequencies hold, in positions.
+        by_length: whether every length beyond it has frequencies of its own (dynamic), or all have the same (longrope).
+    """
+
+    modules: tuple[Any, ...]
+    compute: Callable[..., tuple[Any, float]]
+    original: int
+    by_length: bool
+
+    def key(self, n_positions: int) -> int:
+        """Equal for lengths of equal frequencies."""
+        longer = max(n_positions - self.original, 0)
+        return longer if self.by_length else int(longer > 0)
+
+    def set(self, n_positions: int) -> None:
+        """Set the frequencies for a prompt of this many positions."""
+        for module in self.modules:
+            device = module.inv_freq.device
+            module.inv_freq, module.attention_scaling = self.compute(module.config, device, seq_len=n_positions)
+
+
+def length_rope(model: Any) -> LengthRope | None:
+    """Take over the rotary embeddings of a model if their frequencies depend on the length, else None."""
+    modules = tuple(
+        module
+        for module in model.modules()
+        if isinstance(getattr(module, "rope_type", None), str) and re.search("dynamic|longrope", module.rope_type)
+    )
+    if not modules:
+        return None
+    first = modules[0]
+    rope_type, parameters = first.rope_type, first.config.rope_parameters
+    original = parameters.get("original_max_position_embeddings", first.config.max_position_embeddings)
+    for module in modules:
+        module.rope_type = _FIXED
+    return LengthRope(modules, ROPE_INIT_FUNCTIONS[rope_type], original, by_length="dynamic" in rope_type)

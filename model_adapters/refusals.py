@@ -1,0 +1,42 @@
+"""What a model refuses to be asked, in the same words whichever model it is."""
+
+from collections.abc import Sequence
+
+from infthor_eval.errors import ModelError
+from model_adapters.protocols import Capabilities, Decoding, Turn
+
+__all__ = ["check_decoding", "check_turns"]
+
+
+def check_decoding(name: str, capabilities: Capabilities, decoding: Decoding) -> None:
+    """Refuse what the model cannot do.
+
+    Args:
+        name: of the model.
+        capabilities: its own.
+        decoding: what is asked for.
+
+    Raises:
+        ModelError: the model does not draw, or cannot be held to choices.
+    """
+    if not (decoding.greedy or capabilities.sampling):
+        raise ModelError(
+            f"{name} decodes greedily only, not at temperature {decoding.temperature}; ask at temperature 0"
+        )
+    if decoding.choices and not capabilities.choices:
+        raise ModelError(f"{name} cannot be held to {len(decoding.choices)} choices; ask without choices")
+
+
+def check_turns(name: str, turns: Sequence[Turn]) -> None:
+    """Refuse a conversation in which it is not the model's turn.
+
+    Args:
+        name: of the model.
+        turns: the conversation.
+
+    Raises:
+        ModelError: it is empty, or its last turn is not the user's.
+    """
+    if not turns or turns[-1].role != "user":
+        found = f"the last turn is the {turns[-1].role}'s" if turns else "the conversation is empty"
+        raise ModelError(f"{name} has nothing to reply to: {found}; append a user turn")

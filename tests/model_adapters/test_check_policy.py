@@ -1,0 +1,81 @@
+"""The contract check of policies, on one that plays a script."""
+
+import hashlib
+import math
+from typing import Any
+
+import pytest
+
+from infthor_eval.formats.frames import FrameRef
+from model_adapters import ArmDelta, Capabilities, ContractError, Policy, check_policy
+
+STEP = ArmDelta((0.0, 0.1, 0.0), (0.0, 0.0, 0.5), 1.0)
+
+
+class Scripted:
+    """Moves by what the frame's digest says, a little more with every call of an episode."""
+
+    name = "scripted"
+    capabilities = Capabilities()
+
+    def __init__(self) -> None:
+        self.n_calls = 0
+
+    def identity(self) -> dict[str, Any]:
+        return {"policy": self.name}
+
+    def reset(self) -> None:
+        self.n_calls = 0
+
+    def act(self, frame: FrameRef, instruction: str) -> tuple[ArmDelta, ...]:
+        self.n_calls += 1
+        seed = hashlib.sha256(f"{frame.digest}{instruction}".encode()).digest()[0]
+        return (ArmDelta((0.01 * self.n_calls, 0.0, 0.0), (0.0, 0.0, 0.0), seed / 255),)
+
+    def close(self) -> None:
+        pass
+
+
+def _acting(*steps: Any) -> Policy:
+    return type("Acting", (Scripted,), {"act": lambda self, frame, instruction: steps})()
+
+
+def test_a_good_policy_passes() -> None:
+    assert isinstance(Scripted(), Policy)
+    check_policy(Scripted(), frame_size=(30, 20))
+    check_policy(_acting(STEP, STEP))
+
+
+@pytest.mark.parametrize(
+    ("step", "clause"),
+    [
+        ("left", "no ArmDelta"),
+        (ArmDelta((0.0, 0.0), (0.0, 0.0, 0.0), 0.0), "not three numbers"),  # type: ignore[arg-type]
+        (ArmDelta((0.0, math.nan, 0.0), (0.0, 0.0, 0.0), 0.0), "finite floats"),
+        (ArmDelta((0, 0, 0), (0.0, 0.0, 0.0), 0.0), "finite floats"),
+        (ArmDelta((0.0, 0.0, 0.0), (0.0, 0.0, math.inf), 0.0), "finite floats"),
+        (ArmDelta((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 1.5), "the gripper is not between 0"),
+    ],
+)
+def test_a_step_that_is_none_is_named(step: Any, clause: str) -> None:
+    with pytest.raises(ContractError, match=clause):
+        check_policy(_acting(STEP, step))
+
+
+def test_no_step_is_named() -> None:
+    with pytest.raises(ContractError, match="at least one ArmDelta"):
+        check_policy(_acting())
+
+
+def test_an_episode_that_is_remembered_is_named_unless_chance_is_admitted() -> None:
+    remembering = type("Remembering", (Scripted,), {"reset": lambda self: None})
+    with pytest.raises(ContractError, match="after reset.. the same frames are not acted on the same way"):
+        check_policy(remembering())
+    check_policy(type("Random", (remembering,), {"capabilities": Capabilities(deterministic=False)})())
+
+
+def test_a_policy_without_reset_or_with_a_bad_identity_is_named() -> None:
+    with pytest.raises(ContractError, match="object lacks a member of Policy: .*reset"):
+        check_policy(object())  # type: ignore[arg-type]
+    with pytest.raises(ContractError, match="JSON values"):
+        check_policy(type("Broken", (Scripted,), {"identity": lambda self: {"a": {1}}})())
