@@ -37,7 +37,9 @@ def export(outcome: RunOutcome) -> Path:
         folder.mkdir(parents=True, exist_ok=True)
         for task in _tasks(outcome):
             rows = list(_rows(outcome, task))
-            hashes[task.name] = _hash("".join(row["doc_hash"] + row["prompt_hash"] + row["target_hash"] for row in rows))
+            hashes[task.name] = _hash(
+                "".join(row["doc_hash"] + row["prompt_hash"] + row["target_hash"] for row in rows)
+            )
             with written_whole(folder / f"samples_{task.name}_{stamp}.jsonl") as partial:
                 lines = (json.dumps(row, ensure_ascii=False) + "\n" for row in rows)
                 partial.write_text("".join(lines), encoding="utf-8")
@@ -45,7 +47,9 @@ def export(outcome: RunOutcome) -> Path:
             document = _results(outcome) | {"task_hashes": hashes, "model_name_sanitized": model}
             partial.write_text(json.dumps(document, indent=2, ensure_ascii=False), encoding="utf-8")
     except OSError as error:
-        raise DataError(f"{folder}: cannot be written ({error.strerror}); make room, the journal holds it all") from error
+        raise DataError(
+            f"{folder}: cannot be written ({error.strerror}); make room, the journal holds it all"
+        ) from error
     return folder
 
 
@@ -78,9 +82,7 @@ def _row(view: SampleView) -> dict[str, Any]:
         "doc_id": view.number,
         "doc": dict(view.doc),
         "target": view.target,
-        "arguments": {
-            "gen_args_0": {"arg_0": view.prompt, "arg_1": dict(view.settings), "arg_2": {"visual": []}}
-        },
+        "arguments": {"gen_args_0": {"arg_0": view.prompt, "arg_1": dict(view.settings), "arg_2": {"visual": []}}},
         "resps": [[view.reply]],
         "filtered_resps": [view.reply],
         "filter": _FILTER,
@@ -105,9 +107,7 @@ def _results(outcome: RunOutcome) -> dict[str, Any]:
         "configs": {task.name: _plain(task.settings) for task in tasks},
         "versions": {task.name: task.settings.get("metadata", {}).get("version") for task in tasks},
         "n-shot": {task.name: 0 for task in tasks},
-        "higher_is_better": {
-            task.name: dict.fromkeys(_metrics(_of(outcome, task), outcome), True) for task in tasks
-        },
+        "higher_is_better": {task.name: dict.fromkeys(_metrics(_of(outcome, task), outcome), True) for task in tasks},
         "n-samples": {name: {"original": n, "effective": n} for name, n in counts.items()},
         "config": {
             "model": NAME,

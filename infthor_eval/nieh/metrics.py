@@ -51,8 +51,10 @@ class Metrics:
         try:
             made = self.process(doc_of(found, sample), [reply])
             return {name: float(made[name]) for name in self.names}
-        except Exception as error:  # noqa: BLE001 - anybody's code; its sample fails by name
-            raise DataError(f"process_results fails on {sample.question.id}: {type(error).__name__}: {error}") from error
+        except Exception as error:
+            raise DataError(
+                f"process_results fails on {sample.question.id}: {type(error).__name__}: {error}"
+            ) from error
 
 
 PUBLISHED = Metrics(SCORERS)

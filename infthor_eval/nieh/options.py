@@ -25,7 +25,10 @@ class NiehOptions:
     )
     tokens_per_frame: int | None = field(
         default=None,
-        metadata={"help": "Tokens of one frame where a context has a size, for models that count none.", "metavar": "N"},
+        metadata={
+            "help": "Tokens of one frame where a context has a size, for models that count none.",
+            "metavar": "N",
+        },
     )
     retriever: str | None = field(
         default=None, metadata={"help": "CLIP model of retrieval tasks, a hub id or a folder.", "metavar": "NAME"}

@@ -25,7 +25,7 @@ class NiehAnswer(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, 
     n_clues: int
     answers: tuple[str | int | float, ...]
     reply: str | None = None
-    scores: dict[str, float] = {}  # noqa: RUF012 - msgspec copies it
+    scores: dict[str, float] = {}
 
     @classmethod
     def of(cls, question: Question) -> "NiehAnswer":

@@ -127,4 +127,3 @@ def _problem(frames: list[FrameRef], known: dict[FrameRef, str | None]) -> str |
         if known[frame]:
             return known[frame]
     return None
-

@@ -100,9 +100,7 @@ class _Task:
     def identity(self, plan: TaskPlan) -> dict[str, Any]:
         """What its numbers depend on, as JSON values."""
         found, names = plan.found, plan.metrics.names
-        skipped = [
-            {"question_id": i.question.id, "variant": i.variant, "reason": i.reason} for i in found.skipped
-        ]
+        skipped = [{"question_id": i.question.id, "variant": i.variant, "reason": i.reason} for i in found.skipped]
         return {
             "config": dict(self.file.settings),
             "decoding": plan.decoding.document(),

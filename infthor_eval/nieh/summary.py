@@ -186,9 +186,7 @@ def _mean(records: Sequence[Record], metric: str) -> Score:
     )
 
 
-def _skipped(
-    records: Sequence[Record], metrics: Sequence[str], skipped: Sequence[Mapping[str, str]]
-) -> SkippedSummary:
+def _skipped(records: Sequence[Record], metrics: Sequence[str], skipped: Sequence[Mapping[str, str]]) -> SkippedSummary:
     n = len(records) + len(skipped)
     means = {name: math.fsum(_score(record, name) for record in records) / n if n else None for name in metrics}
     reasons = Counter(item["reason"] for item in skipped)

@@ -52,7 +52,9 @@ def _in_threads(groups: Sequence[Group], do: Do, n_threads: int) -> Iterator[Uni
         stop.set()
 
 
-def _work(waiting: "SimpleQueue[Group]", do: Do, made: "SimpleQueue[UnitRecord | BaseException | None]", stop: Event) -> None:
+def _work(
+    waiting: "SimpleQueue[Group]", do: Do, made: "SimpleQueue[UnitRecord | BaseException | None]", stop: Event
+) -> None:
     try:
         while not stop.is_set() and not waiting.empty():
             for record in do(waiting.get()):

@@ -31,9 +31,7 @@ def _is_one_needle(clues: tuple[int, ...]) -> bool:
     return len(clues) == 1 or (len(clues) == 2 and clues[1] - clues[0] == 1)
 
 
-def _at_depth(
-    question: Question, clues: tuple[int, ...], n_all: int, n: int, depth: float
-) -> Sample | SkippedQuestion:
+def _at_depth(question: Question, clues: tuple[int, ...], n_all: int, n: int, depth: float) -> Sample | SkippedQuestion:
     variant = f"depth={depth:g}"
     if n < len(clues):
         return SkippedQuestion(question, "the clues do not fit the window", variant)
