@@ -1,0 +1,207 @@
+"""The driver, by the smallest suite: whatever it can do, it can do for every suite."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from infthor_eval.errors import ModelError, UsageError
+from infthor_eval.runs import Group, RunRequest, Unit, UnitKey, execute, prepare, read_header, read_run
+from infthor_eval.runs.executor import evaluated
+from model_adapters import Capabilities
+from tests.runs.toy import Adder, Sum, Sums, ToySuite
+from tests.runs.toy_command import request
+
+TOY = Path(__file__).with_name("toy_command.py")
+
+
+class Watching:
+    def __init__(self):
+        self.begun, self.seen = None, []
+
+    def begin(self, work, n_recovered):
+        self.begun = (work.n_units, len(work.skipped), n_recovered)
+
+    def done(self, record, resumed):
+        self.seen.append((record.id, record.failure, resumed))
+
+
+def run(asked: RunRequest, suite=None):
+    watching = Watching()
+    return execute(prepare(asked, suite or ToySuite()), watching), watching
+
+
+def start(output, *arguments):
+    return subprocess.Popen(
+        [sys.executable, TOY, output, *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])},
+    )
+
+
+def test_a_group_that_fails_takes_no_other_with_it_and_its_units_are_named(tmp_path):
+    outcome, watching = run(request(tmp_path))
+    assert watching.begun == (4, 1, 0)
+    broken = "the abacus is broken"
+    assert watching.seen == [
+        ("1+3", None, False),
+        ("1+4", None, False),
+        ("2+3", broken, False),
+        ("2+4", broken, False),
+    ]
+    assert outcome.summary.summary.numbers == (2, 2)
+    assert [record.payload.answer for record in outcome.records] == [4, 5, None, None]
+    assert read_run(outcome.folder, ToySuite.records) == (outcome.summary.header, outcome.records)
+
+
+def test_what_is_known_is_not_done_again_and_what_failed_is_tried_again(tmp_path):
+    run(request(tmp_path))
+    outcome, watching = run(request(tmp_path))
+    assert [resumed for _, _, resumed in watching.seen] == [True, True, False, False]
+    assert [record.attempt for record in outcome.records] == [1, 1, 2, 2]
+
+
+def test_fresh_starts_anew_and_keeps_the_earlier_journal_aside(tmp_path):
+    first, _ = run(request(tmp_path))
+    _, watching = run(request(tmp_path, fresh=True))
+    assert not any(resumed for _, _, resumed in watching.seen)
+    assert (first.folder / "journal.1" / "worker-0.jsonl").is_file()
+
+
+def test_bad_lines_are_set_aside_and_only_their_units_are_tried_again(tmp_path):
+    outcome, _ = run(request(tmp_path))
+    shard = outcome.folder / "journal" / "worker-0.jsonl"
+    lines = shard.read_bytes().splitlines()
+    lines[1] = lines[1][:30] + b"\x00" + lines[1][31:]
+    shard.write_bytes(b"\n".join(lines) + b"\n")
+    with pytest.raises(Exception, match=r"worker-0.jsonl, line 2: not a line of a journal .* --recover"):
+        run(request(tmp_path))
+    _, watching = run(request(tmp_path, recover=True))
+    assert watching.begun == (4, 1, 1)
+    assert [resumed for _, _, resumed in watching.seen] == [False, True, False, False]
+    assert (shard.parent / "bad_lines.txt").read_bytes() == lines[1] + b"\n"
+
+
+def test_the_name_is_the_runs_own_and_changes_no_identity(tmp_path):
+    plain, named = run(request(tmp_path))[0], run(request(tmp_path, name="my adder"))[0]
+    assert (plain.folder.parent.name, named.folder.parent.name) == ("adder", "my adder")
+    assert plain.folder.name == named.folder.name
+    assert read_header(named.folder).name == "my adder"
+
+
+def test_records_of_units_that_the_run_does_not_ask_are_not_counted(tmp_path):
+    outcome, _ = run(request(tmp_path))
+    shard = outcome.folder / "journal" / "worker-0.jsonl"
+    stray = msgspec.structs.replace(outcome.records[0], id="9+9")
+    shard.write_bytes(shard.read_bytes() + msgspec.json.encode(stray) + b"\n")
+    assert run(request(tmp_path))[0].summary.summary.numbers == (2, 2)
+
+
+def test_a_killed_command_goes_on_and_shows_progress_table_results_and_export(tmp_path):
+    killed = start(tmp_path, "0.3")
+    deadline = time.monotonic() + 60
+    while not any(path.read_bytes().count(b"\n") > 1 for path in tmp_path.rglob("worker-0.jsonl")):
+        assert killed.poll() is None, killed.stderr.read()
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+    os.kill(killed.pid, signal.SIGKILL)
+    killed.communicate()
+    again = start(tmp_path)
+    shown, said = again.communicate(timeout=60)
+    assert again.returncode == 1, said  # a group failed
+    assert "adder: 3 answered now, 1 found in the journal" in said
+    assert "sums: 1 sample(s) skipped: nothing to add" in said
+    assert "sums: 2 sample(s) failed, counted as wrong: the abacus is broken" in said
+    assert ["adder", "2"] in [line.split() for line in shown.splitlines()]
+    (folder,) = (tmp_path / "adder").iterdir()
+    results = json.loads((folder / "results.json").read_text())
+    assert (results["suite"], results["summary"]["numbers"]) == ("toy", [2, 2])
+    (samples,) = folder.glob("lm_eval/adder/samples_sums_*.jsonl")
+    rows = [json.loads(line) for line in samples.read_text().splitlines()]
+    assert [(row["target"], row["right"]) for row in rows] == [("4", 1.0), ("5", 1.0), ("5", 0.0), ("6", 0.0)]
+
+
+def test_a_subject_that_cannot_do_what_the_suite_needs_is_refused(tmp_path, monkeypatch):
+    class Policy(Adder):
+        def act(self, frame, instruction):
+            raise AssertionError
+
+        def reset(self):
+            raise AssertionError
+
+    monkeypatch.setattr("infthor_eval.runs.driver.names", lambda: ("arm",))
+    monkeypatch.setattr("infthor_eval.runs.driver.check_options", lambda *_: None)
+    monkeypatch.setattr("infthor_eval.runs.driver.load", lambda *_: Policy())
+    with pytest.raises(UsageError, match="arm cannot be evaluated on toy, which needs a conversation"):
+        run(request(tmp_path, model="arm"))
+
+
+def test_unknown_names_and_options_are_refused_before_anything_is_done(tmp_path):
+    with pytest.raises(UsageError, match="did you mean 'adder'"):
+        prepare(request(tmp_path, model="ader"), ToySuite())
+    with pytest.raises(UsageError, match="adder has no option a"):
+        prepare(request(tmp_path, model_options={"a": "1"}), ToySuite())
+
+
+# -- several at a time
+
+
+def groups(n):
+    return [Group([Unit(UnitKey("t", f"{g}.{u}"), "c", Sum((g, u))) for u in range(3)]) for g in range(n)]
+
+
+def test_groups_in_flight_are_done_at_the_same_time_and_each_in_its_order():
+    running, most = [], []
+
+    def do(group):
+        running.append(group)
+        most.append(len(running))
+        for unit in group.units:
+            time.sleep(0.02)
+            yield unit.record("f", unit.payload)
+        running.remove(group)
+
+    records = list(evaluated(groups(6), do, 3))
+    assert 1 < max(most) <= 3
+    assert sorted(record.id for record in records) == sorted(u.key.id for g in groups(6) for u in g.units)
+    for number in range(6):
+        assert [r.id for r in records if r.id.startswith(f"{number}.")] == [f"{number}.{u}" for u in range(3)]
+
+
+def test_an_error_in_a_thread_ends_the_run_with_that_error():
+    def do(group):
+        yield group.units[0].record("f", group.units[0].payload)
+        raise ZeroDivisionError("a bug")
+
+    with pytest.raises(ZeroDivisionError, match="a bug"):
+        list(evaluated(groups(5), do, 2))
+
+
+def test_a_subject_with_several_in_flight_gives_the_same_records(tmp_path):
+    class Wide(Adder):
+        capabilities = Capabilities(counts_tokens=False, token_ids=False, max_in_flight=2)
+
+    class WideSuite(ToySuite):
+        baselines = {"adder": Wide}  # noqa: RUF012
+
+    one, two = run(request(tmp_path / "1"))[0], run(request(tmp_path / "2"), WideSuite())[0]
+    assert one.records == two.records
+
+
+def test_a_suite_that_refuses_its_work_ends_before_a_journal_is_begun(tmp_path):
+    class Refusing(Sums):
+        def work(self, subject):
+            raise ModelError("no")
+
+    suite = type("RefusingSuite", (ToySuite,), {"prepare": lambda self, request: Refusing()})()
+    with pytest.raises(ModelError, match="no"):
+        run(request(tmp_path), suite)
+    assert not list(tmp_path.iterdir())

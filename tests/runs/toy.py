@@ -1,0 +1,54 @@
+"""The smallest suite: sums, in two groups, one of which cannot be done."""
+
+import msgspec
+
+from infthor_eval import runs
+from infthor_eval.errors import DataError
+from model_adapters import Capabilities
+
+
+class Sum(msgspec.Struct, frozen=True, tag_field="type", tag="sum"):
+    numbers: tuple[int, int]
+    answer: int | None = None
+
+
+class Adder:
+    name, capabilities = "adder", Capabilities(counts_tokens=False, token_ids=False)
+
+    def __init__(self, seed=0):
+        self.identity, self.close = lambda: {"baseline": "adder"}, lambda: None
+
+
+class Sums:
+    def work(self, subject):
+        units = [runs.Unit(runs.UnitKey("sums", f"{a}+{b}"), f"from {a}", Sum((a, b))) for a in (1, 2) for b in (3, 4)]
+        skipped = [runs.Skipped(runs.UnitKey("sums", "0+0"), "nothing to add")]
+        return runs.Work([runs.Group(units[:2]), runs.Group(units[2:], "broken")], skipped, {"tasks": {"sums": {}}})
+
+    def run(self, group, session):
+        for unit in group.units:
+            if group.context == "broken":
+                raise DataError("the abacus is broken")
+            yield session.known(unit, "f") or unit.record("f", Sum(unit.payload.numbers, sum(unit.payload.numbers)))
+
+    def view(self, record):
+        a, b = record.payload.numbers
+        return runs.SampleView(a * 10 + b, {"numbers": [a, b]}, str(a + b), f"{a}+{b}", {}, str(record.payload.answer))
+
+
+class ToySuite:
+    name, needs, options, records = "toy", "conversation", object, runs.RecordTypes(Sum)
+    baselines = {"adder": Adder}  # noqa: RUF012
+
+    def prepare(self, request):
+        return Sums()
+
+    def summarise(self, header, records):
+        return Sum((sum(r.failure is None for r in records), sum(r.failure is not None for r in records)))
+
+    def scores(self, record):
+        return {"right": float(record.payload.answer == sum(record.payload.numbers))}
+
+    def tables(self, summaries):
+        rows = tuple(runs.Row((run.header.name, str(run.summary.numbers[0]))) for run in summaries)
+        return [runs.Table("Sums", (runs.Column("who", False), runs.Column("right")), rows)]
