@@ -15,11 +15,11 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
-from infthor_eval.generation.pddl import DOMAIN, problem
-from infthor_eval.generation.planner import plan
 from infthor_eval.generation.sampling import TaskPool
-from infthor_eval.generation.symbolic import Room, room_of
-from infthor_eval.generation.tasks import Task, TaskType
+from infthor_eval.household.pddl import DOMAIN, problem
+from infthor_eval.household.planner import plan
+from infthor_eval.household.symbolic import Room, room_of
+from infthor_eval.household.tasks import Task, TaskType
 from infthor_eval.thor.launch import embedded
 from infthor_eval.thor.simulator import Simulator
 

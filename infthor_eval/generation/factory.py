@@ -22,17 +22,17 @@ from infthor_eval.formats.trajectory import (
     SubTrajectory,
     Trajectory,
 )
-from infthor_eval.generation.affordances import goes_into
 from infthor_eval.generation.final_task import ends_of
-from infthor_eval.generation.pddl import problem
-from infthor_eval.generation.planner import plan
 from infthor_eval.generation.recorder import object_log
 from infthor_eval.generation.rollout import Rollout, RolloutError
 from infthor_eval.generation.sampling import TaskPool, tasks_of
-from infthor_eval.generation.scout import reachable
 from infthor_eval.generation.setbacks import Setbacks
-from infthor_eval.generation.symbolic import Operator, Room, room_of
-from infthor_eval.generation.tasks import Task, TaskType, sub_task
+from infthor_eval.household.affordances import goes_into
+from infthor_eval.household.pddl import problem
+from infthor_eval.household.planner import plan
+from infthor_eval.household.scout import reachable
+from infthor_eval.household.symbolic import Operator, Room, room_of
+from infthor_eval.household.tasks import Task, TaskType, sub_task
 from infthor_eval.thor.restore import restore
 from infthor_eval.thor.simulator import Mark, Simulator
 

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from infthor_eval.formats.trajectory import Trajectory
-from infthor_eval.generation.tasks import Task
+from infthor_eval.household.tasks import Task
 
 __all__ = ["SHARE", "Ends", "ends_of", "violation"]
 

@@ -7,9 +7,9 @@ from typing import Any
 
 from infthor_eval.errors import InfthorError, UsageError
 from infthor_eval.formats.trajectory import encode_trajectory, iter_sources
-from infthor_eval.generation.collecting import libraries_set_aside
 from infthor_eval.generation.factory import Settings, Statistics, generate
-from infthor_eval.generation.pddl import DOMAIN
+from infthor_eval.generation.garbage import libraries_set_aside
+from infthor_eval.household.pddl import DOMAIN
 from infthor_eval.thor.simulator import Simulator
 
 __all__ = ["Generated", "generate_set", "is_bathroom"]

@@ -13,8 +13,8 @@ from infthor_eval.formats.step_log import write_steps
 from infthor_eval.formats.trajectory import LowAction, Trajectory
 from infthor_eval.generation.motion import between
 from infthor_eval.generation.recorder import Recorder
-from infthor_eval.generation.sequence_text import sequence_text
-from infthor_eval.generation.state_summary import state_summaries
+from infthor_eval.household.sequence_text import sequence_text
+from infthor_eval.household.state_summary import state_summaries
 from infthor_eval.thor.actions import text_of
 from infthor_eval.thor.grounding import Grounding
 from infthor_eval.thor.recorded import MissingObjectError, translate

@@ -20,7 +20,7 @@ import msgspec
 from infthor_eval.errors import DataError, InfthorError, SimulatorError
 from infthor_eval.formats.set_info import claim_for_simulator
 from infthor_eval.formats.trajectory import Source, Trajectory, folder_name, iter_sources
-from infthor_eval.generation.collecting import libraries_set_aside
+from infthor_eval.generation.garbage import libraries_set_aside
 from infthor_eval.generation.replay import Overlap, Replayed, replay
 from infthor_eval.thor.simulator import Simulator
 

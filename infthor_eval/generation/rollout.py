@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from infthor_eval.formats.trajectory import ApiAction, DiscreteAction, HighAction, LowAction, PlannerAction
-from infthor_eval.generation.navigation import GRID, Grid
-from infthor_eval.generation.scout import HORIZON_STEP, Viewpoint, find_viewpoint, reachable, stand_of
-from infthor_eval.generation.symbolic import Operator, direct_parent
-from infthor_eval.generation.wording import compact
+from infthor_eval.household.navigation import GRID, Grid
+from infthor_eval.household.scout import HORIZON_STEP, Viewpoint, find_viewpoint, reachable, stand_of
+from infthor_eval.household.symbolic import Operator, direct_parent
+from infthor_eval.household.wording import compact
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import View
 

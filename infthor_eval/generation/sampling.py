@@ -5,7 +5,7 @@ import random
 from collections import Counter
 from collections.abc import Iterable, Iterator
 
-from infthor_eval.generation.affordances import (
+from infthor_eval.household.affordances import (
     CLEANABLE,
     COOLABLE,
     HEATABLE,
@@ -15,8 +15,8 @@ from infthor_eval.generation.affordances import (
     SLICEABLE,
     goes_into,
 )
-from infthor_eval.generation.symbolic import ABSENT, Room
-from infthor_eval.generation.tasks import Task, TaskType
+from infthor_eval.household.symbolic import ABSENT, Room
+from infthor_eval.household.tasks import Task, TaskType
 
 __all__ = ["TaskPool", "tasks_of"]
 

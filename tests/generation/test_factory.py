@@ -12,7 +12,7 @@ from infthor_eval.generation.factory import Settings, generate
 from infthor_eval.generation.final_task import violation
 from infthor_eval.generation.generate_set import generate_set
 from infthor_eval.generation.replay_set import replay_set, select
-from infthor_eval.generation.tasks import TaskType
+from infthor_eval.household.tasks import TaskType
 from infthor_eval.thor.launch import embedded
 from infthor_eval.thor.simulator import Simulator
 

@@ -2,10 +2,9 @@ import random
 from collections import Counter
 
 from infthor_eval.generation.sampling import TaskPool, tasks_of
-from infthor_eval.generation.symbolic import room_of
-from infthor_eval.generation.tasks import Task, TaskType, sub_task
-
-from .rooms import KITCHEN
+from infthor_eval.household.symbolic import room_of
+from infthor_eval.household.tasks import Task, TaskType, sub_task
+from tests.household.rooms import KITCHEN
 
 ROOM = room_of(KITCHEN)
 

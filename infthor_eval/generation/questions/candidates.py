@@ -5,9 +5,9 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from infthor_eval.formats.question import Answer, Question
-from infthor_eval.generation.affordances import preposition
 from infthor_eval.generation.questions.history import canonical
-from infthor_eval.generation.wording import compact, noun
+from infthor_eval.household.affordances import preposition
+from infthor_eval.household.wording import compact, noun
 
 __all__ = ["MANY", "Candidate", "answer_of", "distinct", "listing", "the", "within"]
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 from infthor_eval.generation.questions.candidates import Candidate, the, within
 from infthor_eval.generation.questions.history import Event, History, Move
-from infthor_eval.generation.wording import an, noun
+from infthor_eval.household.wording import an, noun
 
 __all__ = ["KIND", "counts"]
 

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 from infthor_eval.generation.questions.candidates import Candidate
 from infthor_eval.generation.questions.history import History
-from infthor_eval.generation.wording import an, noun
+from infthor_eval.household.wording import an, noun
 
 __all__ = ["KIND", "absent", "present"]
 

@@ -1,7 +1,7 @@
 import pytest
 
-from infthor_eval.generation.affordances import preposition
-from infthor_eval.generation.wording import an, noun, plural
+from infthor_eval.household.affordances import preposition
+from infthor_eval.household.wording import an, noun, plural
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ import math
 from collections.abc import Container, Iterable
 from dataclasses import dataclass
 
-from infthor_eval.generation.affordances import SLICEABLE
+from infthor_eval.household.affordances import SLICEABLE
 from infthor_eval.thor.view import ThorObject, View
 
 __all__ = ["ABSENT", "FLOOR", "Operator", "Room", "State", "direct_parent", "room_of", "slice_item"]

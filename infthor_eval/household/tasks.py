@@ -5,8 +5,8 @@ from enum import StrEnum
 import msgspec
 
 from infthor_eval.formats.trajectory import SubTask, TaskInfo
-from infthor_eval.generation.affordances import preposition
-from infthor_eval.generation.wording import an, noun, plural
+from infthor_eval.household.affordances import preposition
+from infthor_eval.household.wording import an, noun, plural
 
 __all__ = ["Task", "TaskType", "sub_task"]
 

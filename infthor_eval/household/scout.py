@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from infthor_eval.errors import SimulatorError
-from infthor_eval.generation.navigation import Grid, Stand
+from infthor_eval.household.navigation import Grid, Stand
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import ThorObject, Vector, View
 

@@ -5,8 +5,8 @@ place where it was last seen, what is open or on, and what the agent holds.
 """
 
 from infthor_eval.formats.step_log import ObjectState, Step, worlds
-from infthor_eval.generation.affordances import preposition
-from infthor_eval.generation.wording import an, noun
+from infthor_eval.household.affordances import preposition
+from infthor_eval.household.wording import an, noun
 
 __all__ = ["state_summaries"]
 

@@ -1,8 +1,8 @@
 """When a task is done, in the symbolic state, and a lower bound on what is left to do."""
 
-from infthor_eval.generation.affordances import KNIVES
-from infthor_eval.generation.symbolic import Room, State
-from infthor_eval.generation.tasks import Task, TaskType
+from infthor_eval.household.affordances import KNIVES
+from infthor_eval.household.symbolic import Room, State
+from infthor_eval.household.tasks import Task, TaskType
 
 __all__ = ["APPLIANCE", "achieved", "least_remaining"]
 

@@ -10,10 +10,10 @@ import itertools
 from collections.abc import Iterator
 from dataclasses import replace
 
-from infthor_eval.generation.affordances import KNIVES, goes_into
-from infthor_eval.generation.goals import APPLIANCE, least_remaining
-from infthor_eval.generation.symbolic import ABSENT, FLOOR, Operator, Room, State, slice_item
-from infthor_eval.generation.tasks import Task, TaskType
+from infthor_eval.household.affordances import KNIVES, goes_into
+from infthor_eval.household.goals import APPLIANCE, least_remaining
+from infthor_eval.household.symbolic import ABSENT, FLOOR, Operator, Room, State, slice_item
+from infthor_eval.household.tasks import Task, TaskType
 
 __all__ = ["plan", "relevant_items"]
 

@@ -7,10 +7,10 @@ every place of the room, and the items of the types that the task is about.
 
 from collections.abc import Iterable
 
-from infthor_eval.generation.affordances import KNIVES, SLICEABLE, goes_into
-from infthor_eval.generation.planner import relevant_items
-from infthor_eval.generation.symbolic import ABSENT, FLOOR, Room, slice_item
-from infthor_eval.generation.tasks import Task, TaskType
+from infthor_eval.household.affordances import KNIVES, SLICEABLE, goes_into
+from infthor_eval.household.planner import relevant_items
+from infthor_eval.household.symbolic import ABSENT, FLOOR, Room, slice_item
+from infthor_eval.household.tasks import Task, TaskType
 
 __all__ = ["DOMAIN", "problem"]
 
