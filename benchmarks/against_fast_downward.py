@@ -49,11 +49,11 @@ def sampled(number: int, seed: int) -> Iterator[tuple[Task, Room]]:
         rooms = []
         for scene in _SCENES:
             view = simulator.reset(scene)
-            kinds = {item.object_type for item in view.objects.values()}
-            rooms.append((room_of(view), kinds, TaskPool(TaskType, rng)))
+            types = {item.object_type for item in view.objects.values()}
+            rooms.append((room_of(view), types, TaskPool(TaskType, rng)))
     for index in range(number):
-        room, kinds, pool = rooms[index % len(rooms)]
-        task = next(task for task in pool.sample(room, kinds) if plan(task, room))
+        room, types, pool = rooms[index % len(rooms)]
+        task = next(task for task in pool.sample(room, types) if plan(task, room))
         pool.used(task)
         yield task, room
 

@@ -25,16 +25,17 @@ from infthor_eval.formats.trajectory import (
 from infthor_eval.generation.final_task import ends_of
 from infthor_eval.generation.recorder import object_log
 from infthor_eval.generation.rollout import Rollout, RolloutError
-from infthor_eval.generation.sampling import TaskPool, tasks_of
+from infthor_eval.generation.sampling import TaskPool
 from infthor_eval.generation.setbacks import Setbacks
 from infthor_eval.household.affordances import goes_into
 from infthor_eval.household.pddl import problem
 from infthor_eval.household.planner import plan
+from infthor_eval.household.possible_tasks import tasks_of
 from infthor_eval.household.scout import reachable
 from infthor_eval.household.symbolic import Operator, Room, room_of
 from infthor_eval.household.tasks import Task, TaskType, sub_task
 from infthor_eval.thor.restore import restore
-from infthor_eval.thor.simulator import Mark, Simulator
+from infthor_eval.thor.simulator import Simulator, SimulatorMark
 
 __all__ = ["Made", "Settings", "Statistics", "generate"]
 
@@ -52,7 +53,7 @@ class Settings:
         min_steps: low-level actions at least.
         min_subgoals: sub-goals at least.
         final_task: whether a final task follows (see `final_task`).
-        kinds: task types to draw from.
+        task_types: what to draw from.
     """
 
     scene: str
@@ -60,7 +61,7 @@ class Settings:
     min_steps: int
     min_subgoals: int
     final_task: bool = False
-    kinds: tuple[TaskType, ...] = tuple(TaskType)
+    task_types: tuple[TaskType, ...] = tuple(TaskType)
 
     @property
     def traj_id(self) -> str:
@@ -75,7 +76,7 @@ class Settings:
             "min_steps": self.min_steps,
             "min_subgoals": self.min_subgoals,
             "final_task": self.final_task,
-            "task_types": [str(kind) for kind in self.kinds],
+            "task_types": [str(task_type) for task_type in self.task_types],
         }
 
 
@@ -131,7 +132,7 @@ class _Factory:
         self._name = f"scene {settings.scene}, seed {settings.seed}"
         self._simulator = simulator
         self._rng = random.Random(f"{settings.scene}/{settings.seed}")
-        self._pool = TaskPool(settings.kinds, self._rng)
+        self._pool = TaskPool(settings.task_types, self._rng)
         self._setbacks = Setbacks()
         self._low: list[LowAction] = []
         self._high: list[HighAction] = []
@@ -203,11 +204,11 @@ class _Factory:
 
     def _try_sampled(self, allowed: Callable[[Task], bool], trials: int | None, is_last: bool) -> Task | None:
         view = self._simulator.view
-        kinds = {item.object_type for item in view.objects.values()}
+        types = {item.object_type for item in view.objects.values()}
         room = self._setbacks.room(view)
-        possible = set(tasks_of(room, kinds))
+        possible = set(tasks_of(room, types))
         tried = 0
-        for task in self._pool.sample(room, kinds):
+        for task in self._pool.sample(room, types):
             operators = plan(task, room) if task in possible and allowed(task) else None
             if not operators or all(step.name == "GotoLocation" for step in operators):
                 continue  # it holds already, or would by standing elsewhere
@@ -220,7 +221,7 @@ class _Factory:
             if failure.item is not None:
                 self._setbacks.note(view, failure.item, failure.receptacle)
             room = self._setbacks.room(view)
-            possible = set(tasks_of(room, kinds))
+            possible = set(tasks_of(room, types))
         return None
 
     def trajectory(self) -> Trajectory:
@@ -245,7 +246,7 @@ class _Factory:
         )
 
     def _try(self, task: Task, room: Room, operators: Sequence[Operator], is_last: bool) -> RolloutError | None:
-        name = f"{task.kind}{' sliced' if task.sliced else ''}"
+        name = f"{task.task_type}{' sliced' if task.sliced else ''}"
         self.statistics.tried[name] += 1
         before, low, high = self._simulator.mark(), len(self._low), len(self._high)
         failure = self._carry_out(operators)
@@ -284,7 +285,7 @@ class _Factory:
         self.statistics.reasons[str(error)] += 1
         return error
 
-    def _go_back(self, before: Mark, low: int, high: int) -> None:
+    def _go_back(self, before: SimulatorMark, low: int, high: int) -> None:
         """Take back what was added since a mark at which there were so many actions and sub-goals."""
         if len(self._low) > low:
             self._simulator.rewind(before)

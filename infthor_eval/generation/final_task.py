@@ -42,7 +42,7 @@ def ends_of(object_log: Sequence[dict[str, Any]]) -> Ends:
     """
     count = max(1, math.floor(SHARE * len(object_log)))
     early, late = object_log[:count], object_log[-count:]
-    return Ends(*({kind for entry in part for kind in entry["visible"]} for part in (early, late)))
+    return Ends(*({object_type for entry in part for object_type in entry["visible"]} for part in (early, late)))
 
 
 def violation(trajectory: Trajectory) -> str | None:

@@ -104,7 +104,7 @@ def object_log(view: View) -> ObjectLog:
         is_open=_types([item for item in visible if item.openable and item.is_open]),
         inven_obj=sorted(object_type_of(key) for key in view.inventory),
         receptacles=_types([item for item in visible if item.receptacle]),
-        recep_objs={kind: sorted(types) for kind, types in sorted(inside.items())},
+        recep_objs={object_type: sorted(types) for object_type, types in sorted(inside.items())},
     )
 
 

@@ -174,5 +174,5 @@ class _Run:
             return
         shown = before.instances.get(target)
         iou = 0.0 if shown is None else box_iou(recorded, shown.box)
-        kind = before.objects[target].object_type
-        self.report.overlaps.append(Overlap(index, low.api_action.action, kind, round(iou, 4)))
+        object_type = before.objects[target].object_type
+        self.report.overlaps.append(Overlap(index, low.api_action.action, object_type, round(iou, 4)))

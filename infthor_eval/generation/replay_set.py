@@ -79,12 +79,12 @@ class Summary:
             for overlap in report.overlaps:
                 found[by(overlap)].append(overlap.iou)
         return {
-            kind: {
+            name: {
                 "count": len(values),
                 "median": round(statistics.median(values), 4),
                 "mean": round(statistics.fmean(values), 4),
             }
-            for kind, values in sorted(found.items())
+            for name, values in sorted(found.items())
         }
 
     def document(self) -> dict[str, Any]:
@@ -158,7 +158,7 @@ def replay_set(
     started = time.monotonic()
     metadata = out / "metadata"
     metadata.mkdir(parents=True, exist_ok=True)
-    claim_for_simulator(out, simulator.kind)
+    claim_for_simulator(out, simulator.label)
     summary = Summary(failures=list(selection.failures))
     for source, trajectory in selection.items:
         try:

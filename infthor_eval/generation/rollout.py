@@ -8,9 +8,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from infthor_eval.formats.trajectory import ApiAction, DiscreteAction, HighAction, LowAction, PlannerAction
+from infthor_eval.household.containment import direct_parent
 from infthor_eval.household.navigation import GRID, Grid
 from infthor_eval.household.scout import HORIZON_STEP, Viewpoint, find_viewpoint, reachable, stand_of
-from infthor_eval.household.symbolic import Operator, direct_parent
+from infthor_eval.household.symbolic import Operator
 from infthor_eval.household.wording import compact
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import View
@@ -241,15 +242,15 @@ class Rollout:
             return item
         if item not in self._slices:
             whole = item.partition("#")[0]
-            kind = f"{whole.partition('|')[0]}Sliced"
+            object_type = f"{whole.partition('|')[0]}Sliced"
             taken = set(self._slices.values())
             free = [
                 key
                 for key, found in self._view.objects.items()
-                if found.object_type == kind and key.startswith(whole) and key not in taken
+                if found.object_type == object_type and key.startswith(whole) and key not in taken
             ]
             if not free:
-                raise RolloutError(f"no {kind} came of slicing")
+                raise RolloutError(f"no {object_type} came of slicing")
             self._slices[item] = min(free, key=lambda key: (not self._view.objects[key].visible, key))
         return self._slices[item]
 
@@ -267,11 +268,11 @@ class Rollout:
         item = self._view.objects[key]
         return item.openable and not item.is_open and item.receptacle
 
-    def _nearest(self, kind: str, to: str) -> str:
+    def _nearest(self, object_type: str, to: str) -> str:
         objects = self._view.objects
-        found = [item for item in objects.values() if item.object_type == kind]
+        found = [item for item in objects.values() if item.object_type == object_type]
         if not found:
-            raise RolloutError(f"no {kind} in the room")
+            raise RolloutError(f"no {object_type} in the room")
         at = objects[to].position
         return min(found, key=lambda item: (item.position.x - at.x) ** 2 + (item.position.z - at.z) ** 2).object_id
 

@@ -1,6 +1,7 @@
 """What turned out not to work in a room, so that it is not tried again while things are as they were."""
 
-from infthor_eval.household.symbolic import Room, direct_parent, room_of
+from infthor_eval.household.containment import direct_parent
+from infthor_eval.household.symbolic import Room, room_of
 from infthor_eval.thor.view import View
 
 __all__ = ["Setbacks"]

@@ -115,7 +115,7 @@ class SafeController(ai2thor.controller.Controller):
         """The fault with the last line that the simulator logged, the simulator stopped."""
         words = self._last_words()
         self.stop()
-        return PeerFault(fault.kind, f"{fault}; its log ends with: {words}" if words else str(fault))
+        return PeerFault(fault.fault_type, f"{fault}; its log ends with: {words}" if words else str(fault))
 
     def _last_words(self) -> str:
         log = Path(self.log_dir) / "unity.log"

@@ -13,10 +13,11 @@ from typing import Any, Self
 from infthor_eval.errors import SimulatorError
 from infthor_eval.thor.controller import SafeController
 from infthor_eval.thor.launch import Launch
+from infthor_eval.thor.teleport import teleport_call
 from infthor_eval.thor.transport import PeerFault
 from infthor_eval.thor.view import View, view_of
 
-__all__ = ["Mark", "Simulator"]
+__all__ = ["Simulator", "SimulatorMark"]
 
 _LOG = logging.getLogger(__name__)
 _INITIAL = {"gridSize": 0.25, "fieldOfView": 60, "visibilityDistance": 1.5, "snapToGrid": True}
@@ -25,7 +26,7 @@ _WALKING = {"MoveAhead", "MoveBack", "MoveLeft", "MoveRight", "RotateLeft", "Rot
 
 
 @dataclass(frozen=True)
-class Mark:
+class SimulatorMark:
     """A moment of an episode: how many actions led to it, and the world then."""
 
     length: int
@@ -84,14 +85,14 @@ class Simulator:
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+        self, error_type: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
 
     @property
-    def kind(self) -> str:
+    def label(self) -> str:
         """Which simulator this is, "embedded" or "unity"."""
-        return self._launch.kind
+        return self._launch.label
 
     @property
     def view(self) -> View:
@@ -167,7 +168,7 @@ class Simulator:
         self._view = before
         return answer
 
-    def mark(self) -> Mark:
+    def mark(self) -> SimulatorMark:
         """Remember where the episode is now, for `rewind`; the last two marks are cheap to go back to.
 
         The embedded simulator keeps a copy of its state. Unity cannot: there `rewind` may repeat the episode.
@@ -177,9 +178,9 @@ class Simulator:
             slot = min(range(_SLOTS), key=lambda slot: self._saved.get(slot, -1))
             if self.query("SaveState", slot=slot).success:
                 self._saved[slot] = length
-        return Mark(length, self.view)
+        return SimulatorMark(length, self.view)
 
-    def rewind(self, mark: Mark) -> View:
+    def rewind(self, mark: SimulatorMark) -> View:
         """Bring the world back to where it was at a mark of this episode.
 
         Raises:
@@ -202,17 +203,10 @@ class Simulator:
         slot = next((slot for slot, known in self._saved.items() if known == length), None)
         return slot is not None and self.query("RestoreState", slot=slot).success
 
-    def _walk_back(self, mark: Mark) -> bool:
+    def _walk_back(self, mark: SimulatorMark) -> bool:
         """Put the agent where it was; enough where it only walked and looked about since."""
-        agent = mark.view.agent
-        back = self.query(
-            "Teleport",
-            position={"x": agent.position.x, "y": agent.position.y, "z": agent.position.z},
-            rotation={"x": 0.0, "y": agent.rotation, "z": 0.0},
-            horizon=agent.horizon,
-            forceAction=True,
-        )
-        return back.success and back.agent == agent
+        back = self.query(**teleport_call(mark.view.agent))
+        return back.success and back.agent == mark.view.agent
 
     def close(self) -> None:
         """Stop the simulator; a later `reset` starts it again."""

@@ -36,11 +36,11 @@ _NOT_PROTOCOL = (
 
 
 class PeerFault(SimulatorError):
-    """The simulator's process failed; `kind` is "died", "hung" or "garbage"."""
+    """The simulator's process failed; `fault_type` is "died", "hung" or "garbage"."""
 
-    def __init__(self, kind: str, message: str) -> None:
+    def __init__(self, fault_type: str, message: str) -> None:
         super().__init__(message)
-        self.kind = kind
+        self.fault_type = fault_type
 
 
 class SafeFifoServer(FifoServer):
@@ -190,8 +190,8 @@ class SafeFifoServer(FifoServer):
             return "closed its pipe while still running"
         return f"died (exit status {code})"
 
-    def _fail(self, kind: str, words: str) -> PeerFault:
-        self.fault = PeerFault(kind, f"the simulator {words} at {self.doing}")
+    def _fail(self, fault_type: str, words: str) -> PeerFault:
+        self.fault = PeerFault(fault_type, f"the simulator {words} at {self.doing}")
         return self.fault
 
 

@@ -80,5 +80,5 @@ def test_looking_for_places_leaves_no_trace(scene, seed, tmp_path):
 
 def test_a_task_type_that_the_room_offers_nothing_for_is_one_line(simulator):
     with pytest.raises(UsageError, match=r"scene living-room-1, seed 0: no further task works after 0 steps") as error:
-        generate(Settings("living-room-1", 0, 10, 1, kinds=(TaskType.HEAT,)), simulator)
+        generate(Settings("living-room-1", 0, 10, 1, task_types=(TaskType.HEAT,)), simulator)
     assert "\n" not in str(error.value)

@@ -1,7 +1,8 @@
 import random
 from collections import Counter
 
-from infthor_eval.generation.sampling import TaskPool, tasks_of
+from infthor_eval.generation.sampling import TaskPool
+from infthor_eval.household.possible_tasks import tasks_of
 from infthor_eval.household.symbolic import room_of
 from infthor_eval.household.tasks import Task, TaskType, sub_task
 from tests.household.rooms import KITCHEN
@@ -22,19 +23,19 @@ def drawn(number):
 
 def test_every_type_with_and_without_slicing_is_in_the_pool():
     tasks = tasks_of(ROOM, {"Faucet"})
-    assert {task.kind for task in tasks} == set(TaskType)
-    assert {task.kind for task in tasks if task.sliced} == set(TaskType)
+    assert {task.task_type for task in tasks} == set(TaskType)
+    assert {task.task_type for task in tasks if task.sliced} == set(TaskType)
     assert len(tasks) == len(set(tasks))
 
 
 def test_no_washing_without_a_faucet():
-    assert not [task for task in tasks_of(ROOM) if task.kind == TaskType.CLEAN]
+    assert not [task for task in tasks_of(ROOM) if task.task_type == TaskType.CLEAN]
 
 
 def test_use_keeps_the_choice_diverse():
     chosen = drawn(28)
-    kinds = Counter(task.kind for task in chosen)
-    assert set(kinds) == set(TaskType) and max(kinds.values()) <= 8
+    types = Counter(task.task_type for task in chosen)
+    assert set(types) == set(TaskType) and max(types.values()) <= 8
     assert len(set(chosen)) > 20
 
 
@@ -59,7 +60,7 @@ def test_descriptions():
 
 def test_the_choice_stays_diverse_however_long_the_trajectory():
     late = Counter(drawn(3000)[-300:])
-    assert {task.kind for task in late} == set(TaskType)
+    assert {task.task_type for task in late} == set(TaskType)
     assert max(late.values()) <= 30
     assert len(late) > 60
 

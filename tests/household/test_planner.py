@@ -2,9 +2,9 @@ from collections import deque
 
 import pytest
 
-from infthor_eval.generation.sampling import tasks_of
 from infthor_eval.household.goals import achieved, least_remaining
 from infthor_eval.household.planner import plan
+from infthor_eval.household.possible_tasks import tasks_of
 from infthor_eval.household.symbolic import room_of
 from infthor_eval.household.tasks import Task, TaskType
 

@@ -17,7 +17,7 @@ from infthor_eval.nieh.scoring import score
 from infthor_eval.thor.launch import embedded
 from infthor_eval.thor.simulator import Simulator
 
-KINDS = {
+QUESTION_TYPES = {
     "object_presence",
     "open_state",
     "location_tracing",
@@ -46,7 +46,7 @@ def everything(replayed):
 
 def test_the_checker_agrees_with_every_question(everything):
     assert not everything.doubted and not everything.skipped
-    assert {question.question_type for question in everything.questions} == KINDS
+    assert {question.question_type for question in everything.questions} == QUESTION_TYPES
     assert all(everything.by_clues().values())
 
 
@@ -76,7 +76,7 @@ def test_choice_is_balanced_and_seeded(replayed):
     yes = [question for question in made[0].questions if question.answers == ("yes",)]
     no = [question for question in made[0].questions if question.answers == ("no",)]
     assert abs(len(yes) - len(no)) <= 5
-    assert set(made[0].by_kind()) == KINDS
+    assert set(made[0].by_type()) == QUESTION_TYPES
 
 
 def test_absences_are_flagged_and_look_like_presences(everything):
