@@ -22,7 +22,7 @@ from infthor_eval.thor.restore import restore
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import View
 
-__all__ = ["Overlap", "Refusal", "Replayed", "box_iou", "replay"]
+__all__ = ["Overlap", "Refusal", "ReplayReport", "box_iou", "replay"]
 
 
 class Refusal(msgspec.Struct):
@@ -42,7 +42,7 @@ class Overlap(msgspec.Struct):
     iou: float
 
 
-class Replayed(msgspec.Struct):
+class ReplayReport(msgspec.Struct):
     """What came of one replay (`replay.json`).
 
     Attributes:
@@ -68,12 +68,12 @@ class Replayed(msgspec.Struct):
     seconds: float = 0.0
 
     @property
-    def whole(self) -> bool:
+    def complete(self) -> bool:
         """Whether every action was carried out."""
         return not self.refusals
 
 
-def replay(trajectory: Trajectory, simulator: Simulator, folder: Path, digest: str, frames: int = 1) -> Replayed:
+def replay(trajectory: Trajectory, simulator: Simulator, folder: Path, digest: str, frames: int = 1) -> ReplayReport:
     """Run a trajectory and write its frames and logs into a folder.
 
     These are `img/`, `metadata.json`, `traj.txt`, `expert_log.json`, and `state_summary.json`: the room in words
@@ -89,7 +89,7 @@ def replay(trajectory: Trajectory, simulator: Simulator, folder: Path, digest: s
     Raises:
         SimulatorError: the simulator fails or has no such scene.
     """
-    run = _Run(simulator, Replayed(trajectory.traj_id, digest, trajectory.scene.floor_plan, frames))
+    run = _Run(simulator, ReplayReport(trajectory.traj_id, digest, trajectory.scene.floor_plan, frames))
     restored = restore(simulator, trajectory.scene)
     run.report.restore = [f"no {name} here" for name in restored.dropped] + restored.refused
     (folder / "img").mkdir()
@@ -122,7 +122,7 @@ def _area(box: tuple[int, int, int, int]) -> int:
 class _Run:
     """The state of one replay."""
 
-    def __init__(self, simulator: Simulator, report: Replayed) -> None:
+    def __init__(self, simulator: Simulator, report: ReplayReport) -> None:
         self._simulator = simulator
         self.report = report
 

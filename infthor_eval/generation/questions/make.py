@@ -23,11 +23,11 @@ from infthor_eval.generation.questions.candidates import Candidate
 from infthor_eval.generation.questions.checker import Checker
 from infthor_eval.generation.questions.history import DEFAULT_SHARE, History
 
-__all__ = ["Made", "candidates_of", "make_questions"]
+__all__ = ["MadeQuestions", "candidates_of", "make_questions"]
 
 
 @dataclass
-class Made:
+class MadeQuestions:
     """What came of it.
 
     Attributes:
@@ -58,7 +58,9 @@ class Made:
         return f"by type: {types}\nby number of clues: {clues}"
 
 
-def make_questions(folder: Path, *, seed: int = 0, per_trajectory: int = 25, share: float = DEFAULT_SHARE) -> Made:
+def make_questions(
+    folder: Path, *, seed: int = 0, per_trajectory: int = 25, share: float = DEFAULT_SHARE
+) -> MadeQuestions:
     """Make questions on a replayed set.
 
     Args:
@@ -74,7 +76,7 @@ def make_questions(folder: Path, *, seed: int = 0, per_trajectory: int = 25, sha
         DataError: the set has no trajectory, or is of another version.
     """
     simulator_of(folder)
-    made = Made()
+    made = MadeQuestions()
     histories = []
     for path in _folders(folder):
         try:

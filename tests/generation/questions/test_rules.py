@@ -7,12 +7,13 @@ import pytest
 
 from infthor_eval.errors import DataError
 from infthor_eval.formats.step_log import Step, read_steps
-from infthor_eval.generation.factory import Settings
 from infthor_eval.generation.generate_set import generate_set
 from infthor_eval.generation.questions.checker import Checker
 from infthor_eval.generation.questions.history import DEFAULT_SHARE, History
 from infthor_eval.generation.questions.make import make_questions
 from infthor_eval.generation.replay_set import replay_set, select
+from infthor_eval.generation.replay_summary import summarise
+from infthor_eval.generation.settings import TrajectorySettings
 from infthor_eval.nieh.scoring import score
 from infthor_eval.thor.launch import embedded
 from infthor_eval.thor.simulator import Simulator
@@ -32,10 +33,10 @@ QUESTION_TYPES = {
 @pytest.fixture(scope="module")
 def replayed(tmp_path_factory):
     folder = tmp_path_factory.mktemp("set")
-    jobs = [Settings(scene, 3, 110, 1) for scene in ("kitchen-3", "kitchen-5")]
+    jobs = [TrajectorySettings(scene, 3, 110, 1) for scene in ("kitchen-3", "kitchen-5")]
     with Simulator(embedded()) as simulator:
         generate_set(jobs, simulator, folder / "trajectories")
-        assert replay_set(select([folder / "trajectories"]), simulator, folder).document()["whole"] == 2
+        assert summarise(replay_set(select([folder / "trajectories"]), simulator, folder)).complete == 2
     return folder
 
 
