@@ -56,7 +56,7 @@ class Manifest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def read_manifest(path: Path) -> Manifest:
-    """Read a manifest.
+    """Reads a manifest.
 
     Raises:
         DataError: it cannot be read or is none.
@@ -66,13 +66,13 @@ def read_manifest(path: Path) -> Manifest:
     except OSError as error:
         raise DataError(f"{path}: cannot be read ({error.strerror}); give a manifest") from error
     except msgspec.DecodeError as error:
-        raise DataError(f"{path}: not a manifest ({error})") from error
+        raise DataError(f"{path}: not a manifest ({error}); restore it or give another") from error
 
 
 def make_bundle(
     manifest: Manifest, simulator: Simulator, out: Path, progress: Callable[[], None] = lambda: None
 ) -> tuple[Manifest, MadeQuestions]:
-    """Make the set: generate, replay, ask, and store the frames small.
+    """Makes the set: generates, replays, asks, and stores the frames small.
 
     Args:
         manifest: what to make; its digests are not looked at.

@@ -62,7 +62,7 @@ class ReplayedSet:
 
 
 def select(paths: Iterable[Path], limit: int | None = None, per_floor_plan: int | None = None) -> Selection:
-    """Read the trajectories to replay.
+    """Reads the trajectories to replay.
 
     Args:
         paths: files and directories.
@@ -96,7 +96,7 @@ def replay_set(
     progress: Callable[[], None] = lambda: None,
     frames: int = 1,
 ) -> ReplayedSet:
-    """Replay the selected trajectories into `out/metadata/<traj_id>`.
+    """Replays the selected trajectories into `out/metadata/<traj_id>`.
 
     Args:
         selection: what to replay.

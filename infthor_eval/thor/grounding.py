@@ -30,7 +30,7 @@ class Grounding:
     metres."""
 
     def __init__(self, view: View) -> None:
-        """Remember where everything is.
+        """Remembers where everything is.
 
         Args:
             view: the world when the episode begins, after the scene was restored.
