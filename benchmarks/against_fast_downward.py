@@ -15,11 +15,11 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
-from infthor_eval.generation.pddl import DOMAIN, problem
-from infthor_eval.generation.planner import plan
 from infthor_eval.generation.sampling import TaskPool
-from infthor_eval.generation.symbolic import Room, room_of
-from infthor_eval.generation.tasks import Task, TaskType
+from infthor_eval.household.pddl import DOMAIN, problem
+from infthor_eval.household.planner import plan
+from infthor_eval.household.symbolic import Room, room_of
+from infthor_eval.household.tasks import Task, TaskType
 from infthor_eval.thor.launch import embedded
 from infthor_eval.thor.simulator import Simulator
 
@@ -49,11 +49,11 @@ def sampled(number: int, seed: int) -> Iterator[tuple[Task, Room]]:
         rooms = []
         for scene in _SCENES:
             view = simulator.reset(scene)
-            kinds = {item.object_type for item in view.objects.values()}
-            rooms.append((room_of(view), kinds, TaskPool(TaskType, rng)))
+            types = {item.object_type for item in view.objects.values()}
+            rooms.append((room_of(view), types, TaskPool(TaskType, rng)))
     for index in range(number):
-        room, kinds, pool = rooms[index % len(rooms)]
-        task = next(task for task in pool.sample(room, kinds) if plan(task, room))
+        room, types, pool = rooms[index % len(rooms)]
+        task = next(task for task in pool.sample(room, types) if plan(task, room))
         pool.used(task)
         yield task, room
 

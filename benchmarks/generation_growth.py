@@ -13,8 +13,8 @@ import time
 from pathlib import Path
 
 from infthor_eval.formats.trajectory import iter_trajectories
-from infthor_eval.generation.factory import Settings
 from infthor_eval.generation.generate_set import generate_set
+from infthor_eval.generation.settings import TrajectorySettings
 from infthor_eval.thor.launch import embedded
 from infthor_eval.thor.simulator import Simulator
 
@@ -33,7 +33,7 @@ def main() -> None:
     per_step = []
     for steps in chosen.steps:
         before = processor_seconds()
-        seconds, made, subgoals, simulator_mb = make(Settings(chosen.scene, chosen.seed, steps, 1))
+        seconds, made, subgoals, simulator_mb = make(TrajectorySettings(chosen.scene, chosen.seed, steps, 1))
         per_step.append(1000 * (processor_seconds() - before) / made)
         own_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
         print(
@@ -50,7 +50,7 @@ def processor_seconds() -> float:
     return sum(item.ru_utime + item.ru_stime for item in used)
 
 
-def make(settings: Settings) -> tuple[float, int, int, float]:
+def make(settings: TrajectorySettings) -> tuple[float, int, int, float]:
     """Seconds, low-level actions, sub-goals and the simulator's peak memory (MB) of one trajectory."""
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder)

@@ -32,7 +32,7 @@ def main() -> None:
     chosen = parser.parse_args()
     check_all(chosen.set)
     made = make_questions(chosen.set, seed=chosen.seed, per_trajectory=chosen.per_trajectory)
-    print(f"chosen: {len(made.questions)}, by number of clues {made.by_clues()}, by type {made.by_kind()}")
+    print(f"chosen: {len(made.questions)}, by number of clues {made.by_clues()}, by type {made.by_type()}")
     yes_no = [item for item in made.questions if item.answers[0] in _YES_NO]
     for bound in (Oracle(), Blind()):
         bound.study(made.questions)
@@ -42,7 +42,7 @@ def main() -> None:
 def check_all(folder: Path) -> None:
     """Print how often the checker agrees with every candidate, and why not."""
     histories = [History(path.name, read_steps(path)) for path in sorted((folder / "metadata").iterdir())]
-    vocabulary = frozenset[str]().union(*(history.all_kinds for history in histories))
+    vocabulary = frozenset[str]().union(*(history.all_object_types for history in histories))
     found: Counter[str] = Counter()
     for history in histories:
         checker = Checker(history.steps, DEFAULT_SHARE)

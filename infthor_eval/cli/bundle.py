@@ -19,7 +19,7 @@ def command(manifest: Path, out: Path) -> int:
     from rich.console import Console
     from rich.progress import Progress
 
-    from infthor_eval.generation.bundle import make_bundle, read_manifest
+    from infthor_eval.generation.bundle import differing_files, make_bundle, read_manifest
     from infthor_eval.thor.launch import embedded
     from infthor_eval.thor.simulator import Simulator
 
@@ -32,9 +32,8 @@ def command(manifest: Path, out: Path) -> int:
     click.echo(made.words())
     if not wanted.files:
         return 0
-    names = wanted.files.keys() | finished.files.keys()
-    differing = sorted(name for name in names if wanted.files.get(name) != finished.files.get(name))
-    click.echo(f"{len(names) - len(differing)} of {len(names)} files as in the manifest")
+    n_files, differing = len(wanted.files.keys() | finished.files.keys()), differing_files(wanted, finished)
+    click.echo(f"{n_files - len(differing)} of {n_files} files as in the manifest")
     for name in differing[:10]:
         click.echo(f"differs: {name}", err=True)
     return int(bool(differing))

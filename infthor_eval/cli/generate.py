@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 import click
 
+from infthor_eval.cli.options import floor_plans_option
+
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from infthor_eval.generation.generate_set import Generated
-
-from infthor_eval.cli.options import floor_plans_option
+    from infthor_eval.generation.generate_set import GenerationSummary
 
 __all__ = ["command"]
 
@@ -51,46 +51,42 @@ def command(
     from rich.console import Console
     from rich.progress import Progress
 
-    from infthor_eval.errors import UsageError
-    from infthor_eval.generation.factory import Settings
-    from infthor_eval.generation.generate_set import generate_set, is_bathroom
+    from infthor_eval.generation.generate_set import generate_set
+    from infthor_eval.generation.jobs import trajectory_jobs, without_bathrooms
     from infthor_eval.thor.launch import embedded
     from infthor_eval.thor.simulator import Simulator
 
     notes = Console(stderr=True, soft_wrap=True)
-    chosen = [scene for scene in scenes if not (test_set and is_bathroom(scene))]
-    left_out = sorted(set(scenes) - set(chosen))
-    if not chosen:
-        raise UsageError(f"{', '.join(left_out)}: bathrooms are left out of test sets; name other scenes")
-    if left_out:
-        notes.print(f"bathrooms are left out of test sets: {', '.join(left_out)}", highlight=False, markup=False)
-    final = final_task or test_set
-    jobs = [Settings(scene, seed + k, min_steps, min_subgoals, final) for scene in chosen for k in range(count)]
+    chosen, skipped = without_bathrooms(scenes) if test_set else (scenes, [])
+    if skipped:
+        notes.print(f"bathrooms are left out of test sets: {', '.join(skipped)}", highlight=False, markup=False)
+    jobs = trajectory_jobs(
+        chosen,
+        seed=seed,
+        count=count,
+        min_steps=min_steps,
+        min_subgoals=min_subgoals,
+        final_task=final_task or test_set,
+    )
     with Simulator(embedded(data)) as simulator, Progress(console=notes, transient=True) as progress:
         bar = progress.add_task("generate", total=len(jobs))
         result = generate_set(jobs, simulator, out, lambda: progress.advance(bar))
     if as_json:
         import msgspec
 
-        click.echo(msgspec.json.encode(result.document()))
+        click.echo(msgspec.json.encode(result.summary()))
     else:
-        _print(result, out, Console(soft_wrap=True))
+        _print(result.summary(), out, Console(soft_wrap=True))
     for failure in result.failures:
         notes.print(f"not made: {failure}", style="red", highlight=False, markup=False)
     context.exit(1 if result.failures else 0)
 
 
-def _print(result: Generated, out: Path, output: Console) -> None:
-    from rich import box
-    from rich.table import Table
+def _print(summary: GenerationSummary, out: Path, output: Console) -> None:
+    from infthor_eval.generation.tables import tasks_table
 
-    document = result.document()
     output.print(
-        f"{document['trajectories']} trajectories ({document['resumed']} made earlier), "
-        f"{document['steps']} steps: {out}",
+        f"{summary.trajectories} trajectories ({summary.resumed} made earlier), {summary.steps} steps: {out}",
         highlight=False,
     )
-    table = Table("task", "tried", "accepted", box=box.SIMPLE_HEAD)
-    for name, counts in document["tasks"].items():
-        table.add_row(name, str(counts["tried"]), str(counts["accepted"]))
-    output.print(table)
+    output.print(tasks_table(summary))

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import tempfile
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
+from infthor_eval.cli.options import floor_plans_option
+
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from infthor_eval.generation.replay_set import Selection, Summary
-    from infthor_eval.thor.launch import Launch
-
-from infthor_eval.cli.options import floor_plans_option
+    from infthor_eval.generation.replay_summary import ReplaySummary
 
 __all__ = ["command"]
 
@@ -51,66 +48,47 @@ def command(
     replay goes on. Exit status 1 where a trajectory could not be replayed at all.
     """
     from rich.console import Console
+    from rich.progress import Progress
 
-    from infthor_eval.generation.replay_set import select
+    from infthor_eval.generation.replay_set import replay_set, select
+    from infthor_eval.generation.replay_summary import summarise
+    from infthor_eval.generation.supplement import supplement_file
     from infthor_eval.thor import launch
-
-    def start(supplement: Path) -> Launch:
-        return launch.unity() if unity else launch.embedded(data, supplement)
+    from infthor_eval.thor.simulator import Simulator
 
     notes = Console(stderr=True, soft_wrap=True)
     selection = select(trajectories, limit, per_floor_plan)
-    summary = _replay(selection, out, start, frames, notes)
+    with supplement_file(trajectory for _, trajectory in selection.items) as supplement:
+        start = launch.unity() if unity else launch.embedded(data, supplement)
+        with Simulator(start) as simulator, Progress(console=notes, transient=True) as progress:
+            bar = progress.add_task("replay", total=len(selection.items))
+            replayed = replay_set(selection, simulator, out, lambda: progress.advance(bar), frames)
     if as_json:
         import msgspec
 
-        click.echo(msgspec.json.encode(summary.document()))
+        click.echo(msgspec.json.encode(summarise(replayed)))
     else:
-        _print(summary, Console(soft_wrap=True))
-    for failure in summary.failures[:_SHOWN]:
+        _print(summarise(replayed), Console(soft_wrap=True))
+    for failure in replayed.failures[:_SHOWN]:
         notes.print(f"not replayed: {failure.place}: {failure.message}", style="red", highlight=False, markup=False)
-    context.exit(1 if summary.failures else 0)
+    context.exit(1 if replayed.failures else 0)
 
 
-def _replay(selection: Selection, out: Path, start: Callable[[Path], Launch], frames: int, notes: Console) -> Summary:
-    from rich.progress import Progress
+def _print(summary: ReplaySummary, output: Console) -> None:
+    from infthor_eval.generation.tables import actions_table, overlaps_table
 
-    from infthor_eval.generation.replay_set import replay_set
-    from infthor_eval.generation.supplement import write_supplement
-    from infthor_eval.thor.simulator import Simulator
-
-    with tempfile.TemporaryDirectory(prefix="infthor-") as folder:
-        supplement = Path(folder) / "supplement.json"
-        write_supplement((trajectory for _, trajectory in selection.items), supplement)
-        with Simulator(start(supplement)) as simulator, Progress(console=notes, transient=True) as progress:
-            bar = progress.add_task("replay", total=len(selection.items))
-            return replay_set(selection, simulator, out, lambda: progress.advance(bar), frames)
-
-
-def _print(summary: Summary, output: Console) -> None:
-    from rich import box
-    from rich.table import Table
-
-    document = summary.document()
     output.print(
-        f"{document['trajectories']} trajectories on {document['floor_plans']} floor plans "
-        f"({document['resumed']} replayed earlier, {document['failed']} failed), {document['whole']} whole, "
-        f"{document['seconds']} s",
+        f"{summary.trajectories} trajectories on {summary.floor_plans} floor plans ({summary.resumed} replayed "
+        f"earlier, {summary.failed} failed), {summary.complete} whole, {summary.seconds} s",
         highlight=False,
     )
-    actions = Table("action", "accepted", "refused", "share", box=box.SIMPLE_HEAD)
-    for name, counts in document["actions"].items():
-        share = counts["accepted"] / (counts["accepted"] + counts["refused"])
-        actions.add_row(name, str(counts["accepted"]), str(counts["refused"]), f"{share:.1%}")
-    output.print(actions)
-    if document["iou"]:
-        overlaps = Table("action, object type", "boxes", "median IoU", "mean IoU", box=box.SIMPLE_HEAD)
-        for kind, values in {**document["iou_by_action"], **document["iou"]}.items():
-            overlaps.add_row(kind, str(values["count"]), f"{values['median']:.2f}", f"{values['mean']:.2f}")
+    output.print(actions_table(summary))
+    overlaps = overlaps_table(summary)
+    if overlaps is not None:
         output.print(overlaps)
-    for item in document["diverged"][:_SHOWN]:
-        line = f"diverged: {item['traj_id']}: step {item['step']}: {item['action']}: {item['error']}"
+    for item in summary.diverged[:_SHOWN]:
+        line = f"diverged: {item.traj_id}: step {item.step}: {item.action}: {item.error}"
         output.print(line, highlight=False, markup=False)
-    hidden = len(document["diverged"]) - _SHOWN
+    hidden = len(summary.diverged) - _SHOWN
     if hidden > 0:
         output.print(f"and {hidden} more; --json lists all", highlight=False)

@@ -4,7 +4,6 @@ The manifest says which trajectories to generate and how questions are drawn; th
 digest of every file, by which a test tells that the same set comes out again.
 """
 
-import hashlib
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -13,20 +12,21 @@ import msgspec
 from PIL import Image
 
 from infthor_eval.errors import DataError
+from infthor_eval.formats.digests import digest_of_file
 from infthor_eval.formats.qa_csv import write_questions
-from infthor_eval.generation.factory import Settings
 from infthor_eval.generation.generate_set import generate_set
-from infthor_eval.generation.questions.make import Made, make_questions
+from infthor_eval.generation.questions.make import MadeQuestions, make_questions
 from infthor_eval.generation.replay_set import replay_set, select
+from infthor_eval.generation.settings import TrajectorySettings
 from infthor_eval.thor.simulator import Simulator
 
-__all__ = ["MANIFEST", "Manifest", "make_bundle", "read_manifest"]
+__all__ = ["MANIFEST", "Manifest", "TrajectoryRecipe", "differing_files", "make_bundle", "read_manifest"]
 
 MANIFEST = "manifest.json"
 _NOT_SHIPPED = ("replay.json",)  # holds times
 
 
-class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class TrajectoryRecipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """One trajectory: the arguments of `generate`."""
 
     scene: str
@@ -48,7 +48,7 @@ class Manifest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """
 
     name: str
-    trajectories: tuple[Source, ...]
+    trajectories: tuple[TrajectoryRecipe, ...]
     per_trajectory: int = 25
     question_seed: int = 0
     colors: int = 128
@@ -56,7 +56,7 @@ class Manifest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def read_manifest(path: Path) -> Manifest:
-    """Read a manifest.
+    """Reads a manifest.
 
     Raises:
         DataError: it cannot be read or is none.
@@ -66,13 +66,13 @@ def read_manifest(path: Path) -> Manifest:
     except OSError as error:
         raise DataError(f"{path}: cannot be read ({error.strerror}); give a manifest") from error
     except msgspec.DecodeError as error:
-        raise DataError(f"{path}: not a manifest ({error})") from error
+        raise DataError(f"{path}: not a manifest ({error}); restore it or give another") from error
 
 
 def make_bundle(
     manifest: Manifest, simulator: Simulator, out: Path, progress: Callable[[], None] = lambda: None
-) -> tuple[Manifest, Made]:
-    """Make the set: generate, replay, ask, and store the frames small.
+) -> tuple[Manifest, MadeQuestions]:
+    """Makes the set: generates, replays, asks, and stores the frames small.
 
     Args:
         manifest: what to make; its digests are not looked at.
@@ -88,7 +88,7 @@ def make_bundle(
     """
     if out.exists() and any(out.iterdir()):
         raise DataError(f"{out}: is not empty; give a new folder")
-    jobs = [Settings(item.scene, item.seed, item.min_steps, item.min_subgoals) for item in manifest.trajectories]
+    jobs = [TrajectorySettings(**msgspec.structs.asdict(item)) for item in manifest.trajectories]
     with tempfile.TemporaryDirectory(prefix="infthor-") as folder:
         _refuse(generate_set(jobs, simulator, Path(folder), progress).failures)
         replayed = replay_set(select([Path(folder)]), simulator, out, progress)
@@ -105,6 +105,12 @@ def make_bundle(
     return finished, made
 
 
+def differing_files(wanted: Manifest, made: Manifest) -> list[str]:
+    """Paths of the files whose digests differ, or that one of two manifests lacks."""
+    names = wanted.files.keys() | made.files.keys()
+    return sorted(name for name in names if wanted.files.get(name) != made.files.get(name))
+
+
 def _refuse(failures: list[str]) -> None:
     if failures:
         raise DataError(f"the set cannot be made: {failures[0]}")
@@ -118,6 +124,4 @@ def _store_small(path: Path, colors: int) -> None:
 
 def _digests(root: Path) -> dict[str, str]:
     files = sorted(path for path in root.rglob("*") if path.is_file() and path.name != MANIFEST)
-    return {
-        str(path.relative_to(root)): hashlib.blake2b(path.read_bytes(), digest_size=16).hexdigest() for path in files
-    }
+    return {str(path.relative_to(root)): digest_of_file(path) for path in files}

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from infthor_eval.formats.trajectory import Trajectory
-from infthor_eval.generation.tasks import Task
+from infthor_eval.household.tasks import Task
 
 __all__ = ["SHARE", "Ends", "ends_of", "violation"]
 
@@ -42,7 +42,7 @@ def ends_of(object_log: Sequence[dict[str, Any]]) -> Ends:
     """
     count = max(1, math.floor(SHARE * len(object_log)))
     early, late = object_log[:count], object_log[-count:]
-    return Ends(*({kind for entry in part for kind in entry["visible"]} for part in (early, late)))
+    return Ends(*({object_type for entry in part for object_type in entry["visible"]} for part in (early, late)))
 
 
 def violation(trajectory: Trajectory) -> str | None:

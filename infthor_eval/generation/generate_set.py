@@ -3,20 +3,50 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+
+import msgspec
 
 from infthor_eval.errors import InfthorError, UsageError
+from infthor_eval.formats.files import written_whole
 from infthor_eval.formats.trajectory import encode_trajectory, iter_sources
-from infthor_eval.generation.collecting import libraries_set_aside
-from infthor_eval.generation.factory import Settings, Statistics, generate
-from infthor_eval.generation.pddl import DOMAIN
+from infthor_eval.generation.factory import TaskStatistics, generate
+from infthor_eval.generation.garbage import libraries_set_aside
+from infthor_eval.generation.settings import TrajectorySettings
+from infthor_eval.household.pddl import DOMAIN
 from infthor_eval.thor.simulator import Simulator
 
-__all__ = ["Generated", "generate_set", "is_bathroom"]
+__all__ = ["GeneratedSet", "GenerationSummary", "TaskCounts", "generate_set"]
+
+
+class TaskCounts(msgspec.Struct):
+    """Numbers of tasks of one type."""
+
+    tried: int
+    accepted: int
+
+
+class GenerationSummary(msgspec.Struct):
+    """What came of it in numbers, as `--json` prints it.
+
+    Attributes:
+        trajectories: how many there are.
+        resumed: how many of them are from earlier runs.
+        steps: low-level actions of all of them.
+        tasks: numbers of this run, by task type.
+        refusals: why tasks failed in this run, the most frequent first.
+        failures: what could not be made, one line each.
+    """
+
+    trajectories: int
+    resumed: int
+    steps: int
+    tasks: dict[str, TaskCounts]
+    refusals: dict[str, int]
+    failures: list[str]
 
 
 @dataclass
-class Generated:
+class GeneratedSet:
     """What came of it.
 
     Attributes:
@@ -31,25 +61,25 @@ class Generated:
     resumed: int = 0
     steps: int = 0
     failures: list[str] = field(default_factory=list)
-    statistics: Statistics = field(default_factory=Statistics)
+    statistics: TaskStatistics = field(default_factory=TaskStatistics)
 
-    def document(self) -> dict[str, Any]:
-        """As it is printed with `--json`."""
+    def summary(self) -> GenerationSummary:
+        """It in numbers."""
         tried, accepted = self.statistics.tried, self.statistics.accepted
-        return {
-            "trajectories": len(self.paths),
-            "resumed": self.resumed,
-            "steps": self.steps,
-            "tasks": {name: {"tried": tried[name], "accepted": accepted[name]} for name in sorted(tried)},
-            "refusals": dict(self.statistics.reasons.most_common()),
-            "failures": self.failures,
-        }
+        return GenerationSummary(
+            trajectories=len(self.paths),
+            resumed=self.resumed,
+            steps=self.steps,
+            tasks={name: TaskCounts(tried[name], accepted[name]) for name in sorted(tried)},
+            refusals=dict(self.statistics.reasons.most_common()),
+            failures=self.failures,
+        )
 
 
 def generate_set(
-    jobs: Sequence[Settings], simulator: Simulator, out: Path, progress: Callable[[], None] = lambda: None
-) -> Generated:
-    """Make the trajectories that `out` does not have yet, one file each, and beside it their tasks as PDDL.
+    jobs: Sequence[TrajectorySettings], simulator: Simulator, out: Path, progress: Callable[[], None] = lambda: None
+) -> GeneratedSet:
+    """Makes the trajectories that `out` does not have yet, one file each, and beside it their tasks as PDDL.
 
     Args:
         jobs: what to make.
@@ -58,7 +88,7 @@ def generate_set(
         progress: is called after each trajectory.
     """
     out.mkdir(parents=True, exist_ok=True)
-    result = Generated()
+    result = GeneratedSet()
     for job in jobs:
         path = out / f"{job.traj_id}.json"
         try:
@@ -74,13 +104,7 @@ def generate_set(
     return result
 
 
-def is_bathroom(scene: str) -> bool:
-    """Whether a scene is one by its name (`bathroom-3`, `FloorPlan401` to `FloorPlan430`)."""
-    number = scene.removeprefix("FloorPlan")
-    return scene.startswith("bathroom-") or (number.isdigit() and 400 < int(number) <= 430)
-
-
-def _make(path: Path, job: Settings, simulator: Simulator, totals: Statistics) -> int:
+def _make(path: Path, job: TrajectorySettings, simulator: Simulator, totals: TaskStatistics) -> int:
     made = generate(job, simulator)
     totals.add(made.statistics)
     folder = path.with_suffix(".pddl")
@@ -88,14 +112,12 @@ def _make(path: Path, job: Settings, simulator: Simulator, totals: Statistics) -
     (folder / "domain.pddl").write_text(DOMAIN)
     for number, problem in enumerate(made.problems):
         (folder / f"task-{number:03d}.pddl").write_text(problem)
-    # The trajectory comes last: where it is, everything is.
-    partial = path.with_name(f".{path.name}.partial")
-    partial.write_bytes(encode_trajectory(made.trajectory))
-    partial.replace(path)
+    with written_whole(path) as partial:  # it comes last: where it is, everything is
+        partial.write_bytes(encode_trajectory(made.trajectory))
     return len(made.trajectory.plan.low_actions)
 
 
-def _earlier(path: Path, job: Settings) -> int:
+def _earlier(path: Path, job: TrajectorySettings) -> int:
     trajectory = next(iter_sources(path)).read()
     made = trajectory.gen_info or {}
     if made.get("settings") != job.document():

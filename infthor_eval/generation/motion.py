@@ -3,13 +3,14 @@
 from collections.abc import Iterator
 
 from infthor_eval.thor.simulator import Simulator
+from infthor_eval.thor.teleport import teleport_call
 from infthor_eval.thor.view import AgentPose, Vector, View
 
 __all__ = ["between"]
 
 
 def between(simulator: Simulator, start: AgentPose, end: AgentPose, frames: int) -> Iterator[View]:
-    """Look from evenly spaced poses between two; the agent is back at the second one afterwards.
+    """Looks from evenly spaced poses between two; the agent is back at the second one afterwards.
 
     Args:
         simulator: where the agent stands at `end`.
@@ -23,9 +24,9 @@ def between(simulator: Simulator, start: AgentPose, end: AgentPose, frames: int)
     if start == end:
         return
     for number in range(1, frames):
-        yield _look(simulator, _mix(start, end, number / frames))
+        yield simulator.query(**teleport_call(_mix(start, end, number / frames)))
     if frames > 1:
-        _look(simulator, end)
+        simulator.query(**teleport_call(end))
 
 
 def _mix(start: AgentPose, end: AgentPose, share: float) -> AgentPose:
@@ -40,16 +41,4 @@ def _mix(start: AgentPose, end: AgentPose, share: float) -> AgentPose:
         (start.rotation + share * turn) % 360.0,
         start.horizon + share * (end.horizon - start.horizon),
         end.standing,
-    )
-
-
-def _look(simulator: Simulator, pose: AgentPose) -> View:
-    at = pose.position
-    return simulator.query(
-        "TeleportFull",
-        position={"x": at.x, "y": at.y, "z": at.z},
-        rotation={"x": 0.0, "y": pose.rotation, "z": 0.0},
-        horizon=pose.horizon,
-        standing=pose.standing,
-        forceAction=True,
     )

@@ -22,7 +22,7 @@ class Recorder:
     """
 
     def __init__(self, images: Path | None = None) -> None:
-        """Begin with no frame.
+        """Begins with no frame.
 
         Args:
             images: folder for the frames, which must exist; None keeps the log only.
@@ -41,7 +41,7 @@ class Recorder:
         target: str | None = None,
         receptacle: str | None = None,
     ) -> Step:
-        """Add one frame.
+        """Adds one frame.
 
         Args:
             view: the world after the action.
@@ -104,7 +104,7 @@ def object_log(view: View) -> ObjectLog:
         is_open=_types([item for item in visible if item.openable and item.is_open]),
         inven_obj=sorted(object_type_of(key) for key in view.inventory),
         receptacles=_types([item for item in visible if item.receptacle]),
-        recep_objs={kind: sorted(types) for kind, types in sorted(inside.items())},
+        recep_objs={object_type: sorted(types) for object_type, types in sorted(inside.items())},
     )
 
 

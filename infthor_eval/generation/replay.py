@@ -13,8 +13,8 @@ from infthor_eval.formats.step_log import write_steps
 from infthor_eval.formats.trajectory import LowAction, Trajectory
 from infthor_eval.generation.motion import between
 from infthor_eval.generation.recorder import Recorder
-from infthor_eval.generation.sequence_text import sequence_text
-from infthor_eval.generation.state_summary import state_summaries
+from infthor_eval.household.sequence_text import sequence_text
+from infthor_eval.household.state_summary import state_summaries
 from infthor_eval.thor.actions import text_of
 from infthor_eval.thor.grounding import Grounding
 from infthor_eval.thor.recorded import MissingObjectError, translate
@@ -22,7 +22,7 @@ from infthor_eval.thor.restore import restore
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import View
 
-__all__ = ["Overlap", "Refusal", "Replayed", "box_iou", "replay"]
+__all__ = ["Overlap", "Refusal", "ReplayReport", "box_iou", "replay"]
 
 
 class Refusal(msgspec.Struct):
@@ -42,7 +42,7 @@ class Overlap(msgspec.Struct):
     iou: float
 
 
-class Replayed(msgspec.Struct):
+class ReplayReport(msgspec.Struct):
     """What came of one replay (`replay.json`).
 
     Attributes:
@@ -68,13 +68,13 @@ class Replayed(msgspec.Struct):
     seconds: float = 0.0
 
     @property
-    def whole(self) -> bool:
+    def complete(self) -> bool:
         """Whether every action was carried out."""
         return not self.refusals
 
 
-def replay(trajectory: Trajectory, simulator: Simulator, folder: Path, digest: str, frames: int = 1) -> Replayed:
-    """Run a trajectory and write its frames and logs into a folder.
+def replay(trajectory: Trajectory, simulator: Simulator, folder: Path, digest: str, frames: int = 1) -> ReplayReport:
+    """Runs a trajectory and writes its frames and logs into a folder.
 
     These are `img/`, `metadata.json`, `traj.txt`, `expert_log.json`, and `state_summary.json`: the room in words
     after each task and at the end, by index of the low-level action.
@@ -89,7 +89,7 @@ def replay(trajectory: Trajectory, simulator: Simulator, folder: Path, digest: s
     Raises:
         SimulatorError: the simulator fails or has no such scene.
     """
-    run = _Run(simulator, Replayed(trajectory.traj_id, digest, trajectory.scene.floor_plan, frames))
+    run = _Run(simulator, ReplayReport(trajectory.traj_id, digest, trajectory.scene.floor_plan, frames))
     restored = restore(simulator, trajectory.scene)
     run.report.restore = [f"no {name} here" for name in restored.dropped] + restored.refused
     (folder / "img").mkdir()
@@ -122,18 +122,18 @@ def _area(box: tuple[int, int, int, int]) -> int:
 class _Run:
     """The state of one replay."""
 
-    def __init__(self, simulator: Simulator, report: Replayed) -> None:
+    def __init__(self, simulator: Simulator, report: ReplayReport) -> None:
         self._simulator = simulator
         self.report = report
 
     def begin(self, images: Path) -> None:
-        """Record the first frame; the scene is restored by now."""
+        """Records the first frame; the scene is restored by now."""
         self.recorder = Recorder(images)
         self.recorder.record(self._simulator.view)
         self._grounding = Grounding(self._simulator.view)
 
     def act(self, index: int, low: LowAction) -> None:
-        """Run and record one action."""
+        """Runs and records one action."""
         before, api = self._simulator.view, low.api_action
         text = str(text_of(api.action, api.object_id, api.receptacle_id))
         target, error = self._call(index, low, before)
@@ -156,7 +156,7 @@ class _Run:
         step.success, step.error = error is None, error
 
     def _call(self, index: int, low: LowAction, before: View) -> tuple[str | None, str | None]:
-        """Run it; the id of the object it is about, and why it was refused."""
+        """Runs it; the id of the object it is about, and why it was refused."""
         try:
             call = translate(low, self._grounding, before)
         except MissingObjectError as missing:
@@ -167,12 +167,12 @@ class _Run:
         return target, None if after.success else after.error or "refused without a message"
 
     def _compare_box(self, index: int, low: LowAction, target: str | None, before: View) -> None:
-        """Compare the recorded box of the object acted on with what the frame before the action shows of
+        """Compares the recorded box of the object acted on with what the frame before the action shows of
         it."""
         recorded = low.discrete_action.box if low.discrete_action is not None else None
         if recorded is None or target is None or before.instances is None:
             return
         shown = before.instances.get(target)
         iou = 0.0 if shown is None else box_iou(recorded, shown.box)
-        kind = before.objects[target].object_type
-        self.report.overlaps.append(Overlap(index, low.api_action.action, kind, round(iou, 4)))
+        object_type = before.objects[target].object_type
+        self.report.overlaps.append(Overlap(index, low.api_action.action, object_type, round(iou, 4)))

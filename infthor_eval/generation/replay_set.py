@@ -5,26 +5,24 @@ there is complete. A folder that is there already, made from the same trajectory
 again.
 """
 
-import hashlib
-import shutil
-import statistics
 import time
-from collections import Counter, defaultdict
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import msgspec
 
 from infthor_eval.errors import DataError, InfthorError, SimulatorError
+from infthor_eval.formats.digests import digest
+from infthor_eval.formats.files import written_whole
 from infthor_eval.formats.set_info import claim_for_simulator
 from infthor_eval.formats.trajectory import Source, Trajectory, folder_name, iter_sources
-from infthor_eval.generation.collecting import libraries_set_aside
-from infthor_eval.generation.replay import Overlap, Replayed, replay
+from infthor_eval.generation.garbage import libraries_set_aside
+from infthor_eval.generation.replay import ReplayReport, replay
 from infthor_eval.thor.simulator import Simulator
 
-__all__ = ["Failure", "Selection", "Summary", "replay_set", "select"]
+__all__ = ["Failure", "ReplayedSet", "Selection", "replay_set", "select"]
 
 _REPORT = "replay.json"
 _TRAJECTORY = "traj_data.json"
@@ -47,7 +45,7 @@ class Selection:
 
 
 @dataclass
-class Summary:
+class ReplayedSet:
     """What came of a set.
 
     Attributes:
@@ -57,59 +55,14 @@ class Summary:
         seconds: wall time of this run.
     """
 
-    reports: list[Replayed] = field(default_factory=list)
+    reports: list[ReplayReport] = field(default_factory=list)
     resumed: int = 0
     failures: list[Failure] = field(default_factory=list)
     seconds: float = 0.0
 
-    def actions(self) -> dict[str, dict[str, int]]:
-        """Accepted and refused actions by name, the most frequent first."""
-        accepted: Counter[str] = Counter()
-        refused: Counter[str] = Counter()
-        for report in self.reports:
-            accepted.update(report.accepted)
-            refused.update(refusal.action.split()[0] for refusal in report.refusals)
-        names = sorted(accepted | refused, key=lambda name: (-(accepted[name] + refused[name]), name))
-        return {name: {"accepted": accepted[name], "refused": refused[name]} for name in names}
-
-    def overlaps(self, by: Callable[[Overlap], str]) -> dict[str, dict[str, float]]:
-        """Number, median and mean of the box overlaps (IoU) by object type, or by action."""
-        found: defaultdict[str, list[float]] = defaultdict(list)
-        for report in self.reports:
-            for overlap in report.overlaps:
-                found[by(overlap)].append(overlap.iou)
-        return {
-            kind: {
-                "count": len(values),
-                "median": round(statistics.median(values), 4),
-                "mean": round(statistics.fmean(values), 4),
-            }
-            for kind, values in sorted(found.items())
-        }
-
-    def document(self) -> dict[str, Any]:
-        """The summary as it is printed with `--json`."""
-        return {
-            "trajectories": len(self.reports),
-            "resumed": self.resumed,
-            "failed": len(self.failures),
-            "whole": sum(report.whole for report in self.reports),
-            "floor_plans": len({report.floor_plan for report in self.reports}),
-            "actions": self.actions(),
-            "iou": self.overlaps(lambda overlap: overlap.type),
-            "iou_by_action": self.overlaps(lambda overlap: overlap.action),
-            "seconds": round(self.seconds, 2),
-            "diverged": [
-                {"traj_id": report.traj_id, **msgspec.to_builtins(report.refusals[0])}
-                for report in self.reports
-                if report.refusals
-            ],
-            "failures": [{"place": item.place, "message": item.message} for item in self.failures],
-        }
-
 
 def select(paths: Iterable[Path], limit: int | None = None, per_floor_plan: int | None = None) -> Selection:
-    """Read the trajectories to replay.
+    """Reads the trajectories to replay.
 
     Args:
         paths: files and directories.
@@ -142,8 +95,8 @@ def replay_set(
     out: Path,
     progress: Callable[[], None] = lambda: None,
     frames: int = 1,
-) -> Summary:
-    """Replay the selected trajectories into `out/metadata/<traj_id>`.
+) -> ReplayedSet:
+    """Replays the selected trajectories into `out/metadata/<traj_id>`.
 
     Args:
         selection: what to replay.
@@ -153,25 +106,25 @@ def replay_set(
         frames: per action that moves the agent or its camera.
 
     Returns:
-        The summary. The failure of one trajectory is in it and does not stop the others.
+        The result. The failure of one trajectory is in it and does not stop the others.
     """
     started = time.monotonic()
     metadata = out / "metadata"
     metadata.mkdir(parents=True, exist_ok=True)
-    claim_for_simulator(out, simulator.kind)
-    summary = Summary(failures=list(selection.failures))
+    claim_for_simulator(out, simulator.label)
+    result = ReplayedSet(failures=list(selection.failures))
     for source, trajectory in selection.items:
         try:
             with libraries_set_aside():
                 report, new = _one(source, trajectory, simulator, metadata, frames)
         except InfthorError as error:
-            summary.failures.append(Failure(source.place, f"{trajectory.traj_id}: {error}"))
+            result.failures.append(Failure(source.place, f"{trajectory.traj_id}: {error}"))
         else:
-            summary.reports.append(report)
-            summary.resumed += not new
+            result.reports.append(report)
+            result.resumed += not new
         progress()
-    summary.seconds = time.monotonic() - started
-    return summary
+    result.seconds = time.monotonic() - started
+    return result
 
 
 def _all_sources(paths: Iterable[Path]) -> Iterator[Source]:
@@ -181,40 +134,34 @@ def _all_sources(paths: Iterable[Path]) -> Iterator[Source]:
 
 def _one(
     source: Source, trajectory: Trajectory, simulator: Simulator, metadata: Path, frames: int
-) -> tuple[Replayed, bool]:
+) -> tuple[ReplayReport, bool]:
     """The report of one trajectory, and whether it was made now."""
-    digest = hashlib.blake2b(source.raw.strip(), digest_size=16).hexdigest()
-    name = folder_name(trajectory.traj_id)
-    final = metadata / name
+    content = source.raw.strip()
+    final = metadata / folder_name(trajectory.traj_id)
     if final.exists():
-        return _earlier(final, digest, frames), False
-    partial = metadata / f".{name}.partial"
-    if partial.exists():
-        shutil.rmtree(partial)
-    partial.mkdir()
+        return _earlier(final, digest(content), frames), False
     started = time.monotonic()
     try:
-        report = replay(trajectory, simulator, partial, digest, frames)
-        report.seconds = round(time.monotonic() - started, 3)
-        (partial / _TRAJECTORY).write_bytes(source.raw.strip() + b"\n")
-        (partial / _REPORT).write_bytes(msgspec.json.encode(report) + b"\n")
-        partial.rename(final)
+        with written_whole(final) as partial:
+            partial.mkdir()
+            report = replay(trajectory, simulator, partial, digest(content), frames)
+            report.seconds = round(time.monotonic() - started, 3)
+            (partial / _TRAJECTORY).write_bytes(content + b"\n")
+            (partial / _REPORT).write_bytes(msgspec.json.encode(report) + b"\n")
     except OSError as error:
         message = f"{final}: cannot be written ({error.strerror}); make room or choose another --out"
         raise SimulatorError(message) from error
-    finally:
-        shutil.rmtree(partial, ignore_errors=True)
     return report, True
 
 
-def _earlier(folder: Path, digest: str, frames: int) -> Replayed:
+def _earlier(folder: Path, wanted: str, frames: int) -> ReplayReport:
     """The report of a trajectory that an earlier run replayed."""
     path = folder / _REPORT
     try:
-        report = msgspec.json.decode(path.read_bytes(), type=Replayed)
+        report = msgspec.json.decode(path.read_bytes(), type=ReplayReport)
     except (OSError, msgspec.DecodeError) as error:
         raise DataError(f"{path}: not readable ({error}); remove the folder to replay it again") from error
-    if report.digest != digest:
+    if report.digest != wanted:
         raise DataError(f"{folder}: made from another trajectory of this name; remove it or choose another --out")
     if report.frames != frames:
         raise DataError(f"{folder}: made with {report.frames} frames per move; remove it or choose another --out")

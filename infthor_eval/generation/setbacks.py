@@ -1,6 +1,7 @@
 """What turned out not to work in a room, so that it is not tried again while things are as they were."""
 
-from infthor_eval.generation.symbolic import Room, direct_parent, room_of
+from infthor_eval.household.containment import direct_parent
+from infthor_eval.household.symbolic import Room, room_of
 from infthor_eval.thor.view import View
 
 __all__ = ["Setbacks"]
@@ -21,7 +22,7 @@ class Setbacks:
         return bool(self._blocked or self._refused)
 
     def note(self, view: View, item: str, receptacle: str | None) -> None:
-        """Remember that an object cannot be acted on, or finds no room in a receptacle, as things are.
+        """Remembers that an object cannot be acted on, or finds no room in a receptacle, as things are.
 
         Args:
             view: as things are.
@@ -38,7 +39,7 @@ class Setbacks:
         self._tasks += 1
 
     def forget(self) -> None:
-        """Believe that everything may work again."""
+        """Believes that everything may work again."""
         self._blocked.clear()
         self._refused.clear()
 

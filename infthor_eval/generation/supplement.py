@@ -5,7 +5,9 @@ gaps. Where the expert walked there is floor, and what it opened, switched and p
 """
 
 import math
-from collections.abc import Iterable
+import tempfile
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -14,7 +16,7 @@ import msgspec
 from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.thor.recorded import degrees_of
 
-__all__ = ["agent_path", "write_supplement"]
+__all__ = ["agent_path", "supplement_file", "write_supplement"]
 
 _GRID = 0.25
 _HEADINGS = {"MoveAhead": 0.0, "MoveRight": 90.0, "MoveBack": 180.0, "MoveLeft": 270.0}
@@ -29,7 +31,7 @@ class _FloorPlan:
 
 
 def write_supplement(trajectories: Iterable[Trajectory], path: Path) -> None:
-    """Write what the trajectories tell of each floor plan.
+    """Writes what the trajectories tell of each floor plan.
 
     The file is `{floor plan: {"cells": [[x, z], ...], "floor_y": y, "objects": [id, ...]}}`: cells (metres)
     where the agent stood, the agent's height, ids of the fixed objects it acted on.
@@ -49,6 +51,15 @@ def write_supplement(trajectories: Iterable[Trajectory], path: Path) -> None:
         for name, plan in sorted(plans.items())
     }
     path.write_bytes(msgspec.json.encode(document))
+
+
+@contextmanager
+def supplement_file(trajectories: Iterable[Trajectory]) -> Iterator[Path]:
+    """What the trajectories tell of each floor plan, in a temporary file."""
+    with tempfile.TemporaryDirectory(prefix="infthor-") as folder:
+        path = Path(folder) / "supplement.json"
+        write_supplement(trajectories, path)
+        yield path
 
 
 def agent_path(trajectory: Trajectory) -> list[tuple[float, float]]:

@@ -42,7 +42,7 @@ class ActionText:
 
 
 def parse_action(text: str) -> ActionText:
-    """Read an action text; white space does not matter, the case of the names does.
+    """Reads an action text; white space does not matter, the case of the names does.
 
     Raises:
         UngroundedError: an unknown action, or not as many object types as it takes.
@@ -72,7 +72,7 @@ def text_of(action: str, object_id: str | None = None, receptacle_id: str | None
 
 
 def ground(text: ActionText, view: View, degrees: float = _LOOK_DEGREES) -> dict[str, Any]:
-    """Turn an action text into a call.
+    """Turns an action text into a call.
 
     Args:
         text: the action.
@@ -107,10 +107,10 @@ def object_type_of(object_id: str) -> str:
 
 
 def _nearest(text: ActionText, view: View) -> ThorObject:
-    kind, applies = text.types[-1], _APPLIES[text.action]
-    fitting = [item for item in view.objects.values() if item.object_type == kind and item.visible]
+    object_type, applies = text.types[-1], _APPLIES[text.action]
+    fitting = [item for item in view.objects.values() if item.object_type == object_type and item.visible]
     able = [item for item in fitting if applies(item)]
     if not able:
         why = "none of those in sight allows it" if fitting else "none in sight"
-        raise UngroundedError(f"{text}: {kind}: {why}")
+        raise UngroundedError(f"{text}: {object_type}: {why}")
     return min(able, key=lambda item: (item.distance, item.object_id))

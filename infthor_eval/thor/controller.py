@@ -22,7 +22,7 @@ class SafeController(ai2thor.controller.Controller):
     """
 
     def __init__(self, launch: Launch, scene: str | dict[str, Any], **options: Any) -> None:
-        """Start the simulator and load a scene.
+        """Starts the simulator and loads a scene.
 
         Args:
             launch: what to start.
@@ -70,14 +70,14 @@ class SafeController(ai2thor.controller.Controller):
         return super().base_dir if self._folder is None else self._folder.name
 
     def reset(self, scene: str | dict[str, Any] | None = None, **init_params: Any) -> Any:
-        """Load a scene; as the published method, but a failed simulator raises SimulatorError."""
+        """Loads a scene; as the published method, but a failed simulator raises SimulatorError."""
         try:
             return super().reset(scene, **init_params)
         except PeerFault as fault:
             raise self._explained(fault) from fault
 
     def step(self, action: str | dict[str, Any] | None = None, **action_args: Any) -> Any:
-        """Run one action; as the published method, but a failed simulator raises SimulatorError."""
+        """Runs one action; as the published method, but a failed simulator raises SimulatorError."""
         try:
             return super().step(action, **action_args)
         except PeerFault as fault:
@@ -89,7 +89,7 @@ class SafeController(ai2thor.controller.Controller):
             raise self._explained(self.server.fault) from error
 
     def stop(self) -> None:
-        """Kill and reap the simulator, remove pipes and temporary files. Safe to call again."""
+        """Kills and reaps the simulator, removes pipes and temporary files. Safe to call again."""
         if self.server is not None:
             self.server.stop()
         # ai2thor registers an exit handler that keeps this object alive: let go of what is large.
@@ -115,7 +115,7 @@ class SafeController(ai2thor.controller.Controller):
         """The fault with the last line that the simulator logged, the simulator stopped."""
         words = self._last_words()
         self.stop()
-        return PeerFault(fault.kind, f"{fault}; its log ends with: {words}" if words else str(fault))
+        return PeerFault(fault.fault_type, f"{fault}; its log ends with: {words}" if words else str(fault))
 
     def _last_words(self) -> str:
         log = Path(self.log_dir) / "unity.log"

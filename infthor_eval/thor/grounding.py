@@ -30,7 +30,7 @@ class Grounding:
     metres."""
 
     def __init__(self, view: View) -> None:
-        """Remember where everything is.
+        """Remembers where everything is.
 
         Args:
             view: the world when the episode begins, after the scene was restored.
@@ -55,9 +55,9 @@ class Grounding:
         if object_id in view.objects:
             self._chosen[object_id], self.distances[object_id] = object_id, 0.0
             return object_id
-        kind = object_type_of(object_id)
+        object_type = object_type_of(object_id)
         taken = set(self._chosen.values())
-        fitting = [item for item in view.objects.values() if item.object_type == kind]
+        fitting = [item for item in view.objects.values() if item.object_type == object_type]
         # Two recorded things of one type are two things here, unless the scene has too few; furniture may be
         # merged.
         free = [item for item in fitting if not item.pickupable or item.object_id not in taken]

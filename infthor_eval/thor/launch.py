@@ -14,7 +14,7 @@ class Launch:
     """What to start and how long to wait for it.
 
     Attributes:
-        kind: "unity" or "embedded": what sets made with it are labelled by.
+        label: "unity" or "embedded": what sets made with it are labelled by.
         executable: command line of the simulator; None for the build that ai2thor downloads.
         platform: name of ai2thor's platform for its own build ("CloudRendering" needs no X server).
         timeout: seconds for one reply.
@@ -22,7 +22,7 @@ class Launch:
     """
 
     executable: str | None = None
-    kind: str = "unity"
+    label: str = "unity"
     platform: str | None = None
     timeout: float = 100.0
     start_timeout: float = 300.0

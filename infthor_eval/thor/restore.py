@@ -12,7 +12,8 @@ from typing import Any
 from infthor_eval.formats.trajectory import ObjectPose, Scene
 from infthor_eval.thor.axes import modern_rotation
 from infthor_eval.thor.simulator import Simulator
-from infthor_eval.thor.view import View
+from infthor_eval.thor.teleport import teleport_call
+from infthor_eval.thor.view import AgentPose, Vector, View
 
 __all__ = ["Restored", "restore"]
 
@@ -31,7 +32,7 @@ class Restored:
 
 
 def restore(simulator: Simulator, scene: Scene) -> Restored:
-    """Load the scene of a trajectory and put everything where the recording begins.
+    """Loads the scene of a trajectory and puts everything where the recording begins.
 
     Args:
         simulator: is reset to the scene; its `view` then is the first frame.
@@ -46,7 +47,9 @@ def restore(simulator: Simulator, scene: Scene) -> Restored:
     if scene.object_poses:
         poses, report.dropped = _poses(scene.object_poses, view)
         calls.append({"action": "SetObjectPoses", "objectPoses": poses, "placeStationary": True})
-    calls.append(_teleport(scene))
+    start = scene.init_action
+    pose = AgentPose(Vector(start.x, start.y, start.z), start.yaw, start.horizon)
+    calls.append(teleport_call(pose))
     for call in calls:
         view = simulator.step(**call)
         if not view.success:
@@ -63,18 +66,6 @@ def _state_calls(scene: Scene) -> list[dict[str, Any]]:
         calls.append({"action": "SetStateOfAllObjects", "StateChange": "CanBeDirty", "forceAction": True})
         calls.append({"action": "SetStateOfAllObjects", "StateChange": "CanBeFilled", "forceAction": False})
     return calls
-
-
-def _teleport(scene: Scene) -> dict[str, Any]:
-    start = scene.init_action
-    return {
-        "action": "TeleportFull",
-        "position": {"x": start.x, "y": start.y, "z": start.z},
-        "rotation": {"x": 0.0, "y": start.yaw, "z": 0.0},
-        "horizon": start.horizon,
-        "standing": True,
-        "forceAction": True,
-    }
 
 
 def _poses(recorded: list[ObjectPose], view: View) -> tuple[list[dict[str, Any]], list[str]]:

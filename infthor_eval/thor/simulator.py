@@ -13,10 +13,11 @@ from typing import Any, Self
 from infthor_eval.errors import SimulatorError
 from infthor_eval.thor.controller import SafeController
 from infthor_eval.thor.launch import Launch
+from infthor_eval.thor.teleport import teleport_call
 from infthor_eval.thor.transport import PeerFault
 from infthor_eval.thor.view import View, view_of
 
-__all__ = ["Mark", "Simulator"]
+__all__ = ["Simulator", "SimulatorMark"]
 
 _LOG = logging.getLogger(__name__)
 _INITIAL = {"gridSize": 0.25, "fieldOfView": 60, "visibilityDistance": 1.5, "snapToGrid": True}
@@ -25,7 +26,7 @@ _WALKING = {"MoveAhead", "MoveBack", "MoveLeft", "MoveRight", "RotateLeft", "Rot
 
 
 @dataclass(frozen=True)
-class Mark:
+class SimulatorMark:
     """A moment of an episode: how many actions led to it, and the world then."""
 
     length: int
@@ -51,7 +52,7 @@ class Simulator:
         max_restarts: int = 3,
         **options: Any,
     ) -> None:
-        """Describe the simulator; it starts with the first `reset`.
+        """Describes the simulator; it starts with the first `reset`.
 
         Args:
             launch: what to start.
@@ -84,14 +85,14 @@ class Simulator:
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+        self, error_type: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
 
     @property
-    def kind(self) -> str:
+    def label(self) -> str:
         """Which simulator this is, "embedded" or "unity"."""
-        return self._launch.kind
+        return self._launch.label
 
     @property
     def view(self) -> View:
@@ -116,7 +117,7 @@ class Simulator:
         return dict(self._controller.last_event.metadata)
 
     def reset(self, scene: str | dict[str, Any] | None) -> View:
-        """Load a scene and begin an episode.
+        """Loads a scene and begins an episode.
 
         Args:
             scene: its name (`FloorPlan10`, `kitchen-3`), the description of a ProcTHOR house, or None for the
@@ -135,7 +136,7 @@ class Simulator:
                 self._recover_from(fault)
 
     def step(self, action: str, **arguments: Any) -> View:
-        """Run one action; a refused one is told by the view's `success` and `error`.
+        """Runs one action; a refused one is told by the view's `success` and `error`.
 
         Raises:
             SimulatorError: the simulator failed more often than it may, or a repeated episode went another
@@ -155,7 +156,7 @@ class Simulator:
                 return view
 
     def query(self, action: str, **arguments: Any) -> View:
-        """Run an action that only asks (`GetReachablePositions`): it is no part of the episode, nor is its
+        """Runs an action that only asks (`GetReachablePositions`): it is no part of the episode, nor is its
         view kept.
 
         Raises:
@@ -167,8 +168,8 @@ class Simulator:
         self._view = before
         return answer
 
-    def mark(self) -> Mark:
-        """Remember where the episode is now, for `rewind`; the last two marks are cheap to go back to.
+    def mark(self) -> SimulatorMark:
+        """Remembers where the episode is now, for `rewind`; the last two marks are cheap to go back to.
 
         The embedded simulator keeps a copy of its state. Unity cannot: there `rewind` may repeat the episode.
         """
@@ -177,10 +178,10 @@ class Simulator:
             slot = min(range(_SLOTS), key=lambda slot: self._saved.get(slot, -1))
             if self.query("SaveState", slot=slot).success:
                 self._saved[slot] = length
-        return Mark(length, self.view)
+        return SimulatorMark(length, self.view)
 
-    def rewind(self, mark: Mark) -> View:
-        """Bring the world back to where it was at a mark of this episode.
+    def rewind(self, mark: SimulatorMark) -> View:
+        """Brings the world back to where it was at a mark of this episode.
 
         Raises:
             SimulatorError: as `step`.
@@ -202,27 +203,20 @@ class Simulator:
         slot = next((slot for slot, known in self._saved.items() if known == length), None)
         return slot is not None and self.query("RestoreState", slot=slot).success
 
-    def _walk_back(self, mark: Mark) -> bool:
-        """Put the agent where it was; enough where it only walked and looked about since."""
-        agent = mark.view.agent
-        back = self.query(
-            "Teleport",
-            position={"x": agent.position.x, "y": agent.position.y, "z": agent.position.z},
-            rotation={"x": 0.0, "y": agent.rotation, "z": 0.0},
-            horizon=agent.horizon,
-            forceAction=True,
-        )
-        return back.success and back.agent == agent
+    def _walk_back(self, mark: SimulatorMark) -> bool:
+        """Puts the agent where it was; enough where it only walked and looked about since."""
+        back = self.query(**teleport_call(mark.view.agent))
+        return back.success and back.agent == mark.view.agent
 
     def close(self) -> None:
-        """Stop the simulator; a later `reset` starts it again."""
+        """Stops the simulator; a later `reset` starts it again."""
         self._saved = {}
         if self._controller is not None:
             self._controller.stop()
             self._controller = None
 
     def _load(self) -> View:
-        """Bring the process to the start of the episode, starting one if need be."""
+        """Brings the process to the start of the episode, starting one if need be."""
         if self._scene is None:
             raise SimulatorError("no scene is loaded; reset the simulator to one first")
         if self._controller is None:
@@ -252,7 +246,7 @@ class Simulator:
                 )
 
     def _recover_from(self, fault: PeerFault) -> None:
-        """Drop the failed process; raise where it failed too often."""
+        """Drops the failed process; raises where it failed too often."""
         self.close()
         self._failures += 1
         if self._failures > self._max_restarts:

@@ -36,11 +36,11 @@ _NOT_PROTOCOL = (
 
 
 class PeerFault(SimulatorError):
-    """The simulator's process failed; `kind` is "died", "hung" or "garbage"."""
+    """The simulator's process failed; `fault_type` is "died", "hung" or "garbage"."""
 
-    def __init__(self, kind: str, message: str) -> None:
+    def __init__(self, fault_type: str, message: str) -> None:
         super().__init__(message)
-        self.kind = kind
+        self.fault_type = fault_type
 
 
 class SafeFifoServer(FifoServer):
@@ -65,7 +65,7 @@ class SafeFifoServer(FifoServer):
         self._connected = False
 
     def receive(self, timeout: float | None = None) -> MultiAgentEvent:
-        """Wait for one reply.
+        """Waits for one reply.
 
         Args:
             timeout: seconds for the whole reply; None takes the server's own.
@@ -81,7 +81,7 @@ class SafeFifoServer(FifoServer):
             raise self._fail("garbage", f"sent what is not its protocol ({_one_line(error)})") from error
 
     def send(self, action: dict[str, Any]) -> None:
-        """Send one action.
+        """Sends one action.
 
         Raises:
             PeerFault: the simulator died or does not read.
@@ -90,7 +90,7 @@ class SafeFifoServer(FifoServer):
         super().send(action)
 
     def stop(self) -> None:
-        """Kill the simulator, reap it, close the pipes and remove their folder. Safe to call again."""
+        """Kills the simulator, reaps it, closes the pipes and removes their folder. Safe to call again."""
         process = self.unity_proc
         if process is not None and process.poll() is None:
             process.kill()
@@ -120,7 +120,7 @@ class SafeFifoServer(FifoServer):
         message_size: int,
         timeout: float | None,  # the deadline is that of the whole reply, not of one read
     ) -> bytearray:
-        """Read exactly `message_size` bytes."""
+        """Reads exactly `message_size` bytes."""
         if message_size > _LARGEST_BODY:
             raise self._fail("garbage", f"announced a message part of {message_size} bytes")
         body = bytearray(message_size)
@@ -131,7 +131,7 @@ class SafeFifoServer(FifoServer):
         return body
 
     def _read_some(self, descriptor: int, into: memoryview) -> int:
-        """Read what is there, at least one byte."""
+        """Reads what is there, at least one byte."""
         while True:
             try:
                 count = os.readv(descriptor, [into])
@@ -161,7 +161,7 @@ class SafeFifoServer(FifoServer):
                 raise self._fail("died", self._exit_words()) from error
 
     def _open_client_pipe(self) -> io.FileIO:
-        """Open the pipe to the simulator as soon as it has opened its end."""
+        """Opens the pipe to the simulator as soon as it has opened its end."""
         while True:
             try:
                 return _open_pipe(self.client_pipe_path, os.O_WRONLY)
@@ -175,7 +175,7 @@ class SafeFifoServer(FifoServer):
         self._deadline = time.monotonic() + self._seconds
 
     def _check(self) -> None:
-        """Raise where waiting on is pointless."""
+        """Raises where waiting on is pointless."""
         if self.unity_proc is not None and self.unity_proc.poll() is not None:
             raise self._fail("died", self._exit_words())
         if time.monotonic() > self._deadline:
@@ -190,8 +190,8 @@ class SafeFifoServer(FifoServer):
             return "closed its pipe while still running"
         return f"died (exit status {code})"
 
-    def _fail(self, kind: str, words: str) -> PeerFault:
-        self.fault = PeerFault(kind, f"the simulator {words} at {self.doing}")
+    def _fail(self, fault_type: str, words: str) -> PeerFault:
+        self.fault = PeerFault(fault_type, f"the simulator {words} at {self.doing}")
         return self.fault
 
 

@@ -61,24 +61,17 @@ class ThorObject(msgspec.Struct, rename="camel", frozen=True):
     temperature: str = "RoomTemp"
     axis_aligned_bounding_box: Box | None = None
 
-    @property
-    def id(self) -> str:
-        """The object's id."""
-        return self.object_id
-
-    @property
-    def type(self) -> str:
-        """The object's type."""
-        return self.object_type
-
 
 class AgentPose(msgspec.Struct, frozen=True):
-    """Where the agent is; `rotation` is about the vertical, `horizon` downwards, both in degrees."""
+    """Where the agent is; `rotation` is about the vertical, `horizon` downwards, both in degrees.
+
+    `standing` is None where the agent cannot crouch.
+    """
 
     position: Vector
     rotation: float
     horizon: float
-    standing: bool = True
+    standing: bool | None = True
 
 
 @dataclass(frozen=True)
@@ -121,7 +114,7 @@ class View:
 
 
 def view_of(event: Any) -> View:
-    """Turn an `ai2thor.server.Event` into a View.
+    """Turns an `ai2thor.server.Event` into a View.
 
     Raises:
         SimulatorError: the metadata lacks a field or has it in another form.
@@ -149,7 +142,7 @@ def view_of(event: Any) -> View:
 
 
 def instances_of(codes: NDArray[np.uint32]) -> dict[int, Instance]:
-    """Count and box the pixels of each code.
+    """Counts and boxes the pixels of each code.
 
     Args:
         codes: one code per pixel, [height, width].
@@ -164,17 +157,17 @@ def instances_of(codes: NDArray[np.uint32]) -> dict[int, Instance]:
     np.not_equal(codes[:, 1:], codes[:, :-1], out=starts[:, 1:])
     first = np.flatnonzero(starts)
     length = np.diff(first, append=codes.size)
-    kinds, which = np.unique(codes.ravel()[first], return_inverse=True)
+    shown, which = np.unique(codes.ravel()[first], return_inverse=True)
     row, left = np.divmod(first, width)
     pixels = np.bincount(which, weights=length).astype(int)
-    low = np.full((len(kinds), 2), codes.size)
-    high = np.zeros((len(kinds), 2), dtype=int)
+    low = np.full((len(shown), 2), codes.size)
+    high = np.zeros((len(shown), 2), dtype=int)
     np.minimum.at(low, which, np.stack([left, row], axis=1))
     np.maximum.at(high, which, np.stack([left + length - 1, row], axis=1))
     boxes = np.concatenate([low, high], axis=1).tolist()
     return {
-        int(kind): Instance(int(count), (box[0], box[1], box[2], box[3]))
-        for kind, count, box in zip(kinds, pixels, boxes, strict=True)
+        int(code): Instance(int(count), (box[0], box[1], box[2], box[3]))
+        for code, count, box in zip(shown, pixels, boxes, strict=True)
     }
 
 
@@ -183,7 +176,7 @@ def _pose(agent: dict[str, Any]) -> AgentPose:
         msgspec.convert(agent["position"], Vector),
         float(agent["rotation"]["y"]),
         float(agent["cameraHorizon"]),
-        bool(agent.get("isStanding", True)),
+        agent.get("isStanding"),
     )
 
 

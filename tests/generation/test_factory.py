@@ -8,11 +8,13 @@ import pytest
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.step_log import read_steps
 from infthor_eval.formats.trajectory import iter_trajectories
-from infthor_eval.generation.factory import Settings, generate
+from infthor_eval.generation.factory import generate
 from infthor_eval.generation.final_task import violation
 from infthor_eval.generation.generate_set import generate_set
 from infthor_eval.generation.replay_set import replay_set, select
-from infthor_eval.generation.tasks import TaskType
+from infthor_eval.generation.replay_summary import summarise
+from infthor_eval.generation.settings import TrajectorySettings
+from infthor_eval.household.tasks import TaskType
 from infthor_eval.thor.launch import embedded
 from infthor_eval.thor.simulator import Simulator
 
@@ -27,7 +29,7 @@ def simulator():
 
 def test_every_task_begins_with_an_empty_hand(simulator):
     # This room's first lit object, a bowl, finds no place to be put down: the task is taken back.
-    made = generate(Settings("bedroom-3", 0, 80, 1), simulator)
+    made = generate(TrajectorySettings("bedroom-3", 0, 80, 1), simulator)
     trajectory = made.trajectory
     assert made.statistics.reasons["no place takes Bowl"] == 1
     assert [entry["step"] for entry in trajectory.object_log] == list(range(len(trajectory.plan.low_actions) + 1))
@@ -38,7 +40,7 @@ def test_every_task_begins_with_an_empty_hand(simulator):
 
 
 def test_sub_goals_and_actions_are_numbered_through(simulator):
-    trajectory = generate(Settings("living-room-2", 5, 60, 4), simulator).trajectory
+    trajectory = generate(TrajectorySettings("living-room-2", 5, 60, 4), simulator).trajectory
     plan = trajectory.plan
     assert [high.high_idx for high in plan.high_pddl] == list(range(len(plan.high_pddl))) and len(plan.high_pddl) >= 4
     assert [low.low_idx for low in plan.low_actions] == list(range(len(plan.low_actions)))
@@ -54,7 +56,7 @@ def test_sub_goals_and_actions_are_numbered_through(simulator):
 
 
 def test_the_final_task_is_about_both_ends_and_comes_last(simulator):
-    trajectory = generate(Settings("kitchen-2", 3, 60, 1, final_task=True), simulator).trajectory
+    trajectory = generate(TrajectorySettings("kitchen-2", 3, 60, 1, final_task=True), simulator).trajectory
     assert violation(trajectory) is None
     assert len(trajectory.sub_trajs) == len(trajectory.sub_tasks) + 1
     assert trajectory.sub_trajs[-1].subgoal == trajectory.long_horizon_task.task_desc
@@ -68,10 +70,10 @@ def test_looking_for_places_leaves_no_trace(scene, seed, tmp_path):
     if data is not None and not data.is_dir():
         pytest.skip("recorded floor plans not at ../shared/data")
     with Simulator(embedded(data)) as simulator:
-        (path,) = generate_set([Settings(scene, seed, 150, 1)], simulator, tmp_path / "trajectories").paths
+        (path,) = generate_set([TrajectorySettings(scene, seed, 150, 1)], simulator, tmp_path / "trajectories").paths
     with Simulator(embedded(data)) as simulator:
-        summary = replay_set(select([path]), simulator, tmp_path / "set").document()
-    assert summary["whole"] == 1, summary["diverged"]
+        summary = summarise(replay_set(select([path]), simulator, tmp_path / "set"))
+    assert summary.complete == 1, summary.diverged
     trajectory = next(iter_trajectories(path))
     made = [{key: value for key, value in entry.items() if key != "step"} for entry in trajectory.object_log]
     steps = read_steps(tmp_path / "set" / "metadata" / trajectory.traj_id)
@@ -80,5 +82,5 @@ def test_looking_for_places_leaves_no_trace(scene, seed, tmp_path):
 
 def test_a_task_type_that_the_room_offers_nothing_for_is_one_line(simulator):
     with pytest.raises(UsageError, match=r"scene living-room-1, seed 0: no further task works after 0 steps") as error:
-        generate(Settings("living-room-1", 0, 10, 1, kinds=(TaskType.HEAT,)), simulator)
+        generate(TrajectorySettings("living-room-1", 0, 10, 1, task_types=(TaskType.HEAT,)), simulator)
     assert "\n" not in str(error.value)

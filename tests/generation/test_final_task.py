@@ -12,8 +12,8 @@ from infthor_eval.formats.trajectory import (
 from infthor_eval.generation.final_task import ends_of, violation
 
 
-def log(*kinds):
-    return [{"visible": [kind]} for kind in kinds]
+def log(*types):
+    return [{"visible": [object_type]} for object_type in types]
 
 
 def test_the_ends_are_a_fifth_each():

@@ -8,16 +8,17 @@ from PIL import Image
 from infthor_eval.errors import SimulatorError
 from infthor_eval.formats.step_log import read_steps, worlds
 from infthor_eval.formats.trajectory import iter_sources, iter_trajectories
-from infthor_eval.generation.factory import Settings
 from infthor_eval.generation.generate_set import generate_set
 from infthor_eval.generation.replay import box_iou
 from infthor_eval.generation.replay_set import replay_set, select
+from infthor_eval.generation.replay_summary import summarise
+from infthor_eval.generation.settings import TrajectorySettings
 from infthor_eval.generation.supplement import write_supplement
 from infthor_eval.thor.launch import embedded
 from infthor_eval.thor.simulator import Simulator
 
 SHARED = Path(__file__).parents[2] / "../shared/data"
-JOB = Settings("kitchen-3", 4, min_steps=40, min_subgoals=1)
+JOB = TrajectorySettings("kitchen-3", 4, min_steps=40, min_subgoals=1)
 
 
 @pytest.fixture(scope="module")
@@ -31,11 +32,11 @@ def generated(tmp_path_factory):
 
 def test_a_generated_trajectory_replays_whole(generated, tmp_path):
     with Simulator(embedded()) as simulator:
-        summary = replay_set(select([generated]), simulator, tmp_path)
+        replayed = replay_set(select([generated]), simulator, tmp_path)
         again = replay_set(select([generated]), simulator, tmp_path)
     trajectory = next(iter_trajectories(generated))
-    assert summary.document()["whole"] == 1 and not summary.failures
-    assert (again.resumed, summary.resumed) == (1, 0)
+    assert summarise(replayed).complete == 1 and not replayed.failures
+    assert (again.resumed, replayed.resumed) == (1, 0)
     folder = tmp_path / "metadata" / trajectory.traj_id
     steps = read_steps(folder)
     frames = sorted((folder / "img").iterdir())
@@ -57,9 +58,9 @@ def test_a_generated_trajectory_replays_whole(generated, tmp_path):
 
 def test_several_frames_per_move(generated, tmp_path):
     with Simulator(embedded()) as simulator:
-        summary = replay_set(select([generated]), simulator, tmp_path, frames=3)
+        replayed = replay_set(select([generated]), simulator, tmp_path, frames=3)
         again = replay_set(select([generated]), simulator, tmp_path)
-    assert summary.document()["whole"] == 1
+    assert summarise(replayed).complete == 1
     assert "3 frames per move" in again.failures[0].message
     steps = read_steps(tmp_path / "metadata" / JOB.traj_id)
     first = [step for step in steps if step.step == 1]
@@ -75,7 +76,7 @@ def test_the_seed_decides_and_what_exists_is_kept(generated, tmp_path):
         generate_set([JOB], simulator, tmp_path)
         assert (tmp_path / generated.name).read_bytes() == generated.read_bytes()
         assert generate_set([JOB], simulator, tmp_path).resumed == 1
-        other = Settings(JOB.scene, JOB.seed, min_steps=41, min_subgoals=1)
+        other = TrajectorySettings(JOB.scene, JOB.seed, min_steps=41, min_subgoals=1)
         assert "other settings" in generate_set([other], simulator, tmp_path).failures[0]
 
 
@@ -87,9 +88,9 @@ def test_one_bad_trajectory_does_not_stop_the_others(generated, tmp_path):
     path = tmp_path / "all.jsonl.gz"
     path.write_bytes(gzip.compress(b"\n".join(lines)))
     with Simulator(embedded()) as simulator:
-        summary = replay_set(select([path]), simulator, tmp_path / "set")
-    assert len(summary.reports) == 1
-    assert sorted(failure.place.rpartition(":")[2] for failure in summary.failures) == ["1", "2"]
+        replayed = replay_set(select([path]), simulator, tmp_path / "set")
+    assert len(replayed.reports) == 1
+    assert sorted(failure.place.rpartition(":")[2] for failure in replayed.failures) == ["1", "2"]
     assert [folder.name for folder in (tmp_path / "set/metadata").iterdir()] == [JOB.traj_id]
 
 
@@ -99,8 +100,8 @@ def test_another_trajectory_of_the_same_name_is_refused(generated, tmp_path):
     (tmp_path / "short.json").write_text(json.dumps(changed))
     with Simulator(embedded()) as simulator:
         replay_set(select([tmp_path / "short.json"]), simulator, tmp_path / "set")
-        summary = replay_set(select([generated]), simulator, tmp_path / "set")
-    assert "another trajectory" in summary.failures[0].message
+        replayed = replay_set(select([generated]), simulator, tmp_path / "set")
+    assert "another trajectory" in replayed.failures[0].message
 
 
 @pytest.mark.skipif(not SHARED.is_dir(), reason="recorded data not at ../shared/data")
@@ -108,11 +109,11 @@ def test_recorded_trajectories_replay(tmp_path):
     selection = select([SHARED / "alfred/valid_seen.jsonl.gz"], limit=3, per_floor_plan=1)
     write_supplement((trajectory for _, trajectory in selection.items), tmp_path / "supplement.json")
     with Simulator(embedded(SHARED, tmp_path / "supplement.json")) as simulator:
-        summary = replay_set(selection, simulator, tmp_path)
-    document = summary.document()
-    assert document["trajectories"] == document["floor_plans"] == 3
-    assert document["actions"]["MoveAhead"]["accepted"] > 20
-    assert document["iou"]
+        replayed = replay_set(selection, simulator, tmp_path)
+    summary = summarise(replayed)
+    assert summary.trajectories == summary.floor_plans == 3
+    assert summary.actions["MoveAhead"].accepted > 20
+    assert summary.iou
     # Passed on as it came, with what the typed form leaves out.
     raw = json.loads(next((tmp_path / "metadata").glob("*/traj_data.json")).read_bytes())
     assert raw["turk_annotations"]

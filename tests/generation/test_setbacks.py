@@ -2,9 +2,8 @@ from msgspec.structs import replace
 
 from infthor_eval.generation.setbacks import Setbacks
 from infthor_eval.thor.view import Vector
+from tests.household.rooms import APPLE, COUNTER, FRIDGE, KITCHEN, KNIFE, MUG, TABLE
 from tests.thor.views import view
-
-from .rooms import APPLE, COUNTER, FRIDGE, KITCHEN, KNIFE, MUG, TABLE
 
 OTHERS = [item for item in KITCHEN.objects.values() if item.object_id != MUG.object_id]
 

@@ -58,8 +58,8 @@ class Peer:
         elif fault == "sequence":
             self.reply({**action, "sequenceId": 999})
 
-    def frame(self, kind, body):
-        data = struct.pack("!BI", kind, len(body)) + body
+    def frame(self, field_type, body):
+        data = struct.pack("!BI", field_type, len(body)) + body
         while data:
             data = data[os.write(self.out, data) :]
 
@@ -89,10 +89,10 @@ class Peer:
         self.frame(255, b"")
 
     def receive(self):
-        kind, length = struct.unpack("!BI", self.inp.read(5))
+        field_type, length = struct.unpack("!BI", self.inp.read(5))
         body = self.inp.read(length)
         self.inp.read(5)
-        assert kind == 2
+        assert field_type == 2
         return json.loads(body)
 
     def act(self, action):

@@ -59,13 +59,13 @@ def test_moves_need_no_object():
 
 
 @pytest.mark.parametrize(
-    ("object_id", "kind"),
+    ("object_id", "object_type"),
     [
         ("Mug|+01.00|+00.90|-00.50", "Mug"),
         ("Sink|+01.00|+00.90|-00.50|SinkBasin", "SinkBasin"),
         ("Apple|+01.00|+00.90|-00.50|AppleSliced_3", "AppleSliced"),
     ],
 )
-def test_types_of_ids(object_id, kind):
-    assert object_type_of(object_id) == kind
-    assert text_of("PickupObject", object_id).types == (kind,)
+def test_types_of_ids(object_id, object_type):
+    assert object_type_of(object_id) == object_type
+    assert text_of("PickupObject", object_id).types == (object_type,)

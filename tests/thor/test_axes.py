@@ -19,9 +19,9 @@ def test_a_thing_that_did_not_change_keeps_its_rotation(rotation):
     assert modern_rotation("Mug", rotation) == rotation
 
 
-@pytest.mark.parametrize(("kind", "turn"), [("Knife", 90.0), ("Spatula", 270.0)])
-def test_a_thing_that_lies_flat_is_turned_about_the_vertical(kind, turn):
-    turned = modern_rotation(kind, {"x": 0.0, "y": 30.0, "z": 0.0})
+@pytest.mark.parametrize(("object_type", "turn"), [("Knife", 90.0), ("Spatula", 270.0)])
+def test_a_thing_that_lies_flat_is_turned_about_the_vertical(object_type, turn):
+    turned = modern_rotation(object_type, {"x": 0.0, "y": 30.0, "z": 0.0})
     assert turned == pytest.approx({"x": 0.0, "y": 30.0 + turn, "z": 0.0}, abs=1e-5)
 
 

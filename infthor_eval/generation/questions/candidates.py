@@ -5,9 +5,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from infthor_eval.formats.question import Answer, Question
-from infthor_eval.generation.affordances import preposition
-from infthor_eval.generation.questions.history import canonical
-from infthor_eval.generation.wording import compact, noun
+from infthor_eval.household.affordances import preposition
+from infthor_eval.household.wording import canonical, compact, noun
 
 __all__ = ["MANY", "Candidate", "answer_of", "distinct", "listing", "the", "within"]
 
@@ -27,7 +26,7 @@ class Candidate:
     """A question that holds.
 
     Attributes:
-        kind: its type.
+        question_type: its type.
         form: the question with "{}" where it names things; balance is kept within a form.
         names: what stands there.
         clues: the frames that show the answer, in order.
@@ -36,7 +35,7 @@ class Candidate:
         absence: whether the answer is that something is not there, which no frame proves.
     """
 
-    kind: str
+    question_type: str
     form: str
     names: tuple[str, ...]
     clues: tuple[int, ...]
@@ -57,46 +56,46 @@ class Candidate:
 
     def question(self, traj_id: str) -> Question:
         """The question as sets hold it."""
-        return Question(traj_id, self.text, self.clues, self.answers, self.kind, self.absence)
+        return Question(traj_id, self.text, self.clues, self.answers, self.question_type, self.absence)
 
 
-def the(kind: str) -> str:
+def the(object_type: str) -> str:
     """ "the coffee table" for an object type."""
-    return f"the {noun(canonical(kind))}"
+    return f"the {noun(canonical(object_type))}"
 
 
-def within(kind: str) -> str:
+def within(object_type: str) -> str:
     """ "on the coffee table", "in the fridge" for a receptacle type."""
-    return f"{preposition(kind)} {the(kind)}"
+    return f"{preposition(object_type)} {the(object_type)}"
 
 
-def answer_of(kind: str) -> str:
+def answer_of(object_type: str) -> str:
     """An object type as a gold answer, in the published data's form ("coffeetable")."""
-    return compact(canonical(kind))
+    return compact(canonical(object_type))
 
 
-def distinct(kinds: Sequence[str]) -> bool:
+def distinct(object_types: Sequence[str]) -> bool:
     """Whether a list of these types can be a gold answer: no scorer may take one for another.
 
     The published scorer deletes "and" inside words of lists too ("candle"), so such words cannot be in one.
     """
-    words = [answer_of(kind) for kind in kinds]
+    words = [answer_of(object_type) for object_type in object_types]
     if len(words) > 1 and any("and" in word for word in words):
         return False
     for index, word in enumerate(words):
-        for other, kind in zip(words[:index], kinds[:index], strict=True):
+        for other, object_type in zip(words[:index], object_types[:index], strict=True):
             if difflib.SequenceMatcher(None, word, other).ratio() >= _SIMILAR:
                 return False
-            if any({canonical(kind), canonical(kinds[index])} <= group for group in _ALIKE):
+            if any({canonical(object_type), canonical(object_types[index])} <= group for group in _ALIKE):
                 return False
     return True
 
 
-def listing(kind: str, form: str, occasions: Iterable[tuple[str | None, int | None]]) -> Iterator[Candidate]:
+def listing(question_type: str, form: str, occasions: Iterable[tuple[str | None, int | None]]) -> Iterator[Candidate]:
     """A question on all types that something happened with, each with the first frame that shows it happen.
 
     Args:
-        kind: the question's type.
+        question_type: the question's type.
         form: the question; it names nothing.
         occasions: of each, the object type (None where that is not clear) and the frame (None where none shows it).
 
@@ -111,4 +110,4 @@ def listing(kind: str, form: str, occasions: Iterable[tuple[str | None, int | No
     complete = all(name is not None and canonical(name) in first for name, _ in everything)
     if first and complete and len(first) <= MANY and distinct(list(first)):
         answers = tuple(answer_of(name) for name in first)
-        yield Candidate(kind, form, (), tuple(first.values()), answers, tuple(first))
+        yield Candidate(question_type, form, (), tuple(first.values()), answers, tuple(first))

@@ -66,7 +66,7 @@ def glimpses(steps: Sequence[Step], share: float, frames: Container[int] | None 
 
 
 def answer(text: str, seen: Sequence[Glimpse]) -> list[str] | None:
-    """Answer a question from glimpses; None where they do not tell."""
+    """Answers a question from glimpses; None where they do not tell."""
     for pattern, solve in _SOLVERS:
         match = re.fullmatch(pattern, text)
         if match is not None and seen:
@@ -79,7 +79,7 @@ class Checker:
     """Judges the questions on one trajectory."""
 
     def __init__(self, steps: Sequence[Step], share: float) -> None:
-        """Read the log.
+        """Reads the log.
 
         Args:
             steps: the log.
@@ -89,7 +89,7 @@ class Checker:
         self._single = {item.frame: item for item in glimpses(steps, share, range(len(steps)))}
 
     def verdict(self, question: Question) -> Verdict:
-        """Judge one question. An absence is proven by no frame; its clues count as minimal."""
+        """Judges one question. An absence is proven by no frame; its clues count as minimal."""
         gold = sorted(str(item) for item in question.answers)
         clues = question.clues
 
@@ -98,13 +98,13 @@ class Checker:
             return found is not None and sorted(found) == gold
 
         shown = [self._single[clue] for clue in clues]
-        smaller = [[item for item in shown if item.frame != left_out] for left_out in clues]
+        smaller = [[item for item in shown if item.frame != skipped] for skipped in clues]
         absence = question.text.startswith("Did you see") and gold == ["no"]
         return Verdict(gives(self._whole), gives(shown), absence or not any(gives(rest) for rest in smaller))
 
 
-def _name(kind: str) -> str:
-    return kind.lower().replace(" ", "").removesuffix("basin")
+def _name(object_type: str) -> str:
+    return object_type.lower().replace(" ", "").removesuffix("basin")
 
 
 def _said(words: str) -> str:
@@ -120,7 +120,11 @@ def _is(state: ObjectState, words: str) -> bool:
 
 
 def _holder(glimpse: Glimpse, key: str) -> str | None:
-    """What an object is directly in or on: of its parents the one that is in most of the others."""
+    """What an object is directly in or on: of its parents the one that is in most of the others.
+
+    Found in its own way, not by `household.containment`, on which the rules rely: a second opinion must not share their
+    faults.
+    """
     state = glimpse.objects[key]
     parents = [parent for parent in state.parents if parent in glimpse.objects]
     parents = [parent for parent in parents if glimpse.objects[parent].type != "Floor"]
@@ -272,8 +276,8 @@ def _sliced(seen: Sequence[Glimpse]) -> list[str]:
 
 
 def _else_at_slicing(seen: Sequence[Glimpse], _preposition: str, place: str, item: str) -> list[str]:
-    left_out = {_said(item), f"{_said(item)}sliced"}
-    return [name for name in _left_at(seen, "SliceObject", place, item) if name not in left_out]
+    skipped = {_said(item), f"{_said(item)}sliced"}
+    return [name for name in _left_at(seen, "SliceObject", place, item) if name not in skipped]
 
 
 def _at_opening(seen: Sequence[Glimpse], _preposition: str, place: str) -> list[str]:

@@ -5,11 +5,11 @@ from collections.abc import Iterator
 
 from infthor_eval.generation.questions.candidates import Candidate, the, within
 from infthor_eval.generation.questions.history import Event, History, Move
-from infthor_eval.generation.wording import an, noun
+from infthor_eval.household.wording import an, noun
 
-__all__ = ["KIND", "counts"]
+__all__ = ["QUESTION_TYPE", "counts"]
 
-KIND = "movement_counting"
+QUESTION_TYPE = "movement_counting"
 
 
 def counts(history: History) -> Iterator[Candidate]:
@@ -22,24 +22,25 @@ def counts(history: History) -> Iterator[Candidate]:
 
 def _moves(history: History) -> Iterator[Candidate]:
     """Of every object that alone of its type was handled. A move ends when the object is put down."""
-    for kind, items in sorted(history.handled.items()):
+    for object_type, items in sorted(history.handled.items()):
         moves = history.moves_of(next(iter(items))) if len(items) == 1 else ()
         if moves and all(history.shows(move.after, move.item, move.target) for move in moves):
             frames = [move.after for move in moves]
-            yield _count("How many times did you pick up {} and put it down again?", (the(kind),), frames, kind)
+            form = "How many times did you pick up {} and put it down again?"
+            yield _count(form, (the(object_type),), frames, object_type)
 
 
 def _openings(history: History) -> Iterator[Candidate]:
     """Of every type: "the fridge" where there is one, "a drawer" where there are several."""
-    by_kind: dict[str, list[Event]] = defaultdict(list)
+    by_type: dict[str, list[Event]] = defaultdict(list)
     for event in history.events:
         if event.action == "OpenObject":
-            by_kind[event.kind].append(event)
-    for kind, events in sorted(by_kind.items()):
+            by_type[event.object_type].append(event)
+    for object_type, events in sorted(by_type.items()):
         if all(history.shows(event.frame, event.target) for event in events):
             single = all(history.only_one(event.frame, event.target) for event in events)
-            name = the(kind) if single else an(noun(kind))
-            yield _count("How many times did you open {}?", (name,), [event.frame for event in events], kind)
+            name = the(object_type) if single else an(noun(object_type))
+            yield _count("How many times did you open {}?", (name,), [event.frame for event in events], object_type)
 
 
 def _puts(history: History) -> Iterator[Candidate]:
@@ -50,9 +51,9 @@ def _puts(history: History) -> Iterator[Candidate]:
     for target, moves in sorted(by_target.items()):
         shown = all(history.shows_put(move) for move in moves)
         if shown and all(history.only_one(move.after, target) for move in moves):
-            kind = history.world(moves[0].after)[target].type
+            place_type = history.world(moves[0].after)[target].type
             frames = [move.after for move in moves]
-            yield _count("How many times did you put something {}?", (within(kind),), frames, kind)
+            yield _count("How many times did you put something {}?", (within(place_type),), frames, place_type)
 
 
 def _items(history: History) -> Iterator[Candidate]:
@@ -66,4 +67,4 @@ def _items(history: History) -> Iterator[Candidate]:
 
 
 def _count(form: str, names: tuple[str, ...], frames: list[int], subject: str) -> Candidate:
-    return Candidate(KIND, form, names, tuple(frames), (str(len(frames)),), (subject,))
+    return Candidate(QUESTION_TYPE, form, names, tuple(frames), (str(len(frames)),), (subject,))

@@ -4,11 +4,12 @@ from collections.abc import Iterator
 
 from infthor_eval.generation.questions.candidates import MANY, Candidate, answer_of, distinct, the, within
 from infthor_eval.generation.questions.evidence import cover
-from infthor_eval.generation.questions.history import History, canonical
+from infthor_eval.generation.questions.history import History
+from infthor_eval.household.wording import canonical
 
-__all__ = ["KIND", "final_states"]
+__all__ = ["QUESTION_TYPE", "final_states"]
 
-KIND = "final_state"
+QUESTION_TYPE = "final_state"
 
 
 def final_states(history: History) -> Iterator[Candidate]:
@@ -28,14 +29,14 @@ def _inside(history: History, receptacle: str) -> Iterator[Candidate]:
     for item in sorted({move.item for move in history.moves if receptacle in {move.target, move.origin}}):
         move = history.moves_of(item)[-1]
         here = history.parent(last, item)
-        alone = item in world and history.only_one(last, item) and len(history.handled[move.kind]) == 1
+        alone = item in world and history.only_one(last, item) and len(history.handled[move.object_type]) == 1
         if not alone or here != move.target:
             continue
         if history.shows_put(move):
-            kind = world[receptacle].type
-            names = (the(world[item].type), within(kind))
+            place_type = world[receptacle].type
+            names, subjects = (the(world[item].type), within(place_type)), (world[item].type, place_type)
             answer = "yes" if here == receptacle else "no"
-            yield Candidate(KIND, "Is {} {} now?", names, (move.after,), (answer,), (world[item].type, kind))
+            yield Candidate(QUESTION_TYPE, "Is {} {} now?", names, (move.after,), (answer,), subjects)
 
 
 def _what(history: History, receptacle: str) -> Iterator[Candidate]:
@@ -55,12 +56,13 @@ def _what(history: History, receptacle: str) -> Iterator[Candidate]:
     clues = cover(inside, shown) if inside else None
     if clues is None or len(inside) > MANY:
         return
-    kind = world[receptacle].type
-    kinds = sorted(world[key].type for key in inside)
-    yield Candidate(KIND, "How many objects are {} now?", (within(kind),), clues, (str(len(inside)),), (kind, "#"))
-    if len({canonical(item) for item in kinds}) == len(kinds) and distinct(kinds):
-        answers = tuple(answer_of(item) for item in kinds)
-        yield Candidate(KIND, "What is {} now?", (within(kind),), clues, answers, (kind, *kinds))
+    place_type = world[receptacle].type
+    types = sorted(world[key].type for key in inside)
+    where, count = (within(place_type),), str(len(inside))
+    yield Candidate(QUESTION_TYPE, "How many objects are {} now?", where, clues, (count,), (place_type, "#"))
+    if len({canonical(item) for item in types}) == len(types) and distinct(types):
+        answers = tuple(answer_of(item) for item in types)
+        yield Candidate(QUESTION_TYPE, "What is {} now?", where, clues, answers, (place_type, *types))
 
 
 def _arrival(history: History, item: str, receptacle: str) -> int:

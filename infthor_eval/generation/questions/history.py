@@ -6,17 +6,13 @@ from functools import cached_property
 
 from infthor_eval.errors import DataError
 from infthor_eval.formats.step_log import ObjectState, Seen, Step, worlds
+from infthor_eval.household.containment import logged_parent
+from infthor_eval.household.wording import canonical
 
-__all__ = ["DEFAULT_SHARE", "FRAME_PIXELS", "Event", "History", "Move", "canonical", "is_same"]
+__all__ = ["DEFAULT_SHARE", "FRAME_PIXELS", "Event", "History", "Move", "is_same"]
 
 FRAME_PIXELS = 300 * 300
 DEFAULT_SHARE = 0.001  # of the frame: 90 pixels, about a fork on a table an arm's length away
-_WHOLE = {"SinkBasin": "Sink", "BathtubBasin": "Bathtub"}
-
-
-def canonical(kind: str) -> str:
-    """The type that people would name: the basin of a sink is the sink."""
-    return _WHOLE.get(kind, kind)
 
 
 @dataclass(frozen=True)
@@ -25,7 +21,7 @@ class Move:
 
     Attributes:
         item: its id.
-        kind: its type.
+        object_type: its type.
         origin: id of what it was in or on; None where that is not clear.
         before: the frame before it was picked up.
         target: id of what it was put into or onto.
@@ -33,7 +29,7 @@ class Move:
     """
 
     item: str
-    kind: str
+    object_type: str
     origin: str | None
     before: int
     target: str
@@ -48,14 +44,14 @@ class Event:
         frame: the frame after it.
         action: its name.
         target: id of the object acted on.
-        kind: its type.
+        object_type: its type.
         receptacle: id of the receptacle, for PutObject.
     """
 
     frame: int
     action: str
     target: str
-    kind: str
+    object_type: str
     receptacle: str | None
 
 
@@ -69,7 +65,7 @@ class History:
     """
 
     def __init__(self, traj_id: str, steps: list[Step], share: float = DEFAULT_SHARE) -> None:
-        """Read a log.
+        """Reads a log.
 
         Args:
             traj_id: the trajectory's folder.
@@ -117,20 +113,10 @@ class History:
         """What an object is directly in or on at a frame; None where it is held, lies on the floor, or it is not
         clear."""
         world = self.world(frame)
-        state = world.get(item)
-        if state is None or state.held:
-            return None
-        parents = [key for key in state.parents if key in world and world[key].type != "Floor"]
-        # The innermost is in all the others; basins count as their sinks.
-        inner = [key for key in parents if all(_within(world, key, other) for other in parents if other != key)]
-        return inner[0] if inner else None
-
-    def kinds(self, frame: int) -> set[str]:
-        """The types that exist at a frame, as people would name them."""
-        return {canonical(state.type) for state in self.world(frame).values() if state.exists}
+        return logged_parent(world[item], world) if item in world else None
 
     @cached_property
-    def all_kinds(self) -> frozenset[str]:
+    def all_object_types(self) -> frozenset[str]:
         """The types that exist at any time."""
         return frozenset(canonical(state.type) for step in self.steps for state in step.changes.values())
 
@@ -138,7 +124,7 @@ class History:
     def events(self) -> tuple[Event, ...]:
         """The actions on objects that were carried out, in order."""
         return tuple(
-            Event(frame, step.action.partition(" ")[0], step.target, self._kind(frame, step.target), step.receptacle)
+            Event(frame, step.action.partition(" ")[0], step.target, self._type_of(frame, step.target), step.receptacle)
             for frame, step in enumerate(self.steps)
             if step.success and step.action is not None and step.target is not None
         )
@@ -154,7 +140,7 @@ class History:
             elif event.action == "PutObject" and event.receptacle is not None and event.target in picked:
                 before = picked.pop(event.target)
                 origin = self.parent(before, event.target)
-                found.append(Move(event.target, event.kind, origin, before, event.receptacle, event.frame))
+                found.append(Move(event.target, event.object_type, origin, before, event.receptacle, event.frame))
         return tuple(found)
 
     def moves_of(self, item: str) -> tuple[Move, ...]:
@@ -167,21 +153,21 @@ class History:
         found: dict[str, set[str]] = {}
         for event in self.events:
             if event.action == "PickupObject":
-                found.setdefault(event.kind, set()).add(event.target)
+                found.setdefault(event.object_type, set()).add(event.target)
         return found
 
     def alone(self, frame: int, item: str) -> bool:
         """Whether a frame shows no other object that people would call the same, however small."""
-        kind = canonical(self._kind(frame, item))
+        object_type = canonical(self._type_of(frame, item))
         world = self.world(frame)
         others = (key for key in self.seen(frame) if key != item and key in world)
-        return not any(canonical(world[key].type) == kind and not is_same(key, item) for key in others)
+        return not any(canonical(world[key].type) == object_type and not is_same(key, item) for key in others)
 
     def only_one(self, frame: int, item: str) -> bool:
         """Whether the scene has no other object that people would call the same."""
         world = self.world(frame)
-        kind = canonical(world[item].type)
-        return not any(canonical(state.type) == kind and not is_same(key, item) for key, state in world.items())
+        object_type = canonical(world[item].type)
+        return not any(canonical(state.type) == object_type and not is_same(key, item) for key, state in world.items())
 
     def contents(self, frame: int, receptacle: str) -> frozenset[str]:
         """The objects directly in or on a receptacle."""
@@ -197,7 +183,7 @@ class History:
         parent = self.parent(frame, item)
         return parent is not None and self.shows(frame, item, parent)
 
-    def _kind(self, frame: int, item: str) -> str:
+    def _type_of(self, frame: int, item: str) -> str:
         """The type of an object; one that the action used up was there the frame before."""
         state = self.world(frame).get(item) or self.world(frame - 1)[item]
         return state.type
@@ -215,10 +201,3 @@ def _snapshots(steps: list[Step]) -> Iterator[dict[str, ObjectState]]:
         if step.changes or not last:
             last = {key: state for key, state in world.items() if state.exists}
         yield last
-
-
-def _within(world: dict[str, ObjectState], inner: str, outer: str) -> bool:
-    if outer in world[inner].parents:
-        return True
-    one, other = world[inner].type, world[outer].type
-    return canonical(one) == canonical(other) and one.endswith("Basin")

@@ -23,11 +23,11 @@ from infthor_eval.generation.questions.candidates import Candidate
 from infthor_eval.generation.questions.checker import Checker
 from infthor_eval.generation.questions.history import DEFAULT_SHARE, History
 
-__all__ = ["Made", "candidates_of", "make_questions"]
+__all__ = ["MadeQuestions", "candidates_of", "make_questions"]
 
 
 @dataclass
-class Made:
+class MadeQuestions:
     """What came of it.
 
     Attributes:
@@ -42,7 +42,7 @@ class Made:
     skipped: list[str] = field(default_factory=list)
     doubted: list[Question] = field(default_factory=list)
 
-    def by_kind(self) -> dict[str, int]:
+    def by_type(self) -> dict[str, int]:
         """Number of questions by type."""
         return dict(sorted(Counter(item.question_type or "" for item in self.questions).items()))
 
@@ -53,13 +53,15 @@ class Made:
 
     def words(self) -> str:
         """The counts by type and by number of clues, a line each, for people."""
-        kinds = ", ".join(f"{name} {count}" for name, count in self.by_kind().items())
+        types = ", ".join(f"{name} {count}" for name, count in self.by_type().items())
         clues = ", ".join(f"{name}: {count}" for name, count in self.by_clues().items())
-        return f"by type: {kinds}\nby number of clues: {clues}"
+        return f"by type: {types}\nby number of clues: {clues}"
 
 
-def make_questions(folder: Path, *, seed: int = 0, per_trajectory: int = 25, share: float = DEFAULT_SHARE) -> Made:
-    """Make questions on a replayed set.
+def make_questions(
+    folder: Path, *, seed: int = 0, per_trajectory: int = 25, share: float = DEFAULT_SHARE
+) -> MadeQuestions:
+    """Makes questions on a replayed set.
 
     Args:
         folder: the set, with `metadata/<traj_id>/metadata.json`.
@@ -74,7 +76,7 @@ def make_questions(folder: Path, *, seed: int = 0, per_trajectory: int = 25, sha
         DataError: the set has no trajectory, or is of another version.
     """
     simulator_of(folder)
-    made = Made()
+    made = MadeQuestions()
     histories = []
     for path in _folders(folder):
         try:
@@ -82,7 +84,7 @@ def make_questions(folder: Path, *, seed: int = 0, per_trajectory: int = 25, sha
         except DataError as error:
             made.skipped.append(str(error))
     made.trajectories = len(histories)
-    vocabulary = frozenset[str]().union(*(history.all_kinds for history in histories))
+    vocabulary = frozenset[str]().union(*(history.all_object_types for history in histories))
     chooser = _Chooser()
     for history in histories:
         rng = random.Random(f"{seed}/{history.traj_id}")
@@ -128,7 +130,7 @@ class _Chooser:
     """Chooses so that types, forms, answers, numbers of clues and what is asked about are even over the whole set."""
 
     def __init__(self) -> None:
-        self._kinds: Counter[str] = Counter()
+        self._types: Counter[str] = Counter()
         self._groups: Counter[str] = Counter()
         self._clues: Counter[int] = Counter()
         self._answers: Counter[tuple[str, str]] = Counter()
@@ -161,7 +163,7 @@ class _Chooser:
 
     def _note(self, item: Candidate) -> None:
         group = _group(item)
-        self._kinds[item.kind] += 1
+        self._types[item.question_type] += 1
         self._groups[group] += 1
         self._clues[_clue_class(item)] += 1
         self._subjects.update((group, subject) for subject in item.subjects)
@@ -171,12 +173,12 @@ class _Chooser:
     def _use(self, item: Candidate) -> tuple[int, int, int, int]:
         group = _group(item)
         subjects = sum(self._subjects[group, subject] for subject in item.subjects)
-        return self._kinds[item.kind], self._groups[group], self._clues[_clue_class(item)], subjects
+        return self._types[item.question_type], self._groups[group], self._clues[_clue_class(item)], subjects
 
 
 def _group(item: Candidate) -> str:
     """What is to be even within a question type: yes, no, and the rest."""
-    return f"{item.kind} {item.answers[0]}" if item.answers[0] in {"yes", "no"} else item.kind
+    return f"{item.question_type} {item.answers[0]}" if item.answers[0] in {"yes", "no"} else item.question_type
 
 
 def _clue_class(item: Candidate) -> int:

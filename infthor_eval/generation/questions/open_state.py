@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from infthor_eval.generation.questions.candidates import Candidate, listing, the, within
 from infthor_eval.generation.questions.history import Event, History
 
-__all__ = ["KIND", "open_states", "phrase"]
+__all__ = ["QUESTION_TYPE", "open_states", "phrase"]
 
-KIND = "open_state"
+QUESTION_TYPE = "open_state"
 _UNASKED = frozenset({"Blinds", "Curtains", "Book", "Kettle", "ShowerCurtain", "ShowerDoor", "Window"})
 _ASKED_AT = {"PickupObject", "PutObject", "SliceObject", "ToggleObjectOn"}
 
@@ -35,20 +35,18 @@ def open_states(history: History) -> Iterator[Candidate]:
 def phrase(history: History, event: Event) -> str:
     """What the agent did, as the end of a "when you ..." """
     if event.action == "PutObject" and event.receptacle is not None:
-        kind = history.world(event.frame)[event.receptacle].type
-        return f"put {the(event.kind)} {within(kind)}"
+        place_type = history.world(event.frame)[event.receptacle].type
+        return f"put {the(event.object_type)} {within(place_type)}"
     verbs = {"PickupObject": "picked up", "SliceObject": "sliced", "ToggleObjectOn": "turned on"}
-    return f"{verbs.get(event.action, event.action)} {the(event.kind)}"
+    return f"{verbs.get(event.action, event.action)} {the(event.object_type)}"
 
 
 def _then(history: History, key: str, event: Event, told: str) -> Iterator[Candidate]:
     world = history.world(event.frame)
     if key in world and history.shows(event.frame, key) and _shows_event(history, event):
         answer = "yes" if world[key].is_open else "no"
-        names = (the(world[key].type), told)
-        yield Candidate(
-            KIND, "Was {} open when you {}?", names, (event.frame,), (answer,), (world[key].type, event.kind)
-        )
+        names, subjects = (the(world[key].type), told), (world[key].type, event.object_type)
+        yield Candidate(QUESTION_TYPE, "Was {} open when you {}?", names, (event.frame,), (answer,), subjects)
 
 
 def _shows_event(history: History, event: Event) -> bool:
@@ -67,16 +65,16 @@ def _now(history: History, key: str) -> Iterator[Candidate]:
     frame = next((frame for frame in range(last, -1, -1) if history.shows(frame, key)), None)
     if frame is not None and history.world(frame)[key].is_open == state.is_open:
         answer = "yes" if state.is_open else "no"
-        yield Candidate(KIND, "Is {} open now?", (the(state.type),), (frame,), (answer,), (state.type,))
+        yield Candidate(QUESTION_TYPE, "Is {} open now?", (the(state.type),), (frame,), (answer,), (state.type,))
 
 
 def _opened(history: History) -> Iterator[Candidate]:
     """Everything that was opened."""
     yield from listing(
-        KIND,
+        QUESTION_TYPE,
         "What did you open?",
         (
-            (event.kind, event.frame if history.shows(event.frame, event.target) else None)
+            (event.object_type, event.frame if history.shows(event.frame, event.target) else None)
             for event in history.events
             if event.action == "OpenObject"
         ),

@@ -11,11 +11,11 @@ from collections.abc import Iterator
 
 from infthor_eval.generation.questions.candidates import Candidate
 from infthor_eval.generation.questions.history import History
-from infthor_eval.generation.wording import an, noun
+from infthor_eval.household.wording import an, noun
 
-__all__ = ["KIND", "absent", "present"]
+__all__ = ["QUESTION_TYPE", "absent", "present"]
 
-KIND = "object_presence"
+QUESTION_TYPE = "object_presence"
 _FEW = 8  # types of other trajectories below which AI2-THOR's join them
 _BUSY = 3  # objects that a sampled frame shows at least, where the trajectory has such frames
 _FORM = "Did you see {}?"
@@ -67,12 +67,12 @@ def present(history: History) -> Iterator[Candidate]:
         world = history.world(frame)
         for key, seen in history.seen(frame).items():
             if seen.pixels >= history.least and key in world:
-                kind = world[key].type
-                if seen.pixels > best.get(kind, (0, 0))[0]:
-                    best[kind] = (seen.pixels, frame)
-    for kind, (_, frame) in sorted(best.items()):
-        if _asked(kind):
-            yield Candidate(KIND, _FORM, (an(noun(kind)),), (frame,), ("yes",), (kind,))
+                object_type = world[key].type
+                if seen.pixels > best.get(object_type, (0, 0))[0]:
+                    best[object_type] = (seen.pixels, frame)
+    for object_type, (_, frame) in sorted(best.items()):
+        if _asked(object_type):
+            yield Candidate(QUESTION_TYPE, _FORM, (an(noun(object_type)),), (frame,), ("yes",), (object_type,))
 
 
 def absent(history: History, vocabulary: frozenset[str], rng: random.Random) -> Iterator[Candidate]:
@@ -84,23 +84,23 @@ def absent(history: History, vocabulary: frozenset[str], rng: random.Random) -> 
         rng: samples the frames.
     """
     frames = [frame for frame in range(len(history)) if _shown(history, frame) >= _BUSY] or [0]
-    kinds = _missing(history, vocabulary)
-    if len(kinds) < _FEW:
-        kinds |= _missing(history, _COMMON)
-    for kind in sorted(kinds):
+    types = _missing(history, vocabulary)
+    if len(types) < _FEW:
+        types |= _missing(history, _COMMON)
+    for object_type in sorted(types):
         frame = rng.choice(frames)
-        yield Candidate(KIND, _FORM, (an(noun(kind)),), (frame,), ("no",), (kind,), absence=True)
+        yield Candidate(QUESTION_TYPE, _FORM, (an(noun(object_type)),), (frame,), ("no",), (object_type,), absence=True)
 
 
 def _missing(history: History, vocabulary: frozenset[str]) -> set[str]:
-    there = history.all_kinds
+    there = history.all_object_types
     alike = set().union(*(group for group in _TAKEN_FOR_EACH_OTHER if group & there))
-    return {kind for kind in vocabulary - there - alike if _asked(kind)}
+    return {object_type for object_type in vocabulary - there - alike if _asked(object_type)}
 
 
 def _shown(history: History, frame: int) -> int:
     return sum(seen.pixels >= history.least for seen in history.seen(frame).values())
 
 
-def _asked(kind: str) -> bool:
-    return kind not in _UNASKED and not kind.endswith(("Basin", "Sliced", "Cracked"))
+def _asked(object_type: str) -> bool:
+    return object_type not in _UNASKED and not object_type.endswith(("Basin", "Sliced", "Cracked"))

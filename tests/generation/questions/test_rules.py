@@ -7,17 +7,18 @@ import pytest
 
 from infthor_eval.errors import DataError
 from infthor_eval.formats.step_log import Step, read_steps
-from infthor_eval.generation.factory import Settings
 from infthor_eval.generation.generate_set import generate_set
 from infthor_eval.generation.questions.checker import Checker
 from infthor_eval.generation.questions.history import DEFAULT_SHARE, History
 from infthor_eval.generation.questions.make import make_questions
 from infthor_eval.generation.replay_set import replay_set, select
+from infthor_eval.generation.replay_summary import summarise
+from infthor_eval.generation.settings import TrajectorySettings
 from infthor_eval.nieh.scoring import score
 from infthor_eval.thor.launch import embedded
 from infthor_eval.thor.simulator import Simulator
 
-KINDS = {
+QUESTION_TYPES = {
     "object_presence",
     "open_state",
     "location_tracing",
@@ -32,10 +33,10 @@ KINDS = {
 @pytest.fixture(scope="module")
 def replayed(tmp_path_factory):
     folder = tmp_path_factory.mktemp("set")
-    jobs = [Settings(scene, 3, 110, 1) for scene in ("kitchen-3", "kitchen-5")]
+    jobs = [TrajectorySettings(scene, 3, 110, 1) for scene in ("kitchen-3", "kitchen-5")]
     with Simulator(embedded()) as simulator:
         generate_set(jobs, simulator, folder / "trajectories")
-        assert replay_set(select([folder / "trajectories"]), simulator, folder).document()["whole"] == 2
+        assert summarise(replay_set(select([folder / "trajectories"]), simulator, folder)).complete == 2
     return folder
 
 
@@ -46,7 +47,7 @@ def everything(replayed):
 
 def test_the_checker_agrees_with_every_question(everything):
     assert not everything.doubted and not everything.skipped
-    assert {question.question_type for question in everything.questions} == KINDS
+    assert {question.question_type for question in everything.questions} == QUESTION_TYPES
     assert all(everything.by_clues().values())
 
 
@@ -76,7 +77,7 @@ def test_choice_is_balanced_and_seeded(replayed):
     yes = [question for question in made[0].questions if question.answers == ("yes",)]
     no = [question for question in made[0].questions if question.answers == ("no",)]
     assert abs(len(yes) - len(no)) <= 5
-    assert set(made[0].by_kind()) == KINDS
+    assert set(made[0].by_type()) == QUESTION_TYPES
 
 
 def test_absences_are_flagged_and_look_like_presences(everything):

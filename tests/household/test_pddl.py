@@ -2,11 +2,11 @@ import re
 
 import pytest
 
-from infthor_eval.generation.pddl import DOMAIN, problem
-from infthor_eval.generation.planner import plan
-from infthor_eval.generation.sampling import tasks_of
-from infthor_eval.generation.symbolic import room_of
-from infthor_eval.generation.tasks import TaskType
+from infthor_eval.household.pddl import DOMAIN, problem
+from infthor_eval.household.planner import plan
+from infthor_eval.household.possible_tasks import tasks_of
+from infthor_eval.household.symbolic import room_of
+from infthor_eval.household.tasks import TaskType
 
 from .rooms import KITCHEN
 

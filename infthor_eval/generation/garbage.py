@@ -9,7 +9,7 @@ __all__ = ["libraries_set_aside"]
 
 @contextmanager
 def libraries_set_aside() -> Iterator[None]:
-    """Have the garbage collector pass over all that exists now, which is mainly what libraries hold.
+    """Has the garbage collector pass over all that exists now, which is mainly what libraries hold.
 
     A reply of the simulator decodes to thousands of objects. They make the collector look through everything again
     and again: 40 % of the processor time of a long loop of steps (`benchmarks/generation_growth.py`).

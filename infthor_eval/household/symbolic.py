@@ -6,14 +6,14 @@ two of them are enough for every task. Opening and closing are not modelled: the
 needs them, as ALFRED does.
 """
 
-import math
 from collections.abc import Container, Iterable
 from dataclasses import dataclass
 
-from infthor_eval.generation.affordances import SLICEABLE
+from infthor_eval.household.affordances import SLICEABLE
+from infthor_eval.household.containment import direct_parent
 from infthor_eval.thor.view import ThorObject, View
 
-__all__ = ["ABSENT", "FLOOR", "Operator", "Room", "State", "direct_parent", "room_of", "slice_item"]
+__all__ = ["ABSENT", "FLOOR", "Operator", "Room", "State", "room_of", "slice_item"]
 
 ABSENT = ""  # where an item is that does not exist yet, or no longer
 FLOOR = "floor"
@@ -85,7 +85,7 @@ class Room:
 
 
 def room_of(view: View, blocked: Container[str] = (), refused: Iterable[tuple[str, str]] = ()) -> Room:
-    """Read a room from what the simulator reports. The agent counts as being at no place.
+    """Reads a room from what the simulator reports. The agent counts as being at no place.
 
     Args:
         view: the world now.
@@ -124,14 +124,6 @@ def slice_item(whole: str, number: int) -> str:
     return f"{whole}#{number}"
 
 
-def direct_parent(item: ThorObject, objects: dict[str, ThorObject]) -> str | None:
-    """The innermost receptacle that an object is in or on, by its id."""
-    parents = [objects[key] for key in item.parent_receptacles or () if key in objects and key != item.object_id]
-    if not parents:
-        return None
-    return min(parents, key=lambda parent: (not parent.pickupable, _volume(parent), parent.object_id)).object_id
-
-
 def _whereabouts(item: ThorObject, objects: dict[str, ThorObject], places: Iterable[str]) -> str:
     if item.is_picked_up:
         return ABSENT
@@ -149,8 +141,3 @@ def _is_place(item: ThorObject) -> bool:
     furniture = item.receptacle and item.object_type != "Floor"
     lamp = item.toggleable and item.object_type.endswith("Lamp")
     return not item.pickupable and (furniture or lamp)
-
-
-def _volume(item: ThorObject) -> float:
-    box = item.axis_aligned_bounding_box
-    return math.inf if box is None else box.size.x * box.size.y * box.size.z

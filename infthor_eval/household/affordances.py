@@ -101,9 +101,9 @@ _INSIDE = frozenset(
 )
 
 
-def base_type(kind: str) -> str:
+def base_type(object_type: str) -> str:
     """The type of the whole of which an object may be a slice ("AppleSliced" to "Apple")."""
-    return kind.removesuffix("Sliced")
+    return object_type.removesuffix("Sliced")
 
 
 def goes_into(item: str, receptacle: str) -> bool:

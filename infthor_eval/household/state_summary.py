@@ -5,8 +5,9 @@ place where it was last seen, what is open or on, and what the agent holds.
 """
 
 from infthor_eval.formats.step_log import ObjectState, Step, worlds
-from infthor_eval.generation.affordances import preposition
-from infthor_eval.generation.wording import an, noun
+from infthor_eval.household.affordances import preposition
+from infthor_eval.household.containment import logged_parent
+from infthor_eval.household.wording import an, noun
 
 __all__ = ["state_summaries"]
 
@@ -55,6 +56,6 @@ def _words(known: dict[str, tuple[ObjectState, str | None]], held: list[str]) ->
 
 
 def _place(world: dict[str, ObjectState], state: ObjectState) -> str | None:
-    """The type of the innermost receptacle."""
-    parents = [world[key] for key in state.parents if key in world and world[key].type not in _SURROUNDINGS]
-    return max(parents, key=lambda item: len(item.parents)).type if parents else None
+    """The type of what an object is directly in or on."""
+    parent = logged_parent(state, world)
+    return None if parent is None else world[parent].type

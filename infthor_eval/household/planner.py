@@ -10,10 +10,10 @@ import itertools
 from collections.abc import Iterator
 from dataclasses import replace
 
-from infthor_eval.generation.affordances import KNIVES, goes_into
-from infthor_eval.generation.goals import APPLIANCE, least_remaining
-from infthor_eval.generation.symbolic import ABSENT, FLOOR, Operator, Room, State, slice_item
-from infthor_eval.generation.tasks import Task, TaskType
+from infthor_eval.household.affordances import KNIVES, goes_into
+from infthor_eval.household.goals import APPLIANCE, least_remaining
+from infthor_eval.household.symbolic import ABSENT, FLOOR, Operator, Room, State, slice_item
+from infthor_eval.household.tasks import Task, TaskType
 
 __all__ = ["plan", "relevant_items"]
 
@@ -119,7 +119,7 @@ class _Problem:
 
     def _relevant_places(self, kept: set[str], where: dict[str, str]) -> list[str]:
         room, task = self._room, self._task
-        wanted = {task.receptacle, task.light, APPLIANCE.get(task.kind)}
+        wanted = {task.receptacle, task.light, APPLIANCE.get(task.task_type)}
         chosen = {place for place in room.places if room.types[place] in wanted}
         chosen |= {place for item in kept if (place := room.place_of(item, where)) in room.places and place}
         wanted_or_source = set(chosen)
@@ -154,13 +154,13 @@ class _Problem:
 
     def _treatments(self, state: State, where: dict[str, str], held: str) -> Iterator[tuple[Operator, State]]:
         at = self._room.types.get(state.at or "")
-        if at == APPLIANCE.get(self._task.kind) and self._room.types[held] == self._task.target:
-            if self._task.kind == TaskType.CLEAN and held not in state.clean:
+        if at == APPLIANCE.get(self._task.task_type) and self._room.types[held] == self._task.target:
+            if self._task.task_type == TaskType.CLEAN and held not in state.clean:
                 yield Operator("CleanObject", held, state.at), _with(state, clean=state.clean | {held})
-            if self._task.kind == TaskType.HEAT and held not in state.hot:
+            if self._task.task_type == TaskType.HEAT and held not in state.hot:
                 after = _with(state, hot=state.hot | {held}, cold=state.cold - {held})
                 yield Operator("HeatObject", held, state.at), after
-            if self._task.kind == TaskType.COOL and held not in state.cold:
+            if self._task.task_type == TaskType.COOL and held not in state.cold:
                 after = _with(state, cold=state.cold | {held}, hot=state.hot - {held})
                 yield Operator("CoolObject", held, state.at), after
         if self._task.sliced and self._room.types[held] in KNIVES:

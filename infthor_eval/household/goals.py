@@ -1,8 +1,8 @@
 """When a task is done, in the symbolic state, and a lower bound on what is left to do."""
 
-from infthor_eval.generation.affordances import KNIVES
-from infthor_eval.generation.symbolic import Room, State
-from infthor_eval.generation.tasks import Task, TaskType
+from infthor_eval.household.affordances import KNIVES
+from infthor_eval.household.symbolic import Room, State
+from infthor_eval.household.tasks import Task, TaskType
 
 __all__ = ["APPLIANCE", "achieved", "least_remaining"]
 
@@ -11,7 +11,7 @@ APPLIANCE = {TaskType.CLEAN: "SinkBasin", TaskType.HEAT: "Microwave", TaskType.C
 
 def achieved(task: Task, room: Room, state: State) -> bool:
     """Whether the goal of a task holds."""
-    if task.kind == TaskType.EXAMINE:
+    if task.task_type == TaskType.EXAMINE:
         held = state.held is not None and room.types[state.held] == task.target
         return held and state.at in state.lit and room.types.get(state.at or "") == task.light
     return _placed(task, room, state) >= _wanted(task)
@@ -24,7 +24,7 @@ def least_remaining(task: Task, room: Room, state: State) -> int:
     here = room.types.get(state.at or "")
     held = None if state.held is None else room.types[state.held]
     needed = _to_slice(task, room, state, held) + _to_treat(task, state, here)
-    if task.kind == TaskType.EXAMINE:
+    if task.task_type == TaskType.EXAMINE:
         return max(1, needed + (here != task.light) + (held != task.target))
     # Whatever completes the goal happens at its receptacle.
     return max(1, needed + (here != task.receptacle) + _to_carry(task, room, state, held))
@@ -40,13 +40,13 @@ def _to_slice(task: Task, room: Room, state: State, held: str | None) -> int:
 
 def _to_treat(task: Task, state: State, here: str | None) -> int:
     """What washing, heating or cooling still needs: going there and doing it."""
-    treated = {TaskType.CLEAN: state.clean, TaskType.HEAT: state.hot, TaskType.COOL: state.cold}.get(task.kind)
-    return 0 if treated is None or treated else 1 + (here != APPLIANCE[task.kind])
+    treated = {TaskType.CLEAN: state.clean, TaskType.HEAT: state.hot, TaskType.COOL: state.cold}.get(task.task_type)
+    return 0 if treated is None or treated else 1 + (here != APPLIANCE[task.task_type])
 
 
 def _to_carry(task: Task, room: Room, state: State, held: str | None) -> int:
     """The pick-ups and puts still needed; what is sliced where it shall be needs none."""
-    if task.kind == TaskType.STACK:
+    if task.task_type == TaskType.STACK:
         where = dict(state.where)
         carriers = [item for item in where if room.types[item] == task.movable]
         there = any(room.types.get(where[item]) == task.receptacle for item in carriers)
@@ -60,22 +60,22 @@ def _to_carry(task: Task, room: Room, state: State, held: str | None) -> int:
 
 
 def _wanted(task: Task) -> int:
-    return 2 if task.kind == TaskType.PLACE_TWO else 1
+    return 2 if task.task_type == TaskType.PLACE_TWO else 1
 
 
 def _placed(task: Task, room: Room, state: State) -> int:
-    """How many objects of the asked kind, in the asked condition, are where they shall be."""
+    """How many objects of the asked type, in the asked condition, are where they shall be."""
     where = dict(state.where)
     treated = {
         TaskType.CLEAN: state.clean,
         TaskType.HEAT: state.hot,
         TaskType.COOL: state.cold,
-    }.get(task.kind)
+    }.get(task.task_type)
     count = 0
     for item, parent in state.where:
         if room.types[item] != task.target or (treated is not None and item not in treated):
             continue
-        if task.kind == TaskType.STACK:
+        if task.task_type == TaskType.STACK:
             inside = room.types.get(parent) == task.movable
             count += inside and room.types.get(where.get(parent, "")) == task.receptacle
         else:

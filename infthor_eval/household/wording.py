@@ -6,21 +6,27 @@ nothing is renamed, so joining the words again gives the type but for capitals.
 
 import re
 
-__all__ = ["an", "compact", "noun", "plural"]
+__all__ = ["an", "canonical", "compact", "noun", "plural"]
 
 _VOWEL_SOUND = re.compile(r"^(?:[aeio]|u(?!se|ni))", re.IGNORECASE)
+_WHOLE = {"SinkBasin": "Sink", "BathtubBasin": "Bathtub"}
 _LETTERS = {"CD": "CD", "TVStand": "TV stand", "Television": "television"}
 _BARE = {"blinds", "boots", "bread", "curtains", "lettuce", "toilet paper"}  # plural, or not counted
 _IRREGULAR = {"knife": "knives", "butter knife": "butter knives", "shelf": "shelves", "bread": "loaves of bread"}
 
 
-def noun(kind: str) -> str:
+def canonical(object_type: str) -> str:
+    """The type that people would name: the basin of a sink is the sink."""
+    return _WHOLE.get(object_type, object_type)
+
+
+def noun(object_type: str) -> str:
     """An object type in words: "CoffeeTable" to "coffee table", "AppleSliced" to "sliced apple"."""
-    if kind in _LETTERS:
-        return _LETTERS[kind]
-    if kind.endswith("Sliced"):
-        return f"sliced {noun(kind.removesuffix('Sliced'))}"
-    words: list[str] = re.findall(r"[A-Z]+(?![a-z])|[A-Z][a-z]*|[a-z0-9]+", kind)
+    if object_type in _LETTERS:
+        return _LETTERS[object_type]
+    if object_type.endswith("Sliced"):
+        return f"sliced {noun(object_type.removesuffix('Sliced'))}"
+    words: list[str] = re.findall(r"[A-Z]+(?![a-z])|[A-Z][a-z]*|[a-z0-9]+", object_type)
     return " ".join(word.lower() for word in words)
 
 
@@ -44,6 +50,6 @@ def plural(words: str) -> str:
     return f"{words}s"
 
 
-def compact(kind: str) -> str:
+def compact(object_type: str) -> str:
     """An object type as the published data write it: lower case in one word ("coffeetable")."""
-    return kind.lower()
+    return object_type.lower()

@@ -1,7 +1,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from infthor_eval.generation.navigation import GRID, Grid, Stand
+from infthor_eval.household.navigation import GRID, Grid, Stand
 
 cells = st.frozensets(st.tuples(st.integers(0, 4), st.integers(0, 4)), min_size=1, max_size=25)
 

@@ -2,11 +2,11 @@ from collections import deque
 
 import pytest
 
-from infthor_eval.generation.goals import achieved, least_remaining
-from infthor_eval.generation.planner import plan
-from infthor_eval.generation.sampling import tasks_of
-from infthor_eval.generation.symbolic import room_of
-from infthor_eval.generation.tasks import Task, TaskType
+from infthor_eval.household.goals import achieved, least_remaining
+from infthor_eval.household.planner import plan
+from infthor_eval.household.possible_tasks import tasks_of
+from infthor_eval.household.symbolic import room_of
+from infthor_eval.household.tasks import Task, TaskType
 
 from .rooms import APPLE, COUNTER, KITCHEN, MUG
 
@@ -59,7 +59,7 @@ def test_no_shorter_plan_exists(task):
 
 
 def shortest(task, limit):
-    from infthor_eval.generation.planner import _Problem
+    from infthor_eval.household.planner import _Problem
 
     problem = _Problem(task, ROOM)
     depth = {problem.start: 0}

@@ -7,11 +7,13 @@ back. That moves nothing but the agent, so it leaves no trace in a trajectory.
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 from infthor_eval.errors import SimulatorError
-from infthor_eval.generation.navigation import Grid, Stand
+from infthor_eval.household.navigation import Grid, Stand
 from infthor_eval.thor.simulator import Simulator
-from infthor_eval.thor.view import ThorObject, Vector, View
+from infthor_eval.thor.teleport import teleport_call
+from infthor_eval.thor.view import AgentPose, ThorObject, Vector, View
 
 __all__ = ["CAMERA_HEIGHT", "HORIZON_STEP", "Viewpoint", "find_viewpoint", "reachable", "stand_of"]
 
@@ -22,7 +24,7 @@ _REACH = 1.5  # the simulator's visibility distance, metres
 _SIDEWAYS = 32.0  # degrees off the camera's axis; half the field of view is 30
 _TOO_NEAR = 0.5  # closer than this a door may hit the agent and an object fills the frame
 _TRIALS = 30
-_UNSEEN = {"renderImage": False}  # nobody looks at the colours; what is in the frame is told by its id image
+_UNSEEN: dict[str, Any] = {"renderImage": False}  # the id image tells what is in the frame
 
 
 @dataclass(frozen=True)
@@ -63,7 +65,7 @@ def find_viewpoint(
         if inside is None or _comes_into_view(simulator, shown[0], inside, min_pixels):
             found = viewpoint
             break
-    _return(simulator, here)
+    simulator.query(**teleport_call(here.agent), **_UNSEEN)
     return found
 
 
@@ -134,22 +136,6 @@ def _middle(item: ThorObject) -> Vector:
 
 def _teleport(simulator: Simulator, grid: Grid, here: View, viewpoint: Viewpoint) -> View:
     x, z = grid.position(viewpoint.stand.cell)
-    return simulator.query(
-        "Teleport",
-        position={"x": x, "y": here.agent.position.y, "z": z},
-        rotation={"x": 0.0, "y": float(viewpoint.stand.facing), "z": 0.0},
-        horizon=float(viewpoint.horizon),
-        **_UNSEEN,
-    )
-
-
-def _return(simulator: Simulator, here: View) -> None:
-    at = here.agent.position
-    simulator.query(
-        "Teleport",
-        position={"x": at.x, "y": at.y, "z": at.z},
-        rotation={"x": 0.0, "y": here.agent.rotation, "z": 0.0},
-        horizon=here.agent.horizon,
-        forceAction=True,
-        **_UNSEEN,
-    )
+    position = Vector(x, here.agent.position.y, z)
+    pose = AgentPose(position, float(viewpoint.stand.facing), float(viewpoint.horizon), here.agent.standing)
+    return simulator.query(**teleport_call(pose, force=False), **_UNSEEN)

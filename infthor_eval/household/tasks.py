@@ -5,8 +5,8 @@ from enum import StrEnum
 import msgspec
 
 from infthor_eval.formats.trajectory import SubTask, TaskInfo
-from infthor_eval.generation.affordances import preposition
-from infthor_eval.generation.wording import an, noun, plural
+from infthor_eval.household.affordances import preposition
+from infthor_eval.household.wording import an, noun, plural
 
 __all__ = ["Task", "TaskType", "sub_task"]
 
@@ -27,7 +27,7 @@ class Task(msgspec.Struct, frozen=True):
     """One task, by object types.
 
     Attributes:
-        kind: its type.
+        task_type: its type.
         pickup: the object that is handled (the whole's type, also where `sliced`).
         receptacle: where it goes; None for EXAMINE.
         movable: for STACK, the receptacle that is carried with it.
@@ -35,7 +35,7 @@ class Task(msgspec.Struct, frozen=True):
         sliced: whether a slice of the object is asked for.
     """
 
-    kind: TaskType
+    task_type: TaskType
     pickup: str
     receptacle: str | None = None
     movable: str | None = None
@@ -67,7 +67,7 @@ def sub_task(task: Task, scene: str) -> SubTask:
         task: the task.
         scene: name of the scene.
     """
-    info = TaskInfo(str(task.kind), task.pickup, task.movable, task.receptacle, scene)
+    info = TaskInfo(str(task.task_type), task.pickup, task.movable, task.receptacle, scene)
     params = {
         "mrecep_target": task.movable or "",
         "object_sliced": task.sliced,
@@ -81,7 +81,7 @@ def sub_task(task: Task, scene: str) -> SubTask:
 def _describe(task: Task) -> str:
     bare = f"sliced {noun(task.pickup)}" if task.sliced else noun(task.pickup)
     place = task.receptacle
-    text = _TEMPLATES[task.kind].format(
+    text = _TEMPLATES[task.task_type].format(
         item=an(bare),
         items=f"slices of {noun(task.pickup)}" if task.sliced else plural(bare),
         bare=bare,

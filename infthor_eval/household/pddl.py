@@ -7,10 +7,10 @@ every place of the room, and the items of the types that the task is about.
 
 from collections.abc import Iterable
 
-from infthor_eval.generation.affordances import KNIVES, SLICEABLE, goes_into
-from infthor_eval.generation.planner import relevant_items
-from infthor_eval.generation.symbolic import ABSENT, FLOOR, Room, slice_item
-from infthor_eval.generation.tasks import Task, TaskType
+from infthor_eval.household.affordances import KNIVES, SLICEABLE, goes_into
+from infthor_eval.household.planner import relevant_items
+from infthor_eval.household.symbolic import ABSENT, FLOOR, Room, slice_item
+from infthor_eval.household.tasks import Task, TaskType
 
 __all__ = ["DOMAIN", "problem"]
 
@@ -81,7 +81,7 @@ def _domain() -> str:
         "  (basin ?p - place) (oven ?p - place) (fridge ?p - place) (lamp ?p - place) (lit ?p - place)",
         "  (clean ?i - item) (hot ?i - item) (cold ?i - item)",
         "  (target ?i - item) (carrier ?i - item) (goal-place ?p - place) (goal-lamp ?p - place)",
-        *(f"  (asked-{kind})" for kind in TaskType),
+        *(f"  (asked-{task_type})" for task_type in TaskType),
         "  (done))",
         " (:functions (total-cost) - number)",
     ]
@@ -89,10 +89,10 @@ def _domain() -> str:
         lines.append(f" (:action {name} :parameters {parameters}")
         lines.append(f"  :precondition (and {condition})")
         lines.append(f"  :effect (and {effect} (increase (total-cost) 1)))")
-    for kind, finish in _FINISHES.items():
+    for task_type, finish in _FINISHES.items():
         parameters, _, condition = finish.partition(") (and")
-        lines.append(f" (:action finish-{kind} :parameters {parameters})")
-        lines.append(f"  :precondition (and (asked-{kind}){condition}")
+        lines.append(f" (:action finish-{task_type} :parameters {parameters})")
+        lines.append(f"  :precondition (and (asked-{task_type}){condition}")
         lines.append("  :effect (and (done) (increase (total-cost) 0)))")
     return "\n".join([*lines, ")", ""])
 
@@ -148,15 +148,15 @@ def _state(room: Room, items: list[str], names: dict[str, str]) -> Iterable[str]
 def _rules(task: Task, room: Room, items: list[str], names: dict[str, str]) -> Iterable[str]:
     holders = [key for key in sorted(names) if key in room.receptacles]
     for item in items:
-        kind = room.types[item]
+        object_type = room.types[item]
         for holder in holders:
             usable = holder in room.places or room.types[holder] == task.movable
-            fits = goes_into(kind, room.types[holder]) and (item, holder) not in room.refused
+            fits = goes_into(object_type, room.types[holder]) and (item, holder) not in room.refused
             if usable and holder != item and fits:
                 yield f"fits {names[item]} {names[holder]}"
-        if kind in KNIVES and task.sliced:
+        if object_type in KNIVES and task.sliced:
             yield f"knife {names[item]}"
-        if kind in SLICEABLE and kind == task.pickup and task.sliced:
+        if object_type in SLICEABLE and object_type == task.pickup and task.sliced:
             yield f"slices {names[item]} {names[slice_item(item, 1)]} {names[slice_item(item, 2)]}"
     for place in sorted(room.places):
         if room.types[place] in _APPLIANCES:
@@ -166,7 +166,7 @@ def _rules(task: Task, room: Room, items: list[str], names: dict[str, str]) -> I
 
 
 def _goal(task: Task, room: Room, items: list[str], names: dict[str, str]) -> Iterable[str]:
-    yield f"asked-{task.kind}"
+    yield f"asked-{task.task_type}"
     yield from (f"target {names[item]}" for item in items if room.types[item] == task.target)
     yield from (f"carrier {names[item]}" for item in items if room.types[item] == task.movable)
     for place in sorted(room.places):

@@ -1,11 +1,11 @@
 import pytest
 
-from infthor_eval.generation.affordances import preposition
-from infthor_eval.generation.wording import an, noun, plural
+from infthor_eval.household.affordances import preposition
+from infthor_eval.household.wording import an, noun, plural
 
 
 @pytest.mark.parametrize(
-    ("kind", "words"),
+    ("object_type", "words"),
     [
         ("Mug", "a mug"),
         ("Apple", "an apple"),
@@ -19,12 +19,12 @@ from infthor_eval.generation.wording import an, noun, plural
         ("BreadSliced", "sliced bread"),
     ],
 )
-def test_words_with_their_article(kind, words):
-    assert an(noun(kind)) == words
+def test_words_with_their_article(object_type, words):
+    assert an(noun(object_type)) == words
 
 
 @pytest.mark.parametrize(
-    ("kind", "words"),
+    ("object_type", "words"),
     [
         ("Mug", "mugs"),
         ("Knife", "knives"),
@@ -36,9 +36,14 @@ def test_words_with_their_article(kind, words):
         ("Bread", "loaves of bread"),
     ],
 )
-def test_plurals(kind, words):
-    assert plural(noun(kind)) == words
+def test_plurals(object_type, words):
+    assert plural(noun(object_type)) == words
 
 
 def test_prepositions():
-    assert [preposition(kind) for kind in ("Fridge", "CounterTop", "Plate", "Mug")] == ["in", "on", "on", "in"]
+    assert [preposition(object_type) for object_type in ("Fridge", "CounterTop", "Plate", "Mug")] == [
+        "in",
+        "on",
+        "on",
+        "in",
+    ]

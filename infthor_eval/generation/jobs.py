@@ -1,0 +1,46 @@
+"""Which trajectories a set is made of."""
+
+from collections.abc import Sequence
+
+from infthor_eval.errors import UsageError
+from infthor_eval.generation.settings import TrajectorySettings
+
+__all__ = ["trajectory_jobs", "without_bathrooms"]
+
+_BATHROOMS = range(401, 431)  # numbers of floor plans
+
+
+def trajectory_jobs(
+    scenes: Sequence[str], *, seed: int, count: int, min_steps: int, min_subgoals: int, final_task: bool
+) -> list[TrajectorySettings]:
+    """The settings of every trajectory of a set, scene by scene.
+
+    Args:
+        scenes: names of the scenes.
+        seed: of the first trajectory of each scene; the others have the seeds after it.
+        count: trajectories for each scene.
+        min_steps: low-level actions at least.
+        min_subgoals: sub-goals at least.
+        final_task: whether a final task follows.
+    """
+    seeds = range(seed, seed + count)
+    return [TrajectorySettings(scene, k, min_steps, min_subgoals, final_task) for scene in scenes for k in seeds]
+
+
+def without_bathrooms(scenes: Sequence[str]) -> tuple[list[str], list[str]]:
+    """The scenes that a test set may have, and the others in alphabetical order.
+
+    Raises:
+        UsageError: all of them are bathrooms.
+    """
+    chosen = [scene for scene in scenes if not _is_bathroom(scene)]
+    skipped = sorted(set(scenes) - set(chosen))
+    if not chosen:
+        raise UsageError(f"{', '.join(skipped)}: bathrooms are left out of test sets; name other scenes")
+    return chosen, skipped
+
+
+def _is_bathroom(scene: str) -> bool:
+    """Whether a scene is one by its name (`bathroom-3`, `FloorPlan401` to `FloorPlan430`)."""
+    number = scene.removeprefix("FloorPlan")
+    return scene.startswith("bathroom-") or (number.isdigit() and int(number) in _BATHROOMS)

@@ -1,0 +1,110 @@
+"""A replayed set in numbers."""
+
+import statistics
+from collections import Counter, defaultdict
+from collections.abc import Callable, Sequence
+
+import msgspec
+
+from infthor_eval.generation.replay import Overlap, ReplayReport
+from infthor_eval.generation.replay_set import Failure, ReplayedSet
+
+__all__ = ["ActionCounts", "Divergence", "OverlapStatistics", "ReplaySummary", "summarise"]
+
+
+class ActionCounts(msgspec.Struct):
+    """Numbers of actions of one name."""
+
+    accepted: int
+    refused: int
+
+
+class OverlapStatistics(msgspec.Struct):
+    """How well rendered boxes meet the recorded ones: their number, median and mean overlap (IoU)."""
+
+    count: int
+    median: float
+    mean: float
+
+
+class Divergence(msgspec.Struct):
+    """The first action of a trajectory that was refused."""
+
+    traj_id: str
+    step: int
+    action: str
+    error: str
+
+
+class ReplaySummary(msgspec.Struct):
+    """What came of a set, as `--json` prints it.
+
+    Attributes:
+        trajectories: how many were replayed, in earlier runs too.
+        resumed: how many of them in earlier runs.
+        failed: how many could not be replayed at all.
+        complete: how many were replayed without a refused action.
+        floor_plans: number of scenes.
+        actions: numbers by name, the most frequent first.
+        iou: box overlaps by object type.
+        iou_by_action: box overlaps by action.
+        seconds: wall time of this run.
+        diverged: where the others first were refused an action.
+        failures: why some could not be replayed.
+    """
+
+    trajectories: int
+    resumed: int
+    failed: int
+    complete: int = msgspec.field(name="whole")
+    floor_plans: int
+    actions: dict[str, ActionCounts]
+    iou: dict[str, OverlapStatistics]
+    iou_by_action: dict[str, OverlapStatistics]
+    seconds: float
+    diverged: list[Divergence]
+    failures: list[Failure]
+
+
+def summarise(replayed: ReplayedSet) -> ReplaySummary:
+    """Counts what came of a set."""
+    reports = replayed.reports
+    overlaps = [overlap for report in reports for overlap in report.overlaps]
+    return ReplaySummary(
+        trajectories=len(reports),
+        resumed=replayed.resumed,
+        failed=len(replayed.failures),
+        complete=sum(report.complete for report in reports),
+        floor_plans=len({report.floor_plan for report in reports}),
+        actions=_actions(reports),
+        iou=_statistics(overlaps, lambda overlap: overlap.type),
+        iou_by_action=_statistics(overlaps, lambda overlap: overlap.action),
+        seconds=round(replayed.seconds, 2),
+        diverged=[_divergence(report) for report in reports if not report.complete],
+        failures=replayed.failures,
+    )
+
+
+def _actions(reports: Sequence[ReplayReport]) -> dict[str, ActionCounts]:
+    accepted: Counter[str] = Counter()
+    refused: Counter[str] = Counter()
+    for report in reports:
+        accepted.update(report.accepted)
+        refused.update(refusal.action.split()[0] for refusal in report.refusals)
+    names = sorted(accepted | refused, key=lambda name: (-(accepted[name] + refused[name]), name))
+    return {name: ActionCounts(accepted[name], refused[name]) for name in names}
+
+
+def _statistics(overlaps: Sequence[Overlap], by: Callable[[Overlap], str]) -> dict[str, OverlapStatistics]:
+    found: defaultdict[str, list[float]] = defaultdict(list)
+    for overlap in overlaps:
+        found[by(overlap)].append(overlap.iou)
+    return {
+        name: OverlapStatistics(len(values), round(statistics.median(values), 4), round(statistics.fmean(values), 4))
+        for name, values in sorted(found.items())
+    }
+
+
+def _divergence(report: ReplayReport) -> Divergence:
+    first = report.refusals[0]
+    return Divergence(report.traj_id, first.step, first.action, first.error)

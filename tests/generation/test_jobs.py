@@ -1,0 +1,21 @@
+import pytest
+
+from infthor_eval.errors import UsageError
+from infthor_eval.generation.jobs import trajectory_jobs, without_bathrooms
+
+
+def test_every_scene_has_as_many_seeds_as_asked_for():
+    length = {"min_steps": 5, "min_subgoals": 1, "final_task": True}
+    jobs = trajectory_jobs(["kitchen-1", "bedroom-2"], seed=7, count=2, **length)
+    names = ["kitchen-1-seed7", "kitchen-1-seed8", "bedroom-2-seed7", "bedroom-2-seed8"]
+    assert [job.traj_id for job in jobs] == names
+    assert all(job.final_task and job.min_steps == 5 for job in jobs)
+
+
+def test_bathrooms_are_known_by_their_names():
+    scenes = ["FloorPlan401", "kitchen-1", "FloorPlan30", "bathroom-2", "FloorPlan430", "FloorPlan431"]
+    chosen, skipped = without_bathrooms(scenes)
+    assert chosen == ["kitchen-1", "FloorPlan30", "FloorPlan431"]
+    assert skipped == ["FloorPlan401", "FloorPlan430", "bathroom-2"]
+    with pytest.raises(UsageError, match=r"FloorPlan401, bathroom-2: bathrooms are left out"):
+        without_bathrooms(["bathroom-2", "FloorPlan401"])
