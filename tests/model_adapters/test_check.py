@@ -73,11 +73,8 @@ class HashConversation(Transcript):
         return Reply(text, *counted, ids if self.capabilities.token_ids else None)
 
     def text(self, decoding: Decoding) -> str:
-        key = "\n".join(
-            f"{turn.role}:{part if isinstance(part, str) else part.digest}"
-            for turn in self.turns
-            for part in turn.parts
-        )
+        said = [(turn.role, part) for turn in self.turns for part in turn.parts]
+        key = "\n".join(f"{role}:{part if isinstance(part, str) else part.digest}" for role, part in said)
         if not decoding.greedy:
             key += f"\n{decoding.seed}"
         if not self.capabilities.deterministic:
@@ -329,7 +326,7 @@ def test_replies_that_hang_on_who_else_asks_are_named() -> None:
         crowd = len(flying)
         with lock:
             flying.pop()
-        return HashConversation.text(self, decoding)[:-1] + ("x" if crowd > 1 else "y")
+        return ("x" if crowd > 1 else "y") + HashConversation.text(self, decoding)[:-1]
 
     check_adapter(_talking(Capabilities(), text=text))
     with pytest.raises(ContractError, match="at the same time differ"):
@@ -337,7 +334,7 @@ def test_replies_that_hang_on_who_else_asks_are_named() -> None:
 
 
 def test_what_is_missing_is_named() -> None:
-    with pytest.raises(ContractError, match="object lacks a member of Model: .*tokens_per_frame"):
+    with pytest.raises(ContractError, match=r"object lacks a member of Model: .*tokens_per_frame"):
         check_adapter(object())  # type: ignore[arg-type]
     silent = type("Silent", (HashModel,), {"conversation": lambda self: Transcript()})()
     with pytest.raises(ContractError, match="Transcript lacks a member of Conversation: n_tokens, reply"):
