@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 from infthor_eval.sim.geometry import Array, euler_matrix
 from infthor_eval.sim.objects import SimObject
 from infthor_eval.sim.render.camera import FAR, NEAR, Camera
-from infthor_eval.sim.render.picture import Backend, Picture, backend, cast_picture, colour_picture
+from infthor_eval.sim.render.picture import Picture, Rasterizer, cast_picture, colour_picture, rasterizer
 from infthor_eval.sim.render.primitives import INSTANCE
 from infthor_eval.sim.render.scene import SceneModel
 from infthor_eval.sim.scenes.catalogue import Catalogue
-from infthor_eval.sim.settings import Settings
+from infthor_eval.sim.settings import SimulatorSettings
 from infthor_eval.sim.visibility import enclosures, visible_ids
 from infthor_eval.sim.world import World
 
@@ -48,10 +48,10 @@ class Simulation:
     catalogue: Catalogue
     width: int = 300
     height: int = 300
-    settings: Settings = field(default_factory=Settings)
+    settings: SimulatorSettings = field(default_factory=SimulatorSettings)
     cameras: list[ThirdPartyCamera] = field(default_factory=list)
     random: np.random.Generator = field(default_factory=lambda: np.random.default_rng(0))
-    renderer: Backend = field(default_factory=backend)
+    renderer: Rasterizer = field(default_factory=rasterizer)
     map_view: bool = False
     failed_reset: str = ""
 
@@ -108,12 +108,15 @@ class Simulation:
         """What the agent's frame shows: its view, or the map from above when the map view is on."""
         if not self.map_view:
             return self.full_view()
+        return self.third_party(self.map_camera())
+
+    def map_camera(self) -> ThirdPartyCamera:
+        """A camera that sees the whole scene from above."""
         low, high = self.world.scene_bounds()
         middle = (low + high) / 2
         size = float(max(high[0] - low[0], high[2] - low[2])) / 2 + 0.1
-        return self.third_party(
-            ThirdPartyCamera(np.array([middle[0], high[1] - 0.05, middle[2]]), np.array([90.0, 0.0, 0.0]), 90.0, size)
-        )
+        eye = np.array([middle[0], high[1] - 0.05, middle[2]])
+        return ThirdPartyCamera(eye, np.array([90.0, 0.0, 0.0]), orthographic_size=size)
 
     def visible(self) -> frozenset[str]:
         """Ids of the objects that the agent sees within its visibility distance."""

@@ -9,7 +9,7 @@ import numpy as np
 from infthor_eval.sim.actions.interaction import set_openness
 from infthor_eval.sim.actions.registry import action
 from infthor_eval.sim.errors import ActionError
-from infthor_eval.sim.restore import Pose, set_poses, spawn_randomly
+from infthor_eval.sim.restore import NamedPose, set_poses, spawn_randomly
 from infthor_eval.sim.simulation import Simulation
 
 __all__: list[str] = []
@@ -31,7 +31,7 @@ def set_object_toggles(sim: Simulation, objectToggles: list[Any]) -> None:
         if not isinstance(entry, Mapping) or not isinstance(entry.get("objectType"), str):
             raise ActionError(f"objectToggles needs entries with objectType and isOn, not {entry!r}")
         for item in sim.world.objects.values():
-            if item.object_type == entry["objectType"] and item.kind.toggleable:
+            if item.object_type == entry["objectType"] and item.type.toggleable:
                 item.state.toggled = bool(entry.get("isOn", False))
                 sim.world.touch(item)
 
@@ -44,7 +44,7 @@ def set_state_of_all_objects(sim: Simulation, StateChange: str, forceAction: boo
         raise ActionError(f"{StateChange!r} is not a state change; use one of {', '.join(sorted(_CHANGES))}")
     capability, attribute, on, off = change
     for item in sim.world.objects.values():
-        if getattr(item.kind, capability):
+        if getattr(item.type, capability):
             setattr(item.state, attribute, on if forceAction else off)
             sim.world.touch(item)
 
@@ -71,7 +71,7 @@ def set_object_states(sim: Simulation, SetObjectStates: Mapping[str, Any]) -> No
     value = on if SetObjectStates.get(key, True) else off
     only = SetObjectStates.get("objectType")
     for item in sim.world.objects.values():
-        if not getattr(item.kind, capability) or only not in (None, "", item.object_type):
+        if not getattr(item.type, capability) or only not in (None, "", item.object_type):
             continue
         if attribute == "openness":
             set_openness(sim, item, value)
@@ -136,10 +136,10 @@ def seeded(seed: int) -> np.random.Generator:
     return np.random.default_rng(int(seed) % 2**32)
 
 
-def _pose(entry: Any) -> Pose:
+def _pose(entry: Any) -> NamedPose:
     if not isinstance(entry, Mapping) or not isinstance(entry.get("objectName"), str):
         raise ActionError(f"objectPoses needs entries with objectName, position and rotation, not {entry!r}")
     try:
-        return Pose.from_wire(entry)
+        return NamedPose.from_wire(entry)
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise ActionError(f"objectPoses: {entry['objectName']} has no usable position or rotation ({error})") from error
