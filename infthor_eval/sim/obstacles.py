@@ -30,20 +30,20 @@ def blocking_object(world: World, target: Array) -> str | None:
 
 def door_leaf(item: SimObject) -> tuple[Array, Array] | None:
     """Low and high corner of the axis-aligned box around an open door or drawer; None for other things."""
+    if not (item.type.hinged or item.type.slides):
+        return None
     width, height, depth = item.front_size
     matrix = item.matrix @ yaw_matrix(item.front)
     if item.type.slides:
         reach = DRAWER_SLIDE * depth * item.state.openness
         points = [(x, y, depth / 2 + z) for x in (-width / 2, width / 2) for y in (-height / 2, height / 2)
                   for z in (0.0, reach)]  # fmt: skip
-    elif item.type.hinged:
+    else:
         side = item.hinge or -1
         swing = yaw_matrix(side * DOOR_SWING * item.state.openness)
         hinge = np.array([side * width / 2, 0.0, depth / 2])
         edge = hinge + swing @ np.array([-side * width, 0.0, 0.0])
         points = [(p[0], y, p[2]) for p in (hinge, edge) for y in (-height / 2, height / 2)]
-    else:
-        return None
     world = np.array(points) @ matrix.T + item.center
     return world.min(axis=0), world.max(axis=0)
 

@@ -45,32 +45,17 @@ class Surface:
 
 def surfaces(receptacle: SimObject) -> list[Surface]:
     """The surfaces of a receptacle, lowest first."""
-    size = receptacle.box_size
+    if receptacle.type.levels:
+        return _levels_inside(receptacle)
     low, high = receptacle.bounds()
-    yaw = float(receptacle.rotation[1])
-    declared = receptacle.type
-    half = (size[0] / 2, size[2] / 2)
-    if declared.levels:
-        inner = (max(half[0] - _WALL, 0.02), max(half[1] - _WALL, 0.02))
-        heights = [low[1] + share * (high[1] - low[1]) for share in declared.levels]
-        tops = [*heights[1:], float(high[1]) - _WALL]
-        slide = drawer_offset(receptacle)
-        middle = (low + high) / 2 + slide
-        return [
-            Surface(np.array([middle[0], y, middle[2]]), inner, yaw, top - y, from_middle=True)
-            for y, top in zip(heights, tops, strict=True)
-        ]
-    middle = (low + high) / 2
-    overhang = math.inf if declared.overhang else 0.03
-    if declared.open_top:
+    middle, half = (low + high) / 2, (receptacle.box_size[0] / 2, receptacle.box_size[2] / 2)
+    yaw, overhang = float(receptacle.rotation[1]), math.inf if receptacle.type.overhang else 0.03
+    if receptacle.type.open_top:
         base = float(low[1]) + min(_WALL, (high[1] - low[1]) * 0.3)
         if receptacle.support is not None:
             base = max(base, float(low[1]) + receptacle.support)
-        inner = (
-            max(half[0] * declared.open_top - _WALL / 2, 0.015),
-            max(half[1] * declared.open_top - _WALL / 2, 0.015),
-        )
-        return [Surface(np.array([middle[0], base, middle[2]]), inner, yaw, math.inf, overhang, True)]
+        inner = [max(side * receptacle.type.open_top - _WALL / 2, 0.015) for side in half]
+        return [Surface(np.array([middle[0], base, middle[2]]), (inner[0], inner[1]), yaw, math.inf, overhang, True)]
     level = receptacle.surface_height()
     if not receptacle.pieces:
         return [Surface(np.array([middle[0], level, middle[2]]), half, yaw, math.inf, overhang)]
@@ -79,6 +64,19 @@ def surfaces(receptacle: SimObject) -> list[Surface]:
         at = receptacle.center + receptacle.matrix @ np.array([(x0 + x1) / 2, 0.0, (z0 + z1) / 2])
         found.append(Surface(np.array([at[0], level, at[2]]), ((x1 - x0) / 2, (z1 - z0) / 2), yaw, math.inf, overhang))
     return found
+
+
+def _levels_inside(receptacle: SimObject) -> list[Surface]:
+    """The floor and shelves of a cabinet, a fridge or the like, or of a drawer as far as it has come out."""
+    low, high = receptacle.bounds()
+    inner = (max(receptacle.box_size[0] / 2 - _WALL, 0.02), max(receptacle.box_size[2] / 2 - _WALL, 0.02))
+    heights = [low[1] + share * (high[1] - low[1]) for share in receptacle.type.levels]
+    tops = [*heights[1:], float(high[1]) - _WALL]
+    middle, yaw = (low + high) / 2 + drawer_offset(receptacle), float(receptacle.rotation[1])
+    return [
+        Surface(np.array([middle[0], y, middle[2]]), inner, yaw, top - y, from_middle=True)
+        for y, top in zip(heights, tops, strict=True)
+    ]
 
 
 def drawer_offset(receptacle: SimObject) -> Array:
