@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from infthor_eval.sim.geometry import Array, euler_matrix
 from infthor_eval.sim.objects import SimObject
 from infthor_eval.sim.render.camera import FAR, NEAR, Camera
-from infthor_eval.sim.render.picture import Picture, Rasterizer, cast_picture, colour_picture, rasterizer
+from infthor_eval.sim.render.picture import Picture, Rasterizer, cast_picture, choose_rasterizer, colour_picture
 from infthor_eval.sim.render.primitives import INSTANCE
 from infthor_eval.sim.render.scene import SceneModel
 from infthor_eval.sim.scenes.catalogue import Catalogue
@@ -51,7 +51,7 @@ class Simulation:
     settings: SimulatorSettings = field(default_factory=SimulatorSettings)
     cameras: list[ThirdPartyCamera] = field(default_factory=list)
     random: np.random.Generator = field(default_factory=lambda: np.random.default_rng(0))
-    renderer: Rasterizer = field(default_factory=rasterizer)
+    rasterizer: Rasterizer = field(default_factory=choose_rasterizer)
     map_view: bool = False
     failed_reset: str = ""
 
@@ -101,7 +101,7 @@ class Simulation:
         if not len(held):
             return self._view
         if self._full is None:
-            self._full = cast_picture(held, names, self._view.camera, self.renderer, self._view)
+            self._full = cast_picture(held, names, self._view.camera, self.rasterizer, self._view)
         return self._full
 
     def agent_picture(self) -> Picture:
@@ -146,16 +146,16 @@ class Simulation:
         around = enclosures(self.world, item)
         prims, _, names = self._model.primitives()
         kept = prims[~np.isin(prims[:, INSTANCE], [names.index(o.object_id) for o in around])]
-        picture = cast_picture(kept, names, self.view().camera, self.renderer)
+        picture = cast_picture(kept, names, self.view().camera, self.rasterizer)
         return item.object_id in visible_ids(self.world, picture, self.settings.visibility_distance)
 
     def colours(self, picture: Picture) -> NDArray[np.uint8]:
         """RGB (h, w, 3), bottom row first; with supersampling the mean of 2x2 rays per pixel."""
         lights = self._model.lights()
         if not self.settings.supersample:
-            return colour_picture(picture, lights, self.renderer)
-        fine = cast_picture(picture.prims, picture.names, picture.camera.scaled(2), self.renderer)
-        rgb = colour_picture(fine, lights, self.renderer).astype(np.uint16)
+            return colour_picture(picture, lights, self.rasterizer)
+        fine = cast_picture(picture.prims, picture.names, picture.camera.scaled(2), self.rasterizer)
+        rgb = colour_picture(fine, lights, self.rasterizer).astype(np.uint16)
         total = rgb[0::2, 0::2] + rgb[1::2, 0::2] + rgb[0::2, 1::2] + rgb[1::2, 1::2]
         return ((total + 2) // 4).astype(np.uint8)
 
@@ -163,7 +163,7 @@ class Simulation:
         """What a third-party camera sees."""
         prims, held, names = self._model.primitives()
         lens = self._lens(camera)
-        return cast_picture(np.concatenate([prims, held]), names, lens, self.renderer)
+        return cast_picture(np.concatenate([prims, held]), names, lens, self.rasterizer)
 
     def _lens(self, camera: ThirdPartyCamera) -> Camera:
         matrix = euler_matrix(camera.rotation)
@@ -184,7 +184,7 @@ class Simulation:
             agent.camera_position(), agent.camera_matrix(), self.settings.field_of_view, self.width, self.height
         )
         prims, _, names = self._model.primitives()
-        self._view = cast_picture(prims, names, camera, self.renderer)
+        self._view = cast_picture(prims, names, camera, self.rasterizer)
         self._full = None
         self._visible = None
         self._key = key

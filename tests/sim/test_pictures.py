@@ -10,7 +10,7 @@ from infthor_eval.sim.instances import instance_color
 from infthor_eval.sim.object_types import OBJECT_TYPES, type_named
 from infthor_eval.sim.render.camera import Camera, project
 from infthor_eval.sim.render.lighting import Lights
-from infthor_eval.sim.render.picture import cast_picture, colour_picture, rasterizer
+from infthor_eval.sim.render.picture import cast_picture, choose_rasterizer, colour_picture
 from infthor_eval.sim.render.primitives import Form, Material, ShapePart, rows
 from infthor_eval.sim.render.shapes import shape
 
@@ -34,7 +34,7 @@ def one(form: Form, distance: float, half: float = 0.5, **more: float) -> np.nda
     ("form", "depth"), [(Form.BOX, 2.5), (Form.ELLIPSOID, 2.5), (Form.CYLINDER, 2.5), (Form.CUP, 2.5)]
 )
 def test_depth_is_that_of_geometry(name, form, depth):
-    picture = cast_picture(one(form, 3.0), ("a",), camera(), rasterizer(name))
+    picture = cast_picture(one(form, 3.0), ("a",), camera(), choose_rasterizer(name))
     assert picture.depth[50, 50] == pytest.approx(depth, abs=1e-3)
     assert picture.instances[50, 50] == 0
     assert picture.instances[0, 0] == -1
@@ -49,7 +49,7 @@ def test_one_looks_into_a_cup_from_above(name):
     above = Camera(np.array([0.0, 2.0, 0.0]), euler_matrix((90, 0, 0)), 60.0, 101, 101)
     for form, depth in ((Form.CYLINDER, 1.5), (Form.CUP, 2.5)):
         drawn = rows([ShapePart(form, (0, 0, 0), (0.5,) * 3, (1, 1, 1))], np.zeros(3), STRAIGHT, 0)
-        picture = cast_picture(drawn, ("a",), above, rasterizer(name))
+        picture = cast_picture(drawn, ("a",), above, choose_rasterizer(name))
         assert picture.depth[50, 50] == pytest.approx(depth, abs=1e-3)
 
 
@@ -66,16 +66,16 @@ def test_both_renderers_draw_the_same_picture():
     lights = Lights(np.array([[0.3, 1.0, 1.0, 0.9]]), 0.7)
     pictures = []
     for name in ("numba", "numpy"):
-        renderer = rasterizer(name)
-        picture = cast_picture(prims, names, camera(120), renderer)
-        pictures.append((picture.depth, picture.instances, colour_picture(picture, lights, renderer)))
+        rasterizer = choose_rasterizer(name)
+        picture = cast_picture(prims, names, camera(120), rasterizer)
+        pictures.append((picture.depth, picture.instances, colour_picture(picture, lights, rasterizer)))
     for first, second in zip(*pictures, strict=True):
         assert np.array_equal(first, second)
 
 
 def test_near_plane_and_things_behind_are_cut():
     assert not len(project(one(Form.BOX, -3.0), camera()).index)
-    assert cast_picture(one(Form.BOX, 0.0, 0.05), ("a",), camera(), rasterizer("numba")).instances.max() == -1
+    assert cast_picture(one(Form.BOX, 0.0, 0.05), ("a",), camera(), choose_rasterizer("numba")).instances.max() == -1
 
 
 FLAT = {"Laptop", "Shelf", "ShowerGlass"}  # closed; the space above a board; one of the panes that its box is around

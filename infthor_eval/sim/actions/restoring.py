@@ -2,7 +2,7 @@
 """Setting a scene to a recorded or random state: poses, toggles, states of objects, random placement."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -39,21 +39,10 @@ def set_object_toggles(sim: Simulation, objectToggles: list[Any]) -> None:
 @action("SetStateOfAllObjects")
 def set_state_of_all_objects(sim: Simulation, StateChange: str, forceAction: bool = False) -> None:
     """Makes every object that can be so dirty, filled or used up; the contrary without `forceAction`."""
-    change = _CHANGES.get(StateChange)
+    change = _ALL_AT_ONCE.get(StateChange)
     if change is None:
-        raise ActionError(f"{StateChange!r} is not a state change; use one of {', '.join(sorted(_CHANGES))}")
-    capability, attribute, on, off = change
-    for item in sim.world.objects.values():
-        if getattr(item.type, capability):
-            setattr(item.state, attribute, on if forceAction else off)
-            sim.world.touch(item)
-
-
-_CHANGES: dict[str, tuple[str, str, Any, Any]] = {
-    "CanBeDirty": ("dirtyable", "dirty", True, False),
-    "CanBeFilled": ("fillable", "fill_liquid", "water", None),
-    "CanBeUsedUp": ("usable_up", "used_up", True, False),
-}
+        raise ActionError(f"{StateChange!r} is not a state change; use one of {', '.join(sorted(_ALL_AT_ONCE))}")
+    _change_all(sim, change, forceAction)
 
 
 @action("SetObjectStates")
@@ -64,31 +53,49 @@ def set_object_states(sim: Simulation, SetObjectStates: Mapping[str, Any]) -> No
     (`isOpen`, `isToggled`, `isDirty`, `isBroken`, `isFilledWithLiquid`, `isUsedUp`, `isCooked`).
     """
     wanted = str(SetObjectStates.get("stateChange", ""))
-    found = _STATES.get(wanted)
-    if found is None:
-        raise ActionError(f"{wanted!r} is not a stateChange; use one of {', '.join(sorted(_STATES))}")
-    capability, key, attribute, on, off = found
-    value = on if SetObjectStates.get(key, True) else off
-    only = SetObjectStates.get("objectType")
+    change = _CHANGES.get(wanted)
+    if change is None:
+        raise ActionError(f"{wanted!r} is not a stateChange; use one of {', '.join(sorted(_CHANGES))}")
+    _change_all(sim, change, bool(SetObjectStates.get(change.flag, True)), SetObjectStates.get("objectType"))
+
+
+class _Change(NamedTuple):
+    """What a type must be able to, the metadata's flag of the state, the state itself and its two values."""
+
+    ability: str
+    flag: str
+    state: str
+    on: Any = True
+    off: Any = False
+
+
+_CHANGES = {
+    "openable": _Change("openable", "isOpen", "openness", 1.0, 0.0),
+    "toggleable": _Change("toggleable", "isToggled", "toggled"),
+    "dirtyable": _Change("dirtyable", "isDirty", "dirty"),
+    "breakable": _Change("breakable", "isBroken", "broken"),
+    "canFillWithLiquid": _Change("fillable", "isFilledWithLiquid", "fill_liquid", "water", None),
+    "canBeUsedUp": _Change("usable_up", "isUsedUp", "used_up"),
+    "cookable": _Change("cookable", "isCooked", "cooked"),
+}
+_ALL_AT_ONCE = {
+    "CanBeDirty": _CHANGES["dirtyable"],
+    "CanBeFilled": _CHANGES["canFillWithLiquid"],
+    "CanBeUsedUp": _CHANGES["canBeUsedUp"],
+}
+
+
+def _change_all(sim: Simulation, change: _Change, on: bool, only: str | None = None) -> None:
+    """Changes the state of every object that can be so, or of those of type `only`."""
+    value = change.on if on else change.off
     for item in sim.world.objects.values():
-        if not getattr(item.type, capability) or only not in (None, "", item.object_type):
+        if not getattr(item.type, change.ability) or only not in (None, "", item.object_type):
             continue
-        if attribute == "openness":
+        if change.state == "openness":
             set_openness(sim, item, value)
         else:
-            setattr(item.state, attribute, value)
+            setattr(item.state, change.state, value)
             sim.world.touch(item)
-
-
-_STATES: dict[str, tuple[str, str, str, Any, Any]] = {
-    "openable": ("openable", "isOpen", "openness", 1.0, 0.0),
-    "toggleable": ("toggleable", "isToggled", "toggled", True, False),
-    "dirtyable": ("dirtyable", "isDirty", "dirty", True, False),
-    "breakable": ("breakable", "isBroken", "broken", True, False),
-    "canFillWithLiquid": ("fillable", "isFilledWithLiquid", "fill_liquid", "water", None),
-    "canBeUsedUp": ("usable_up", "isUsedUp", "used_up", True, False),
-    "cookable": ("cookable", "isCooked", "cooked", True, False),
-}
 
 
 @action("RemoveFromScene")

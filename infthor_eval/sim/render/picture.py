@@ -13,7 +13,7 @@ from infthor_eval.sim.render.kernel_cache import drop_stale_kernels
 from infthor_eval.sim.render.lighting import Lights
 from infthor_eval.sim.render.primitives import COLUMNS, INSTANCE
 
-__all__ = ["Picture", "Rasterizer", "cast_picture", "colour_picture", "rasterizer"]
+__all__ = ["Picture", "Rasterizer", "cast_picture", "choose_rasterizer", "colour_picture"]
 
 Cast = Callable[[Array, Projection, Camera], tuple[Array, NDArray[np.int32]]]
 Shade = Callable[[Array, Projection, Camera, Array, NDArray[np.int32], Lights], NDArray[np.uint8]]
@@ -47,8 +47,8 @@ class Picture:
     names: tuple[str, ...]
 
 
-def rasterizer(name: str | None = None) -> Rasterizer:
-    """The renderer: `numba`, or `numpy` where numba is not installed or INFTHOR_SIM_RENDERER asks for it."""
+def choose_rasterizer(name: str | None = None) -> Rasterizer:
+    """The rasterizer: `numba`, or `numpy` where numba is not installed or INFTHOR_SIM_RENDERER asks for it."""
     chosen = name or os.environ.get("INFTHOR_SIM_RENDERER", "")
     if chosen != "numpy":
         drop_stale_kernels()
@@ -65,14 +65,14 @@ def rasterizer(name: str | None = None) -> Rasterizer:
 
 
 def cast_picture(
-    prims: Array, names: tuple[str, ...], camera: Camera, renderer: Rasterizer, base: Picture | None = None
+    prims: Array, names: tuple[str, ...], camera: Camera, rasterizer: Rasterizer, base: Picture | None = None
 ) -> Picture:
     """Casts primitives (n, COLUMNS); over `base`, where given, keeping its pixels that are nearer.
 
     `base` must be cast with the same camera.
     """
     seen = project(prims, camera) if len(prims) else _nothing()
-    depth, nearest = renderer.cast(prims, seen, camera)
+    depth, nearest = rasterizer.cast(prims, seen, camera)
     lookup = np.append(prims[seen.index, INSTANCE], -1).astype(np.int32)
     instances = lookup[nearest]
     if base is None:
@@ -96,9 +96,9 @@ def cast_picture(
     )
 
 
-def colour_picture(picture: Picture, lights: Lights, renderer: Rasterizer) -> NDArray[np.uint8]:
+def colour_picture(picture: Picture, lights: Lights, rasterizer: Rasterizer) -> NDArray[np.uint8]:
     """RGB (h, w, 3) of a cast picture."""
-    return renderer.shade(picture.prims, picture.seen, picture.camera, picture.depth, picture.nearest, lights)
+    return rasterizer.shade(picture.prims, picture.seen, picture.camera, picture.depth, picture.nearest, lights)
 
 
 def _nothing() -> Projection:
