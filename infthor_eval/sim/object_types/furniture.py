@@ -2,7 +2,7 @@
 
 from functools import partial
 
-from infthor_eval.sim.object_types.record import ObjectType
+from infthor_eval.sim.object_types.record import ObjectType, portable
 
 __all__ = ["TYPES"]
 
@@ -28,8 +28,7 @@ TYPES = (
     _store("Drawer", (0.49, 0.19, 0.38), shape="drawer", materials=("Wood",), refuses=("bulky",), centered=True,
            levels=(0.12,), slides=True, fitted=True, stacked=True, faces_room=True),
     _furniture("Dresser", (1.52, 0.97, 0.53), shape="chest", mass=30.0, materials=("Wood",), cut_out=True, tall=True),
-    ObjectType("Footstool", (0.28, 0.31, 0.28), shape="stool", pickupable=True, receptacle=True, mass=0.5,
-               takes=("lounge",)),
+    portable("Footstool", (0.28, 0.31, 0.28), shape="stool", receptacle=True, takes=("lounge",)),
     _furniture("Ottoman", (0.85, 0.43, 0.52), shape="ottoman", takes=("lounge",), yields=True),
     _store("Safe", (0.50, 0.51, 0.56), shape="safe", moveable=True, takes=("small", "ornaments", "Book"),
            levels=(0.04,), hinged=True, fitted=True),

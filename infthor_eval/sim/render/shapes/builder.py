@@ -47,6 +47,16 @@ class Builder:
         """A length in metres as a fraction of the half box along `axis`, at most 1."""
         return min(1.0, metres / max(float(self.half[axis]), 1e-6))
 
+    @property
+    def slenderness(self) -> float:
+        """The shorter of its two horizontal sides as a share of the longer one."""
+        sides = float(self.half[0]), float(self.half[2])
+        return min(sides) / max(sides)
+
+    def lengthwise(self, along: float, y: float, across: float) -> tuple[float, float, float]:
+        """A position or half extents given along and across the longer of the two horizontal sides."""
+        return (along, y, across) if self.half[0] >= self.half[2] else (across, y, along)
+
     def metric(self, at: Vector) -> Array:
         """A position given in fractions, as metres in the object's frame (3,)."""
         return self.item.box_center + self._turn @ (np.asarray(at, dtype=float) * self.half)

@@ -204,9 +204,8 @@ def shower_curtain(b: Builder) -> None:
     share = 0.35 if b.state.openness > 0 else 1.0
     for index in range(6):
         at = -1 + share * (2 * index + 1) / 6
-        where = (at, 0, 0) if long == 0 else (0, 0, at)
-        half = (share / 5, 1, 0.5) if long == 0 else (0.5, 1, share / 5)
-        b.tube(where, half, shade_of(color, 0.95 + 0.1 * (index % 2)), Material.FABRIC)
+        fold = shade_of(color, 0.95 + 0.1 * (index % 2))
+        b.tube(b.lengthwise(at, 0, 0), b.lengthwise(share / 5, 1, 0.5), fold, Material.FABRIC)
     b.rod((0, 0.99, 0), 0.012, float(b.half[long]), long, CHROME)
 
 

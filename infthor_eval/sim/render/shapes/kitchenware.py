@@ -20,20 +20,15 @@ def _liquid(b: Builder, level: float, radius: float, at: tuple[float, float] = (
 def mug(b: Builder) -> None:
     """A cup with a handle on the longer side."""
     color = pick(CERAMICS, b.style)
-    long = 0 if b.half[0] >= b.half[2] else 2
-    ratio = min(1.0, float(b.half[2 - long] / b.half[long]))
-    shift = 1 - ratio
-    at = (-shift, 0, 0) if long == 0 else (0, 0, -shift)
-    half = (ratio, 1, 1) if long == 0 else (1, 1, ratio)
+    ratio = b.slenderness
+    at, half = b.lengthwise(ratio - 1, 0, 0), b.lengthwise(ratio, 1, 1)
     b.cup(at, half, color, bottom=0.85)
     b.tube((at[0], -0.92, at[2]), (half[0] * 0.85, 0.08, half[2] * 0.85), shade_of(color, 0.8))
     _liquid(b, 0.6, min(half[0], half[2]) * 0.9, (at[0], at[2]))
     reach = max(1 - (2 * ratio - 1), 0.25)
     for level in (-0.45, 0.45):
-        middle = (1 - reach / 2, level, 0) if long == 0 else (0, level, 1 - reach / 2)
-        bar = (reach / 2, 0.1, 0.12) if long == 0 else (0.12, 0.1, reach / 2)
-        b.box(middle, bar, color)
-    b.box((0.93, 0, 0) if long == 0 else (0, 0, 0.93), (0.07, 0.55, 0.12) if long == 0 else (0.12, 0.55, 0.07), color)
+        b.box(b.lengthwise(1 - reach / 2, level, 0), b.lengthwise(reach / 2, 0.1, 0.12), color)
+    b.box(b.lengthwise(0.93, 0, 0), b.lengthwise(0.07, 0.55, 0.12), color)
 
 
 @draws
@@ -66,32 +61,25 @@ def plate(b: Builder) -> None:
 def pot(b: Builder) -> None:
     """A pot with two ears."""
     color = pick((STEEL, (0.35, 0.36, 0.38), (0.6, 0.25, 0.2)), b.style)
-    long = 0 if b.half[0] >= b.half[2] else 2
-    body = max(0.6, float(b.half[2 - long] / b.half[long]) * 0.98)
-    half: tuple[float, float, float] = (body, 1, 1) if long == 0 else (1, 1, body)
+    half = b.lengthwise(max(0.6, b.slenderness * 0.98), 1, 1)
     if abs(b.half[0] - b.half[2]) < 0.05 * b.half[0]:
         half = (0.85, 1, 0.85)
     b.cup((0, 0, 0), half, color, Material.METAL, bottom=0.92)
     b.tube((0, -0.94, 0), (half[0] * 0.92, 0.06, half[2] * 0.92), shade_of(color, 0.7))
     _liquid(b, 0.3, min(half[0], half[2]) * 0.94)
     for side in (-1, 1):
-        ear = (side * 0.92, 0.65, 0) if long == 0 else (0, 0.65, side * 0.92)
-        b.box(ear, (0.08, 0.08, 0.3) if long == 0 else (0.3, 0.08, 0.08), BLACK)
+        b.box(b.lengthwise(side * 0.92, 0.65, 0), b.lengthwise(0.08, 0.08, 0.3), BLACK)
 
 
 @draws
 def pan(b: Builder) -> None:
     """A shallow pan with a long handle."""
-    long = 0 if b.half[0] >= b.half[2] else 2
-    ratio = min(0.95, float(b.half[2 - long] / b.half[long]))
-    shift = 1 - ratio
-    at = (-shift, 0, 0) if long == 0 else (0, 0, -shift)
-    half = (ratio, 0.95, 1) if long == 0 else (1, 0.95, ratio)
-    b.cup((at[0], 0, at[2]), half, DARK, Material.METAL, bottom=0.88)
+    ratio = min(0.95, b.slenderness)
+    at, half = b.lengthwise(ratio - 1, 0, 0), b.lengthwise(ratio, 0.95, 1)
+    b.cup(at, half, DARK, Material.METAL, bottom=0.88)
     b.tube((at[0], -0.85, at[2]), (half[0] * 0.88, 0.1, half[2] * 0.88), (0.14, 0.14, 0.15))
     length = max(1 - ratio, 0.05)
-    where = (1 - length, 0.6, 0) if long == 0 else (0, 0.6, 1 - length)
-    b.box(where, (length, 0.25, 0.08) if long == 0 else (0.08, 0.25, length), BLACK)
+    b.box(b.lengthwise(1 - length, 0.6, 0), b.lengthwise(length, 0.25, 0.08), BLACK)
 
 
 @draws
