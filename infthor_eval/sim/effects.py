@@ -3,17 +3,12 @@
 import numpy as np
 
 from infthor_eval.sim.geometry import yaw_matrix
-from infthor_eval.sim.object_types import object_type
+from infthor_eval.sim.object_types import type_named
 from infthor_eval.sim.objects import SimObject
 from infthor_eval.sim.world import World
 
-__all__ = ["SLICES", "break_object", "settle", "slice_object", "toggle"]
+__all__ = ["break_object", "settle", "slice_object", "toggle"]
 
-SLICES = {"Apple": 5, "Bread": 9, "Egg": 1, "Lettuce": 7, "Potato": 8, "Tomato": 6}
-"""How many slices each type falls into; the highest number seen in ALFRED's recordings, or above."""
-
-_SLICED = {"Egg": "EggCracked"}
-_COOKS = frozenset({"Microwave", "StoveBurner", "Toaster"})
 _WASHABLE_LIQUID = "water"
 
 
@@ -23,8 +18,7 @@ def slice_object(world: World, target: SimObject) -> list[SimObject]:
     Returns:
         The new objects; their ids are the old one's and `|AppleSliced_1` and so on.
     """
-    name = _SLICED.get(target.object_type, f"{target.object_type}Sliced")
-    count = SLICES[target.object_type]
+    name, count = target.type.slice_type, target.type.slices
     owner = None if target.parent is None else world.objects[target.parent]
     axis = _slicing_axis(world, target)
     length = float(target.box_size[axis])
@@ -35,13 +29,13 @@ def slice_object(world: World, target: SimObject) -> list[SimObject]:
     made = []
     for number in range(1, count + 1):
         piece = target.duplicate(f"{target.object_id}|{name}_{number}")
-        piece.kind, piece.name = object_type(name), f"{target.name}_{name}_{number}"
+        piece.type, piece.name = type_named(name), f"{target.name}_{name}_{number}"
         piece.box_size, piece.box_center, piece.asset_id = size.copy(), np.zeros(3), ""
         offset = np.zeros(3)
         offset[axis] = (number - 0.5) * length / count - length / 2
         piece.rotation = np.array([0.0, float(target.rotation[1]), 0.0])
         piece.position = middle + matrix @ offset
-        piece.state.sliced = name != "EggCracked"
+        piece.state.sliced = not target.type.cracks
         piece.state.picked_up = False
         world.add(piece)
         if owner is not None:
@@ -58,7 +52,7 @@ def _slicing_axis(world: World, target: SimObject) -> int:
 
 def break_object(world: World, target: SimObject) -> None:
     """Breaks an object; an egg cracks, and what was in a vessel spills."""
-    if target.object_type == "Egg":
+    if target.type.cracks:
         slice_object(world, target)
         return
     target.state.broken = True
@@ -81,30 +75,31 @@ def toggle(world: World, target: SimObject, on: bool) -> None:
 def settle(world: World) -> None:
     """Applies every source of heat, cold and liquid to what is in it now; runs after each action."""
     for source in list(world.objects.values()):
-        if source.object_type == "Fridge":
+        if source.type.cold_source:
             _chill(world, source)
-        elif source.kind.toggleable and source.state.toggled:
+        elif source.state.toggled:
             _work(world, source)
-        elif source.object_type == "StoveBurner" and source.state.toggled:
-            _heat(world, source)
 
 
 def _work(world: World, source: SimObject) -> None:
-    name = source.object_type
-    if name in _COOKS:
+    if source.type.pours:
+        _pour(world, source)
+    elif source.type.heat_source:
         _heat(world, source)
-    elif name == "CoffeeMachine":
-        for item in world.children(source):
-            if item.kind.fillable and item.state.fill_liquid is None:
-                item.state.fill_liquid, item.state.temperature = "coffee", "Hot"
-                world.touch(item)
-    elif name in {"Faucet", "ShowerHead"}:
+    elif source.type.runs_water:
         _rinse(world, source)
+
+
+def _pour(world: World, source: SimObject) -> None:
+    for item in world.children(source):
+        if item.type.fillable and item.state.fill_liquid is None:
+            item.state.fill_liquid, item.state.temperature = source.type.pours, "Hot"
+            world.touch(item)
 
 
 def _heat(world: World, source: SimObject) -> None:
     for item in world.descendants(source):
-        cooks = item.kind.cookable and not item.state.cooked
+        cooks = item.type.cookable and not item.state.cooked
         if item.state.temperature != "Hot" or cooks:
             item.state.temperature = "Hot"
             item.state.cooked = item.state.cooked or cooks
@@ -125,13 +120,13 @@ def _rinse(world: World, source: SimObject) -> None:
     low, high = source.bounds()
     middle = (low + high) / 2
     for basin in world.objects.values():
-        if basin.object_type not in {"SinkBasin", "Sink", "BathtubBasin", "Bathtub"}:
+        if not basin.type.basin:
             continue
         b_low, b_high = basin.bounds()
         if np.any(middle[[0, 2]] < b_low[[0, 2]] - 0.5) or np.any(middle[[0, 2]] > b_high[[0, 2]] + 0.5):
             continue
         for item in world.descendants(basin):
-            fills = item.kind.fillable and item.state.fill_liquid is None and not item.state.broken
+            fills = item.type.fillable and item.state.fill_liquid is None and not item.state.broken
             if item.state.dirty or fills:
                 item.state.dirty = False
                 item.state.fill_liquid = _WASHABLE_LIQUID if fills else item.state.fill_liquid

@@ -61,7 +61,7 @@ class FifoPeer:
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+        self, error_type: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         os.close(self._out)
         if self._in is not None:
@@ -69,9 +69,9 @@ class FifoPeer:
 
     def send(self, frames: Sequence[tuple[FieldType, bytes | memoryview]]) -> None:
         """Writes one message of these frames."""
-        for kind, body in frames:
+        for field_type, body in frames:
             view = memoryview(body).cast("B")
-            self._write(_HEADER.pack(kind, len(view)))
+            self._write(_HEADER.pack(field_type, len(view)))
             self._write(view)
         self._write(_END)
 
@@ -90,13 +90,13 @@ class FifoPeer:
             header = self._read(_HEADER.size)
             if header is None:
                 return None
-            kind, length = _HEADER.unpack(header)
+            field_type, length = _HEADER.unpack(header)
             body = self._read(length) if length else b""
             if body is None:
                 return None
-            if kind == FieldType.END_OF_MESSAGE:
+            if field_type == FieldType.END_OF_MESSAGE:
                 break
-            action = _parse(kind, body)
+            action = _parse(field_type, body)
         if action is None:
             raise SimulatorError(
                 "the controller sent a message without an action; it must be ai2thor 5.0.0's FIFO form"
@@ -153,9 +153,9 @@ class FifoPeer:
         return b"".join(parts)
 
 
-def _parse(kind: int, body: bytes) -> dict[str, Any]:
-    if kind != FieldType.ACTION:
-        raise SimulatorError(f"the controller sent a frame of type {kind} where an action (2) is expected")
+def _parse(field_type: int, body: bytes) -> dict[str, Any]:
+    if field_type != FieldType.ACTION:
+        raise SimulatorError(f"the controller sent a frame of type {field_type} where an action (2) is expected")
     try:
         action = json.loads(body)
     except ValueError as error:

@@ -13,6 +13,7 @@ __all__ = [
     "aabb_overlap",
     "corners",
     "euler_matrix",
+    "level_gaps",
     "object_id",
     "rounded",
     "to_array",
@@ -92,3 +93,10 @@ def aabb_gap(point: Array, low: Array, high: Array) -> float:
     """Distance in metres from a point to an axis-aligned box; any number of dimensions, 0 inside."""
     nearest = np.clip(point, low, high)
     return float(np.linalg.norm(point - nearest))
+
+
+def level_gaps(points: Array, low: Array, high: Array) -> Array:
+    """Horizontal distances in metres from points (x, z), (n, 2) or (2,), to a box given by its corners (3,)."""
+    nearest = np.clip(points, low[[0, 2]], high[[0, 2]])
+    gaps: Array = np.hypot(*(points - nearest).T)
+    return gaps

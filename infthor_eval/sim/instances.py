@@ -1,11 +1,11 @@
 """Colours that stand for objects and classes in the segmentation frames; the same name always has the same colour."""
 
-import hashlib
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from infthor_eval.formats.digests import digest
 from infthor_eval.sim.render.picture import Picture
 from infthor_eval.sim.world import World
 
@@ -42,6 +42,6 @@ def _paint(picture: Picture, colors: list[tuple[int, int, int]]) -> NDArray[np.u
     return packed[picture.instances].view(np.uint8).reshape(*picture.instances.shape, 4)
 
 
-def _color(kind: str, name: str) -> tuple[int, int, int]:
-    digest = hashlib.blake2b(f"{kind}:{name}".encode(), digest_size=3).digest()
-    return digest[0], digest[1], max(digest[2], 1)
+def _color(namespace: str, name: str) -> tuple[int, int, int]:
+    red, green, blue = bytes.fromhex(digest(f"{namespace}:{name}", 3))
+    return red, green, max(blue, 1)

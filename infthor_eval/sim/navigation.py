@@ -77,6 +77,10 @@ class NavGrid:
         aside = np.abs(offset @ (math.cos(angle), -math.sin(angle)))
         return int(np.sum((ahead > 0.05) & (ahead <= reach) & (aside <= 0.3 + ahead * 0.4)))
 
+    def freest_yaw(self, x: float, z: float, reach: float = 1.25) -> float:
+        """The quarter turn (degrees) that looks from (x, z) at the most cells; see `freedom`."""
+        return max((0.0, 90.0, 180.0, 270.0), key=lambda yaw: self.freedom(x, z, yaw, reach))
+
     def _key(self, x: float, z: float) -> tuple[int, int]:
         return round((x - self._offset[0]) / CELL), round((z - self._offset[1]) / CELL)
 

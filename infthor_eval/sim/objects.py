@@ -8,11 +8,14 @@ from infthor_eval.sim.footprints import Rect
 from infthor_eval.sim.geometry import Array, corners, euler_matrix
 from infthor_eval.sim.object_types import ObjectType
 
-__all__ = ["ObjectState", "SimObject"]
+__all__ = ["DOOR_SWING", "DRAWER_SLIDE", "SimObject", "SimObjectState"]
+
+DOOR_SWING = 85.0  # degrees that a door opens
+DRAWER_SLIDE = 0.8  # share of its depth that a drawer comes out
 
 
 @dataclass
-class ObjectState:
+class SimObjectState:
     """What actions change beside the pose; the names follow AI2-THOR's metadata."""
 
     openness: float = 0.0
@@ -48,7 +51,7 @@ class SimObject:
 
     object_id: str
     name: str
-    kind: ObjectType
+    type: ObjectType
     position: Array
     rotation: Array
     box_center: Array
@@ -62,7 +65,7 @@ class SimObject:
     style: int = 0
     parent: str | None = None
     controls: tuple[str, ...] = ()
-    state: ObjectState = field(default_factory=ObjectState)
+    state: SimObjectState = field(default_factory=SimObjectState)
     contents: list[str] = field(default_factory=list)
     version: int = 0
     _bounds: tuple[bytes, Array, Array] | None = field(default=None, init=False, repr=False)
@@ -70,7 +73,7 @@ class SimObject:
     @property
     def object_type(self) -> str:
         """Name of the type."""
-        return self.kind.name
+        return self.type.name
 
     @property
     def matrix(self) -> Array:
@@ -81,6 +84,11 @@ class SimObject:
     def center(self) -> Array:
         """Centre of the box in the world, metres (3,)."""
         return self.position + self.matrix @ self.box_center
+
+    @property
+    def front_size(self) -> Array:
+        """Width, height and depth of the box as one sees it from its front, metres (3,)."""
+        return self.box_size[[2, 1, 0]] if round(self.front / 90) % 2 else self.box_size
 
     def oriented_corners(self) -> Array:
         """The 8 corners (8, 3) of the box, turned with the object."""

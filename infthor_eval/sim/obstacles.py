@@ -2,16 +2,14 @@
 
 import numpy as np
 
-from infthor_eval.sim.geometry import Array, aabb_overlap, yaw_matrix
-from infthor_eval.sim.objects import SimObject
+from infthor_eval.sim.geometry import Array, aabb_overlap, level_gaps, yaw_matrix
+from infthor_eval.sim.objects import DOOR_SWING, DRAWER_SLIDE, SimObject
 from infthor_eval.sim.world import World
 
 __all__ = ["blocking_object", "door_leaf", "held_object_blocks"]
 
 _RADIUS = 0.2  # of the agent's capsule, metres
-_DOORED = frozenset({"Cabinet", "Fridge", "Microwave", "Safe"})
 _KNEE, _HEAD = 0.15, 1.5
-_WIDE_OPEN = 85.0  # degrees
 
 
 def blocking_object(world: World, target: Array) -> str | None:
@@ -21,8 +19,6 @@ def blocking_object(world: World, target: Array) -> str | None:
     """
     for item in world.objects.values():
         if item.object_id in world.open_at_start or item.state.openness <= 0:
-            continue
-        if not (item.object_type in _DOORED or item.object_type == "Drawer"):
             continue
         leaf = door_leaf(item)
         if leaf is None or leaf[1][1] < _KNEE or leaf[0][1] > _HEAD:
@@ -34,22 +30,20 @@ def blocking_object(world: World, target: Array) -> str | None:
 
 def door_leaf(item: SimObject) -> tuple[Array, Array] | None:
     """Low and high corner of the axis-aligned box around an open door or drawer; None for other things."""
-    turned = round(item.front / 90) % 2
-    width, depth = (item.box_size[2], item.box_size[0]) if turned else (item.box_size[0], item.box_size[2])
-    height = item.box_size[1]
+    if not (item.type.hinged or item.type.slides):
+        return None
+    width, height, depth = item.front_size
     matrix = item.matrix @ yaw_matrix(item.front)
-    if item.object_type == "Drawer":
-        reach = 0.8 * depth * item.state.openness
+    if item.type.slides:
+        reach = DRAWER_SLIDE * depth * item.state.openness
         points = [(x, y, depth / 2 + z) for x in (-width / 2, width / 2) for y in (-height / 2, height / 2)
                   for z in (0.0, reach)]  # fmt: skip
-    elif item.object_type in _DOORED:
+    else:
         side = item.hinge or -1
-        swing = yaw_matrix(side * _WIDE_OPEN * item.state.openness)
+        swing = yaw_matrix(side * DOOR_SWING * item.state.openness)
         hinge = np.array([side * width / 2, 0.0, depth / 2])
         edge = hinge + swing @ np.array([-side * width, 0.0, 0.0])
         points = [(p[0], y, p[2]) for p in (hinge, edge) for y in (-height / 2, height / 2)]
-    else:
-        return None
     world = np.array(points) @ matrix.T + item.center
     return world.min(axis=0), world.max(axis=0)
 
@@ -66,7 +60,4 @@ def held_object_blocks(world: World, target: Array) -> bool:
 
 
 def _touches(box: tuple[Array, Array], position: Array) -> bool:
-    low, high = box
-    point = position[[0, 2]]
-    nearest = np.clip(point, low[[0, 2]], high[[0, 2]])
-    return bool(np.hypot(*(point - nearest)) < _RADIUS)
+    return bool(level_gaps(position[[0, 2]], *box) < _RADIUS)

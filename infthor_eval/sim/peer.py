@@ -75,14 +75,14 @@ class Peer:
             frames += self._pictures(sim.third_party(camera), wants, _THIRD)
         return frames
 
-    def _pictures(self, picture: Picture, wants: Mapping[str, Any], kinds: tuple[FieldType, ...]) -> Frames:
+    def _pictures(self, picture: Picture, wants: Mapping[str, Any], field_types: tuple[FieldType, ...]) -> Frames:
         frames: Frames = []
         if wants["rgb"]:
-            frames.append((kinds[0], self._sim.colours(picture).data))
+            frames.append((field_types[0], self._sim.colours(picture).data))
         if wants["depth"]:
-            frames.append((kinds[1], picture.depth.astype(np.float32).data))
+            frames.append((field_types[1], picture.depth.astype(np.float32).data))
         if wants["ids"]:
-            frames.append((kinds[2], instance_image(picture).data))
+            frames.append((field_types[2], instance_image(picture).data))
         if wants["classes"]:
-            frames.append((kinds[3], class_image(picture, self._sim.world).data))
+            frames.append((field_types[3], class_image(picture, self._sim.world).data))
         return frames

@@ -1,4 +1,3 @@
-# ruff: noqa: SIM905 - tables of names read best as words
 """Where things stand: the surfaces of receptacles, what lies on them, and where there is room for one thing more."""
 
 import math
@@ -9,25 +8,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from infthor_eval.sim.geometry import Array, yaw_matrix
-from infthor_eval.sim.objects import SimObject
+from infthor_eval.sim.objects import DRAWER_SLIDE, SimObject
 from infthor_eval.sim.world import World
 
-__all__ = ["Seen", "Surface", "find_place", "owner_of", "surfaces"]
+__all__ = ["PointFilter", "Surface", "find_place", "owner_of", "surfaces"]
 
 _WALL = 0.02  # thickness in metres of the sides and floors of hollow receptacles
-_OPEN_TOP = frozenset("BathtubBasin Bowl Box Cup GarbageCan LaundryHamper Mug Pan Plate Pot Sink SinkBasin".split())
-_SHELVES = {"Fridge": (0.22, 0.41, 0.62), "Safe": (0.04,), "Cabinet": (0.03,), "Microwave": (0.08,), "Drawer": (0.12,)}
-_OVERHANG = frozenset(
-    "Bowl CoffeeMachine Cup HandTowelHolder Mug Pan Plate Pot StoveBurner Toaster Toilet ToiletPaperHanger"
-    " TowelHolder".split()
-)
 _STEP = 0.05
 _BELOW_HAND = 0.15  # metres below the agent's own height at which it likes best to put things
 _CLEARANCE = 0.008
-_SLIDE = 0.8  # share of its depth that a drawer comes out
 
 
-Seen = Callable[[Array], NDArray[np.bool_]]
+PointFilter = Callable[[Array], NDArray[np.bool_]]
 
 
 @dataclass(frozen=True)
@@ -53,30 +45,17 @@ class Surface:
 
 def surfaces(receptacle: SimObject) -> list[Surface]:
     """The surfaces of a receptacle, lowest first."""
-    size = receptacle.box_size
+    if receptacle.type.levels:
+        return _levels_inside(receptacle)
     low, high = receptacle.bounds()
-    yaw = float(receptacle.rotation[1])
-    name = receptacle.object_type
-    half = (size[0] / 2, size[2] / 2)
-    if name in _SHELVES and receptacle.kind.encloses:
-        inner = (max(half[0] - _WALL, 0.02), max(half[1] - _WALL, 0.02))
-        heights = [low[1] + share * (high[1] - low[1]) for share in _SHELVES[name]]
-        tops = [*heights[1:], float(high[1]) - _WALL]
-        slide = drawer_offset(receptacle)
-        middle = (low + high) / 2 + slide
-        return [
-            Surface(np.array([middle[0], y, middle[2]]), inner, yaw, top - y, from_middle=True)
-            for y, top in zip(heights, tops, strict=True)
-        ]
-    middle = (low + high) / 2
-    overhang = math.inf if name in _OVERHANG else 0.03
-    if name in _OPEN_TOP:
+    middle, half = (low + high) / 2, (receptacle.box_size[0] / 2, receptacle.box_size[2] / 2)
+    yaw, overhang = float(receptacle.rotation[1]), math.inf if receptacle.type.overhang else 0.03
+    if receptacle.type.open_top:
         base = float(low[1]) + min(_WALL, (high[1] - low[1]) * 0.3)
         if receptacle.support is not None:
             base = max(base, float(low[1]) + receptacle.support)
-        shrink = 0.8 if name in {"Bowl", "Cup", "Mug", "Plate", "Pot", "Pan"} else 1.0
-        inner = (max(half[0] * shrink - _WALL / 2, 0.015), max(half[1] * shrink - _WALL / 2, 0.015))
-        return [Surface(np.array([middle[0], base, middle[2]]), inner, yaw, math.inf, overhang, True)]
+        inner = [max(side * receptacle.type.open_top - _WALL / 2, 0.015) for side in half]
+        return [Surface(np.array([middle[0], base, middle[2]]), (inner[0], inner[1]), yaw, math.inf, overhang, True)]
     level = receptacle.surface_height()
     if not receptacle.pieces:
         return [Surface(np.array([middle[0], level, middle[2]]), half, yaw, math.inf, overhang)]
@@ -87,14 +66,25 @@ def surfaces(receptacle: SimObject) -> list[Surface]:
     return found
 
 
+def _levels_inside(receptacle: SimObject) -> list[Surface]:
+    """The floor and shelves of a cabinet, a fridge or the like, or of a drawer as far as it has come out."""
+    low, high = receptacle.bounds()
+    inner = (max(receptacle.box_size[0] / 2 - _WALL, 0.02), max(receptacle.box_size[2] / 2 - _WALL, 0.02))
+    heights = [low[1] + share * (high[1] - low[1]) for share in receptacle.type.levels]
+    tops = [*heights[1:], float(high[1]) - _WALL]
+    middle, yaw = (low + high) / 2 + drawer_offset(receptacle), float(receptacle.rotation[1])
+    return [
+        Surface(np.array([middle[0], y, middle[2]]), inner, yaw, top - y, from_middle=True)
+        for y, top in zip(heights, tops, strict=True)
+    ]
+
+
 def drawer_offset(receptacle: SimObject) -> Array:
     """How far (3,), in metres, an open drawer's tray has come out of its box; zero for all else."""
-    if receptacle.object_type != "Drawer" or receptacle.state.openness == 0:
+    if not receptacle.type.slides or receptacle.state.openness == 0:
         return np.zeros(3)
     matrix = yaw_matrix(float(receptacle.rotation[1]) + receptacle.front)
-    turned = round(receptacle.front / 90) % 2
-    depth = receptacle.box_size[0 if turned else 2]
-    return matrix @ np.array([0.0, 0.0, _SLIDE * depth * receptacle.state.openness])
+    return matrix @ np.array([0.0, 0.0, DRAWER_SLIDE * receptacle.front_size[2] * receptacle.state.openness])
 
 
 def find_place(
@@ -103,7 +93,7 @@ def find_place(
     receptacle: SimObject,
     crowd: float = 0.0,
     random: np.random.Generator | None = None,
-    seen: Seen | None = None,
+    seen: PointFilter | None = None,
 ) -> SimObject | None:
     """A copy of `item` standing in the free place of `receptacle` that is nearest to the agent; None if it is full.
 
@@ -131,7 +121,7 @@ def _neighbours(world: World, item: SimObject, receptacle: SimObject) -> Iterato
     """What could be in the way: things in this receptacle, and loose ones of others that reach into it."""
     inside = {o.object_id for o in world.descendants(item)} | {item.object_id}
     for other in world.objects.values():
-        if other.object_id in inside or other is receptacle or not other.kind.pickupable:
+        if other.object_id in inside or other is receptacle or not other.type.pickupable:
             continue
         if other.parent == receptacle.object_id or (other.parent is not None and receptacle.parent != other.parent):
             yield other
@@ -159,7 +149,7 @@ def _free_point(
     boxes: list[tuple[Array, Array]],
     crowd: float,
     random: np.random.Generator | None,
-    seen: Seen | None,
+    seen: PointFilter | None,
 ) -> Array | None:
     low, high = ghost.bounds()
     height = high[1] - low[1]
@@ -212,7 +202,7 @@ def owner_of(world: World, item: SimObject) -> SimObject | None:
     best: tuple[float, SimObject] | None = None
     inside = {o.object_id for o in world.descendants(item)}
     for other in world.objects.values():
-        if other is item or not other.kind.receptacle or other.object_id in inside:
+        if other is item or not other.type.receptacle or other.object_id in inside:
             continue
         cost = _holding_cost(other, point, item)
         if cost is not None and (best is None or cost < best[0]):
@@ -228,10 +218,10 @@ def _holding_cost(receptacle: SimObject, point: Array, item: SimObject) -> float
     if receptacle.object_type == "Floor":
         return 5.0
     volume = float(np.prod(np.maximum(high - low, 0.02)))
-    if receptacle.kind.encloses or receptacle.object_type in _OPEN_TOP:
-        top = (low[1] + high[1]) / 2 if receptacle.object_type == "Drawer" else high[1] - 0.005
+    if receptacle.type.encloses or receptacle.type.open_top:
+        top = (low[1] + high[1]) / 2 if receptacle.type.slides else high[1] - 0.005
         inside = low[1] - _sinking(receptacle) <= point[1] <= top
-        if receptacle.kind.pickupable and float(np.prod(item.box_size)) > volume:
+        if receptacle.type.pickupable and float(np.prod(item.box_size)) > volume:
             return None
         return 0.01 * volume if inside else None
     gap = point[1] - receptacle.surface_height()
@@ -242,6 +232,6 @@ def _holding_cost(receptacle: SimObject, point: Array, item: SimObject) -> float
 
 def _sinking(receptacle: SimObject) -> float:
     """How far below the box of a hollow receptacle, in metres, the underside of its contents may be recorded."""
-    if receptacle.kind.encloses:
+    if receptacle.type.encloses:
         return 0.12
-    return 0.03 if receptacle.kind.pickupable else 0.08
+    return 0.03 if receptacle.type.pickupable else 0.08

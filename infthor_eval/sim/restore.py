@@ -7,23 +7,21 @@ from typing import Any
 
 import numpy as np
 
+from infthor_eval.sim.default_objects import default_object
 from infthor_eval.sim.geometry import Array, object_id, to_array
-from infthor_eval.sim.object_types import object_type
+from infthor_eval.sim.object_types import ObjectType, allowed_in, type_named
 from infthor_eval.sim.objects import SimObject
-from infthor_eval.sim.placement_rules import allowed_in
 from infthor_eval.sim.receptacles import find_place, owner_of
-from infthor_eval.sim.sizes import default_object
 from infthor_eval.sim.world import World
 
-__all__ = ["Pose", "set_poses", "settle_parents", "spawn_randomly"]
+__all__ = ["NamedPose", "set_poses", "settle_parents", "spawn_randomly"]
 
 _SUNK = 0.2  # metres; what lies deeper is inside
-_TUBS = frozenset(["Bathtub", "BathtubBasin", "GarbageCan", "LaundryHamper", "Sink", "SinkBasin"])
 _RENAMED = {"Glassbottle": "Bottle"}  # as ALFRED's AI2-THOR 2.1.0 calls it
 
 
 @dataclass(frozen=True)
-class Pose:
+class NamedPose:
     """Where one object is to be: by name, as AI2-THOR's SetObjectPoses takes it."""
 
     name: str
@@ -31,13 +29,13 @@ class Pose:
     rotation: Array
 
     @classmethod
-    def from_wire(cls, entry: Mapping[str, Any]) -> "Pose":
+    def from_wire(cls, entry: Mapping[str, Any]) -> "NamedPose":
         """From `{"objectName", "position", "rotation"}`."""
         rotation = entry.get("rotation") or {}
         return cls(entry["objectName"].removesuffix("(Clone)"), to_array(entry["position"]), to_array(rotation))
 
 
-def set_poses(world: World, poses: Iterable[Pose], keep_moveable: bool = False) -> None:
+def set_poses(world: World, poses: Iterable[NamedPose], keep_moveable: bool = False) -> None:
     """Gives the named objects new poses and new ids made from them; loose objects that are not named vanish.
 
     Names of other versions of AI2-THOR differ after the type: a name that the scene does not have is taken by type.
@@ -46,13 +44,13 @@ def set_poses(world: World, poses: Iterable[Pose], keep_moveable: bool = False) 
     if world.held is not None:
         world.objects[world.held].state.picked_up = False
         world.held = None
-    for item in [o for o in world.objects.values() if o.kind.pickupable]:
+    for item in [o for o in world.objects.values() if o.type.pickupable]:
         world.remove(item)
     for pose in poses:
         template = chooser.choose(pose.name)
         if template is None:
             continue
-        if not template.kind.pickupable:
+        if not template.type.pickupable:
             if not keep_moveable:
                 world.set_pose(template, pose.position, pose.rotation)
             continue
@@ -67,7 +65,7 @@ def set_poses(world: World, poses: Iterable[Pose], keep_moveable: bool = False) 
 def _lower_supports(world: World) -> None:
     """Lowers surfaces that recorded things would be sunk in: where things were put tells how high a table is."""
     for item in world.objects.values():
-        if not item.kind.receptacle or item.kind.encloses or item.kind.pickupable or item.object_type in _TUBS:
+        if not _has_surface(item.type):
             continue
         bottoms = [float(o.bounds()[0][1]) for o in world.children(item)]
         level = item.surface_height()
@@ -77,10 +75,16 @@ def _lower_supports(world: World) -> None:
             world.touch(item)
 
 
+def _has_surface(furniture: ObjectType) -> bool:
+    """Whether things stand on it, and not in it."""
+    hollow = furniture.encloses or furniture.open_top > 0 or furniture.basin
+    return furniture.receptacle and not furniture.pickupable and not hollow
+
+
 def settle_parents(world: World) -> None:
     """Finds for every loose object without a parent the receptacle that it stands in or on."""
     for item in world.objects.values():
-        if item.kind.pickupable and item.parent is None and item.object_id != world.held:
+        if item.type.pickupable and item.parent is None and item.object_id != world.held:
             owner = owner_of(world, item)
             if owner is not None:
                 world.attach(item, owner)
@@ -104,20 +108,20 @@ class _Templates:
             return self._named[name]
         if name not in self._chosen:
             prefix = name.split("_", maxsplit=1)[0]
-            kind = _RENAMED.get(prefix, prefix)
-            known = self._typed.get(kind) or self._defaults(kind)
+            object_type = _RENAMED.get(prefix, prefix)
+            known = self._typed.get(object_type) or self._defaults(object_type)
             if not known:
                 return None
-            self._chosen[name] = known[self._count[kind] % len(known)]
-            self._count[kind] += 1
+            self._chosen[name] = known[self._count[object_type] % len(known)]
+            self._count[object_type] += 1
         return self._chosen[name]
 
-    def _defaults(self, kind: str) -> list[SimObject]:
-        return [default_object(kind, np.zeros(3))] if object_type(kind).pickupable else []
+    def _defaults(self, object_type: str) -> list[SimObject]:
+        return [default_object(object_type, np.zeros(3))] if type_named(object_type).pickupable else []
 
 
-def _unused(world: World, kind: str, position: Array) -> str:
-    wanted = object_id(kind, position)
+def _unused(world: World, object_type: str, position: Array) -> str:
+    wanted = object_id(object_type, position)
     number, found = 1, wanted
     while found in world.objects:
         found, number = f"{wanted}|{number}", number + 1
@@ -132,15 +136,15 @@ def spawn_randomly(
     in_open_only: bool,
 ) -> None:
     """Puts every loose object that is not `kept` into a random receptacle that takes its type and has room."""
-    loose = [o for o in world.objects.values() if o.kind.pickupable and o.object_id not in kept]
+    loose = [o for o in world.objects.values() if o.type.pickupable and o.object_id not in kept]
     for index in random.permutation(len(loose)):
         item = loose[index]
         if item.object_id == world.held:
             continue
         homes = [
             o for o in world.objects.values()
-            if o.kind.receptacle and not o.kind.pickupable and allowed_in(item.object_type, o.object_type)
-            and o.object_type not in excluded_types and not (in_open_only and o.kind.encloses)
+            if o.type.receptacle and not o.type.pickupable and allowed_in(item.object_type, o.object_type)
+            and o.object_type not in excluded_types and not (in_open_only and o.type.encloses)
         ]  # fmt: skip
         for home_index in random.permutation(len(homes)):
             place = find_place(world, item, homes[home_index])

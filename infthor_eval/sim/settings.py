@@ -2,13 +2,13 @@
 
 from dataclasses import dataclass
 
-__all__ = ["AGENT_MODES", "Settings"]
+__all__ = ["AGENT_MODES", "SimulatorSettings"]
 
 AGENT_MODES = ("default",)  # the arm agent registers its mode here when it comes
 
 
 @dataclass(frozen=True)
-class Settings:
+class SimulatorSettings:
     """Parameters of the agent and of the pictures; names and defaults are those of AI2-THOR 5.
 
     Lengths in metres, angles in degrees.

@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 from infthor_eval.sim.geometry import Array, euler_matrix
 from infthor_eval.sim.objects import SimObject
 from infthor_eval.sim.render.camera import FAR, NEAR, Camera
-from infthor_eval.sim.render.picture import Backend, Picture, backend, cast_picture, colour_picture
+from infthor_eval.sim.render.picture import Picture, Rasterizer, cast_picture, choose_rasterizer, colour_picture
 from infthor_eval.sim.render.primitives import INSTANCE
 from infthor_eval.sim.render.scene import SceneModel
 from infthor_eval.sim.scenes.catalogue import Catalogue
-from infthor_eval.sim.settings import Settings
+from infthor_eval.sim.settings import SimulatorSettings
 from infthor_eval.sim.visibility import enclosures, visible_ids
 from infthor_eval.sim.world import World
 
@@ -48,10 +48,10 @@ class Simulation:
     catalogue: Catalogue
     width: int = 300
     height: int = 300
-    settings: Settings = field(default_factory=Settings)
+    settings: SimulatorSettings = field(default_factory=SimulatorSettings)
     cameras: list[ThirdPartyCamera] = field(default_factory=list)
     random: np.random.Generator = field(default_factory=lambda: np.random.default_rng(0))
-    renderer: Backend = field(default_factory=backend)
+    rasterizer: Rasterizer = field(default_factory=choose_rasterizer)
     map_view: bool = False
     failed_reset: str = ""
 
@@ -101,19 +101,22 @@ class Simulation:
         if not len(held):
             return self._view
         if self._full is None:
-            self._full = cast_picture(held, names, self._view.camera, self.renderer, self._view)
+            self._full = cast_picture(held, names, self._view.camera, self.rasterizer, self._view)
         return self._full
 
     def agent_picture(self) -> Picture:
         """What the agent's frame shows: its view, or the map from above when the map view is on."""
         if not self.map_view:
             return self.full_view()
+        return self.third_party(self.map_camera())
+
+    def map_camera(self) -> ThirdPartyCamera:
+        """A camera that sees the whole scene from above."""
         low, high = self.world.scene_bounds()
         middle = (low + high) / 2
         size = float(max(high[0] - low[0], high[2] - low[2])) / 2 + 0.1
-        return self.third_party(
-            ThirdPartyCamera(np.array([middle[0], high[1] - 0.05, middle[2]]), np.array([90.0, 0.0, 0.0]), 90.0, size)
-        )
+        eye = np.array([middle[0], high[1] - 0.05, middle[2]])
+        return ThirdPartyCamera(eye, np.array([90.0, 0.0, 0.0]), orthographic_size=size)
 
     def visible(self) -> frozenset[str]:
         """Ids of the objects that the agent sees within its visibility distance."""
@@ -143,16 +146,16 @@ class Simulation:
         around = enclosures(self.world, item)
         prims, _, names = self._model.primitives()
         kept = prims[~np.isin(prims[:, INSTANCE], [names.index(o.object_id) for o in around])]
-        picture = cast_picture(kept, names, self.view().camera, self.renderer)
+        picture = cast_picture(kept, names, self.view().camera, self.rasterizer)
         return item.object_id in visible_ids(self.world, picture, self.settings.visibility_distance)
 
     def colours(self, picture: Picture) -> NDArray[np.uint8]:
         """RGB (h, w, 3), bottom row first; with supersampling the mean of 2x2 rays per pixel."""
         lights = self._model.lights()
         if not self.settings.supersample:
-            return colour_picture(picture, lights, self.renderer)
-        fine = cast_picture(picture.prims, picture.names, picture.camera.scaled(2), self.renderer)
-        rgb = colour_picture(fine, lights, self.renderer).astype(np.uint16)
+            return colour_picture(picture, lights, self.rasterizer)
+        fine = cast_picture(picture.prims, picture.names, picture.camera.scaled(2), self.rasterizer)
+        rgb = colour_picture(fine, lights, self.rasterizer).astype(np.uint16)
         total = rgb[0::2, 0::2] + rgb[1::2, 0::2] + rgb[0::2, 1::2] + rgb[1::2, 1::2]
         return ((total + 2) // 4).astype(np.uint8)
 
@@ -160,7 +163,7 @@ class Simulation:
         """What a third-party camera sees."""
         prims, held, names = self._model.primitives()
         lens = self._lens(camera)
-        return cast_picture(np.concatenate([prims, held]), names, lens, self.renderer)
+        return cast_picture(np.concatenate([prims, held]), names, lens, self.rasterizer)
 
     def _lens(self, camera: ThirdPartyCamera) -> Camera:
         matrix = euler_matrix(camera.rotation)
@@ -181,7 +184,7 @@ class Simulation:
             agent.camera_position(), agent.camera_matrix(), self.settings.field_of_view, self.width, self.height
         )
         prims, _, names = self._model.primitives()
-        self._view = cast_picture(prims, names, camera, self.renderer)
+        self._view = cast_picture(prims, names, camera, self.rasterizer)
         self._full = None
         self._visible = None
         self._key = key

@@ -39,7 +39,7 @@ def enclosures(world: World, item: SimObject) -> list[SimObject]:
     found = list(world.ancestors(item))
     for other in world.objects.values():
         low, high = other.bounds()
-        fixed = other.kind.receptacle and not other.kind.pickupable and other not in found
+        fixed = other.type.receptacle and not other.type.pickupable and other not in found
         if fixed and bool(np.all((point > low - 0.05) & (point < high + 0.05))):
             found.append(other)
     return [o for o in found if o.object_type != "Floor" and o is not item]

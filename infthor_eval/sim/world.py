@@ -10,7 +10,7 @@ from infthor_eval.sim.geometry import Array, aabb_gap, euler_matrix
 from infthor_eval.sim.navigation import NavGrid
 from infthor_eval.sim.objects import SimObject
 
-__all__ = ["AGENT_HEIGHT", "CAMERA_HEIGHT", "FLOOR_STYLES", "Agent", "Room", "Wall", "World"]
+__all__ = ["AGENT_HEIGHT", "CAMERA_HEIGHT", "FLOOR_STYLES", "Agent", "RoomShell", "Wall", "World"]
 
 AGENT_HEIGHT = 0.9009992  # agent.y of AI2-THOR's default agent on a floor at 0
 CAMERA_HEIGHT = 0.675  # camera above agent.y, fitted to the boxes recorded in ALFRED
@@ -52,7 +52,7 @@ class Wall:
 
 
 @dataclass(frozen=True)
-class Room:
+class RoomShell:
     """The shell of one room: a rectangle on the floor with walls around, metres; else see `Wall`."""
 
     x_min: float
@@ -74,13 +74,14 @@ class World:
     Attributes:
         objects: by id, in the order of the metadata.
         version: grows with every change, so that views can be cached.
+        templates: copies of the loose objects as the scene first had them, by type.
         open_at_start: doors that are open in the recording; its cells already go around them.
         coarse: the shapes of its furniture are only known as boxes, as in recordings.
     """
 
     scene: str
     objects: dict[str, SimObject]
-    rooms: tuple[Room, ...]
+    rooms: tuple[RoomShell, ...]
     nav: NavGrid
     agent: Agent
     seed: int = 0
@@ -183,9 +184,16 @@ class World:
         item.position, item.rotation = np.asarray(position, dtype=float), np.asarray(rotation, dtype=float)
         self.touch(item)
 
+    def keep_templates(self) -> None:
+        """Remembers what its loose objects are like, for poses that name objects which are gone by then."""
+        self.templates = {}
+        for item in self.objects.values():
+            if item.type.pickupable:
+                self.templates.setdefault(item.object_type, []).append(item.duplicate(item.object_id))
+
     def hidden(self, item: SimObject) -> bool:
         """Whether something closed encloses the object."""
-        return any(outer.kind.encloses and outer.kind.openable and outer.state.openness == 0
+        return any(outer.type.encloses and outer.type.openable and outer.state.openness == 0
                    for outer in self.ancestors(item))  # fmt: skip
 
     def hand_pose(self) -> Array:

@@ -28,7 +28,7 @@ class Bench:
 
     def step(self, action: str, **arguments: Any) -> dict[str, Any]:
         reply = self.peer.answer({"action": action, "sequenceId": 1, **arguments})
-        self.frames = {kind: bytes(body) for kind, body in reply}
+        self.frames = {field_type: bytes(body) for field_type, body in reply}
         self.metadata = msgpack.unpackb(self.frames[FieldType.METADATA])["agents"][0]
         return self.metadata
 

@@ -99,7 +99,7 @@ def test_a_supplement_adds_cells_height_and_objects(folder):
     assert fridge.object_id not in world.objects
     assert world.objects[wanted[1]].object_type == "Desk"
     assert table.object_id not in world.objects
-    assert world.objects[wanted[2]].kind.receptacle
+    assert world.objects[wanted[2]].type.receptacle
     assert wanted[3] not in world.objects, "loose objects come with a trajectory's own poses"
 
 

@@ -23,8 +23,8 @@ def wall(room: str, x0: float, z0: float, x1: float, z1: float) -> dict[str, Any
     return {"id": f"wall|{room}|{x0}|{z0}|{x1}|{z1}", "roomId": room, "polygon": polygon, "material": {"name": "A"}}
 
 
-def room(name: str, kind: str, *corners: tuple[float, float]) -> dict[str, Any]:
-    return {"id": name, "roomType": kind, "floorPolygon": [point(*c) for c in corners], "ceilings": []}
+def room(name: str, room_type: str, *corners: tuple[float, float]) -> dict[str, Any]:
+    return {"id": name, "roomType": room_type, "floorPolygon": [point(*c) for c in corners], "ceilings": []}
 
 
 def thing(name: str, asset: str, x: float, y: float, z: float, yaw: float = 0, children: Any = ()) -> dict[str, Any]:

@@ -3,20 +3,20 @@
 import numpy as np
 import pytest
 
+from infthor_eval.sim.default_objects import default_object
 from infthor_eval.sim.fifo import FieldType
 from infthor_eval.sim.geometry import euler_matrix
 from infthor_eval.sim.instances import instance_color
-from infthor_eval.sim.object_types import TYPES, object_type
+from infthor_eval.sim.object_types import OBJECT_TYPES, type_named
 from infthor_eval.sim.render.camera import Camera, project
 from infthor_eval.sim.render.lighting import Lights
-from infthor_eval.sim.render.picture import backend, cast_picture, colour_picture
-from infthor_eval.sim.render.primitives import Kind, Material, Part, rows
+from infthor_eval.sim.render.picture import cast_picture, choose_rasterizer, colour_picture
+from infthor_eval.sim.render.primitives import Form, Material, ShapePart, rows
 from infthor_eval.sim.render.shapes import shape
-from infthor_eval.sim.sizes import SIZES, default_object
 
 from .harness import Bench
 
-BACKENDS = pytest.mark.parametrize("name", ["numba", "numpy"])
+RASTERIZERS = pytest.mark.parametrize("name", ["numba", "numpy"])
 STRAIGHT = np.eye(3)
 
 
@@ -24,32 +24,32 @@ def camera(size: int = 101, **more: float) -> Camera:
     return Camera(np.zeros(3), STRAIGHT, 60.0, size, size, **more)
 
 
-def one(kind: Kind, distance: float, half: float = 0.5, **more: float) -> np.ndarray:
-    part = Part(kind, (0, 0, 0), (half,) * 3, (0.5, 0.5, 0.5), **more)
+def one(form: Form, distance: float, half: float = 0.5, **more: float) -> np.ndarray:
+    part = ShapePart(form, (0, 0, 0), (half,) * 3, (0.5, 0.5, 0.5), **more)
     return rows([part], np.array([0.0, 0.0, distance]), STRAIGHT, 0)
 
 
-@BACKENDS
+@RASTERIZERS
 @pytest.mark.parametrize(
-    ("kind", "depth"), [(Kind.BOX, 2.5), (Kind.ELLIPSOID, 2.5), (Kind.CYLINDER, 2.5), (Kind.CUP, 2.5)]
+    ("form", "depth"), [(Form.BOX, 2.5), (Form.ELLIPSOID, 2.5), (Form.CYLINDER, 2.5), (Form.CUP, 2.5)]
 )
-def test_depth_is_that_of_geometry(name, kind, depth):
-    picture = cast_picture(one(kind, 3.0), ("a",), camera(), backend(name))
+def test_depth_is_that_of_geometry(name, form, depth):
+    picture = cast_picture(one(form, 3.0), ("a",), camera(), choose_rasterizer(name))
     assert picture.depth[50, 50] == pytest.approx(depth, abs=1e-3)
     assert picture.instances[50, 50] == 0
     assert picture.instances[0, 0] == -1
     wide = np.nonzero((picture.instances == 0).any(axis=0))[0]
     focal = 50.5 / np.tan(np.radians(30))
-    expected = 2 * focal * (0.5 / 2.5 if kind == Kind.BOX else 0.5 / np.sqrt(9 - 0.25))
+    expected = 2 * focal * (0.5 / 2.5 if form == Form.BOX else 0.5 / np.sqrt(9 - 0.25))
     assert len(wide) == pytest.approx(expected, abs=1.5)
 
 
-@BACKENDS
+@RASTERIZERS
 def test_one_looks_into_a_cup_from_above(name):
     above = Camera(np.array([0.0, 2.0, 0.0]), euler_matrix((90, 0, 0)), 60.0, 101, 101)
-    for kind, depth in ((Kind.CYLINDER, 1.5), (Kind.CUP, 2.5)):
-        picture = cast_picture(rows([Part(kind, (0, 0, 0), (0.5,) * 3, (1, 1, 1))], np.zeros(3), STRAIGHT, 0), ("a",),
-                               above, backend(name))  # fmt: skip
+    for form, depth in ((Form.CYLINDER, 1.5), (Form.CUP, 2.5)):
+        drawn = rows([ShapePart(form, (0, 0, 0), (0.5,) * 3, (1, 1, 1))], np.zeros(3), STRAIGHT, 0)
+        picture = cast_picture(drawn, ("a",), above, choose_rasterizer(name))
         assert picture.depth[50, 50] == pytest.approx(depth, abs=1e-3)
 
 
@@ -57,7 +57,7 @@ def test_both_renderers_draw_the_same_picture():
     random = np.random.default_rng(3)
     parts = [
         rows(
-            [Part(Kind(i % 4), (0, 0, 0), random.uniform(0.03, 0.3, 3), tuple(random.uniform(0.2, 1, 3)),
+            [ShapePart(Form(i % 4), (0, 0, 0), random.uniform(0.03, 0.3, 3), tuple(random.uniform(0.2, 1, 3)),
                   Material(i % len(Material)), bottom=0.6, emission=0.5 * (i % 7 == 0))],
             random.uniform((-1.5, -1.5, 0.5), (1.5, 1.5, 3.5)), euler_matrix(random.uniform(0, 360, 3)), i,
         ) for i in range(120)
@@ -66,42 +66,42 @@ def test_both_renderers_draw_the_same_picture():
     lights = Lights(np.array([[0.3, 1.0, 1.0, 0.9]]), 0.7)
     pictures = []
     for name in ("numba", "numpy"):
-        renderer = backend(name)
-        picture = cast_picture(prims, names, camera(120), renderer)
-        pictures.append((picture.depth, picture.instances, colour_picture(picture, lights, renderer)))
+        rasterizer = choose_rasterizer(name)
+        picture = cast_picture(prims, names, camera(120), rasterizer)
+        pictures.append((picture.depth, picture.instances, colour_picture(picture, lights, rasterizer)))
     for first, second in zip(*pictures, strict=True):
         assert np.array_equal(first, second)
 
 
 def test_near_plane_and_things_behind_are_cut():
-    assert not len(project(one(Kind.BOX, -3.0), camera()).index)
-    assert cast_picture(one(Kind.BOX, 0.0, 0.05), ("a",), camera(), backend("numba")).instances.max() == -1
+    assert not len(project(one(Form.BOX, -3.0), camera()).index)
+    assert cast_picture(one(Form.BOX, 0.0, 0.05), ("a",), camera(), choose_rasterizer("numba")).instances.max() == -1
 
 
 FLAT = {"Laptop", "Shelf", "ShowerGlass"}  # closed; the space above a board; one of the panes that its box is around
 
 
-@pytest.mark.parametrize("kind", sorted(TYPES & set(SIZES)))
-def test_shapes_fill_their_boxes_and_no_more(kind):
-    item = default_object(kind, np.zeros(3))
+@pytest.mark.parametrize("object_type", sorted(OBJECT_TYPES))
+def test_shapes_fill_their_boxes_and_no_more(object_type):
+    item = default_object(object_type, np.zeros(3))
     parts = shape(item)
     assert parts
     points = np.concatenate([_corners(part) for part in parts]) - item.box_center
     span = np.ptp(points, axis=0)
     loose = 0.035 + 0.25 * item.box_size
     assert np.all(np.abs(points) <= item.box_size / 2 + loose), "the shape sticks out of its box"
-    if kind not in FLAT:
+    if object_type not in FLAT:
         assert np.all(span >= 0.3 * item.box_size - 0.02), "the shape leaves most of its box empty"
 
 
-def _corners(part: Part) -> np.ndarray:
+def _corners(part: ShapePart) -> np.ndarray:
     signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
     matrix = STRAIGHT if part.matrix is None else part.matrix
     return np.asarray(part.center) + (signs * np.asarray(part.half)) @ matrix.T
 
 
 @pytest.mark.parametrize(
-    ("kind", "change"),
+    ("object_type", "change"),
     [
         ("Fridge", {"openness": 1.0}), ("DeskLamp", {"toggled": True}), ("Mug", {"fill_liquid": "coffee"}),
         ("Plate", {"dirty": True}), ("Potato", {"cooked": True}), ("Drawer", {"openness": 0.5}),
@@ -109,8 +109,8 @@ def _corners(part: Part) -> np.ndarray:
         ("Vase", {"broken": True}),
     ],
 )  # fmt: skip
-def test_a_state_can_be_seen(kind, change):
-    item = default_object(kind, np.zeros(3))
+def test_a_state_can_be_seen(object_type, change):
+    item = default_object(object_type, np.zeros(3))
     before = repr(shape(item))
     for name, value in change.items():
         setattr(item.state, name, value)
@@ -173,7 +173,7 @@ def test_lamps_and_switches_light_the_room():
 
 def test_unknown_types_are_plain_boxes():
     item = default_object("Mug", np.zeros(3))
-    item.kind = object_type("Gizmo")
+    item.type = type_named("Gizmo")
     assert len(shape(item)) == 1
 
 

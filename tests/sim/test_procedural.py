@@ -1,10 +1,10 @@
-"""Procedural rooms are furnished as their kind needs, connected, and different from seed to seed."""
+"""Procedural rooms are furnished as their type needs, connected, and different from seed to seed."""
 
 import pytest
 
 from infthor_eval.sim.errors import ActionError
 from infthor_eval.sim.scenes.catalogue import Catalogue
-from infthor_eval.sim.scenes.procedural import ROOM_KINDS
+from infthor_eval.sim.scenes.procedural import SCENE_TYPES
 
 from .harness import Bench
 
@@ -17,19 +17,19 @@ NEEDED = {
 }
 
 
-@pytest.mark.parametrize("kind", sorted(NEEDED))
+@pytest.mark.parametrize("room_type", sorted(NEEDED))
 @pytest.mark.parametrize("seed", range(5))
-def test_furniture_of_the_kind(kind, seed):
-    world = Catalogue().load(f"{kind}-{seed}")
-    missing = set(NEEDED[kind].split()) - {o.object_type for o in world.objects.values()}
+def test_furniture_of_the_room_type(room_type, seed):
+    world = Catalogue().load(f"{room_type}-{seed}")
+    missing = set(NEEDED[room_type].split()) - {o.object_type for o in world.objects.values()}
     assert not missing
     assert 35 <= len(world.objects) <= 80
     assert len(world.nav.reachable(world.agent.position[0], world.agent.position[2])) == len(world.nav)
 
 
-@pytest.mark.parametrize("kind", ROOM_KINDS)
-def test_names_are_reproducible_and_seeds_differ(kind):
-    first, again, other = (Catalogue().load(f"{kind}-{seed}") for seed in (3, 3, 4))
+@pytest.mark.parametrize("scene_type", SCENE_TYPES)
+def test_names_are_reproducible_and_seeds_differ(scene_type):
+    first, again, other = (Catalogue().load(f"{scene_type}-{seed}") for seed in (3, 3, 4))
     assert list(first.objects) == list(again.objects)
     assert list(first.objects) != list(other.objects)
 
@@ -59,9 +59,9 @@ def test_tasks_can_be_done_by_an_agent_that_must_see(task):
     assert bench.metadata["inventoryObjects"] == []
 
 
-def pick(bench: Bench, kind: str) -> str:
-    """Picks up the first object of a kind that the agent gets to see."""
-    for item in [o["objectId"] for o in bench.metadata["objects"] if o["objectType"] == kind]:
+def pick(bench: Bench, object_type: str) -> str:
+    """Picks up the first object of a type that the agent gets to see."""
+    for item in [o["objectId"] for o in bench.metadata["objects"] if o["objectType"] == object_type]:
         parent = bench.sim.world.objects[item].parent
         if bench.sim.world.hidden(bench.sim.world.objects[item]):
             bench.stand_before(parent)
@@ -69,19 +69,19 @@ def pick(bench: Bench, kind: str) -> str:
         bench.stand_before(item)
         bench.ok("PickupObject", objectId=item)
         return item
-    raise ActionError(f"no {kind}")
+    raise ActionError(f"no {object_type}")
 
 
-def put(bench: Bench, kind: str) -> str:
-    target = bench.first(kind)
+def put(bench: Bench, object_type: str) -> str:
+    target = bench.first(object_type)
     bench.stand_before(target)
     bench.ok("PutObject", objectId=target)
     return target
 
 
-def store(bench: Bench, kind: str) -> tuple[str, str]:
+def store(bench: Bench, object_type: str) -> tuple[str, str]:
     """Opens, puts, closes; returns what was stored and where."""
-    target, item = bench.first(kind), bench.metadata["inventoryObjects"][0]["objectId"]
+    target, item = bench.first(object_type), bench.metadata["inventoryObjects"][0]["objectId"]
     bench.stand_before(target)
     bench.ok("OpenObject", objectId=target)
     bench.ok("PutObject", objectId=target)
@@ -89,15 +89,15 @@ def store(bench: Bench, kind: str) -> tuple[str, str]:
     return item, target
 
 
-def heat(bench: Bench, kind: str) -> None:
-    item, target = store(bench, kind)
+def heat(bench: Bench, object_type: str) -> None:
+    item, target = store(bench, object_type)
     bench.ok("ToggleObjectOn", objectId=target)
     bench.ok("ToggleObjectOff", objectId=target)
     fetch(bench, item, target, "Hot")
 
 
-def cool(bench: Bench, kind: str) -> None:
-    item, target = store(bench, kind)
+def cool(bench: Bench, object_type: str) -> None:
+    item, target = store(bench, object_type)
     fetch(bench, item, target, "Cold")
 
 
@@ -109,10 +109,10 @@ def fetch(bench: Bench, item: str, target: str, temperature: str) -> None:
     assert bench.object(item)["temperature"] == temperature
 
 
-def clean(bench: Bench, kind: str) -> None:
+def clean(bench: Bench, object_type: str) -> None:
     item = bench.metadata["inventoryObjects"][0]["objectId"]
     bench.ok("DirtyObject", objectId=item)
-    target = put(bench, kind)
+    target = put(bench, object_type)
     faucet = bench.first("Faucet")
     bench.stand_before(faucet)
     bench.ok("ToggleObjectOn", objectId=faucet)
@@ -122,8 +122,8 @@ def clean(bench: Bench, kind: str) -> None:
     bench.ok("PickupObject", objectId=item)
 
 
-def cut(bench: Bench, kind: str) -> None:
-    target = bench.first(kind)
+def cut(bench: Bench, object_type: str) -> None:
+    target = bench.first(object_type)
     parent = bench.sim.world.objects[target].parent
     if bench.sim.world.hidden(bench.sim.world.objects[target]):
         bench.stand_before(parent)

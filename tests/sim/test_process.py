@@ -26,12 +26,12 @@ def pipes(tmp_path: Path) -> Iterator[dict[str, str]]:
 
 def first_state(states: BinaryIO) -> list[int]:
     """Reads one message; the types of its frames."""
-    kinds = []
-    while not kinds or kinds[-1] != 255:
-        kind, length = struct.unpack("!BI", states.read(5))
+    field_types = []
+    while not field_types or field_types[-1] != 255:
+        field_type, length = struct.unpack("!BI", states.read(5))
         assert len(states.read(length)) == length
-        kinds.append(kind)
-    return kinds
+        field_types.append(field_type)
+    return field_types
 
 
 def test_started_by_hand_it_explains_itself():

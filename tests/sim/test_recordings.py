@@ -116,8 +116,8 @@ def test_expert_trajectories_replay(tmp_path):
         for step in trajectory["plan"]["low_actions"]:
             call = as_call(step["api_action"])
             box = step["discrete_action"]["args"].get("bbox")
-            kind = call.get("objectId", "").split("|")[0]
-            group = "pickup" if call["action"] == "PickupObject" else "large" if kind in LARGE else ""
+            object_type = call.get("objectId", "").split("|")[0]
+            group = "pickup" if call["action"] == "PickupObject" else "large" if object_type in LARGE else ""
             if box and group:
                 drawn = drawn_box(bench, call["objectId"])
                 overlaps[group].append(0.0 if drawn is None else overlap(box, drawn))

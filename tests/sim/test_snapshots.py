@@ -42,7 +42,7 @@ def change(bench: Bench) -> None:
     act(bench, action="RotateRight")
     act(bench, action="InitialRandomSpawn", randomSeed=3)
     for item in list(bench.sim.world.objects.values()):
-        if item.kind.openable:
+        if item.type.openable:
             act(bench, action="OpenObject", objectId=item.object_id, forceAction=True)
             return
 

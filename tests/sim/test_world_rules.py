@@ -53,8 +53,8 @@ def test_a_receptacle_fills_up(bench):
     world = bench.sim.world
     burner = bench.first("StoveBurner")
     for _ in range(3):
-        for kind in ("Pan", "Pot"):
-            pans = [o.object_id for o in world.objects.values() if o.object_type == kind and o.parent != burner]
+        for object_type in ("Pan", "Pot"):
+            pans = [o.object_id for o in world.objects.values() if o.object_type == object_type and o.parent != burner]
             if not pans:
                 continue
             bench.ok("PickupObject", objectId=pans[0], forceAction=True)
@@ -165,12 +165,12 @@ def test_knobs_light_burners_that_cook(bench):
 
 
 @pytest.mark.parametrize(
-    ("action", "kind", "flag"),
+    ("action", "object_type", "flag"),
     [("DirtyObject", "Plate", "isDirty"), ("BreakObject", "Cup", "isBroken"), ("UseUpObject", "SoapBottle", "isUsedUp"),
      ("CookObject", "Potato", "isCooked")],
 )  # fmt: skip
-def test_direct_changes_of_state(bench, action, kind, flag):
-    target = bench.first(kind)
+def test_direct_changes_of_state(bench, action, object_type, flag):
+    target = bench.first(object_type)
     bench.ok(action, objectId=target, forceAction=True)
     assert bench.object(target)[flag]
     bench.refused(action, objectId=target, forceAction=True)

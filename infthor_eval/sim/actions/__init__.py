@@ -1,4 +1,4 @@
-"""What the agent and the user can do, one module per kind of action; importing this package registers them all."""
+"""What the agent and the user can do, one module per theme; importing this package registers them all."""
 
 from infthor_eval.sim.actions import (  # noqa: F401 - imported to be registered
     cameras,

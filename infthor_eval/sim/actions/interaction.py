@@ -7,15 +7,14 @@ from infthor_eval.sim.actions.registry import action
 from infthor_eval.sim.actions.targets import held_object, interactable
 from infthor_eval.sim.effects import slice_object, toggle
 from infthor_eval.sim.errors import ActionError, ErrorCode
+from infthor_eval.sim.object_types import allowed_in
 from infthor_eval.sim.objects import SimObject
-from infthor_eval.sim.placement_rules import allowed_in
 from infthor_eval.sim.receptacles import drawer_offset, find_place
 from infthor_eval.sim.simulation import Simulation
 
 __all__: list[str] = []
 
 _CROWDED = 0.35  # overlap that `forceAction` tolerates when a receptacle is nearly full
-_SWITCH_WHILE_CLOSED = frozenset({"Microwave"})
 
 
 @action("PickupObject")
@@ -29,7 +28,7 @@ def pick_up(
 ) -> None:
     """Takes an object into the hand, with all it contains."""
     target = interactable(sim, objectId, forceAction, x, y)
-    if not target.kind.pickupable:
+    if not target.type.pickupable:
         raise ActionError(
             f"{target.object_id} must have the property CanPickup to be picked up.", ErrorCode.NOT_PICKUPABLE
         )
@@ -83,9 +82,9 @@ def _place(sim: Simulation, held: SimObject, target: SimObject, force: bool) -> 
 
 
 def _check_receptacle(held: SimObject, target: SimObject) -> None:
-    if not target.kind.receptacle:
+    if not target.type.receptacle:
         raise ActionError(f"This target object is NOT a receptacle! {target.object_id}")
-    if target.kind.encloses and target.kind.openable and target.state.openness == 0:
+    if target.type.encloses and target.type.openable and target.state.openness == 0:
         raise ActionError("Target openable Receptacle is CLOSED, can't place if target is not open!",
                           ErrorCode.RECEPTACLE_CLOSED)  # fmt: skip
     if not allowed_in(held.object_type, target.object_type):
@@ -115,11 +114,11 @@ def open_object(
     if not 0 <= openness <= 1:
         raise ActionError(f"openness must be in [0:1], not {openness}")
     target = interactable(sim, objectId, forceAction, x, y)
-    if not target.kind.openable:
+    if not target.type.openable:
         raise ActionError(f"{target.object_id} is not an Openable object")
     if target.state.openness == openness and openness > 0:
         raise ActionError(f"object already open: {target.object_id}")
-    if target.state.toggled and target.object_type in _SWITCH_WHILE_CLOSED and openness > 0:
+    if target.state.toggled and target.type.runs_closed and openness > 0:
         raise ActionError(f"Can't open {target.object_id}: it is on. Turn it off first.")
     set_openness(sim, target, openness)
 
@@ -134,7 +133,7 @@ def close_object(
 ) -> None:
     """Closes a door, drawer or lid."""
     target = interactable(sim, objectId, forceAction, x, y)
-    if not target.kind.openable:
+    if not target.type.openable:
         raise ActionError(f"{target.object_id} is not an Openable object")
     if target.state.openness == 0:
         raise ActionError(f"object already closed: {target.object_id}")
@@ -174,13 +173,13 @@ def toggle_off(
 
 
 def _toggle(sim: Simulation, target: SimObject, on: bool) -> None:
-    if not target.kind.toggleable:
+    if not target.type.toggleable:
         raise ActionError(f"{target.object_id} is not toggleable")
-    if target.object_type == "StoveBurner":
-        raise ActionError(f"{target.object_id} is not self controlled; toggle its StoveKnob")
+    if target.type.switched_by:
+        raise ActionError(f"{target.object_id} is not self controlled; toggle its {target.type.switched_by}")
     if target.state.toggled == on:
         raise ActionError(f"{target.object_id} is already toggled {'on' if on else 'off'}!")
-    if on and target.object_type in _SWITCH_WHILE_CLOSED and target.state.openness > 0:
+    if on and target.type.runs_closed and target.state.openness > 0:
         raise ActionError(f"Target {target.object_id} must be closed to be toggled on.")
     if target.state.broken:
         raise ActionError(f"{target.object_id} is broken and cannot be toggled.")
@@ -197,7 +196,7 @@ def cut(
 ) -> Any:
     """Cuts an object into slices, which are new objects."""
     target = interactable(sim, objectId, forceAction, x, y)
-    if not target.kind.sliceable:
+    if not target.type.sliceable:
         raise ActionError(f"{target.object_id} Does not have the CanBeSliced property!")
     if target.object_id == sim.world.held:
         raise ActionError("target object is in the agent's hand; put it down to slice it")

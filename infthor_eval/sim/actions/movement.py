@@ -7,7 +7,7 @@ import numpy as np
 
 from infthor_eval.sim.actions.registry import Vector3, action
 from infthor_eval.sim.errors import ActionError, ErrorCode
-from infthor_eval.sim.geometry import Array, to_array, to_xyz
+from infthor_eval.sim.geometry import Array, level_gaps, to_array, to_xyz
 from infthor_eval.sim.obstacles import blocking_object, held_object_blocks
 from infthor_eval.sim.simulation import Simulation
 
@@ -159,9 +159,9 @@ def _nearest_name(sim: Simulation, point: Array) -> str:
     best = ("Wall", 0.6)
     for item in sim.world.objects.values():
         low, high = item.bounds()
-        if item.kind.pickupable or item.object_type == "Floor" or low[1] > 1.6 or high[1] < 0.2:
+        if item.type.pickupable or item.object_type == "Floor" or low[1] > 1.6 or high[1] < 0.2:
             continue
-        gap = float(np.hypot(*(point[[0, 2]] - np.clip(point[[0, 2]], low[[0, 2]], high[[0, 2]]))))
+        gap = float(level_gaps(point[[0, 2]], low, high))
         if gap < best[1]:
             best = (item.name, gap)
     return best[0]

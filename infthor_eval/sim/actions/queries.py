@@ -6,7 +6,7 @@ from typing import Any
 from infthor_eval.sim.actions.registry import Vector3, action
 from infthor_eval.sim.actions.targets import object_at
 from infthor_eval.sim.errors import ActionError
-from infthor_eval.sim.geometry import to_array
+from infthor_eval.sim.geometry import to_array, to_xyz
 from infthor_eval.sim.simulation import Simulation
 
 __all__: list[str] = []
@@ -48,14 +48,14 @@ def get_shortest_path(
     return {"corners": [{"x": x, "y": height, "z": z} for x, z in path]}
 
 
-def _goal(sim: Simulation, object_id: str | None, kind: str | None, target: Vector3 | None) -> Any:
+def _goal(sim: Simulation, object_id: str | None, object_type: str | None, target: Vector3 | None) -> Any:
     if target is not None:
         return to_array(target)
     if object_id is not None:
         return sim.world.get(object_id).center
-    named = [o for o in sim.world.objects.values() if o.object_type == kind]
+    named = [o for o in sim.world.objects.values() if o.object_type == object_type]
     if not named:
-        raise ActionError(f"No object of type {kind!r} is in the scene")
+        raise ActionError(f"No object of type {object_type!r} is in the scene")
     return min(named, key=lambda o: (sim.world.distance(o), o.object_id)).center
 
 
@@ -69,11 +69,10 @@ def get_object_in_frame(sim: Simulation, x: float, y: float, checkVisible: bool 
 @action("GetMapViewCameraProperties", query=True)
 def get_map_view_camera_properties(sim: Simulation) -> dict[str, Any]:
     """Arguments of AddThirdPartyCamera for a view of the whole scene from above."""
-    low, high = sim.world.scene_bounds()
-    middle = (low + high) / 2
+    camera = sim.map_camera()
     return {
-        "position": {"x": float(middle[0]), "y": float(high[1]) - 0.05, "z": float(middle[2])},
-        "rotation": {"x": 90.0, "y": 0.0, "z": 0.0},
+        "position": to_xyz(camera.position),
+        "rotation": to_xyz(camera.rotation),
         "orthographic": True,
-        "orthographicSize": float(max(high[0] - low[0], high[2] - low[2])) / 2 + 0.1,
+        "orthographicSize": camera.orthographic_size,
     }

@@ -2,14 +2,14 @@
 """Setting a scene to a recorded or random state: poses, toggles, states of objects, random placement."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from infthor_eval.sim.actions.interaction import set_openness
 from infthor_eval.sim.actions.registry import action
 from infthor_eval.sim.errors import ActionError
-from infthor_eval.sim.restore import Pose, set_poses, spawn_randomly
+from infthor_eval.sim.restore import NamedPose, set_poses, spawn_randomly
 from infthor_eval.sim.simulation import Simulation
 
 __all__: list[str] = []
@@ -31,7 +31,7 @@ def set_object_toggles(sim: Simulation, objectToggles: list[Any]) -> None:
         if not isinstance(entry, Mapping) or not isinstance(entry.get("objectType"), str):
             raise ActionError(f"objectToggles needs entries with objectType and isOn, not {entry!r}")
         for item in sim.world.objects.values():
-            if item.object_type == entry["objectType"] and item.kind.toggleable:
+            if item.object_type == entry["objectType"] and item.type.toggleable:
                 item.state.toggled = bool(entry.get("isOn", False))
                 sim.world.touch(item)
 
@@ -39,21 +39,10 @@ def set_object_toggles(sim: Simulation, objectToggles: list[Any]) -> None:
 @action("SetStateOfAllObjects")
 def set_state_of_all_objects(sim: Simulation, StateChange: str, forceAction: bool = False) -> None:
     """Makes every object that can be so dirty, filled or used up; the contrary without `forceAction`."""
-    change = _CHANGES.get(StateChange)
+    change = _ALL_AT_ONCE.get(StateChange)
     if change is None:
-        raise ActionError(f"{StateChange!r} is not a state change; use one of {', '.join(sorted(_CHANGES))}")
-    capability, attribute, on, off = change
-    for item in sim.world.objects.values():
-        if getattr(item.kind, capability):
-            setattr(item.state, attribute, on if forceAction else off)
-            sim.world.touch(item)
-
-
-_CHANGES: dict[str, tuple[str, str, Any, Any]] = {
-    "CanBeDirty": ("dirtyable", "dirty", True, False),
-    "CanBeFilled": ("fillable", "fill_liquid", "water", None),
-    "CanBeUsedUp": ("usable_up", "used_up", True, False),
-}
+        raise ActionError(f"{StateChange!r} is not a state change; use one of {', '.join(sorted(_ALL_AT_ONCE))}")
+    _change_all(sim, change, forceAction)
 
 
 @action("SetObjectStates")
@@ -64,31 +53,49 @@ def set_object_states(sim: Simulation, SetObjectStates: Mapping[str, Any]) -> No
     (`isOpen`, `isToggled`, `isDirty`, `isBroken`, `isFilledWithLiquid`, `isUsedUp`, `isCooked`).
     """
     wanted = str(SetObjectStates.get("stateChange", ""))
-    found = _STATES.get(wanted)
-    if found is None:
-        raise ActionError(f"{wanted!r} is not a stateChange; use one of {', '.join(sorted(_STATES))}")
-    capability, key, attribute, on, off = found
-    value = on if SetObjectStates.get(key, True) else off
-    only = SetObjectStates.get("objectType")
+    change = _CHANGES.get(wanted)
+    if change is None:
+        raise ActionError(f"{wanted!r} is not a stateChange; use one of {', '.join(sorted(_CHANGES))}")
+    _change_all(sim, change, bool(SetObjectStates.get(change.flag, True)), SetObjectStates.get("objectType"))
+
+
+class _Change(NamedTuple):
+    """What a type must be able to, the metadata's flag of the state, the state itself and its two values."""
+
+    ability: str
+    flag: str
+    state: str
+    on: Any = True
+    off: Any = False
+
+
+_CHANGES = {
+    "openable": _Change("openable", "isOpen", "openness", 1.0, 0.0),
+    "toggleable": _Change("toggleable", "isToggled", "toggled"),
+    "dirtyable": _Change("dirtyable", "isDirty", "dirty"),
+    "breakable": _Change("breakable", "isBroken", "broken"),
+    "canFillWithLiquid": _Change("fillable", "isFilledWithLiquid", "fill_liquid", "water", None),
+    "canBeUsedUp": _Change("usable_up", "isUsedUp", "used_up"),
+    "cookable": _Change("cookable", "isCooked", "cooked"),
+}
+_ALL_AT_ONCE = {
+    "CanBeDirty": _CHANGES["dirtyable"],
+    "CanBeFilled": _CHANGES["canFillWithLiquid"],
+    "CanBeUsedUp": _CHANGES["canBeUsedUp"],
+}
+
+
+def _change_all(sim: Simulation, change: _Change, on: bool, only: str | None = None) -> None:
+    """Changes the state of every object that can be so, or of those of type `only`."""
+    value = change.on if on else change.off
     for item in sim.world.objects.values():
-        if not getattr(item.kind, capability) or only not in (None, "", item.object_type):
+        if not getattr(item.type, change.ability) or only not in (None, "", item.object_type):
             continue
-        if attribute == "openness":
+        if change.state == "openness":
             set_openness(sim, item, value)
         else:
-            setattr(item.state, attribute, value)
+            setattr(item.state, change.state, value)
             sim.world.touch(item)
-
-
-_STATES: dict[str, tuple[str, str, str, Any, Any]] = {
-    "openable": ("openable", "isOpen", "openness", 1.0, 0.0),
-    "toggleable": ("toggleable", "isToggled", "toggled", True, False),
-    "dirtyable": ("dirtyable", "isDirty", "dirty", True, False),
-    "breakable": ("breakable", "isBroken", "broken", True, False),
-    "canFillWithLiquid": ("fillable", "isFilledWithLiquid", "fill_liquid", "water", None),
-    "canBeUsedUp": ("usable_up", "isUsedUp", "used_up", True, False),
-    "cookable": ("cookable", "isCooked", "cooked", True, False),
-}
 
 
 @action("RemoveFromScene")
@@ -136,10 +143,10 @@ def seeded(seed: int) -> np.random.Generator:
     return np.random.default_rng(int(seed) % 2**32)
 
 
-def _pose(entry: Any) -> Pose:
+def _pose(entry: Any) -> NamedPose:
     if not isinstance(entry, Mapping) or not isinstance(entry.get("objectName"), str):
         raise ActionError(f"objectPoses needs entries with objectName, position and rotation, not {entry!r}")
     try:
-        return Pose.from_wire(entry)
+        return NamedPose.from_wire(entry)
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise ActionError(f"objectPoses: {entry['objectName']} has no usable position or rotation ({error})") from error

@@ -6,7 +6,7 @@ from infthor_eval.errors import DataError
 from infthor_eval.sim.actions.registry import action
 from infthor_eval.sim.errors import ActionError, ErrorCode
 from infthor_eval.sim.render.camera import FAR, NEAR
-from infthor_eval.sim.settings import AGENT_MODES, Settings
+from infthor_eval.sim.settings import AGENT_MODES, SimulatorSettings
 from infthor_eval.sim.simulation import Simulation
 
 __all__: list[str] = []
@@ -21,7 +21,7 @@ def reset(sim: Simulation, sceneName: str) -> None:
         sim.failed_reset = str(error)
         raise ActionError(str(error)) from error
     sim.failed_reset = ""
-    sim.settings = Settings()
+    sim.settings = SimulatorSettings()
     sim.map_view = False
     sim.load(world)
 

@@ -23,7 +23,7 @@ _THROW_REACH = 0.9  # metres in front of the agent at which a thrown thing lands
 def cook(sim: Simulation, objectId: str, forceAction: bool = False) -> None:
     """Cooks an object."""
     target = interactable(sim, objectId, forceAction, None, None)
-    _require(target, target.kind.cookable, "CanBeCooked")
+    _require(target, target.type.cookable, "CanBeCooked")
     if target.state.cooked:
         raise ActionError(f"{objectId} is already Cooked!")
     target.state.cooked = True
@@ -35,7 +35,7 @@ def cook(sim: Simulation, objectId: str, forceAction: bool = False) -> None:
 def clean(sim: Simulation, objectId: str, forceAction: bool = False) -> None:
     """Cleans a dirty object."""
     target = interactable(sim, objectId, forceAction, None, None)
-    _require(target, target.kind.dirtyable, "CanBeDirty")
+    _require(target, target.type.dirtyable, "CanBeDirty")
     if not target.state.dirty:
         raise ActionError(f"{objectId} is already Clean!")
     target.state.dirty = False
@@ -46,7 +46,7 @@ def clean(sim: Simulation, objectId: str, forceAction: bool = False) -> None:
 def make_dirty(sim: Simulation, objectId: str, forceAction: bool = False) -> None:
     """Makes an object dirty."""
     target = interactable(sim, objectId, forceAction, None, None)
-    _require(target, target.kind.dirtyable, "CanBeDirty")
+    _require(target, target.type.dirtyable, "CanBeDirty")
     if target.state.dirty:
         raise ActionError(f"{objectId} is already dirty!")
     target.state.dirty = True
@@ -57,10 +57,10 @@ def make_dirty(sim: Simulation, objectId: str, forceAction: bool = False) -> Non
 def smash(sim: Simulation, objectId: str, forceAction: bool = False) -> None:
     """Breaks an object."""
     target = interactable(sim, objectId, forceAction, None, None)
-    _require(target, target.kind.breakable, "CanBreak")
+    _require(target, target.type.breakable, "CanBreak")
     if target.state.broken:
         raise ActionError(f"{objectId} is already broken")
-    if target.object_id == sim.world.held and target.object_type == "Egg":
+    if target.object_id == sim.world.held and target.type.cracks:
         raise ActionError("target object is in the agent's hand; put it down to crack it")
     break_object(sim.world, target)
 
@@ -71,7 +71,7 @@ def fill(sim: Simulation, objectId: str, fillLiquid: str, forceAction: bool = Fa
     target = interactable(sim, objectId, forceAction, None, None)
     if fillLiquid not in _LIQUIDS:
         raise ActionError(f"{fillLiquid} is not a valid Liquid; use one of {', '.join(_LIQUIDS)}")
-    _require(target, target.kind.fillable, "CanBeFilled")
+    _require(target, target.type.fillable, "CanBeFilled")
     if target.state.fill_liquid is not None:
         raise ActionError(f"{objectId} is already Filled!")
     target.state.fill_liquid = fillLiquid
@@ -82,7 +82,7 @@ def fill(sim: Simulation, objectId: str, fillLiquid: str, forceAction: bool = Fa
 def empty(sim: Simulation, objectId: str, forceAction: bool = False) -> None:
     """Empties a vessel."""
     target = interactable(sim, objectId, forceAction, None, None)
-    _require(target, target.kind.fillable, "CanBeFilled")
+    _require(target, target.type.fillable, "CanBeFilled")
     if target.state.fill_liquid is None:
         raise ActionError(f"{objectId} is already empty")
     target.state.fill_liquid = None
@@ -93,7 +93,7 @@ def empty(sim: Simulation, objectId: str, forceAction: bool = False) -> None:
 def use_up(sim: Simulation, objectId: str, forceAction: bool = False) -> None:
     """Uses an object up, e.g. a soap bottle."""
     target = interactable(sim, objectId, forceAction, None, None)
-    _require(target, target.kind.usable_up, "CanBeUsedUp")
+    _require(target, target.type.usable_up, "CanBeUsedUp")
     if target.state.used_up:
         raise ActionError(f"{objectId} is already used up")
     target.state.used_up = True
@@ -130,7 +130,7 @@ def _let_go(sim: Simulation, ahead: float) -> None:
     owner = owner_of(world, held)
     if owner is not None:
         world.attach(held, owner)
-    if held.kind.breakable and not held.state.broken and fall > _DROP_BREAKS:
+    if held.type.breakable and not held.state.broken and fall > _DROP_BREAKS:
         break_object(world, held)
 
 
@@ -139,7 +139,7 @@ def _ground(sim: Simulation, held: SimObject, point: np.ndarray) -> float:
     best = 0.0
     bottom = held.bounds()[0][1]
     for item in sim.world.objects.values():
-        if item is held or item.kind.pickupable or not item.kind.receptacle or item.kind.encloses:
+        if item is held or item.type.pickupable or not item.type.receptacle or item.type.encloses:
             continue
         low, high = item.bounds()
         height = item.surface_height()

@@ -4,8 +4,9 @@ Numba recompiles a kernel when its own file changes, but not when a function or 
 file does. A stamp of all the kernels' sources beside the cache tells when it is stale.
 """
 
-import hashlib
 from pathlib import Path
+
+from infthor_eval.formats.digests import digest
 
 __all__ = ["drop_stale_kernels"]
 
@@ -15,17 +16,17 @@ _HERE = Path(__file__).parent
 
 def drop_stale_kernels(folder: Path = _HERE) -> bool:
     """Removes compiled kernels that were made from other sources than those in `folder`; whether there were any."""
-    digest = hashlib.blake2b(b"".join((folder / name).read_bytes() for name in _SOURCES), digest_size=16).hexdigest()
+    sources = digest(b"".join((folder / name).read_bytes() for name in _SOURCES))
     cache = folder / "__pycache__"
     stamp = cache / "kernels.stamp"
-    if stamp.exists() and stamp.read_text(encoding="ascii") == digest:
+    if stamp.exists() and stamp.read_text(encoding="ascii") == sources:
         return False
     try:
         stale = [*cache.glob("*_numba.*.nbi"), *cache.glob("*_numba.*.nbc")]
         for path in stale:
             path.unlink(missing_ok=True)
         cache.mkdir(exist_ok=True)
-        stamp.write_text(digest, encoding="ascii")
+        stamp.write_text(sources, encoding="ascii")
     except PermissionError:  # a read-only installation: its files change together, with an upgrade
         return False
     return bool(stale)

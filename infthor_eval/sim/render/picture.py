@@ -13,14 +13,14 @@ from infthor_eval.sim.render.kernel_cache import drop_stale_kernels
 from infthor_eval.sim.render.lighting import Lights
 from infthor_eval.sim.render.primitives import COLUMNS, INSTANCE
 
-__all__ = ["Backend", "Picture", "backend", "cast_picture", "colour_picture"]
+__all__ = ["Picture", "Rasterizer", "cast_picture", "choose_rasterizer", "colour_picture"]
 
 Cast = Callable[[Array, Projection, Camera], tuple[Array, NDArray[np.int32]]]
 Shade = Callable[[Array, Projection, Camera, Array, NDArray[np.int32], Lights], NDArray[np.uint8]]
 
 
 @dataclass(frozen=True)
-class Backend:
+class Rasterizer:
     """One implementation of casting and shading."""
 
     name: str
@@ -47,8 +47,8 @@ class Picture:
     names: tuple[str, ...]
 
 
-def backend(name: str | None = None) -> Backend:
-    """The renderer: `numba`, or `numpy` where numba is not installed or INFTHOR_SIM_RENDERER asks for it."""
+def choose_rasterizer(name: str | None = None) -> Rasterizer:
+    """The rasterizer: `numba`, or `numpy` where numba is not installed or INFTHOR_SIM_RENDERER asks for it."""
     chosen = name or os.environ.get("INFTHOR_SIM_RENDERER", "")
     if chosen != "numpy":
         drop_stale_kernels()
@@ -58,21 +58,21 @@ def backend(name: str | None = None) -> Backend:
             if chosen == "numba":
                 raise
         else:
-            return Backend("numba", raster_numba.cast, shading_numba.shade)
+            return Rasterizer("numba", raster_numba.cast, shading_numba.shade)
     from infthor_eval.sim.render import raster_numpy, shading_numpy
 
-    return Backend("numpy", raster_numpy.cast, shading_numpy.shade)
+    return Rasterizer("numpy", raster_numpy.cast, shading_numpy.shade)
 
 
 def cast_picture(
-    prims: Array, names: tuple[str, ...], camera: Camera, renderer: Backend, base: Picture | None = None
+    prims: Array, names: tuple[str, ...], camera: Camera, rasterizer: Rasterizer, base: Picture | None = None
 ) -> Picture:
     """Casts primitives (n, COLUMNS); over `base`, where given, keeping its pixels that are nearer.
 
     `base` must be cast with the same camera.
     """
     seen = project(prims, camera) if len(prims) else _nothing()
-    depth, nearest = renderer.cast(prims, seen, camera)
+    depth, nearest = rasterizer.cast(prims, seen, camera)
     lookup = np.append(prims[seen.index, INSTANCE], -1).astype(np.int32)
     instances = lookup[nearest]
     if base is None:
@@ -96,9 +96,9 @@ def cast_picture(
     )
 
 
-def colour_picture(picture: Picture, lights: Lights, renderer: Backend) -> NDArray[np.uint8]:
+def colour_picture(picture: Picture, lights: Lights, rasterizer: Rasterizer) -> NDArray[np.uint8]:
     """RGB (h, w, 3) of a cast picture."""
-    return renderer.shade(picture.prims, picture.seen, picture.camera, picture.depth, picture.nearest, lights)
+    return rasterizer.shade(picture.prims, picture.seen, picture.camera, picture.depth, picture.nearest, lights)
 
 
 def _nothing() -> Projection:

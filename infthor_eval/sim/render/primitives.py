@@ -20,26 +20,26 @@ __all__ = [
     "COLOR",
     "COLUMNS",
     "EMISSION",
+    "FORM",
     "HALF",
     "INSTANCE",
-    "KIND",
     "MATERIAL",
     "TOP",
     "Color",
-    "Kind",
+    "Form",
     "Material",
-    "Part",
+    "ShapePart",
     "rows",
 ]
 
-KIND, CENTER, HALF, AXES, BOTTOM, TOP, COLOR, MATERIAL, EMISSION, INSTANCE = 0, 1, 4, 7, 16, 17, 18, 21, 22, 23
+FORM, CENTER, HALF, AXES, BOTTOM, TOP, COLOR, MATERIAL, EMISSION, INSTANCE = 0, 1, 4, 7, 16, 17, 18, 21, 22, 23
 COLUMNS = 24
 _MIN_HALF = 5e-4  # thinner than half a millimetre is drawn half a millimetre thick
 
 Color = tuple[float, float, float]
 
 
-class Kind(IntEnum):
+class Form(IntEnum):
     """Forms of primitives."""
 
     BOX = 0
@@ -64,7 +64,7 @@ class Material(IntEnum):
 
 
 @dataclass(frozen=True)
-class Part:
+class ShapePart:
     """One primitive of an object, in the object's frame.
 
     Attributes:
@@ -76,7 +76,7 @@ class Part:
         emission: 0 lit by the lights only, 1 shines by itself.
     """
 
-    kind: Kind
+    form: Form
     center: Sequence[float] | Array
     half: Sequence[float] | Array
     color: Color
@@ -87,7 +87,7 @@ class Part:
     emission: float = 0.0
 
 
-def rows(parts: Iterable[Part], position: Array, matrix: Array, instance: int) -> Array:
+def rows(parts: Iterable[ShapePart], position: Array, matrix: Array, instance: int) -> Array:
     """World rows (n, COLUMNS) of an object's parts.
 
     Args:
@@ -100,7 +100,7 @@ def rows(parts: Iterable[Part], position: Array, matrix: Array, instance: int) -
     out = np.zeros((len(listed), COLUMNS))
     for row, part in zip(out, listed, strict=True):
         axes = matrix if part.matrix is None else matrix @ part.matrix
-        row[KIND] = part.kind
+        row[FORM] = part.form
         row[CENTER : CENTER + 3] = position + matrix @ np.asarray(part.center, dtype=float)
         row[HALF : HALF + 3] = np.maximum(part.half, _MIN_HALF)
         row[AXES : AXES + 9] = axes.T.reshape(9)  # one axis of the primitive after the other

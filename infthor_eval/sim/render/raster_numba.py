@@ -8,13 +8,13 @@ from numpy.typing import NDArray
 
 from infthor_eval.sim.geometry import Array
 from infthor_eval.sim.render.camera import Camera, Projection
-from infthor_eval.sim.render.primitives import BOTTOM, KIND, TOP, Kind
+from infthor_eval.sim.render.primitives import BOTTOM, FORM, TOP, Form
 
 __all__ = ["cast"]
 
 _TINY = 1e-12
 _BANDS = 8
-_BOX, _ELLIPSOID, _CUP = int(Kind.BOX), int(Kind.ELLIPSOID), int(Kind.CUP)
+_BOX, _ELLIPSOID, _CUP = int(Form.BOX), int(Form.ELLIPSOID), int(Form.CUP)
 
 
 def cast(prims: Array, seen: Projection, camera: Camera) -> tuple[Array, NDArray[np.int32]]:
@@ -22,8 +22,8 @@ def cast(prims: Array, seen: Projection, camera: Camera) -> tuple[Array, NDArray
     us, vs = camera.rays()
     depth = np.empty((len(vs), len(us)))
     nearest = np.empty((len(vs), len(us)), dtype=np.int32)
-    forms = prims[seen.index][:, [KIND, BOTTOM, TOP]]
-    _cast(forms, seen.origin, seen.steps, seen.box, seen.near, us, vs, camera.near, camera.far, depth, nearest)
+    profiles = prims[seen.index][:, [FORM, BOTTOM, TOP]]
+    _cast(profiles, seen.origin, seen.steps, seen.box, seen.near, us, vs, camera.near, camera.far, depth, nearest)
     return depth, nearest
 
 
@@ -97,7 +97,7 @@ def _hit_cylinder(
 
 @njit(cache=True, parallel=True)
 def _cast(
-    forms: Array,
+    profiles: Array,
     origin: Array,
     steps: Array,
     box: NDArray[np.int64],
@@ -114,8 +114,8 @@ def _cast(
         low, high = band * height // _BANDS, (band + 1) * height // _BANDS
         depth[low:high] = far
         nearest[low:high] = -1
-        for order in range(len(forms)):
-            kind, bottom, top = forms[order, 0], forms[order, 1], forms[order, 2]
+        for order in range(len(profiles)):
+            form, bottom, top = profiles[order, 0], profiles[order, 1], profiles[order, 2]
             ox, oy, oz = origin[order, 0], origin[order, 1], origin[order, 2]
             step = steps[order]
             for y in range(max(low, box[order, 2]), min(high, box[order, 3] + 1)):
@@ -128,12 +128,12 @@ def _cast(
                     dx = (step[0, 0] + u * step[1, 0]) + v * step[2, 0]
                     dy = (step[0, 1] + u * step[1, 1]) + v * step[2, 1]
                     dz = (step[0, 2] + u * step[1, 2]) + v * step[2, 2]
-                    if kind == _BOX:
+                    if form == _BOX:
                         t = _hit_box(ox, oy, oz, dx, dy, dz)
-                    elif kind == _ELLIPSOID:
+                    elif form == _ELLIPSOID:
                         t = _hit_sphere(ox, oy, oz, dx, dy, dz)
                     else:
-                        t = _hit_cylinder(ox, oy, oz, dx, dy, dz, bottom, top, kind == _CUP, clip)
+                        t = _hit_cylinder(ox, oy, oz, dx, dy, dz, bottom, top, form == _CUP, clip)
                     if clip < t < limit:
                         depth[y, x] = t
                         nearest[y, x] = order

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from infthor_eval.sim.geometry import Array
 from infthor_eval.sim.render.camera import Camera, Projection
-from infthor_eval.sim.render.primitives import BOTTOM, KIND, TOP, Kind
+from infthor_eval.sim.render.primitives import BOTTOM, FORM, TOP, Form
 
 __all__ = ["cast"]
 
@@ -34,12 +34,12 @@ def cast(prims: Array, seen: Projection, camera: Camera) -> tuple[Array, NDArray
 
 
 def _hit(prim: Array, o: Array, d: list[Array], near: float) -> Array:
-    kind = prim[KIND]
-    if kind == Kind.BOX:
+    form = prim[FORM]
+    if form == Form.BOX:
         return _hit_box(o, d)
-    if kind == Kind.ELLIPSOID:
+    if form == Form.ELLIPSOID:
         return _hit_sphere(o, d)
-    return _hit_cylinder(o, d, prim[BOTTOM], prim[TOP], kind == Kind.CUP, near)
+    return _hit_cylinder(o, d, prim[BOTTOM], prim[TOP], form == Form.CUP, near)
 
 
 def _steady(d: Array) -> Array:

@@ -12,7 +12,6 @@ from infthor_eval.sim.world import World
 
 __all__ = ["SceneModel"]
 
-_LAMPS = {"DeskLamp": 0.9, "FloorLamp": 1.1, "Candle": 0.35}
 _DARK = 0.55  # share of light that is left when every light switch is off
 
 
@@ -38,9 +37,9 @@ class SceneModel:
         """The lamps that are on, and daylight by the state of the light switches."""
         lamps, switches = [], []
         for item in self._world.objects.values():
-            if item.object_type in _LAMPS and item.state.toggled:
+            if item.type.light and item.state.toggled:
                 low, high = item.bounds()
-                lamps.append([(low[0] + high[0]) / 2, high[1] - 0.08, (low[2] + high[2]) / 2, _LAMPS[item.object_type]])
+                lamps.append([(low[0] + high[0]) / 2, high[1] - 0.08, (low[2] + high[2]) / 2, item.type.light])
             elif item.object_type == "LightSwitch":
                 switches.append(item.state.toggled)
         dark = bool(switches) and not any(switches)

@@ -16,11 +16,11 @@ from infthor_eval.sim.render.primitives import (
     BOTTOM,
     COLOR,
     EMISSION,
+    FORM,
     HALF,
-    KIND,
     MATERIAL,
     TOP,
-    Kind,
+    Form,
     Material,
 )
 
@@ -28,7 +28,7 @@ __all__ = ["shade"]
 
 _RIM = 1.0 - 1e-6
 _BANDS = 8
-_BOX, _ELLIPSOID, _CUP = int(Kind.BOX), int(Kind.ELLIPSOID), int(Kind.CUP)
+_BOX, _ELLIPSOID, _CUP = int(Form.BOX), int(Form.ELLIPSOID), int(Form.CUP)
 _SUN_X, _SUN_Y, _SUN_Z = SUN_DIRECTION
 _WOOD, _PLANKS, _TILES = int(Material.WOOD), int(Material.PLANKS), int(Material.TILES)
 _FABRIC, _STONE, _METAL = int(Material.FABRIC), int(Material.STONE), int(Material.METAL)
@@ -81,15 +81,15 @@ def _surface(p: Array, x: float, y: float, z: float) -> Any:
     ax, ay, az = abs(x), abs(y), abs(z)
     nx, ny, nz = x, y, z
     a, b = x * hx + z * hz, y * hy
-    if p[KIND] == _BOX:
+    if p[FORM] == _BOX:
         if ax >= ay and ax >= az:
             ny, nz, a = 0.0, 0.0, z * hz
         elif ay >= az:
             nx, nz, a, b = 0.0, 0.0, x * hx, z * hz
         else:
             nx, ny, a = 0.0, 0.0, x * hx
-    elif p[KIND] != _ELLIPSOID:
-        if ay >= _RIM and not (y > 0 and p[KIND] == _CUP):
+    elif p[FORM] != _ELLIPSOID:
+        if ay >= _RIM and not (y > 0 and p[FORM] == _CUP):
             nx, nz = 0.0, 0.0
         else:
             k = (p[TOP] - p[BOTTOM]) * 0.5

@@ -7,7 +7,7 @@ from infthor_eval.sim.geometry import Array
 from infthor_eval.sim.render.camera import Camera, Projection
 from infthor_eval.sim.render.lighting import AMBIENT, HEADLIGHT, LAMP_REACH, SKY, SUN, SUN_DIRECTION, Lights
 from infthor_eval.sim.render.patterns import PATTERNS
-from infthor_eval.sim.render.primitives import AXES, BOTTOM, COLOR, EMISSION, HALF, KIND, MATERIAL, TOP, Kind
+from infthor_eval.sim.render.primitives import AXES, BOTTOM, COLOR, EMISSION, FORM, HALF, MATERIAL, TOP, Form
 
 __all__ = ["shade"]
 
@@ -46,14 +46,14 @@ def shade(
 def _surface(p: Array, local: list[Array]) -> tuple[list[Array], Array, Array]:
     """World normals (3 arrays) and the two metric surface coordinates of hit points in scaled local frames."""
     x, y, z = local
-    kind = p[:, KIND]
+    form = p[:, FORM]
     ax, ay, az = np.abs(x), np.abs(y), np.abs(z)
     on_x = (ax >= ay) & (ax >= az)
     on_y = ~on_x & (ay >= az)
     k = (p[:, TOP] - p[:, BOTTOM]) * 0.5
     m = (p[:, BOTTOM] + p[:, TOP]) * 0.5
-    box, ball = kind == Kind.BOX, kind == Kind.ELLIPSOID
-    cap = (ay >= _RIM) & ~((y > 0) & (kind == Kind.CUP))
+    box, ball = form == Form.BOX, form == Form.ELLIPSOID
+    cap = (ay >= _RIM) & ~((y > 0) & (form == Form.CUP))
     nx = np.where(box, np.where(on_x, x, 0.0), np.where(ball | ~cap, x, 0.0))
     nz = np.where(box, np.where(on_x | on_y, 0.0, z), np.where(ball | ~cap, z, 0.0))
     ny = np.where(box, np.where(on_y, y, 0.0), np.where(ball, y, np.where(cap, y, -k * (m + k * y))))

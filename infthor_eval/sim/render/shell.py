@@ -3,8 +3,8 @@
 import numpy as np
 
 from infthor_eval.sim.geometry import Array, yaw_matrix
-from infthor_eval.sim.render.primitives import Color, Kind, Material, Part, rows
-from infthor_eval.sim.world import Room, Wall, World
+from infthor_eval.sim.render.primitives import Color, Form, Material, ShapePart, rows
+from infthor_eval.sim.world import RoomShell, Wall, World
 
 __all__ = ["FLOORS", "SHELL_NAMES", "shell_rows"]
 
@@ -30,30 +30,30 @@ def shell_rows(world: World) -> Array:
             made.append(rows(_walls(room), origin, straight, 0))
         width, length = (room.x_max - room.x_min) / 2, (room.z_max - room.z_min) / 2
         middle = ((room.x_max + room.x_min) / 2, (room.z_max + room.z_min) / 2)
-        ceiling = Part(
-            Kind.BOX, (middle[0], room.height + _THICK, middle[1]), (width, _THICK, length), (0.9, 0.9, 0.88)
+        ceiling = ShapePart(
+            Form.BOX, (middle[0], room.height + _THICK, middle[1]), (width, _THICK, length), (0.9, 0.9, 0.88)
         )
         made.append(rows([ceiling], origin, straight, 1))
         color, material = FLOORS[room.floor_style]
         made.append(rows(_thresholds(room, color, material), origin, straight, 2))
-        ground = Part(
-            Kind.BOX, (middle[0], room.floor - _THICK - 0.002, middle[1]), (width, _THICK, length), color, material
+        ground = ShapePart(
+            Form.BOX, (middle[0], room.floor - _THICK - 0.002, middle[1]), (width, _THICK, length), color, material
         )
         made.append(rows([ground], origin, straight, 2))
     made.append(rows([_standing(wall) for wall in world.walls], origin, straight, 0))
     return np.concatenate(made)
 
 
-def _standing(wall: Wall) -> Part:
+def _standing(wall: Wall) -> ShapePart:
     along = np.array([wall.x1 - wall.x0, wall.z1 - wall.z0])
     length = float(np.hypot(*along))
     yaw = float(np.degrees(np.arctan2(along[0], along[1])))
     center = ((wall.x0 + wall.x1) / 2, (wall.bottom + wall.top) / 2, (wall.z0 + wall.z1) / 2)
     half = (_THICK, (wall.top - wall.bottom) / 2, length / 2 + _THICK)
-    return Part(Kind.BOX, center, half, _WALLS[wall.style % len(_WALLS)], matrix=yaw_matrix(yaw))
+    return ShapePart(Form.BOX, center, half, _WALLS[wall.style % len(_WALLS)], matrix=yaw_matrix(yaw))
 
 
-def _walls(room: Room) -> list[Part]:
+def _walls(room: RoomShell) -> list[ShapePart]:
     color = _WALLS[room.style % len(_WALLS)]
     trim: Color = (0.93, 0.92, 0.9)
     parts = []
@@ -80,14 +80,14 @@ def _walls(room: Room) -> list[Part]:
     return parts
 
 
-def _thresholds(room: Room, color: Color, material: Material) -> list[Part]:
+def _thresholds(room: RoomShell, color: Color, material: Material) -> list[ShapePart]:
     """The floor within the thickness of the walls, in doorways."""
     level = room.floor - _THICK - 0.001
     made = []
     for side, low, high in room.openings:
         middle, half = (low + high) / 2, (high - low) / 2
         at = {"x-": room.x_min, "x+": room.x_max, "z-": room.z_min, "z+": room.z_max}[side]
-        made.append(Part(Kind.BOX, *_laid(side[0] == "z", middle, at, half, level), color, material))
+        made.append(ShapePart(Form.BOX, *_laid(side[0] == "z", middle, at, half, level), color, material))
     return made
 
 
@@ -112,7 +112,7 @@ def _pieces(
 
 def _slab(
     along_x: bool, middle: float, at: float, half: float, level: float, rise: float, thick: float, color: Color
-) -> Part:
+) -> ShapePart:
     if along_x:
-        return Part(Kind.BOX, (middle, level, at), (half, rise, thick), color)
-    return Part(Kind.BOX, (at, level, middle), (thick, rise, half), color)
+        return ShapePart(Form.BOX, (middle, level, at), (half, rise, thick), color)
+    return ShapePart(Form.BOX, (at, level, middle), (thick, rise, half), color)

@@ -1,4 +1,3 @@
-# ruff: noqa: SIM905 - tables of names read best as words
 """Giving recorded objects the ids that trajectories use.
 
 Trajectories were recorded with another version of AI2-THOR than the objects' metadata: fixed things may have another
@@ -9,19 +8,14 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from infthor_eval.sim.default_objects import default_object
 from infthor_eval.sim.geometry import Array
 from infthor_eval.sim.navigation import NavGrid
-from infthor_eval.sim.object_types import object_type
+from infthor_eval.sim.object_types import type_named
 from infthor_eval.sim.objects import SimObject
-from infthor_eval.sim.sizes import SIZES, default_object, support_height
 
 __all__ = ["adopt"]
 
-_FURNITURE = frozenset(
-    "ArmChair Bed Cart CoffeeTable CounterTop Desk DiningTable Dresser Ottoman ShelvingUnit SideTable Sofa Stool"
-    " TVStand".split()
-)
-_STACKED = frozenset("Cabinet Drawer Shelf".split())  # others of their type stand right above them
 _NEAR = 0.3
 
 
@@ -55,53 +49,52 @@ def adopt(objects: dict[str, SimObject], wanted: Iterable[str], nav: NavGrid, fl
 def parse_id(object_id: str) -> tuple[str, Array]:
     """Type and position of an id; `Sink|..|..|..|SinkBasin` is a SinkBasin."""
     parts = object_id.split("|")
-    kind = parts[4].split("_")[0] if len(parts) > 4 else parts[0]
+    object_type = parts[4].split("_")[0] if len(parts) > 4 else parts[0]
     try:
-        return kind, np.array([float(p) for p in parts[1:4]])
+        return object_type, np.array([float(p) for p in parts[1:4]])
     except ValueError:
-        return kind, np.full(3, np.nan)
+        return object_type, np.full(3, np.nan)
 
 
 def _loose(object_id: str) -> bool:
-    kind, position = parse_id(object_id)
-    return object_type(kind).pickupable or len(position) != 3 or bool(np.isnan(position).any())
+    object_type, position = parse_id(object_id)
+    return type_named(object_type).pickupable or len(position) != 3 or bool(np.isnan(position).any())
 
 
 def _cost(wanted: str, item: SimObject) -> float | None:
     """How unlike the wanted thing is; None: it cannot be it."""
-    kind, position = parse_id(wanted)
+    object_type, position = parse_id(wanted)
     low, high = item.bounds()
     level = float(np.hypot(*(position - item.position)[[0, 2]]))
     rise = abs(float(position[1] - item.position[1]))
-    if kind == item.object_type:
-        away = float(np.hypot(level, rise)) if kind in _STACKED else level + 0.05 * rise
-        inside = kind in _FURNITURE and bool(np.all((position >= low - 0.05) & (position <= high + 0.3)))
+    if object_type == item.object_type:
+        away = float(np.hypot(level, rise)) if item.type.stacked else level + 0.05 * rise
+        inside = item.type.furniture and bool(np.all((position >= low - 0.05) & (position <= high + 0.3)))
         return away if away <= _NEAR or inside else None
-    if kind in _FURNITURE and item.object_type in _FURNITURE and level <= _NEAR:
+    if type_named(object_type).furniture and item.type.furniture and level <= _NEAR:
         return 1.0 + level
     return None
 
 
 def _rename(item: SimObject, wanted: str) -> None:
-    kind, position = parse_id(wanted)
+    object_type, position = parse_id(wanted)
     offset = position - item.position
     if float(np.hypot(offset[0], offset[2])) <= _NEAR:
-        rise = offset[1] if item.object_type in _STACKED else 0.0
+        rise = offset[1] if item.type.stacked else 0.0
         item.position = item.position + np.array([offset[0], rise, offset[2]])
-    if kind != item.object_type:
-        item.kind = object_type(kind)
-        item.support = support_height(kind, float(item.box_size[1]))
+    if object_type != item.object_type:
+        item.type = type_named(object_type)
+        item.support = item.type.support_height(float(item.box_size[1]))
     item.object_id = wanted
 
 
 def _added(wanted: str, nav: NavGrid, floor: float) -> SimObject:
-    kind, position = parse_id(wanted)
-    yaw = max((0.0, 90.0, 180.0, 270.0), key=lambda angle: nav.freedom(position[0], position[2], angle))
-    item = default_object(kind, position, yaw)
-    if kind in _FURNITURE:
-        top = position[1] if position[1] - floor > 0.3 else floor + SIZES.get(kind, (0.5, 0.8, 0.5))[1]
+    object_type, position = parse_id(wanted)
+    item = default_object(object_type, position, nav.freest_yaw(position[0], position[2]))
+    if item.type.furniture:
+        top = position[1] if position[1] - floor > 0.3 else floor + item.type.size[1]
         item.box_size = np.array([item.box_size[0], top - floor, item.box_size[2]])
         item.box_center = np.array([0.0, (top + floor) / 2 - position[1], 0.0])
-        item.support = support_height(kind, float(item.box_size[1]))
+        item.support = item.type.support_height(float(item.box_size[1]))
     item.object_id = wanted
     return item

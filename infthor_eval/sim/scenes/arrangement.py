@@ -1,4 +1,3 @@
-# ruff: noqa: SIM905 - tables of names read best as words
 """What a scene's objects are to each other: fronts, hinges, drawers in desks, sinks in counters, knobs of burners."""
 
 from collections.abc import Iterator
@@ -13,34 +12,26 @@ from infthor_eval.sim.world import World
 
 __all__ = ["arrange"]
 
-_INNER = frozenset("Cabinet Drawer Shelf Safe Microwave".split())
-_BASINS = frozenset("Sink SinkBasin BathtubBasin".split())
-_HOLED = frozenset("CounterTop Desk DiningTable Dresser SideTable Sink".split())
-_TALL = frozenset("Fridge ShelvingUnit Dresser".split())
 _BODY = np.array([0.2, 0.0, 0.2])  # half of the floor that the agent takes, metres
 _LIP, _BEFORE = 0.02, 0.6  # how far a counter reaches over its cabinets, and how far before them is floor, metres
-# boxes whose axes do not tell their front; other things face +z of their own frame, as nearly all assets do
-_FACING_ROOM = frozenset(
-    "Blinds Cabinet CounterTop Curtains Drawer Mirror Painting Poster Shelf ShelvingUnit ShowerDoor Sink Window".split()
-)
 
 
 def arrange(world: World) -> None:
     """Works out, in place, what a list of boxes does not tell."""
     items = list(world.objects.values())
-    fixed = [o for o in items if not o.kind.pickupable]
+    fixed = [o for o in items if not o.type.pickupable]
     for item in fixed:
-        if item.object_type in _FACING_ROOM:
+        if item.type.faces_room:
             item.front = _front(item, world.nav)
-        if item.object_type == "Cabinet" or item.kind.encloses:
+        if item.type.encloses:
             item.hinge = _hinge(item)
     for item in fixed:
-        item.pieces = _plan(item, fixed, world.nav) if item.object_type in _HOLED else ()
+        item.pieces = _plan(item, fixed, world.nav) if item.type.cut_out else ()
         if item.object_type == "Cabinet":
-            item.hollow = any(o.object_type in _BASINS and _cuts(o, item) for o in fixed)
+            item.hollow = any(_hangs(o) and _cuts(o, item) for o in fixed)
             continue
-        item.hollow = item.kind.receptacle and item.object_type not in _INNER and any(
-            other.object_type in _INNER and other is not item and _inside(other, item) for other in fixed
+        item.hollow = item.type.receptacle and not item.type.fitted and any(
+            other.type.fitted and other is not item and _inside(other, item) for other in fixed
         )  # fmt: skip
     _connect_knobs(items)
     _raise_supports(world)
@@ -59,7 +50,7 @@ def _front(item: SimObject, nav: NavGrid) -> float:
         at_face = float(hinge @ direction) >= float(np.abs(direction) @ half) - 0.08
         bonus = 100 if item.object_type == "Cabinet" and at_face else 0
         thin = float(np.abs(direction) @ half) <= min(half[0], half[2]) + 1e-6
-        flat = 3 if thin and item.object_type in {"Window", "Painting", "Mirror", "Poster"} else 0
+        flat = 3 if thin and item.type.flat else 0
         scores.append((free + bonus + flat * 10, thin, -angle))
     best = max(scores)
     return (-best[2] - float(item.rotation[1])) % 360
@@ -72,6 +63,11 @@ def _hinge(item: SimObject) -> int:
     angle = np.radians(float(item.rotation[1]) + item.front)
     aside = float((item.position - item.center) @ (np.cos(angle), 0.0, -np.sin(angle)))
     return 1 if aside > 0 else -1
+
+
+def _hangs(item: SimObject) -> bool:
+    """Whether it is a basin that hangs in a cabinet or counter; a bathtub is solid around its own basin."""
+    return item.type.basin and item.type.open_top > 0
 
 
 def _cuts(a: SimObject, b: SimObject) -> bool:
@@ -98,7 +94,7 @@ def _plan(item: SimObject, fixed: list[SimObject], nav: NavGrid) -> tuple[Rect, 
                 point = np.array([x, low[1], z])
                 holes.append(_own_frame(item, point - _BODY, point + _BODY))
         holes += [_own_frame(item, *front) for front in _fronts_below(item, fixed)]
-        holes += [_own_frame(item, *o.bounds()) for o in fixed if o.object_type in _TALL and _stands_through(o, item)]
+        holes += [_own_frame(item, *o.bounds()) for o in fixed if o.type.tall and _stands_through(o, item)]
     half = item.box_size / 2
     whole = (-float(half[0]), -float(half[2]), float(half[0]), float(half[2]))
     return () if not holes else without(whole, holes)
@@ -162,11 +158,11 @@ def _raise_supports(world: World) -> None:
     """Learns from what lies on a table or seat, where its box does not tell, how high its surface is."""
     lying: dict[str, list[float]] = {}
     for item in world.objects.values():
-        if item.kind.pickupable:
+        if item.type.pickupable:
             low, high = item.bounds()
             middle = (low + high) / 2
             for other in world.objects.values():
-                if other.object_type in _LEARNING and _over(other, middle):
+                if other.type.yields and _over(other, middle):
                     lying.setdefault(other.object_id, []).append(float(low[1]))
     for object_id, heights in lying.items():
         owner = world.objects[object_id]
@@ -175,9 +171,6 @@ def _raise_supports(world: World) -> None:
         usual = (float(high[1]) if owner.support is None else float(low[1]) + owner.support) - float(low[1])
         if 0.2 * (high[1] - low[1]) < level < high[1] - low[1] - 0.05 and abs(level - usual) > 0.04:
             owner.support = level
-
-
-_LEARNING = frozenset("ArmChair Bed Chair Desk Ottoman Sofa SideTable Stool".split())
 
 
 def _over(owner: SimObject, point: Array) -> bool:

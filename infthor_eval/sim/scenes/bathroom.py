@@ -1,7 +1,7 @@
 # ruff: noqa: SIM905 - tables of names read best as words
 """Procedural bathrooms: a washstand, a toilet, a tub, rails and what belongs to them."""
 
-from infthor_eval.sim.scenes.kitchen import around
+from infthor_eval.sim.scenes.basins import around, name_after
 from infthor_eval.sim.scenes.roomplan import RoomPlan
 
 __all__ = ["furnish_bathroom"]
@@ -23,21 +23,21 @@ def furnish_bathroom(plan: RoomPlan, loose: int = 16) -> None:
     tub_at = round(room.z_min + 0.95, 2)
     tub = plan.against("x+", "Bathtub", tub_at, size=(1.7, 0.5, 0.75), gap=0.02)
     basin = plan.against("x+", "BathtubBasin", tub_at, y=0.03, size=(1.55, 0.3, 0.6), gap=0.095)
-    basin.object_id, basin.name = f"{tub.object_id}|BathtubBasin", f"BathtubBasin_{tub.name.split('_')[1]}"
+    name_after(tub, basin)
     plan.against("x+", "Faucet", tub_at, y=0.52, size=(0.16, 0.2, 0.16), gap=0.02)
     plan.against("z-", "TowelHolder", round(room.x_min + 0.7, 2), y=1.3, size=(0.6, 0.04, 0.1))
     plan.against("x-", "HandTowelHolder", round(room.z_max - 1.2, 2), y=1.25, size=(0.2, 0.12, 0.06))
-    for kind, size in (
+    for object_type, size in (
         ("GarbageCan", (0.28, 0.4, 0.28)),
         ("Cart", (0.5, 0.75, 0.35)),
         ("LaundryHamper", (0.4, 0.6, 0.4)),
     ):
-        if kind == "GarbageCan" or plan.random.random() < 0.6:
-            plan.try_against(kind, [str(s) for s in plan.random.permutation(["x-", "z-"])], size)
+        if object_type == "GarbageCan" or plan.random.random() < 0.6:
+            plan.try_against(object_type, plan.shuffled(["x-", "z-"]), size)
     plan.try_against("Plunger", ["z+", "x-"], (0.14, 0.5, 0.14))
     plan.try_against("ScrubBrush", ["z+", "x-"], (0.12, 0.45, 0.12))
     plan.try_against("Window", ["z-", "x-"], (0.8, 0.8, 0.06), y=1.35)
-    plan.loose += [str(k) for k in plan.random.permutation(_LOOSE)][:loose]
+    plan.loose += plan.shuffled(_LOOSE)[:loose]
 
 
 def _washstand(plan: RoomPlan, at: float) -> None:
@@ -46,7 +46,7 @@ def _washstand(plan: RoomPlan, at: float) -> None:
     top.support = None
     sink = plan.against("z+", "Sink", at, y=_TOP - 0.15, size=(0.5, 0.152, 0.4), gap=0.08)
     basin = plan.against("z+", "SinkBasin", at, y=_TOP - 0.145, size=(0.44, 0.14, 0.34), gap=0.1)
-    basin.object_id, basin.name = f"{sink.object_id}|SinkBasin", f"SinkBasin_{sink.name.split('_')[1]}"
+    name_after(sink, basin)
     top.pieces, sink.pieces = around(top, sink), around(sink, basin)
     plan.against("z+", "Faucet", at, y=_TOP, size=(0.14, 0.2, 0.16), gap=0.03)
     plan.against("z+", "Mirror", at, y=1.2, size=(1.0, 0.8, 0.04))

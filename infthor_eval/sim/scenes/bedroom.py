@@ -31,10 +31,14 @@ def furnish_bedroom(plan: RoomPlan, loose: int = 22) -> None:
     lamp(plan, desk.center[0] + 0.5, desk.center[2], 0.76)
     plan.place("Chair", round(desk_at - 0.1, 2), round(room.z_min + 0.95, 2), 180.0, size=(0.42, 0.88, 0.42))
     sides = ["x-", "z-"]
-    for kind, size_of in (("GarbageCan", None), ("ArmChair", (0.8, 0.85, 0.8)), ("ShelvingUnit", (0.9, 1.5, 0.35))):
-        if kind != "ArmChair" or plan.random.random() < 0.6:
-            plan.try_against(kind, [str(s) for s in plan.random.permutation(sides)], size_of)
+    for object_type, size_of in (
+        ("GarbageCan", None),
+        ("ArmChair", (0.8, 0.85, 0.8)),
+        ("ShelvingUnit", (0.9, 1.5, 0.35)),
+    ):
+        if object_type != "ArmChair" or plan.random.random() < 0.6:
+            plan.try_against(object_type, plan.shuffled(sides), size_of)
     if plan.random.random() < 0.5:
         plan.try_against("Safe", sides, (0.45, 0.45, 0.4))
     plan.try_against("Painting", ["x-", "z-", "x+"], (0.8, 0.6, 0.05), y=1.45)
-    plan.loose += [str(k) for k in plan.random.permutation(_LOOSE)][:loose]
+    plan.loose += plan.shuffled(_LOOSE)[:loose]

@@ -11,9 +11,9 @@ from infthor_eval.errors import DataError
 from infthor_eval.sim.navigation import NavGrid
 from infthor_eval.sim.scenes.dataset import FloorPlanData
 from infthor_eval.sim.scenes.floorplan import build_floor_plan
-from infthor_eval.sim.scenes.procedural import ROOM_KINDS, build_room
+from infthor_eval.sim.scenes.procedural import SCENE_TYPES, build_scene
 from infthor_eval.sim.scenes.supplement import Supplement, read_supplement
-from infthor_eval.sim.world import AGENT_HEIGHT, Agent, Room, World
+from infthor_eval.sim.world import AGENT_HEIGHT, Agent, RoomShell, World
 
 __all__ = ["Catalogue"]
 
@@ -48,14 +48,14 @@ class Catalogue:
         if _FLOOR_PLAN.fullmatch(name):
             return self._floor_plan(name)
         procedural = _PROCEDURAL.fullmatch(name)
-        if procedural and procedural[1] in ROOM_KINDS:
-            return build_room(procedural[1], int(procedural[2]))
-        kinds = ", ".join(f"{kind}-<seed>" for kind in ROOM_KINDS)
-        raise DataError(f"Scene {name!r} is unknown; use {kinds}, or FloorPlan<N> with --data")
+        if procedural and procedural[1] in SCENE_TYPES:
+            return build_scene(procedural[1], int(procedural[2]))
+        names = ", ".join(f"{scene_type}-<seed>" for scene_type in SCENE_TYPES)
+        raise DataError(f"Scene {name!r} is unknown; use {names}, or FloorPlan<N> with --data")
 
     def empty(self) -> World:
         """A bare room, the state before the first Reset and before CreateHouse."""
-        room = Room(-1.5, 1.5, -1.5, 1.5)
+        room = RoomShell(-1.5, 1.5, -1.5, 1.5)
         cells = [(x * 0.25, z * 0.25) for x in range(-4, 5) for z in range(-4, 5)]
         return World("Procedural", {}, (room,), NavGrid(cells), Agent(np.array([0.0, AGENT_HEIGHT, 0.0])))
 

@@ -1,4 +1,3 @@
-# ruff: noqa: SIM905 - tables of names read best as words
 """Worlds from recorded floor plans."""
 
 from collections.abc import Mapping, Sequence
@@ -15,12 +14,11 @@ from infthor_eval.sim.scenes.adoption import adopt
 from infthor_eval.sim.scenes.arrangement import arrange
 from infthor_eval.sim.scenes.recorded import recorded_object
 from infthor_eval.sim.scenes.supplement import Supplement
-from infthor_eval.sim.world import AGENT_HEIGHT, FLOOR_STYLES, Agent, Room, World
+from infthor_eval.sim.world import AGENT_HEIGHT, FLOOR_STYLES, Agent, RoomShell, World
 
 __all__ = ["build_floor_plan"]
 
 _CEILING = 2.6
-_ON_WALLS = frozenset("Blinds Curtains Floor Window".split())  # these reach beyond the room
 _STYLES = {0: "tiles", 2: "wood", 3: "carpet", 4: "tiles"}
 
 
@@ -47,7 +45,7 @@ def build_floor_plan(name: str, entries: Sequence[Mapping[str, Any]], layout: Ar
     room = _room(name, list(objects.values()), cells, floor)
     height = floor + AGENT_HEIGHT if extra.floor_y is None else extra.floor_y
     middle = nav.nearest((room.x_min + room.x_max) / 2, (room.z_min + room.z_max) / 2)
-    yaw = max((0.0, 90.0, 180.0, 270.0), key=lambda angle: nav.freedom(*middle, angle, reach=3.0))
+    yaw = nav.freest_yaw(*middle, reach=3.0)
     world = World(
         name,
         objects,
@@ -70,31 +68,28 @@ def _settle(world: World, entries: Sequence[Mapping[str, Any]]) -> None:
     """Finds the parents of loose objects: as recorded where one is known, by position else."""
     for entry in entries:
         item = world.objects.get(str(entry["objectId"]))
-        if item is None or not item.kind.pickupable:
+        if item is None or not item.type.pickupable:
             continue
         parents = [world.objects[p] for p in entry.get("parentReceptacles") or () if p in world.objects]
-        inner = [p for p in parents if p.object_type != "Floor" and p.kind.receptacle and p is not item]
+        inner = [p for p in parents if p.object_type != "Floor" and p.type.receptacle and p is not item]
         if inner:
             world.attach(item, min(inner, key=lambda p: (float(np.prod(p.box_size)), p.object_id)))
     settle_parents(world)
-    world.templates = {}
-    for item in world.objects.values():
-        if item.kind.pickupable:
-            world.templates.setdefault(item.object_type, []).append(item.duplicate(item.object_id))
+    world.keep_templates()
 
 
-def _room(name: str, objects: list[SimObject], cells: list[tuple[float, float]], floor: float) -> Room:
+def _room(name: str, objects: list[SimObject], cells: list[tuple[float, float]], floor: float) -> RoomShell:
     """A rectangle around all that the room holds."""
     lows = [np.array([x - 0.25, floor, z - 0.25]) for x, z in cells]
     highs = [np.array([x + 0.25, floor, z + 0.25]) for x, z in cells]
     for item in objects:
-        if item.object_type not in _ON_WALLS:
+        if not item.type.beyond_room:
             low, high = item.bounds()
             lows.append(low)
             highs.append(high)
     low, high = np.min(lows, axis=0), np.max(highs, axis=0)
     number = _number(name)
-    return Room(
+    return RoomShell(
         float(low[0]), float(high[0]), float(low[2]), float(high[2]), max(floor + _CEILING, float(high[1]) + 0.05),
         floor, _STYLES.get(number // 100, "wood"), number,
     )  # fmt: skip

@@ -3,14 +3,15 @@
 
 import numpy as np
 
-from infthor_eval.sim.footprints import Rect, without
 from infthor_eval.sim.objects import SimObject
+from infthor_eval.sim.scenes.basins import around, name_after
 from infthor_eval.sim.scenes.roomplan import RoomPlan
 
-__all__ = ["around", "furnish_kitchen"]
+__all__ = ["furnish_kitchen"]
 
 _HEIGHT, _DEPTH = 0.92, 0.65  # of the counter, metres
 _MODULE = 0.6
+_APPLIANCES = (("Microwave", (0.52, 0.32, 0.4)), ("CoffeeMachine", (0.25, 0.36, 0.3)), ("Toaster", (0.2, 0.2, 0.3)))
 _TOOLS = (
     "Apple Bread ButterKnife Bowl Cup DishSponge Egg Fork Knife Lettuce Mug Pan PepperShaker Plate Pot Potato"
     " SaltShaker SoapBottle Spatula Spoon Tomato Cup Mug Plate Bowl Apple Potato Tomato".split()
@@ -22,16 +23,11 @@ def furnish_kitchen(plan: RoomPlan, loose: int = 34) -> None:
     """Furnishes a room as a kitchen with about `loose` small things."""
     _counter(plan)
     _table(plan)
-    plan.try_against("GarbageCan", _shuffled(plan, ("x-", "x+", "z-")))
-    plan.try_against("HousePlant", _shuffled(plan, ("x-", "x+", "z-")), (0.34, 0.7, 0.34))
+    plan.try_against("GarbageCan", plan.shuffled(("x-", "x+", "z-")))
+    plan.try_against("HousePlant", plan.shuffled(("x-", "x+", "z-")), (0.34, 0.7, 0.34))
     if plan.random.random() < 0.6:
-        plan.try_against("SideTable", _shuffled(plan, ("x-", "x+", "z-")))
-    more = [str(kind) for kind in plan.random.permutation(_MORE)]
-    plan.loose += [*_TOOLS, *more][:loose]
-
-
-def _shuffled(plan: RoomPlan, sides: tuple[str, ...]) -> list[str]:
-    return [str(side) for side in plan.random.permutation(sides)]
+        plan.try_against("SideTable", plan.shuffled(("x-", "x+", "z-")))
+    plan.loose += [*_TOOLS, *plan.shuffled(_MORE)][:loose]
 
 
 def _counter(plan: RoomPlan) -> None:
@@ -58,9 +54,8 @@ def _counter(plan: RoomPlan) -> None:
             upper = plan.against("z+", "Cabinet", at, y=1.5, size=(_MODULE - 0.02, 0.65, 0.35))
             upper.hinge = 1 if index % 2 else -1
     free = [i for i in range(count) if i not in (sink, stove)]
-    for kind, index in zip(("Microwave", "CoffeeMachine", "Toaster"), plan.random.permutation(free), strict=False):
-        size = {"Microwave": (0.52, 0.32, 0.4), "CoffeeMachine": (0.25, 0.36, 0.3), "Toaster": (0.2, 0.2, 0.3)}[kind]
-        plan.against("z+", kind, first + (int(index) + 0.5) * _MODULE, y=_HEIGHT, size=size, gap=0.08)
+    for (object_type, size), index in zip(_APPLIANCES, plan.random.permutation(free), strict=False):
+        plan.against("z+", object_type, first + (int(index) + 0.5) * _MODULE, y=_HEIGHT, size=size, gap=0.08)
 
 
 def _lower(plan: RoomPlan, at: float, index: int, drawer: bool) -> None:
@@ -76,21 +71,11 @@ def _lower(plan: RoomPlan, at: float, index: int, drawer: bool) -> None:
 def _sink(plan: RoomPlan, top: SimObject, at: float) -> None:
     sink = plan.against("z+", "Sink", at, y=_HEIGHT - 0.17, size=(0.56, 0.172, 0.46), gap=0.1)
     basin = plan.against("z+", "SinkBasin", at, y=_HEIGHT - 0.165, size=(0.5, 0.16, 0.38), gap=0.12)
-    basin.object_id, basin.name = f"{sink.object_id}|SinkBasin", f"SinkBasin_{sink.name.split('_')[1]}"
+    name_after(sink, basin)
     faucet = plan.against("z+", "Faucet", at, y=_HEIGHT, size=(0.16, 0.28, 0.2), gap=0.04)
     faucet.style = 0
     top.pieces, sink.pieces = around(top, sink), around(sink, basin)
     plan.against("z+", "Window", at, y=1.25, size=(0.8, 0.9, 0.06), gap=-0.02)
-
-
-def around(outer: SimObject, inner: SimObject) -> tuple[Rect, ...]:
-    """The plan of `outer` less that of `inner`; both look the same way."""
-    middle = outer.matrix.T @ (inner.center - outer.center)
-    whole, hole = outer.box_size / 2, inner.box_size / 2
-    return without(
-        (-float(whole[0]), -float(whole[2]), float(whole[0]), float(whole[2])),
-        [(middle[0] - hole[0], middle[2] - hole[2], middle[0] + hole[0], middle[2] + hole[2])],
-    )
 
 
 def _stove(plan: RoomPlan, at: float) -> None:
@@ -110,7 +95,7 @@ def _table(plan: RoomPlan) -> None:
     room = plan.room
     length = round(float(plan.random.uniform(1.1, 1.4)), 2)
     z = room.z_min + length / 2 + 0.15
-    for side in _shuffled(plan, ("x-", "x+")):
+    for side in plan.shuffled(("x-", "x+")):
         inward = 1.0 if side == "x-" else -1.0
         x = (room.x_min if side == "x-" else room.x_max) + 0.5 * inward
         ends = np.array([[x - 0.45 * inward, 0.0, z - length / 2], [x + 0.95 * inward, 1.0, z + length / 2]])

@@ -5,6 +5,7 @@ from infthor_eval.sim.scenes.roomplan import RoomPlan
 
 __all__ = ["furnish_living_room"]
 
+_ALONG_WALLS = "ArmChair SideTable FloorLamp ShelvingUnit GarbageCan DiningTable Desk Ottoman".split()
 _LOOSE = (
     "Book Book Box CellPhone CreditCard KeyChain Laptop Newspaper Pillow Pillow RemoteControl Statue"
     " TissueBox Vase Watch WateringCan Candle Plate Bowl Pencil Pen Mug CreditCard KeyChain Vase"
@@ -24,15 +25,15 @@ def furnish_living_room(plan: RoomPlan, loose: int = 24) -> None:
         "CoffeeTable", round(middle, 2), round(max(away, room.z_min + 0.55) + 1.15, 2), 0.0, size=(1.1, 0.42, 0.55)
     )
     sides = ["x-", "x+", "z-"]
-    for kind in ("ArmChair", "SideTable", "FloorLamp", "ShelvingUnit", "GarbageCan", "DiningTable", "Desk", "Ottoman"):
-        if kind in {"ArmChair", "FloorLamp", "SideTable", "GarbageCan"} or plan.random.random() < 0.5:
-            made = plan.try_against(kind, [str(s) for s in plan.random.permutation(sides)], _SIZES.get(kind))
-            if made is not None and kind == "SideTable":
+    for object_type in _ALONG_WALLS:
+        if object_type in {"ArmChair", "FloorLamp", "SideTable", "GarbageCan"} or plan.random.random() < 0.5:
+            made = plan.try_against(object_type, plan.shuffled(sides), _SIZES.get(object_type))
+            if made is not None and object_type == "SideTable":
                 lamp(plan, made.center[0], made.center[2], float(made.bounds()[1][1]))
     plan.try_against("HousePlant", sides, (0.4, 0.9, 0.4))
     plan.try_against("Painting", ["z+", "x-", "x+"], (0.9, 0.7, 0.05), y=1.4)
     plan.try_against("Window", ["x+", "x-"], (1.3, 1.3, 0.06), y=0.95)
-    plan.loose += [str(k) for k in plan.random.permutation(_LOOSE)][:loose]
+    plan.loose += plan.shuffled(_LOOSE)[:loose]
 
 
 _SIZES = {"DiningTable": (1.1, 0.75, 0.8), "Desk": (1.2, 0.76, 0.6), "ShelvingUnit": (0.9, 1.5, 0.35),

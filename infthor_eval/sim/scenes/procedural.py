@@ -6,14 +6,15 @@ from collections.abc import Callable
 import numpy as np
 
 from infthor_eval.errors import SimulatorError
+from infthor_eval.sim.geometry import level_gaps
 from infthor_eval.sim.scenes.bathroom import furnish_bathroom
 from infthor_eval.sim.scenes.bedroom import furnish_bedroom
 from infthor_eval.sim.scenes.kitchen import furnish_kitchen
 from infthor_eval.sim.scenes.living_room import furnish_living_room
 from infthor_eval.sim.scenes.roomplan import RoomPlan, finish
-from infthor_eval.sim.world import FLOOR_STYLES, Room, World
+from infthor_eval.sim.world import FLOOR_STYLES, RoomShell, World
 
-__all__ = ["ROOM_KINDS", "build_room"]
+__all__ = ["SCENE_TYPES", "build_scene"]
 
 _FURNISH: dict[str, Callable[[RoomPlan], None]] = {
     "kitchen": furnish_kitchen,
@@ -32,26 +33,26 @@ _DOOR = 0.5  # half of a doorway's width, metres
 _DRAWS = 20
 _MOST = 0.85  # of a room's free floor
 _REACH = 0.75  # metres from a place to stand to a thing's box
-ROOM_KINDS = (*_FURNISH, "house")
+SCENE_TYPES = (*_FURNISH, "house")
 
 
-def build_room(kind: str, seed: int) -> World:
-    """The world of `<kind>-<seed>`: the first draw of furniture that leaves every room open.
+def build_scene(scene_type: str, seed: int) -> World:
+    """The world of `<scene_type>-<seed>`: the first draw of furniture that leaves every room open.
 
     Raises:
         SimulatorError: no draw does.
     """
     for attempt in range(_DRAWS):
-        random = np.random.default_rng([zlib.crc32(kind.encode()), seed, attempt])
-        if kind == "house":
+        random = np.random.default_rng([zlib.crc32(scene_type.encode()), seed, attempt])
+        if scene_type == "house":
             plans, doors = _house_plans(random, seed)
         else:
-            plans, doors = [RoomPlan(_shell(kind, random, seed), random)], []
-            _furnish(plans[0], kind)
-        world = finish(f"{kind}-{seed}", seed, plans, doors)
+            plans, doors = [RoomPlan(_shell(scene_type, random, seed), random)], []
+            _furnish(plans[0], scene_type)
+        world = finish(f"{scene_type}-{seed}", seed, plans, doors)
         if all(_open(world, plan) for plan in plans):
             return world
-    raise SimulatorError(f"{kind}-{seed}: {_DRAWS} draws of furniture all block the way; use another seed")
+    raise SimulatorError(f"{scene_type}-{seed}: {_DRAWS} draws of furniture all block the way; use another seed")
 
 
 def _open(world: World, plan: RoomPlan) -> bool:
@@ -63,27 +64,26 @@ def _open(world: World, plan: RoomPlan) -> bool:
     cells = np.array(reached)
     for item in plan.objects:
         low, high = item.bounds()
-        nearest = np.clip(cells, low[[0, 2]], high[[0, 2]])
-        if item.kind.receptacle and np.hypot(*(cells - nearest).T).min() > _REACH:
+        if item.type.receptacle and level_gaps(cells, low, high).min() > _REACH:
             return False
     return True
 
 
-def _shell(kind: str, random: np.random.Generator, seed: int) -> Room:
-    """A room of a size that suits its kind, around (0, 0)."""
-    least_x, most_x, least_z, most_z = _SIZES[kind]
+def _shell(room_type: str, random: np.random.Generator, seed: int) -> RoomShell:
+    """A room of a size that suits its type, around (0, 0)."""
+    least_x, most_x, least_z, most_z = _SIZES[room_type]
     width, length = round(random.uniform(least_x, most_x) / 2, 2), round(random.uniform(least_z, most_z) / 2, 2)
-    return Room(-width, width, -length, length, floor_style=_FLOORS[kind], style=seed)
+    return RoomShell(-width, width, -length, length, floor_style=_FLOORS[room_type], style=seed)
 
 
-def _furnish(plan: RoomPlan, kind: str) -> None:
+def _furnish(plan: RoomPlan, room_type: str) -> None:
     room = plan.room
     floor = plan.place(
         "Floor", (room.x_min + room.x_max) / 2, (room.z_min + room.z_max) / 2, y=room.floor - 0.1,
         size=(room.x_max - room.x_min, 0.1, room.z_max - room.z_min),
     )  # fmt: skip
     floor.style = FLOOR_STYLES.index(room.floor_style)
-    _FURNISH[kind](plan)
+    _FURNISH[room_type](plan)
     switch = plan.try_against("LightSwitch", ["z-", "x-", "x+"], (0.1, 0.14, 0.02), y=1.2)
     if switch is not None:
         switch.state.toggled = True
@@ -109,11 +109,12 @@ def _house_plans(random: np.random.Generator, seed: int) -> tuple[list[RoomPlan]
         "bathroom": (("x-", upper_z - _DOOR, upper_z + _DOOR),),
     }
     plans: list[RoomPlan] = []
-    for kind, (x0, x1, z0, z1) in spans.items():
-        room = Room(x0, x1, z0, z1, floor_style=_FLOORS[kind], style=seed + len(plans), openings=openings[kind])
+    for room_type, (x0, x1, z0, z1) in spans.items():
+        style, doorways = seed + len(plans), openings[room_type]
+        room = RoomShell(x0, x1, z0, z1, floor_style=_FLOORS[room_type], style=style, openings=doorways)
         plan = RoomPlan(room, random)
         plan.keep_doors_free()
-        _furnish(plan, kind)
+        _furnish(plan, room_type)
         plans.append(plan)
     doors = [(x, z) for x, z in _doorway_cells(door_x, gap / 2, True)]
     doors += [(x, z) for x, z in _doorway_cells(door_z, gap / 2, False)]

@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 
 from infthor_eval.errors import DataError
+from infthor_eval.sim.default_objects import style_of
 from infthor_eval.sim.footprints import Rect, polygon_rects
-from infthor_eval.sim.geometry import Array, to_array
+from infthor_eval.sim.geometry import Array, level_gaps, to_array
 from infthor_eval.sim.navigation import CELL, NavGrid
-from infthor_eval.sim.object_types import object_type
+from infthor_eval.sim.object_types import type_named
 from infthor_eval.sim.objects import SimObject
 from infthor_eval.sim.restore import settle_parents
 from infthor_eval.sim.scenes.arrangement import arrange
-from infthor_eval.sim.sizes import SIZES, style_of, support_height
-from infthor_eval.sim.world import AGENT_HEIGHT, FLOOR_STYLES, Agent, Room, Wall, World
+from infthor_eval.sim.world import AGENT_HEIGHT, FLOOR_STYLES, Agent, RoomShell, Wall, World
 
 __all__ = ["build_house", "read_asset_sizes"]
 
@@ -75,8 +75,8 @@ def _build(house: Mapping[str, Any], assets: Mapping[str, tuple[float, float, fl
     doors = list(_door_spans(house))
     walls = tuple(_walls(house, doors))
     objects: dict[str, SimObject] = {}
-    for found, (kind, rects) in zip(ids, floors, strict=True):
-        floor = _floor(found, kind, rects)
+    for found, (room_type, rects) in zip(ids, floors, strict=True):
+        floor = _floor(found, room_type, rects)
         objects[floor.object_id] = floor
     for entry in _flat(house.get("objects", ())):
         item = _object(entry, assets)
@@ -85,16 +85,14 @@ def _build(house: Mapping[str, Any], assets: Mapping[str, tuple[float, float, fl
         if "assetPosition" in entry:
             objects[str(entry["id"])] = _window(entry, house)
     rooms = tuple(
-        Room(*(r[0], r[2], r[1], r[3]), _HEIGHT, 0.0, _FLOORS.get(kind, "wood"), index, walled=False)
-        for index, (kind, rects) in enumerate(floors) for r in rects
+        RoomShell(*(r[0], r[2], r[1], r[3]), _HEIGHT, 0.0, _FLOORS.get(room_type, "wood"), index, walled=False)
+        for index, (room_type, rects) in enumerate(floors) for r in rects
     )  # fmt: skip
     nav = _nav([r for _, rects in floors for r in rects], walls, list(objects.values()))
     world = World("Procedural", objects, rooms, nav, _agent(house, nav), walls=walls)
     arrange(world)
     settle_parents(world)
-    for item in objects.values():
-        if item.kind.pickupable:
-            world.templates.setdefault(item.object_type, []).append(item.duplicate(item.object_id))
+    world.keep_templates()
     return world
 
 
@@ -111,32 +109,32 @@ def _flat(entries: Sequence[Mapping[str, Any]]) -> Iterator[Mapping[str, Any]]:
 def _object(entry: Mapping[str, Any], assets: Mapping[str, tuple[float, float, float]]) -> SimObject:
     """An object; ProcTHOR's position is the middle of the asset's box."""
     found = str(entry["id"])
-    kind = str(entry.get("objectType") or found.split("|", 1)[0])
+    declared = type_named(str(entry.get("objectType") or found.split("|", 1)[0]))
     asset = str(entry.get("assetId", ""))
-    size = np.array(assets.get(asset) or SIZES.get(kind, (0.3, 0.3, 0.3)))
+    size = np.array(assets.get(asset) or declared.size)
     rotation = to_array(entry.get("rotation") or {})
     return SimObject(
         object_id=found,
         name=found,
-        kind=object_type(kind),
+        type=declared,
         position=to_array(entry["position"]),
         rotation=np.array([0.0, rotation[1] % 360, 0.0]),
         box_center=np.zeros(3),
         box_size=size,
         asset_id=asset,
-        support=support_height(kind, float(size[1])),
+        support=declared.support_height(float(size[1])),
         style=style_of(asset or found),
     )
 
 
-def _floor(found: str, kind: str, rects: Sequence[Rect]) -> SimObject:
+def _floor(found: str, room_type: str, rects: Sequence[Rect]) -> SimObject:
     low = np.array([min(r[0] for r in rects), -0.1, min(r[1] for r in rects)])
     high = np.array([max(r[2] for r in rects), 0.0, max(r[3] for r in rects)])
     middle = (low + high) / 2
     item = SimObject(
-        found, f"Floor_{found}", object_type("Floor"), middle, np.zeros(3), np.zeros(3), high - low, style=0
+        found, f"Floor_{found}", type_named("Floor"), middle, np.zeros(3), np.zeros(3), high - low, style=0
     )
-    item.style = FLOOR_STYLES.index(_FLOORS.get(kind, "wood"))
+    item.style = FLOOR_STYLES.index(_FLOORS.get(room_type, "wood"))
     item.pieces = tuple((r[0] - middle[0], r[1] - middle[2], r[2] - middle[0], r[3] - middle[2]) for r in rects)
     return item
 
@@ -149,7 +147,7 @@ def _window(entry: Mapping[str, Any], house: Mapping[str, Any]) -> SimObject:
     share = float(local[0]) / max(length, 1e-6)
     found = str(entry["id"])
     return SimObject(
-        found, found, object_type("Window"), np.array([x0 + (x1 - x0) * share, local[1], z0 + (z1 - z0) * share]),
+        found, found, type_named("Window"), np.array([x0 + (x1 - x0) * share, local[1], z0 + (z1 - z0) * share]),
         np.array([0.0, math.degrees(math.atan2(x1 - x0, z1 - z0)) + 90.0, 0.0]), np.zeros(3),
         np.array([1.0, 1.2, 0.16]), asset_id=str(entry.get("assetId", "")),
     )  # fmt: skip
@@ -207,9 +205,8 @@ def _nav(rects: Sequence[Rect], walls: Sequence[Wall], objects: list[SimObject])
             points = points[_distance(points, wall) >= _BODY]
     for item in objects:
         low, high = item.bounds()
-        if item.object_type != "Floor" and not item.kind.pickupable and low[1] < 1.6 and high[1] > 0.1:
-            nearest = np.clip(points, low[[0, 2]], high[[0, 2]])
-            points = points[np.hypot(*(points - nearest).T) >= _BODY]
+        if item.object_type != "Floor" and not item.type.pickupable and low[1] < 1.6 and high[1] > 0.1:
+            points = points[level_gaps(points, low, high) >= _BODY]
     if not len(points):
         raise DataError("house: its rooms leave nowhere to stand")
     return NavGrid([(float(x), float(z)) for x, z in points])

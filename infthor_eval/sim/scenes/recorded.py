@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from infthor_eval.errors import DataError
+from infthor_eval.sim.default_objects import style_of
 from infthor_eval.sim.geometry import Array, to_array, yaw_matrix
-from infthor_eval.sim.object_types import ObjectType, object_type
-from infthor_eval.sim.objects import ObjectState, SimObject
-from infthor_eval.sim.sizes import style_of, support_height
+from infthor_eval.sim.object_types import ObjectType, type_named
+from infthor_eval.sim.objects import SimObject, SimObjectState
 
 __all__ = ["recorded_object"]
 
@@ -32,8 +32,7 @@ def recorded_object(entry: Mapping[str, Any]) -> SimObject:
 
 
 def _object(entry: Mapping[str, Any]) -> SimObject:
-    position = to_array(entry["position"])
-    kind = _kind(entry)
+    position, declared = to_array(entry["position"]), _type(entry)
     oriented = entry.get("objectOrientedBoundingBox")
     if oriented and oriented.get("cornerPoints"):
         points = np.array(oriented["cornerPoints"], dtype=float)
@@ -49,20 +48,20 @@ def _object(entry: Mapping[str, Any]) -> SimObject:
     return SimObject(
         object_id=found,
         name=str(entry["name"]),
-        kind=kind,
+        type=declared,
         position=position,
         rotation=np.array([0.0, yaw % 360.0, 0.0]),
         box_center=(low + high) / 2,
         box_size=np.maximum(high - low, 1e-3),
         asset_id=str(entry.get("assetId") or ""),
-        support=support_height(kind.name, float(high[1] - low[1])),
+        support=declared.support_height(float(high[1] - low[1])),
         style=style_of(str(entry.get("assetId") or found)),
         state=_state(entry),
     )
 
 
-def _kind(entry: Mapping[str, Any]) -> ObjectType:
-    known = object_type(str(entry["objectType"]))
+def _type(entry: Mapping[str, Any]) -> ObjectType:
+    known = type_named(str(entry["objectType"]))
     return replace(
         known,
         pickupable=bool(entry["pickupable"]),
@@ -81,9 +80,9 @@ def _kind(entry: Mapping[str, Any]) -> ObjectType:
     )
 
 
-def _state(entry: Mapping[str, Any]) -> ObjectState:
+def _state(entry: Mapping[str, Any]) -> SimObjectState:
     openness = float(entry.get("openness") or 0.0)
-    return ObjectState(
+    return SimObjectState(
         openness=openness or (1.0 if entry.get("isOpen") else 0.0),
         toggled=bool(entry.get("isToggled")),
         broken=bool(entry.get("isBroken")),

@@ -1,22 +1,21 @@
 """A room while it is being furnished: walls, what stands where, and the floor that stays free."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from infthor_eval.sim.geometry import Array, aabb_overlap
+from infthor_eval.sim.default_objects import default_object
+from infthor_eval.sim.geometry import Array, aabb_overlap, level_gaps
 from infthor_eval.sim.navigation import CELL, NavGrid
+from infthor_eval.sim.object_types import allowed_in, type_named
 from infthor_eval.sim.objects import SimObject
-from infthor_eval.sim.placement_rules import allowed_in
 from infthor_eval.sim.receptacles import find_place
-from infthor_eval.sim.sizes import SIZES, default_object
-from infthor_eval.sim.world import AGENT_HEIGHT, Agent, Room, World
+from infthor_eval.sim.world import AGENT_HEIGHT, Agent, RoomShell, World
 
 __all__ = ["RoomPlan", "finish"]
 
 _BODY = 0.23  # the agent's radius and a little, metres
 _KNEE, _HEAD = 0.1, 1.6
-_AT_MOST = {"Sink": 0, "SinkBasin": 0, "Microwave": 0, "Fridge": 4, "StoveBurner": 1, "BathtubBasin": 1, "Toilet": 2}
 _CLEAR = 0.9  # metres of floor before a doorway
 
 
@@ -28,7 +27,7 @@ class RoomPlan:
         random: decides everything that varies.
     """
 
-    def __init__(self, room: Room, random: np.random.Generator) -> None:
+    def __init__(self, room: RoomShell, random: np.random.Generator) -> None:
         self.room = room
         self.random = random
         self.objects: list[SimObject] = []
@@ -37,7 +36,7 @@ class RoomPlan:
 
     def place(
         self,
-        kind: str,
+        object_type: str,
         x: float,
         z: float,
         yaw: float = 0.0,
@@ -45,9 +44,9 @@ class RoomPlan:
         size: tuple[float, float, float] | None = None,
     ) -> SimObject:
         """Puts an object with the middle of its underside at (x, y, z)."""
-        item = default_object(kind, np.zeros(3), yaw, None if size is None else np.array(size))
+        item = default_object(object_type, np.zeros(3), yaw, None if size is None else np.array(size))
         item.place_bottom(np.array([x, y, z]))
-        named = default_object(kind, np.round(item.position, 4), yaw, item.box_size)
+        named = default_object(object_type, np.round(item.position, 4), yaw, item.box_size)
         named.support = item.support
         self.objects.append(named)
         return named
@@ -55,7 +54,7 @@ class RoomPlan:
     def against(
         self,
         side: str,
-        kind: str,
+        object_type: str,
         at: float,
         y: float = 0.0,
         size: tuple[float, float, float] | None = None,
@@ -65,13 +64,13 @@ class RoomPlan:
 
         Args:
             side: `x-`, `x+`, `z-` or `z+`.
-            kind: type.
+            object_type: type.
             at: where along the wall, metres (x for z walls, z for x walls).
             y: height of its underside.
             size: width, height, depth; the usual one if None.
             gap: distance from the wall.
         """  # fmt: skip
-        depth = (SIZES[kind] if size is None else size)[2] / 2 + gap
+        depth = (type_named(object_type).size if size is None else size)[2] / 2 + gap
         room = self.room
         x, z, yaw = {
             "z+": (at, room.z_max - depth, 180.0),
@@ -79,7 +78,11 @@ class RoomPlan:
             "x+": (room.x_max - depth, at, 270.0),
             "x-": (room.x_min + depth, at, 90.0),
         }[side]
-        return self.place(kind, x, z, yaw, y, size)
+        return self.place(object_type, x, z, yaw, y, size)
+
+    def shuffled(self, options: Sequence[str]) -> list[str]:
+        """Sides or types in a random order."""
+        return [str(option) for option in self.random.permutation(options)]
 
     def span(self, side: str) -> tuple[float, float]:
         """From and to of a wall along its length."""
@@ -93,15 +96,15 @@ class RoomPlan:
         return not any(aabb_overlap(grown_low, grown_high, a, b) for a, b in boxes)
 
     def try_against(
-        self, kind: str, sides: Iterable[str], size: tuple[float, float, float] | None = None, y: float = 0.0
+        self, object_type: str, sides: Iterable[str], size: tuple[float, float, float] | None = None, y: float = 0.0
     ) -> SimObject | None:
         """Puts an object somewhere along one of the walls where there is room; None if there is none."""
-        width = (SIZES[kind] if size is None else size)[0]
+        width = (type_named(object_type).size if size is None else size)[0]
         for side in sides:
             start, end = self.span(side)
             places = np.arange(start + width / 2 + 0.1, end - width / 2 - 0.1 + 1e-6, 0.15)
             for at in self.random.permutation(places):
-                item = self.against(side, kind, round(float(at), 2), y, size, gap=0.02 if y == 0 else 0.0)
+                item = self.against(side, object_type, round(float(at), 2), y, size, gap=0.02 if y == 0 else 0.0)
                 self.objects.pop()
                 low, high = item.bounds()
                 blocked = any(s == side and a - width / 2 < at < b + width / 2 for s, a, b in self.room.openings)
@@ -133,8 +136,7 @@ class RoomPlan:
         zs = np.arange(np.ceil((room.z_min + _BODY) / CELL), np.floor((room.z_max - _BODY) / CELL) + 1) * CELL
         cells = np.array([(x, z) for x in xs for z in zs]).reshape(-1, 2)
         for low, high in boxes:
-            nearest = np.clip(cells, low[[0, 2]], high[[0, 2]])
-            cells = cells[np.hypot(*(cells - nearest).T) >= _BODY]
+            cells = cells[level_gaps(cells, low, high) >= _BODY]
         return [(float(x), float(z)) for x, z in cells]
 
 
@@ -156,14 +158,12 @@ def finish(name: str, seed: int, plans: list[RoomPlan], doors: list[tuple[float,
             objects[item.object_id] = item
     room = plans[0].room
     start = nav.nearest((room.x_min + room.x_max) / 2, (room.z_min + room.z_max) / 2)
-    yaw = max((0.0, 90.0, 180.0, 270.0), key=lambda angle: nav.freedom(*start, angle, reach=3.0))
+    yaw = nav.freest_yaw(*start, reach=3.0)
     agent = Agent(np.array([start[0], AGENT_HEIGHT, start[1]]), yaw)
     world = World(name, objects, tuple(p.room for p in plans), nav, agent, seed=seed)
     for plan in plans:
         _scatter(world, plan)
-    for item in world.objects.values():
-        if item.kind.pickupable:
-            world.templates.setdefault(item.object_type, []).append(item.duplicate(item.object_id))
+    world.keep_templates()
     return world
 
 
@@ -179,23 +179,20 @@ def _samples(grid: NavGrid) -> list[tuple[float, float]]:
 
 def _scatter(world: World, plan: RoomPlan) -> None:
     """Puts the plan's loose things into or onto the plan's furniture, where the agent can get at them."""
-    homes = [
-        o for o in plan.objects if o.kind.receptacle and o.object_type not in {"Floor", "Toaster", "CoffeeMachine"}
-    ]
-    for kind in plan.loose:
-        item = default_object(kind, np.zeros(3))
+    homes = [(o, o.type.stock) for o in plan.objects if o.type.receptacle and o.type.stock is not None]
+    for object_type in plan.loose:
+        item = default_object(object_type, np.zeros(3))
         item.style = int(plan.random.integers(1000))
-        fitting = [o for o in homes if allowed_in(kind, o.object_type)]
-        holders = [o for o in fitting if o.object_type.endswith("Holder")]
+        fitting = [(o, stock) for o, stock in homes if allowed_in(object_type, o.object_type)]
+        holders = [(o, stock) for o, stock in fitting if o.object_type.endswith("Holder")]
         order = [*holders, *(fitting[i] for i in plan.random.permutation(len(fitting)))]
-        for home in order:
+        for home, stock in order:
             place = find_place(world, item, home, random=plan.random)
-            full = len(home.contents) >= _AT_MOST.get(home.object_type, 99)
-            if place is None or full:
+            if place is None or len(home.contents) >= stock:
                 continue
-            made = default_object(kind, np.round(place.position, 4), float(place.rotation[1]))
+            made = default_object(object_type, np.round(place.position, 4), float(place.rotation[1]))
             made.style = item.style
-            made.state.openness = 1.0 if kind in {"Box", "Laptop"} else 0.0  # as AI2-THOR's rooms have them
+            made.state.openness = 1.0 if made.type.starts_open else 0.0  # as AI2-THOR's rooms have them
             if made.object_id not in world.objects:
                 world.add(made)
                 world.attach(made, home)

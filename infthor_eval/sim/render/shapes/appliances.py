@@ -1,18 +1,18 @@
 """Machines, screens and lamps."""
 
-from collections.abc import Callable
-
 from infthor_eval.sim.render.primitives import Color, Material
 from infthor_eval.sim.render.shapes.builder import Builder, shade_of
 from infthor_eval.sim.render.shapes.palette import BLACK, BRASS, CHROME, DARK, STEEL, WHITE, pick
+from infthor_eval.sim.render.shapes.register import draws
 
-__all__ = ["SHAPES"]
+__all__: list[str] = []
 
 _SCREEN: Color = (0.35, 0.6, 0.9)
 _WARM: Color = (1.0, 0.93, 0.7)
 _SHADES: tuple[Color, ...] = ((0.9, 0.85, 0.72), (0.75, 0.35, 0.3), (0.5, 0.6, 0.68))
 
 
+@draws
 def toaster(b: Builder) -> None:
     """A rounded box with two slots, glowing inside while on."""
     color = pick((STEEL, (0.7, 0.2, 0.18), WHITE), b.style)
@@ -24,6 +24,7 @@ def toaster(b: Builder) -> None:
     b.box((0, 1.0, 0), (0.02, 0.01, 0.9), shade_of(color, 0.7))
 
 
+@draws
 def coffee_machine(b: Builder) -> None:
     """A back with a tank, a head, and a plate for the mug in front; a stream and a light while on."""
     color = pick((BLACK, STEEL, (0.5, 0.15, 0.14)), b.style)
@@ -37,6 +38,7 @@ def coffee_machine(b: Builder) -> None:
         b.tube((0, -0.2, 0.25), (0.05, 0.5, 0.05), (0.3, 0.17, 0.08))
 
 
+@draws
 def television(b: Builder) -> None:
     """A flat screen on a foot."""
     screen = _SCREEN if b.state.toggled else (0.06, 0.07, 0.09)
@@ -49,6 +51,7 @@ def television(b: Builder) -> None:
         b.box((0, 0.1, z * 1.3), (0.6, 0.01, z * 0.2), WHITE, tilt=(0, 0, 30))
 
 
+@draws
 def desktop(b: Builder) -> None:
     """A screen with a keyboard before it."""
     screen = _SCREEN if b.state.toggled else (0.06, 0.07, 0.09)
@@ -58,6 +61,7 @@ def desktop(b: Builder) -> None:
     b.box((0, -0.95, 0.6), (0.6, 0.05, 0.35), DARK)
 
 
+@draws
 def laptop(b: Builder) -> None:
     """Keyboard and lid; the lid lies flat when closed."""
     y = b.thick(0.01, 1)
@@ -72,11 +76,13 @@ def laptop(b: Builder) -> None:
     b.box((0, 0.05, -0.88 + z), (0.92, 0.86, z * 0.4), screen, Material.GLASS, glow=0.85 if b.state.toggled else 0.0)
 
 
+@draws
 def desk_lamp(b: Builder) -> None:
     """A foot, a stem and a shade that is bright when lit."""
     _lamp(b, foot=0.35, shade_low=0.2)
 
 
+@draws
 def floor_lamp(b: Builder) -> None:
     """The same, tall."""
     _lamp(b, foot=0.6, shade_low=0.62)
@@ -92,6 +98,7 @@ def _lamp(b: Builder, foot: float, shade_low: float) -> None:
     b.tube((0, middle, 0), (1, half, 1), color, Material.FABRIC, top=0.6, glow=0.95 if lit else 0.0)
 
 
+@draws
 def cell_phone(b: Builder) -> None:
     """A slab with a screen."""
     b.box((0, -0.1, 0), (1, 0.9, 1), BLACK)
@@ -99,6 +106,7 @@ def cell_phone(b: Builder) -> None:
     b.box((0, 0.9, 0), (0.88, 0.1, 0.9), _SCREEN if lit else (0.2, 0.24, 0.32), glow=0.8 if lit else 0.0)
 
 
+@draws
 def remote(b: Builder) -> None:
     """A bar with rows of keys."""
     b.box((0, -0.2, 0), (1, 0.8, 1), DARK)
@@ -108,6 +116,7 @@ def remote(b: Builder) -> None:
     b.box((-0.45, 0.75, 0.85), (0.18, 0.22, 0.08), (0.85, 0.2, 0.15))
 
 
+@draws
 def vacuum(b: Builder) -> None:
     """A head, a body and a handle."""
     b.box((0, -0.9, 0.4), (1, 0.1, 0.6), (0.6, 0.15, 0.15))
@@ -115,6 +124,7 @@ def vacuum(b: Builder) -> None:
     b.rod((0, 0.6, -0.5), 0.015, float(b.half[1]) * 0.4, 1, DARK)
 
 
+@draws
 def alarm_clock(b: Builder) -> None:
     """A clock with a face, hands and two bells."""
     color = pick(((0.75, 0.2, 0.18), BRASS, (0.3, 0.5, 0.5)), b.style)
@@ -124,18 +134,3 @@ def alarm_clock(b: Builder) -> None:
     b.box((0.2, -0.1, 1), (0.22, 0.05, 0.05), BLACK)
     for side in (-1, 1):
         b.ball((side * 0.5, 0.85, 0), (0.35, 0.15, 0.4), BRASS, Material.METAL)
-
-
-SHAPES: dict[str, Callable[[Builder], None]] = {
-    "AlarmClock": alarm_clock,
-    "CellPhone": cell_phone,
-    "CoffeeMachine": coffee_machine,
-    "DeskLamp": desk_lamp,
-    "Desktop": desktop,
-    "FloorLamp": floor_lamp,
-    "Laptop": laptop,
-    "RemoteControl": remote,
-    "Television": television,
-    "Toaster": toaster,
-    "VacuumCleaner": vacuum,
-}

@@ -6,8 +6,8 @@ from typing import TypedDict, Unpack
 import numpy as np
 
 from infthor_eval.sim.geometry import Array, euler_matrix, yaw_matrix
-from infthor_eval.sim.objects import ObjectState, SimObject
-from infthor_eval.sim.render.primitives import Color, Kind, Material, Part
+from infthor_eval.sim.objects import SimObject, SimObjectState
+from infthor_eval.sim.render.primitives import Color, Form, Material, ShapePart
 
 __all__ = ["Builder", "shade_of"]
 
@@ -20,7 +20,7 @@ def shade_of(color: Color, factor: float) -> Color:
 
 
 class Details(TypedDict, total=False):
-    """Optional properties of a part; see `Part`."""
+    """Optional properties of a part; see `ShapePart`."""
 
     tilt: Vector
     bottom: float
@@ -37,17 +37,25 @@ class Builder:
 
     def __init__(self, item: SimObject) -> None:
         self.item = item
-        self.state: ObjectState = item.state
-        self.parts: list[Part] = []
+        self.state: SimObjectState = item.state
+        self.parts: list[ShapePart] = []
         self.style = item.style
         self._turn = yaw_matrix(item.front)
-        turned = round(item.front / 90) % 2
-        x, y, z = (float(v) / 2 for v in item.box_size)
-        self.half: Array = np.array([z, y, x] if turned else [x, y, z])
+        self.half: Array = item.front_size / 2
 
     def thick(self, metres: float, axis: int) -> float:
         """A length in metres as a fraction of the half box along `axis`, at most 1."""
         return min(1.0, metres / max(float(self.half[axis]), 1e-6))
+
+    @property
+    def slenderness(self) -> float:
+        """The shorter of its two horizontal sides as a share of the longer one."""
+        sides = float(self.half[0]), float(self.half[2])
+        return min(sides) / max(sides)
+
+    def lengthwise(self, along: float, y: float, across: float) -> tuple[float, float, float]:
+        """A position or half extents given along and across the longer of the two horizontal sides."""
+        return (along, y, across) if self.half[0] >= self.half[2] else (across, y, along)
 
     def metric(self, at: Vector) -> Array:
         """A position given in fractions, as metres in the object's frame (3,)."""
@@ -55,7 +63,7 @@ class Builder:
 
     def add(
         self,
-        kind: Kind,
+        form: Form,
         at: Vector,
         half: Vector,
         color: Color,
@@ -69,31 +77,31 @@ class Builder:
         """Adds a primitive; `tilt` are Euler angles in degrees about its own middle."""
         matrix = self._turn @ euler_matrix(tilt) if any(tilt) else self._turn
         metres = np.asarray(half, dtype=float) * self.half
-        self.parts.append(Part(kind, self.metric(at), metres, color, material, matrix, bottom, top, glow))
+        self.parts.append(ShapePart(form, self.metric(at), metres, color, material, matrix, bottom, top, glow))
 
     def box(
         self, at: Vector, half: Vector, color: Color, material: Material = Material.PLAIN, **more: Unpack[Details]
     ) -> None:
         """Adds a box."""
-        self.add(Kind.BOX, at, half, color, material, **more)
+        self.add(Form.BOX, at, half, color, material, **more)
 
     def ball(
         self, at: Vector, half: Vector, color: Color, material: Material = Material.PLAIN, **more: Unpack[Details]
     ) -> None:
         """Adds an ellipsoid."""
-        self.add(Kind.ELLIPSOID, at, half, color, material, **more)
+        self.add(Form.ELLIPSOID, at, half, color, material, **more)
 
     def tube(
         self, at: Vector, half: Vector, color: Color, material: Material = Material.PLAIN, **more: Unpack[Details]
     ) -> None:
         """Adds an upright cylinder; `bottom` and `top` are its relative radii."""
-        self.add(Kind.CYLINDER, at, half, color, material, **more)
+        self.add(Form.CYLINDER, at, half, color, material, **more)
 
     def cup(
         self, at: Vector, half: Vector, color: Color, material: Material = Material.PLAIN, **more: Unpack[Details]
     ) -> None:
         """Adds a cylinder that is open at the top."""
-        self.add(Kind.CUP, at, half, color, material, **more)
+        self.add(Form.CUP, at, half, color, material, **more)
 
     def open_front(self, color: Color, material: Material, wall: float) -> None:
         """Adds a box without its front: five boards `wall` metres thick."""
@@ -117,11 +125,13 @@ class Builder:
         """Adds a round bar, `radius` and half `length` in metres, along axis 0 (x), 1 (y) or 2 (z)."""
         tilt = {0: (0.0, 0.0, 90.0), 1: (0.0, 0.0, 0.0), 2: (90.0, 0.0, 0.0)}[axis]
         matrix = self._turn @ euler_matrix(tilt)
-        self.parts.append(Part(Kind.CYLINDER, self.metric(at), (radius, length, radius), color, Material.METAL, matrix))
+        self.parts.append(
+            ShapePart(Form.CYLINDER, self.metric(at), (radius, length, radius), color, Material.METAL, matrix)
+        )
 
     def slab(self, at: Vector, metres: Vector, color: Color, material: Material = Material.PLAIN) -> None:
         """Adds a box whose half extents are given in metres."""
-        self.parts.append(Part(Kind.BOX, self.metric(at), tuple(metres), color, material, self._turn))
+        self.parts.append(ShapePart(Form.BOX, self.metric(at), tuple(metres), color, material, self._turn))
 
     def swung(
         self, hinge: Vector, offset: Vector, metres: Vector, angle: float, color: Color, material: Material
@@ -138,4 +148,4 @@ class Builder:
         """
         turn = self._turn @ yaw_matrix(angle)
         center = self.metric(hinge) + turn @ np.asarray(offset, dtype=float)
-        self.parts.append(Part(Kind.BOX, center, tuple(metres), color, material, turn))
+        self.parts.append(ShapePart(Form.BOX, center, tuple(metres), color, material, turn))

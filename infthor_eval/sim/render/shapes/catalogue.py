@@ -1,40 +1,41 @@
-"""The register of shapes by object type, and what dirt does to any of them."""
+"""What any object looks like: the drawing that its type names, and what dirt does to it."""
 
-from collections.abc import Callable
 from dataclasses import replace
 
 from infthor_eval.sim.objects import SimObject
-from infthor_eval.sim.render.primitives import Color, Part
-from infthor_eval.sim.render.shapes import appliances, fixtures, food, household, kitchenware, seats, storage, tables
+from infthor_eval.sim.render.primitives import Color, ShapePart
+from infthor_eval.sim.render.shapes import (  # noqa: F401 - imported to be registered
+    appliances,
+    fixtures,
+    food,
+    household,
+    kitchenware,
+    seats,
+    storage,
+    tables,
+)
 from infthor_eval.sim.render.shapes.builder import Builder
+from infthor_eval.sim.render.shapes.register import SHAPES, draws
 
-__all__ = ["SHAPES", "shape"]
+__all__ = ["shape"]
 
-SHAPES: dict[str, Callable[[Builder], None]] = {
-    **appliances.SHAPES,
-    **fixtures.SHAPES,
-    **food.SHAPES,
-    **household.SHAPES,
-    **kitchenware.SHAPES,
-    **seats.SHAPES,
-    **storage.SHAPES,
-    **tables.SHAPES,
-}
 _DIRT: Color = (0.36, 0.27, 0.16)
 _DIRT_SHARE = 0.45
 
 
-def shape(item: SimObject) -> list[Part]:
-    """The parts of an object in its own frame, as its type and state make it look; an unknown type is a plain box."""
+def shape(item: SimObject) -> list[ShapePart]:
+    """The parts of an object in its own frame, as its type and state make it look."""
     board = Builder(item)
-    draw = SHAPES.get(item.object_type)
-    if draw is None:
-        board.box((0, 0, 0), (1, 1, 1), (0.6, 0.55, 0.5))
-    else:
-        draw(board)
+    SHAPES[item.type.shape](board)
     if item.state.dirty:
         return [replace(part, color=_soiled(part.color)) for part in board.parts]
     return board.parts
+
+
+@draws
+def box(b: Builder) -> None:
+    """A plain box, for types that name no other shape."""
+    b.box((0, 0, 0), (1, 1, 1), (0.6, 0.55, 0.5))
 
 
 def _soiled(color: Color) -> Color:

@@ -1,26 +1,27 @@
 """What is built into rooms: sinks, taps, baths, toilets, windows, pictures, switches, stoves, rails."""
 
-from collections.abc import Callable
-
-from infthor_eval.sim.render.primitives import Color, Kind, Material
+from infthor_eval.sim.render.primitives import Color, Form, Material
 from infthor_eval.sim.render.shapes.builder import Builder, shade_of
 from infthor_eval.sim.render.shapes.palette import BLACK, BRASS, CHROME, CLOTHS, DARK, GLASS, STEEL, WHITE, WOODS, pick
+from infthor_eval.sim.render.shapes.register import draws
 from infthor_eval.sim.render.shapes.tables import cut_slab
 from infthor_eval.sim.render.shell import FLOORS
 from infthor_eval.sim.world import FLOOR_STYLES
 
-__all__ = ["SHAPES"]
+__all__: list[str] = []
 
 _CERAMIC: Color = (0.95, 0.95, 0.93)
 _SKY: Color = (0.66, 0.83, 0.97)
 _WATER: Color = (0.55, 0.75, 0.9)
 
 
+@draws
 def floor(b: Builder) -> None:
     """The floor of a room; its style is an index of `FLOORS`."""
     cut_slab(b, 0.0, 1.0, *FLOORS[FLOOR_STYLES[b.style % len(FLOOR_STYLES)]])
 
 
+@draws
 def sink(b: Builder) -> None:
     """A rim of steel or stone around the basins; a hollow tub where the basins are not objects of their own."""
     color = STEEL if b.style % 2 else _CERAMIC
@@ -31,13 +32,25 @@ def sink(b: Builder) -> None:
     cut_slab(b, 1 - rim, rim, color, Material.METAL)
 
 
-def basin(b: Builder) -> None:
+@draws
+def sink_basin(b: Builder) -> None:
+    """A basin of steel or ceramic."""
+    _basin(b, steel=b.style % 2 == 1)
+
+
+@draws
+def bathtub_basin(b: Builder) -> None:
+    """A basin of ceramic."""
+    _basin(b, steel=False)
+
+
+def _basin(b: Builder, steel: bool) -> None:
     """A tub with a drain."""
-    steel = b.style % 2 == 1 and b.item.object_type == "SinkBasin"
     b.open_top(STEEL if steel else _CERAMIC, Material.METAL if steel else Material.PLAIN, 0.014)
     b.tube((0, -0.93, 0), (b.thick(0.025, 0), 0.03, b.thick(0.025, 2)), DARK)
 
 
+@draws
 def faucet(b: Builder) -> None:
     """A tap: a post, a spout to the front, two handles; water falls while it is on."""
     r = 0.014
@@ -51,11 +64,13 @@ def faucet(b: Builder) -> None:
         b.rod((0, -0.35, 0.85), 0.008, float(b.half[1]) * 0.9, 1, _WATER)
 
 
+@draws
 def bathtub(b: Builder) -> None:
     """A white tub; its bottom is an object of its own where the recording has one."""
     b.open_top(_CERAMIC, Material.PLAIN, 0.07)
 
 
+@draws
 def toilet(b: Builder) -> None:
     """A bowl in front of a tank."""
     b.box((0, 0.45, -0.72), (0.95, 0.55, 0.28), _CERAMIC)
@@ -71,6 +86,7 @@ def toilet(b: Builder) -> None:
     b.box((-0.7, 0.6, -0.42), (0.12, 0.03, 0.03), CHROME, Material.METAL)
 
 
+@draws
 def window(b: Builder) -> None:
     """A bright pane in a white frame with a cross, at the wall side of its box."""
     x, y, z = b.thick(0.03, 0), b.thick(0.03, 1), b.thick(0.05, 2)
@@ -85,6 +101,7 @@ def window(b: Builder) -> None:
         b.box((0.2, 0.3, at), (0.5, 0.02, z), BLACK, tilt=(0, 0, 40))
 
 
+@draws
 def curtains(b: Builder) -> None:
     """Cloth in folds on a rail."""
     color = pick(CLOTHS, b.style)
@@ -94,6 +111,7 @@ def curtains(b: Builder) -> None:
     b.rod((0, 0.97, 0), 0.012, float(b.half[0]), 0, BRASS)
 
 
+@draws
 def blinds(b: Builder) -> None:
     """Slats: a bundle at the top when open."""
     count = 3 if b.state.openness > 0 else 9
@@ -101,6 +119,7 @@ def blinds(b: Builder) -> None:
         b.box((0, 0.95 - index * 1.9 / count, 0), (1, 0.75 / count, 0.6), (0.9, 0.88, 0.82))
 
 
+@draws
 def painting(b: Builder) -> None:
     """A framed picture of hills."""
     x, y = b.thick(0.04, 0), b.thick(0.04, 1)
@@ -110,6 +129,7 @@ def painting(b: Builder) -> None:
     b.ball((0.35, 0.4, 0.85), (0.15, 0.15 * float(b.half[0] / b.half[1]), 0.06), (0.95, 0.85, 0.4))
 
 
+@draws
 def mirror(b: Builder) -> None:
     """A shiny plate in a frame."""
     b.box((0, 0, -0.3), (1, 1, 0.7), STEEL, Material.METAL)
@@ -119,6 +139,7 @@ def mirror(b: Builder) -> None:
         b.box((0, 0.1, 0.9), (0.7, 0.01, 0.05), BLACK, tilt=(0, 0, 35))
 
 
+@draws
 def light_switch(b: Builder) -> None:
     """A plate with a rocker."""
     b.box((0, 0, -0.2), (1, 1, 0.8), WHITE)
@@ -126,6 +147,7 @@ def light_switch(b: Builder) -> None:
     b.box((0, up, 0.5), (0.4, 0.35, 0.5), (0.75, 0.75, 0.72))
 
 
+@draws
 def burner(b: Builder) -> None:
     """A ring on the stove, glowing while it is on."""
     hot = b.state.toggled
@@ -134,13 +156,15 @@ def burner(b: Builder) -> None:
     b.tube((0, 0.4, 0), (0.35, 1, 0.35), (1.0, 0.45, 0.15) if hot else DARK, glow=0.8 if hot else 0.0)
 
 
+@draws
 def knob(b: Builder) -> None:
     """A round knob with a mark."""
-    b.add(Kind.CYLINDER, (0, 0, 0), (1, 1, 1), DARK, tilt=(90, 0, 0))
+    b.add(Form.CYLINDER, (0, 0, 0), (1, 1, 1), DARK, tilt=(90, 0, 0))
     turn = 90.0 if b.state.toggled else 0.0
-    b.add(Kind.BOX, (0, 0, 0.95), (0.12, 0.9, 0.1), WHITE, tilt=(0, 0, turn))
+    b.add(Form.BOX, (0, 0, 0.95), (0.12, 0.9, 0.1), WHITE, tilt=(0, 0, turn))
 
 
+@draws
 def shower_head(b: Builder) -> None:
     """A pipe with a rose; drops fall while it is on."""
     b.rod((0, -0.1, -0.8), 0.012, float(b.half[1]) * 0.9, 1, CHROME)
@@ -151,6 +175,7 @@ def shower_head(b: Builder) -> None:
             b.rod((x, -0.1, z), 0.005, float(b.half[1]) * 0.8, 1, _WATER)
 
 
+@draws
 def shower_glass(b: Builder) -> None:
     """A frame around a pane that one sees through: only its edges are drawn."""
     x, y, z = b.thick(0.012, 0), b.thick(0.012, 1), b.thick(0.012, 2)
@@ -164,12 +189,14 @@ def shower_glass(b: Builder) -> None:
             b.box((0, side * (1 - y), 0), (1, y, min(1.0, z * 2)), CHROME, Material.METAL)
 
 
+@draws
 def shower_door(b: Builder) -> None:
     """The framed door of a shower, swung out when open, with a grip."""
     shower_glass(b)
     b.box((0, 0, 0.6) if b.half[0] < b.half[2] else (0.6, 0, 0), (b.thick(0.02, 0), 0.12, b.thick(0.02, 2)), GLASS)
 
 
+@draws
 def shower_curtain(b: Builder) -> None:
     """A curtain on a rail, gathered to one side when open."""
     color = pick(CLOTHS, b.style + 2)
@@ -177,12 +204,12 @@ def shower_curtain(b: Builder) -> None:
     share = 0.35 if b.state.openness > 0 else 1.0
     for index in range(6):
         at = -1 + share * (2 * index + 1) / 6
-        where = (at, 0, 0) if long == 0 else (0, 0, at)
-        half = (share / 5, 1, 0.5) if long == 0 else (0.5, 1, share / 5)
-        b.tube(where, half, shade_of(color, 0.95 + 0.1 * (index % 2)), Material.FABRIC)
+        fold = shade_of(color, 0.95 + 0.1 * (index % 2))
+        b.tube(b.lengthwise(at, 0, 0), b.lengthwise(share / 5, 1, 0.5), fold, Material.FABRIC)
     b.rod((0, 0.99, 0), 0.012, float(b.half[long]), long, CHROME)
 
 
+@draws
 def rail(b: Builder) -> None:
     """A bar that a towel hangs on."""
     b.rod((0, 0, 0.5), 0.01, float(b.half[0]), 0, CHROME)
@@ -190,43 +217,17 @@ def rail(b: Builder) -> None:
         b.box((side * 0.92, 0, -0.2), (0.06, 0.9, 0.8), CHROME, Material.METAL)
 
 
+@draws
 def paper_hanger(b: Builder) -> None:
     """A holder for a roll of paper."""
     b.rod((0, 0, 0.4), 0.012, float(b.half[0]), 0, CHROME)
     b.box((0, 0, -0.8), (0.9, 0.8, 0.2), CHROME, Material.METAL)
 
 
+@draws
 def doorway(b: Builder) -> None:
     """A door frame."""
     x, y = b.thick(0.05, 0), b.thick(0.05, 1)
     for side in (-1, 1):
         b.box((side * (1 - x), 0, 0), (x, 1, 1), WHITE, Material.WOOD)
     b.box((0, 1 - y, 0), (1, y, 1), WHITE, Material.WOOD)
-
-
-SHAPES: dict[str, Callable[[Builder], None]] = {
-    "Bathtub": bathtub,
-    "BathtubBasin": basin,
-    "Blinds": blinds,
-    "Curtains": curtains,
-    "Doorway": doorway,
-    "Faucet": faucet,
-    "Floor": floor,
-    "HandTowelHolder": rail,
-    "LightSwitch": light_switch,
-    "Mirror": mirror,
-    "Painting": painting,
-    "Poster": painting,
-    "ShowerCurtain": shower_curtain,
-    "ShowerDoor": shower_door,
-    "ShowerGlass": shower_glass,
-    "ShowerHead": shower_head,
-    "Sink": sink,
-    "SinkBasin": basin,
-    "StoveBurner": burner,
-    "StoveKnob": knob,
-    "Toilet": toilet,
-    "ToiletPaperHanger": paper_hanger,
-    "TowelHolder": rail,
-    "Window": window,
-}

@@ -1,8 +1,6 @@
 """Small things of living rooms, bedrooms and bathrooms."""
 
-from collections.abc import Callable
-
-from infthor_eval.sim.render.primitives import Color, Kind, Material
+from infthor_eval.sim.render.primitives import Color, Form, Material
 from infthor_eval.sim.render.shapes.builder import Builder, shade_of
 from infthor_eval.sim.render.shapes.palette import (
     BLACK,
@@ -18,12 +16,14 @@ from infthor_eval.sim.render.shapes.palette import (
     WOODS,
     pick,
 )
+from infthor_eval.sim.render.shapes.register import draws
 
-__all__ = ["SHAPES"]
+__all__: list[str] = []
 
 _COVERS: tuple[Color, ...] = ((0.6, 0.18, 0.15), (0.18, 0.3, 0.5), (0.2, 0.42, 0.3), (0.55, 0.42, 0.2))
 
 
+@draws
 def book(b: Builder) -> None:
     """Covers around pages; two leaves when open."""
     color = pick(_COVERS, b.style)
@@ -39,12 +39,14 @@ def book(b: Builder) -> None:
     b.box((0.1, 0.99, 0.2), (0.5, 0.02, 0.3), shade_of(color, 1.6))
 
 
+@draws
 def newspaper(b: Builder) -> None:
     """A folded paper with lines."""
     b.box((0, 0, 0), (1, 1, 1), (0.85, 0.85, 0.82), Material.PAPER)
     b.box((0, 0.95, 0.75), (0.9, 0.08, 0.12), DARK)
 
 
+@draws
 def card(b: Builder) -> None:
     """A plastic card with a stripe and a chip."""
     b.box((0, 0, 0), (1, 1, 1), pick(((0.15, 0.3, 0.65), (0.75, 0.6, 0.2), (0.5, 0.12, 0.2)), b.style))
@@ -52,6 +54,7 @@ def card(b: Builder) -> None:
     b.box((-0.5, 0.9, -0.2), (0.18, 0.2, 0.2), BRASS)
 
 
+@draws
 def pen(b: Builder) -> None:
     """A pen with its cap."""
     color = pick(((0.1, 0.15, 0.5), (0.1, 0.1, 0.1), (0.6, 0.1, 0.1)), b.style)
@@ -59,6 +62,7 @@ def pen(b: Builder) -> None:
     b.box((0, 0, -0.65), (1, 1, 0.35), shade_of(color, 1.6))
 
 
+@draws
 def pencil(b: Builder) -> None:
     """A yellow pencil with a rubber and a point."""
     b.box((0, 0, 0.05), (1, 1, 0.75), (0.93, 0.75, 0.15))
@@ -66,12 +70,14 @@ def pencil(b: Builder) -> None:
     b.box((0, 0, -0.85), (0.5, 0.5, 0.15), (0.75, 0.6, 0.4))
 
 
+@draws
 def disc(b: Builder) -> None:
     """A shiny disc with a hole."""
     b.tube((0, 0, 0), (1, 1, 1), (0.75, 0.8, 0.88), Material.METAL)
     b.tube((0, 0.1, 0), (0.2, 1, 0.2), (0.35, 0.36, 0.4))
 
 
+@draws
 def keys(b: Builder) -> None:
     """A ring with two keys."""
     b.tube((-0.6, 0, 0), (0.4, 0.6, 0.7), BRASS, Material.METAL)
@@ -80,12 +86,14 @@ def keys(b: Builder) -> None:
     b.box((0.3, 0.2, -0.4), (0.6, 0.6, 0.15), BRASS, Material.METAL, tilt=(0, 15, 0))
 
 
+@draws
 def watch(b: Builder) -> None:
     """A face on a strap."""
     b.tube((0, 0, 0), (0.95, 0.7, 0.95), DARK)
     b.tube((0, 0.5, 0), (0.7, 0.5, 0.7), (0.9, 0.85, 0.6), Material.METAL)
 
 
+@draws
 def pillow(b: Builder) -> None:
     """A soft cushion."""
     color = pick(CLOTHS, b.style)
@@ -93,6 +101,7 @@ def pillow(b: Builder) -> None:
     b.box((0, 0, 0), (0.85, 0.5, 0.85), shade_of(color, 1.05), Material.FABRIC)
 
 
+@draws
 def teddy(b: Builder) -> None:
     """Body, head, ears, arms and legs."""
     fur: Color = (0.6, 0.42, 0.25)
@@ -106,18 +115,21 @@ def teddy(b: Builder) -> None:
         b.ball((side * 0.18, 0.6, 0.6), (0.05, 0.05, 0.05), BLACK)
 
 
+@draws
 def ball(b: Builder) -> None:
     """An orange ball with seams."""
     b.ball((0, 0, 0), (0.99, 0.99, 0.99), (0.85, 0.42, 0.12), Material.STONE)
     b.tube((0, 0, 0), (1.005, 0.02, 1.005), BLACK)
-    b.add(Kind.CYLINDER, (0, 0, 0), (1.005, 0.02, 1.005), BLACK, tilt=(0, 0, 90))
+    b.add(Form.CYLINDER, (0, 0, 0), (1.005, 0.02, 1.005), BLACK, tilt=(0, 0, 90))
 
 
+@draws
 def bat(b: Builder) -> None:
     """A bat along its longest side."""
     _club(b, (0.7, 0.5, 0.3), thick=1.0, handle=0.45)
 
 
+@draws
 def racket(b: Builder) -> None:
     """A frame of strings on a handle, along its longest side."""
     axis = max(range(3), key=lambda i: float(b.half[i]))
@@ -139,6 +151,7 @@ def _club(b: Builder, color: Color, thick: float, handle: float) -> None:
     b.rod(low, radius * handle, length * 0.4, axis, shade_of(color, 0.7))
 
 
+@draws
 def candle(b: Builder) -> None:
     """A wax stick with a wick, and a flame when lit."""
     b.tube((0, -0.15, 0), (1, 0.85, 1), pick(((0.93, 0.88, 0.75), (0.7, 0.3, 0.3), (0.5, 0.6, 0.7)), b.style))
@@ -147,6 +160,7 @@ def candle(b: Builder) -> None:
         b.ball((0, 1.0, 0), (0.25, 0.25, 0.25), (1.0, 0.75, 0.2), glow=1.0)
 
 
+@draws
 def vase(b: Builder) -> None:
     """A belly with a narrow neck."""
     color = pick(CERAMICS, b.style + 1)
@@ -157,6 +171,7 @@ def vase(b: Builder) -> None:
     b.cup((0, 0.6, 0), (0.55, 0.4, 0.55), color, bottom=0.6)
 
 
+@draws
 def statue(b: Builder) -> None:
     """A figure on a plinth."""
     color = pick((BRASS, (0.75, 0.73, 0.7), (0.35, 0.3, 0.28)), b.style)
@@ -173,6 +188,7 @@ def _shards(b: Builder, color: Color) -> None:
         b.box((x, -0.85, z), (0.3, 0.12, 0.2), color, tilt=(0, 40 * index, 12))
 
 
+@draws
 def plant(b: Builder) -> None:
     """Leaves in a pot."""
     b.tube((0, -0.72, 0), (0.6, 0.28, 0.6), (0.62, 0.34, 0.22), top=1.0, bottom=0.75)
@@ -187,6 +203,7 @@ def _bottle_with_head(b: Builder, color: Color, head: Color) -> None:
     b.box((0, 0.88, 0.25), (0.35, 0.12, 0.65), head)
 
 
+@draws
 def soap_bottle(b: Builder) -> None:
     """A bottle with a pump; flat when used up."""
     color: Color = (
@@ -195,23 +212,27 @@ def soap_bottle(b: Builder) -> None:
     _bottle_with_head(b, color, WHITE)
 
 
+@draws
 def spray_bottle(b: Builder) -> None:
     """A bottle with a trigger."""
     _bottle_with_head(b, pick(((0.25, 0.45, 0.8), (0.3, 0.7, 0.4)), b.style), (0.85, 0.25, 0.2))
 
 
+@draws
 def soap_bar(b: Builder) -> None:
     """A rounded bar."""
     b.ball((0, 0, 0), (1.05, 1, 1.05), (0.93, 0.82, 0.7))
     b.box((0, 0, 0), (0.85, 0.9, 0.88), (0.95, 0.86, 0.74))
 
 
+@draws
 def sponge(b: Builder) -> None:
     """Two layers."""
     b.box((0, -0.3, 0), (1, 0.7, 1), (0.95, 0.82, 0.25), Material.STONE)
     b.box((0, 0.7, 0), (1, 0.3, 1), (0.25, 0.5, 0.3), Material.FABRIC)
 
 
+@draws
 def cloth(b: Builder) -> None:
     """A crumpled rag."""
     color: Color = (0.45, 0.38, 0.3) if b.state.dirty else pick(CLOTHS, b.style)
@@ -219,6 +240,7 @@ def cloth(b: Builder) -> None:
     b.box((0.1, 0.6, -0.1), (0.6, 0.4, 0.5), shade_of(color, 1.15), Material.FABRIC, tilt=(0, 25, 0))
 
 
+@draws
 def towel(b: Builder) -> None:
     """A hanging or lying cloth with a border."""
     color = pick(CLOTHS, b.style + 1)
@@ -230,6 +252,7 @@ def towel(b: Builder) -> None:
     b.box(at, half, WHITE, Material.FABRIC)
 
 
+@draws
 def toilet_paper(b: Builder) -> None:
     """A roll with a core along its axis of equal sides."""
     color: Color = (0.7, 0.6, 0.45) if b.state.used_up else WHITE
@@ -238,6 +261,7 @@ def toilet_paper(b: Builder) -> None:
     b.tube((0, 0.02, 0), (0.35, 1, 0.35), (0.6, 0.48, 0.33))
 
 
+@draws
 def tissue_box(b: Builder) -> None:
     """A box with a tissue sticking out."""
     b.box((0, -0.15, 0), (1, 0.85, 1), pick(((0.5, 0.65, 0.8), (0.8, 0.6, 0.65)), b.style))
@@ -245,13 +269,25 @@ def tissue_box(b: Builder) -> None:
         b.tube((0, 0.8, 0), (0.3, 0.2, 0.3), WHITE, bottom=0.4)
 
 
-def stick_tool(b: Builder) -> None:
-    """A plunger or a brush: a stick with a working end at its foot."""
-    color: Color = (0.65, 0.2, 0.15) if b.item.object_type == "Plunger" else (0.9, 0.9, 0.92)
+@draws
+def plunger(b: Builder) -> None:
+    """A red bell on a stick."""
+    _stick_tool(b, (0.65, 0.2, 0.15))
+
+
+@draws
+def scrub_brush(b: Builder) -> None:
+    """White bristles on a stick."""
+    _stick_tool(b, (0.9, 0.9, 0.92))
+
+
+def _stick_tool(b: Builder, color: Color) -> None:
+    """A stick with a working end at its foot."""
     b.tube((0, -0.8, 0), (1, 0.2, 1), color, top=0.6)
     b.tube((0, 0.15, 0), (0.16, 0.85, 0.16), pick(WOODS, b.style))
 
 
+@draws
 def boots(b: Builder) -> None:
     """Two shafts with feet."""
     for side in (-1, 1):
@@ -259,14 +295,16 @@ def boots(b: Builder) -> None:
         b.box((side * 0.5, -0.78, 0.2), (0.42, 0.22, 0.8), (0.3, 0.18, 0.1))
 
 
+@draws
 def watering_can(b: Builder) -> None:
     """A can with a spout and a handle."""
     color: Color = (0.3, 0.55, 0.45)
     b.tube((0, -0.3, -0.2), (0.9, 0.7, 0.55), color, Material.METAL)
-    b.add(Kind.CYLINDER, (0, 0.0, 0.65), (0.15, 0.6, 0.1), color, tilt=(45, 0, 0))
+    b.add(Form.CYLINDER, (0, 0.0, 0.65), (0.15, 0.6, 0.1), color, tilt=(45, 0, 0))
     b.box((0, 0.85, -0.2), (0.15, 0.1, 0.5), shade_of(color, 0.8))
 
 
+@draws
 def dumbbell(b: Builder) -> None:
     """Two weights on a bar."""
     b.box((0, 0, 0), (0.25, 0.25, 1), CHROME, Material.METAL)
@@ -274,52 +312,16 @@ def dumbbell(b: Builder) -> None:
         b.box((0, 0, side * 0.7), (1, 1, 0.3), DARK)
 
 
+@draws
 def foil(b: Builder) -> None:
     """A roll of foil."""
     b.box((0, 0, 0), (1, 1, 1), STEEL, Material.METAL)
     b.box((0, 0.5, 0.9), (0.95, 0.5, 0.12), (0.3, 0.4, 0.7))
 
 
+@draws
 def decor(b: Builder) -> None:
     """A tall ornament."""
     b.tube((0, -0.9, 0), (1, 0.1, 1), DARK)
     b.tube((0, 0, 0), (0.6, 0.9, 0.6), pick(CERAMICS, b.style), top=0.5)
     b.ball((0, 0.75, 0), (0.5, 0.25, 0.5), pick(CERAMICS, b.style + 1))
-
-
-SHAPES: dict[str, Callable[[Builder], None]] = {
-    "AluminumFoil": foil,
-    "BaseballBat": bat,
-    "BasketBall": ball,
-    "Book": book,
-    "Boots": boots,
-    "CD": disc,
-    "Candle": candle,
-    "Cloth": cloth,
-    "CreditCard": card,
-    "DishSponge": sponge,
-    "Dumbbell": dumbbell,
-    "HandTowel": towel,
-    "HousePlant": plant,
-    "KeyChain": keys,
-    "Newspaper": newspaper,
-    "Pen": pen,
-    "Pencil": pencil,
-    "Pillow": pillow,
-    "Plunger": stick_tool,
-    "RoomDecor": decor,
-    "ScrubBrush": stick_tool,
-    "SoapBar": soap_bar,
-    "SoapBottle": soap_bottle,
-    "SprayBottle": spray_bottle,
-    "Statue": statue,
-    "TableTopDecor": decor,
-    "TeddyBear": teddy,
-    "TennisRacket": racket,
-    "TissueBox": tissue_box,
-    "ToiletPaper": toilet_paper,
-    "Towel": towel,
-    "Vase": vase,
-    "Watch": watch,
-    "WateringCan": watering_can,
-}

@@ -1,12 +1,11 @@
 """Dishes, pots, cutlery, bottles."""
 
-from collections.abc import Callable
-
-from infthor_eval.sim.render.primitives import Color, Kind, Material
+from infthor_eval.sim.render.primitives import Color, Form, Material
 from infthor_eval.sim.render.shapes.builder import Builder, shade_of
 from infthor_eval.sim.render.shapes.palette import BLACK, CERAMICS, CHROME, DARK, GLASS, STEEL, WHITE, WOODS, pick
+from infthor_eval.sim.render.shapes.register import draws
 
-__all__ = ["SHAPES"]
+__all__: list[str] = []
 
 _LIQUIDS: dict[str, Color] = {"water": (0.5, 0.72, 0.88), "coffee": (0.25, 0.14, 0.07), "wine": (0.45, 0.05, 0.12)}
 
@@ -17,25 +16,22 @@ def _liquid(b: Builder, level: float, radius: float, at: tuple[float, float] = (
         b.tube((at[0], level, at[1]), (radius, 0.02, radius), color)
 
 
+@draws
 def mug(b: Builder) -> None:
     """A cup with a handle on the longer side."""
     color = pick(CERAMICS, b.style)
-    long = 0 if b.half[0] >= b.half[2] else 2
-    ratio = min(1.0, float(b.half[2 - long] / b.half[long]))
-    shift = 1 - ratio
-    at = (-shift, 0, 0) if long == 0 else (0, 0, -shift)
-    half = (ratio, 1, 1) if long == 0 else (1, 1, ratio)
+    ratio = b.slenderness
+    at, half = b.lengthwise(ratio - 1, 0, 0), b.lengthwise(ratio, 1, 1)
     b.cup(at, half, color, bottom=0.85)
     b.tube((at[0], -0.92, at[2]), (half[0] * 0.85, 0.08, half[2] * 0.85), shade_of(color, 0.8))
     _liquid(b, 0.6, min(half[0], half[2]) * 0.9, (at[0], at[2]))
     reach = max(1 - (2 * ratio - 1), 0.25)
     for level in (-0.45, 0.45):
-        middle = (1 - reach / 2, level, 0) if long == 0 else (0, level, 1 - reach / 2)
-        bar = (reach / 2, 0.1, 0.12) if long == 0 else (0.12, 0.1, reach / 2)
-        b.box(middle, bar, color)
-    b.box((0.93, 0, 0) if long == 0 else (0, 0, 0.93), (0.07, 0.55, 0.12) if long == 0 else (0.12, 0.55, 0.07), color)
+        b.box(b.lengthwise(1 - reach / 2, level, 0), b.lengthwise(reach / 2, 0.1, 0.12), color)
+    b.box(b.lengthwise(0.93, 0, 0), b.lengthwise(0.07, 0.55, 0.12), color)
 
 
+@draws
 def cup(b: Builder) -> None:
     """A tumbler."""
     color = pick((GLASS, (0.4, 0.6, 0.75), (0.8, 0.5, 0.3)), b.style)
@@ -44,6 +40,7 @@ def cup(b: Builder) -> None:
     _liquid(b, 0.4, 0.85)
 
 
+@draws
 def bowl(b: Builder) -> None:
     """A wide bowl on a foot."""
     color = pick(CERAMICS, b.style)
@@ -52,6 +49,7 @@ def bowl(b: Builder) -> None:
     _liquid(b, 0.5, 0.85)
 
 
+@draws
 def plate(b: Builder) -> None:
     """A flat plate with a rim."""
     color = pick(CERAMICS, b.style)
@@ -59,42 +57,38 @@ def plate(b: Builder) -> None:
     b.tube((0, -0.8, 0), (0.66, 0.2, 0.66), shade_of(color, 0.92))
 
 
+@draws
 def pot(b: Builder) -> None:
     """A pot with two ears."""
     color = pick((STEEL, (0.35, 0.36, 0.38), (0.6, 0.25, 0.2)), b.style)
-    long = 0 if b.half[0] >= b.half[2] else 2
-    body = max(0.6, float(b.half[2 - long] / b.half[long]) * 0.98)
-    half: tuple[float, float, float] = (body, 1, 1) if long == 0 else (1, 1, body)
+    half = b.lengthwise(max(0.6, b.slenderness * 0.98), 1, 1)
     if abs(b.half[0] - b.half[2]) < 0.05 * b.half[0]:
         half = (0.85, 1, 0.85)
     b.cup((0, 0, 0), half, color, Material.METAL, bottom=0.92)
     b.tube((0, -0.94, 0), (half[0] * 0.92, 0.06, half[2] * 0.92), shade_of(color, 0.7))
     _liquid(b, 0.3, min(half[0], half[2]) * 0.94)
     for side in (-1, 1):
-        ear = (side * 0.92, 0.65, 0) if long == 0 else (0, 0.65, side * 0.92)
-        b.box(ear, (0.08, 0.08, 0.3) if long == 0 else (0.3, 0.08, 0.08), BLACK)
+        b.box(b.lengthwise(side * 0.92, 0.65, 0), b.lengthwise(0.08, 0.08, 0.3), BLACK)
 
 
+@draws
 def pan(b: Builder) -> None:
     """A shallow pan with a long handle."""
-    long = 0 if b.half[0] >= b.half[2] else 2
-    ratio = min(0.95, float(b.half[2 - long] / b.half[long]))
-    shift = 1 - ratio
-    at = (-shift, 0, 0) if long == 0 else (0, 0, -shift)
-    half = (ratio, 0.95, 1) if long == 0 else (1, 0.95, ratio)
-    b.cup((at[0], 0, at[2]), half, DARK, Material.METAL, bottom=0.88)
+    ratio = min(0.95, b.slenderness)
+    at, half = b.lengthwise(ratio - 1, 0, 0), b.lengthwise(ratio, 0.95, 1)
+    b.cup(at, half, DARK, Material.METAL, bottom=0.88)
     b.tube((at[0], -0.85, at[2]), (half[0] * 0.88, 0.1, half[2] * 0.88), (0.14, 0.14, 0.15))
     length = max(1 - ratio, 0.05)
-    where = (1 - length, 0.6, 0) if long == 0 else (0, 0.6, 1 - length)
-    b.box(where, (length, 0.25, 0.08) if long == 0 else (0.08, 0.25, length), BLACK)
+    b.box(b.lengthwise(1 - length, 0.6, 0), b.lengthwise(length, 0.25, 0.08), BLACK)
 
 
+@draws
 def kettle(b: Builder) -> None:
     """A round kettle with a spout and a handle over its lid."""
     color = pick((STEEL, (0.65, 0.2, 0.16), (0.3, 0.45, 0.55)), b.style)
     b.tube((0, -0.4, 0), (0.85, 0.6, 0.85), color, Material.METAL, top=0.7)
     b.ball((0, 0.2, 0), (0.6, 0.2, 0.6), shade_of(color, 0.9), Material.METAL)
-    b.add(Kind.CYLINDER, (0, -0.05, 0.78), (0.12, 0.4, 0.12), color, tilt=(50, 0, 0))
+    b.add(Form.CYLINDER, (0, -0.05, 0.78), (0.12, 0.4, 0.12), color, tilt=(50, 0, 0))
     for side in (-1, 1):
         b.box((0, 0.45, side * 0.5), (0.08, 0.5, 0.06), BLACK)
     b.box((0, 0.92, 0), (0.1, 0.08, 0.55), BLACK)
@@ -109,11 +103,13 @@ def _bottle(b: Builder, color: Color, label: Color, neck: float) -> None:
         b.box((0, 0.1, 0.9), (0.05, 0.5, 0.2), BLACK)
 
 
+@draws
 def wine_bottle(b: Builder) -> None:
     """A dark bottle with a label."""
     _bottle(b, (0.12, 0.25, 0.14), (0.9, 0.87, 0.75), 0.35)
 
 
+@draws
 def bottle(b: Builder) -> None:
     """A clear bottle with a coloured label."""
     _bottle(b, GLASS, pick(((0.3, 0.5, 0.7), (0.75, 0.4, 0.25)), b.style), 0.4)
@@ -124,18 +120,21 @@ def _handled(b: Builder, share: float, handle: Color) -> None:
     b.box((0, 0, 1 - share), (0.5, 0.9, share), handle)
 
 
+@draws
 def knife(b: Builder) -> None:
     """A blade and a dark handle."""
     _handled(b, 0.36, (0.15, 0.13, 0.12))
     b.box((0.15, 0, -0.36), (0.85, 0.35, 0.64), CHROME, Material.METAL)
 
 
+@draws
 def butter_knife(b: Builder) -> None:
     """All of steel."""
     _handled(b, 0.45, shade_of(STEEL, 0.9))
     b.box((0, 0, -0.45), (1, 0.5, 0.55), CHROME, Material.METAL)
 
 
+@draws
 def fork(b: Builder) -> None:
     """A handle and tines."""
     b.box((0, 0, 0.35), (0.3, 0.6, 0.65), STEEL, Material.METAL)
@@ -144,12 +143,14 @@ def fork(b: Builder) -> None:
         b.box((at, 0.2, -0.75), (0.16, 0.5, 0.25), STEEL, Material.METAL)
 
 
+@draws
 def spoon(b: Builder) -> None:
     """A handle and a bowl."""
     b.box((0, 0.1, 0.35), (0.3, 0.5, 0.65), STEEL, Material.METAL)
     b.ball((0, 0, -0.65), (1, 1, 0.35), CHROME, Material.METAL)
 
 
+@draws
 def spatula(b: Builder) -> None:
     """A slotted blade on a long handle."""
     b.box((0, 0.2, 0.35), (0.22, 0.6, 0.65), DARK)
@@ -158,44 +159,35 @@ def spatula(b: Builder) -> None:
         b.box((at, 0.25, -0.65), (0.1, 0.1, 0.22), (0.6, 0.6, 0.62))
 
 
+@draws
 def ladle(b: Builder) -> None:
     """A cup at the end of a long handle."""
     b.cup((0, -0.3, -0.68), (0.95, 0.7, 0.32), STEEL, Material.METAL, bottom=0.6)
     b.box((0, 0.5, 0.3), (0.15, 0.2, 0.7), CHROME, Material.METAL)
 
 
-def shaker(b: Builder) -> None:
+@draws
+def salt_shaker(b: Builder) -> None:
+    """A shaker of white."""
+    _shaker(b, WHITE)
+
+
+@draws
+def pepper_shaker(b: Builder) -> None:
+    """A shaker of nearly black."""
+    _shaker(b, (0.22, 0.18, 0.15))
+
+
+def _shaker(b: Builder, fill: Color) -> None:
     """A glass with a metal cap."""
-    fill: Color = WHITE if b.item.object_type == "SaltShaker" else (0.22, 0.18, 0.15)
     b.tube((0, -0.25, 0), (1, 0.75, 1), fill, Material.GLASS, top=0.8)
     b.tube((0, 0.7, 0), (0.82, 0.3, 0.82), CHROME, Material.METAL, top=0.7)
 
 
+@draws
 def paper_roll(b: Builder) -> None:
     """A roll of kitchen paper on a post."""
     color: Color = (0.75, 0.7, 0.6) if b.state.used_up else (0.96, 0.96, 0.94)
     width = 0.35 if b.state.used_up else 1.0
     b.tube((0, 0, 0), (width, 0.95, width), color, Material.FABRIC)
     b.tube((0, 0, 0), (0.2, 1, 0.2), pick(WOODS, b.style))
-
-
-SHAPES: dict[str, Callable[[Builder], None]] = {
-    "Bottle": bottle,
-    "Bowl": bowl,
-    "ButterKnife": butter_knife,
-    "Cup": cup,
-    "Fork": fork,
-    "Kettle": kettle,
-    "Knife": knife,
-    "Ladle": ladle,
-    "Mug": mug,
-    "Pan": pan,
-    "PaperTowelRoll": paper_roll,
-    "PepperShaker": shaker,
-    "Plate": plate,
-    "Pot": pot,
-    "SaltShaker": shaker,
-    "Spatula": spatula,
-    "Spoon": spoon,
-    "WineBottle": wine_bottle,
-}

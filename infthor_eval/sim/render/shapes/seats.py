@@ -1,12 +1,11 @@
 """Chairs, sofas, beds and stools."""
 
-from collections.abc import Callable
-
 from infthor_eval.sim.render.primitives import Color, Material
 from infthor_eval.sim.render.shapes.builder import Builder, shade_of
 from infthor_eval.sim.render.shapes.palette import CLOTHS, WHITE, WOODS, pick
+from infthor_eval.sim.render.shapes.register import draws
 
-__all__ = ["SHAPES"]
+__all__: list[str] = []
 
 
 def _seat_level(b: Builder, usual: float) -> float:
@@ -16,6 +15,7 @@ def _seat_level(b: Builder, usual: float) -> float:
     return min(0.9, max(-0.8, b.item.support / float(b.half[1]) - 1))
 
 
+@draws
 def chair(b: Builder) -> None:
     """A wooden chair with a back of slats."""
     color = pick(WOODS, b.style)
@@ -29,6 +29,7 @@ def chair(b: Builder) -> None:
         b.box((0, level + (1 - level) * share - 0.06, -0.93), (0.9, 0.07, z * 0.7), color, Material.WOOD)
 
 
+@draws
 def stool(b: Builder) -> None:
     """A round seat on legs."""
     color = pick(WOODS, b.style)
@@ -38,6 +39,7 @@ def stool(b: Builder) -> None:
             b.box((sx * 0.6, -0.08, sz * 0.6), (b.thick(0.018, 0), 0.92, b.thick(0.018, 2)), shade_of(color, 0.8))
 
 
+@draws
 def sofa(b: Builder) -> None:
     """A padded bench with a back and arms."""
     color = pick(CLOTHS, b.style)
@@ -57,6 +59,7 @@ def sofa(b: Builder) -> None:
         b.box((at, level - 0.1, back), (width * 0.97, 0.1, 1 - back), shade_of(color, 1.12), Material.FABRIC)
 
 
+@draws
 def ottoman(b: Builder) -> None:
     """A padded block."""
     color = pick(CLOTHS, b.style)
@@ -64,6 +67,7 @@ def ottoman(b: Builder) -> None:
     b.box((0, -0.9, 0), (0.9, 0.1, 0.9), shade_of(pick(WOODS, b.style), 0.7))
 
 
+@draws
 def bed(b: Builder) -> None:
     """A frame with a headboard at its back, a mattress and a blanket."""
     wood, cloth = pick(WOODS, b.style), pick(CLOTHS, b.style)
@@ -78,18 +82,7 @@ def bed(b: Builder) -> None:
         b.box((0, (frame + level) / 2 + 0.012, 0.35), (0.985, (level - frame) / 2, 0.64), cloth, Material.FABRIC)
 
 
+@draws
 def pet_bed(b: Builder) -> None:
     """A flat round cushion."""
     b.ball((0, -0.1, 0), (1, 0.9, 1), pick(CLOTHS, b.style), Material.FABRIC)
-
-
-SHAPES: dict[str, Callable[[Builder], None]] = {
-    "ArmChair": sofa,
-    "Bed": bed,
-    "Chair": chair,
-    "DogBed": pet_bed,
-    "Footstool": stool,
-    "Ottoman": ottoman,
-    "Sofa": sofa,
-    "Stool": stool,
-}

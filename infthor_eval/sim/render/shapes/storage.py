@@ -1,16 +1,14 @@
 """Things with an inside: cabinets, drawers, fridges, microwaves, safes, boxes, bins."""
 
-from collections.abc import Callable
-
-from infthor_eval.sim.render.primitives import Color, Kind, Material
+from infthor_eval.sim.objects import DOOR_SWING, DRAWER_SLIDE
+from infthor_eval.sim.render.primitives import Color, Form, Material
 from infthor_eval.sim.render.shapes.builder import Builder, shade_of
 from infthor_eval.sim.render.shapes.palette import BLACK, CHROME, DARK, STEEL, WHITE, WOODS, pick
+from infthor_eval.sim.render.shapes.register import draws
 
-__all__ = ["SHAPES"]
+__all__: list[str] = []
 
 _LEAF = 0.02  # thickness of a door, metres
-_SWING = 85.0  # degrees that a door opens
-_SLIDE = 0.8  # share of its depth that a drawer comes out
 
 
 def _door(b: Builder, color: Color, material: Material, grip: Color, low: float = -1.0, high: float = 1.0) -> None:
@@ -18,7 +16,7 @@ def _door(b: Builder, color: Color, material: Material, grip: Color, low: float 
     side = b.item.hinge or -1
     width, height, depth = (float(v) for v in b.half)
     middle, half = (low + high) / 2 * height, (high - low) / 2 * height
-    angle = side * _SWING * b.state.openness
+    angle = side * DOOR_SWING * b.state.openness
     leaf = min(_LEAF / 2, depth * 0.3)
     hinge = (side, 0.0, 1.0)
     b.swung(hinge, (-side * width, middle, -leaf), (width * 0.985, half * 0.985, leaf), angle, color, material)
@@ -27,6 +25,7 @@ def _door(b: Builder, color: Color, material: Material, grip: Color, low: float 
     b.swung(hinge, (-side * reach, middle, 0.012), (0.008, tall, 0.01), angle, grip, Material.METAL)
 
 
+@draws
 def cabinet(b: Builder) -> None:
     """A cupboard of wood with one door."""
     color = pick(WOODS, b.style // 7 if b.item.asset_id else 2)
@@ -38,10 +37,11 @@ def cabinet(b: Builder) -> None:
     _door(b, color, Material.WOOD, CHROME)
 
 
+@draws
 def drawer(b: Builder) -> None:
     """A drawer: its front, and when open the tray behind it."""
     color = shade_of(pick(WOODS, 2), 1.05)
-    out = 2 * _SLIDE * b.state.openness
+    out = 2 * DRAWER_SLIDE * b.state.openness
     leaf = b.thick(_LEAF / 2, 2)
     if b.state.openness > 0:
         x, y = b.thick(0.008, 0), b.thick(0.008, 1)
@@ -55,6 +55,7 @@ def drawer(b: Builder) -> None:
     b.rod((0, 0.25, out + 1 + 0.012 / max(float(b.half[2]), 0.01)), 0.006, min(float(b.half[0]) * 0.4, 0.08), 0, CHROME)
 
 
+@draws
 def fridge(b: Builder) -> None:
     """A fridge: a freezer door above, a tall door below, each with a grip."""
     color = (WHITE, STEEL, (0.86, 0.87, 0.88))[b.style % 3]
@@ -71,6 +72,7 @@ def fridge(b: Builder) -> None:
     _door(b, shade_of(color, 1.03), Material.METAL, DARK, 0.33, 1.0)
 
 
+@draws
 def microwave(b: Builder) -> None:
     """A microwave oven: a dark window, a panel of keys; lit inside while it runs."""
     body = (STEEL, DARK, WHITE)[b.style % 3]
@@ -87,7 +89,7 @@ def microwave(b: Builder) -> None:
         b.tube((0.2, -0.86, 0), (0.55, 0.03, 0.75), (0.8, 0.86, 0.88), Material.GLASS)
         b.box((-0.76, 0, 0), (0.22, 0.94, 0.98), shade_of(body, 0.9), Material.METAL)
         wide = float(b.half[0])
-        angle = _SWING * b.state.openness
+        angle = DOOR_SWING * b.state.openness
         b.swung((1, 0, 1), (-0.74 * wide, 0, -0.012), (0.74 * wide, 0.92 * float(b.half[1]), 0.012), angle,
                 shade_of(body, 0.8), Material.METAL)  # fmt: skip
         b.swung((1, 0, 1), (-0.72 * wide, 0, 0.002), (0.55 * wide, 0.65 * float(b.half[1]), 0.012), angle,
@@ -98,6 +100,7 @@ def microwave(b: Builder) -> None:
         b.box((-0.76, 0.25 - 0.25 * row, 1), (0.12, 0.07, z), (0.55, 0.56, 0.58))
 
 
+@draws
 def safe(b: Builder) -> None:
     """A steel box with a dial."""
     body: Color = (0.3, 0.32, 0.35)
@@ -108,9 +111,10 @@ def safe(b: Builder) -> None:
         b.open_front(body, Material.METAL, 0.04)
     _door(b, shade_of(body, 1.25), Material.METAL, CHROME)
     if b.state.openness == 0:
-        b.add(Kind.CYLINDER, (0, 0.2, 1), (0.2, 0.02, 0.2), CHROME, Material.METAL, tilt=(90, 0, 0))
+        b.add(Form.CYLINDER, (0, 0.2, 1), (0.2, 0.02, 0.2), CHROME, Material.METAL, tilt=(90, 0, 0))
 
 
+@draws
 def carton(b: Builder) -> None:
     """A cardboard box, its flaps spread when open."""
     color: Color = (0.72, 0.55, 0.35)
@@ -121,35 +125,25 @@ def carton(b: Builder) -> None:
     b.open_top(color, Material.PLAIN, 0.012)
 
 
-def bin_(b: Builder) -> None:
+@draws
+def garbage_can(b: Builder) -> None:
     """A garbage can."""
     color = ((0.35, 0.38, 0.4), (0.75, 0.76, 0.78), (0.3, 0.42, 0.36), (0.2, 0.2, 0.22))[b.style % 4]
     b.cup((0, 0, 0), (1, 1, 1), color, Material.METAL, bottom=0.82, top=1.0)
     b.tube((0, -0.94, 0), (0.8, 0.03, 0.8), shade_of(color, 0.5))
 
 
+@draws
 def bag(b: Builder) -> None:
     """A tied garbage bag."""
     b.ball((0, -0.15, 0), (1, 0.85, 1), (0.12, 0.12, 0.14), Material.METAL)
     b.tube((0, 0.8, 0), (0.2, 0.2, 0.2), (0.1, 0.1, 0.12), bottom=0.5)
 
 
+@draws
 def hamper(b: Builder) -> None:
     """A laundry basket."""
     if b.state.openness == 0:
         b.tube((0, 0, 0), (1, 1, 1), (0.72, 0.6, 0.42), Material.FABRIC, bottom=0.88)
         return
     b.cup((0, 0, 0), (1, 1, 1), (0.72, 0.6, 0.42), Material.FABRIC, bottom=0.88)
-
-
-SHAPES: dict[str, Callable[[Builder], None]] = {
-    "Box": carton,
-    "Cabinet": cabinet,
-    "Drawer": drawer,
-    "Fridge": fridge,
-    "GarbageBag": bag,
-    "GarbageCan": bin_,
-    "LaundryHamper": hamper,
-    "Microwave": microwave,
-    "Safe": safe,
-}

@@ -1,17 +1,19 @@
 """Tables, counters, shelves and chests."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 from infthor_eval.sim.footprints import Rect
 from infthor_eval.sim.render.primitives import Color, Material
 from infthor_eval.sim.render.shapes.builder import Builder, shade_of
 from infthor_eval.sim.render.shapes.palette import CHROME, DARK, WOODS, pick
+from infthor_eval.sim.render.shapes.register import draws
 
-__all__ = ["SHAPES", "cut_slab"]
+__all__ = ["cut_slab"]
 
 _STONES: tuple[Color, ...] = ((0.55, 0.53, 0.5), (0.35, 0.35, 0.37), (0.72, 0.69, 0.63))
 
 
+@draws
 def counter(b: Builder) -> None:
     """A slab of stone, cut out where sinks are; a tall box has a body of wood below it."""
     height = 2 * float(b.half[1])
@@ -64,6 +66,7 @@ def _surface(b: Builder) -> float:
     return 1.0 if b.item.support is None else b.item.support / float(b.half[1]) - 1
 
 
+@draws
 def table(b: Builder) -> None:
     """A board on four legs; with a raised back where the surface is lower than the box."""
     color = pick(WOODS, b.style)
@@ -86,6 +89,7 @@ def table(b: Builder) -> None:
     b.box((0, under - apron, 0), (0.9, apron, 0.9), shade_of(color, 0.8), Material.WOOD)
 
 
+@draws
 def chest(b: Builder) -> None:
     """A closed body with a board on top: dressers and stands whose drawers are not objects of their own."""
     color = pick(WOODS, b.style)
@@ -103,6 +107,7 @@ def chest(b: Builder) -> None:
             b.ball((side * 0.48, level, 1.0), (b.thick(0.015, 0), b.thick(0.015, 1), b.thick(0.015, 2)), CHROME)
 
 
+@draws
 def shelf(b: Builder) -> None:
     """A board at the foot of the space that things stand in."""
     color = pick(WOODS, b.style // 3)
@@ -112,6 +117,7 @@ def shelf(b: Builder) -> None:
            Material.WOOD)  # fmt: skip
 
 
+@draws
 def shelving(b: Builder) -> None:
     """An open rack on posts."""
     color = pick(WOODS, b.style)
@@ -124,6 +130,7 @@ def shelving(b: Builder) -> None:
         b.box((0, level, 0), (1, y, 1), shade_of(color, 0.95), Material.WOOD)
 
 
+@draws
 def cart(b: Builder) -> None:
     """Two trays on wheels."""
     for level in (-0.5, 0.92):
@@ -132,17 +139,3 @@ def cart(b: Builder) -> None:
         for sz in (-1, 1):
             b.box((sx * 0.94, 0, sz * 0.94), (0.04, 1, 0.04), CHROME, Material.METAL)
             b.ball((sx * 0.94, -0.95, sz * 0.94), (0.08, 0.06, 0.08), DARK)
-
-
-SHAPES: dict[str, Callable[[Builder], None]] = {
-    "Cart": cart,
-    "CoffeeTable": table,
-    "CounterTop": counter,
-    "Desk": table,
-    "DiningTable": table,
-    "Dresser": chest,
-    "Shelf": shelf,
-    "ShelvingUnit": shelving,
-    "SideTable": table,
-    "TVStand": chest,
-}

@@ -1,0 +1,17 @@
+"""The register of the functions that draw objects; types name theirs."""
+
+from collections.abc import Callable
+
+from infthor_eval.sim.render.shapes.builder import Builder
+
+__all__ = ["SHAPES", "draws"]
+
+Drawing = Callable[[Builder], None]
+SHAPES: dict[str, Drawing] = {}
+
+
+def draws(drawing: Drawing) -> Drawing:
+    """Registers a drawing under the name of its function."""
+    assert drawing.__name__ not in SHAPES, f"two shapes are called {drawing.__name__}"
+    SHAPES[drawing.__name__] = drawing
+    return drawing
