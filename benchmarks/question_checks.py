@@ -12,13 +12,14 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
+from model_adapters.bounds import Blind, Oracle
+
 from infthor_eval.formats.question import Question
 from infthor_eval.formats.step_log import read_steps
 from infthor_eval.generation.questions.checker import Checker
 from infthor_eval.generation.questions.history import DEFAULT_SHARE, History
 from infthor_eval.generation.questions.make import candidates_of, make_questions
 from infthor_eval.nieh.scoring import score
-from model_adapters.bounds import Blind, Oracle
 
 _YES_NO = {"yes", "no"}
 

@@ -16,7 +16,8 @@ def command(first: Path, second: Path) -> None:
     What both evaluated is paired; intervals and p values are clustered by trajectory.
     """
     from infthor_eval.errors import UsageError
-    from infthor_eval.report import compare, comparison_table, print_table, table_console
+    from infthor_eval.report.comparison import compare, comparison_table
+    from infthor_eval.report.terminal import print_table, table_console
     from infthor_eval.runs import read_header, read_run
     from infthor_eval.suites import suite_named
 

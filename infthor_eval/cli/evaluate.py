@@ -6,7 +6,7 @@ from itertools import groupby
 
 from infthor_eval.cli.progress import NOTES, execute_with_progress, say
 from infthor_eval.harness.export import export
-from infthor_eval.report import print_table, table_console
+from infthor_eval.report.terminal import print_table, table_console
 from infthor_eval.runs import RunOutcome, RunRequest, Suite, prepare
 
 __all__ = ["evaluate"]

@@ -84,9 +84,10 @@ def command(
 
 def _print(summary: GenerationSummary, out: Path, output: Console) -> None:
     from infthor_eval.generation.tables import tasks_table
+    from infthor_eval.report.terminal import print_table
 
     output.print(
         f"{summary.trajectories} trajectories ({summary.resumed} made earlier), {summary.steps} steps: {out}",
         highlight=False,
     )
-    output.print(tasks_table(summary))
+    print_table(tasks_table(summary), output)

@@ -76,16 +76,17 @@ def command(
 
 def _print(summary: ReplaySummary, output: Console) -> None:
     from infthor_eval.generation.tables import actions_table, overlaps_table
+    from infthor_eval.report.terminal import print_table
 
     output.print(
         f"{summary.trajectories} trajectories on {summary.floor_plans} floor plans ({summary.resumed} replayed "
         f"earlier, {summary.failed} failed), {summary.complete} whole, {summary.seconds} s",
         highlight=False,
     )
-    output.print(actions_table(summary))
+    print_table(actions_table(summary), output)
     overlaps = overlaps_table(summary)
     if overlaps is not None:
-        output.print(overlaps)
+        print_table(overlaps, output)
     for item in summary.diverged[:_SHOWN]:
         line = f"diverged: {item.traj_id}: step {item.step}: {item.action}: {item.error}"
         output.print(line, highlight=False, markup=False)

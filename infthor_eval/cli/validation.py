@@ -9,7 +9,8 @@ from infthor_eval.nieh.scoring import Scorer
 from infthor_eval.nieh.tables import clues_table
 from infthor_eval.nieh.validated_set import write_validated_set
 from infthor_eval.nieh.validation import Verdicts, judge, read_decisions
-from infthor_eval.report import print_table, table_console, write_inspection_page
+from infthor_eval.report.inspection import write_inspection_page
+from infthor_eval.report.terminal import print_table, table_console
 from infthor_eval.runs import RunOutcome, RunRequest, RunSummary, Suite, prepare
 
 __all__ = ["validate"]

@@ -29,7 +29,6 @@ from infthor_eval.runs import (
     Session,
     Skipped,
     Subject,
-    Table,
     TaskFile,
     TaskRequest,
     UnitKey,
@@ -38,6 +37,7 @@ from infthor_eval.runs import (
 )
 from infthor_eval.runs.generation_kwargs import decoding_of
 from infthor_eval.runs.suite import Need
+from infthor_eval.tables import Table
 from model_adapters import Decoding
 
 __all__ = ["NiehEvaluation", "NiehSuite"]

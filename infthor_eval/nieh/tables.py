@@ -5,7 +5,8 @@ from collections.abc import Iterator, Sequence
 from infthor_eval.formats.published import PublishedRow, PublishedTable, published_tables
 from infthor_eval.formats.question import ABSENCE
 from infthor_eval.nieh.summary import CLUE_COLUMNS, Cell, NiehSummary, TaskSummary
-from infthor_eval.runs import Column, Row, RunSummary, Table
+from infthor_eval.runs import RunSummary
+from infthor_eval.tables import Column, Row, Table
 
 __all__ = ["clues_table", "tables"]
 

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from infthor_eval.errors import DataError
-from infthor_eval.runs import Column, Row, Suite, Table, UnitRecord
+from infthor_eval.runs import Suite, UnitRecord
 from infthor_eval.statistics import Difference, paired_difference
+from infthor_eval.tables import Column, Row, Table
 
 __all__ = ["Comparison", "compare", "comparison_table"]
 

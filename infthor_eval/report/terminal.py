@@ -5,7 +5,7 @@ from rich.console import Console
 from rich.table import Table as RichTable
 from rich.text import Text
 
-from infthor_eval.runs import Column, Row, Table
+from infthor_eval.tables import Column, Row, Table
 
 __all__ = ["print_table", "table_console"]
 
@@ -19,7 +19,12 @@ def table_console() -> Console:
 
 def print_table(table: Table, console: Console) -> None:
     """Show a table; whatever its cells hold is shown as text."""
-    shown = RichTable(box=box.SIMPLE_HEAD, title=Text(table.title), title_justify="left", caption_justify="left")
+    shown = RichTable(
+        box=box.SIMPLE_HEAD,
+        title=Text(table.title) if table.title else None,
+        title_justify="left",
+        caption_justify="left",
+    )
     for column in table.columns:
         _add_column(shown, column)
     for row in table.rows:

@@ -17,18 +17,15 @@ from infthor_eval.runs.suite import (
     TaskRequest,
     Work,
 )
-from infthor_eval.runs.tables import Column, Row, Table
 
 __all__ = [
     "Catalog",
-    "Column",
     "Cost",
     "Evaluation",
     "Group",
     "Observer",
     "PreparedRun",
     "RecordTypes",
-    "Row",
     "RunHeader",
     "RunOutcome",
     "RunRequest",
@@ -39,7 +36,6 @@ __all__ = [
     "Skipped",
     "Subject",
     "Suite",
-    "Table",
     "TaskFile",
     "TaskRequest",
     "Tokens",

@@ -13,7 +13,7 @@ import msgspec
 
 from infthor_eval.runs.catalog import TaskFile
 from infthor_eval.runs.records import RecordTypes, RunHeader, Unit, UnitKey, UnitRecord
-from infthor_eval.runs.tables import Table
+from infthor_eval.tables import Table
 from model_adapters.protocols import Capabilities
 
 __all__ = [

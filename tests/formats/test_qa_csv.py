@@ -13,7 +13,7 @@ questions = st.builds(
     text=words,
     clues=st.lists(st.integers(0, 3000), max_size=5).map(tuple),
     answers=st.lists(words | st.integers(), max_size=3).map(tuple),
-    kind=words | st.none(),
+    question_type=words | st.none(),
     absence=st.booleans(),
 )
 

@@ -4,6 +4,7 @@ import msgspec
 
 from infthor_eval import runs
 from infthor_eval.errors import DataError
+from infthor_eval.tables import Column, Row, Table
 from model_adapters import Capabilities
 
 
@@ -50,5 +51,5 @@ class ToySuite:
         return {"right": float(record.payload.answer == sum(record.payload.numbers))}
 
     def tables(self, summaries):
-        rows = tuple(runs.Row((run.header.name, str(run.summary.numbers[0]))) for run in summaries)
-        return [runs.Table("Sums", (runs.Column("who", False), runs.Column("right")), rows)]
+        rows = tuple(Row((run.header.name, str(run.summary.numbers[0]))) for run in summaries)
+        return [Table("Sums", (Column("who", False), Column("right")), rows)]

@@ -38,7 +38,7 @@ class Table:
     """A table.
 
     Attributes:
-        title: one line.
+        title: one line; empty for none.
         columns: at least one.
         rows: in the order shown.
         notes: what must be said with it, a paragraph each.
