@@ -1,0 +1,42 @@
+"""lm-eval's own command in a process of its own."""
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import pytest
+
+LM_EVAL = "from lm_eval.__main__ import cli_evaluate; cli_evaluate()"
+OURS = "from infthor_eval.cli import main; main()"
+
+
+@pytest.fixture
+def start() -> Callable[..., str]:
+    """Runs a command in a process of its own; gives what it says on standard error."""
+
+    def start(program: str, *arguments: object, path: Sequence[Path] = ()) -> str:
+        environment = {**os.environ, "HF_HUB_OFFLINE": "1"}
+        environment["PYTHONPATH"] = os.pathsep.join([*map(str, path), *filter(None, [os.environ.get("PYTHONPATH")])])
+        command = [sys.executable, "-c", program, *map(str, arguments)]
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr[-3000:]
+        return done.stderr
+
+    return start
+
+
+def samples(folder: Path) -> dict[str, list[dict]]:
+    """The samples files of a folder, by task."""
+    found = {}
+    for path in sorted(folder.rglob("samples_*.jsonl")):
+        task = path.name.removeprefix("samples_").rpartition("_")[0]
+        found[task] = [json.loads(line) for line in path.read_text().splitlines()]
+    return found
+
+
+def only(folder: Path, pattern: str) -> Path:
+    (path,) = folder.rglob(pattern)
+    return path
