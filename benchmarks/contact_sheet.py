@@ -1,4 +1,4 @@
-"""Draws `docs/contact_sheet.png`: three procedural rooms of each kind, each from its most telling view.
+"""Draws `docs/contact_sheet.png`: three procedural rooms of each type, each from its most telling view.
 
 python benchmarks/contact_sheet.py [OUT.png]
 """
@@ -13,7 +13,7 @@ from infthor_eval.sim.actions import bind
 from infthor_eval.sim.scenes.catalogue import Catalogue
 from infthor_eval.sim.simulation import Simulation
 
-_KINDS = ("kitchen", "living-room", "bedroom", "bathroom")
+_ROOMS = ("kitchen", "living-room", "bedroom", "bathroom")
 _SEEDS = (1, 2, 3)
 _SIZE, _LINE = 300, 16
 
@@ -52,13 +52,13 @@ def main() -> None:
     """Draws the sheet."""
     out = Path(sys.argv[1] if len(sys.argv) > 1 else "docs/contact_sheet.png")
     sim = Simulation(Catalogue(), _SIZE, _SIZE)
-    sheet = Image.new("RGB", (_SIZE * len(_KINDS), (_SIZE + _LINE) * len(_SEEDS)), "white")
+    sheet = Image.new("RGB", (_SIZE * len(_ROOMS), (_SIZE + _LINE) * len(_SEEDS)), "white")
     draw = ImageDraw.Draw(sheet)
-    for column, kind in enumerate(_KINDS):
+    for column, room in enumerate(_ROOMS):
         for row, seed in enumerate(_SEEDS):
             x, y = column * _SIZE, row * (_SIZE + _LINE)
-            sheet.paste(best_view(sim, f"{kind}-{seed}"), (x, y + _LINE))
-            draw.text((x + 4, y + 2), f"{kind}-{seed}", fill="black")
+            sheet.paste(best_view(sim, f"{room}-{seed}"), (x, y + _LINE))
+            draw.text((x + 4, y + 2), f"{room}-{seed}", fill="black")
     sheet.save(out, optimize=True)
 
 

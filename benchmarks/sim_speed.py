@@ -86,8 +86,8 @@ def measure(scene: str, steps: int) -> dict[str, Any]:
         result[f"{name}_steps_per_second"] = round(rate(client, steps), 1)
         result[f"{name}_megabytes_at_end"] = round(memory(client), 1)
         client.stop()
-        kind = "full" if init else "rgb"
-        client = controller(f"{python} {shlex.quote(__file__)} --echo {kind} --scene {scene}", scene, **init)
+        load = "full" if init else "rgb"
+        client = controller(f"{python} {shlex.quote(__file__)} --echo {load} --scene {scene}", scene, **init)
         result[f"{name}_transport_steps_per_second"] = round(rate(client, steps), 1)
         client.stop()
     return result

@@ -6,7 +6,7 @@ from typing import Any
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from infthor_eval.runs import PreparedRun, RunOutcome, UnitRecord, Work, execute
+from infthor_eval.runs import PreparedRun, RunOutcome, UnitRecord, Workload, execute
 
 __all__ = ["NOTES", "execute_with_progress", "say"]
 
@@ -21,15 +21,15 @@ class _Bar:
         self._progress = progress
         self.n_found = self.n_made = 0
 
-    def begin(self, work: Work, n_recovered: int) -> None:
+    def begin(self, workload: Workload, n_recovered: int) -> None:
         """See `Observer`."""
         if n_recovered:
             say(f"{self._name}: {n_recovered} bad line(s) of the journal set aside; those units are tried again")
-        for (task, reason), n in sorted(Counter((item.key.task, item.reason) for item in work.skipped).items()):
+        for (task, reason), n in sorted(Counter((item.key.task, item.reason) for item in workload.skipped).items()):
             say(f"{task}: {n} sample(s) skipped: {reason}", "yellow")
-        for cost in work.costs:
+        for cost in workload.costs:
             say(f"{cost.task}: {cost.description}")
-        self._bar = self._progress.add_task(self._name, total=work.n_units)
+        self._bar = self._progress.add_task(self._name, total=workload.n_units)
 
     def done(self, record: UnitRecord[Any], resumed: bool) -> None:
         """See `Observer`."""

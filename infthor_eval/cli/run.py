@@ -18,7 +18,7 @@ __all__ = ["command"]
 @click.option("--model-args", default="", metavar="K=V,...", help="Options of the model (see `ls models`).")
 @click.option(
     "--rope",
-    metavar="METHOD:FACTOR",
+    metavar="TYPE:FACTOR",
     help="Extend the model's context: yarn:4, linear:2, dynamic:4, longrope:8.",
 )
 @click.option("--name", help="What the run is called in tables and folders; else by its checkpoint, or its model.")

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from infthor_eval.errors import DataError
-from infthor_eval.formats.files import written_whole
+from infthor_eval.formats.files import written_atomically
 
 __all__ = ["floor_plan_names", "write_floor_plan"]
 
@@ -60,7 +60,7 @@ def write_floor_plan(
         np.save(layouts / f"{scene}-layout.npy", np.array(cells, dtype=np.float64).reshape(-1, 2))
         types = sorted({item["objectType"] for item in objects})
         (layouts / f"{scene}-objects.json").write_text(json.dumps(types, indent=1) + "\n", encoding="utf-8")
-        with written_whole(path) as partial, gzip.open(partial, "wt", encoding="utf-8") as file:
+        with written_atomically(path) as partial, gzip.open(partial, "wt", encoding="utf-8") as file:
             file.writelines(f"{kept}\n" for kept in [*_others(path, scene), line])
     except (OSError, EOFError, ValueError, KeyError) as error:
         raise DataError(f"{path}: {scene} cannot be added ({error}); give another folder with --data") from error

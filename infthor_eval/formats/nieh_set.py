@@ -64,7 +64,7 @@ class NiehSet:
         self.simulator = simulator_of(root)
         self._read = tuple(question for file in self._files for question in read_questions(file))
         self._frames: dict[str, dict[int, FrameRef]] = {}
-        self._whole: dict[str, tuple[FrameRef, ...]] = {}  # shared by all questions on the whole trajectory
+        self._all_frames: dict[str, tuple[FrameRef, ...]] = {}  # shared by all questions on the whole trajectory
         self._videos: dict[str, tuple[FrameRef, ...] | DataError] = {}
 
     @cached_property
@@ -117,9 +117,9 @@ class NiehSet:
         Raises:
             DataError: the trajectory is not in the set, or its frames do not fit its metadata.
         """
-        if traj_id not in self._whole:
-            self._whole[traj_id] = tuple(self._trajectory(traj_id).values())
-        return self._whole[traj_id]
+        if traj_id not in self._all_frames:
+            self._all_frames[traj_id] = tuple(self._trajectory(traj_id).values())
+        return self._all_frames[traj_id]
 
     def clue_frames(self, question: Question) -> tuple[FrameRef, ...]:
         """The frames that hold a question's evidence, in the order of its clues."""

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from infthor_eval.errors import DataError
-from infthor_eval.formats.files import written_whole
+from infthor_eval.formats.files import written_atomically
 from infthor_eval.formats.question import Question
 
 __all__ = ["read_questions", "write_questions"]
@@ -43,7 +43,7 @@ def read_questions(path: Path) -> list[Question]:
 
 def write_questions(path: Path, questions: Iterable[Question]) -> None:
     """Write a question file, whole or not at all."""
-    with written_whole(path) as partial, partial.open("w", newline="", encoding="utf-8") as file:
+    with written_atomically(path) as partial, partial.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow([*_COLUMNS, _TYPE, _ABSENCE])
         for item in questions:
@@ -72,14 +72,14 @@ def _question(row: dict[str, str | None], place: str) -> Question:
     )
 
 
-def _literal_list(cell: str | None, place: str, kinds: type | tuple[type, ...]) -> list[Any]:
+def _literal_list(cell: str | None, place: str, types: type | tuple[type, ...]) -> list[Any]:
     try:
         value = ast.literal_eval((cell or "").strip())
     except (ValueError, SyntaxError, MemoryError, RecursionError):
         value = None
     if not isinstance(value, list):
         raise DataError(f"{place} is not a list: {_short(cell)}; write it as in [12, 13] or ['yes']")
-    if not all(isinstance(item, kinds) and not isinstance(item, bool) for item in value):
+    if not all(isinstance(item, types) and not isinstance(item, bool) for item in value):
         raise DataError(f"{place} has an entry of the wrong type: {_short(cell)}")
     return value
 

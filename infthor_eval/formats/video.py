@@ -42,7 +42,7 @@ def frames_per_second(path: Path) -> tuple[FrameRef, ...]:
     except OSError as error:
         raise DataError(f"{path}: cannot be read ({error.strerror}); {_MEND}") from error
     folder = user_cache("video_frames") / f"{digest}-1fps-opencv{cv2.__version__}"
-    if not _is_whole(folder):
+    if not _is_complete(folder):
         try:
             _extract(path, folder)
         except OSError as error:
@@ -52,7 +52,7 @@ def frames_per_second(path: Path) -> tuple[FrameRef, ...]:
     return tuple(FrameRef(file) for file in sorted(folder.glob("*.png")))
 
 
-def _is_whole(folder: Path) -> bool:
+def _is_complete(folder: Path) -> bool:
     """Whether no frame was taken away since; caches are cleaned by all sorts of programs."""
     count = folder / _COUNT
     return count.is_file() and count.read_text() == str(len(list(folder.glob("*.png"))))
@@ -69,7 +69,7 @@ def _extract(path: Path, folder: Path) -> None:
         try:
             made.rename(folder)
         except OSError:
-            if not _is_whole(folder):  # another process was faster
+            if not _is_complete(folder):  # another process was faster
                 raise
 
 

@@ -15,7 +15,7 @@ import msgspec
 
 from infthor_eval.errors import DataError, InfthorError, SimulatorError
 from infthor_eval.formats.digests import digest
-from infthor_eval.formats.files import written_whole
+from infthor_eval.formats.files import written_atomically
 from infthor_eval.formats.set_info import claim_for_simulator
 from infthor_eval.formats.trajectory import Source, Trajectory, folder_name, iter_sources
 from infthor_eval.generation.garbage import libraries_set_aside
@@ -142,7 +142,7 @@ def _one(
         return _earlier(final, digest(content), frames), False
     started = time.monotonic()
     try:
-        with written_whole(final) as partial:
+        with written_atomically(final) as partial:
             partial.mkdir()
             report = replay(trajectory, simulator, partial, digest(content), frames)
             report.seconds = round(time.monotonic() - started, 3)

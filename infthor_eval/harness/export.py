@@ -10,7 +10,7 @@ from typing import Any
 
 from infthor_eval.errors import DataError
 from infthor_eval.formats.digests import canonical_json
-from infthor_eval.formats.files import written_whole
+from infthor_eval.formats.files import written_atomically
 from infthor_eval.harness.registration import NAME
 from infthor_eval.runs import RunOutcome, SampleView, TaskFile, UnitRecord
 from infthor_eval.statistics import clustered_mean
@@ -40,10 +40,10 @@ def export(outcome: RunOutcome) -> Path:
             hashes[task.name] = _hash(
                 "".join(row["doc_hash"] + row["prompt_hash"] + row["target_hash"] for row in rows)
             )
-            with written_whole(folder / f"samples_{task.name}_{stamp}.jsonl") as partial:
+            with written_atomically(folder / f"samples_{task.name}_{stamp}.jsonl") as partial:
                 lines = (json.dumps(row, ensure_ascii=False) + "\n" for row in rows)
                 partial.write_text("".join(lines), encoding="utf-8")
-        with written_whole(folder / f"results_{stamp}.json") as partial:
+        with written_atomically(folder / f"results_{stamp}.json") as partial:
             document = _results(outcome) | {"task_hashes": hashes, "model_name_sanitized": model}
             partial.write_text(json.dumps(document, indent=2, ensure_ascii=False), encoding="utf-8")
     except OSError as error:

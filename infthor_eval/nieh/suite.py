@@ -33,7 +33,7 @@ from infthor_eval.runs import (
     TaskRequest,
     UnitKey,
     UnitRecord,
-    Work,
+    Workload,
 )
 from infthor_eval.runs.generation_kwargs import decoding_of
 from infthor_eval.runs.suite import Need
@@ -137,8 +137,8 @@ class NiehEvaluation:
         _refuse_nothing([task.found for task in self._tasks], self._tasks)
         self._refuse_unused()
 
-    def work(self, subject: Subject) -> Work:
-        """See `infthor_eval.runs.Evaluation.work`."""
+    def workload(self, subject: Subject) -> Workload:
+        """See `infthor_eval.runs.Evaluation.workload`."""
         self._respondent = respondent(subject)
         tokens = self._tokens_per_frame()
         self._plans = {task.file.name: task.plan(tokens) for task in self._tasks}
@@ -146,7 +146,7 @@ class NiehEvaluation:
         self._respondent.read_tasks(self._plans)
         tasks = {task.file.name: task.identity(self._plans[task.file.name]) for task in self._tasks}
         costs = {name: self._respondent.cost(plan) for name, plan in self._plans.items()}
-        return Work(
+        return Workload(
             groups=[group for name, plan in self._plans.items() for group in _groups(name, plan)],
             skipped=[skipped for name, plan in self._plans.items() for skipped in _skipped(name, plan.found)],
             identity={"tasks": tasks, "k_tokens": self._options.k_tokens, "tokens_per_frame": tokens},

@@ -15,7 +15,7 @@ from infthor_eval.runs.suite import (
     Subject,
     Suite,
     TaskRequest,
-    Work,
+    Workload,
 )
 
 __all__ = [
@@ -42,7 +42,7 @@ __all__ = [
     "Unit",
     "UnitKey",
     "UnitRecord",
-    "Work",
+    "Workload",
     "execute",
     "prepare",
     "read_header",

@@ -9,14 +9,14 @@ import msgspec
 
 from infthor_eval.errors import DataError, InfthorError, UsageError, unknown_name
 from infthor_eval.formats.digests import fingerprint
-from infthor_eval.formats.files import written_whole
+from infthor_eval.formats.files import written_atomically
 from infthor_eval.runs import journal as journals
 from infthor_eval.runs.executor import evaluated
 from infthor_eval.runs.identity import identity_of
 from infthor_eval.runs.journal import Journal
 from infthor_eval.runs.records import RunHeader, UnitRecord
 from infthor_eval.runs.session import JournalSession
-from infthor_eval.runs.suite import Evaluation, Group, RunSummary, Subject, Suite, TaskRequest, Work
+from infthor_eval.runs.suite import Evaluation, Group, RunSummary, Subject, Suite, TaskRequest, Workload
 from model_adapters import Model, Policy, adapter_identity, check_options, label, load, names
 
 __all__ = ["Observer", "PreparedRun", "RunOutcome", "RunRequest", "Silent", "execute", "prepare"]
@@ -57,7 +57,7 @@ class RunRequest:
 class Observer(Protocol):
     """Is told how a run goes."""
 
-    def begin(self, work: Work, n_recovered: int) -> None:
+    def begin(self, workload: Workload, n_recovered: int) -> None:
         """All that will be done, before the first unit; and how many bad lines were taken out of the journal."""
         ...
 
@@ -69,7 +69,7 @@ class Observer(Protocol):
 class Silent:
     """An observer that says nothing."""
 
-    def begin(self, work: Work, n_recovered: int) -> None:
+    def begin(self, workload: Workload, n_recovered: int) -> None:
         """Nothing."""
 
     def done(self, record: UnitRecord[Any], resumed: bool) -> None:
@@ -135,14 +135,14 @@ def execute(run: PreparedRun, observer: Observer | None = None) -> RunOutcome:
     observer = observer or Silent()
     subject = _subject(run)
     try:
-        work = run.evaluation.work(subject)
-        header = _header(run, subject, work)
+        workload = run.evaluation.workload(subject)
+        header = _header(run, subject, workload)
         folder = _folder(run.request, header)
         n_recovered = _open_anew(run, folder, header)
         with Journal(folder, header, run.suite.records) as journal:
-            observer.begin(work, n_recovered)
-            _evaluate(run.evaluation, work, JournalSession(subject, journal), observer)
-            records = _of_work(work, journal)
+            observer.begin(workload, n_recovered)
+            _evaluate(run.evaluation, workload, JournalSession(subject, journal), observer)
+            records = _asked(workload, journal)
     finally:
         subject.close()
     summary = RunSummary(header, run.suite.summarise(header, records))
@@ -162,11 +162,11 @@ def _subject(run: PreparedRun) -> Subject:
     return subject
 
 
-def _header(run: PreparedRun, subject: Subject, work: Work) -> RunHeader:
+def _header(run: PreparedRun, subject: Subject, workload: Workload) -> RunHeader:
     request = run.request
     code = {} if request.model in run.suite.baselines else adapter_identity(request.model)
     tasks = request.tasks
-    identity = identity_of(run.suite.name, subject, code, work.identity, tasks.limit, tasks.seed)
+    identity = identity_of(run.suite.name, subject, code, workload.identity, tasks.limit, tasks.seed)
     return RunHeader(suite=run.suite.name, name=request.label, identity=identity)
 
 
@@ -181,15 +181,15 @@ def _open_anew(run: PreparedRun, folder: Path, header: RunHeader) -> int:
     return journals.recover(folder, header, run.suite.records) if run.request.recover else 0
 
 
-def _of_work(work: Work, journal: Journal) -> list[UnitRecord[Any]]:
+def _asked(workload: Workload, journal: Journal) -> list[UnitRecord[Any]]:
     """The records of what this run asks; the journal may know more."""
-    asked = {unit.key for group in work.groups for unit in group.units}
+    asked = {unit.key for group in workload.groups for unit in group.units}
     return [record for record in journal.records if record.key in asked]
 
 
-def _evaluate(evaluation: Evaluation, work: Work, session: JournalSession, observer: Observer) -> None:
+def _evaluate(evaluation: Evaluation, workload: Workload, session: JournalSession, observer: Observer) -> None:
     in_flight = session.subject.capabilities.max_in_flight
-    for record in evaluated(work.groups, lambda group: _records(evaluation, group, session), in_flight):
+    for record in evaluated(workload.groups, lambda group: _records(evaluation, group, session), in_flight):
         observer.done(*session.recorded(record))
 
 
@@ -210,7 +210,7 @@ def _write_results(folder: Path, found: RunSummary) -> None:
     document = {"suite": header.suite, "name": header.name, "identity": header.identity, "summary": found.summary}
     path = folder / _RESULTS
     try:
-        with written_whole(path) as partial:
+        with written_atomically(path) as partial:
             encoded = msgspec.json.encode(document, order="sorted")
             partial.write_bytes(msgspec.json.format(encoded, indent=2) + b"\n")
     except OSError as error:

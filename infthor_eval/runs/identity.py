@@ -11,7 +11,7 @@ __all__ = ["identity_of"]
 
 
 def identity_of(
-    suite: str, subject: Subject, code: Mapping[str, Any], work: Mapping[str, Any], limit: int | None, seed: int
+    suite: str, subject: Subject, code: Mapping[str, Any], workload: Mapping[str, Any], limit: int | None, seed: int
 ) -> dict[str, Any]:
     """The identity, as JSON values.
 
@@ -19,7 +19,7 @@ def identity_of(
         suite: the kind of evaluation.
         subject: what is evaluated.
         code: of a model's adapter that is not this package's (`model_adapters.adapter_identity`).
-        work: what the suite's numbers depend on.
+        workload: what the suite's numbers depend on.
         limit: of items a task.
         seed: of the run.
     """
@@ -30,7 +30,7 @@ def identity_of(
         "adapter": dict(code),
         "limit": limit,
         "seed": seed,
-        **work,
+        **workload,
     }
     # As it is read back from the journal: tuples are lists, keys are strings.
     return dict(json.loads(json.dumps(identity)))

@@ -19,7 +19,7 @@ import msgspec
 
 from infthor_eval.errors import DataError, UsageError
 from infthor_eval.formats.digests import canonical_json
-from infthor_eval.formats.files import written_whole
+from infthor_eval.formats.files import written_atomically
 from infthor_eval.runs.records import FORMAT, MemoRecord, RecordTypes, RunHeader, UnitKey, UnitRecord
 
 __all__ = ["FOLDER", "Journal", "RunLog", "read_header", "read_run", "recover", "set_aside"]
@@ -275,7 +275,7 @@ def _recover_shard(path: Path, header: RunHeader, types: RecordTypes) -> int:
             good.insert(0, msgspec.json.encode(header))
         with (path.parent / _BAD_LINES).open("ab") as kept:
             kept.write(b"".join(line + b"\n" for line in bad))
-        with written_whole(path) as partial:
+        with written_atomically(path) as partial:
             partial.write_bytes(b"".join(line + b"\n" for line in good))
         return len(bad)
 

@@ -28,7 +28,7 @@ __all__ = [
     "Subject",
     "Suite",
     "TaskRequest",
-    "Work",
+    "Workload",
 ]
 
 Need = Literal["conversation", "policy"]
@@ -110,7 +110,7 @@ class Cost:
 
 
 @dataclass(frozen=True)
-class Work:
+class Workload:
     """All that a run has to do.
 
     Attributes:
@@ -176,7 +176,7 @@ class SampleView:
 class Evaluation(Protocol):
     """A suite set up for one run."""
 
-    def work(self, subject: Subject) -> Work:
+    def workload(self, subject: Subject) -> Workload:
         """Find all that is to be done; called once, before the first unit.
 
         Raises:

@@ -198,7 +198,7 @@ def test_a_subject_with_several_in_flight_gives_the_same_records(tmp_path):
 
 def test_a_suite_that_refuses_its_work_ends_before_a_journal_is_begun(tmp_path):
     class Refusing(Sums):
-        def work(self, subject):
+        def workload(self, subject):
             raise ModelError("no")
 
     suite = type("RefusingSuite", (ToySuite,), {"prepare": lambda self, request: Refusing()})()

@@ -21,10 +21,10 @@ class Adder:
 
 
 class Sums:
-    def work(self, subject):
+    def workload(self, subject):
         units = [runs.Unit(runs.UnitKey("sums", f"{a}+{b}"), f"from {a}", Sum((a, b))) for a in (1, 2) for b in (3, 4)]
         skipped = [runs.Skipped(runs.UnitKey("sums", "0+0"), "nothing to add")]
-        return runs.Work([runs.Group(units[:2]), runs.Group(units[2:], "broken")], skipped, {"tasks": {"sums": {}}})
+        return runs.Workload([runs.Group(units[:2]), runs.Group(units[2:], "broken")], skipped, {"tasks": {"sums": {}}})
 
     def run(self, group, session):
         for unit in group.units:
