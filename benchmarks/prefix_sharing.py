@@ -29,6 +29,7 @@ from transformers import DynamicCache, Qwen2_5_VLConfig
 
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
+from model_adapters import Decoding
 from model_adapters.hf.model import TransformersModel
 from model_adapters.tiny.qwen2_5_vl import Qwen25VLTiny
 from model_adapters.tiny.twin import TinyAdapter, TinyOptions
@@ -130,7 +131,7 @@ def machine_report(model: TransformersModel, frames: Sequence[FrameRef], options
 def _prefill(model: TransformersModel, frames: Sequence[FrameRef]) -> tuple[int, ...]:
     talk = model.conversation()
     talk.append(*frames)
-    return (talk.reply(1).n_context_tokens,)
+    return (talk.reply(Decoding(max_new_tokens=1)).n_context_tokens or 0,)
 
 
 def _largest(model: TransformersModel, frames: Sequence[FrameRef]) -> int:
@@ -166,16 +167,16 @@ def conversation(model: Any, frames: Sequence[FrameRef], questions: Sequence[str
     replies = []
     for question in questions:
         talk.append(PROMPT + question)
-        replies.append(talk.reply(new_tokens).token_ids)
+        replies.append(talk.reply(Decoding(max_new_tokens=new_tokens)).token_ids)
         talk.rewind(start)
     return replies
 
 
 def together(model: Any, frames: Sequence[FrameRef], questions: Sequence[str], new_tokens: int) -> Replies:
     """Answer all questions on one prefix, several at a time."""
-    talk = model.conversation()
+    talk, decoding = model.conversation(), Decoding(max_new_tokens=new_tokens)
     talk.append(*frames)
-    return [reply.token_ids for reply in talk.replies([[PROMPT + text] for text in questions], new_tokens)]
+    return [reply.token_ids for reply in talk.replies([[PROMPT + text] for text in questions], decoding)]
 
 
 @torch.inference_mode()

@@ -56,7 +56,7 @@ class Decoding:
         top_p: draw from the most likely tokens that together have this probability; of no account when greedy.
         seed: of the draws; the same request with the same seed is answered the same way.
         stop: strings that end the reply; the first to appear is cut off with what follows.
-        choices: where there are any, the reply is one of these texts.
+        choices: where there are any, the reply is one of these texts, whole: no stop string cuts it.
     """
 
     max_new_tokens: int

@@ -92,6 +92,9 @@ def test_identity_has_what_can_change_a_number(checkpoint: Path) -> None:
     identity = _load(checkpoint, attn_implementation="eager").identity()
     assert identity["checkpoint"] == "tiny"
     assert len(identity["fingerprint"]) == 32
+    assert identity["n_parameters"] == sum(
+        tensor.numel() for tensor in load_file(checkpoint / "model.safetensors").values()
+    )
     assert identity["dtype"] == "float32"
     assert identity["device"] == "cpu"
     assert identity["attn_implementation"] == "eager"

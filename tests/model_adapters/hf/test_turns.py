@@ -1,0 +1,120 @@
+"""Conversations of several turns, against transformers' own chat template, processor and generate."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from infthor_eval.errors import ModelError
+from infthor_eval.formats.frames import FrameRef
+from model_adapters import Turn, load
+from model_adapters.hf.prompt import token_ids
+
+from ..asking import up_to
+from ..checkpoints import FAMILIES
+
+NEW = 6
+ADAPTERS = {family: family for family in FAMILIES} | dict.fromkeys(("llava", "idefics3", "deepseek-vl-1.3b"), "hf-vlm")
+
+
+@pytest.fixture(scope="module")
+def conversations(frames: list[FrameRef]) -> list[tuple[Turn, ...]]:
+    return [
+        (
+            Turn("user", (*frames[:2], "\nWhat is it?")),
+            Turn("assistant", ("A mug.",)),
+            Turn("user", ("\nAnd now?",)),
+        ),
+        (
+            Turn("system", ("You wash cups.",)),
+            Turn("user", ("Goal: ", frames[0], "MoveAhead", frames[1], "\nWhat now?")),
+            Turn("assistant", ("RotateLeft",)),
+            Turn("user", (frames[2], "\nAnd now?")),
+            Turn("assistant", ("MoveAhead",)),
+            Turn("user", ("So: ", frames[2], frames[3])),
+        ),
+    ]
+
+
+@pytest.fixture(scope="module")
+def plainly(
+    checkpoints: dict[str, Path], conversations: list[tuple[Turn, ...]], answer_plainly: Any
+) -> dict[Path, list[Any]]:
+    return answer_plainly({checkpoints[name]: conversations for name in ADAPTERS}, NEW)
+
+
+def _load(name: str, checkpoints: Mapping[str, Path], **options: str) -> Any:
+    given = {"pretrained": str(checkpoints[name]), "device": "cpu", "dtype": "float32", "max_tokens": "0"}
+    return load(ADAPTERS[name], {**given, **options}, seed=0)
+
+
+def _talk(model: Any, turns: tuple[Turn, ...]) -> Any:
+    talk = model.conversation()
+    for turn in turns:
+        talk.append(*turn.parts, role=turn.role)
+    return talk
+
+
+@pytest.mark.parametrize("name", ADAPTERS)
+@pytest.mark.parametrize("share_prefix", ["true", "false"])
+def test_ids_and_replies_are_those_of_transformers(
+    name: str,
+    share_prefix: str,
+    checkpoints: dict[str, Path],
+    conversations: list[tuple[Turn, ...]],
+    plainly: dict[Path, list[Any]],
+) -> None:
+    model = _load(name, checkpoints, share_prefix=share_prefix, chunk_tokens="50")
+    for turns, (ids, reply) in zip(conversations, plainly[checkpoints[name]], strict=True):
+        talk = _talk(model, turns)
+        assert talk.n_tokens == len(ids)
+        assert not hasattr(model, "pieces") or list(token_ids(model.pieces(turns))) == ids
+        got = list(talk.reply(up_to(NEW)).token_ids)
+        assert got == reply[: len(got)]
+        assert reply[len(got) :] == [] or reply[len(got)] in model._loaded.generation.end_ids
+    model.close()
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_every_round_encodes_what_is_new_in_it_only(family: str, frames: list[FrameRef]) -> None:
+    shared: Any = load(f"{family}-tiny", {"chunk_tokens": "40"}, seed=0)
+    alone: Any = load(f"{family}-tiny", {"share_prefix": "false"}, seed=0)
+    talk, other = shared.conversation(), alone.conversation()
+    n_context, cached = 0, []
+    for frame, action in zip(frames, ("RotateLeft", "MoveAhead", "PickUp", "LookDown"), strict=False):
+        for each in (talk, other):
+            each.append("Goal: wash. ", frame, "\nWhat next?")
+        reply = talk.reply(up_to(NEW))
+        assert reply.token_ids == other.reply(up_to(NEW)).token_ids
+        # All of the last prompt is there, but for what tokens its last text makes with the first of what was answered.
+        assert reply.n_cached_tokens >= n_context - 2
+        n_context = reply.n_context_tokens
+        cached.append(reply.n_cached_tokens)
+        for each in (talk, other):
+            each.append(action, role="assistant")
+    assert cached == sorted(set(cached))
+    assert cached[-1] > 3 * shared.tokens_per_frame(frames[0])
+
+
+def test_batches_go_on_from_several_turns(conversations: list[tuple[Turn, ...]]) -> None:
+    found = []
+    for size in ("1", "3"):
+        talk = _talk(load("qwen2.5-vl-tiny", {"batch_size": size}, seed=0), conversations[1][:-1])
+        replies = talk.replies([["What?"], [*conversations[1][-1].parts], ["\nWhy not?"]], up_to(NEW))
+        found.append([(reply.text, reply.token_ids, reply.n_context_tokens) for reply in replies])
+    assert found[0] == found[1]
+
+
+@pytest.mark.parametrize("role", ["system", "assistant"])
+def test_only_a_users_turn_is_replied_to(tiny: Any, role: Any) -> None:
+    talk = tiny.conversation()
+    for _ in range(2):
+        with pytest.raises(ModelError, match=r"qwen2\.5-vl-tiny has nothing to reply to: .*; append a user turn"):
+            talk.reply(up_to(NEW))
+        with pytest.raises(ModelError, match="append a user turn"):
+            assert talk.n_tokens
+        with pytest.raises(ModelError, match="append a user turn"):
+            talk.replies([[]], up_to(NEW))
+        talk.append("I see.", role=role)
+    assert [reply.text for reply in talk.replies([["What?"]], up_to(2))] != []

@@ -1,0 +1,41 @@
+from typing import Any
+
+import pytest
+
+from infthor_eval.errors import ModelError
+from model_adapters import Capabilities, Turn, check_decoding, check_turns
+
+from .asking import up_to, user
+
+
+@pytest.mark.parametrize(
+    ("able", "asked"),
+    [
+        ({}, {}),
+        ({}, {"top_p": 0.5, "seed": 3, "stop": ("x",)}),  # greedy all the same
+        ({"sampling": True}, {"temperature": 0.5, "top_p": 0.5}),
+        ({"choices": True}, {"choices": ("yes", "no")}),
+    ],
+)
+def test_what_a_model_can_do_is_let_through(able: dict[str, Any], asked: dict[str, Any]) -> None:
+    check_decoding("m", Capabilities(**able), up_to(3, **asked))
+
+
+@pytest.mark.parametrize(
+    ("able", "asked", "complaint"),
+    [
+        ({"choices": True}, {"temperature": 0.5}, "m decodes greedily only, not at temperature 0.5; ask at"),
+        ({"sampling": True}, {"choices": ("yes", "no")}, "m cannot be held to 2 choices; ask without choices"),
+    ],
+)
+def test_what_it_cannot_do_is_refused(able: dict[str, Any], asked: dict[str, Any], complaint: str) -> None:
+    with pytest.raises(ModelError, match=complaint):
+        check_decoding("m", Capabilities(**able), up_to(3, **asked))
+
+
+def test_only_a_users_turn_can_be_replied_to() -> None:
+    check_turns("m", user("What?"))
+    with pytest.raises(ModelError, match="m has nothing to reply to: the conversation is empty; append a user turn"):
+        check_turns("m", ())
+    with pytest.raises(ModelError, match="nothing to reply to: the last turn is the assistant's; append a user turn"):
+        check_turns("m", (*user("What?"), Turn("assistant", ("This.",))))
