@@ -56,7 +56,7 @@ class Manifest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def read_manifest(path: Path) -> Manifest:
-    """Reads a manifest.
+    """Read a manifest.
 
     Raises:
         DataError: it cannot be read or is none.
@@ -72,7 +72,7 @@ def read_manifest(path: Path) -> Manifest:
 def make_bundle(
     manifest: Manifest, simulator: Simulator, out: Path, progress: Callable[[], None] = lambda: None
 ) -> tuple[Manifest, MadeQuestions]:
-    """Makes the set: generates, replays, asks, and stores the frames small.
+    """Make the set: generate, replay, ask, and store the frames small.
 
     Args:
         manifest: what to make; its digests are not looked at.

@@ -57,7 +57,7 @@ class Draft:
     """The actions, sub-goals and tasks so far, and the log of every frame."""
 
     def __init__(self, settings: TrajectorySettings, scene: Scene, view: View) -> None:
-        """Begins with the first frame.
+        """Begin with the first frame.
 
         Args:
             settings: what is being made.
@@ -80,7 +80,7 @@ class Draft:
         return Length(len(self._low), len(self._high))
 
     def add(self, trace: Trace) -> None:
-        """Adds what a rollout did."""
+        """Add what a rollout did."""
         for acted in trace.acted:
             acted.low.low_idx = len(self._low)
             self._low.append(acted.low)
@@ -88,11 +88,11 @@ class Draft:
         self._high += trace.high
 
     def cut(self, length: Length) -> None:
-        """Takes back what was added since it had a length."""
+        """Take back what was added since it had a length."""
         del self._low[length.low :], self._high[length.high :], self._log[length.low + 1 :]
 
     def add_task(self, task: SubTask, start: Length, end: Length) -> None:
-        """Notes which part of it carried a task out.
+        """Note which part of it carried a task out.
 
         Args:
             task: the task.
@@ -104,7 +104,7 @@ class Draft:
         self._sub_tasks.append(task)
 
     def make_last_task_final(self) -> None:
-        """Takes the last task for the final one."""
+        """Take the last task for the final one."""
         self._final = self._sub_tasks.pop()
 
     def object_log(self) -> list[dict[str, Any]]:

@@ -39,7 +39,7 @@ class TaskStatistics:
     reasons: Counter[str] = field(default_factory=Counter)
 
     def add(self, other: "TaskStatistics") -> None:
-        """Adds the numbers of another trajectory."""
+        """Add the numbers of another trajectory."""
         self.tried += other.tried
         self.accepted += other.accepted
         self.reasons += other.reasons
@@ -55,7 +55,7 @@ class GeneratedTrajectory:
 
 
 def generate(settings: TrajectorySettings, simulator: Simulator) -> GeneratedTrajectory:
-    """Makes one trajectory.
+    """Make one trajectory.
 
     Args:
         settings: what to make.
@@ -77,7 +77,7 @@ class _Factory:
     """Makes one trajectory."""
 
     def __init__(self, settings: TrajectorySettings, simulator: Simulator) -> None:
-        """Loads the scene and puts the agent somewhere."""
+        """Load the scene and put the agent somewhere."""
         self._settings = settings
         self._name = f"scene {settings.scene}, seed {settings.seed}"
         self._simulator = simulator
@@ -111,7 +111,7 @@ class _Factory:
         return GeneratedTrajectory(trajectory, statistics, self._problems)
 
     def extend(self) -> None:
-        """Adds one task: the first sampled one that can be planned and carried out.
+        """Add one task: the first sampled one that can be planned and carried out.
 
         What it leaves in the hand is put down, as a sub-goal of its own behind the task.
         """
@@ -123,7 +123,7 @@ class _Factory:
             )
 
     def finish(self) -> None:
-        """Adds the final task; where none works, another ordinary one comes before it."""
+        """Add the final task; where none works, another ordinary one comes before it."""
         for _ in range(_LONGER):
             task = self._first_that_works(ends_of(self._draft.object_log()).allow_task, None, is_last=True)
             if task is not None:
@@ -135,7 +135,7 @@ class _Factory:
     def _first_that_works(
         self, allowed: Callable[[Task], bool], trials: int | None, is_last: bool = False
     ) -> Task | None:
-        """Tries sampled tasks until one becomes part of the trajectory; None where none does."""
+        """Try sampled tasks until one becomes part of the trajectory; None where none does."""
         task = self._try_sampled(allowed, trials, is_last)
         if task is None and self._setbacks:
             self._setbacks.forget()  # before giving up: they may be outdated
@@ -184,7 +184,7 @@ class _Factory:
         return None
 
     def _put_down(self) -> RolloutError | None:
-        """Puts a held object down, wherever there is room for it."""
+        """Put a held object down, wherever there is room for it."""
         room = room_of(self._simulator.view)
         held = room.start.held
         if held is None:
@@ -201,13 +201,13 @@ class _Factory:
         return error
 
     def _go_back(self, mark: SimulatorMark, length: Length) -> None:
-        """Takes back what was added since a mark at which the trajectory had this length."""
+        """Take back what was added since a mark at which the trajectory had this length."""
         if self._draft.length.low > length.low:
             self._simulator.rewind(mark)
             self._draft.cut(length)
 
     def _carry_out(self, operators: Sequence[Operator]) -> RolloutError | None:
-        """Runs operators; where that fails, the simulator is as it was before and nothing is added."""
+        """Run operators; where that fails, the simulator is as it was before and nothing is added."""
         mark = self._simulator.mark()
         rollout = Rollout(self._simulator, self._draft.length.high)
         try:

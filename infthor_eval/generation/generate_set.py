@@ -79,7 +79,7 @@ class GeneratedSet:
 def generate_set(
     jobs: Sequence[TrajectorySettings], simulator: Simulator, out: Path, progress: Callable[[], None] = lambda: None
 ) -> GeneratedSet:
-    """Makes the trajectories that `out` does not have yet, one file each, and beside it their tasks as PDDL.
+    """Make the trajectories that `out` does not have yet, one file each, and beside it their tasks as PDDL.
 
     Args:
         jobs: what to make.

@@ -10,7 +10,7 @@ __all__ = ["between"]
 
 
 def between(simulator: Simulator, start: AgentPose, end: AgentPose, frames: int) -> Iterator[View]:
-    """Looks from evenly spaced poses between two; the agent is back at the second one afterwards.
+    """Look from evenly spaced poses between two; the agent is back at the second one afterwards.
 
     Args:
         simulator: where the agent stands at `end`.

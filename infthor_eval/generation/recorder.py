@@ -22,7 +22,7 @@ class Recorder:
     """
 
     def __init__(self, images: Path | None = None) -> None:
-        """Begins with no frame.
+        """Begin with no frame.
 
         Args:
             images: folder for the frames, which must exist; None keeps the log only.
@@ -41,7 +41,7 @@ class Recorder:
         target: str | None = None,
         receptacle: str | None = None,
     ) -> Step:
-        """Adds one frame.
+        """Add one frame.
 
         Args:
             view: the world after the action.

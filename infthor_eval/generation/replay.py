@@ -74,7 +74,7 @@ class ReplayReport(msgspec.Struct):
 
 
 def replay(trajectory: Trajectory, simulator: Simulator, folder: Path, digest: str, frames: int = 1) -> ReplayReport:
-    """Runs a trajectory and writes its frames and logs into a folder.
+    """Run a trajectory and write its frames and logs into a folder.
 
     These are `img/`, `metadata.json`, `traj.txt`, `expert_log.json`, and `state_summary.json`: the room in words
     after each task and at the end, by index of the low-level action.
@@ -127,13 +127,13 @@ class _Run:
         self.report = report
 
     def begin(self, images: Path) -> None:
-        """Records the first frame; the scene is restored by now."""
+        """Record the first frame; the scene is restored by now."""
         self.recorder = Recorder(images)
         self.recorder.record(self._simulator.view)
         self._grounding = Grounding(self._simulator.view)
 
     def act(self, index: int, low: LowAction) -> None:
-        """Runs and records one action."""
+        """Run and record one action."""
         before, api = self._simulator.view, low.api_action
         text = str(text_of(api.action, api.object_id, api.receptacle_id))
         target, error = self._call(index, low, before)
@@ -156,7 +156,7 @@ class _Run:
         step.success, step.error = error is None, error
 
     def _call(self, index: int, low: LowAction, before: View) -> tuple[str | None, str | None]:
-        """Runs it; the id of the object it is about, and why it was refused."""
+        """Run it; the id of the object it is about, and why it was refused."""
         try:
             call = translate(low, self._grounding, before)
         except MissingObjectError as missing:
@@ -167,7 +167,7 @@ class _Run:
         return target, None if after.success else after.error or "refused without a message"
 
     def _compare_box(self, index: int, low: LowAction, target: str | None, before: View) -> None:
-        """Compares the recorded box of the object acted on with what the frame before the action shows of
+        """Compare the recorded box of the object acted on with what the frame before the action shows of
         it."""
         recorded = low.discrete_action.box if low.discrete_action is not None else None
         if recorded is None or target is None or before.instances is None:

@@ -62,7 +62,7 @@ class ReplayedSet:
 
 
 def select(paths: Iterable[Path], limit: int | None = None, per_floor_plan: int | None = None) -> Selection:
-    """Reads the trajectories to replay.
+    """Read the trajectories to replay.
 
     Args:
         paths: files and directories.

@@ -67,7 +67,7 @@ class ReplaySummary(msgspec.Struct):
 
 
 def summarise(replayed: ReplayedSet) -> ReplaySummary:
-    """Counts what came of a set."""
+    """Count what came of a set."""
     reports = replayed.reports
     overlaps = [overlap for report in reports for overlap in report.overlaps]
     return ReplaySummary(

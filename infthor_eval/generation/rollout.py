@@ -22,7 +22,7 @@ class Rollout:
     """Operators turned into actions. `trace` has what was done so far."""
 
     def __init__(self, simulator: Simulator, first_high: int = 0) -> None:
-        """Begins with nothing done.
+        """Begin with nothing done.
 
         Args:
             simulator: carries the actions out.
@@ -33,7 +33,7 @@ class Rollout:
         self._slices: dict[str, str] = {}
 
     def run(self, operators: list[Operator]) -> None:
-        """Carries out a plan.
+        """Carry out a plan.
 
         Raises:
             RolloutError: an action was refused, or there is no place to act from.
@@ -103,7 +103,7 @@ class Rollout:
         self.trace.begin(words, PlannerAction(name, object_id=item, receptacle_id=receptacle))
 
     def _inside(self, holder: str | None, act: Callable[[], None]) -> None:
-        """Opens what holds the object, acts, and closes it again; just acts where nothing is closed."""
+        """Open what holds the object, act, and close it again; just act where nothing is closed."""
         if holder is not None:
             self._interact("OpenObject", holder)
         act()

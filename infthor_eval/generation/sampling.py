@@ -18,7 +18,7 @@ class TaskPool:
     """Samples tasks; what was used or failed becomes less likely."""
 
     def __init__(self, task_types: Iterable[TaskType], rng: random.Random) -> None:
-        """Begins with nothing used.
+        """Begin with nothing used.
 
         Args:
             task_types: what to draw from.
@@ -44,11 +44,11 @@ class TaskPool:
         yield from sorted(found, key=lambda task: waits[task])
 
     def used(self, task: Task) -> None:
-        """Notes that a task became part of the trajectory."""
+        """Note that a task became part of the trajectory."""
         self._used.update(_aspects(task))
 
     def failed(self, task: Task) -> None:
-        """Notes that a task was tried and did not work."""
+        """Note that a task was tried and did not work."""
         self._failed[task] += 1
 
     def _weight(self, task: Task) -> float:

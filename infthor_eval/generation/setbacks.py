@@ -22,7 +22,7 @@ class Setbacks:
         return bool(self._blocked or self._refused)
 
     def note(self, view: View, item: str, receptacle: str | None) -> None:
-        """Remembers that an object cannot be acted on, or finds no room in a receptacle, as things are.
+        """Remember that an object cannot be acted on, or finds no room in a receptacle, as things are.
 
         Args:
             view: as things are.

@@ -31,7 +31,7 @@ class _FloorPlan:
 
 
 def write_supplement(trajectories: Iterable[Trajectory], path: Path) -> None:
-    """Writes what the trajectories tell of each floor plan.
+    """Write what the trajectories tell of each floor plan.
 
     The file is `{floor plan: {"cells": [[x, z], ...], "floor_y": y, "objects": [id, ...]}}`: cells (metres)
     where the agent stood, the agent's height, ids of the fixed objects it acted on.

@@ -42,7 +42,7 @@ class Trace:
     """
 
     def __init__(self, simulator: Simulator, first_high: int = 0) -> None:
-        """Begins with nothing done.
+        """Begin with nothing done.
 
         Args:
             simulator: carries the actions out.
@@ -59,7 +59,7 @@ class Trace:
         return self.simulator.view
 
     def begin(self, words: list[str], action: PlannerAction) -> None:
-        """Begins a sub-goal: the actions from here on belong to it.
+        """Begin a sub-goal: the actions from here on belong to it.
 
         Args:
             words: the object types that it is about, in words.
@@ -69,7 +69,7 @@ class Trace:
         self.high.append(HighAction(number, DiscreteAction(action.action, words), action))
 
     def act(self, api: ApiAction, arguments: dict[str, Any], suffix: str = "") -> None:
-        """Carries out one action of the present sub-goal.
+        """Carry out one action of the present sub-goal.
 
         Args:
             api: the action as it is stored.

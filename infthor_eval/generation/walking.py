@@ -20,7 +20,7 @@ class Walker:
         self._grid: Grid | None = None
 
     def go(self, shown: list[str], inside: str | None = None) -> None:
-        """Walks to where objects can be acted on, as a sub-goal of its own where there is a step to go.
+        """Walk to where objects can be acted on, as a sub-goal of its own where there is a step to go.
 
         Args:
             shown: ids of the objects; the first is what the agent faces.
@@ -40,7 +40,7 @@ class Walker:
         self._walk(viewpoint, shown)
 
     def step_aside(self, item: str) -> None:
-        """Walks to where an object is in sight, within the present sub-goal.
+        """Walk to where an object is in sight, within the present sub-goal.
 
         Raises:
             RolloutError: as `go`.
@@ -48,7 +48,7 @@ class Walker:
         self._walk(self._viewpoint([item]), [item])
 
     def forget_grid(self) -> None:
-        """Forgets where the agent can stand: things may be in the way now, or no longer."""
+        """Forget where the agent can stand: things may be in the way now, or no longer."""
         self._grid = None
 
     def _viewpoint(self, shown: list[str], inside: str | None = None) -> Viewpoint:
@@ -60,7 +60,7 @@ class Walker:
         return found
 
     def _walk(self, viewpoint: Viewpoint, shown: list[str]) -> None:
-        """Goes there. A refused step changes nothing and is not part of the trajectory: it is walked around."""
+        """Go there. A refused step changes nothing and is not part of the trajectory: it is walked around."""
         target = self._trace.view.objects[shown[0]].object_type
         while (moves := self._moves(viewpoint)) is not None:
             if all(self._move(action) for action in moves):

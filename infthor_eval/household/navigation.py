@@ -29,7 +29,7 @@ class Grid:
     """The cells that the agent can reach."""
 
     def __init__(self, positions: Iterable[tuple[float, float]]) -> None:
-        """Takes positions (x, z) in metres; they lie on a grid of 0.25 m, whose offset is that of the
+        """Take positions (x, z) in metres; they lie on a grid of 0.25 m, whose offset is that of the
         first."""
         points = sorted(positions)
         self._origin = (points[0][0] % GRID, points[0][1] % GRID) if points else (0.0, 0.0)

@@ -85,7 +85,7 @@ class Room:
 
 
 def room_of(view: View, blocked: Container[str] = (), refused: Iterable[tuple[str, str]] = ()) -> Room:
-    """Reads a room from what the simulator reports. The agent counts as being at no place.
+    """Read a room from what the simulator reports. The agent counts as being at no place.
 
     Args:
         view: the world now.

@@ -37,7 +37,7 @@ class Respondent(Protocol):
         ...
 
     def answerer(self, task: str, session: Session) -> Answerer:
-        """Answers the questions of one task on one trajectory."""
+        """Who answers the questions of one task on one trajectory."""
         ...
 
 

@@ -125,7 +125,7 @@ class RecordTypes:
     memo: type[Any] | None = None
 
     def decoder(self) -> msgspec.json.Decoder[Any]:
-        """Decodes a line of a journal."""
+        """The decoder of a journal's lines."""
         lines: Any = RunHeader | UnitRecord[self.unit] | MemoRecord[self.memo]  # type: ignore[name-defined]
         return msgspec.json.Decoder(lines)
 

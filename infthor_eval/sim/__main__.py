@@ -13,7 +13,7 @@ __all__ = ["main"]
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Runs the simulator until the controller hangs up; returns the exit code."""
+    """Run the simulator until the controller hangs up; return the exit code."""
     # OpenMP's threads must not spin between frames: the controller needs the core meanwhile.
     os.environ.setdefault("OMP_WAIT_POLICY", "passive")
     os.environ.setdefault("NUMBA_NUM_THREADS", str(min(4, os.cpu_count() or 1)))

@@ -13,7 +13,7 @@ _WASHABLE_LIQUID = "water"
 
 
 def slice_object(world: World, target: SimObject) -> list[SimObject]:
-    """Replaces an object by its slices; an egg by its cracked self.
+    """Replace an object by its slices; an egg by its cracked self.
 
     Returns:
         The new objects; their ids are the old one's and `|AppleSliced_1` and so on.
@@ -51,7 +51,7 @@ def _slicing_axis(world: World, target: SimObject) -> int:
 
 
 def break_object(world: World, target: SimObject) -> None:
-    """Breaks an object; an egg cracks, and what was in a vessel spills."""
+    """Break an object; an egg cracks, and what was in a vessel spills."""
     if target.type.cracks:
         slice_object(world, target)
         return

@@ -68,7 +68,7 @@ class FifoPeer:
             os.close(self._in)
 
     def send(self, frames: Sequence[tuple[FieldType, bytes | memoryview]]) -> None:
-        """Writes one message of these frames."""
+        """Write one message of these frames."""
         for field_type, body in frames:
             view = memoryview(body).cast("B")
             self._write(_HEADER.pack(field_type, len(view)))
@@ -104,7 +104,7 @@ class FifoPeer:
         return action
 
     def _open_out(self, path: Path) -> int:
-        """Opens the pipe of states when the controller reads from it.
+        """Open the pipe of states when the controller reads from it.
 
         A plain open would wait for ever for a controller that has died meanwhile.
         """
@@ -121,7 +121,7 @@ class FifoPeer:
                 return pipe
 
     def _open_in(self) -> int | None:
-        """Opens the pipe of actions and waits for the controller to write to it; None if it dies before."""
+        """Open the pipe of actions and wait for the controller to write to it; None if it dies before."""
         pipe = os.open(self._client_path, os.O_RDONLY | os.O_NONBLOCK)
         poll = select.poll()
         poll.register(pipe, select.POLLIN)

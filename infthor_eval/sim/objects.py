@@ -113,7 +113,7 @@ class SimObject:
         return float(high[1] if self.support is None else low[1] + self.support)
 
     def place_bottom(self, point: Array) -> None:
-        """Moves the object so that the middle of the underside of its box is at `point` (world, metres)."""
+        """Move the object so that the middle of the underside of its box is at `point` (world, metres)."""
         low, high = self.bounds()
         middle = (low + high) / 2
         self.position = self.position + np.array([point[0] - middle[0], point[1] - low[1], point[2] - middle[2]])

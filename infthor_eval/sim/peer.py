@@ -35,7 +35,7 @@ class Peer:
         self._packer = MetadataPacker()
 
     def serve(self, pipes: FifoPeer) -> None:
-        """Sends the first state, then one reply to each action."""
+        """Send the first state, then one reply to each action."""
         pipes.send(self._reply(Outcome("Initialize"), 0, {}))
         while (message := pipes.receive()) is not None:
             pipes.send(self.answer(message))

@@ -36,7 +36,7 @@ class NamedPose:
 
 
 def set_poses(world: World, poses: Iterable[NamedPose], keep_moveable: bool = False) -> None:
-    """Gives the named objects new poses and new ids made from them; loose objects that are not named vanish.
+    """Give the named objects new poses and new ids made from them; loose objects that are not named vanish.
 
     Names of other versions of AI2-THOR differ after the type: a name that the scene does not have is taken by type.
     """
@@ -82,7 +82,7 @@ def _has_surface(furniture: ObjectType) -> bool:
 
 
 def settle_parents(world: World) -> None:
-    """Finds for every loose object without a parent the receptacle that it stands in or on."""
+    """Find for every loose object without a parent the receptacle that it stands in or on."""
     for item in world.objects.values():
         if item.type.pickupable and item.parent is None and item.object_id != world.held:
             owner = owner_of(world, item)
@@ -135,7 +135,7 @@ def spawn_randomly(
     kept: frozenset[str],
     in_open_only: bool,
 ) -> None:
-    """Puts every loose object that is not `kept` into a random receptacle that takes its type and has room."""
+    """Put every loose object that is not `kept` into a random receptacle that takes its type and has room."""
     loose = [o for o in world.objects.values() if o.type.pickupable and o.object_id not in kept]
     for index in random.permutation(len(loose)):
         item = loose[index]

@@ -59,18 +59,18 @@ class Simulation:
         self.load(self.catalogue.empty())
 
     def load(self, world: World) -> None:
-        """Makes `world` the present scene; settings stay until the next Initialize."""
+        """Make `world` the present scene; settings stay until the next Initialize."""
         self.cameras.clear()
         self.random = np.random.default_rng(world.seed)
         self._saved: dict[int, tuple[World, np.random.Generator]] = {}
         self._show(world)
 
     def save(self, slot: int) -> None:
-        """Keeps a copy of the present state of the scene, in place of an earlier one of this slot."""
+        """Keep a copy of the present state of the scene, in place of an earlier one of this slot."""
         self._saved[slot] = copy.deepcopy((self.world, self.random))
 
     def restore(self, slot: int) -> bool:
-        """Brings the kept state back, which stays kept; False where the slot has none of this scene."""
+        """Bring the kept state back, which stays kept; False where the slot has none of this scene."""
         if slot not in self._saved:
             return False
         world, self.random = copy.deepcopy(self._saved[slot])

@@ -104,18 +104,18 @@ class World:
         return found
 
     def touch(self, *changed: SimObject) -> None:
-        """Records that these objects (and the view) changed."""
+        """Record that these objects (and the view) changed."""
         self.version += 1
         for item in changed:
             item.version += 1
 
     def add(self, item: SimObject) -> None:
-        """Adds an object; its id must be new."""
+        """Add an object; its id must be new."""
         self.objects[item.object_id] = item
         self.touch(item)
 
     def remove(self, item: SimObject) -> None:
-        """Takes an object out of the scene; its contents stay where they are, on nothing."""
+        """Take an object out of the scene; its contents stay where they are, on nothing."""
         self.detach(item)
         for content in self.children(item):
             content.parent = None
@@ -126,14 +126,14 @@ class World:
         self.touch()
 
     def attach(self, item: SimObject, receptacle: SimObject) -> None:
-        """Puts `item` among the contents of `receptacle`."""
+        """Put `item` among the contents of `receptacle`."""
         self.detach(item)
         item.parent = receptacle.object_id
         receptacle.contents.append(item.object_id)
         self.touch(item, receptacle)
 
     def detach(self, item: SimObject) -> None:
-        """Takes `item` out of whatever contains it."""
+        """Take `item` out of whatever contains it."""
         if item.parent is not None:
             receptacle = self.objects[item.parent]
             receptacle.contents.remove(item.object_id)
@@ -157,14 +157,14 @@ class World:
             yield item
 
     def shift(self, items: Iterable[SimObject], offset: Array) -> None:
-        """Moves objects, and all they contain, by `offset` metres (3,)."""
+        """Move objects, and all they contain, by `offset` metres (3,)."""
         for item in items:
             for part in (item, *self.descendants(item)):
                 part.position = part.position + offset
                 self.touch(part)
 
     def carry(self) -> None:
-        """Takes what the agent holds, and all it contains, to the agent's hand."""
+        """Take what the agent holds, and all it contains, to the agent's hand."""
         if self.held is None:
             return
         item = self.objects[self.held]
@@ -173,7 +173,7 @@ class World:
         self.set_pose(item, self.hand_pose() - middle, turn)
 
     def set_pose(self, item: SimObject, position: Array, rotation: Array) -> None:
-        """Moves and turns an object; what it contains comes along as if fixed to it."""
+        """Move and turn an object; what it contains comes along as if fixed to it."""
         turn = euler_matrix(rotation) @ item.matrix.T
         yaw = float(rotation[1] - item.rotation[1])
         pivot = item.position.copy()
@@ -185,7 +185,7 @@ class World:
         self.touch(item)
 
     def keep_templates(self) -> None:
-        """Remembers what its loose objects are like, for poses that name objects which are gone by then."""
+        """Remember what its loose objects are like, for poses that name objects which are gone by then."""
         self.templates = {}
         for item in self.objects.values():
             if item.type.pickupable:

@@ -42,7 +42,7 @@ class ActionText:
 
 
 def parse_action(text: str) -> ActionText:
-    """Reads an action text; white space does not matter, the case of the names does.
+    """Read an action text; white space does not matter, the case of the names does.
 
     Raises:
         UngroundedError: an unknown action, or not as many object types as it takes.
@@ -72,7 +72,7 @@ def text_of(action: str, object_id: str | None = None, receptacle_id: str | None
 
 
 def ground(text: ActionText, view: View, degrees: float = _LOOK_DEGREES) -> dict[str, Any]:
-    """Turns an action text into a call.
+    """Turn an action text into a call.
 
     Args:
         text: the action.

@@ -22,7 +22,7 @@ class SafeController(ai2thor.controller.Controller):
     """
 
     def __init__(self, launch: Launch, scene: str | dict[str, Any], **options: Any) -> None:
-        """Starts the simulator and loads a scene.
+        """Start the simulator and load a scene.
 
         Args:
             launch: what to start.
@@ -70,14 +70,14 @@ class SafeController(ai2thor.controller.Controller):
         return super().base_dir if self._folder is None else self._folder.name
 
     def reset(self, scene: str | dict[str, Any] | None = None, **init_params: Any) -> Any:
-        """Loads a scene; as the published method, but a failed simulator raises SimulatorError."""
+        """Load a scene; as the published method, but a failed simulator raises SimulatorError."""
         try:
             return super().reset(scene, **init_params)
         except PeerFault as fault:
             raise self._explained(fault) from fault
 
     def step(self, action: str | dict[str, Any] | None = None, **action_args: Any) -> Any:
-        """Runs one action; as the published method, but a failed simulator raises SimulatorError."""
+        """Run one action; as the published method, but a failed simulator raises SimulatorError."""
         try:
             return super().step(action, **action_args)
         except PeerFault as fault:

@@ -30,7 +30,7 @@ class Grounding:
     metres."""
 
     def __init__(self, view: View) -> None:
-        """Remembers where everything is.
+        """Remember where everything is.
 
         Args:
             view: the world when the episode begins, after the scene was restored.

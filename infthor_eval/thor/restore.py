@@ -32,7 +32,7 @@ class Restored:
 
 
 def restore(simulator: Simulator, scene: Scene) -> Restored:
-    """Loads the scene of a trajectory and puts everything where the recording begins.
+    """Load the scene of a trajectory and put everything where the recording begins.
 
     Args:
         simulator: is reset to the scene; its `view` then is the first frame.

@@ -27,7 +27,7 @@ def scene_pictures(simulator: Simulator, scene: str) -> tuple[NDArray[np.uint8],
 
 
 def dump_scene(simulator: Simulator, scene: str, folder: Path) -> int:
-    """Writes what the simulator reports of a scene into a folder of recorded floor plans.
+    """Write what the simulator reports of a scene into a folder of recorded floor plans.
 
     Args:
         simulator: Unity, to carry a scene to machines without it; any other serves.

@@ -52,7 +52,7 @@ class Simulator:
         max_restarts: int = 3,
         **options: Any,
     ) -> None:
-        """Describes the simulator; it starts with the first `reset`.
+        """Describe the simulator; it starts with the first `reset`.
 
         Args:
             launch: what to start.
@@ -117,7 +117,7 @@ class Simulator:
         return dict(self._controller.last_event.metadata)
 
     def reset(self, scene: str | dict[str, Any] | None) -> View:
-        """Loads a scene and begins an episode.
+        """Load a scene and begin an episode.
 
         Args:
             scene: its name (`FloorPlan10`, `kitchen-3`), the description of a ProcTHOR house, or None for the
@@ -136,7 +136,7 @@ class Simulator:
                 self._recover_from(fault)
 
     def step(self, action: str, **arguments: Any) -> View:
-        """Runs one action; a refused one is told by the view's `success` and `error`.
+        """Run one action; a refused one is told by the view's `success` and `error`.
 
         Raises:
             SimulatorError: the simulator failed more often than it may, or a repeated episode went another
@@ -156,7 +156,7 @@ class Simulator:
                 return view
 
     def query(self, action: str, **arguments: Any) -> View:
-        """Runs an action that only asks (`GetReachablePositions`): it is no part of the episode, nor is its
+        """Run an action that only asks (`GetReachablePositions`): it is no part of the episode, nor is its
         view kept.
 
         Raises:
@@ -169,7 +169,7 @@ class Simulator:
         return answer
 
     def mark(self) -> SimulatorMark:
-        """Remembers where the episode is now, for `rewind`; the last two marks are cheap to go back to.
+        """Remember where the episode is now, for `rewind`; the last two marks are cheap to go back to.
 
         The embedded simulator keeps a copy of its state. Unity cannot: there `rewind` may repeat the episode.
         """
@@ -181,7 +181,7 @@ class Simulator:
         return SimulatorMark(length, self.view)
 
     def rewind(self, mark: SimulatorMark) -> View:
-        """Brings the world back to where it was at a mark of this episode.
+        """Bring the world back to where it was at a mark of this episode.
 
         Raises:
             SimulatorError: as `step`.
@@ -204,19 +204,19 @@ class Simulator:
         return slot is not None and self.query("RestoreState", slot=slot).success
 
     def _walk_back(self, mark: SimulatorMark) -> bool:
-        """Puts the agent where it was; enough where it only walked and looked about since."""
+        """Put the agent where it was; enough where it only walked and looked about since."""
         back = self.query(**teleport_call(mark.view.agent))
         return back.success and back.agent == mark.view.agent
 
     def close(self) -> None:
-        """Stops the simulator; a later `reset` starts it again."""
+        """Stop the simulator; a later `reset` starts it again."""
         self._saved = {}
         if self._controller is not None:
             self._controller.stop()
             self._controller = None
 
     def _load(self) -> View:
-        """Brings the process to the start of the episode, starting one if need be."""
+        """Bring the process to the start of the episode, starting one if need be."""
         if self._scene is None:
             raise SimulatorError("no scene is loaded; reset the simulator to one first")
         if self._controller is None:
@@ -246,7 +246,7 @@ class Simulator:
                 )
 
     def _recover_from(self, fault: PeerFault) -> None:
-        """Drops the failed process; raises where it failed too often."""
+        """Drop the failed process; raise where it failed too often."""
         self.close()
         self._failures += 1
         if self._failures > self._max_restarts:

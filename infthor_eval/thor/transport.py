@@ -65,7 +65,7 @@ class SafeFifoServer(FifoServer):
         self._connected = False
 
     def receive(self, timeout: float | None = None) -> MultiAgentEvent:
-        """Waits for one reply.
+        """Wait for one reply.
 
         Args:
             timeout: seconds for the whole reply; None takes the server's own.
@@ -81,7 +81,7 @@ class SafeFifoServer(FifoServer):
             raise self._fail("garbage", f"sent what is not its protocol ({_one_line(error)})") from error
 
     def send(self, action: dict[str, Any]) -> None:
-        """Sends one action.
+        """Send one action.
 
         Raises:
             PeerFault: the simulator died or does not read.
@@ -120,7 +120,7 @@ class SafeFifoServer(FifoServer):
         message_size: int,
         timeout: float | None,  # the deadline is that of the whole reply, not of one read
     ) -> bytearray:
-        """Reads exactly `message_size` bytes."""
+        """Read exactly `message_size` bytes."""
         if message_size > _LARGEST_BODY:
             raise self._fail("garbage", f"announced a message part of {message_size} bytes")
         body = bytearray(message_size)
@@ -131,7 +131,7 @@ class SafeFifoServer(FifoServer):
         return body
 
     def _read_some(self, descriptor: int, into: memoryview) -> int:
-        """Reads what is there, at least one byte."""
+        """Read what is there, at least one byte."""
         while True:
             try:
                 count = os.readv(descriptor, [into])
@@ -161,7 +161,7 @@ class SafeFifoServer(FifoServer):
                 raise self._fail("died", self._exit_words()) from error
 
     def _open_client_pipe(self) -> io.FileIO:
-        """Opens the pipe to the simulator as soon as it has opened its end."""
+        """Open the pipe to the simulator as soon as it has opened its end."""
         while True:
             try:
                 return _open_pipe(self.client_pipe_path, os.O_WRONLY)
@@ -175,7 +175,7 @@ class SafeFifoServer(FifoServer):
         self._deadline = time.monotonic() + self._seconds
 
     def _check(self) -> None:
-        """Raises where waiting on is pointless."""
+        """Raise where waiting on is pointless."""
         if self.unity_proc is not None and self.unity_proc.poll() is not None:
             raise self._fail("died", self._exit_words())
         if time.monotonic() > self._deadline:

@@ -114,7 +114,7 @@ class View:
 
 
 def view_of(event: Any) -> View:
-    """Turns an `ai2thor.server.Event` into a View.
+    """Turn an `ai2thor.server.Event` into a View.
 
     Raises:
         SimulatorError: the metadata lacks a field or has it in another form.
@@ -142,7 +142,7 @@ def view_of(event: Any) -> View:
 
 
 def instances_of(codes: NDArray[np.uint32]) -> dict[int, Instance]:
-    """Counts and boxes the pixels of each code.
+    """Count and box the pixels of each code.
 
     Args:
         codes: one code per pixel, [height, width].

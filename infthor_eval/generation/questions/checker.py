@@ -66,7 +66,7 @@ def glimpses(steps: Sequence[Step], share: float, frames: Container[int] | None 
 
 
 def answer(text: str, seen: Sequence[Glimpse]) -> list[str] | None:
-    """Answers a question from glimpses; None where they do not tell."""
+    """Answer a question from glimpses; None where they do not tell."""
     for pattern, solve in _SOLVERS:
         match = re.fullmatch(pattern, text)
         if match is not None and seen:
@@ -79,7 +79,7 @@ class Checker:
     """Judges the questions on one trajectory."""
 
     def __init__(self, steps: Sequence[Step], share: float) -> None:
-        """Reads the log.
+        """Read the log.
 
         Args:
             steps: the log.
@@ -89,7 +89,7 @@ class Checker:
         self._single = {item.frame: item for item in glimpses(steps, share, range(len(steps)))}
 
     def verdict(self, question: Question) -> Verdict:
-        """Judges one question. An absence is proven by no frame; its clues count as minimal."""
+        """Judge one question. An absence is proven by no frame; its clues count as minimal."""
         gold = sorted(str(item) for item in question.answers)
         clues = question.clues
 

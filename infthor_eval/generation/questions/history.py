@@ -65,7 +65,7 @@ class History:
     """
 
     def __init__(self, traj_id: str, steps: list[Step], share: float = DEFAULT_SHARE) -> None:
-        """Reads a log.
+        """Read a log.
 
         Args:
             traj_id: the trajectory's folder.

@@ -61,7 +61,7 @@ class MadeQuestions:
 def make_questions(
     folder: Path, *, seed: int = 0, per_trajectory: int = 25, share: float = DEFAULT_SHARE
 ) -> MadeQuestions:
-    """Makes questions on a replayed set.
+    """Make questions on a replayed set.
 
     Args:
         folder: the set, with `metadata/<traj_id>/metadata.json`.

@@ -37,7 +37,7 @@ def add_third_party_camera(
     orthographicSize: float = 5.0,
     skyboxColor: Any = None,
 ) -> None:
-    """Adds a camera; its frames come with every reply from now on."""
+    """Add a camera; its frames come with every reply from now on."""
     size = orthographicSize if orthographic else None
     sim.cameras.append(_camera(position or Vector3(), rotation or Vector3(), fieldOfView, size))
 
@@ -51,7 +51,7 @@ def update_third_party_camera(
     fieldOfView: float | None = None,
     skyboxColor: Any = None,
 ) -> None:
-    """Moves a third-party camera; what is not given stays."""
+    """Move a third-party camera; what is not given stays."""
     if not 0 <= thirdPartyCameraId < len(sim.cameras):
         raise ActionError(f"There is no third party camera with id {thirdPartyCameraId}")
     old = sim.cameras[thirdPartyCameraId]

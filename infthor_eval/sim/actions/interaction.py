@@ -26,7 +26,7 @@ def pick_up(
     forceAction: bool = False,
     manualInteract: bool = False,
 ) -> None:
-    """Takes an object into the hand, with all it contains."""
+    """Take an object into the hand, with all it contains."""
     target = interactable(sim, objectId, forceAction, x, y)
     if not target.type.pickupable:
         raise ActionError(
@@ -55,7 +55,7 @@ def put(
     randomSeed: int = 0,
     putNearXY: bool = False,
 ) -> None:
-    """Puts the held object into or onto the receptacle `objectId`."""
+    """Put the held object into or onto the receptacle `objectId`."""
     held = held_object(sim)
     if held is None:
         raise ActionError(
@@ -92,7 +92,7 @@ def _check_receptacle(held: SimObject, target: SimObject) -> None:
 
 
 def release(sim: Simulation, pose: SimObject) -> None:
-    """Takes the held object out of the hand and gives it, and what it contains, the pose of `pose`."""
+    """Take the held object out of the hand and give it, and what it contains, the pose of `pose`."""
     world = sim.world
     assert world.held is not None
     held = world.objects[world.held]
@@ -110,7 +110,7 @@ def open_object(
     forceAction: bool = False,
     openness: float = 1.0,
 ) -> None:
-    """Opens a door, drawer or lid to `openness`, 0 (closed) to 1."""
+    """Open a door, drawer or lid to `openness`, 0 (closed) to 1."""
     if not 0 <= openness <= 1:
         raise ActionError(f"openness must be in [0:1], not {openness}")
     target = interactable(sim, objectId, forceAction, x, y)
@@ -131,7 +131,7 @@ def close_object(
     y: float | None = None,
     forceAction: bool = False,
 ) -> None:
-    """Closes a door, drawer or lid."""
+    """Close a door, drawer or lid."""
     target = interactable(sim, objectId, forceAction, x, y)
     if not target.type.openable:
         raise ActionError(f"{target.object_id} is not an Openable object")
@@ -141,7 +141,7 @@ def close_object(
 
 
 def set_openness(sim: Simulation, target: SimObject, openness: float) -> None:
-    """Opens or closes; what lies in a drawer comes along."""
+    """Open or close; what lies in a drawer comes along."""
     before = drawer_offset(target)
     target.state.openness = float(openness)
     sim.world.shift(sim.world.children(target), drawer_offset(target) - before)
@@ -194,7 +194,7 @@ def cut(
     y: float | None = None,
     forceAction: bool = False,
 ) -> Any:
-    """Cuts an object into slices, which are new objects."""
+    """Cut an object into slices, which are new objects."""
     target = interactable(sim, objectId, forceAction, x, y)
     if not target.type.sliceable:
         raise ActionError(f"{target.object_id} Does not have the CanBeSliced property!")

@@ -20,7 +20,7 @@ _MAX_DOWN, _MAX_UP = 60.0, 30.0
 def move_ahead(
     sim: Simulation, moveMagnitude: float | None = None, noise: float = 0.0, forceAction: bool = False
 ) -> None:
-    """Moves along the agent's forward direction, by `gridSize` unless told."""
+    """Move along the agent's forward direction, by `gridSize` unless told."""
     _move(sim, 0.0, moveMagnitude, forceAction)
 
 
@@ -28,7 +28,7 @@ def move_ahead(
 def move_back(
     sim: Simulation, moveMagnitude: float | None = None, noise: float = 0.0, forceAction: bool = False
 ) -> None:
-    """Moves backwards."""
+    """Move backwards."""
     _move(sim, 180.0, moveMagnitude, forceAction)
 
 
@@ -36,7 +36,7 @@ def move_back(
 def move_left(
     sim: Simulation, moveMagnitude: float | None = None, noise: float = 0.0, forceAction: bool = False
 ) -> None:
-    """Moves to the left without turning."""
+    """Move to the left without turning."""
     _move(sim, -90.0, moveMagnitude, forceAction)
 
 
@@ -44,19 +44,19 @@ def move_left(
 def move_right(
     sim: Simulation, moveMagnitude: float | None = None, noise: float = 0.0, forceAction: bool = False
 ) -> None:
-    """Moves to the right without turning."""
+    """Move to the right without turning."""
     _move(sim, 90.0, moveMagnitude, forceAction)
 
 
 @action("RotateRight")
 def rotate_right(sim: Simulation, degrees: float | None = None, forceAction: bool = False) -> None:
-    """Turns clockwise, by `rotateStepDegrees` unless told."""
+    """Turn clockwise, by `rotateStepDegrees` unless told."""
     _rotate(sim, degrees, 1.0)
 
 
 @action("RotateLeft")
 def rotate_left(sim: Simulation, degrees: float | None = None, forceAction: bool = False) -> None:
-    """Turns counter-clockwise."""
+    """Turn counter-clockwise."""
     _rotate(sim, degrees, -1.0)
 
 
@@ -83,7 +83,7 @@ def crouch(sim: Simulation) -> None:
 
 @action("Stand")
 def stand(sim: Simulation) -> None:
-    """Raises the camera again."""
+    """Raise the camera again."""
     if sim.world.agent.standing:
         raise ActionError("Already standing")
     sim.world.agent.standing = True
@@ -104,7 +104,7 @@ def teleport(
     standing: bool | None = None,
     forceAction: bool = False,
 ) -> None:
-    """Puts the agent elsewhere; what is not given stays as it is."""
+    """Put the agent elsewhere; what is not given stays as it is."""
     agent = sim.world.agent
     where = agent.position.copy()
     for index, axis in enumerate("xyz"):
@@ -123,7 +123,7 @@ def teleport_full(
     standing: bool,
     forceAction: bool = False,
 ) -> None:
-    """Puts the agent elsewhere; everything must be given."""
+    """Put the agent elsewhere; everything must be given."""
     _teleport(sim, to_array(position), float(rotation.get("y", 0.0)), horizon, standing, forceAction)
 
 
@@ -168,7 +168,7 @@ def _nearest_name(sim: Simulation, point: Array) -> str:
 
 
 def _clean(position: Array) -> Array:
-    """Takes the float noise off positions that should be on the grid."""
+    """Take the float noise off positions that should be on the grid."""
     return np.array([round(float(position[0]), 5), float(position[1]), round(float(position[2]), 5)])
 
 
@@ -215,6 +215,6 @@ def _teleport(sim: Simulation, where: Array, yaw: float, horizon: float, standin
 
 
 def _carry(sim: Simulation) -> None:
-    """Takes what the agent holds along with it."""
+    """Take what the agent holds along with it."""
     sim.world.carry()
     sim.world.touch()

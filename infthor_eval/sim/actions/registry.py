@@ -49,7 +49,7 @@ _ACTIONS: dict[str, Action] = {}
 
 
 def action(*names: str, query: bool = False, lenient: bool = False) -> Callable[[Body], Body]:
-    """Registers a function as the action(s) `names`; see `Action`."""
+    """Register a function as the action(s) `names`; see `Action`."""
 
     def register(run: Body) -> Body:
         parameters = dict(list(inspect.signature(run).parameters.items())[1:])

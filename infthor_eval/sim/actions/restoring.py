@@ -20,7 +20,7 @@ def set_object_poses(
     sim: Simulation, objectPoses: list[Any], placeStationary: bool = True, enablePhysicsJitter: bool = True,
     forceRigidbodySleep: bool = True, skipMoveable: bool = False,
 ) -> None:  # fmt: skip
-    """Places the listed objects by name; a name listed twice is copied, pickupable objects not listed vanish."""
+    """Place the listed objects by name; a name listed twice is copied, pickupable objects not listed vanish."""
     set_poses(sim.world, [_pose(entry) for entry in objectPoses], keep_moveable=skipMoveable)
 
 
@@ -38,7 +38,7 @@ def set_object_toggles(sim: Simulation, objectToggles: list[Any]) -> None:
 
 @action("SetStateOfAllObjects")
 def set_state_of_all_objects(sim: Simulation, StateChange: str, forceAction: bool = False) -> None:
-    """Makes every object that can be so dirty, filled or used up; the contrary without `forceAction`."""
+    """Make every object that can be so dirty, filled or used up; the contrary without `forceAction`."""
     change = _ALL_AT_ONCE.get(StateChange)
     if change is None:
         raise ActionError(f"{StateChange!r} is not a state change; use one of {', '.join(sorted(_ALL_AT_ONCE))}")
@@ -47,7 +47,7 @@ def set_state_of_all_objects(sim: Simulation, StateChange: str, forceAction: boo
 
 @action("SetObjectStates")
 def set_object_states(sim: Simulation, SetObjectStates: Mapping[str, Any]) -> None:
-    """Opens, switches, dirties and so on all objects of a type, or all at once.
+    """Open, switch, dirty and so on all objects of a type, or all at once.
 
     `SetObjectStates` holds `objectType` (or none for all), `stateChange` and the new value under its own name
     (`isOpen`, `isToggled`, `isDirty`, `isBroken`, `isFilledWithLiquid`, `isUsedUp`, `isCooked`).
@@ -100,7 +100,7 @@ def _change_all(sim: Simulation, change: _Change, on: bool, only: str | None = N
 
 @action("RemoveFromScene")
 def remove_from_scene(sim: Simulation, objectId: str) -> None:
-    """Takes an object out of the scene."""
+    """Take an object out of the scene."""
     sim.world.remove(sim.world.get(objectId))
 
 
@@ -117,7 +117,7 @@ def initial_random_spawn(
     allowFloor: bool = False,
     allowMoveable: bool = False,
 ) -> None:
-    """Spreads the pickupable objects over the receptacles, the same way for the same seed.
+    """Spread the pickupable objects over the receptacles, the same way for the same seed.
 
     Without `randomSeed` it draws on from the numbers that SetRandomSeed started.
     """
@@ -134,7 +134,7 @@ def initial_random_spawn(
 
 @action("SetRandomSeed")
 def set_random_seed(sim: Simulation, seed: int) -> None:
-    """Starts the simulator's random numbers anew."""
+    """Start the simulator's random numbers anew."""
     sim.random = seeded(seed)
 
 

@@ -14,7 +14,7 @@ __all__: list[str] = []
 
 @action("Reset")
 def reset(sim: Simulation, sceneName: str) -> None:
-    """Loads a scene by name."""
+    """Load a scene by name."""
     try:
         world = sim.catalogue.load(sceneName)
     except DataError as error:
@@ -43,7 +43,7 @@ def initialize(
     fastActionEmit: bool = True,
     agentCount: int = 1,
 ) -> dict[str, float]:
-    """Sets up the agent; arguments that only Unity knows are passed over, as Unity does."""
+    """Set up the agent; arguments that only Unity knows are passed over, as Unity does."""
     if sim.failed_reset:
         raise ActionError(sim.failed_reset)
     if agentMode.lower() not in AGENT_MODES:
@@ -71,7 +71,7 @@ def initialize(
 
 @action("CreateHouse")
 def create_house(sim: Simulation, house: dict[str, Any]) -> None:
-    """Builds a ProcTHOR house from its JSON."""
+    """Build a ProcTHOR house from its JSON."""
     try:
         world = sim.catalogue.house(house)
     except DataError as error:

@@ -9,12 +9,12 @@ __all__: list[str] = []
 
 @action("SaveState", query=True)
 def save_state(sim: Simulation, slot: int = 0) -> None:
-    """Keeps the present state; an earlier one of the same slot is forgotten."""
+    """Keep the present state; an earlier one of the same slot is forgotten."""
     sim.save(slot)
 
 
 @action("RestoreState")
 def restore_state(sim: Simulation, slot: int = 0) -> None:
-    """Brings the state kept in a slot back; it stays kept."""
+    """Bring the state kept in a slot back; it stays kept."""
     if not sim.restore(slot):
         raise ActionError("There is no saved state of this scene")

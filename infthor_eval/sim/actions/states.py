@@ -21,7 +21,7 @@ _THROW_REACH = 0.9  # metres in front of the agent at which a thrown thing lands
 
 @action("CookObject")
 def cook(sim: Simulation, objectId: str, forceAction: bool = False) -> None:
-    """Cooks an object."""
+    """Cook an object."""
     target = interactable(sim, objectId, forceAction, None, None)
     _require(target, target.type.cookable, "CanBeCooked")
     if target.state.cooked:
@@ -33,7 +33,7 @@ def cook(sim: Simulation, objectId: str, forceAction: bool = False) -> None:
 
 @action("CleanObject")
 def clean(sim: Simulation, objectId: str, forceAction: bool = False) -> None:
-    """Cleans a dirty object."""
+    """Clean a dirty object."""
     target = interactable(sim, objectId, forceAction, None, None)
     _require(target, target.type.dirtyable, "CanBeDirty")
     if not target.state.dirty:
@@ -44,7 +44,7 @@ def clean(sim: Simulation, objectId: str, forceAction: bool = False) -> None:
 
 @action("DirtyObject")
 def make_dirty(sim: Simulation, objectId: str, forceAction: bool = False) -> None:
-    """Makes an object dirty."""
+    """Make an object dirty."""
     target = interactable(sim, objectId, forceAction, None, None)
     _require(target, target.type.dirtyable, "CanBeDirty")
     if target.state.dirty:
@@ -55,7 +55,7 @@ def make_dirty(sim: Simulation, objectId: str, forceAction: bool = False) -> Non
 
 @action("BreakObject")
 def smash(sim: Simulation, objectId: str, forceAction: bool = False) -> None:
-    """Breaks an object."""
+    """Break an object."""
     target = interactable(sim, objectId, forceAction, None, None)
     _require(target, target.type.breakable, "CanBreak")
     if target.state.broken:
@@ -67,7 +67,7 @@ def smash(sim: Simulation, objectId: str, forceAction: bool = False) -> None:
 
 @action("FillObjectWithLiquid")
 def fill(sim: Simulation, objectId: str, fillLiquid: str, forceAction: bool = False) -> None:
-    """Fills a vessel with coffee, wine or water."""
+    """Fill a vessel with coffee, wine or water."""
     target = interactable(sim, objectId, forceAction, None, None)
     if fillLiquid not in _LIQUIDS:
         raise ActionError(f"{fillLiquid} is not a valid Liquid; use one of {', '.join(_LIQUIDS)}")
@@ -80,7 +80,7 @@ def fill(sim: Simulation, objectId: str, fillLiquid: str, forceAction: bool = Fa
 
 @action("EmptyLiquidFromObject")
 def empty(sim: Simulation, objectId: str, forceAction: bool = False) -> None:
-    """Empties a vessel."""
+    """Empty a vessel."""
     target = interactable(sim, objectId, forceAction, None, None)
     _require(target, target.type.fillable, "CanBeFilled")
     if target.state.fill_liquid is None:
@@ -91,7 +91,7 @@ def empty(sim: Simulation, objectId: str, forceAction: bool = False) -> None:
 
 @action("UseUpObject")
 def use_up(sim: Simulation, objectId: str, forceAction: bool = False) -> None:
-    """Uses an object up, e.g. a soap bottle."""
+    """Use an object up, e.g. a soap bottle."""
     target = interactable(sim, objectId, forceAction, None, None)
     _require(target, target.type.usable_up, "CanBeUsedUp")
     if target.state.used_up:
@@ -102,13 +102,13 @@ def use_up(sim: Simulation, objectId: str, forceAction: bool = False) -> None:
 
 @action("DropHandObject")
 def drop(sim: Simulation, forceAction: bool = False, autoSimulation: bool = True) -> None:
-    """Lets the held object fall to whatever is below it."""
+    """Let the held object fall to whatever is below it."""
     _let_go(sim, 0.0)
 
 
 @action("ThrowObject")
 def throw(sim: Simulation, moveMagnitude: float = 0.0, forceAction: bool = False, autoSimulation: bool = True) -> None:
-    """Drops the held object a step in front of the agent; there is no flight."""
+    """Drop the held object a step in front of the agent; there is no flight."""
     _let_go(sim, _THROW_REACH)
 
 

@@ -15,7 +15,7 @@ _HERE = Path(__file__).parent
 
 
 def drop_stale_kernels(folder: Path = _HERE) -> bool:
-    """Removes compiled kernels that were made from other sources than those in `folder`; whether there were any."""
+    """Remove compiled kernels that were made from other sources than those in `folder`; whether there were any."""
     sources = digest(b"".join((folder / name).read_bytes() for name in _SOURCES))
     cache = folder / "__pycache__"
     stamp = cache / "kernels.stamp"

@@ -155,7 +155,7 @@ def _connect_knobs(items: list[SimObject]) -> None:
 
 
 def _raise_supports(world: World) -> None:
-    """Learns from what lies on a table or seat, where its box does not tell, how high its surface is."""
+    """Learn from what lies on a table or seat, where its box does not tell, how high its surface is."""
     lying: dict[str, list[float]] = {}
     for item in world.objects.values():
         if item.type.pickupable:

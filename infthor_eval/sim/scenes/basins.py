@@ -7,7 +7,7 @@ __all__ = ["around", "name_after"]
 
 
 def name_after(outer: SimObject, basin: SimObject) -> None:
-    """Gives a basin the id and name that AI2-THOR makes of those of the sink or tub that it is in."""
+    """Give a basin the id and name that AI2-THOR makes of those of the sink or tub that it is in."""
     basin.object_id = f"{outer.object_id}|{basin.object_type}"
     basin.name = f"{basin.object_type}_{outer.name.split('_')[1]}"
 

@@ -65,7 +65,7 @@ def build_floor_plan(name: str, entries: Sequence[Mapping[str, Any]], layout: Ar
 
 
 def _settle(world: World, entries: Sequence[Mapping[str, Any]]) -> None:
-    """Finds the parents of loose objects: as recorded where one is known, by position else."""
+    """Find the parents of loose objects: as recorded where one is known, by position else."""
     for entry in entries:
         item = world.objects.get(str(entry["objectId"]))
         if item is None or not item.type.pickupable:

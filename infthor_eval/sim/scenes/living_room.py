@@ -48,7 +48,7 @@ def lamp(plan: RoomPlan, x: float, z: float, y: float) -> None:
 def drawers_in(
     plan: RoomPlan, owner_id: str, side: str, at: float, size: tuple[float, float, float], rows: int
 ) -> None:
-    """Fills the front of a chest with two columns of drawers and leaves the front to them."""
+    """Fill the front of a chest with two columns of drawers and leave the front to them."""
     owner = next(o for o in plan.objects if o.object_id == owner_id)
     owner.hollow = True
     width, height, depth = size

@@ -43,7 +43,7 @@ class RoomPlan:
         y: float = 0.0,
         size: tuple[float, float, float] | None = None,
     ) -> SimObject:
-        """Puts an object with the middle of its underside at (x, y, z)."""
+        """Put an object with the middle of its underside at (x, y, z)."""
         item = default_object(object_type, np.zeros(3), yaw, None if size is None else np.array(size))
         item.place_bottom(np.array([x, y, z]))
         named = default_object(object_type, np.round(item.position, 4), yaw, item.box_size)
@@ -60,7 +60,7 @@ class RoomPlan:
         size: tuple[float, float, float] | None = None,
         gap: float = 0.0,
     ) -> SimObject:
-        """Puts an object with its back to a wall.
+        """Put an object with its back to a wall.
 
         Args:
             side: `x-`, `x+`, `z-` or `z+`.
@@ -98,7 +98,7 @@ class RoomPlan:
     def try_against(
         self, object_type: str, sides: Iterable[str], size: tuple[float, float, float] | None = None, y: float = 0.0
     ) -> SimObject | None:
-        """Puts an object somewhere along one of the walls where there is room; None if there is none."""
+        """Put an object somewhere along one of the walls where there is room; None if there is none."""
         width = (type_named(object_type).size if size is None else size)[0]
         for side in sides:
             start, end = self.span(side)
@@ -114,7 +114,7 @@ class RoomPlan:
         return None
 
     def keep_doors_free(self) -> None:
-        """Reserves the floor before each doorway."""
+        """Reserve the floor before each doorway."""
         room = self.room
         for side, low, high in room.openings:
             x0, x1, z0, z1 = {
@@ -178,7 +178,7 @@ def _samples(grid: NavGrid) -> list[tuple[float, float]]:
 
 
 def _scatter(world: World, plan: RoomPlan) -> None:
-    """Puts the plan's loose things into or onto the plan's furniture, where the agent can get at them."""
+    """Put the plan's loose things into or onto the plan's furniture, where the agent can get at them."""
     homes = [(o, o.type.stock) for o in plan.objects if o.type.receptacle and o.type.stock is not None]
     for object_type in plan.loose:
         item = default_object(object_type, np.zeros(3))

@@ -74,7 +74,7 @@ class Builder:
         top: float = 1.0,
         glow: float = 0.0,
     ) -> None:
-        """Adds a primitive; `tilt` are Euler angles in degrees about its own middle."""
+        """Add a primitive; `tilt` are Euler angles in degrees about its own middle."""
         matrix = self._turn @ euler_matrix(tilt) if any(tilt) else self._turn
         metres = np.asarray(half, dtype=float) * self.half
         self.parts.append(ShapePart(form, self.metric(at), metres, color, material, matrix, bottom, top, glow))
@@ -82,29 +82,29 @@ class Builder:
     def box(
         self, at: Vector, half: Vector, color: Color, material: Material = Material.PLAIN, **more: Unpack[Details]
     ) -> None:
-        """Adds a box."""
+        """Add a box."""
         self.add(Form.BOX, at, half, color, material, **more)
 
     def ball(
         self, at: Vector, half: Vector, color: Color, material: Material = Material.PLAIN, **more: Unpack[Details]
     ) -> None:
-        """Adds an ellipsoid."""
+        """Add an ellipsoid."""
         self.add(Form.ELLIPSOID, at, half, color, material, **more)
 
     def tube(
         self, at: Vector, half: Vector, color: Color, material: Material = Material.PLAIN, **more: Unpack[Details]
     ) -> None:
-        """Adds an upright cylinder; `bottom` and `top` are its relative radii."""
+        """Add an upright cylinder; `bottom` and `top` are its relative radii."""
         self.add(Form.CYLINDER, at, half, color, material, **more)
 
     def cup(
         self, at: Vector, half: Vector, color: Color, material: Material = Material.PLAIN, **more: Unpack[Details]
     ) -> None:
-        """Adds a cylinder that is open at the top."""
+        """Add a cylinder that is open at the top."""
         self.add(Form.CUP, at, half, color, material, **more)
 
     def open_front(self, color: Color, material: Material, wall: float) -> None:
-        """Adds a box without its front: five boards `wall` metres thick."""
+        """Add a box without its front: five boards `wall` metres thick."""
         x, y, z = (self.thick(wall / 2, axis) for axis in range(3))
         inner = shade_of(color, 0.8)
         self.box((0, 0, -1 + z), (1, 1, z), inner, material)
@@ -113,7 +113,7 @@ class Builder:
             self.box((0, side * (1 - y), z), (1 - 2 * x, y, 1 - z), color, material)
 
     def open_top(self, color: Color, material: Material, wall: float) -> None:
-        """Adds a box without its lid: four sides `wall` metres thick on a thin bottom."""
+        """Add a box without its lid: four sides `wall` metres thick on a thin bottom."""
         x, z = self.thick(wall / 2, 0), self.thick(wall / 2, 2)
         y = self.thick(min(wall / 2, 0.004), 1)
         self.box((0, -1 + y, 0), (1, y, 1), shade_of(color, 0.85), material)
@@ -122,7 +122,7 @@ class Builder:
             self.box((0, y, side * (1 - z)), (1 - 2 * x, 1 - y, z), color, material)
 
     def rod(self, at: Vector, radius: float, length: float, axis: int, color: Color) -> None:
-        """Adds a round bar, `radius` and half `length` in metres, along axis 0 (x), 1 (y) or 2 (z)."""
+        """Add a round bar, `radius` and half `length` in metres, along axis 0 (x), 1 (y) or 2 (z)."""
         tilt = {0: (0.0, 0.0, 90.0), 1: (0.0, 0.0, 0.0), 2: (90.0, 0.0, 0.0)}[axis]
         matrix = self._turn @ euler_matrix(tilt)
         self.parts.append(
@@ -130,13 +130,13 @@ class Builder:
         )
 
     def slab(self, at: Vector, metres: Vector, color: Color, material: Material = Material.PLAIN) -> None:
-        """Adds a box whose half extents are given in metres."""
+        """Add a box whose half extents are given in metres."""
         self.parts.append(ShapePart(Form.BOX, self.metric(at), tuple(metres), color, material, self._turn))
 
     def swung(
         self, hinge: Vector, offset: Vector, metres: Vector, angle: float, color: Color, material: Material
     ) -> None:
-        """Adds a box that has turned about an upright hinge.
+        """Add a box that has turned about an upright hinge.
 
         Args:
             hinge: where the hinge is, in fractions.

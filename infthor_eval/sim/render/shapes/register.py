@@ -11,7 +11,7 @@ SHAPES: dict[str, Drawing] = {}
 
 
 def draws(drawing: Drawing) -> Drawing:
-    """Registers a drawing under the name of its function."""
+    """Register a drawing under the name of its function."""
     assert drawing.__name__ not in SHAPES, f"two shapes are called {drawing.__name__}"
     SHAPES[drawing.__name__] = drawing
     return drawing
