@@ -10,10 +10,11 @@ from lm_eval.api.model import LM
 
 from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.harness.registration import NAME, say_model_takes_references
-from infthor_eval.nieh.answering import ModelAnswerer, NiehUnit, TaskPlan, answered
+from infthor_eval.nieh.answering import ModelAnswerer, NiehUnit, answered
 from infthor_eval.nieh.baselines import BASELINES
 from infthor_eval.nieh.docs import sample_of, samples_around
 from infthor_eval.nieh.records import RECORDS
+from infthor_eval.nieh.task import PreparedTask
 from infthor_eval.runs import RunHeader
 from infthor_eval.runs.generation_kwargs import decoding_of
 from infthor_eval.runs.identity import identity_of
@@ -110,9 +111,9 @@ class InfthorLM(LM):
         """Replies to the requests of one task on one trajectory."""
         unit, request = group[0]
         decoding = decoding_of(request.args[1], self._seed, unit.key.task)
-        plan = TaskPlan(samples_around(request.doc), decoding)
+        prepared = PreparedTask(samples_around(request.doc), decoding)
         answerer = ModelAnswerer(self._model, self._session)
-        records = answered([unit for unit, _ in group], plan, answerer, self._session)
+        records = answered([unit for unit, _ in group], prepared, answerer, self._session)
         return {record.key: self._session.recorded(record)[0].payload.reply or "" for record in records}
 
 

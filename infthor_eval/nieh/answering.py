@@ -15,15 +15,14 @@ from infthor_eval.formats.digests import fingerprint
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.nieh.baselines import Predict
 from infthor_eval.nieh.contexts import ContextPart, Sample
-from infthor_eval.nieh.metrics import PUBLISHED, Metrics
 from infthor_eval.nieh.notebook import Notebook
 from infthor_eval.nieh.notes import Notes
 from infthor_eval.nieh.records import NiehAnswer
-from infthor_eval.nieh.samples import TaskSamples
+from infthor_eval.nieh.task import PreparedTask
 from infthor_eval.runs import Session, Tokens, Unit, UnitKey, UnitRecord
-from model_adapters import Decoding, Model, Reply
+from model_adapters import Model, Reply
 
-__all__ = ["Answerer", "BaselineAnswerer", "ModelAnswerer", "NiehUnit", "TaskPlan", "answered"]
+__all__ = ["Answerer", "BaselineAnswerer", "ModelAnswerer", "NiehUnit", "answered"]
 
 
 @dataclass(frozen=True)
@@ -44,40 +43,25 @@ class NiehUnit(Unit[NiehAnswer]):
 
 
 @dataclass(frozen=True)
-class TaskPlan:
-    """How a task's samples become records.
-
-    Attributes:
-        found: what it asks.
-        decoding: how replies are decoded.
-        metrics: what is made of them.
-    """
-
-    found: TaskSamples
-    decoding: Decoding
-    metrics: Metrics = PUBLISHED
-
-
-@dataclass(frozen=True)
 class _Asked:
     """A unit with its request.
 
     Attributes:
         unit: the unit.
-        plan: its task's.
+        prepared: its task's.
         context: what the model is shown before the question's text; notes in it are taken before the unit is asked.
         text: the text with the question.
     """
 
     unit: NiehUnit
-    plan: TaskPlan
+    prepared: PreparedTask
     context: tuple[ContextPart, ...]
     text: str
 
     @classmethod
-    def of(cls, unit: NiehUnit, plan: TaskPlan) -> "_Asked":
-        context, text = plan.found.request(unit.sample)
-        return cls(unit, plan, tuple(context), text)
+    def of(cls, unit: NiehUnit, prepared: PreparedTask) -> "_Asked":
+        context, text = prepared.found.request(unit.sample)
+        return cls(unit, prepared, tuple(context), text)
 
     @property
     def shown(self) -> tuple[str | FrameRef, ...]:
@@ -99,13 +83,13 @@ class _Asked:
                 "context": [[part.digest] if isinstance(part, FrameRef) else part for part in self.shown],
                 "text": self.text,
                 "answers": list(self.unit.payload.answers),
-                "decoding": self.plan.decoding.document(),
+                "decoding": self.prepared.decoding.document(),
             }
         )
 
     def record(self, reply: Reply, seconds: float, faults: tuple[str, ...]) -> UnitRecord[NiehAnswer]:
         """The record of its reply."""
-        scores = self.plan.metrics.scores(self.plan.found, self.unit.sample, reply.text)
+        scores = self.prepared.metrics.scores(self.prepared.found, self.unit.sample, reply.text)
         return self.unit.record(
             self.fingerprint,
             self.unit.payload.with_reply(reply.text, scores),
@@ -166,7 +150,7 @@ class ModelAnswerer:
             self._conversation.append(*context)
             self._context, self._after_context = context, self._conversation.mark()
         self._conversation.rewind(self._after_context)
-        return self._conversation.replies([[item.text] for item in asked], asked[0].plan.decoding)
+        return self._conversation.replies([[item.text] for item in asked], asked[0].prepared.decoding)
 
 
 class BaselineAnswerer:
@@ -187,14 +171,14 @@ class BaselineAnswerer:
 
 
 def answered(
-    units: Sequence[NiehUnit], plan: TaskPlan, answerer: Answerer, session: Session
+    units: Sequence[NiehUnit], prepared: PreparedTask, answerer: Answerer, session: Session
 ) -> Iterator[UnitRecord[NiehAnswer]]:
     """The records of units on one trajectory: those in the same context together, several at a time where that pays.
 
     Neighbours share as long a prefix as there is, which a model's conversation encodes once. The order depends on the
     units alone, so it is the same when a run is resumed.
     """
-    asked = sorted((_Asked.of(unit, plan) for unit in units), key=_names)
+    asked = sorted((_Asked.of(unit, prepared) for unit in units), key=_names)
     for _, in_one_context in groupby(asked, key=_names):
         yield from _in_context(list(in_one_context), answerer, session)
 

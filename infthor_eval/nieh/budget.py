@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 from infthor_eval.errors import DataError, ModelError
 from infthor_eval.formats.frames import FrameRef
-from infthor_eval.nieh.answering import TaskPlan
 from infthor_eval.nieh.contexts import ContextPart, Sample
 from infthor_eval.nieh.notes import Notes
+from infthor_eval.nieh.task import PreparedTask
 from model_adapters import Model
 
 __all__ = ["Budget", "budget_of"]
@@ -52,13 +52,13 @@ class Budget:
         return "; ".join(f"{n} of {self.n_contexts} contexts {what}" for n, what in counted if n) or "fits"
 
 
-def budget_of(plan: TaskPlan, model: Model) -> Budget:
+def budget_of(prepared: PreparedTask, model: Model) -> Budget:
     """Count the tokens of a task's requests as the model's own processor does.
 
     Questions in one context differ by a few words, so each context is counted once, with its longest question.
 
     Args:
-        plan: the task's.
+        prepared: the task.
         model: whose tokens; one that counts them.
 
     Raises:
@@ -66,8 +66,8 @@ def budget_of(plan: TaskPlan, model: Model) -> Budget:
     """
     capabilities = model.capabilities
     limit, before = capabilities.max_tokens, capabilities.max_tokens_before_extension
-    longest = _longest_questions(plan.found.samples)
-    counts = _counts(model, plan, longest)
+    longest = _longest_questions(prepared.found.samples)
+    counts = _counts(model, prepared, longest)
     fitting = [count for count in counts if limit is None or count <= limit]
     return Budget(
         longest=max(counts, default=0),
@@ -90,13 +90,13 @@ def _longest_questions(samples: Iterable[Sample]) -> list[Sample]:
     return list(longest.values())
 
 
-def _counts(model: Model, plan: TaskPlan, samples: Sequence[Sample]) -> list[int]:
+def _counts(model: Model, prepared: PreparedTask, samples: Sequence[Sample]) -> list[int]:
     counts: list[int] = []
     refusals: list[ModelError] = []
     for sample in samples:
-        context, text = plan.found.request(sample)
+        context, text = prepared.found.request(sample)
         try:
-            counts.append(_most_tokens(model, [*context, text], plan.decoding.max_new_tokens))
+            counts.append(_most_tokens(model, [*context, text], prepared.decoding.max_new_tokens))
         except ModelError as error:  # one question's text may be to blame; the run records it as failed
             refusals.append(error)
     if refusals and not counts:

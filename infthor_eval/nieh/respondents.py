@@ -5,9 +5,10 @@ from typing import Protocol
 
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.frames import FrameRef
-from infthor_eval.nieh.answering import Answerer, BaselineAnswerer, ModelAnswerer, TaskPlan
+from infthor_eval.nieh.answering import Answerer, BaselineAnswerer, ModelAnswerer
 from infthor_eval.nieh.baselines import Baseline, Predict
 from infthor_eval.nieh.budget import budget_of
+from infthor_eval.nieh.task import PreparedTask
 from infthor_eval.runs import Session, Subject
 from model_adapters import Model
 
@@ -28,11 +29,11 @@ class Respondent(Protocol):
         """
         ...
 
-    def read_tasks(self, plans: Mapping[str, TaskPlan]) -> None:
+    def read_tasks(self, prepared_tasks: Mapping[str, PreparedTask]) -> None:
         """What will be asked, by task, once, before the first question."""
         ...
 
-    def cost(self, plan: TaskPlan) -> str | None:
+    def cost(self, prepared: PreparedTask) -> str | None:
         """What a task costs, in words; None where that is not known."""
         ...
 
@@ -53,11 +54,11 @@ class _ModelRespondent:
             )
         return tokens
 
-    def read_tasks(self, plans: Mapping[str, TaskPlan]) -> None:
+    def read_tasks(self, prepared_tasks: Mapping[str, PreparedTask]) -> None:
         """A model learns nothing beforehand."""
 
-    def cost(self, plan: TaskPlan) -> str | None:
-        return budget_of(plan, self._model).description if self._model.capabilities.counts_tokens else None
+    def cost(self, prepared: PreparedTask) -> str | None:
+        return budget_of(prepared, self._model).description if self._model.capabilities.counts_tokens else None
 
     def answerer(self, task: str, session: Session) -> Answerer:
         return ModelAnswerer(self._model, session)
@@ -71,11 +72,13 @@ class _BaselineRespondent:
     def tokens_per_frame(self, frame: FrameRef) -> int:
         return _BASELINE_TOKENS_PER_FRAME
 
-    def read_tasks(self, plans: Mapping[str, TaskPlan]) -> None:
+    def read_tasks(self, prepared_tasks: Mapping[str, PreparedTask]) -> None:
         """Fitted to each task apart: what one task asks is no clue to another."""
-        self._predictions = {task: self._baseline.fit(plan.found.data.questions) for task, plan in plans.items()}
+        self._predictions = {
+            task: self._baseline.fit(prepared.found.data.questions) for task, prepared in prepared_tasks.items()
+        }
 
-    def cost(self, plan: TaskPlan) -> str | None:
+    def cost(self, prepared: PreparedTask) -> str | None:
         return None
 
     def answerer(self, task: str, session: Session) -> Answerer:

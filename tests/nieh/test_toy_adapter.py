@@ -24,7 +24,8 @@ def test_it_runs_the_bundled_set(tmp_path, run):
     (results,) = tmp_path.rglob("results.json")
     tasks = json.loads(results.read_text())["summary"]["tasks"]
     assert {name: task["n"] for name, task in tasks.items()} == {"nieh_mini_gt": 150, "nieh_mini_full": 150}
-    assert [line.split()[-3:] for line in out.splitlines() if line.split()[:1] == ["toy"]][0] == ["150", "0", "0"]
+    row = next(line.split() for line in out.splitlines() if line.split()[:1] == ["toy"])
+    assert row[-3:] == ["150", "0", "0"]
     assert "0 answered now, 300 found" in run("--model", "toy", "--tasks", "nieh_mini", "--output", tmp_path)[2]
 
 
