@@ -97,17 +97,14 @@ def _check_texts(text: str, turns: Sequence[Turn]) -> None:
     Raises:
         ModelError: one is left out.
     """
-    said = Counter(
-        (part.strip() for turn in turns for part in turn.parts if isinstance(part, str)),
-    )
-    for part, count in said.items():
+    said = [(turn.role, part.strip()) for turn in turns for part in turn.parts if isinstance(part, str)]
+    for part, count in Counter(part for _, part in said).items():
         if text.count(part) < count:
-            roles = {turn.role for turn in turns if any(isinstance(p, str) and p.strip() == part for p in turn.parts)}
+            roles = " or ".join(sorted({role for role, other in said if other == part}))
             raise ModelError(
-                f"the chat template leaves out the text {part[:40]!r} of a turn ({' or '.join(sorted(roles))}); "
-                "it cannot be used"
+                f"the chat template leaves out the text {part[:40]!r} of a turn ({roles}); it cannot be used"
             )
-    if _PRINTED in text and not any(_PRINTED in part for part in said):
+    if _PRINTED in text and not any(_PRINTED in part for _, part in said):
         raise ModelError(f"the chat template writes lists instead of texts for {_roles(turns)}; ask in other turns")
 
 

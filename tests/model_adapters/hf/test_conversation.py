@@ -108,6 +108,7 @@ STEPS = st.lists(
     st.one_of(
         st.tuples(st.just("text"), st.sampled_from(["mug", " on", " the table", "\nQuestion: ", "Mo", "veAhead"])),
         st.tuples(st.just("frame"), st.integers(0, 5)),
+        st.tuples(st.just("answer"), st.sampled_from(["mug", " table.", "MoveAhead\n"])),
         st.tuples(st.just("mark"), st.just(0)),
         st.tuples(st.just("rewind"), st.integers(0, 3)),
         st.tuples(st.just("reply"), st.integers(1, 4)),
@@ -135,7 +136,9 @@ def test_sharing_changes_no_reply(tiny: Any, plain: Any, frames: list[FrameRef],
                 talk.rewind(marks[-1])
             elif step == "fresh":
                 talk, marks = model.conversation(), []
-            elif step == "reply" and not talk.turns:
+            elif step == "answer":
+                talk.append(value, role="assistant")
+            elif step == "reply" and not (talk.turns and talk.turns[-1].role == "user"):
                 heard.append("nothing to reply to")
             elif step == "reply":
                 reply = talk.reply(up_to(value))
