@@ -1,6 +1,6 @@
 """Memory that a run takes beside its model, for a trajectory of thousands of frames.
 
-A whole run in one process: an NIEH set of noise frames, `nieh_full`, lm-eval, the journal, and the engine with a
+A whole run in one process: an NIEH set of noise frames, `nieh_full`, the journal, and the back end with a
 Qwen2.5-VL that has a vision tower and no language layer. Every frame is decoded, cut into patches and embedded, and
 every prompt is laid out token by token, as for a real model; attention, keys and values, which are the model's own
 affair, cost nothing. A run on three frames comes first: what the process holds after it, everything imported and a
@@ -21,7 +21,8 @@ from typing import Any
 import torch
 from noise_set import write_set
 
-from infthor_eval.runs import RunRequest, UnitRecord, execute, plan
+from infthor_eval.cli.requests import Asked, requests_for
+from infthor_eval.runs import UnitRecord, execute, prepare
 from model_adapters.tiny.qwen2_5_vl import Qwen25VLTiny
 
 PROCESS = Path("/proc/self")
@@ -47,7 +48,7 @@ def main() -> None:
         records = answer(folder, "large")
         seconds = time.perf_counter() - began
         peak = megabytes("VmHWM")
-    print(f"{chosen.frames} frames, {chosen.questions} questions of {records[0].n_context_tokens:,} tokens, nieh_full")
+    print(f"{chosen.frames} frames, {chosen.questions} questions of {records[0].tokens.context:,} tokens, nieh_full")
     print(f"run             {seconds:8.1f} s")
     print(f"process before  {before:8.0f} MB")
     print(f"peak            {peak:8.0f} MB")
@@ -67,8 +68,9 @@ def answer(folder: Path, data: str) -> list[UnitRecord]:
         RuntimeError: a question failed, so that the numbers would be those of something else.
     """
     options = {"pretrained": str(folder / "checkpoint"), "device": "cpu", "max_tokens": "0"}
-    request = RunRequest("qwen2.5-vl", ("nieh_full",), folder / "out", folder / data, options)
-    records = execute(plan(request), lambda *_: lambda *_: None).records
+    asked = Asked(tasks=("nieh_full",), data=folder / data, output=folder / "out")
+    ((request, suite),) = requests_for(asked, "qwen2.5-vl", options)
+    records = execute(prepare(request, suite)).records
     failures = [record.failure for record in records if record.failure]
     if failures:
         raise RuntimeError(failures[0])

@@ -1,6 +1,6 @@
 """How much faster `nieh_mini` is when questions share the frames' prefix, and whether the replies are the same.
 
-Both runs go through the whole runner (lm-eval, journal) in one process; the times are those of answering.
+Both runs go through the whole runner (suite, journal) in one process; the times are those of answering.
 
     python benchmarks/nieh_mini_sharing.py [--model qwen2.5-vl-tiny] [--tasks nieh_mini]
 """
@@ -10,13 +10,15 @@ import tempfile
 from collections import defaultdict
 from pathlib import Path
 
-from infthor_eval.runs import RunRequest, UnitRecord, execute, plan
+from infthor_eval.cli.requests import Asked, requests_for
+from infthor_eval.runs import UnitKey, UnitRecord, execute, prepare
 
 
 def answer(model: str, tasks: str, shared: bool, output: Path) -> list[UnitRecord]:
     """Every record of a run with sharing on or off."""
-    request = RunRequest(model, (tasks,), output, model_options={"share_prefix": str(shared).lower()})
-    return execute(plan(request), lambda *_: lambda *_: None).records
+    asked = Asked(tasks=(tasks,), data=None, output=output)
+    ((request, suite),) = requests_for(asked, model, {"share_prefix": str(shared).lower()})
+    return execute(prepare(request, suite)).records
 
 
 def main() -> None:
@@ -26,16 +28,16 @@ def main() -> None:
     parser.add_argument("--tasks", default="nieh_mini")
     chosen = parser.parse_args()
     seconds: defaultdict[str, dict[bool, float]] = defaultdict(dict)
-    replies: dict[bool, dict[tuple[str, str, str], str | None]] = {}
+    replies: dict[bool, dict[UnitKey, str | None]] = {}
     with tempfile.TemporaryDirectory() as folder:
         for shared in (True, False):
             records = answer(chosen.model, chosen.tasks, shared, Path(folder))
-            replies[shared] = {record.key: record.reply for record in records}
+            replies[shared] = {record.key: record.payload.reply for record in records}
             for record in records:
                 seconds[record.task][shared] = seconds[record.task].get(shared, 0.0) + record.seconds
     print(f"{'task':18} {'questions':>9} {'shared s':>9} {'plain s':>9} {'factor':>7}")
     for task, times in sorted(seconds.items()):
-        n = sum(key[0] == task for key in replies[True])
+        n = sum(key.task == task for key in replies[True])
         print(f"{task:18} {n:9} {times[True]:9.2f} {times[False]:9.2f} {times[False] / times[True]:7.2f}")
     print("replies equal:", "yes" if replies[True] == replies[False] else "NO")
 

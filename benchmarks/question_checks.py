@@ -3,7 +3,7 @@
 python benchmarks/question_checks.py SET [--per-trajectory 25] [--seed 0]
 
 The checker answers every question that the rules can make, from the log, by another way than the rules; then once from
-the entries of the clue frames alone, and once with each clue left out. The bounds are those of the chosen questions.
+the entries of the clue frames alone, and once with each clue left out. The baselines are those of the chosen questions.
 """
 
 import argparse
@@ -12,20 +12,19 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
-from model_adapters.bounds import Blind, Oracle
-
 from infthor_eval.formats.question import Question
 from infthor_eval.formats.step_log import read_steps
 from infthor_eval.generation.questions.checker import Checker
 from infthor_eval.generation.questions.history import DEFAULT_SHARE, History
 from infthor_eval.generation.questions.make import candidates_of, make_questions
+from infthor_eval.nieh.baselines import BASELINES, Predict
 from infthor_eval.nieh.scoring import score
 
 _YES_NO = {"yes", "no"}
 
 
 def main() -> None:
-    """Print the checker's verdicts and the bounds."""
+    """Print the checker's verdicts and the baselines."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("set", type=Path)
     parser.add_argument("--per-trajectory", type=int, default=25)
@@ -35,9 +34,9 @@ def main() -> None:
     made = make_questions(chosen.set, seed=chosen.seed, per_trajectory=chosen.per_trajectory)
     print(f"chosen: {len(made.questions)}, by number of clues {made.by_clues()}, by type {made.by_type()}")
     yes_no = [item for item in made.questions if item.answers[0] in _YES_NO]
-    for bound in (Oracle(), Blind()):
-        bound.study(made.questions)
-        print(f"{bound.name}, strict: {mean(bound, made.questions):.3f}; yes/no alone {mean(bound, yes_no):.3f}")
+    for name in ("oracle", "blind"):
+        predict = BASELINES[name](0).fit(made.questions)
+        print(f"{name}, strict: {mean(predict, made.questions):.3f}; yes/no alone {mean(predict, yes_no):.3f}")
 
 
 def check_all(folder: Path) -> None:
@@ -57,9 +56,9 @@ def check_all(folder: Path) -> None:
     print(f"{len(histories)} trajectories, {found['all']} candidates: {shares}")
 
 
-def mean(bound: Oracle | Blind, questions: Sequence[Question]) -> float:
-    """A bound's mean under the strict scorer."""
-    return sum(score(bound.answer(item), item.answers, "strict") for item in questions) / len(questions)
+def mean(predict: Predict, questions: Sequence[Question]) -> float:
+    """A baseline's mean under the strict scorer."""
+    return sum(score(predict(item), item.answers, "strict") for item in questions) / len(questions)
 
 
 if __name__ == "__main__":
