@@ -7,8 +7,9 @@ again.
 """
 
 import fcntl
+import itertools
 import os
-from collections.abc import Iterable
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
 from threading import Lock
@@ -288,10 +289,16 @@ def _is_record(line: bytes, decoder: msgspec.json.Decoder[Any]) -> bool:
     return True
 
 
-def set_aside(run: Path, names: Iterable[str] = (FOLDER,)) -> None:
-    """Give the journal of a run another name, so that the run starts anew and nothing is lost."""
-    for name in names:
-        path = run / name
-        if path.exists():
-            number = next(n for n in range(1, 10**6) if not (run / f"{name}.{n}").exists())
-            path.rename(run / f"{name}.{number}")
+def set_aside(run: Path) -> None:
+    """Give the journal of a run another name, so that the run starts anew and nothing is lost.
+
+    Raises:
+        UsageError: another process is writing it.
+    """
+    if not (run / FOLDER).exists():
+        return
+    with ExitStack() as held:
+        for path in _shards(run):
+            _lock(held.enter_context(path.open("rb")), path)
+        number = next(n for n in itertools.count(1) if not (run / f"{FOLDER}.{n}").exists())
+        (run / FOLDER).rename(run / f"{FOLDER}.{number}")

@@ -230,7 +230,7 @@ class Suite(Protocol):
         ...
 
     def scores(self, record: UnitRecord[Any]) -> Mapping[str, float]:
-        """The metrics of one unit; a failed one has the worst there is."""
+        """The metrics of one unit by name; one that is missing, as all are where it failed, counts as 0."""
         ...
 
     def tables(self, runs: Sequence["RunSummary"]) -> Sequence[Table]:

@@ -171,6 +171,13 @@ def test_an_earlier_journal_is_kept_under_another_name(tmp_path):
     assert not (tmp_path / "journal.3").exists()
 
 
+def test_a_journal_that_is_being_written_is_not_set_aside_nor_mended(tmp_path):
+    with opened(tmp_path):
+        for change in (set_aside, lambda run: recover(run, HEADER, TYPES)):
+            with pytest.raises(UsageError, match="another run is writing it"):
+                change(tmp_path)
+
+
 def test_a_folder_that_cannot_be_written_is_named(tmp_path):
     (tmp_path / "run").write_text("a file")
     with pytest.raises(UsageError, match="cannot be written"):
