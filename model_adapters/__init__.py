@@ -18,6 +18,7 @@ from model_adapters.protocols import (
     Policy,
     Reply,
     Role,
+    Subject,
     Turn,
 )
 from model_adapters.refusals import check_decoding, check_turns
@@ -40,6 +41,7 @@ __all__ = [
     "Policy",
     "Reply",
     "Role",
+    "Subject",
     "Transcript",
     "Turn",
     "adapter_identity",

@@ -25,6 +25,7 @@ __all__ = [
     "Policy",
     "Reply",
     "Role",
+    "Subject",
     "Turn",
 ]
 
@@ -212,23 +213,31 @@ class Conversation(Protocol):
         ...
 
 
-@runtime_checkable
-class Model(Protocol):
-    """A model that can be talked to."""
+class Subject(Protocol):
+    """What can be evaluated: a model, a policy, or a suite's own baseline."""
 
     @property
     def name(self) -> str:
-        """Its name in the registry."""
+        """Its name on the command line."""
         ...
 
     @property
     def capabilities(self) -> Capabilities:
-        """What it can do."""
+        """What it can do; to a policy only `deterministic` and `max_in_flight` matter."""
         ...
 
     def identity(self) -> dict[str, Any]:
-        """All that can change a number, as JSON values; two models of equal identity answer alike."""
+        """All that can change a number, as JSON values; two subjects of equal identity answer or act alike."""
         ...
+
+    def close(self) -> None:
+        """Give the memory back; it cannot be used afterwards."""
+        ...
+
+
+@runtime_checkable
+class Model(Subject, Protocol):
+    """A model that can be talked to."""
 
     def tokens_per_frame(self, frame: FrameRef) -> int | None:
         """How many of the model's tokens one frame becomes, its surroundings in the chat template not counted.
@@ -240,10 +249,6 @@ class Model(Protocol):
 
     def conversation(self) -> Conversation:
         """A new, empty conversation."""
-        ...
-
-    def close(self) -> None:
-        """Give the memory back; the model cannot be used afterwards."""
         ...
 
 
@@ -263,22 +268,8 @@ class ArmDelta:
 
 
 @runtime_checkable
-class Policy(Protocol):
+class Policy(Subject, Protocol):
     """A vision-language-action model that drives an arm."""
-
-    @property
-    def name(self) -> str:
-        """Its name in the registry."""
-        ...
-
-    @property
-    def capabilities(self) -> Capabilities:
-        """What it can do; only `deterministic` and `max_in_flight` matter to a policy."""
-        ...
-
-    def identity(self) -> dict[str, Any]:
-        """All that can change a number, as JSON values; two policies of equal identity act alike."""
-        ...
 
     def reset(self) -> None:
         """Begin a new episode: whatever was remembered of the last one is forgotten."""
@@ -295,10 +286,6 @@ class Policy(Protocol):
             ModelError: the policy cannot act, or memory ran out.
             DataError: the frame cannot be read.
         """
-        ...
-
-    def close(self) -> None:
-        """Give the memory back; the policy cannot be used afterwards."""
         ...
 
 

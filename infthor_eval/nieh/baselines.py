@@ -9,7 +9,7 @@ from infthor_eval.errors import ModelError
 from infthor_eval.formats.digests import seed_of
 from infthor_eval.formats.question import Question
 from infthor_eval.nieh.docs import doc_target
-from model_adapters import Capabilities
+from model_adapters import Capabilities, Subject
 
 __all__ = ["BASELINES", "Baseline", "Predict", "question_type"]
 
@@ -23,22 +23,14 @@ def question_type(question: Question) -> str:
 
 
 @runtime_checkable
-class Baseline(Protocol):
-    """What answers from the answer key and the question's text, and never sees a frame."""
+class Baseline(Subject, Protocol):
+    """What answers from the answer key and the question's text, and never sees a frame.
 
-    name: str
-    capabilities: Capabilities
-
-    def identity(self) -> dict[str, Any]:
-        """All that can change a number, as JSON values; the key is part of the data's own fingerprint."""
-        ...
+    The key is no part of its identity: it is part of the data's own fingerprint.
+    """
 
     def fit(self, questions: Sequence[Question]) -> Predict:
         """Read the whole answer key of one task; what comes of it answers that task's questions."""
-        ...
-
-    def close(self) -> None:
-        """Nothing is held."""
         ...
 
 

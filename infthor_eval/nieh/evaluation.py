@@ -19,12 +19,12 @@ from infthor_eval.runs import (
     SampleView,
     Session,
     Skipped,
-    Subject,
     TaskRequest,
     UnitKey,
     UnitRecord,
     Workload,
 )
+from model_adapters import Subject
 
 __all__ = ["NiehEvaluation"]
 

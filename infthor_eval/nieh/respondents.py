@@ -9,8 +9,8 @@ from infthor_eval.nieh.answering import Answerer, BaselineAnswerer, ModelAnswere
 from infthor_eval.nieh.baselines import Baseline, Predict
 from infthor_eval.nieh.budget import budget_of
 from infthor_eval.nieh.task import PreparedTask
-from infthor_eval.runs import Session, Subject
-from model_adapters import Model
+from infthor_eval.runs import Session
+from model_adapters import Model, Subject
 
 __all__ = ["Respondent", "respondent"]
 

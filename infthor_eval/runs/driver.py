@@ -16,8 +16,8 @@ from infthor_eval.runs.identity import identity_of
 from infthor_eval.runs.journal import Journal
 from infthor_eval.runs.records import RunHeader, UnitRecord
 from infthor_eval.runs.session import JournalSession
-from infthor_eval.runs.suite import Evaluation, Group, RunSummary, Subject, Suite, TaskRequest, Workload
-from model_adapters import Model, Policy, adapter_identity, check_options, label, load, names
+from infthor_eval.runs.suite import Evaluation, Group, RunSummary, Suite, TaskRequest, Workload
+from model_adapters import Model, Policy, Subject, adapter_identity, check_options, label, load, names
 
 __all__ = ["Observer", "PreparedRun", "RunOutcome", "RunRequest", "Silent", "execute", "prepare"]
 

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import infthor_eval
-from infthor_eval.runs.suite import Subject
+from model_adapters import Subject
 
 __all__ = ["identity_of"]
 

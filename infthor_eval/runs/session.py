@@ -4,7 +4,7 @@ from typing import Any
 
 from infthor_eval.runs.journal import Journal
 from infthor_eval.runs.records import Unit, UnitRecord
-from infthor_eval.runs.suite import Subject
+from model_adapters import Subject
 
 __all__ = ["JournalSession"]
 

@@ -14,7 +14,7 @@ import msgspec
 from infthor_eval.runs.catalog import TaskFile
 from infthor_eval.runs.records import RecordTypes, RunHeader, Unit, UnitKey, UnitRecord
 from infthor_eval.tables import Table
-from model_adapters.protocols import Capabilities
+from model_adapters import Subject
 
 __all__ = [
     "Cost",
@@ -25,35 +25,12 @@ __all__ = [
     "SampleView",
     "Session",
     "Skipped",
-    "Subject",
     "Suite",
     "TaskRequest",
     "Workload",
 ]
 
 Need = Literal["conversation", "policy"]
-
-
-class Subject(Protocol):
-    """What is evaluated: a model, a policy, or a suite's own baseline."""
-
-    @property
-    def name(self) -> str:
-        """Its name on the command line."""
-        ...
-
-    @property
-    def capabilities(self) -> Capabilities:
-        """What it can do."""
-        ...
-
-    def identity(self) -> dict[str, Any]:
-        """All that can change a number, as JSON values."""
-        ...
-
-    def close(self) -> None:
-        """Give the memory back."""
-        ...
 
 
 @dataclass(frozen=True)
