@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from PIL import Image
 
 from infthor_eval.formats.qa_csv import write_questions
 from infthor_eval.formats.question import Question
+from infthor_eval.runs import Catalog
 
 # Before torch is imported, here and in processes that tests start: on a busy machine two threads that wait for each
 # other take ten times as long as one.
@@ -50,6 +52,15 @@ def make_nieh_set(tmp_path: Path) -> Callable[..., Path]:
         return root
 
     return make
+
+
+@pytest.fixture
+def task_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A copy of the packaged task files that commands and runs of this process find instead; its folder."""
+    folder = tmp_path / "tasks"
+    shutil.copytree(Catalog.packaged().folder, folder)
+    monkeypatch.setattr(Catalog, "packaged", classmethod(lambda cls: cls(folder)))
+    return folder
 
 
 @pytest.fixture(scope="session")
