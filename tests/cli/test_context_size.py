@@ -51,6 +51,18 @@ def test_a_kilo_token_is_each_contexts_own_or_the_one_given(make_nieh_set, tmp_p
     assert [set(n_frames(tmp_path / "out", task)) for task in tasks] == [{haystack}, {truncated}]
 
 
+@pytest.mark.parametrize("model", ["oracle", "qwen2.5-vl-tiny"])
+def test_the_tokens_of_a_frame_can_be_told(make_nieh_set, tmp_path, run, model):
+    data, out = make_nieh_set(ONE, n_frames=80, size=56), tmp_path / "out"
+    tasks = ["nieh_haystack_8k", "nieh_truncate_head_8k"]
+    arguments = ["--model", model, "--tasks", ",".join(tasks), "--data", data, "--output", out]
+    code, _, err = run(*arguments, "--tokens-per-frame", 390)
+    assert code == 0, err
+    assert [set(n_frames(out, task)) for task in tasks] == [{8000 // 390}, {8192 // 390}]
+    (folder,) = (path.parent for path in out.rglob("journal"))
+    assert read_header(folder).identity["tokens_per_frame"] == 390
+
+
 def test_the_kilo_token_and_the_extension_are_part_of_the_runs_identity(make_nieh_set, tmp_path, run):
     data = make_nieh_set(ONE, n_frames=80, size=56)
     tasks, out = "nieh_gt,nieh_haystack_8k", tmp_path / "out"
@@ -127,6 +139,10 @@ BAD = [
     (["--model", "qwen2.5-vl-tiny", "--rope", "ntk:4"], "rope=ntk:4 is not TYPE:FACTOR"),
     (["--model", "qwen2.5-vl-tiny", "--rope", "yarn:4", "--model-args", "rope=yarn:4"], "give one of them"),
     (["--model", "oracle", "--k-tokens", "1000"], "no context of nieh_gt, nieh_full has a size in tokens"),
+    (["--model", "oracle", "--tokens-per-frame", "500"], "no context of nieh_gt, nieh_full has a size in tokens"),
+    (["--model", "oracle", "--tokens-per-frame", "0"], "--tokens-per-frame 0: a frame has one token at least"),
+    (["--model", "oracle", "--tokens-per-frame", "-3"], "--tokens-per-frame -3: a frame has one token at least"),
+    (["--model", "oracle", "--tokens-per-frame", "few"], "'few' is not a valid integer"),
     (["--model", "oracle", "--k-tokens", "1001"], "'1001' is not one of '1000', '1024'"),
 ]
 

@@ -81,6 +81,55 @@ def test_limit_asks_only_so_many_of_each_task(make_nieh_set, tmp_path, run):
     assert {name: task["n"] for name, task in results["summary"]["tasks"].items()} == {"nieh_gt": 2, "nieh_full": 2}
 
 
+def test_the_limit_counts_questions_and_what_is_skipped_follows_it(make_nieh_set, tmp_path, run):
+    asked = [Question("t", f"Is there a {name}?", (70,), ("yes",)) for name in ("mug", "cup")]
+    outside = [Question("t", f"Is there a {name}?", (999,), ("yes",)) for name in ("pan", "pot")]
+    data = make_nieh_set([outside[0], asked[0], outside[1], asked[1]], n_frames=140, size=56)
+    arguments = ["--model", "oracle", "--tasks", "nieh_haystack_8k", "--data", data]
+    for limit, n, n_skipped in ((1, 5, 1), (2, 10, 2)):
+        code, _, err = run(*arguments, "--output", tmp_path / str(limit), "--limit", limit)
+        assert code == 0
+        assert f"nieh_haystack_8k: {n_skipped} sample(s) skipped: clue 999 is outside" in err
+        task = json.loads(only(tmp_path / str(limit), "results.json").read_text())["summary"]["tasks"][
+            "nieh_haystack_8k"
+        ]
+        assert (task["n"], task["skipped"]["n"]) == (n, n_skipped)
+        assert {cell["n"] for cell in task["by_variant"].values()} == {limit}
+
+
+def test_the_metrics_of_a_task_file_are_shown_beside_the_published_ones(make_nieh_set, tmp_path, run, task_files):
+    (task_files / "nieh" / "own.py").write_text(
+        "def measure(doc, results):\n    return {'letters': len(results[0]) / 20}\n"
+    )
+    (task_files / "nieh" / "nieh_own.yaml").write_text(
+        "include: _nieh.yaml\ntask: nieh_own\ndataset_kwargs: {context: clues}\n"
+        "process_results: !function own.measure\nmetric_list: [{metric: letters}]\n"
+    )
+    arguments = ["--model", "oracle", "--data", make_nieh_set(size=56), "--output", tmp_path / "out"]
+    code, out, err = run(*arguments, "--tasks", "nieh_gt,nieh_own")
+    assert code == 0, err
+    rows = [line.split() for line in out.splitlines()]
+    assert [row[2] for row in rows if row[:2] == ["oracle", "nieh_own"] and len(row) > 6] == ["letters"]
+    # By clues: 3, 2 and 2 letters of 20; 10; 10.
+    assert next(row for row in rows if row[1:3] == ["nieh_own", "letters"])[3:7] == ["11.67", "50.00", "50.00", "27.00"]
+    assert ["oracle", "nieh_gt", "strict", *FULL_MARKS] in rows
+    found = json.loads(only(tmp_path / "out", "results.json").read_text())["summary"]["tasks"]["nieh_own"]
+    assert found["by_clues"]["total"]["scores"]["letters"]["mean"] == pytest.approx(0.27)
+    samples = [json.loads(line) for line in only(tmp_path / "out", "samples_nieh_own_*.jsonl").read_text().splitlines()]
+    assert [sample["letters"] for sample in samples] == [0.15, 0.5, 0.5, 0.1, 0.1]
+
+    (task_files / "nieh" / "own.py").write_text("def measure(doc, results):\n    return {}\n")
+    code, _, err = run(*arguments, "--tasks", "nieh_own")
+    assert code == 1
+    assert "nieh_own: 1 sample(s) failed, counted as wrong: process_results fails on traj_a/" in err
+    (task_files / "nieh" / "nieh_own.yaml").write_text(
+        (task_files / "nieh" / "nieh_own.yaml").read_text().replace("letters}", "letters, aggregation: median}")
+    )
+    code, out, err = run(*arguments, "--tasks", "nieh_own")
+    assert (code, out, len(err.strip().splitlines())) == (2, "", 1)
+    assert "letters is not averaged (aggregation: mean); use lm-eval" in err
+
+
 def test_a_killed_run_goes_on_and_ends_as_an_undisturbed_one(make_nieh_set, tmp_path):
     data = make_nieh_set(MANY)
 

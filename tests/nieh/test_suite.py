@@ -240,7 +240,19 @@ def test_one_of_a_batch_that_cannot_be_answered_fails_alone(prepared, monkeypatc
     assert failed.faults == ("asked with 1 others: no sink, please",)
 
 
-# -- limits
+# -- sizes and limits
+
+
+def test_a_model_that_counts_no_tokens_is_asked_once_the_size_of_a_frame_is_told(prepared, recorder, monkeypatch):
+    monkeypatch.setattr(Recorder, "capabilities", Capabilities(counts_tokens=False, token_ids=False))
+    monkeypatch.setattr(Recorder, "tokens_per_frame", lambda *_: None)
+    tasks = ("nieh_truncate_head_8k",)
+    with pytest.raises(UsageError, match="which recorder does not count; give --tokens-per-frame"):
+        execute(prepared(TINY, tasks=tasks))
+    watcher = Watcher()
+    execute(prepared(TINY, tasks=tasks, suite_options={"tokens_per_frame": 2000}), watcher)
+    assert {len(parts) for parts in recorder.asked} == {8192 // 2000 + 1}
+    assert watcher.work.costs == []
 
 
 def test_the_limit_is_of_questions_that_can_be_asked_with_all_their_variants(make_nieh_set):
@@ -304,7 +316,7 @@ def sampling(task_files):
     def write(settings):
         (task_files / "nieh" / "nieh_gt.yaml").write_text(
             "include: _nieh.yaml\ntask: nieh_gt\ndataset_kwargs: {context: clues}\n"
-            f"generation_kwargs: {{max_gen_toks: 12, {settings}}}\n"
+            f"generation_kwargs: {{{settings}}}\n"
         )
 
     return write
@@ -315,19 +327,19 @@ def test_a_temperature_in_the_task_file_samples_and_the_seed_decides_what(prepar
         sampling(settings)
         return replies(execute(prepared(TINY, tasks=("nieh_gt",), seed=seed, output=tmp_path / folder)))
 
-    greedy = said("do_sample: false, temperature: 0.0")
-    drawn = said("do_sample: true, temperature: 2.0")
+    greedy = said("max_gen_toks: 12, do_sample: false, temperature: 0.0")
+    drawn = said("max_gen_toks: 12, do_sample: true, temperature: 2.0")
     assert drawn != greedy
-    assert said("do_sample: true, temperature: 2.0", folder="again") == drawn
-    assert said("temperature: 2.0", folder="without the word") == drawn
-    assert said("do_sample: true, temperature: 2.0, top_p: 0.000001", folder="top") == greedy
+    assert said("max_gen_toks: 12, do_sample: true, temperature: 2.0", folder="again") == drawn
+    assert said("max_gen_toks: 12, temperature: 2.0", folder="without the word") == drawn
+    assert said("max_gen_toks: 12, do_sample: true, temperature: 2.0, top_p: 0.000001", folder="top") == greedy
 
 
 def test_another_seed_draws_other_replies_from_the_same_weights(prepared, sampling, tmp_path):
     from model_adapters.tiny.qwen2_5_vl import save_tiny_checkpoint
 
     save_tiny_checkpoint(tmp_path / "checkpoint", seed=0)
-    sampling("do_sample: true, temperature: 2.0")
+    sampling("max_gen_toks: 12, do_sample: true, temperature: 2.0")
     options = {"pretrained": str(tmp_path / "checkpoint"), "device": "cpu"}
     first, second = (
         replies(execute(prepared("qwen2.5-vl", options, tasks=("nieh_gt",), seed=seed))) for seed in (0, 1)
@@ -343,21 +355,27 @@ def test_another_seed_draws_other_replies_from_the_same_weights(prepared, sampli
         ("do_sample: true, temperature: 0.0", "do_sample with temperature 0 contradict each other"),
         ("num_beams: 4", "num_beams is not known; there are until, max_gen_toks"),
         ("until: [7]", r"until is \[7\]; it is a text or a list of texts"),
+        ("do_sample: 'no'", "do_sample is 'no'; it is true or false"),
         ("temperature: -1.0", "temperature must be 0"),
+        ("temperature: warm", "temperature is 'warm'; it is a number"),
+        ("top_p: most", "top_p is 'most'; it is a number"),
+        ("top_p: 1.5", "top_p must be above 0 and at most 1, not 1.5"),
+        ("max_gen_toks: 0", "max_new_tokens must be at least 1, not 0"),
+        ("max_gen_toks: many", "max_gen_toks is 'many'; it is a whole number"),
     ],
 )
 def test_settings_that_would_not_act_are_refused_before_a_model_is_loaded(prepared, sampling, settings, said):
-    sampling(settings)
-    with pytest.raises(UsageError, match=said) as caught:
+    sampling(settings if "max_gen_toks" in settings else f"max_gen_toks: 12, {settings}")
+    with pytest.raises(UsageError, match=f"nieh_gt: generation_kwargs: {said}") as caught:
         prepared(TINY, tasks=("nieh_gt",))
     assert "\n" not in str(caught.value)
 
 
 def test_a_stop_text_of_the_task_file_ends_replies(prepared, sampling):
-    sampling("until: []")
+    sampling("max_gen_toks: 12, until: []")
     whole = replies(execute(prepared(TINY, tasks=("nieh_gt",))))
     mark = next(text[1] for text in whole.values() if len(text) > 1)
-    sampling(f"until: {json.dumps([mark])}")
+    sampling(f"max_gen_toks: 12, until: {json.dumps([mark])}")
     assert replies(execute(prepared(TINY, tasks=("nieh_gt",)))) == {
         key: text.partition(mark)[0] for key, text in whole.items()
     }
