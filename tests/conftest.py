@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from PIL import Image
 from infthor_eval.cli import main
 from infthor_eval.formats.qa_csv import write_questions
 from infthor_eval.formats.question import Question
+from infthor_eval.runs import Catalog
 
 # Before torch is imported, here and in processes that tests start: on a busy machine two threads that wait for each
 # other take ten times as long as one.
@@ -63,6 +65,15 @@ def run(capfd: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]
         return ended.value.code, *capfd.readouterr()
 
     return run
+
+
+@pytest.fixture
+def task_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A copy of the packaged task files that commands and runs of this process find instead; its folder."""
+    folder = tmp_path / "tasks"
+    shutil.copytree(Catalog.packaged().folder, folder)
+    monkeypatch.setattr(Catalog, "packaged", classmethod(lambda cls: cls(folder)))
+    return folder
 
 
 @pytest.fixture(scope="session")

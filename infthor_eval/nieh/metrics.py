@@ -6,6 +6,7 @@ them; our runs honour both.
 
 import importlib
 import importlib.util
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -50,11 +51,16 @@ class Metrics:
             return scores(reply, sample.question.answers)
         try:
             made = self.process(doc_of(found, sample), [reply])
-            return {name: float(made[name]) for name in self.names}
+            return {name: _finite(name, made[name]) for name in self.names}
         except Exception as error:
-            raise DataError(
-                f"process_results fails on {sample.question.id}: {type(error).__name__}: {error}"
-            ) from error
+            said = " ".join(f"{type(error).__name__}: {error}".split())
+            raise DataError(f"process_results fails on {sample.question.id}: {said}") from error
+
+
+def _finite(name: str, value: Any) -> float:
+    if not math.isfinite(number := float(value)):
+        raise ValueError(f"{name} is {number}")  # neither a mean nor a journal can hold it
+    return number
 
 
 PUBLISHED = Metrics(SCORERS)
@@ -64,20 +70,28 @@ def metrics_of(task: TaskFile) -> Metrics:
     """The metrics of a task file.
 
     Raises:
-        DataError: its function cannot be imported, or a metric is not averaged.
+        DataError: its function cannot be imported, or a metric is not averaged, or is better when lower.
     """
     name = task.settings["process_results"]
     if name == _OURS:
         return PUBLISHED
     listed = task.settings.get("metric_list") or []
     for item in listed:
-        if item.get("aggregation", "mean") != "mean":
-            raise DataError(f"{task.path}: metric {item['metric']} is not averaged (aggregation: mean); use lm-eval")
+        _check(item, f"{task.path}: metric_list: ")
     if not listed:
         raise DataError(f"{task.path}: a task with its own process_results names its metrics under metric_list")
     module, attribute = _imported(task.path, name)
     source = {"process_results": name, "source": digest_of_file(Path(str(module.__file__)))}
     return Metrics(tuple(item["metric"] for item in listed), getattr(module, attribute), source)
+
+
+def _check(item: object, place: str) -> None:
+    if not isinstance(item, Mapping) or "metric" not in item:
+        raise DataError(f"{place}{item!r} is not a mapping with the metric's name (metric: NAME)")
+    if item.get("aggregation", "mean") != "mean":
+        raise DataError(f"{place}{item['metric']} is not averaged (aggregation: mean); use lm-eval")
+    if not item.get("higher_is_better", True):  # what fails counts as 0, which would be the best there is
+        raise DataError(f"{place}{item['metric']} is better when lower; turn it round, or use lm-eval")
 
 
 def _imported(task_file: Path, name: str) -> tuple[ModuleType, str]:
@@ -93,6 +107,7 @@ def _imported(task_file: Path, name: str) -> tuple[ModuleType, str]:
         else:
             found = importlib.import_module(module)
         getattr(found, attribute)
-    except (ImportError, AttributeError, SyntaxError, ValueError) as error:
-        raise DataError(f"{task_file}: process_results {name} cannot be imported ({error})") from error
+    except Exception as error:  # whatever a module does when it is imported
+        said = " ".join(str(error).split())
+        raise DataError(f"{task_file}: process_results {name} cannot be imported ({said})") from error
     return found, attribute

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass, field
 
+from infthor_eval.errors import UsageError
+
 __all__ = ["NiehOptions"]
 
 
@@ -36,3 +38,12 @@ class NiehOptions:
     retriever_revision: str | None = field(
         default=None, metadata={"help": "Branch, tag or commit of the retriever on the hub.", "metavar": "REVISION"}
     )
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be.
+
+        Raises:
+            UsageError: a frame without tokens.
+        """
+        if self.tokens_per_frame is not None and self.tokens_per_frame < 1:
+            raise UsageError(f"--tokens-per-frame {self.tokens_per_frame}: a frame has one token at least")

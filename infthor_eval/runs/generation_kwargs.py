@@ -28,25 +28,33 @@ def decoding_of(given: Mapping[str, Any], seed: int, place: str) -> Decoding:
     limit = given.get("max_gen_toks")
     if not isinstance(limit, int) or isinstance(limit, bool):
         raise UsageError(f"{place}: generation_kwargs: max_gen_toks is {limit!r}; it is a whole number of tokens")
-    return Decoding(
-        max_new_tokens=limit,
-        temperature=_temperature(given, place),
-        top_p=float(given.get("top_p", 1.0)),
-        seed=seed,
-        stop=_texts(given.get("until", ()), "until", place),
-        choices=_texts(given.get("choices", ()), "choices", place),
-    )
+    temperature, top_p = _temperature(given, place), _number(given.get("top_p", 1.0), "top_p", place)
+    stop, choices = (_texts(given.get(name, ()), name, place) for name in ("until", "choices"))
+    try:
+        return Decoding(
+            max_new_tokens=limit, temperature=temperature, top_p=top_p, seed=seed, stop=stop, choices=choices
+        )
+    except UsageError as error:
+        raise UsageError(f"{place}: generation_kwargs: {error}") from error
 
 
 def _temperature(given: Mapping[str, Any], place: str) -> float:
     """As lm-eval reads it: a temperature above 0 samples unless told otherwise, and sampling alone means 1."""
-    temperature = given.get("temperature")
+    temperature = None if given.get("temperature") is None else _number(given["temperature"], "temperature", place)
     samples = given.get("do_sample", bool(temperature))
+    if not isinstance(samples, bool):
+        raise UsageError(f"{place}: generation_kwargs: do_sample is {samples!r}; it is true or false")
     if samples and temperature == 0:
         raise UsageError(f"{place}: generation_kwargs: do_sample with temperature 0 contradict each other")
     if not samples and temperature:
         raise UsageError(f"{place}: generation_kwargs: temperature {temperature} without do_sample has no effect")
-    return float(1.0 if temperature is None else temperature) if samples else 0.0
+    return (1.0 if temperature is None else temperature) if samples else 0.0
+
+
+def _number(given: Any, name: str, place: str) -> float:
+    if not isinstance(given, int | float) or isinstance(given, bool):
+        raise UsageError(f"{place}: generation_kwargs: {name} is {given!r}; it is a number")
+    return float(given)
 
 
 def _texts(given: str | Sequence[str] | None, name: str, place: str) -> tuple[str, ...]:

@@ -8,7 +8,6 @@ import torch
 from transformers import LlamaConfig
 
 from infthor_eval.formats.question import Question
-from infthor_eval.runs import read_journal
 from model_adapters.tiny.qwen2_5_vl import Qwen25VLTiny
 
 from ..conftest import QUESTIONS
@@ -103,15 +102,14 @@ def test_a_checkpoint_that_cannot_work_is_one_line_before_any_question(checkpoin
     assert said in line
     assert (code, out) == (2, "")
     assert "Traceback" not in err
-    assert not any(read_journal(path)[1] for path in tmp_path.rglob("journal.jsonl"))
+    assert not list(tmp_path.rglob("worker-*.jsonl"))
 
 
-def test_a_context_beyond_the_limit_is_recorded_with_its_tokens_and_the_limit(make_nieh_set, tmp_path, run):
+def test_a_context_beyond_the_limit_is_recorded_with_its_tokens_and_the_limit(make_nieh_set, tmp_path, run, records_in):
     data = make_nieh_set()
     arguments = ["--model", "qwen2.5-vl-tiny", "--model-args", "max_tokens=600", "--tasks", "nieh", "--data", data]
     code, _, err = run(*arguments, "--output", tmp_path / "out")
-    (journal,) = (tmp_path / "out").rglob("journal.jsonl")
-    records = read_journal(journal)[1]
+    records = records_in(tmp_path / "out")
     failed = [record for record in records if record.failure]
     # Six frames of 123 tokens; of the clues, three at most.
     assert {record.task for record in failed} == {"nieh_full"}
@@ -122,14 +120,13 @@ def test_a_context_beyond_the_limit_is_recorded_with_its_tokens_and_the_limit(ma
     assert "Traceback" not in err
 
 
-def test_a_question_with_the_models_image_token_fails_alone(make_nieh_set, tmp_path, run):
+def test_a_question_with_the_models_image_token_fails_alone(make_nieh_set, tmp_path, run, records_in):
     bad = Question("traj_b", "What is <|image_pad|>?", (3,), ("mug",))
     data = make_nieh_set([*QUESTIONS, bad], size=56)
     arguments = ["--model", "qwen2.5-vl-tiny", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out"]
     assert run(*arguments)[0] == 1
-    (journal,) = (tmp_path / "out").rglob("journal.jsonl")
-    (failed,) = [record for record in read_journal(journal)[1] if record.failure]
-    assert failed.question == bad.text
+    (failed,) = [record for record in records_in(tmp_path / "out") if record.failure]
+    assert failed.payload.question == bad.text
     assert "2 image placeholders for 1 frames" in failed.failure
 
 
@@ -167,7 +164,7 @@ def install(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("batch_size", [1, 3])
 def test_out_of_memory_in_mid_run_costs_the_contexts_that_are_too_large(
-    make_nieh_set, tmp_path, run, install, batch_size
+    make_nieh_set, tmp_path, run, install, records_in, batch_size
 ):
     install("cramped", f"{__name__}:Cramped")
     long = Question("traj_a", "What did you see?", (0, 1, 2, 3, 4), ("mug",))
@@ -176,11 +173,13 @@ def test_out_of_memory_in_mid_run_costs_the_contexts_that_are_too_large(
     code, out, err = run(*arguments, "--output", tmp_path / "out")
     assert code == 1
     assert "Traceback" not in err
-    (journal,) = (tmp_path / "out").rglob("journal.jsonl")
-    records = read_journal(journal)[1]
+    records = records_in(tmp_path / "out")
     failed = [record for record in records if record.failure]
-    assert {(record.task, record.n_clues) for record in failed} == {("nieh_gt", 5), *(("nieh_full", n) for n in (1, 5))}
-    assert [record.reply is not None for record in records if record not in failed] == [True] * 3
+    assert {(record.task, record.payload.n_clues) for record in failed} == {
+        ("nieh_gt", 5),
+        *(("nieh_full", n) for n in (1, 5)),
+    }
+    assert [record.payload.reply is not None for record in records if record not in failed] == [True] * 3
     for record in failed:
         n_frames = 5 if record.task == "nieh_gt" else 6
         assert int(record.failure.removeprefix("out of memory on a context of ").split()[0]) > n_frames * 123

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from infthor_eval.formats.question import Question
-from infthor_eval.runs import read_journal
+from infthor_eval.runs import read_header
 from model_adapters.tiny.qwen2_5_vl import save_tiny_checkpoint
 
 ONE = [Question("t", "Is there a mug?", (40,), ("yes",))]
@@ -47,8 +47,20 @@ def test_a_kilo_token_is_each_contexts_own_or_the_one_given(make_nieh_set, tmp_p
     arguments = ["--model", "oracle", "--tasks", ",".join(tasks), "--data", data, "--output", tmp_path / "out"]
     code, _, err = run(*arguments, *options)
     assert code == 0, err
-    # A bound is counted as Qwen2.5-VL: 121 tokens a frame.
+    # A baseline is counted as Qwen2.5-VL: 121 tokens a frame.
     assert [set(n_frames(tmp_path / "out", task)) for task in tasks] == [{haystack}, {truncated}]
+
+
+@pytest.mark.parametrize("model", ["oracle", "qwen2.5-vl-tiny"])
+def test_the_tokens_of_a_frame_can_be_told(make_nieh_set, tmp_path, run, model):
+    data, out = make_nieh_set(ONE, n_frames=80, size=56), tmp_path / "out"
+    tasks = ["nieh_haystack_8k", "nieh_truncate_head_8k"]
+    arguments = ["--model", model, "--tasks", ",".join(tasks), "--data", data, "--output", out]
+    code, _, err = run(*arguments, "--tokens-per-frame", 390)
+    assert code == 0, err
+    assert [set(n_frames(out, task)) for task in tasks] == [{8000 // 390}, {8192 // 390}]
+    (folder,) = (path.parent for path in out.rglob("journal"))
+    assert read_header(folder).identity["tokens_per_frame"] == 390
 
 
 def test_the_kilo_token_and_the_extension_are_part_of_the_runs_identity(make_nieh_set, tmp_path, run):
@@ -56,7 +68,7 @@ def test_the_kilo_token_and_the_extension_are_part_of_the_runs_identity(make_nie
     tasks, out = "nieh_gt,nieh_haystack_8k", tmp_path / "out"
     for options in ((), ("--k-tokens", 1024), ("--rope", "yarn:2")):
         assert run("--model", "qwen2.5-vl-tiny", "--tasks", tasks, "--data", data, "--output", out, *options)[0] == 0
-    identities = [read_journal(path)[0] for path in sorted(out.rglob("journal.jsonl"))]
+    identities = [read_header(path.parent).identity for path in sorted(out.rglob("journal"))]
     found = {(each["k_tokens"], each["model"]["rope"]["rope_type"], each["model"]["max_tokens"]) for each in identities}
     assert found == {(None, "default", 128_000), (1024, "default", 128_000), (None, "yarn", 256_000)}
 
@@ -111,12 +123,11 @@ def test_a_context_that_is_cut_to_its_size_is_told_as_truncated(make_nieh_set, t
 
 
 @pytest.mark.parametrize("family", ["qwen2.5-vl", "llava-onevision", "deepseek-vl", "pixtral"])
-def test_the_longest_request_that_is_told_is_the_one_that_is_made(make_nieh_set, tmp_path, run, family):
+def test_the_longest_request_that_is_told_is_the_one_that_is_made(make_nieh_set, tmp_path, run, records_in, family):
     data = make_nieh_set()
     arguments = ["--model", f"{family}-tiny", "--tasks", "nieh_full", "--data", data, "--output", tmp_path / "out"]
     _, _, err = run(*arguments)
-    records = read_journal(only(tmp_path / "out", "journal.jsonl"))[1]
-    longest = max(record.n_context_tokens for record in records) + 50  # and the room for the reply
+    longest = max(record.tokens.context for record in records_in(tmp_path / "out")) + 50  # and the room for the reply
     assert f"the longest request {longest:,} tokens" in line_of(err, "nieh_full: 2 contexts")
 
 
@@ -124,10 +135,14 @@ BAD = [
     (["--model", "oracle", "--rope", "yarn:4"], "oracle has no option rope"),
     (["--model", "blind", "--rope", "yarn:4"], "blind has no option rope"),
     (["--model", "qwen2.5-vl-tiny,oracle", "--rope", "yarn:4"], "oracle has no option rope"),
-    (["--model", "qwen2.5-vl-tiny", "--rope", "yarn"], "rope=yarn is not KIND:FACTOR"),
-    (["--model", "qwen2.5-vl-tiny", "--rope", "ntk:4"], "rope=ntk:4 is not KIND:FACTOR"),
+    (["--model", "qwen2.5-vl-tiny", "--rope", "yarn"], "rope=yarn is not TYPE:FACTOR"),
+    (["--model", "qwen2.5-vl-tiny", "--rope", "ntk:4"], "rope=ntk:4 is not TYPE:FACTOR"),
     (["--model", "qwen2.5-vl-tiny", "--rope", "yarn:4", "--model-args", "rope=yarn:4"], "give one of them"),
-    (["--model", "oracle", "--k-tokens", "1000"], "no context of nieh has a size in kilo-tokens"),
+    (["--model", "oracle", "--k-tokens", "1000"], "no context of nieh_gt, nieh_full has a size in tokens"),
+    (["--model", "oracle", "--tokens-per-frame", "500"], "no context of nieh_gt, nieh_full has a size in tokens"),
+    (["--model", "oracle", "--tokens-per-frame", "0"], "--tokens-per-frame 0: a frame has one token at least"),
+    (["--model", "oracle", "--tokens-per-frame", "-3"], "--tokens-per-frame -3: a frame has one token at least"),
+    (["--model", "oracle", "--tokens-per-frame", "few"], "'few' is not a valid integer"),
     (["--model", "oracle", "--k-tokens", "1001"], "'1001' is not one of '1000', '1024'"),
 ]
 

@@ -10,7 +10,8 @@ import time
 import pytest
 
 from infthor_eval.formats.question import Question
-from infthor_eval.runs import read_journal
+from infthor_eval.nieh.records import RECORDS
+from infthor_eval.runs import read_header, read_run
 
 QUESTIONS = [
     Question(traj_id, f"Is there a {name}?", (index,), ("yes",), "object_presence")
@@ -46,7 +47,7 @@ def test_retrieval_runs_through_and_the_retriever_is_part_of_the_run(data, make_
     assert "0 answered now, 12 found" in err
     assert only(out, "results.json").read_bytes() == results
     assert run(*arguments, "--retriever", second)[0] == 0
-    identities = [read_journal(path)[0] for path in out.rglob("journal.jsonl")]
+    identities = [read_header(path.parent).identity for path in out.rglob("journal")]
     retrievers = {
         each["tasks"][task]["sources"]["retriever"]["fingerprint"] for each in identities for task in each["tasks"]
     }
@@ -76,14 +77,15 @@ def test_videos_are_shown_where_they_are_and_a_broken_one_is_counted(data, write
     arguments = ["--model", "qwen2.5-vl-tiny", "--tasks", "nieh_video", "--data", data, "--output", out]
     code, _, err = run(*arguments)
     assert code == 0, err
-    assert "nieh_video: 3 question(s) left out: " in err
+    assert "nieh_video: 3 sample(s) skipped: " in err
     assert "traj_b_10fps.mp4: not a video that OpenCV can decode" in err
-    results = json.loads(only(out, "results.json").read_text())["tasks"]["nieh_video"]
-    assert (results["n"], results["left_out"]["n"], list(results["by_variant"])) == (3, 3, ["source=mp4"])
+    results = json.loads(only(out, "results.json").read_text())["summary"]["tasks"]["nieh_video"]
+    assert (results["n"], results["skipped"]["n"], list(results["by_variant"])) == (3, 3, ["source=mp4"])
     assert [len(doc["frames"]) for doc in docs(out, "nieh_video")] == [3] * 3
     (metadata / "traj_b" / "traj_b_10fps.mp4").unlink()
     assert run(*arguments)[0] == 0
-    variants = [json.loads(path.read_text())["tasks"]["nieh_video"]["by_variant"] for path in out.rglob("results.json")]
+    summaries = [json.loads(path.read_text())["summary"] for path in out.rglob("results.json")]
+    variants = [summary["tasks"]["nieh_video"]["by_variant"] for summary in summaries]
     assert sorted(map(sorted, variants)) == [["source=frames", "source=mp4"], ["source=mp4"]]
 
 
@@ -94,22 +96,22 @@ def test_a_run_killed_while_it_takes_notes_ends_as_an_undisturbed_one(data, tmp_
         return subprocess.Popen([sys.executable, "-c", code, *map(str, arguments)], stderr=subprocess.PIPE, text=True)
 
     killed, deadline = start(tmp_path / "killed"), time.monotonic() + 120
-    while not any(path.read_bytes().count(b"\n") > 2 for path in (tmp_path / "killed").rglob("journal.jsonl")):
+    while not any(path.read_bytes().count(b"\n") > 2 for path in (tmp_path / "killed").rglob("worker-0.jsonl")):
         assert killed.poll() is None, killed.stderr.read()
         assert time.monotonic() < deadline
         time.sleep(0.005)
     os.kill(killed.pid, signal.SIGKILL)
     killed.communicate()
-    journal = only(tmp_path / "killed", "journal.jsonl")
-    before = journal.read_bytes().count(b'\n{"note":')
+    journal = only(tmp_path / "killed", "worker-0.jsonl")
+    before = journal.read_bytes().count(b'\n{"type":"memo"')
     assert 0 < before < 6  # three windows of twenty frames in each of two trajectories
 
     for name in ("killed", "whole"):
         process = start(tmp_path / name)
         _, said = process.communicate(timeout=120)
         assert process.returncode == 0, said
-    assert journal.read_bytes().count(b'\n{"note":') == 6
+    assert journal.read_bytes().count(b'\n{"type":"memo"') == 6
     results = [only(tmp_path / name, "results.json").read_bytes() for name in ("killed", "whole")]
     assert results[0] == results[1]
-    records = [read_journal(only(tmp_path / name, "journal.jsonl"))[1] for name in ("killed", "whole")]
+    records = [read_run(only(tmp_path / name, "journal").parent, RECORDS)[1] for name in ("killed", "whole")]
     assert [r.fingerprint for r in records[0]] == [r.fingerprint for r in records[1]]

@@ -21,8 +21,9 @@ def only(folder, pattern):
     return path
 
 
-# By clues, total, reach of the interval, bootstrap, absence, questions, left out, failed.
-FULL_MARKS = ["100.00"] * 4 + ["0.00", "100.0–100.0", "-", "5", "0", "0"]
+# By clues, total, interval, bootstrap, absence, samples, skipped, failed. Two trajectories tell little, even if all is
+# right: Wilson's interval on 5 / (5 / 2) questions, with the t quantile of one degree of freedom.
+FULL_MARKS = ["100.00"] * 4 + ["1.2–100.0", "100.0–100.0", "-", "5", "0", "0"]
 
 
 def test_the_table_shows_every_model_task_and_scorer_beside_the_published_rows(make_nieh_set, tmp_path, run):
@@ -37,7 +38,7 @@ def test_the_table_shows_every_model_task_and_scorer_beside_the_published_rows(m
     assert "82.20" in out
     for model in ("oracle", "blind"):
         results = json.loads(only(tmp_path / "out" / model, "results.json").read_text())
-        assert results["tasks"]["nieh_gt"]["by_clues"]["total"]["n"] == 5
+        assert results["summary"]["tasks"]["nieh_gt"]["by_clues"]["total"]["n"] == 5
 
 
 def test_frames_of_the_embedded_simulator_are_labelled(make_nieh_set, tmp_path, run):
@@ -56,7 +57,7 @@ def test_the_haystack_is_shown_by_depth_and_counts_what_does_not_fit(make_nieh_s
     # 8,000 // 121 = 66 frames: from frame 70, 57, 44, 31, 18; all inside 140 frames.
     assert ["oracle", "nieh_haystack_8k", "strict", *["100.00", "(1)"] * 5] in rows
     assert next(row for row in rows if row[1:3] == ["nieh_haystack_1m", "strict"])[-3:] == ["0", "5", "0"]
-    assert "nieh_haystack_1m: 5 question(s) left out: the window reaches outside the trajectory" in err
+    assert "nieh_haystack_1m: 5 sample(s) skipped: the window reaches outside the trajectory" in err
 
 
 def test_a_context_beyond_the_models_limit_is_told_before_it_is_refused(make_nieh_set, tmp_path, run):
@@ -77,7 +78,56 @@ def test_limit_asks_only_so_many_of_each_task(make_nieh_set, tmp_path, run):
     data = make_nieh_set(size=56)
     run("--model", "oracle", "--tasks", "nieh", "--data", data, "--output", tmp_path / "o", "--limit", 2)
     results = json.loads(only(tmp_path / "o", "results.json").read_text())
-    assert {name: task["n"] for name, task in results["tasks"].items()} == {"nieh_gt": 2, "nieh_full": 2}
+    assert {name: task["n"] for name, task in results["summary"]["tasks"].items()} == {"nieh_gt": 2, "nieh_full": 2}
+
+
+def test_the_limit_counts_questions_and_what_is_skipped_follows_it(make_nieh_set, tmp_path, run):
+    asked = [Question("t", f"Is there a {name}?", (70,), ("yes",)) for name in ("mug", "cup")]
+    outside = [Question("t", f"Is there a {name}?", (999,), ("yes",)) for name in ("pan", "pot")]
+    data = make_nieh_set([outside[0], asked[0], outside[1], asked[1]], n_frames=140, size=56)
+    arguments = ["--model", "oracle", "--tasks", "nieh_haystack_8k", "--data", data]
+    for limit, n, n_skipped in ((1, 5, 1), (2, 10, 2)):
+        code, _, err = run(*arguments, "--output", tmp_path / str(limit), "--limit", limit)
+        assert code == 0
+        assert f"nieh_haystack_8k: {n_skipped} sample(s) skipped: clue 999 is outside" in err
+        task = json.loads(only(tmp_path / str(limit), "results.json").read_text())["summary"]["tasks"][
+            "nieh_haystack_8k"
+        ]
+        assert (task["n"], task["skipped"]["n"]) == (n, n_skipped)
+        assert {cell["n"] for cell in task["by_variant"].values()} == {limit}
+
+
+def test_the_metrics_of_a_task_file_are_shown_beside_the_published_ones(make_nieh_set, tmp_path, run, task_files):
+    (task_files / "nieh" / "own.py").write_text(
+        "def measure(doc, results):\n    return {'letters': len(results[0]) / 20}\n"
+    )
+    (task_files / "nieh" / "nieh_own.yaml").write_text(
+        "include: _nieh.yaml\ntask: nieh_own\ndataset_kwargs: {context: clues}\n"
+        "process_results: !function own.measure\nmetric_list: [{metric: letters}]\n"
+    )
+    arguments = ["--model", "oracle", "--data", make_nieh_set(size=56), "--output", tmp_path / "out"]
+    code, out, err = run(*arguments, "--tasks", "nieh_gt,nieh_own")
+    assert code == 0, err
+    rows = [line.split() for line in out.splitlines()]
+    assert [row[2] for row in rows if row[:2] == ["oracle", "nieh_own"] and len(row) > 6] == ["letters"]
+    # By clues: 3, 2 and 2 letters of 20; 10; 10.
+    assert next(row for row in rows if row[1:3] == ["nieh_own", "letters"])[3:7] == ["11.67", "50.00", "50.00", "27.00"]
+    assert ["oracle", "nieh_gt", "strict", *FULL_MARKS] in rows
+    found = json.loads(only(tmp_path / "out", "results.json").read_text())["summary"]["tasks"]["nieh_own"]
+    assert found["by_clues"]["total"]["scores"]["letters"]["mean"] == pytest.approx(0.27)
+    samples = [json.loads(line) for line in only(tmp_path / "out", "samples_nieh_own_*.jsonl").read_text().splitlines()]
+    assert [sample["letters"] for sample in samples] == [0.15, 0.5, 0.5, 0.1, 0.1]
+
+    (task_files / "nieh" / "own.py").write_text("def measure(doc, results):\n    return {}\n")
+    code, _, err = run(*arguments, "--tasks", "nieh_own")
+    assert code == 1
+    assert "nieh_own: 1 sample(s) failed, counted as wrong: process_results fails on traj_a/" in err
+    (task_files / "nieh" / "nieh_own.yaml").write_text(
+        (task_files / "nieh" / "nieh_own.yaml").read_text().replace("letters}", "letters, aggregation: median}")
+    )
+    code, out, err = run(*arguments, "--tasks", "nieh_own")
+    assert (code, out, len(err.strip().splitlines())) == (2, "", 1)
+    assert "letters is not averaged (aggregation: mean); use lm-eval" in err
 
 
 def test_a_killed_run_goes_on_and_ends_as_an_undisturbed_one(make_nieh_set, tmp_path):
@@ -91,7 +141,7 @@ def test_a_killed_run_goes_on_and_ends_as_an_undisturbed_one(make_nieh_set, tmp_
     killed = start(tmp_path / "killed")
     deadline = time.monotonic() + 120
     while True:  # until some answers, not all, are on disk
-        journals = list((tmp_path / "killed").rglob("journal.jsonl"))
+        journals = list((tmp_path / "killed").rglob("worker-0.jsonl"))
         if journals and journals[0].read_bytes().count(b"\n") > 3:
             break
         assert killed.poll() is None, killed.stderr.read()
@@ -117,7 +167,7 @@ def test_a_killed_run_goes_on_and_ends_as_an_undisturbed_one(make_nieh_set, tmp_
 
 
 BAD = [
-    (["--model", "orcle", "--tasks", "nieh", "--data", "SET"], "did you mean oracle?"),
+    (["--model", "orcle", "--tasks", "nieh", "--data", "SET"], "did you mean 'oracle'?"),
     (["--model", "oracle", "--tasks", "nieh_ful", "--data", "SET"], "did you mean 'nieh_full'?"),
     (["--model", "oracle", "--tasks", "nieh"], "give its folder with --data"),
     (["--model", "oracle", "--tasks", "nieh", "--data", "nowhere"], "nowhere: no such folder"),
@@ -153,11 +203,11 @@ def test_bad_data_ends_in_one_line_and_exit_code_2(make_nieh_set, tmp_path, run)
     assert len(err.strip().splitlines()) == 1
 
 
-def test_what_is_left_out_is_counted_and_named(make_nieh_set, tmp_path, run):
+def test_what_is_skipped_is_counted_and_named(make_nieh_set, tmp_path, run):
     data = make_nieh_set([*MANY, Question("traj_a", "Where is it?", (77,), ("Shelf",))], size=56)
     code, _, err = run("--model", "oracle", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out")
     assert code == 0
-    assert "nieh_gt: 1 question(s) left out: clue 77 is outside trajectory traj_a (6 frames)" in err
+    assert "nieh_gt: 1 sample(s) skipped: clue 77 is outside trajectory traj_a (6 frames)" in err
 
 
 def test_a_frame_that_breaks_in_mid_run_is_counted_as_failed_and_the_exit_code_says_so(make_nieh_set, tmp_path, run):
@@ -167,7 +217,7 @@ def test_a_frame_that_breaks_in_mid_run_is_counted_as_failed_and_the_exit_code_s
     arguments = ["--model", "qwen2.5-vl-tiny", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out"]
     code, out, err = run(*arguments)
     assert code == 1
-    assert "nieh_gt: 2 question(s) failed, counted as wrong" in err
+    assert "nieh_gt: 2 sample(s) failed, counted as wrong" in err
     assert str(frame) in err
     assert next(line for line in out.splitlines() if "nieh_gt" in line).split()[-3:] == ["5", "0", "2"]
 

@@ -6,14 +6,16 @@ import pytest
 from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.formats.qa_csv import read_questions
 from infthor_eval.formats.question import Question
-from model_adapters import load
+from infthor_eval.nieh.baselines import BASELINES
+from infthor_eval.nieh.suite import NiehSuite
+from model_adapters import Capabilities
 
 # Of known skill: which answers each scripted model gets right.
 SKILLS = {
     "one-clue": lambda q: len(q.clues) == 1,
     "yes": lambda q: q.answers == ("yes",),
     "counter": lambda q: str(q.answers[0]).isdecimal(),
-    "places": lambda q: q.kind in {"location_tracing", "put_action"} and len(q.clues) < 3,
+    "places": lambda q: q.question_type in {"location_tracing", "put_action"} and len(q.clues) < 3,
     "none": lambda q: False,
 }
 QUESTIONS = [
@@ -26,14 +28,21 @@ QUESTIONS = [
 
 
 class Scripted:
+    """A baseline of that skill."""
+
+    capabilities = Capabilities(counts_tokens=False, token_ids=False)
+
     def __init__(self, name):
         self.name = name
 
     def identity(self):
         return {}
 
-    def study(self, questions):
+    def close(self):
         pass
+
+    def fit(self, questions):
+        return self.answer
 
     def answer(self, question):
         return ", ".join(question.answers) if SKILLS[self.name](question) else "<script>wrong</script>"
@@ -41,11 +50,8 @@ class Scripted:
 
 @pytest.fixture
 def data(make_nieh_set, monkeypatch):
-    def load_scripted(name, *arguments):
-        return Scripted(name) if name in SKILLS else load(name, *arguments)
-
-    monkeypatch.setattr("infthor_eval.runs.run.load", load_scripted)
-    monkeypatch.setattr("infthor_eval.cli.validation.check_options", lambda *_: None)
+    scripted = {name: lambda seed, name=name: Scripted(name) for name in SKILLS}
+    monkeypatch.setattr(NiehSuite, "baselines", {**BASELINES, **scripted})
     return make_nieh_set(QUESTIONS, size=56)
 
 

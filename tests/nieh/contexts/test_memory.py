@@ -3,10 +3,12 @@ import pytest
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.question import Question
+from infthor_eval.harness import registration
+from infthor_eval.harness.nieh_task import dataset, doc_to_image, doc_to_text
 from infthor_eval.nieh.contexts import CONTEXTS
+from infthor_eval.nieh.docs import doc_parts, sample_of
 from infthor_eval.nieh.notes import Notes, Notetaking
-from infthor_eval.nieh.task import dataset, doc_parts, doc_to_image, doc_to_text
-from infthor_eval.nieh.work import find_work
+from infthor_eval.nieh.samples import find_samples
 
 QUESTION = Question("t", "Is there a mug?", (1,), ("yes",))
 
@@ -33,24 +35,32 @@ def test_the_notes_are_a_line_each_in_time_order():
 
 def test_the_context_is_the_notes_the_last_frame_and_the_question(make_nieh_set):
     root = make_nieh_set([QUESTION], n_frames=5, size=56)
-    work = find_work({"context": "memory_notes", "data": str(root), "note_window": 3, "note_tokens": 7})
-    ((question, case),) = work.cases
-    frames = work.data.frames("t")
-    *context, text = CONTEXTS["memory_notes"].request(work.data, question, case)
+    found = find_samples({"context": "memory_notes", "data": str(root), "note_window": 3, "note_tokens": 7})
+    (sample,) = found.samples
+    frames = found.data.frames("t")
+    context, text = CONTEXTS["memory_notes"].request(found.data, sample)
     assert context == [Notes("t", frames, Notetaking(3, 7)), frames[-1]]
     assert text.endswith("Question: Is there a mug?")
 
 
-def test_a_doc_carries_how_notes_are_taken(make_nieh_set):
+@pytest.fixture
+def references(monkeypatch):
+    """As when lm-eval's model is ours, which has notes taken."""
+    monkeypatch.setattr(registration, "_references", True)
+
+
+def test_a_doc_carries_how_notes_are_taken(make_nieh_set, references):
     root = make_nieh_set([QUESTION], n_frames=5, size=56)
     config = {"context": "memory_notes", "data": str(root), "note_window": 3, "note_tokens": 7}
-    (doc,) = dataset(pixels=False, **config)["test"]
+    (doc,) = dataset(**config)["test"]
     assert doc_parts(doc)[0].taking == Notetaking(3, 7)
     assert doc_to_text(doc).startswith("<notes><image>\nAnswer the question given your notes")
     assert doc_to_image(doc) == []
+    assert sample_of(doc) == find_samples(config).samples[0]
 
 
-def test_a_runner_that_has_no_notes_taken_is_told_so(make_nieh_set):
+def test_a_runner_that_has_no_notes_taken_is_told_so(make_nieh_set, monkeypatch):
+    monkeypatch.setattr(registration, "_references", False)
     root = make_nieh_set([QUESTION], size=56)
     with pytest.raises(UsageError, match="run the task with `infthor-eval run`") as caught:
         dataset(context="memory_notes", data=str(root))

@@ -8,9 +8,9 @@ from transformers import AutoImageProcessor, AutoTokenizer, CLIPModel
 
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.frames import FrameRef
-from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.nieh_set import NiehSet, SkippedQuestion
 from infthor_eval.formats.question import Question
-from infthor_eval.nieh.contexts import CONTEXTS, Settings, Unfit
+from infthor_eval.nieh.contexts import CONTEXTS, ContextSettings
 from model_adapters.hf.retrieval import open_retriever
 
 TEXTS = ("Is there a mug?", "Where was the plate?", "What did you put on the table?")
@@ -37,8 +37,8 @@ def noise(make_nieh_set):
 
 
 def shown(context, root, question=QUESTIONS[0], **settings):
-    (case,) = CONTEXTS[context].cases(NiehSet(root), question, Settings(**settings))
-    return case if isinstance(case, Unfit) else list(case.frames)
+    (found,) = CONTEXTS[context].samples(NiehSet(root), question, ContextSettings(**settings))
+    return found if isinstance(found, SkippedQuestion) else list(found.frames)
 
 
 @torch.inference_mode()
@@ -113,7 +113,7 @@ def test_each_frame_is_decoded_once_and_few_at_a_time(noise, make_clip, monkeypa
     assert len(loaded) == 70
 
 
-def test_a_frame_that_cannot_be_decoded_leaves_the_question_out(noise, clip):
+def test_a_frame_that_cannot_be_decoded_has_the_question_skipped(noise, clip):
     root = noise(12)
     broken = root / "metadata" / "t" / "img" / "000000007.png"
     broken.write_bytes(broken.read_bytes()[:60])
@@ -130,13 +130,13 @@ def test_the_identity_tells_weights_apart_and_not_places(noise, make_clip, clip,
     data = NiehSet(noise(4))
 
     def identity(folder):
-        return CONTEXTS["clip_retrieval"].sources(data, Settings(retriever=str(folder)))["retriever"]
+        return CONTEXTS["clip_retrieval"].sources(data, ContextSettings(retriever=str(folder)))["retriever"]
 
     moved = tmp_path / "elsewhere" / clip.name
     shutil.copytree(clip, moved)
     assert identity(clip) == identity(moved)
     assert identity(clip)["fingerprint"] != identity(make_clip(seed=1))["fingerprint"]
-    assert CONTEXTS["trajectory"].sources(data, Settings()) == {}
+    assert CONTEXTS["trajectory"].sources(data, ContextSettings()) == {}
 
 
 def test_a_retriever_that_cannot_be_had_says_what_to_do(noise, clip, tmp_path, monkeypatch):
@@ -166,4 +166,4 @@ def test_so_many_frames_cannot_be():
     for name in ("top_k", "note_window", "note_tokens"):
         for value in (0, -1, 2.5, "ten"):
             with pytest.raises(UsageError, match=f"{name} is .*whole number"):
-                Settings.read({name: value})
+                ContextSettings.read({name: value})

@@ -4,9 +4,9 @@ import pytest
 
 from infthor_eval.errors import DataError
 from infthor_eval.formats.frames import FrameRef
-from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.nieh_set import NiehSet, SkippedQuestion
 from infthor_eval.formats.question import Question
-from infthor_eval.nieh.contexts import CONTEXTS, Settings, Unfit
+from infthor_eval.nieh.contexts import CONTEXTS, ContextSettings
 
 QUESTION = Question("t", "Where is it?", (1,), ("Shelf",))
 
@@ -14,10 +14,10 @@ QUESTION = Question("t", "Where is it?", (1,), ("Shelf",))
 def shown(context, root):
     """What the context shows: texts, and frames by number."""
     data = NiehSet(root)
-    (case,) = CONTEXTS[context].cases(data, QUESTION, Settings())
-    if isinstance(case, Unfit):
-        return case.reason
-    *parts, _ = CONTEXTS[context].request(data, QUESTION, case)
+    (found,) = CONTEXTS[context].samples(data, QUESTION, ContextSettings())
+    if isinstance(found, SkippedQuestion):
+        return found.reason
+    parts, _ = CONTEXTS[context].request(data, found)
     return [int(part.path.stem) if isinstance(part, FrameRef) else part for part in parts]
 
 

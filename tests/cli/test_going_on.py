@@ -1,0 +1,125 @@
+"""Runs that go on, start anew, or are named, as their user types it."""
+
+import json
+
+import pytest
+
+from infthor_eval.nieh.records import RECORDS
+from infthor_eval.runs import read_run
+
+
+@pytest.fixture
+def ask(make_nieh_set, tmp_path, run):
+    """Runs `nieh_gt` with the tiny model, for 5 samples."""
+    data = make_nieh_set(size=56)
+
+    def ask(*options, model="qwen2.5-vl-tiny"):
+        arguments = ["--model", model, "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out"]
+        return run(*arguments, *options)
+
+    return ask
+
+
+def only(folder, pattern):
+    (path,) = folder.rglob(pattern)
+    return path
+
+
+def replies(folder):
+    return {record.key: record.payload.reply for record in read_run(folder, RECORDS)[1]}
+
+
+def test_a_name_is_the_runs_in_its_folder_its_table_and_its_results(ask, tmp_path):
+    assert ask(model="oracle")[0] == 0
+    code, out, err = ask("--name", "upper bound", model="oracle")
+    assert code == 0
+    results = json.loads(only(tmp_path / "out" / "upper bound", "results.json").read_text())
+    assert results["name"] == "upper bound"
+    assert any(line.split()[:3] == ["upper", "bound", "nieh_gt"] for line in out.splitlines())
+    assert f"upper bound: {tmp_path / 'out' / 'upper bound'}" in out.replace("\n", "")
+    assert "upper bound: 5 answered now" in err
+    # The name is no part of what the run is: it lies in a folder of the same digest.
+    assert [path.name for path in sorted((tmp_path / "out").iterdir())] == ["oracle", "upper bound"]
+    assert len({path.parent.name for path in (tmp_path / "out").rglob("results.json")}) == 1
+
+
+@pytest.mark.parametrize("name", ["../up", "a/b", "", ".hidden", "-x\n"])
+def test_a_name_that_is_no_folders_is_refused(ask, tmp_path, name):
+    code, out, err = ask(f"--name={name}", model="oracle")
+    assert (code, out, len(err.splitlines())) == (2, "", 1)
+    assert "names a folder" in err
+    assert not (tmp_path / "out").exists()
+
+
+def test_one_name_is_not_for_two_models(ask, tmp_path):
+    code, out, err = ask("--name", "both", model="oracle,blind")
+    assert (code, out, len(err.splitlines())) == (2, "", 1)
+    assert "--name both: names one run, and 2 models are asked" in err
+    assert not (tmp_path / "out").exists()
+
+
+def test_fresh_starts_anew_and_sets_every_earlier_journal_aside(ask, tmp_path):
+    ask()
+    journal = only(tmp_path / "out", "journal")
+    folder, first = journal.parent, (journal / "worker-0.jsonl").read_bytes()
+    for number in (1, 2):
+        code, _, err = ask("--fresh")
+        assert code == 0
+        assert "5 answered now, 0 found in the journal" in err
+        assert sorted(path.name for path in folder.glob("journal*")) == [
+            "journal",
+            *(f"journal.{each}" for each in range(1, number + 1)),
+        ]
+    assert (folder / "journal.1" / "worker-0.jsonl").read_bytes() == first
+    assert "0 answered now, 5 found in the journal" in ask()[2]
+
+
+def test_fresh_is_no_matter_where_nothing_was(ask, tmp_path):
+    code, _, err = ask("--fresh", "--recover", model="oracle")
+    assert code == 0
+    assert "5 answered now, 0 found" in err
+    assert not list(tmp_path.rglob("journal.1"))
+
+
+def test_a_bad_line_in_a_journal_is_named_and_recovered_from(ask, tmp_path):
+    ask()
+    path = only(tmp_path / "out", "worker-0.jsonl")
+    before, lines = replies(path.parents[1]), path.read_bytes().splitlines(keepends=True)
+    assert len(lines) == 6
+    lines[2] = lines[2][:40] + b"\x00\n"
+    lines[4] = b'{"type":"unit","task":"nieh_gt"}\n'
+    path.write_bytes(b"".join(lines))
+
+    code, out, err = ask()
+    assert (code, out) == (2, "")
+    (line,) = [line for line in err.splitlines() if line.startswith("infthor-eval: ")]
+    assert f"{path}, line 3: not a line of a journal" in line
+    assert "--recover" in line
+    assert "Traceback" not in err
+    assert path.read_bytes() == b"".join(lines)
+
+    code, _, err = ask("--recover")
+    assert code == 0
+    assert "qwen2.5-vl-tiny: 2 bad line(s) of the journal set aside; those units are tried again" in err
+    assert "2 answered now, 3 found in the journal" in err
+    assert replies(path.parents[1]) == before
+    assert (path.parent / "bad_lines.txt").read_bytes() == lines[2] + lines[4]
+    code, _, err = ask("--recover")
+    assert "bad line" not in err
+    assert "0 answered now, 5 found in the journal" in err
+
+
+def test_a_journal_without_its_first_line_is_recovered_from(ask, tmp_path):
+    ask()
+    path = only(tmp_path / "out", "worker-0.jsonl")
+    before, lines = replies(path.parents[1]), path.read_bytes().splitlines(keepends=True)
+    path.write_bytes(b"no header\n" + b"".join(lines[1:]))
+    code, out, err = ask()
+    assert (code, out) == (2, "")
+    assert f"{path}, line 1: not the first line of a journal" in err
+    assert "--recover" in err
+    code, _, err = ask("--recover")
+    assert code == 0
+    assert "1 bad line(s) of the journal set aside" in err
+    assert "0 answered now, 5 found in the journal" in err
+    assert replies(path.parents[1]) == before

@@ -1,0 +1,62 @@
+"""Records and headers of runs that nobody ran."""
+
+from typing import Any
+
+from infthor_eval.nieh.records import NiehAnswer
+from infthor_eval.nieh.scoring import SCORERS, scores
+from infthor_eval.nieh.summary import NiehSummary, summarise
+from infthor_eval.runs import RunHeader, RunSummary, Tokens, UnitRecord
+
+_PAYLOAD = ("question", "question_type")
+
+
+def record(
+    number: int,
+    reply: str | None,
+    answers: tuple[str, ...] = ("mug",),
+    n_clues: int = 1,
+    n_reply_tokens: int | None = None,
+    **changes: Any,
+) -> UnitRecord[NiehAnswer]:
+    """The record of question `q<number>`, scored as a run scores it; one of four trajectories."""
+    about = {"question": "?", "question_type": "put_action"}
+    about |= {name: changes.pop(name) for name in _PAYLOAD if name in changes}
+    found = {} if reply is None else scores(reply, answers)
+    found = changes.pop("scores", found)
+    payload = NiehAnswer(**about, n_clues=n_clues, answers=answers, reply=reply, scores=found)
+    fields = {
+        "task": "nieh_gt",
+        "id": f"q{number}",
+        "cluster": f"t{number % 4}",
+        "fingerprint": "f",
+        "payload": payload,
+        "tokens": Tokens(reply=n_reply_tokens),
+    }
+    return UnitRecord(**{**fields, **changes})
+
+
+def identity(
+    model: str = "qwen2.5-vl",
+    checkpoint: str | None = "Qwen/Qwen2.5-VL-7B-Instruct",
+    n_parameters: int | None = 8_292_166_656,
+    simulator: str | None = None,
+    skipped: tuple[str, ...] = (),
+    context: str = "clues",
+    metrics: tuple[str, ...] = SCORERS,
+) -> dict[str, Any]:
+    """Of a run of `nieh_gt`; `skipped` are the reasons."""
+    about = {
+        "config": {"dataset_kwargs": {"context": context}},
+        "decoding": {"max_new_tokens": 50},
+        "metrics": {"names": list(metrics)},
+        "simulator": simulator,
+        "skipped": [{"question_id": f"x{i}", "variant": "", "reason": reason} for i, reason in enumerate(skipped)],
+    }
+    named = {"name": model, "checkpoint": checkpoint, "n_parameters": n_parameters}
+    return {"model": {key: value for key, value in named.items() if value is not None}, "tasks": {"nieh_gt": about}}
+
+
+def run_of(about: dict[str, Any], records: list[UnitRecord[NiehAnswer]], name: str = "a run") -> RunSummary:
+    """The run with these records, summed up."""
+    found: NiehSummary = summarise(about, records)
+    return RunSummary(RunHeader(suite="nieh", name=name, identity=about), found)

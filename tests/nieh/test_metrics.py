@@ -1,0 +1,144 @@
+"""Numbers that a task file makes of replies itself, under our own runs."""
+
+import json
+
+import pytest
+
+from infthor_eval.errors import DataError
+from infthor_eval.nieh.baselines import Oracle
+from infthor_eval.nieh.metrics import PUBLISHED, metrics_of
+from infthor_eval.runs import Catalog, execute
+
+OWN = """
+include: _nieh.yaml
+task: nieh_own
+dataset_kwargs: {context: clues}
+process_results: !function own.measure
+metric_list:
+  - {metric: letters, aggregation: mean, higher_is_better: true}
+  - {metric: plain, higher_is_better: true}
+"""
+MEASURE = """
+def measure(doc, results):
+    said, = results
+    return {"letters": len(said) / 20, "plain": doc["question"].startswith("Is"), "unlisted": 1.0}
+"""
+
+
+@pytest.fixture
+def own(task_files):
+    """Writes the task `nieh_own` with its function beside it."""
+
+    def write(function=MEASURE, task=OWN):
+        (task_files / "nieh" / "nieh_own.yaml").write_text(task)
+        (task_files / "nieh" / "own.py").write_text(function)
+
+    return write
+
+
+def task():
+    return Catalog.packaged().tasks["nieh_own"]
+
+
+def test_the_files_function_makes_the_scores_and_the_published_scorers_stay_out(prepared, own):
+    own()
+    outcome = execute(prepared(tasks=("nieh_own",)))
+    assert {record.payload.question: record.payload.scores for record in outcome.records} == {
+        "Is there a mug?": {"letters": 3 / 20, "plain": 1.0},
+        "Where was the mug before you put it?": {"letters": 10 / 20, "plain": 0.0},
+        "What did you put on the table?": {"letters": 10 / 20, "plain": 0.0},
+        "Is there a fridge?": {"letters": 2 / 20, "plain": 1.0},
+        "Is there a sink?": {"letters": 2 / 20, "plain": 1.0},
+    }
+    document = json.loads((outcome.folder / "results.json").read_text())
+    found = document["summary"]["tasks"]["nieh_own"]
+    assert found["metrics"] == ["letters", "plain"]
+    scores = found["by_clues"]["total"]["scores"]
+    assert {name: score["mean"] for name, score in scores.items()} == {"letters": pytest.approx(0.27), "plain": 0.6}
+
+
+def test_tasks_with_and_without_metrics_of_their_own_run_together(prepared, own):
+    own()
+    tasks = execute(prepared(tasks=("nieh_gt", "nieh_own"))).summary.summary.tasks
+    assert {name: task.metrics for name, task in tasks.items()} == {
+        "nieh_gt": ["reference", "strict"],
+        "nieh_own": ["letters", "plain"],
+    }
+    assert tasks["nieh_gt"].by_clues["total"].scores["strict"].mean == 1.0
+
+
+def test_another_source_of_the_function_is_another_run(prepared, own):
+    folders = []
+    for function in (MEASURE, MEASURE.replace("20", "40"), MEASURE):
+        own(function)
+        folders.append(execute(prepared(tasks=("nieh_own",))).folder)
+    assert folders[0] == folders[2] != folders[1]
+
+
+BAD_REPLIES = [
+    ("def measure(doc, results):\n    return {'letters': 1 / 0, 'plain': 1}\n", "ZeroDivisionError: division by zero"),
+    ("def measure(doc, results):\n    return {'letters': 1.0}\n", "KeyError: 'plain'"),
+    ("def measure(doc, results):\n    return {'letters': 'many', 'plain': 1}\n", "ValueError: could not convert"),
+    ("def measure(doc, results):\n    return {'letters': float('nan'), 'plain': 1}\n", "ValueError: letters is nan"),
+    ("def measure(doc, results):\n    return {'letters': 1, 'plain': float('inf')}\n", "ValueError: plain is inf"),
+    ("measure = 3\n", "TypeError: 'int' object is not callable"),
+]
+
+
+@pytest.mark.parametrize(("function", "said"), BAD_REPLIES, ids=[said for _, said in BAD_REPLIES])
+def test_a_function_that_fails_fails_the_sample_by_name(prepared, own, function, said):
+    own(function)
+    outcome = execute(prepared(tasks=("nieh_own",)))
+    assert len(outcome.records) == 5
+    for record in outcome.records:
+        assert record.failure.startswith(f"process_results fails on {record.id}: {said}")
+        assert "\n" not in record.failure
+    again = execute(prepared(tasks=("nieh_own",)))  # its journal can be read
+    assert {record.attempt for record in again.records} == {2}
+
+
+def test_a_function_that_fails_on_one_reply_costs_one_sample(prepared, own):
+    own(MEASURE.replace("    said,", "    assert 'sink' not in doc['question'], 'no\\nsink'\n    said,"))
+    outcome = execute(prepared(tasks=("nieh_own",)))
+    (failed,) = [record for record in outcome.records if record.failure]
+    assert failed.payload.question == "Is there a sink?"
+    assert failed.failure.endswith("AssertionError: no sink")
+    assert outcome.summary.summary.tasks["nieh_own"].by_clues["total"].n_failed == 1
+
+
+LIST = OWN[OWN.index("metric_list") :]
+BAD_FILES = [
+    (OWN.replace("aggregation: mean", "aggregation: median"), MEASURE, "metric_list: letters is not averaged"),
+    (OWN.replace(LIST, "metric_list: []\n"), MEASURE, "names its metrics under metric_list"),
+    (OWN.replace(LIST, "metric_list: [letters]\n"), MEASURE, "metric_list: 'letters' is not a mapping"),
+    (OWN.replace(LIST, "metric_list: [{aggregation: mean}]\n"), MEASURE, "metric_list: .* is not a mapping"),
+    (OWN.replace("higher_is_better: true", "higher_is_better: false"), MEASURE, "letters is better when lower"),
+    (OWN.replace("own.measure", "own.gauge"), MEASURE, "process_results own.gauge cannot be imported"),
+    (OWN.replace("own.measure", "nowhere_at_all.measure"), MEASURE, "nowhere_at_all.measure cannot be imported"),
+    (OWN.replace("own.measure", "measure"), MEASURE, "process_results measure cannot be imported"),
+    (OWN, "def measure(:\n", "process_results own.measure cannot be imported"),
+    (OWN, "1 / 0\n", "process_results own.measure cannot be imported .*division by zero"),
+]
+
+
+@pytest.mark.parametrize(("content", "function", "said"), BAD_FILES, ids=[said for *_, said in BAD_FILES])
+def test_a_file_whose_metrics_cannot_be_had_is_refused_in_one_line(prepared, own, content, function, said):
+    own(function, content)
+    with pytest.raises(DataError, match=said) as caught:
+        prepared(tasks=("nieh_own",))
+    assert "nieh_own.yaml" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_function_that_is_installed_is_found_on_the_path(own):
+    own(task=OWN.replace("own.measure", "infthor_eval.nieh.scoring.scores"))
+    assert metrics_of(task()).names == ("letters", "plain")
+    own(task=OWN.replace("own.measure", "infthor_eval.harness.nieh_task.process_results"))
+    assert metrics_of(task()) is PUBLISHED
+
+
+def test_baselines_are_measured_by_the_files_function_too(prepared, own):
+    own("def measure(doc, results):\n    return {'letters': results[0] == doc['question'], 'plain': True}\n")
+    (found,) = execute(prepared(Oracle.name, tasks=("nieh_own",))).summary.summary.tasks.values()
+    assert found.by_clues["total"].scores["letters"].mean == 0.0
+    assert found.by_clues["total"].scores["plain"].mean == 1.0

@@ -1,0 +1,381 @@
+import json
+from collections import Counter
+
+import pytest
+
+from infthor_eval.errors import ModelError, UsageError
+from infthor_eval.formats.question import Question
+from infthor_eval.harness.export import export
+from infthor_eval.nieh.records import RECORDS
+from infthor_eval.nieh.samples import find_samples
+from infthor_eval.runs import execute, read_run
+from model_adapters import Capabilities, Reply
+
+from .watching import Watcher
+
+TINY = "qwen2.5-vl-tiny"
+
+
+def replies(outcome):
+    return {record.key: record.payload.reply for record in outcome.records}
+
+
+def cells(outcome):
+    return {name: task.by_clues for name, task in outcome.summary.summary.tasks.items()}
+
+
+def test_oracle_is_right_everywhere_and_lm_eval_agrees(prepared):
+    outcome = execute(prepared())
+    assert Counter(record.task for record in outcome.records) == {"nieh_gt": 5, "nieh_full": 5}
+    assert all(record.payload.reply == ", ".join(map(str, record.payload.answers)) for record in outcome.records)
+    export(outcome)
+    (results,) = outcome.folder.glob("lm_eval/*/results_*.json")
+    measured = json.loads(results.read_text())["results"]
+    assert {task: measured[task]["strict,none"] for task in measured} == {"nieh_gt": 1.0, "nieh_full": 1.0}
+    assert len(list(outcome.folder.glob("lm_eval/*/samples_nieh_*.jsonl"))) == 2
+
+
+def test_the_same_command_goes_on_and_another_starts_anew(prepared):
+    watchers = Watcher(), Watcher()
+    first, again = (execute(prepared(), watcher) for watcher in watchers)
+    assert [(len(watcher.made), len(watcher.found)) for watcher in watchers] == [(10, 0), (0, 10)]
+    assert (again.folder, again.summary, again.records) == (first.folder, first.summary, first.records)
+    for changes in ({"seed": 1}, {"limit": 1}, {"tasks": ("nieh_gt",)}, {"model": "blind"}):
+        assert execute(prepared(**changes)).folder != first.folder
+    assert read_run(first.folder, RECORDS) == (first.summary.header, first.records)
+
+
+def test_the_results_file_says_what_the_summary_says(prepared):
+    outcome = execute(prepared(name="mine"))
+    document = json.loads((outcome.folder / "results.json").read_text())
+    assert outcome.folder.parent.name == "mine"
+    assert document.keys() == {"suite", "name", "identity", "summary"}
+    assert (document["suite"], document["name"]) == ("nieh", "mine")
+    assert document["identity"] == outcome.summary.header.identity
+    strict = document["summary"]["tasks"]["nieh_gt"]["by_clues"]["total"]["scores"]["strict"]
+    assert strict.keys() == {"mean", "stderr", "low", "high", "bootstrap", "n_trajectories"}
+    assert strict["mean"] == outcome.summary.summary.tasks["nieh_gt"].by_clues["total"].scores["strict"].mean == 1.0
+
+
+def test_a_changed_frame_of_the_same_size_is_noticed(prepared, data):
+    execute(prepared(tasks=("nieh_gt",)))
+    frame = data / "metadata" / "traj_a" / "img" / "000000001.png"
+    content = bytearray(frame.read_bytes())
+    content[-20] ^= 1
+    frame.write_bytes(bytes(content))
+    watcher = Watcher()
+    execute(prepared(tasks=("nieh_gt",)), watcher)
+    made = {record.payload.question for record in watcher.made}
+    assert made == {"Is there a mug?", "Where was the mug before you put it?"}
+    assert {record.attempt for record in watcher.made} == {2}
+
+
+class Recorder:
+    """A scripted model that keeps what it was asked."""
+
+    name = "recorder"
+    capabilities = Capabilities(token_ids=False)
+
+    def __init__(self):
+        self.asked = []
+
+    def identity(self):
+        return {}
+
+    def tokens_per_frame(self, frame):
+        return 100
+
+    def conversation(self):
+        return Talk(self)
+
+    def close(self):
+        pass
+
+
+class Talk:
+    def __init__(self, model):
+        self.model, self.parts = model, []
+
+    @property
+    def n_tokens(self):
+        return len(self.parts)
+
+    def append(self, *parts, role="user"):
+        assert role == "user"
+        self.parts += parts
+
+    def mark(self):
+        return len(self.parts)
+
+    def rewind(self, mark):
+        del self.parts[mark:]
+
+    def replies(self, continuations, decoding):
+        assert (decoding.max_new_tokens, decoding.greedy, decoding.stop) == (50, True, ())
+        return [self.reply_to([*self.parts, *parts]) for parts in continuations]
+
+    def reply_to(self, parts):
+        self.model.asked.append(parts)
+        for part in parts[:-1]:
+            part.load()
+        return Reply("first line\nmug", n_reply_tokens=2, n_context_tokens=len(parts), n_cached_tokens=0)
+
+
+@pytest.fixture
+def recorder(monkeypatch):
+    """Takes the place of the tiny model."""
+    model = Recorder()
+    monkeypatch.setattr("infthor_eval.runs.driver.load", lambda *_: model)
+    return model
+
+
+def test_a_model_is_asked_by_trajectory_and_in_the_published_words(prepared, recorder):
+    outcome = execute(prepared(TINY, tasks=("nieh_full",)))
+    names = [[part.path.parts[-3] for part in parts[:-1]] for parts in recorder.asked]
+    assert names == [["traj_a"] * 6] * 3 + [["traj_b"] * 6] * 2
+    assert recorder.asked[0][-1] == (
+        "\nAnswer the question given the agent's views in time order. Do not include explanation or reasoning in the "
+        "answer. Answer with a single word or words.\nQuestion: Is there a mug?"
+    )
+    assert set(replies(outcome).values()) == {"first line\nmug"}
+    assert {(record.tokens.context, record.tokens.cached, record.tokens.reply) for record in outcome.records} == {
+        (7, 0, 2)
+    }
+
+
+def test_a_unit_that_fails_is_recorded_and_the_run_goes_on(prepared, recorder, data):
+    frame = data / "metadata" / "traj_a" / "img" / "000000001.png"
+    frame.write_bytes(frame.read_bytes()[:60])
+    outcome = execute(prepared(TINY))
+    failed = [record for record in outcome.records if record.failure]
+    assert len(outcome.records) == 10
+    assert Counter(record.task for record in failed) == {"nieh_gt": 2, "nieh_full": 3}
+    assert all(str(frame) in record.failure for record in failed)
+
+
+def test_a_failed_unit_is_tried_again_by_the_next_run(prepared, recorder, data):
+    frame = data / "metadata" / "traj_a" / "img" / "000000001.png"
+    whole = frame.read_bytes()
+    frame.write_bytes(whole[:60] + bytes(len(whole) - 60))  # its size is part of the set's fingerprint
+    failed = {record.key for record in execute(prepared(TINY)).records if record.failure}
+    frame.write_bytes(whole)
+    watcher = Watcher()
+    outcome = execute(prepared(TINY), watcher)
+    assert len(failed) == 5
+    assert {record.key for record in watcher.made} == failed
+    assert {record.attempt for record in watcher.made} == {2}
+    assert not any(record.failure for record in outcome.records)
+
+
+def test_a_frame_that_is_no_image_has_the_samples_that_need_it_skipped(prepared, data):
+    (data / "metadata" / "traj_b" / "img" / "000000002.png").write_text("text")
+    outcome = execute(prepared())
+    assert {name: task.skipped.n for name, task in outcome.summary.summary.tasks.items()} == {
+        "nieh_gt": 1,
+        "nieh_full": 2,
+    }
+
+
+def test_a_task_without_its_data_or_without_a_question_is_refused(prepared, make_nieh_set):
+    with pytest.raises(UsageError, match="give its folder with --data"):
+        prepared(data=None)
+    empty = make_nieh_set([Question("t", "q", (99,), ("a",))], name="empty")
+    with pytest.raises(UsageError, match=r"can be asked \(clue 99 is outside trajectory t"):
+        prepared(data=empty)
+
+
+def test_the_tiny_model_runs_through_and_shares_prefixes(prepared):
+    outcome = execute(prepared(TINY, tasks=("nieh_full",)))
+    assert all(reply is not None for reply in replies(outcome).values())
+    by_trajectory = {}
+    for record in outcome.records:
+        by_trajectory.setdefault(record.cluster, []).append(record.tokens.cached)
+    assert len(by_trajectory) == 2
+    for cached in by_trajectory.values():
+        # The first of a trajectory finds nothing of it, the others all its frames.
+        assert sum(n == min(cached) for n in cached) == 1
+        assert max(cached) > min(cached)
+
+
+def test_batches_give_the_same_replies_and_one_that_fails_takes_no_other_with_it(prepared, monkeypatch):
+    tasks = ("nieh_full",)
+    alone = execute(prepared(TINY, tasks=tasks))
+    together = execute(prepared(TINY, {"batch_size": "4"}, tasks=tasks))
+    assert replies(together) == replies(alone)
+    assert not any(record.faults for record in together.records)
+
+    from model_adapters.backend import BackendConversation
+
+    whole = BackendConversation.replies
+
+    def one_at_a_time(talk, continuations, decoding):
+        if len(continuations) > 1:
+            raise ModelError("out of memory on a batch")
+        return whole(talk, continuations, decoding)
+
+    monkeypatch.setattr(BackendConversation, "replies", one_at_a_time)
+    survived = execute(prepared(TINY, {"batch_size": "3"}, tasks=tasks))
+    assert replies(survived) == replies(alone)
+    assert Counter(record.faults for record in survived.records) == {
+        ("asked with 2 others: out of memory on a batch",): 3,
+        ("asked with 1 others: out of memory on a batch",): 2,
+    }
+
+
+def test_one_of_a_batch_that_cannot_be_answered_fails_alone(prepared, monkeypatch):
+    from model_adapters.backend import BackendConversation
+
+    whole = BackendConversation.replies
+
+    def but_the_sink(talk, continuations, decoding):
+        if any("sink" in parts[-1] for parts in continuations):
+            raise ModelError("no sink, please")
+        return whole(talk, continuations, decoding)
+
+    monkeypatch.setattr(BackendConversation, "replies", but_the_sink)
+    outcome = execute(prepared(TINY, {"batch_size": "4"}, tasks=("nieh_full",)))
+    (failed,) = [record for record in outcome.records if record.failure]
+    assert failed.payload.question == "Is there a sink?"
+    assert failed.failure == "no sink, please"
+    assert failed.faults == ("asked with 1 others: no sink, please",)
+
+
+# -- sizes and limits
+
+
+def test_a_model_that_counts_no_tokens_is_asked_once_the_size_of_a_frame_is_told(prepared, recorder, monkeypatch):
+    monkeypatch.setattr(Recorder, "capabilities", Capabilities(counts_tokens=False, token_ids=False))
+    monkeypatch.setattr(Recorder, "tokens_per_frame", lambda *_: None)
+    tasks = ("nieh_truncate_head_8k",)
+    with pytest.raises(UsageError, match="which recorder does not count; give --tokens-per-frame"):
+        execute(prepared(TINY, tasks=tasks))
+    watcher = Watcher()
+    execute(prepared(TINY, tasks=tasks, suite_options={"tokens_per_frame": 2000}), watcher)
+    assert {len(parts) for parts in recorder.asked} == {8192 // 2000 + 1}
+    assert watcher.work.costs == []
+
+
+def test_the_limit_is_of_questions_that_can_be_asked_with_all_their_variants(make_nieh_set):
+    asked = [Question("t", f"Is there a mug on {step}?", (step,), ("yes",)) for step in (14, 15, 16, 17)]
+    outside = [Question("t", f"Is there a cup on {step}?", (step,), ("yes",)) for step in (90, 91, 92)]
+    questions = [outside[0], asked[0], asked[1], outside[1], asked[2], outside[2], asked[3]]
+    root = make_nieh_set(questions, n_frames=30, size=56)
+    config = {"context": "haystack", "data": str(root), "ctx_size": 10, "tokens_per_frame": 1000}
+
+    def found(limit):
+        samples = find_samples(config, limit)
+        return (
+            [sample.question.text[-2:-1] for sample in samples.samples],
+            [skipped.question.text for skipped in samples.skipped],
+        )
+
+    assert found(1) == (["4"] * 5, [outside[0].text])
+    assert found(2) == (["4"] * 5 + ["5"] * 5, [outside[0].text])
+    assert found(3) == (["4"] * 5 + ["5"] * 5 + ["6"] * 5, [outside[0].text, outside[1].text])
+    assert (
+        found(None)
+        == found(9)
+        == (
+            [digit for digit in "4567" for _ in range(5)],
+            [question.text for question in outside],
+        )
+    )
+
+
+def test_baselines_answer_the_same_whatever_runs_beside_them(prepared, make_nieh_set, task_files):
+    """Two tasks on sets with other answer keys: what one asks is no clue to another."""
+    key = {"one": ("yes", "yes", "no"), "two": ("no", "no", "yes")}
+    for name, answers in key.items():
+        root = make_nieh_set(
+            [Question(f"t{i}", f"Is there a {name} {i}?", (i,), (answer,)) for i, answer in enumerate(answers)],
+            size=56,
+            name=name,
+        )
+        (task_files / "nieh" / f"nieh_{name}.yaml").write_text(
+            f"include: _nieh.yaml\ntask: nieh_{name}\ndataset_kwargs: {{context: clues, data: {root}}}\n"
+        )
+    for model in ("blind", "random"):
+        alone = [execute(prepared(model, tasks=(f"nieh_{name}",))) for name in key]
+        together = execute(prepared(model, tasks=("nieh_one", "nieh_two")))
+        assert replies(together) == replies(alone[0]) | replies(alone[1])
+        assert cells(together) == cells(alone[0]) | cells(alone[1])
+        if model == "blind":
+            assert {(key.task, reply) for key, reply in replies(together).items()} == {
+                ("nieh_one", "yes"),
+                ("nieh_two", "no"),
+            }
+
+
+# -- decoding that the task file asks for
+
+
+@pytest.fixture
+def sampling(task_files):
+    """Has `nieh_gt` decode as the given lines say."""
+
+    def write(settings):
+        (task_files / "nieh" / "nieh_gt.yaml").write_text(
+            "include: _nieh.yaml\ntask: nieh_gt\ndataset_kwargs: {context: clues}\n"
+            f"generation_kwargs: {{{settings}}}\n"
+        )
+
+    return write
+
+
+def test_a_temperature_in_the_task_file_samples_and_the_seed_decides_what(prepared, sampling, tmp_path):
+    def said(settings, seed=0, folder="out"):
+        sampling(settings)
+        return replies(execute(prepared(TINY, tasks=("nieh_gt",), seed=seed, output=tmp_path / folder)))
+
+    greedy = said("max_gen_toks: 12, do_sample: false, temperature: 0.0")
+    drawn = said("max_gen_toks: 12, do_sample: true, temperature: 2.0")
+    assert drawn != greedy
+    assert said("max_gen_toks: 12, do_sample: true, temperature: 2.0", folder="again") == drawn
+    assert said("max_gen_toks: 12, temperature: 2.0", folder="without the word") == drawn
+    assert said("max_gen_toks: 12, do_sample: true, temperature: 2.0, top_p: 0.000001", folder="top") == greedy
+
+
+def test_another_seed_draws_other_replies_from_the_same_weights(prepared, sampling, tmp_path):
+    from model_adapters.tiny.qwen2_5_vl import save_tiny_checkpoint
+
+    save_tiny_checkpoint(tmp_path / "checkpoint", seed=0)
+    sampling("max_gen_toks: 12, do_sample: true, temperature: 2.0")
+    options = {"pretrained": str(tmp_path / "checkpoint"), "device": "cpu"}
+    first, second = (
+        replies(execute(prepared("qwen2.5-vl", options, tasks=("nieh_gt",), seed=seed))) for seed in (0, 1)
+    )
+    assert first.keys() == second.keys()
+    assert first != second
+
+
+@pytest.mark.parametrize(
+    ("settings", "said"),
+    [
+        ("do_sample: false, temperature: 0.7", "temperature 0.7 without do_sample has no effect"),
+        ("do_sample: true, temperature: 0.0", "do_sample with temperature 0 contradict each other"),
+        ("num_beams: 4", "num_beams is not known; there are until, max_gen_toks"),
+        ("until: [7]", r"until is \[7\]; it is a text or a list of texts"),
+        ("do_sample: 'no'", "do_sample is 'no'; it is true or false"),
+        ("temperature: -1.0", "temperature must be 0"),
+        ("temperature: warm", "temperature is 'warm'; it is a number"),
+        ("top_p: most", "top_p is 'most'; it is a number"),
+        ("top_p: 1.5", "top_p must be above 0 and at most 1, not 1.5"),
+        ("max_gen_toks: 0", "max_new_tokens must be at least 1, not 0"),
+        ("max_gen_toks: many", "max_gen_toks is 'many'; it is a whole number"),
+    ],
+)
+def test_settings_that_would_not_act_are_refused_before_a_model_is_loaded(prepared, sampling, settings, said):
+    sampling(settings if "max_gen_toks" in settings else f"max_gen_toks: 12, {settings}")
+    with pytest.raises(UsageError, match=f"nieh_gt: generation_kwargs: {said}") as caught:
+        prepared(TINY, tasks=("nieh_gt",))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_stop_text_of_the_task_file_ends_replies(prepared, sampling):
+    sampling("max_gen_toks: 12, until: []")
+    whole = replies(execute(prepared(TINY, tasks=("nieh_gt",))))
+    mark = next(text[1] for text in whole.values() if len(text) > 1)
+    sampling(f"max_gen_toks: 12, until: {json.dumps([mark])}")
+    assert replies(execute(prepared(TINY, tasks=("nieh_gt",)))) == {
+        key: text.partition(mark)[0] for key, text in whole.items()
+    }

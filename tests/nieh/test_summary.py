@@ -1,0 +1,91 @@
+import msgspec
+import pytest
+
+from infthor_eval.nieh.summary import NiehSummary, summarise
+
+from .made import identity, record
+
+
+def test_the_same_records_in_another_order_give_the_same_summary():
+    records = [record(number, "mug" if number % 3 else "cup", n_clues=1 + number % 4) for number in range(20)]
+    summary = summarise(identity(), records)
+    assert summary == summarise(identity(), records[::-1])
+    assert msgspec.json.decode(msgspec.json.encode(summary), type=NiehSummary) == summary
+
+
+def test_columns_are_those_of_table_4_and_both_denominators_are_told():
+    records = [record(0, "mug"), record(1, "cup"), record(2, "mug", n_clues=2), record(3, "mug", n_clues=7)]
+    records.append(record(4, "no", answers=("no",), n_clues=0))
+    result = summarise(identity(skipped=("no clue frame", "no clue frame")), records).tasks["nieh_gt"]
+    by_clues = {name: (cell.n, cell.scores["strict"].mean) for name, cell in result.by_clues.items()}
+    assert by_clues == {"1": (2, 0.5), "2": (1, 1.0), ">=3": (1, 1.0), "total": (5, 0.8), "absence": (1, 1.0)}
+    assert (result.n, result.context, result.metrics) == (5, "clues", ["reference", "strict"])
+    assert (result.skipped.n, result.skipped.by_reason) == (2, {"no clue frame": 2})
+    assert result.skipped.mean_counting_them_wrong["strict"] == 4 / 7
+    assert result.below_full_marks["strict"] == ["q1"]
+
+
+def test_a_column_without_a_question_has_no_score():
+    result = summarise(identity(), [record(0, "mug")]).tasks["nieh_gt"]
+    assert (result.by_clues["2"].n, result.by_clues["2"].scores) == (0, {})
+    alone = result.by_clues["total"].scores["strict"]
+    assert (alone.mean, alone.n_trajectories) == (1.0, 1)
+    assert (alone.stderr, alone.low, alone.high, alone.bootstrap) == (None, None, None, None)
+
+
+def test_a_failed_question_counts_as_wrong_and_is_named():
+    result = summarise(identity(), [record(0, "mug"), record(1, None, failure="too long")]).tasks["nieh_gt"]
+    assert result.by_clues["total"].scores["strict"].mean == 0.5
+    assert result.by_clues["total"].n_failed == 1
+    assert [(failure.question, failure.reason) for failure in result.failures] == [("q1", "too long")]
+
+
+def test_an_interval_is_not_zero_wide_where_all_are_right():
+    records = [record(number, "mug") for number in range(40)]
+    strict = summarise(identity(), records).tasks["nieh_gt"].by_clues["total"].scores["strict"]
+    assert (strict.mean, strict.stderr, strict.high) == (1.0, 0.0, 1.0)
+    assert strict.low < 0.9
+
+
+def test_scores_are_those_of_the_tasks_own_metrics():
+    records = [record(0, "mug", scores={"length": 3.0}), record(1, "cups", scores={"length": 4.0})]
+    result = summarise(identity(metrics=("length",)), records).tasks["nieh_gt"]
+    assert {name: score.mean for name, score in result.by_clues["total"].scores.items()} == {"length": 3.5}
+    assert result.below_full_marks == {"length": []}
+
+
+def test_types_and_variants_are_apart():
+    records = [record(0, "mug", question_type="", variant="depth=0"), record(1, "cup", variant="depth=0.2")]
+    result = summarise(identity(), records).tasks["nieh_gt"]
+    assert {name: cell.n for name, cell in result.by_question_type.items()} == {"put_action": 1, "untyped": 1}
+    assert {name: cell.scores["strict"].mean for name, cell in result.by_variant.items()} == {
+        "depth=0": 1.0,
+        "depth=0.2": 0.0,
+    }
+    assert result.below_full_marks["strict"] == ["q1 depth=0.2"]
+
+
+def test_a_leaning_to_yes_and_a_reply_that_is_neither_show():
+    replies = ["yes", "Yes.", "yes", "maybe"]
+    records = [record(i, reply, answers=("yes",) if i < 1 else ("no",)) for i, reply in enumerate(replies)]
+    found = summarise(identity(), [*records, record(9, "mug")]).tasks["nieh_gt"].yes_no
+    assert msgspec.to_builtins(found) == {"n": 4, "share_gold_yes": 0.25, "share_said_yes": 0.75, "n_neither": 1}
+
+
+@pytest.mark.parametrize("shuffled", [1, -1])
+def test_replies_that_are_not_of_the_form_asked_for_are_counted_by_reason(shuffled):
+    records = [
+        record(0, "yes", answers=("yes",)),
+        record(1, "perhaps", answers=("no",)),
+        record(2, "four", answers=("4",)),
+        record(3, "many", answers=("4",)),
+        record(4, "some text\n", answers=("mug", "plate"), n_reply_tokens=50),
+        record(5, " \n", answers=("no",)),
+        record(6, None, answers=("no",), failure="too long"),
+    ]
+    assert summarise(identity(), records[::shuffled]).tasks["nieh_gt"].format_failures == {
+        "cut off at the token limit": 1,
+        "empty": 1,
+        "neither yes nor no": 1,
+        "no number": 1,
+    }

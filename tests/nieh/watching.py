@@ -1,0 +1,30 @@
+"""An observer that keeps what it is told."""
+
+from infthor_eval.runs import UnitRecord, Work
+
+
+class Watcher:
+    """Keeps the work, and every record with whether it was found in the journal."""
+
+    def __init__(self) -> None:
+        self.work: Work | None = None
+        self.n_recovered = 0
+        self.done_units: list[tuple[UnitRecord, bool]] = []
+
+    def begin(self, work: Work, n_recovered: int) -> None:
+        """See `Observer`."""
+        self.work, self.n_recovered = work, n_recovered
+
+    def done(self, record: UnitRecord, resumed: bool) -> None:
+        """See `Observer`."""
+        self.done_units.append((record, resumed))
+
+    @property
+    def made(self) -> list[UnitRecord]:
+        """What was answered now."""
+        return [record for record, resumed in self.done_units if not resumed]
+
+    @property
+    def found(self) -> list[UnitRecord]:
+        """What was in the journal."""
+        return [record for record, resumed in self.done_units if resumed]
