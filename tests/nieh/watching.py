@@ -1,17 +1,17 @@
 """An observer that keeps what it is told."""
 
-from infthor_eval.runs import UnitRecord, Work
+from infthor_eval.runs import UnitRecord, Workload
 
 
 class Watcher:
     """Keeps the work, and every record with whether it was found in the journal."""
 
     def __init__(self) -> None:
-        self.work: Work | None = None
+        self.work: Workload | None = None
         self.n_recovered = 0
         self.done_units: list[tuple[UnitRecord, bool]] = []
 
-    def begin(self, work: Work, n_recovered: int) -> None:
+    def begin(self, work: Workload, n_recovered: int) -> None:
         """See `Observer`."""
         self.work, self.n_recovered = work, n_recovered
 
