@@ -211,9 +211,12 @@ def _read_shards(run: Path, types: RecordTypes) -> RunLog:
         log.header = header
         for number, line in enumerate(lines[1:], 2):
             try:
-                log.add(decoder.decode(line))
+                record = decoder.decode(line)
             except msgspec.DecodeError as error:
                 raise DataError(f"{path}, line {number}: not a line of a journal ({error}); {_MEND}") from error
+            if isinstance(record, RunHeader):
+                raise DataError(f"{path}, line {number}: the first line of a journal amid its records; {_MEND}")
+            log.add(record)
     return log
 
 
@@ -268,8 +271,8 @@ def _recover_shard(path: Path, header: RunHeader, types: RecordTypes) -> int:
         decoder = types.decoder()
         bad: list[bytes] = []
         good: list[bytes] = []
-        for line in _lines(path):
-            (good if _is_record(line, decoder) else bad).append(line)
+        for number, line in enumerate(_lines(path)):
+            (good if _is_good(line, decoder, is_first=number == 0) else bad).append(line)
         if not bad:
             return 0
         if not (good and isinstance(decoder.decode(good[0]), RunHeader)):
@@ -281,12 +284,11 @@ def _recover_shard(path: Path, header: RunHeader, types: RecordTypes) -> int:
         return len(bad)
 
 
-def _is_record(line: bytes, decoder: msgspec.json.Decoder[Any]) -> bool:
+def _is_good(line: bytes, decoder: msgspec.json.Decoder[Any], *, is_first: bool) -> bool:
     try:
-        decoder.decode(line)
+        return isinstance(decoder.decode(line), RunHeader) == is_first
     except msgspec.DecodeError:
         return False
-    return True
 
 
 def set_aside(run: Path) -> None:

@@ -5,7 +5,8 @@ import json
 import pytest
 
 from infthor_eval.nieh.records import RECORDS
-from infthor_eval.runs import read_run
+from infthor_eval.runs import read_header, read_run
+from infthor_eval.runs.journal import Journal
 
 
 @pytest.fixture
@@ -81,6 +82,18 @@ def test_fresh_is_no_matter_where_nothing_was(ask, tmp_path):
     assert not list(tmp_path.rglob("journal.1"))
 
 
+@pytest.mark.parametrize("option", ["--fresh", "--recover"])
+def test_the_journal_of_a_run_that_is_at_work_is_left_alone(ask, tmp_path, option):
+    ask(model="oracle")
+    folder = only(tmp_path / "out", "journal").parent
+    with Journal(folder, read_header(folder), RECORDS):
+        code, out, err = ask(option, model="oracle")
+    assert (code, out) == (2, "")
+    assert "another run is writing it; wait for it or stop it" in err
+    assert not list(folder.glob("journal.*"))
+    assert len(replies(folder)) == 5
+
+
 def test_a_bad_line_in_a_journal_is_named_and_recovered_from(ask, tmp_path):
     ask()
     path = only(tmp_path / "out", "worker-0.jsonl")
@@ -123,3 +136,18 @@ def test_a_journal_without_its_first_line_is_recovered_from(ask, tmp_path):
     assert "1 bad line(s) of the journal set aside" in err
     assert "0 answered now, 5 found in the journal" in err
     assert replies(path.parents[1]) == before
+
+
+def test_two_journals_in_one_file_are_named_and_recovered_from(ask, tmp_path):
+    ask(model="oracle")
+    path = only(tmp_path / "out", "worker-0.jsonl")
+    content = path.read_bytes()
+    path.write_bytes(2 * content)
+    code, out, err = ask(model="oracle")
+    assert (code, out) == (2, "")
+    assert f"{path}, line 7: the first line of a journal amid its records" in err
+    assert "Traceback" not in err
+    code, _, err = ask("--recover", model="oracle")
+    assert code == 0
+    assert "oracle: 1 bad line(s) of the journal set aside" in err
+    assert "0 answered now, 5 found in the journal" in err

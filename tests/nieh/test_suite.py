@@ -185,16 +185,14 @@ def test_a_task_without_its_data_or_without_a_question_is_refused(prepared, make
 
 
 def test_the_tiny_model_runs_through_and_shares_prefixes(prepared):
-    outcome = execute(prepared(TINY, tasks=("nieh_full",)))
-    assert all(reply is not None for reply in replies(outcome).values())
+    watcher = Watcher()
+    execute(prepared(TINY, tasks=("nieh_full",)), watcher)
+    assert all(record.payload.reply is not None for record in watcher.made)
     by_trajectory = {}
-    for record in outcome.records:
+    for record in watcher.made:  # in the order of asking
         by_trajectory.setdefault(record.cluster, []).append(record.tokens.cached)
-    assert len(by_trajectory) == 2
-    for cached in by_trajectory.values():
-        # The first of a trajectory finds nothing of it, the others all its frames.
-        assert sum(n == min(cached) for n in cached) == 1
-        assert max(cached) > min(cached)
+    assert {traj_id: len(cached) for traj_id, cached in by_trajectory.items()} == {"traj_a": 3, "traj_b": 2}
+    assert all(cached[0] < min(cached[1:]) for cached in by_trajectory.values())
 
 
 def test_batches_give_the_same_replies_and_one_that_fails_takes_no_other_with_it(prepared, monkeypatch):
