@@ -22,4 +22,4 @@ def command(what: str, folder: Path | None, token: str | None, endpoint: str | N
     data = fetch_nieh(folder or default_folder(), token, endpoint)
     click.echo(f"{what}: {len(data.questions)} questions in {data.root}")
     for reason, n in data.reasons().most_common():
-        click.echo(f"left out {n}: {reason}", err=True)
+        click.echo(f"skipped {n}: {reason}", err=True)

@@ -40,7 +40,7 @@ def command(context: click.Context, folder: Path, out: Path, seed: int, per_traj
     notes = Console(stderr=True, soft_wrap=True)
     for question in made.doubted:
         notes.print(
-            f"left out, the checker disagrees: {question.traj_id}: {question.text}", highlight=False, markup=False
+            f"skipped, the checker disagrees: {question.traj_id}: {question.text}", highlight=False, markup=False
         )
     for line in made.skipped:
         notes.print(f"skipped: {line}", style="red", highlight=False, markup=False)

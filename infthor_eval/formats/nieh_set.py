@@ -104,7 +104,7 @@ class NiehSet:
         return digest.hexdigest()
 
     def reasons(self) -> Counter[str]:
-        """How many questions were left out, by reason."""
+        """How many questions were skipped, by reason."""
         return Counter(item.reason for item in self.skipped)
 
     def folder(self, traj_id: str) -> Path:

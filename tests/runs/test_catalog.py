@@ -10,8 +10,11 @@ def test_the_packaged_tasks_are_those_that_lm_eval_sees():
     catalog = Catalog.packaged()
     manager = TaskManager(include_path=str(catalog.folder), include_defaults=False)
     assert sorted([*catalog.tasks, *catalog.groups]) == sorted({*manager.all_tasks} - {"infthor"})
-    assert catalog.expand(["nieh"]) == ["nieh_gt", "nieh_full"]
-    assert catalog.expand(["nieh_mini_full", "nieh_mini"]) == ["nieh_mini_full", "nieh_mini_gt"]
+    assert [task.name for task in catalog.expand(["nieh"])] == ["nieh_gt", "nieh_full"]
+    twice = catalog.expand(["nieh_mini_full", "nieh_mini"])
+    assert [task.name for task in twice] == ["nieh_mini_full", "nieh_mini_gt"]
+    assert {task.suite for task in catalog.tasks.values()} == {"nieh"}
+    assert catalog.tasks["nieh_gt"].settings["generation_kwargs"]["max_gen_toks"] == 50
 
 
 @pytest.mark.parametrize(("name", "near"), [("nieh_ful", "'nieh_full'"), ("neih", "'nieh'"), ("xyz", "nieh_mini_gt")])
@@ -27,7 +30,7 @@ def test_an_unknown_name_is_answered_with_the_nearest(name, near):
         ("task: [", "not YAML"),
         ("- a", "not a mapping"),
         ("output_type: generate_until", "neither a task nor a group name"),
-        ("task: a\noutput_type: generate_until", "no custom_dataset, dataset_kwargs"),
+        ("task: a\noutput_type: generate_until", "no suite; write it as metadata"),
         ("group: g\ntask: a", "must be a list"),
         ("include: none.yaml\ntask: a", "cannot be read"),
     ],
@@ -38,3 +41,11 @@ def test_a_broken_task_file_is_named(tmp_path, content, said):
         Catalog(tmp_path).expand(["a"])
     assert "yaml" in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_a_key_that_the_suite_needs_is_named(tmp_path):
+    (tmp_path / "a.yaml").write_text("task: a\nmetadata: {suite: nieh}\ntest_split: test")
+    (task,) = Catalog(tmp_path).expand(["a"])
+    task.require("test_split")
+    with pytest.raises(DataError, match=r"a\.yaml: no dataset_kwargs; tasks of nieh need test_split, dataset_kwargs"):
+        task.require("test_split", "dataset_kwargs")

@@ -34,7 +34,7 @@ class MadeQuestions:
         questions: in the order of trajectories, then of their first clue.
         trajectories: how many were read.
         skipped: those that could not be, one line each.
-        doubted: questions left out because the checker did not agree with them.
+        doubted: questions skipped because the checker did not agree with them.
     """
 
     questions: list[Question] = field(default_factory=list)

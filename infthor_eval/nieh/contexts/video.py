@@ -51,4 +51,4 @@ def _name(data: NiehSet, traj_id: str) -> str:
     try:
         return data.video_frames(traj_id)[0].path.parent.name
     except DataError:
-        return "broken"  # its questions are left out, with the reason
+        return "broken"  # its questions are skipped, with the reason
