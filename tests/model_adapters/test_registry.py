@@ -27,12 +27,12 @@ def test_built_in_names() -> None:
 
 @pytest.mark.parametrize(("typed", "meant"), [("qwen2.5vl", "qwen2.5-vl"), ("pixtrall", "pixtral")])
 def test_unknown_model_names_the_nearest(typed: str, meant: str) -> None:
-    with pytest.raises(UsageError, match=f"no model {typed}; did you mean {meant}"):
+    with pytest.raises(UsageError, match=f"unknown model '{typed}'; did you mean '{meant}'"):
         load(typed, {}, 0)
 
 
 def test_far_off_name_lists_all() -> None:
-    with pytest.raises(UsageError, match=r"no model zzz; models: .*qwen2\.5-vl"):
+    with pytest.raises(UsageError, match=r"unknown model 'zzz'; there are .*qwen2\.5-vl"):
         load("zzz", {}, 0)
 
 
@@ -166,7 +166,7 @@ def test_an_adapter_in_a_single_module_has_the_source_of_that(installed: Path) -
 def test_the_source_of_an_adapter_that_is_not_there_is_one_line(installed: Path) -> None:
     with pytest.raises(ModelError, match="no module no_such; install the package"):
         adapter_identity("lost")
-    with pytest.raises(UsageError, match="there is no model losst; did you mean lost"):
+    with pytest.raises(UsageError, match="unknown model 'losst'; did you mean 'lost'"):
         adapter_identity("losst")
 
 

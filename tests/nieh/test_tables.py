@@ -1,7 +1,7 @@
 from rich.console import Console
 
 from infthor_eval.nieh.tables import clues_table, tables
-from infthor_eval.report import print_table
+from infthor_eval.report.terminal import print_table
 
 from .made import identity, record, run_of
 
