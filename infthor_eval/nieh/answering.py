@@ -88,11 +88,16 @@ class _Asked:
         )
 
     def record(self, reply: Reply, seconds: float, faults: tuple[str, ...]) -> UnitRecord[NiehAnswer]:
-        """The record of its reply."""
-        scores = self.prepared.metrics.scores(self.prepared.found, self.unit.sample, reply.text)
+        """The record of its reply; a failed one, with the reply, where the task's own metrics fail on it."""
+        scores, failure = {}, None
+        try:
+            scores = self.prepared.metrics.scores(self.prepared.found, self.unit.sample, reply.text)
+        except DataError as error:
+            failure = str(error)
         return self.unit.record(
             self.fingerprint,
             self.unit.payload.with_reply(reply.text, scores),
+            failure=failure,
             faults=(*faults, *reply.faults),
             seconds=round(seconds, 4),
             tokens=Tokens(reply.n_context_tokens, reply.n_cached_tokens, reply.n_reply_tokens),
@@ -233,11 +238,4 @@ def _made(
         return
     seconds = (time.perf_counter() - began) / len(asked)
     for item, reply in zip(asked, replies, strict=True):
-        yield _scored(item, reply, seconds, faults)
-
-
-def _scored(asked: _Asked, reply: Reply, seconds: float, faults: tuple[str, ...]) -> UnitRecord[NiehAnswer]:
-    try:
-        return asked.record(reply, seconds, faults)
-    except DataError as error:  # the task's own metrics fail on this reply
-        return asked.unit.failed(str(error), asked.fingerprint, faults=faults)
+        yield item.record(reply, seconds, faults)
