@@ -56,8 +56,7 @@ def clustered_mean(scores: Sequence[float], clusters: Sequence[Hashable]) -> Est
     """The mean with a cluster-robust standard error, and an interval that stays honest near all right and all wrong.
 
     Scores from 0 to 1 get Wilson's interval on the effective sample size, which is not zero wide where all are equal;
-    others (the reference scorer can exceed 1) and differences a t interval. Both take the t quantile of clusters minus
-    one degrees of freedom.
+    others (the reference scorer can exceed 1) and differences a t interval, of clusters minus one degrees of freedom.
 
     Args:
         scores: one per question.
@@ -70,7 +69,7 @@ def clustered_mean(scores: Sequence[float], clusters: Sequence[Hashable]) -> Est
     estimate = _with_t_interval(totals, sizes)
     if estimate.stderr is None or min(scores) < 0 or max(scores) > 1:
         return estimate
-    low, high = _wilson(estimate.mean, _effective_size(estimate), _quantile(len(sizes)))
+    low, high = _wilson(estimate.mean, _effective_size(estimate))
     return replace(estimate, low=low, high=high)
 
 
@@ -90,37 +89,46 @@ def _quantile(n_clusters: int) -> float:
     return float(stats.t.ppf(0.5 + _LEVEL / 2, n_clusters - 1))
 
 
+_NORMAL_QUANTILE = float(stats.norm.ppf(0.5 + _LEVEL / 2))
+
+
 def _effective_size(estimate: Estimate) -> float:
     """How many independent questions tell as much.
 
-    The design effect says how much clustering inflates the variance. It is seen in the questions that are not like the
-    others; the fewer there are, the more weight its worst value gets, that of clusters which are right or wrong as a
-    whole. (`benchmarks/interval_coverage.py` shows what comes of it.)
+    The design effect says how much clustering inflates the variance; it is measured on few clusters, which counts
+    against it as in a t interval. It shows in the questions that are not like the others: the fewer there are, the more
+    weight its worst value gets, that of clusters which are right or wrong as a whole. What comes of it is shown by
+    `benchmarks/interval_coverage.py`.
     """
     worst = estimate.n / estimate.n_clusters
     variance, stderr = estimate.mean * (1 - estimate.mean), estimate.stderr or 0.0
     measured = max(1.0, stderr**2 * estimate.n / variance) if variance > 0 else worst
+    measured *= (_quantile(estimate.n_clusters) / _NORMAL_QUANTILE) ** 2
     n_unlike = estimate.n * min(estimate.mean, 1 - estimate.mean)
     return estimate.n / ((n_unlike * measured + worst) / (n_unlike + 1))
 
 
-def _wilson(mean: float, n: float, quantile: float) -> tuple[float, float]:
-    """Wilson's score interval of a share."""
-    spread = quantile**2 / n
+def _wilson(mean: float, n: float) -> tuple[float, float]:
+    """Wilson's score interval of a share among `n` questions."""
+    spread = _NORMAL_QUANTILE**2 / n
     centre = (mean + spread / 2) / (1 + spread)
-    reach = quantile / (1 + spread) * math.sqrt(mean * (1 - mean) / n + spread / (4 * n))
+    reach = _NORMAL_QUANTILE / (1 + spread) * math.sqrt(mean * (1 - mean) / n + spread / (4 * n))
     return max(0.0, min(mean, centre - reach)), min(1.0, max(mean, centre + reach))
 
 
 def bootstrap_interval(
     scores: Sequence[float], clusters: Sequence[Hashable], seed: int = 0, n_resamples: int = 2000
-) -> tuple[float, float]:
+) -> tuple[float, float] | None:
     """The 95 % percentile interval of the mean over resampled clusters.
+
+    None where resampling tells nothing: of fewer than two clusters, or scores that are all alike.
 
     Raises:
         DataError: as in `clustered_mean`.
     """
     totals, sizes = _partition(scores, clusters)
+    if len(sizes) < 2 or min(scores) == max(scores):
+        return None
     picks = np.random.default_rng(seed).integers(len(sizes), size=(n_resamples, len(sizes)))
     means = totals[picks].sum(axis=1) / sizes[picks].sum(axis=1)
     low, high = np.quantile(means, [0.5 - _LEVEL / 2, 0.5 + _LEVEL / 2])

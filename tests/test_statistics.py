@@ -75,6 +75,8 @@ def test_the_bootstrap_agrees_with_the_formula_and_repeats():
     interval = bootstrap_interval(values, clusters, seed=3)
     assert interval == pytest.approx((estimate.low, estimate.high), abs=0.015)
     assert bootstrap_interval(values, clusters, seed=3) == interval
+    assert bootstrap_interval([1.0] * 4, [0, 0, 1, 1]) is None
+    assert bootstrap_interval([1.0, 0.0], ["t", "t"]) is None
 
 
 def test_a_paired_difference_is_surer_than_two_separate_runs():

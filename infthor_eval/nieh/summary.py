@@ -31,7 +31,7 @@ class Score(msgspec.Struct, frozen=True):
         stderr: clustered by trajectory; None with fewer than two trajectories.
         low: lower end of the 95 % interval; None as above.
         high: upper end.
-        bootstrap: 95 % interval over resampled trajectories; None as above.
+        bootstrap: 95 % interval over resampled trajectories; None as above, and where all scores are alike.
         n_trajectories: number of clusters.
     """
 
@@ -181,7 +181,7 @@ def _mean(records: Sequence[Record], metric: str) -> Score:
         stderr=estimate.stderr,
         low=estimate.low,
         high=estimate.high,
-        bootstrap=bootstrap_interval(found, trajectories) if estimate.n_clusters > 1 else None,
+        bootstrap=bootstrap_interval(found, trajectories),
         n_trajectories=estimate.n_clusters,
     )
 
