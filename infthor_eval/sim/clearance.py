@@ -8,7 +8,7 @@ from infthor_eval.sim.geometry import Array, aabb_overlap
 from infthor_eval.sim.objects import SimObject
 from infthor_eval.sim.world import World
 
-__all__ = ["obstacle_at"]
+__all__ = ["obstacle_at", "occupant"]
 
 _SKIN = 0.005  # metres by which boxes may overlap: things that touch do
 
@@ -19,15 +19,30 @@ def obstacle_at(world: World, item: SimObject, offset: Array) -> str | None:
     What it is already in or touches does not hold it: it could not be got away otherwise.
     """
     low, high = item.bounds()
-    low, high = low + _SKIN, high - _SKIN
-    room_low, room_high = world.scene_bounds()
-    if np.any(low + offset < room_low) or np.any(high + offset > room_high):
-        return "Wall"
-    for other in _solid(world, item):
-        o_low, o_high = _body(other)
-        if aabb_overlap(low + offset, high + offset, o_low, o_high) and not aabb_overlap(low, high, o_low, o_high):
-            return other.name
+    for name, box in _met(world, item, low + offset, high + offset):
+        if not _overlap(low, high, box):
+            return name
     return None
+
+
+def occupant(world: World, pose: SimObject) -> str | None:
+    """Name of what is where an object would be in another pose, given as a copy of it; None for nothing."""
+    return next((name for name, _ in _met(world, pose, *pose.bounds())), None)
+
+
+def _met(world: World, item: SimObject, low: Array, high: Array) -> Iterator[tuple[str, tuple[Array, Array]]]:
+    """What the box of an object, somewhere, overlaps: names and boxes."""
+    room_low, room_high = world.scene_bounds()
+    if np.any(low + _SKIN < room_low) or np.any(high - _SKIN > room_high):
+        yield "Wall", (np.full(3, np.inf), np.full(3, -np.inf))
+    for other in _solid(world, item):
+        box = _body(other)
+        if _overlap(low, high, box):
+            yield other.name, box
+
+
+def _overlap(low: Array, high: Array, box: tuple[Array, Array]) -> bool:
+    return aabb_overlap(low + _SKIN, high - _SKIN, *box)
 
 
 def _solid(world: World, item: SimObject) -> Iterator[SimObject]:
@@ -41,7 +56,9 @@ def _solid(world: World, item: SimObject) -> Iterator[SimObject]:
 
 
 def _open_inside(other: SimObject) -> bool:
-    """Whether there may be room within the box of an object."""
+    """Whether there may be room within the box of a piece of furniture."""
+    if other.type.pickupable:
+        return False
     if other.type.encloses and other.type.openable:
         return other.state.openness > 0
     return bool(other.type.open_top > 0 or other.type.levels or other.pieces)

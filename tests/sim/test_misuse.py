@@ -27,7 +27,7 @@ def test_every_argument_of_every_action(name):
         listed = error.message.split("Expected arguments: ")[1].split("\n")[0]
         parameters = [part.split(" = ")[0].split()[-1] for part in listed.split(", ") if part]
     usual = {"objectId": some, "sceneName": "bathroom-1", "fillLiquid": "water", "StateChange": "CanBeDirty", "seed": 1, "rvalue": "a", "moveMagnitude": 0.1,
-             "pushAngle": 0, "objectIds": [some],
+             "pushAngle": 0, "objectIds": [some], "maxPoses": 1,
              "x": 100, "y": 100, "position": {"x": 0, "y": 1, "z": 0}, "rotation": {"y": 0}, "horizon": 0,
              "standing": True, "quality": "Low", "objectPoses": [], "objectToggles": [], "house": {},
              "SetObjectStates": {"stateChange": "openable"}}  # fmt: skip

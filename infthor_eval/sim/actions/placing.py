@@ -4,7 +4,7 @@
 import numpy as np
 
 from infthor_eval.sim.actions.registry import Vector3, action
-from infthor_eval.sim.clearance import obstacle_at
+from infthor_eval.sim.clearance import occupant
 from infthor_eval.sim.errors import ActionError
 from infthor_eval.sim.falling import let_fall, settle_in
 from infthor_eval.sim.geometry import Array, to_array, to_xyz, yaw_matrix
@@ -17,7 +17,6 @@ from infthor_eval.sim.world import World
 __all__: list[str] = []
 
 _SPACING = 0.05  # metres between the points of a surface
-_FAR = np.array([0.0, 1000.0, 0.0])  # metres; nothing is there
 
 
 @action("TeleportObject", forms=(("position",), ("x", "y", "z"), ("positions",)))
@@ -57,10 +56,10 @@ def place_object_at_point(
     world, item = sim.world, sim.world.get(objectId)
     if not (item.type.pickupable or item.type.moveable):
         raise ActionError(f"{objectId} is neither pickupable nor moveable")
-    pose = item.duplicate(objectId)
+    pose = _copy(item)
     pose.rotation = item.rotation if rotation is None else to_array(rotation)
     pose.place_bottom(to_array(position))
-    obstacle = _in_the_way(world, item, pose)
+    obstacle = occupant(world, pose)
     if obstacle is not None:
         raise ActionError(f"spawn area not clear ({obstacle} is in the way), can't place object at that point")
     _put(world, item, pose)
@@ -116,19 +115,19 @@ def _first_free(world: World, item: SimObject, tried: list[Vector3], turn: Array
     """
     obstacle: str | None = None
     for position in tried:
-        pose = item.duplicate(item.object_id)
+        pose = _copy(item)
         pose.position, pose.rotation = to_array(position), turn
-        obstacle = None if force else _in_the_way(world, item, pose)
+        obstacle = None if force else occupant(world, pose)
         if obstacle is None:
             return pose
     raise ActionError(f"{obstacle} is in the way of {item.object_id}; pass forceAction to put it there nevertheless")
 
 
-def _in_the_way(world: World, item: SimObject, pose: SimObject) -> str | None:
-    """Name of what an object in another pose would run into."""
-    pose.position = pose.position + _FAR
-    pose.contents = item.contents
-    return obstacle_at(world, pose, -_FAR)
+def _copy(item: SimObject) -> SimObject:
+    """A copy with the same contents, to be given another pose."""
+    pose = item.duplicate(item.object_id)
+    pose.contents = list(item.contents)
+    return pose
 
 
 def _put(world: World, item: SimObject, pose: SimObject) -> None:

@@ -2,6 +2,7 @@
 """The table of actions, and the checking of their arguments as Unity's dispatcher does it."""
 
 import inspect
+import json
 import types
 import typing
 from collections.abc import Callable, Mapping
@@ -113,11 +114,11 @@ def _check(found: Action, key: str, value: Any) -> None:
     annotation = found.parameters[key].annotation
     if _fits(value, annotation):
         return
-    wanted = type_name(annotation)
+    wanted, told = type_name(annotation), value if isinstance(value, str) else json.dumps(value)
     if _structured(annotation) and not isinstance(value, dict | list):
-        raise ActionError(f"Error converting value {value} to type '{wanted}'. Path '{key}'.")
+        raise ActionError(f"Error converting value {told} to type '{wanted}'. Path '{key}'.")
     raise ActionError(
-        f"action: {found.name} has an invalid argument: {key} (=={value}). Cannot convert to: {wanted}",
+        f"action: {found.name} has an invalid argument: {key} (=={told}). Cannot convert to: {wanted}",
         ErrorCode.INVALID_ARGUMENT,
     )
 
