@@ -11,9 +11,11 @@ __all__ = [
     "Array",
     "aabb_gap",
     "aabb_overlap",
+    "convex_hull",
     "corners",
     "euler_matrix",
     "level_gaps",
+    "matrix_euler",
     "object_id",
     "rounded",
     "to_array",
@@ -22,6 +24,8 @@ __all__ = [
 ]
 
 Array = NDArray[np.float64]
+
+_STRAIGHT = 1e-6  # cosine of a pitch at which yaw and roll turn about the same axis
 
 _SIGNS = np.array(
     [[1, -1, 1], [-1, -1, 1], [-1, -1, -1], [1, -1, -1], [1, 1, 1], [-1, 1, 1], [-1, 1, -1], [1, 1, -1]], dtype=float
@@ -46,10 +50,40 @@ def yaw_matrix(yaw: float) -> Array:
     return euler_matrix((0.0, yaw, 0.0))
 
 
+def matrix_euler(matrix: Array) -> Array:
+    """Unity's Euler angles (3,) of a rotation matrix, degrees within 0 to 360; straight up or down, z is 0."""
+    x = math.asin(min(max(-float(matrix[1, 2]), -1.0), 1.0))
+    if abs(math.cos(x)) < _STRAIGHT:
+        y, z = math.atan2(-matrix[2, 0], matrix[0, 0]), 0.0
+    else:
+        y, z = math.atan2(matrix[0, 2], matrix[2, 2]), math.atan2(matrix[1, 0], matrix[1, 1])
+    angles: Array = np.round(np.degrees(np.array([x, y, z])), 6) % 360.0
+    return angles
+
+
 def corners(center: Array, size: Array, rotation: Array | None = None) -> Array:
     """The 8 corners (8, 3) of a box, bottom four first, in AI2-THOR's order; `rotation` is a matrix."""
     offsets = _SIGNS * (np.asarray(size) * 0.5)
     return center + (offsets if rotation is None else offsets @ rotation.T)
+
+
+def convex_hull(points: Array) -> list[Array]:
+    """Corners of the convex hull of points (n, 2), around it once; none lies between two others."""
+    ordered = [np.array(p) for p in sorted({(float(p[0]), float(p[1])) for p in np.round(points, 6)})]
+    return _half_hull(ordered)[:-1] + _half_hull(ordered[::-1])[:-1]
+
+
+def _half_hull(ordered: list[Array]) -> list[Array]:
+    hull: list[Array] = []
+    for point in ordered:
+        while len(hull) > 1 and _turn(hull[-2], hull[-1], point) <= 1e-9:
+            hull.pop()
+        hull.append(point)
+    return hull
+
+
+def _turn(a: Array, b: Array, c: Array) -> float:
+    return float((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
 
 
 def to_xyz(vector: Sequence[float] | Array) -> dict[str, float]:

@@ -1,17 +1,26 @@
 """The metadata of AI2-THOR 5.x, of one object and of the agent, as plain values."""
 
+import re
 from typing import Any
 
 import numpy as np
 
-from infthor_eval.sim.geometry import corners, rounded, to_xyz
+from infthor_eval.sim.geometry import corners, matrix_euler, rounded, to_xyz
 from infthor_eval.sim.objects import SimObject
+from infthor_eval.sim.obstacles import door_leaf
 from infthor_eval.sim.simulation import Simulation, ThirdPartyCamera
 from infthor_eval.sim.world import World
 
 __all__ = ["Outcome", "agent_metadata", "object_metadata", "third_party_metadata"]
 
 _DIGITS = 6
+_ITHOR = re.compile(r"FloorPlan\d+")
+_LEGACY: dict[str, Any] = {
+    "colorBounds": None, "visibleRange": None, "flatSurfacesOnGrid": [], "distances": [], "normals": [],
+    "isOpenableGrid": [], "segmentedObjectIds": [], "objectIdsInBox": [], "actionIntReturn": 0,
+    "actionFloatReturn": 0.0, "actionFloatsReturn": [], "actionStringsReturn": [], "actionVector3sReturn": [],
+}  # fmt: skip
+"""Keys of old actions, which Unity sends empty with every reply."""
 
 
 class Outcome:
@@ -26,7 +35,7 @@ class Outcome:
             "lastAction": self.action,
             "lastActionSuccess": not self.error,
             "errorMessage": self.error,
-            "errorCode": self.code,
+            "errorCode": self.code or None,
             "actionReturn": self.value,
         }
 
@@ -84,7 +93,9 @@ def agent_metadata(sim: Simulation, outcome: Outcome) -> dict[str, Any]:
     held = None if world.held is None else world.objects[world.held]
     low, high = world.scene_bounds()
     view = sim.width, sim.height
+    pose = _held_pose(world)
     return {
+        **_LEGACY,
         **outcome.fields(),
         "isSceneAtRest": True,
         "agent": {
@@ -95,7 +106,8 @@ def agent_metadata(sim: Simulation, outcome: Outcome) -> dict[str, Any]:
             "isStanding": agent.standing,
             "inHighFrictionArea": False,
         },
-        "heldObjectPose": _held_pose(world),
+        "heldObjectPose": pose,
+        "hand": pose,
         "arm": None,
         "fov": sim.settings.field_of_view,
         "cameraPosition": _xyz(agent.camera_position()),
@@ -104,7 +116,7 @@ def agent_metadata(sim: Simulation, outcome: Outcome) -> dict[str, Any]:
         "collided": False,
         "collidedObjects": [],
         "inventoryObjects": [] if held is None else [{"objectId": held.object_id, "objectType": held.object_type}],
-        "sceneName": world.scene,
+        "sceneName": _scene_name(world),
         "screenWidth": view[0],
         "screenHeight": view[1],
         "agentId": 0,
@@ -124,23 +136,32 @@ def third_party_metadata(index: int, camera: ThirdPartyCamera) -> dict[str, Any]
     }
 
 
-def _held_pose(world: World) -> dict[str, Any] | None:
+def _scene_name(world: World) -> str:
+    """The scene as Unity calls it: the kitchens and so on of iTHOR by the name of their physics scene."""
+    return f"{world.scene}_physics" if _ITHOR.fullmatch(world.scene) else world.scene
+
+
+def _held_pose(world: World) -> dict[str, Any]:
+    """Pose of the held object in the world and in the camera's frame; all zeros where nothing is held."""
     if world.held is None:
-        return None
+        return dict.fromkeys(("position", "rotation", "localPosition", "localRotation"), _xyz(np.zeros(3)))
     item, agent = world.objects[world.held], world.agent
-    local = agent.camera_matrix().T @ (item.position - agent.camera_position())
-    turn = item.rotation - np.array([agent.horizon, agent.yaw, 0.0])
+    camera = agent.camera_matrix()
     return {
         "position": _xyz(item.position),
         "rotation": _xyz(item.rotation),
-        "localPosition": _xyz(local),
-        "localRotation": _xyz(turn % 360),
+        "localPosition": _xyz(camera.T @ (item.position - agent.camera_position())),
+        "localRotation": _xyz(matrix_euler(camera.T @ item.matrix)),
     }
 
 
 def _axis_aligned(item: SimObject) -> dict[str, Any]:
-    center, size = item.axis_aligned()
-    return _box(center, size)
+    """The box around an object and the door or drawer that it has open."""
+    low, high = item.bounds()
+    leaf = door_leaf(item) if item.state.openness > 0 else None
+    if leaf is not None:
+        low, high = np.minimum(low, leaf[0]), np.maximum(high, leaf[1])
+    return _box((low + high) / 2, high - low)
 
 
 def _box(center: Any, size: Any) -> dict[str, Any]:

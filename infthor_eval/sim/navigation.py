@@ -11,6 +11,7 @@ from infthor_eval.sim.geometry import Array
 __all__ = ["CELL", "NavGrid"]
 
 CELL = 0.25
+_SAME = 1e-3
 _TOLERANCE = 0.06  # a recorded position lies this near to its cell's centre (float noise of the recordings)
 
 
@@ -53,6 +54,26 @@ class NavGrid:
     def reachable(self, x: float, z: float) -> list[tuple[float, float]]:
         """Cells connected to the one at (x, z) by steps of one cell, sorted."""
         return sorted(self._cells[key] for key in self._distances(x, z))
+
+    def lattice(self, x: float, z: float, size: float, yaw: float) -> list[tuple[float, float]]:
+        """Points that can be reached from (x, z) by steps of `size` metres along the axes turned by `yaw` degrees.
+
+        Sorted; steps of one cell along the axes from a cell are those of `reachable`.
+        """
+        start = self._cells.get(self._key(x, z))
+        if size == CELL and yaw % 90 == 0 and start is not None and math.dist(start, (x, z)) < _SAME:
+            return self.reachable(x, z)
+        ahead = (math.sin(math.radians(yaw)) * size, math.cos(math.radians(yaw)) * size)
+        known = {(0, 0): (x, z)}
+        queue = deque(known)
+        while queue:
+            key = queue.popleft()
+            for other in _neighbours(key):
+                point = (x + other[0] * ahead[1] + other[1] * ahead[0], z - other[0] * ahead[0] + other[1] * ahead[1])
+                if other not in known and self.walk(known[key], point):
+                    known[other] = point
+                    queue.append(other)
+        return sorted((round(px, 6), round(pz, 6)) for px, pz in known.values())
 
     def path(self, start: tuple[float, float], end: tuple[float, float]) -> list[tuple[float, float]] | None:
         """A shortest path of cells from `start` to the cell of `end`, or None."""

@@ -6,7 +6,7 @@ from infthor_eval.sim.geometry import Array, aabb_overlap, level_gaps, yaw_matri
 from infthor_eval.sim.objects import DOOR_SWING, DRAWER_SLIDE, SimObject
 from infthor_eval.sim.world import World
 
-__all__ = ["blocking_object", "door_leaf", "held_object_blocks"]
+__all__ = ["blocking_object", "door_leaf", "held_object_blocks", "nearest_name"]
 
 _RADIUS = 0.2  # of the agent's capsule, metres
 _KNEE, _HEAD = 0.15, 1.5
@@ -57,6 +57,19 @@ def held_object_blocks(world: World, target: Array) -> bool:
     low, high = held.bounds()
     inside_low, inside_high = world.scene_bounds()
     return not aabb_overlap(low + offset, high + offset, inside_low, inside_high)
+
+
+def nearest_name(world: World, point: Array) -> str:
+    """Name of the standing thing nearest to `point`, which is what the agent ran into."""
+    best = ("Wall", 0.6)
+    for item in world.objects.values():
+        low, high = item.bounds()
+        if item.type.pickupable or item.object_type == "Floor" or low[1] > 1.6 or high[1] < 0.2:
+            continue
+        gap = float(level_gaps(point[[0, 2]], low, high))
+        if gap < best[1]:
+            best = (item.name, gap)
+    return best[0]
 
 
 def _touches(box: tuple[Array, Array], position: Array) -> bool:

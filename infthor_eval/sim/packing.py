@@ -54,10 +54,11 @@ class MetadataPacker:
             self._packed.clear()
             self._world = world
         seen = sim.visible()
-        positions: Array = np.array([o.position for o in world.objects.values()]).reshape(-1, 3)
+        told = sim.told_objects()
+        positions: Array = np.array([o.position for o in told]).reshape(-1, 3)
         away = np.linalg.norm(positions - world.agent.position, axis=1)
-        parts = [_array_head(len(world.objects))]
-        for item, distance in zip(world.objects.values(), away, strict=True):
+        parts = [_array_head(len(told))]
+        for item, distance in zip(told, away, strict=True):
             known = self._packed.get(item.object_id)
             if known is None or known[0] != item.version:
                 fields = object_metadata(item)

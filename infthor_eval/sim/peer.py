@@ -7,21 +7,23 @@ import numpy as np
 
 from infthor_eval.sim.actions import bind
 from infthor_eval.sim.effects import settle
-from infthor_eval.sim.errors import ActionError
+from infthor_eval.sim.errors import ActionError, ErrorCode
 from infthor_eval.sim.fifo import FieldType, FifoPeer
 from infthor_eval.sim.instances import class_image, instance_image
 from infthor_eval.sim.metadata import Outcome
 from infthor_eval.sim.packing import MetadataPacker
+from infthor_eval.sim.render.normals import normal_image
 from infthor_eval.sim.render.picture import Picture
 from infthor_eval.sim.simulation import Simulation
 
 __all__ = ["Peer"]
 
 Frames = list[tuple[FieldType, bytes | memoryview]]
-_AGENT = (FieldType.RGB, FieldType.DEPTH, FieldType.IDS, FieldType.CLASSES)
+_AGENT = (FieldType.RGB, FieldType.DEPTH, FieldType.NORMALS, FieldType.IDS, FieldType.CLASSES)
 _THIRD = (
     FieldType.THIRD_PARTY_RGB,
     FieldType.THIRD_PARTY_DEPTH,
+    FieldType.THIRD_PARTY_NORMALS,
     FieldType.THIRD_PARTY_IDS,
     FieldType.THIRD_PARTY_CLASSES,
 )
@@ -52,6 +54,10 @@ class Peer:
         """Does one action; how it ended, and whether it was a mere query."""
         name = str(message.get("action"))
         try:
+            if message.get("renderFlowImage"):
+                raise ActionError(
+                    "renderFlowImage is not offered by the embedded simulator", ErrorCode.INVALID_ARGUMENT
+                )
             found, arguments = bind(message)
             value = found.run(self._sim, **arguments)
             if not found.query:
@@ -65,6 +71,7 @@ class Peer:
         wants = {
             "rgb": message.get("renderImage", True),
             "depth": message.get("renderDepthImage", sim.settings.depth),
+            "normals": message.get("renderNormalsImage", sim.settings.normals),
             "ids": message.get("renderInstanceSegmentation", sim.settings.instances),
             "classes": message.get("renderSemanticSegmentation", sim.settings.classes),
         }
@@ -81,8 +88,10 @@ class Peer:
             frames.append((field_types[0], self._sim.colours(picture).data))
         if wants["depth"]:
             frames.append((field_types[1], picture.depth.astype(np.float32).data))
+        if wants["normals"]:
+            frames.append((field_types[2], normal_image(picture).data))
         if wants["ids"]:
-            frames.append((field_types[2], instance_image(picture).data))
+            frames.append((field_types[3], instance_image(picture).data))
         if wants["classes"]:
-            frames.append((field_types[3], class_image(picture, self._sim.world).data))
+            frames.append((field_types[4], class_image(picture, self._sim.world).data))
         return frames

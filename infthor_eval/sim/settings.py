@@ -21,6 +21,7 @@ class SimulatorSettings:
     visibility_distance: float = 1.5
     field_of_view: float = 90.0
     depth: bool = False
+    normals: bool = False
     instances: bool = False
     classes: bool = False
     fast_emit: bool = True

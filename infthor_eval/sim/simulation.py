@@ -6,16 +6,16 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from infthor_eval.sim.geometry import Array, euler_matrix
+from infthor_eval.sim.geometry import Array, euler_matrix, level_gaps
 from infthor_eval.sim.objects import SimObject
-from infthor_eval.sim.render.camera import FAR, NEAR, Camera
+from infthor_eval.sim.render.camera import FAR, NEAR, Camera, project
 from infthor_eval.sim.render.picture import Picture, Rasterizer, cast_picture, choose_rasterizer, colour_picture
 from infthor_eval.sim.render.primitives import INSTANCE
 from infthor_eval.sim.render.scene import SceneModel
 from infthor_eval.sim.scenes.catalogue import Catalogue
 from infthor_eval.sim.settings import SimulatorSettings
-from infthor_eval.sim.visibility import enclosures, visible_ids
-from infthor_eval.sim.world import World
+from infthor_eval.sim.visibility import enclosures, shows, visible_ids
+from infthor_eval.sim.world import Agent, World
 
 __all__ = ["Simulation", "ThirdPartyCamera"]
 
@@ -42,6 +42,7 @@ class Simulation:
         height: of the pictures, pixels.
         catalogue: makes worlds from scene names.
         map_view: the agent's frame shows the scene from above.
+        told: ids of the objects that replies tell of; None for all.
         failed_reset: why the last Reset found no scene; Initialize tells it again, as the client reads only that.
     """
 
@@ -53,6 +54,7 @@ class Simulation:
     random: np.random.Generator = field(default_factory=lambda: np.random.default_rng(0))
     rasterizer: Rasterizer = field(default_factory=choose_rasterizer)
     map_view: bool = False
+    told: frozenset[str] | None = None
     failed_reset: str = ""
 
     def __post_init__(self) -> None:
@@ -61,6 +63,7 @@ class Simulation:
     def load(self, world: World) -> None:
         """Make `world` the present scene; settings stay until the next Initialize."""
         self.cameras.clear()
+        self.told = None
         self.random = np.random.default_rng(world.seed)
         self._saved: dict[int, tuple[World, np.random.Generator]] = {}
         self._show(world)
@@ -88,6 +91,10 @@ class Simulation:
         self._key: tuple[object, ...] | None = None
         self._full: Picture | None = None
         self._visible: frozenset[str] | None = None
+
+    def told_objects(self) -> list[SimObject]:
+        """The objects that replies tell of, in the order of the metadata."""
+        return [o for o in self.world.objects.values() if self.told is None or o.object_id in self.told]
 
     def view(self) -> Picture:
         """The agent's view without what it holds, cast once per state of the world."""
@@ -124,6 +131,33 @@ class Simulation:
         if self._visible is None:
             self._visible = visible_ids(self.world, self._view, self.settings.visibility_distance)
         return self._visible
+
+    def sees_from(self, agent: Agent, item: SimObject, distance: float) -> bool:
+        """Whether the agent would see an object within `distance` metres if it stood like `agent`."""
+        if level_gaps(agent.position[[0, 2]], *item.bounds()) > distance or self.world.hidden(item):
+            return False
+        prims, _, names = self._model.primitives()
+        lens = self._agent_camera(agent)
+        own = prims[prims[:, INSTANCE] == names.index(item.object_id)]
+        if not len(project(own, lens).index):
+            return False
+        return shows(cast_picture(prims, names, lens, self.rasterizer), item.object_id)
+
+    def hit(self, x: float, y: float) -> Array | None:
+        """The point (3,) that the agent sees at (x, y), shares of the frame from its bottom left; None for the void."""
+        lens = self.view().camera
+        slope = np.tan(np.radians(lens.field_of_view) / 2)
+        ray = np.array([(2 * x - 1) * slope * lens.width / lens.height, (2 * y - 1) * slope, 1.0])
+        ahead = lens.matrix @ (ray / np.linalg.norm(ray))
+        aside = np.cross(lens.matrix[:, 1], ahead)
+        aside /= np.linalg.norm(aside)
+        pixel = Camera(lens.position, np.stack([aside, np.cross(ahead, aside), ahead], axis=1), 1.0, 1, 1)
+        prims, _, names = self._model.primitives()
+        picture = cast_picture(prims, names, pixel, self.rasterizer)
+        if picture.instances[0, 0] < 0:
+            return None
+        point: Array = lens.position + ahead * picture.depth[0, 0]
+        return point
 
     def in_view(self, points: Array) -> NDArray[np.bool_]:
         """Which of some points (n, 3) lie well within the agent's frame, whatever may hide them."""
@@ -165,6 +199,10 @@ class Simulation:
         lens = self._lens(camera)
         return cast_picture(np.concatenate([prims, held]), names, lens, self.rasterizer)
 
+    def _agent_camera(self, agent: Agent) -> Camera:
+        angle = self.settings.field_of_view
+        return Camera(agent.camera_position(), agent.camera_matrix(), angle, self.width, self.height)
+
     def _lens(self, camera: ThirdPartyCamera) -> Camera:
         matrix = euler_matrix(camera.rotation)
         if camera.orthographic_size is None:
@@ -180,11 +218,8 @@ class Simulation:
                self.height, self.settings.field_of_view, self.settings.visibility_distance)  # fmt: skip
         if key == self._key:
             return
-        camera = Camera(
-            agent.camera_position(), agent.camera_matrix(), self.settings.field_of_view, self.width, self.height
-        )
         prims, _, names = self._model.primitives()
-        self._view = cast_picture(prims, names, camera, self.rasterizer)
+        self._view = cast_picture(prims, names, self._agent_camera(agent), self.rasterizer)
         self._full = None
         self._visible = None
         self._key = key

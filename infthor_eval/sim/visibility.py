@@ -6,7 +6,7 @@ from infthor_eval.sim.objects import SimObject
 from infthor_eval.sim.render.picture import Picture
 from infthor_eval.sim.world import World
 
-__all__ = ["enclosures", "visible_ids"]
+__all__ = ["enclosures", "shows", "visible_ids"]
 
 _SHARE = 2.5e-5  # of the picture's pixels that must show an object: 2 pixels at 300x300
 
@@ -20,9 +20,8 @@ def visible_ids(world: World, picture: Picture, max_distance: float) -> frozense
         max_distance: `visibilityDistance`, horizontal metres from the agent to the object's box.
     """
     counts = np.bincount(picture.instances.ravel() + 1, minlength=len(picture.names) + 1)[1:]
-    least = max(1, round(_SHARE * picture.instances.size))
     seen = set()
-    for index in np.nonzero(counts >= least)[0]:
+    for index in np.nonzero(counts >= _least(picture))[0]:
         item = world.objects.get(picture.names[index])
         if item is not None and world.reach(item) <= max_distance:
             seen.add(item.object_id)
@@ -31,6 +30,16 @@ def visible_ids(world: World, picture: Picture, max_distance: float) -> frozense
         seen.add(held.object_id)
         seen.update(o.object_id for o in world.descendants(held) if not world.hidden(o))
     return frozenset(seen)
+
+
+def shows(picture: Picture, object_id: str) -> bool:
+    """Whether enough of an object is to be seen in a picture."""
+    count = int(np.count_nonzero(picture.instances == picture.names.index(object_id)))
+    return count >= _least(picture)
+
+
+def _least(picture: Picture) -> int:
+    return max(1, round(_SHARE * picture.instances.size))
 
 
 def enclosures(world: World, item: SimObject) -> list[SimObject]:

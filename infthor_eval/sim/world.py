@@ -5,15 +5,28 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from infthor_eval.sim.appearance import Appearance
 from infthor_eval.sim.errors import ActionError
-from infthor_eval.sim.geometry import Array, aabb_gap, euler_matrix
+from infthor_eval.sim.geometry import Array, aabb_gap, euler_matrix, matrix_euler
 from infthor_eval.sim.navigation import NavGrid
 from infthor_eval.sim.objects import SimObject
 
-__all__ = ["AGENT_HEIGHT", "CAMERA_HEIGHT", "FLOOR_STYLES", "Agent", "RoomShell", "Wall", "World"]
+__all__ = [
+    "AGENT_HEIGHT",
+    "CAMERA_HEIGHT",
+    "FLOOR_STYLES",
+    "MAX_DOWN",
+    "MAX_UP",
+    "Agent",
+    "Grip",
+    "RoomShell",
+    "Wall",
+    "World",
+]
 
 AGENT_HEIGHT = 0.9009992  # agent.y of AI2-THOR's default agent on a floor at 0
 CAMERA_HEIGHT = 0.675  # camera above agent.y, fitted to the boxes recorded in ALFRED
+MAX_DOWN, MAX_UP = 60.0, 30.0  # degrees that the camera tilts below and above the horizon
 FLOOR_STYLES = ("wood", "tiles", "carpet")
 _CROUCH = 0.35
 _HAND = np.array([0.0, -0.16, 0.38])  # where AI2-THOR holds an object, in the camera's frame, metres
@@ -36,6 +49,19 @@ class Agent:
     def camera_matrix(self) -> Array:
         """Rotation matrix (3, 3) of the camera."""
         return euler_matrix((self.horizon, self.yaw, 0.0))
+
+
+@dataclass(frozen=True)
+class Grip:
+    """How the agent holds an object that it moved or turned in its hand, in the camera's frame.
+
+    Attributes:
+        offset: the object's origin, metres (3,).
+        turn: the object's rotation (3, 3).
+    """
+
+    offset: Array
+    turn: Array
 
 
 @dataclass(frozen=True)
@@ -77,6 +103,10 @@ class World:
         templates: copies of the loose objects as the scene first had them, by type.
         open_at_start: doors that are open in the recording; its cells already go around them.
         coarse: the shapes of its furniture are only known as boxes, as in recordings.
+        grip: how the held object is held; None for as one holds what was just picked up.
+        disabled: objects that are taken out for a time, by id.
+        appearance: what changes the colours of the scene.
+        standing_height: height in metres of the agent's position on the floor.
     """
 
     scene: str
@@ -91,6 +121,13 @@ class World:
     walls: tuple[Wall, ...] = ()
     open_at_start: frozenset[str] = frozenset()
     templates: dict[str, list[SimObject]] = field(default_factory=dict)
+    grip: Grip | None = None
+    disabled: dict[str, SimObject] = field(default_factory=dict)
+    appearance: Appearance = field(default_factory=Appearance)
+    standing_height: float = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.standing_height = float(self.agent.position[1])
 
     def get(self, object_id: str) -> SimObject:
         """The object with this id.
@@ -163,14 +200,36 @@ class World:
                 part.position = part.position + offset
                 self.touch(part)
 
-    def carry(self) -> None:
-        """Take what the agent holds, and all it contains, to the agent's hand."""
-        if self.held is None:
-            return
-        item = self.objects[self.held]
-        turn = np.array([item.rotation[0], self.agent.yaw, item.rotation[2]])
-        middle = euler_matrix(turn) @ item.box_center
-        self.set_pose(item, self.hand_pose() - middle, turn)
+    def carry(self, keep_grip: bool = False) -> None:
+        """Take what the agent holds, and all it contains, along in the agent's hand.
+
+        Args:
+            keep_grip: it stays as it was moved and turned in the hand; else the hand goes back to its usual place.
+        """
+        if not keep_grip:
+            self.grip = None
+        if self.held is not None:
+            self.set_pose(self.objects[self.held], *self._held_pose(self.objects[self.held]))
+
+    def _held_pose(self, item: SimObject) -> tuple[Array, Array]:
+        if self.grip is None:
+            turn = np.array([item.rotation[0], self.agent.yaw, item.rotation[2]])
+            return self.hand_pose() - euler_matrix(turn) @ item.box_center, turn
+        camera = self.agent.camera_matrix()
+        return self.agent.camera_position() + camera @ self.grip.offset, matrix_euler(camera @ self.grip.turn)
+
+    def release(self) -> None:
+        """Take the held object out of the hand; it stays where it is."""
+        if self.held is not None:
+            self.objects[self.held].state.picked_up = False
+            self.held = self.grip = None
+
+    def regrip(self, position: Array, matrix: Array) -> None:
+        """Move and turn the held object in the hand, to a position (3,) and rotation (3, 3) in the world."""
+        assert self.held is not None
+        camera = self.agent.camera_matrix()
+        self.grip = Grip(camera.T @ (position - self.agent.camera_position()), camera.T @ matrix)
+        self.carry(keep_grip=True)
 
     def set_pose(self, item: SimObject, position: Array, rotation: Array) -> None:
         """Move and turn an object; what it contains comes along as if fixed to it."""

@@ -4,6 +4,7 @@ from typing import Any
 
 XYZ = {"x": float, "y": float, "z": float}
 BOX = {"cornerPoints": "corners", "center": XYZ, "size": XYZ}
+POSE = {"position": XYZ, "rotation": XYZ, "localPosition": XYZ, "localRotation": XYZ}
 STRINGS = "strings or null"
 
 OBJECT: dict[str, Any] = {
@@ -18,14 +19,17 @@ OBJECT: dict[str, Any] = {
     "axisAlignedBoundingBox": BOX, "objectOrientedBoundingBox": "box or null",
 }  # fmt: skip
 AGENT: dict[str, Any] = {
-    "lastAction": str, "lastActionSuccess": bool, "errorMessage": str, "errorCode": str, "actionReturn": "any",
+    "lastAction": str, "lastActionSuccess": bool, "errorMessage": str, "errorCode": "string or null", "actionReturn": "any",
     "isSceneAtRest": bool,
     "agent": {"name": str, "position": XYZ, "rotation": XYZ, "cameraHorizon": float, "isStanding": bool,
               "inHighFrictionArea": bool},
-    "heldObjectPose": "any", "arm": "any", "fov": float, "cameraPosition": XYZ, "cameraOrthSize": float,
+    "heldObjectPose": POSE, "hand": POSE, "arm": "any", "fov": float, "cameraPosition": XYZ, "cameraOrthSize": float,
     "thirdPartyCameras": list, "collided": bool, "collidedObjects": list, "inventoryObjects": list, "sceneName": str,
     "screenWidth": int, "screenHeight": int, "agentId": int, "depthFormat": str, "currentTime": float,
     "sceneBounds": BOX, "objects": list, "colors": "any",
+    "colorBounds": "any", "visibleRange": "any", "flatSurfacesOnGrid": list, "distances": list, "normals": list,
+    "isOpenableGrid": list, "segmentedObjectIds": list, "objectIdsInBox": list, "actionIntReturn": int,
+    "actionFloatReturn": float, "actionFloatsReturn": list, "actionStringsReturn": list, "actionVector3sReturn": list,
 }  # fmt: skip
 
 

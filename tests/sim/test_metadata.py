@@ -1,9 +1,14 @@
 """Every reply's metadata has the form of AI2-THOR 5.x."""
 
 import re
+from pathlib import Path
 
 import pytest
 
+from infthor_eval.sim.actions import names
+from infthor_eval.sim.scenes.catalogue import Catalogue
+
+from .conftest import need_data
 from .harness import Bench
 from .schema import check
 
@@ -36,7 +41,6 @@ def test_nulls_where_not_applicable():
     assert apple["objectOrientedBoundingBox"] is not None
     assert isinstance(fridge["receptacleObjectIds"], list)
     assert fridge["parentReceptacles"] is None
-    assert bench.metadata["heldObjectPose"] is None
 
 
 def test_boxes_contain_the_position_of_upright_things():
@@ -57,3 +61,53 @@ def test_ids_are_printed_as_unity_prints_them():
     assert object_id("CellPhone", (-1.96499991, 0.593926966, 0.9192637)) == "CellPhone|-01.97|+00.59|+00.92"
     assert object_id("Cloth", (0.705, -0.00154149532, -2.75)) == "Cloth|+00.71|00.00|-02.75"
     assert object_id("Floor", (0.0, 0.0, 0.0)) == "Floor|+00.00|+00.00|+00.00"
+
+
+def test_the_scene_has_the_name_of_its_physics_scene():
+    bench = Bench(Catalogue(need_data()), size=20)
+    for name in ("FloorPlan28", "FloorPlan28_physics"):
+        assert bench.reset(name)["sceneName"] == "FloorPlan28_physics"
+    assert bench.reset("kitchen-1")["sceneName"] == "kitchen-1"
+    assert bench.ok("Reset", sceneName="Procedural")["sceneName"] == "Procedural"
+
+
+@pytest.mark.parametrize("object_type", ["Fridge", "Drawer", "Cabinet", "Microwave"])
+def test_a_box_holds_the_open_door(object_type):
+    bench = Bench(size=20)
+    bench.reset("kitchen-1")
+    name = bench.first(object_type)
+    closed = bench.object(name)["axisAlignedBoundingBox"]
+    bench.ok("OpenObject", objectId=name, openness=0.5, forceAction=True)
+    half = bench.object(name)["axisAlignedBoundingBox"]
+    bench.ok("OpenObject", objectId=name, forceAction=True)
+    wide = bench.object(name)["axisAlignedBoundingBox"]
+    assert closed["size"] != half["size"] != wide["size"]
+    low = [min(c[i] for c in wide["cornerPoints"]) for i in range(3)]
+    assert all(low[i] <= min(c[i] for c in closed["cornerPoints"]) for i in range(3))
+    bench.ok("CloseObject", objectId=name, forceAction=True)
+    assert bench.object(name)["axisAlignedBoundingBox"] == closed
+
+
+def test_open_object_takes_the_old_name_of_openness():
+    bench = Bench(size=20)
+    bench.reset("kitchen-1")
+    fridge = bench.first("Fridge")
+    for magnitude, openness in ((0.65, 0.65), (0, 1.0)):
+        bench.ok("OpenObject", objectId=fridge, moveMagnitude=magnitude, forceAction=True)
+        assert bench.object(fridge)["openness"] == openness
+    for wrong in (-0.5, 1.5):
+        assert "must be in" in bench.refused("OpenObject", objectId=fridge, openness=wrong, forceAction=True)
+
+
+def test_old_keys_are_there_and_empty(kitchen):
+    metadata = kitchen.reset("kitchen-1").metadata
+    assert metadata["actionIntReturn"] == metadata["actionFloatReturn"] == 0
+    assert metadata["visibleRange"] is metadata["colorBounds"] is None
+    for key in ("distances", "normals", "flatSurfacesOnGrid", "isOpenableGrid", "segmentedObjectIds",
+                "objectIdsInBox", "actionFloatsReturn", "actionStringsReturn", "actionVector3sReturn"):  # fmt: skip
+        assert metadata[key] == []
+
+
+def test_every_action_is_described():
+    text = (Path(__file__).resolve().parents[2] / "docs" / "simulator.md").read_text(encoding="utf-8")
+    assert [name for name in names() if f"`{name}`" not in text] == []

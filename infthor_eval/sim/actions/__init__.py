@@ -2,13 +2,20 @@
 
 from infthor_eval.sim.actions import (  # noqa: F401 - imported to be registered
     cameras,
+    hand,
     interaction,
+    looks,
     movement,
+    placing,
+    pushes,
     queries,
     restoring,
     scenes,
     snapshots,
+    standing,
     states,
+    teleport,
+    telling,
 )
 from infthor_eval.sim.actions.registry import Action, bind, names
 

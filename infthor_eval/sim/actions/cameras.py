@@ -3,14 +3,17 @@
 
 from typing import Any
 
+import numpy as np
+
 from infthor_eval.sim.actions.registry import Vector3, action
 from infthor_eval.sim.errors import ActionError
-from infthor_eval.sim.geometry import to_array
+from infthor_eval.sim.geometry import Array, to_array
 from infthor_eval.sim.simulation import Simulation, ThirdPartyCamera
 
 __all__: list[str] = []
 
 _LARGEST = 4096
+_USUAL_SIZE = 5.0  # metres from the middle of an orthographic picture to its upper edge
 
 
 @action("ChangeResolution")
@@ -34,12 +37,12 @@ def add_third_party_camera(
     rotation: Vector3 | None = None,
     fieldOfView: float = 90.0,
     orthographic: bool = False,
-    orthographicSize: float = 5.0,
+    orthographicSize: float = _USUAL_SIZE,
     skyboxColor: Any = None,
 ) -> None:
     """Add a camera; its frames come with every reply from now on."""
     size = orthographicSize if orthographic else None
-    sim.cameras.append(_camera(position or Vector3(), rotation or Vector3(), fieldOfView, size))
+    sim.cameras.append(_camera(to_array(position or {}), to_array(rotation or {}), fieldOfView, size))
 
 
 @action("UpdateThirdPartyCamera")
@@ -50,17 +53,31 @@ def update_third_party_camera(
     rotation: Vector3 | None = None,
     fieldOfView: float | None = None,
     skyboxColor: Any = None,
+    orthographic: bool | None = None,
+    orthographicSize: float | None = None,
 ) -> None:
-    """Move a third-party camera; what is not given stays."""
+    """Move a third-party camera or change its lens; what is not given, even one component, stays."""
     if not 0 <= thirdPartyCameraId < len(sim.cameras):
         raise ActionError(f"There is no third party camera with id {thirdPartyCameraId}")
     old = sim.cameras[thirdPartyCameraId]
-    sim.cameras[thirdPartyCameraId] = ThirdPartyCamera(
-        old.position if position is None else to_array(position),
-        old.rotation if rotation is None else to_array(rotation),
-        old.field_of_view if fieldOfView is None else _checked_angle(fieldOfView),
-        old.orthographic_size,
+    sim.cameras[thirdPartyCameraId] = _camera(
+        _merged(old.position, position),
+        _merged(old.rotation, rotation),
+        old.field_of_view if fieldOfView is None else fieldOfView,
+        _lens_size(old, orthographic, orthographicSize),
     )
+
+
+def _merged(old: Array, given: Vector3 | None) -> Array:
+    return np.array([float((given or Vector3()).get(axis, was)) for axis, was in zip("xyz", old, strict=True)])
+
+
+def _lens_size(old: ThirdPartyCamera, orthographic: bool | None, size: float | None) -> float | None:
+    """Orthographic size of the changed camera; None for one in perspective."""
+    wanted = old.orthographic_size is not None if orthographic is None else orthographic
+    if not wanted:
+        return None
+    return size if size is not None else old.orthographic_size or _USUAL_SIZE
 
 
 @action("ToggleMapView")
@@ -69,13 +86,9 @@ def toggle_map_view(sim: Simulation) -> None:
     sim.map_view = not sim.map_view
 
 
-def _camera(position: Vector3, rotation: Vector3, angle: float, size: float | None) -> ThirdPartyCamera:
+def _camera(position: Array, rotation: Array, angle: float, size: float | None) -> ThirdPartyCamera:
     if size is not None and size <= 0:
         raise ActionError(f"orthographicSize must be positive, not {size}")
-    return ThirdPartyCamera(to_array(position), to_array(rotation), _checked_angle(angle), size)
-
-
-def _checked_angle(angle: float) -> float:
     if not 0 < angle < 180:
         raise ActionError(f"fieldOfView must be in (0, 180) noninclusive, not {angle}")
-    return float(angle)
+    return ThirdPartyCamera(position, rotation, float(angle), size)

@@ -4,7 +4,7 @@
 from typing import Any
 
 from infthor_eval.sim.actions.registry import action
-from infthor_eval.sim.actions.targets import held_object, interactable
+from infthor_eval.sim.actions.targets import BY_ID_OR_PIXEL, held_object, interactable
 from infthor_eval.sim.effects import slice_object, toggle
 from infthor_eval.sim.errors import ActionError, ErrorCode
 from infthor_eval.sim.object_types import allowed_in
@@ -17,7 +17,7 @@ __all__: list[str] = []
 _CROWDED = 0.35  # overlap that `forceAction` tolerates when a receptacle is nearly full
 
 
-@action("PickupObject")
+@action("PickupObject", forms=BY_ID_OR_PIXEL)
 def pick_up(
     sim: Simulation,
     objectId: str | None = None,
@@ -44,7 +44,7 @@ def pick_up(
     world.carry()
 
 
-@action("PutObject")
+@action("PutObject", forms=BY_ID_OR_PIXEL)
 def put(
     sim: Simulation,
     objectId: str | None = None,
@@ -66,7 +66,8 @@ def put(
     placed = _place(sim, held, target, forceAction)
     if placed is None:
         raise ActionError("No valid positions to place object found", ErrorCode.RECEPTACLE_FULL)
-    release(sim, placed)
+    sim.world.set_pose(held, placed.position, placed.rotation)
+    sim.world.release()
     sim.world.attach(held, target)
     sim.world.touch()
 
@@ -91,17 +92,7 @@ def _check_receptacle(held: SimObject, target: SimObject) -> None:
         raise ActionError(f"{held.object_id} cannot be placed in {target.object_id}", ErrorCode.NOT_ALLOWED)
 
 
-def release(sim: Simulation, pose: SimObject) -> None:
-    """Take the held object out of the hand and give it, and what it contains, the pose of `pose`."""
-    world = sim.world
-    assert world.held is not None
-    held = world.objects[world.held]
-    world.set_pose(held, pose.position, pose.rotation)
-    held.state.picked_up = False
-    world.held = None
-
-
-@action("OpenObject")
+@action("OpenObject", forms=BY_ID_OR_PIXEL)
 def open_object(
     sim: Simulation,
     objectId: str | None = None,
@@ -109,8 +100,14 @@ def open_object(
     y: float | None = None,
     forceAction: bool = False,
     openness: float = 1.0,
+    moveMagnitude: float | None = None,
 ) -> None:
-    """Open a door, drawer or lid to `openness`, 0 (closed) to 1."""
+    """Open a door, drawer or lid to `openness`, 0 (closed) to 1.
+
+    `moveMagnitude` is its old name, of which 0 meant wide open.
+    """
+    if moveMagnitude is not None:
+        openness = moveMagnitude or 1.0
     if not 0 <= openness <= 1:
         raise ActionError(f"openness must be in [0:1], not {openness}")
     target = interactable(sim, objectId, forceAction, x, y)
@@ -123,7 +120,7 @@ def open_object(
     set_openness(sim, target, openness)
 
 
-@action("CloseObject")
+@action("CloseObject", forms=BY_ID_OR_PIXEL)
 def close_object(
     sim: Simulation,
     objectId: str | None = None,
@@ -148,7 +145,7 @@ def set_openness(sim: Simulation, target: SimObject, openness: float) -> None:
     sim.world.touch(target)
 
 
-@action("ToggleObjectOn")
+@action("ToggleObjectOn", forms=BY_ID_OR_PIXEL)
 def toggle_on(
     sim: Simulation,
     objectId: str | None = None,
@@ -160,7 +157,7 @@ def toggle_on(
     _toggle(sim, interactable(sim, objectId, forceAction, x, y), True)
 
 
-@action("ToggleObjectOff")
+@action("ToggleObjectOff", forms=BY_ID_OR_PIXEL)
 def toggle_off(
     sim: Simulation,
     objectId: str | None = None,
@@ -186,7 +183,7 @@ def _toggle(sim: Simulation, target: SimObject, on: bool) -> None:
     toggle(sim.world, target, on)
 
 
-@action("SliceObject")
+@action("SliceObject", forms=BY_ID_OR_PIXEL)
 def cut(
     sim: Simulation,
     objectId: str | None = None,

@@ -4,9 +4,11 @@
 from typing import Any
 
 from infthor_eval.sim.actions.registry import Vector3, action
-from infthor_eval.sim.actions.targets import object_at
+from infthor_eval.sim.actions.standing import reachable_positions
+from infthor_eval.sim.actions.targets import check_in_frame, object_at
 from infthor_eval.sim.errors import ActionError
-from infthor_eval.sim.geometry import to_array, to_xyz
+from infthor_eval.sim.geometry import convex_hull, rounded, to_array, to_xyz
+from infthor_eval.sim.objects import SimObject
 from infthor_eval.sim.simulation import Simulation
 
 __all__: list[str] = []
@@ -20,12 +22,13 @@ def get_scenes_in_build(sim: Simulation) -> list[str]:
 
 @action("GetReachablePositions", query=True)
 def get_reachable_positions(
-    sim: Simulation, gridSize: float | None = None, maxStepCount: int = 10000
+    sim: Simulation,
+    maxStepCount: int = 10000,
+    directionsRelativeAgent: bool = False,
+    gridSize: float | None = None,
 ) -> list[dict[str, float]]:
-    """Positions that the agent can reach by steps on the grid."""
-    agent = sim.world.agent
-    cells = sim.world.nav.reachable(agent.position[0], agent.position[2])
-    return [{"x": x, "y": float(agent.position[1]), "z": z} for x, z in cells]
+    """Positions that the agent can reach by steps of `gridSize` along the axes, or ahead, aside and back."""
+    return reachable_positions(sim, gridSize, directionsRelativeAgent, maxStepCount)
 
 
 @action("GetShortestPath", "GetShortestPathToPoint", query=True)
@@ -60,10 +63,59 @@ def _goal(sim: Simulation, object_id: str | None, object_type: str | None, targe
 
 
 @action("GetObjectInFrame", query=True)
-def get_object_in_frame(sim: Simulation, x: float, y: float, checkVisible: bool = False) -> str | None:
-    """Id of the object at (x, y), shares of the frame from its top left; None for none."""
+def get_object_in_frame(sim: Simulation, x: float, y: float, checkVisible: bool = False) -> str:
+    """Id of the object at (x, y), shares of the frame from its top left."""
     found = object_at(sim, x, y)
-    return None if checkVisible and found not in sim.visible() else found
+    if found is None:
+        raise ActionError(f"no sim objects found at ({x},{y})")
+    if checkVisible and found not in sim.visible():
+        raise ActionError(f"target hit ({found}) at ({x}, {y}) is not currently Visible to Agent")
+    return found
+
+
+@action("GetCoordinateFromRaycast", query=True)
+def get_coordinate_from_raycast(sim: Simulation, x: float, y: float) -> dict[str, float]:
+    """World position of what is seen at (x, y), shares of the frame from its top left."""
+    check_in_frame(x, y)
+    point = sim.hit(x, 1.0 - y)
+    if point is None:
+        raise ActionError(f"Nothing is at (x: {x}, y: {y})")
+    return to_xyz(point)
+
+
+@action("Get2DSemanticHull", query=True)
+def get_semantic_hull(sim: Simulation, objectId: str) -> list[list[float]]:
+    """Corners (x, z) of the outline of an object seen from above."""
+    return _hull(sim.world.get(objectId))
+
+
+@action("Get2DSemanticHulls", query=True)
+def get_semantic_hulls(
+    sim: Simulation, objectIds: list[str] | None = None, objectTypes: list[str] | None = None
+) -> dict[str, list[list[float]]]:
+    """Outlines from above of all objects, of those of some types, or of some ids."""
+    if objectIds is not None and objectTypes is not None:
+        raise ActionError("Only one of objectTypes and objectIds can have a non-null value.")
+    if objectIds is not None:
+        return {object_id: _hull(sim.world.get(object_id)) for object_id in objectIds}
+    wanted = sim.world.objects.values()
+    return {o.object_id: _hull(o) for o in wanted if objectTypes is None or o.object_type in objectTypes}
+
+
+def _hull(item: SimObject) -> list[list[float]]:
+    return [rounded(point, 6) for point in convex_hull(item.oriented_corners()[:, [0, 2]])]
+
+
+@action("TestFastEmit", query=True)
+def fast_emit(sim: Simulation, rvalue: str) -> str:
+    """Give the argument back without a new state; AI2-THOR tests its transport with it."""
+    return rvalue
+
+
+@action("TestActionReflectParam")
+def reflect(sim: Simulation, rvalue: str) -> str:
+    """Give the argument back with a new state; AI2-THOR tests its transport with it."""
+    return rvalue
 
 
 @action("GetMapViewCameraProperties", query=True)

@@ -2,12 +2,15 @@
 """The table of actions, and the checking of their arguments as Unity's dispatcher does it."""
 
 import inspect
+import json
 import types
 import typing
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Concatenate
 
+from infthor_eval.sim.actions.signatures import expectation, type_name
+from infthor_eval.sim.actions.vectors import Vector3
 from infthor_eval.sim.errors import ActionError, ErrorCode
 from infthor_eval.sim.simulation import Simulation
 
@@ -22,11 +25,8 @@ _PASSED_BY = frozenset(
 _LARGEST = 1e9
 
 
-class Vector3(dict[str, float]):
-    """Marks arguments that are a position (metres) or rotation (degrees): `{"x", "y", "z"}`, any of them absent."""
-
-
 Body = Callable[Concatenate[Simulation, ...], Any]
+Form = tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -36,6 +36,7 @@ class Action:
     Attributes:
         query: it changes nothing that is seen, so the client keeps its last frame.
         lenient: unknown arguments are passed over, as in the actions that take Unity's whole ServerAction.
+        forms: sets of arguments one of which must be given whole, as Unity overloads its actions; none for one form.
     """
 
     name: str
@@ -43,18 +44,21 @@ class Action:
     parameters: Mapping[str, inspect.Parameter]
     query: bool
     lenient: bool
+    forms: tuple[Form, ...] = ()
 
 
 _ACTIONS: dict[str, Action] = {}
 
 
-def action(*names: str, query: bool = False, lenient: bool = False) -> Callable[[Body], Body]:
+def action(
+    *names: str, query: bool = False, lenient: bool = False, forms: tuple[Form, ...] = ()
+) -> Callable[[Body], Body]:
     """Register a function as the action(s) `names`; see `Action`."""
 
     def register(run: Body) -> Body:
         parameters = dict(list(inspect.signature(run).parameters.items())[1:])
         for name in names:
-            _ACTIONS[name] = Action(name, run, parameters, query, lenient)
+            _ACTIONS[name] = Action(name, run, parameters, query, lenient, forms)
         return run
 
     return register
@@ -74,33 +78,57 @@ def bind(message: Mapping[str, Any]) -> tuple[Action, dict[str, Any]]:
     name = message.get("action")
     found = _ACTIONS.get(name) if isinstance(name, str) else None
     if found is None:
-        raise ActionError(f"Invalid action: {name!r}. No method of that name exists.", ErrorCode.INVALID_ACTION)
+        raise ActionError(f"Invalid action: {name}", ErrorCode.INVALID_ACTION)
     given = {key: value for key, value in message.items() if key not in _PASSED_BY or key in found.parameters}
-    unknown = sorted(set(given) - set(found.parameters))
+    form = _form(found, given)
+    other_forms = {key for other in found.forms for key in other if key not in form}
+    unknown = [key for key in given if key not in found.parameters or (key in other_forms and given[key] is not None)]
     if unknown and not found.lenient:
-        raise ActionError(_misuse(found, "called with invalid argument", unknown, given), ErrorCode.INVALID_ARGUMENT)
+        raise ActionError(expectation(found.name, unknown, found.parameters, given), ErrorCode.INVALID_ARGUMENT)
     arguments = {key: value for key, value in given.items() if key in found.parameters}
-    wrong = sorted(key for key, value in arguments.items() if not _fits(value, found.parameters[key].annotation))
-    if wrong:
-        raise ActionError(_misuse(found, "called with a wrong type of argument", wrong, given),
-                          ErrorCode.INVALID_ARGUMENT)  # fmt: skip
-    missing = [
-        key for key, p in found.parameters.items() if p.default is inspect.Parameter.empty and key not in arguments
-    ]
+    for key, value in arguments.items():
+        _check(found, key, value)
+    missing = [key for key, p in found.parameters.items() if _required(key, p, form) and arguments.get(key) is None]
     if missing:
-        raise ActionError(_misuse(found, "is missing argument", missing, given), ErrorCode.MISSING_ARGUMENTS)
+        raise ActionError(
+            f"action: {found.name} is missing the following arguments: {','.join(missing)}", ErrorCode.MISSING_ARGUMENTS
+        )
     return found, arguments
 
 
-def _misuse(found: Action, what: str, which: list[str], given: Mapping[str, Any]) -> str:
-    expected = ", ".join(f"{_type_name(p.annotation)} {key}" for key, p in found.parameters.items()) or "none"
-    quoted = ", ".join(f"'{key}'" for key in which)
-    yours = ", ".join(sorted(given)) or "none"
-    return f'Action: "{found.name}" {what}: {quoted}. Expected arguments: {expected}. Your arguments: {yours}.'
+def _form(found: Action, given: Mapping[str, Any]) -> Form:
+    """The form that most of the given arguments belong to, the first of several."""
+    return max(found.forms, key=lambda form: sum(given.get(key) is not None for key in form), default=())
 
 
-def _type_name(annotation: Any) -> str:
-    return getattr(annotation, "__name__", str(annotation)) if annotation is not Any else "object"
+def _required(key: str, parameter: inspect.Parameter, form: Form) -> bool:
+    return key in form or parameter.default is inspect.Parameter.empty
+
+
+def _check(found: Action, key: str, value: Any) -> None:
+    """Refuse a value of the wrong type; Unity's dispatcher knows scalars, its parser of JSON all else.
+
+    Raises:
+        ActionError: with a code only where Unity has one, as the client raises by it.
+    """
+    annotation = found.parameters[key].annotation
+    if _fits(value, annotation):
+        return
+    wanted, told = type_name(annotation), value if isinstance(value, str) else json.dumps(value)
+    if _structured(annotation) and not isinstance(value, dict | list):
+        raise ActionError(f"Error converting value {told} to type '{wanted}'. Path '{key}'.")
+    raise ActionError(
+        f"action: {found.name} has an invalid argument: {key} (=={told}). Cannot convert to: {wanted}",
+        ErrorCode.INVALID_ARGUMENT,
+    )
+
+
+def _structured(annotation: Any) -> bool:
+    """Whether values of this type are objects or lists in JSON."""
+    origin, inner = typing.get_origin(annotation), typing.get_args(annotation)
+    if origin in (types.UnionType, typing.Union):
+        return any(_structured(option) for option in inner)
+    return annotation is Vector3 or origin is list
 
 
 def _fits(value: Any, annotation: Any) -> bool:

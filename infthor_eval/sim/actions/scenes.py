@@ -36,6 +36,7 @@ def initialize(
     visibilityDistance: float = 1.5,
     fieldOfView: float = 90.0,
     renderDepthImage: bool = False,
+    renderNormalsImage: bool = False,
     renderInstanceSegmentation: bool = False,
     renderObjectImage: bool = False,
     renderSemanticSegmentation: bool = False,
@@ -52,6 +53,7 @@ def initialize(
         )
     _check(agentCount == 1, f"agentCount must be 1, not {agentCount}")
     _check(gridSize > 0, f"gridSize must be positive, not {gridSize}")
+    _check(rotateStepDegrees > 0, f"rotateStepDegrees must be positive, not {rotateStepDegrees}")
     _check(0 < fieldOfView < 180, f"fieldOfView must be in (0, 180) noninclusive, not {fieldOfView}")
     _check(visibilityDistance >= 0, f"visibilityDistance must be at least 0, not {visibilityDistance}")
     sim.configure(
@@ -62,6 +64,7 @@ def initialize(
         visibility_distance=float(visibilityDistance),
         field_of_view=float(fieldOfView),
         depth=renderDepthImage,
+        normals=renderNormalsImage,
         instances=renderInstanceSegmentation or renderObjectImage,
         classes=renderSemanticSegmentation or renderClassImage,
         fast_emit=fastActionEmit,

@@ -4,23 +4,24 @@ from infthor_eval.sim.errors import ActionError, ErrorCode
 from infthor_eval.sim.objects import SimObject
 from infthor_eval.sim.simulation import Simulation
 
-__all__ = ["held_object", "interactable", "object_at"]
+__all__ = ["BY_ID_OR_PIXEL", "check_in_frame", "held_object", "interactable", "object_at"]
+
+BY_ID_OR_PIXEL = (("objectId",), ("x", "y"))
+"""Forms of the actions that take an object by its id or by where it is seen."""
 
 
 def interactable(sim: Simulation, object_id: str | None, force: bool, x: float | None, y: float | None) -> SimObject:
     """The object with this id, or the one shown at (x, y), shares of the frame from its top left.
 
     Raises:
-        ActionError: neither or both are given, there is no such object, or the agent does not see it near enough.
+        ActionError: there is no such object, or the agent does not see it near enough.
     """
     if object_id is None:
-        if x is None or y is None:
-            raise ActionError("objectId, or x and y, must be given.", ErrorCode.MISSING_ARGUMENTS)
+        assert x is not None
+        assert y is not None
         object_id = object_at(sim, x, y)
         if object_id is None:
-            raise ActionError(f"No object is at x: {x}, y: {y}.")
-    elif x is not None or y is not None:
-        raise ActionError("Provide either objectId or x and y, not both.", ErrorCode.AMBIGUOUS_ACTION)
+            raise ActionError(f"No SimObject found at (x: {x}, y: {y})")
     found = sim.world.get(object_id)
     if not force and object_id not in sim.visible() and not sim.visible_inside(found):
         raise ActionError("Target object not found within the specified visibility.", ErrorCode.NOT_VISIBLE)
@@ -32,14 +33,23 @@ def held_object(sim: Simulation) -> SimObject | None:
     return None if sim.world.held is None else sim.world.objects[sim.world.held]
 
 
+def check_in_frame(x: float, y: float) -> None:
+    """Refuse a point outside the frame.
+
+    Raises:
+        ActionError: it is outside.
+    """
+    if not (0 <= x <= 1 and 0 <= y <= 1):
+        raise ActionError(f"x/y must be in [0:1], not (x={x}, y={y})")
+
+
 def object_at(sim: Simulation, x: float, y: float) -> str | None:
     """Id of the object shown at (x, y), shares of the frame from its top left; None for walls and the void.
 
     Raises:
         ActionError: the point is outside the frame.
     """
-    if not (0 <= x <= 1 and 0 <= y <= 1):
-        raise ActionError("x/y must be in [0:1]")
+    check_in_frame(x, y)
     picture = sim.view()
     row = min(int((1 - y) * sim.height), sim.height - 1)
     index = picture.instances[row, min(int(x * sim.width), sim.width - 1)]

@@ -4,6 +4,7 @@ import numpy as np
 
 from infthor_eval.sim.geometry import Array
 from infthor_eval.sim.objects import SimObject
+from infthor_eval.sim.render.finishes import refinished
 from infthor_eval.sim.render.lighting import Lights
 from infthor_eval.sim.render.primitives import COLUMNS, rows
 from infthor_eval.sim.render.shapes import shape
@@ -43,7 +44,8 @@ class SceneModel:
             elif item.object_type == "LightSwitch":
                 switches.append(item.state.toggled)
         dark = bool(switches) and not any(switches)
-        return Lights(np.array(lamps).reshape(-1, 4), _DARK if dark else 1.0)
+        daylight = (_DARK if dark else 1.0) * self._world.appearance.brightness
+        return Lights(np.array(lamps).reshape(-1, 4), daylight)
 
     def _rebuild(self) -> None:
         world = self._world
@@ -57,7 +59,9 @@ class SceneModel:
                 continue
             (held if item.object_id in in_hand else parts).append(self._object_rows(item, index))
         self._rows = {key: value for key, value in self._rows.items() if key in world.objects}
-        self._all, self._held = np.concatenate(parts), np.concatenate(held)
+        look = world.appearance
+        self._all = refinished(np.concatenate(parts), names, look)
+        self._held = refinished(np.concatenate(held), names, look)
         self._names, self._version = tuple(names), world.version
 
     def _object_rows(self, item: SimObject, index: int) -> Array:

@@ -9,7 +9,7 @@ from infthor_eval.sim.render.lighting import AMBIENT, HEADLIGHT, LAMP_REACH, SKY
 from infthor_eval.sim.render.patterns import PATTERNS
 from infthor_eval.sim.render.primitives import AXES, BOTTOM, COLOR, EMISSION, FORM, HALF, MATERIAL, TOP, Form
 
-__all__ = ["shade"]
+__all__ = ["shade", "surface_normals"]
 
 _RIM = 1.0 - 1e-6
 
@@ -41,6 +41,20 @@ def shade(
     for i in range(3):
         rgb[ys, xs, i] = np.minimum(p[:, COLOR + i] * level * 255.0, 255.0).astype(np.uint8)
     return rgb
+
+
+def surface_normals(
+    prims: Array, seen: Projection, camera: Camera, depth: Array, nearest: NDArray[np.int32]
+) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
+    """Rows, columns and world normals (n, 3), either way, of the pixels that `cast` found something at."""
+    us, vs = camera.rays()
+    ys, xs = np.nonzero(nearest >= 0)
+    order = nearest[ys, xs]
+    u, v, t = us[xs], vs[ys], depth[ys, xs]
+    o, s = seen.origin[order], seen.steps[order]
+    local = [o[:, i] + t * (s[:, 0, i] + u * s[:, 1, i] + v * s[:, 2, i]) for i in range(3)]
+    normal, _, _ = _surface(prims[seen.index[order]], local)
+    return ys, xs, np.stack(normal, axis=1)
 
 
 def _surface(p: Array, local: list[Array]) -> tuple[list[Array], Array, Array]:

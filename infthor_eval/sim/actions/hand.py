@@ -1,0 +1,106 @@
+# ruff: noqa: ARG001 - the wire's arguments are accepted even where nothing depends on them
+"""What the agent does with the object in its hand: move it, turn it, drop it, throw it."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from infthor_eval.sim.actions.registry import Vector3, action
+from infthor_eval.sim.actions.targets import held_object
+from infthor_eval.sim.clearance import obstacle_at
+from infthor_eval.sim.errors import ActionError, ErrorCode
+from infthor_eval.sim.falling import let_fall
+from infthor_eval.sim.geometry import Array, euler_matrix, to_array
+from infthor_eval.sim.objects import SimObject
+from infthor_eval.sim.simulation import Simulation
+
+__all__: list[str] = []
+
+_THROW_REACH = 0.9  # metres in front of the agent at which a thrown thing lands
+_SIDES = {
+    "Ahead": (0.0, 0.0, 1.0),
+    "Back": (0.0, 0.0, -1.0),
+    "Right": (1.0, 0.0, 0.0),
+    "Left": (-1.0, 0.0, 0.0),
+    "Up": (0.0, 1.0, 0.0),
+    "Down": (0.0, -1.0, 0.0),
+}
+
+
+@action("DropHandObject", "DropHeldObject")
+def drop(sim: Simulation, forceAction: bool = False, autoSimulation: bool = True) -> None:
+    """Let the held object fall to whatever is below it."""
+    _let_go(sim, 0.0)
+
+
+@action("ThrowObject")
+def throw(sim: Simulation, moveMagnitude: float = 0.0, forceAction: bool = False, autoSimulation: bool = True) -> None:
+    """Drop the held object a step in front of the agent; there is no flight."""
+    _let_go(sim, _THROW_REACH)
+
+
+def _let_go(sim: Simulation, ahead: float) -> None:
+    held = _in_hand(sim, "Nothing in agent's hand to drop!")
+    forward = sim.world.agent.camera_matrix()[:, 2] * (1.0, 0.0, 1.0)
+    sim.world.release()
+    let_fall(sim.world, held, held.center + forward * ahead)
+
+
+@action("MoveHeldObject")
+def move_held_object(
+    sim: Simulation, ahead: float = 0.0, right: float = 0.0, up: float = 0.0, forceVisible: bool = False
+) -> None:
+    """Move the held object along the camera's axes, metres."""
+    _move_held(sim, np.array([right, up, ahead]), forceVisible)
+
+
+def _mover(side: Array) -> Callable[..., None]:
+    def move(sim: Simulation, moveMagnitude: float, forceVisible: bool = False) -> None:
+        _move_held(sim, side * moveMagnitude, forceVisible)
+
+    return move
+
+
+for _name, _side in _SIDES.items():
+    action(f"MoveHeldObject{_name}", f"MoveHand{_name}")(_mover(np.array(_side)))
+
+
+@action("RotateHeldObject", forms=((), ("rotation",)))
+def rotate_held_object(
+    sim: Simulation,
+    pitch: float = 0.0,
+    yaw: float = 0.0,
+    roll: float = 0.0,
+    rotation: Vector3 | None = None,
+) -> None:
+    """Turn the held object by angles about its own axes, roll positive to the right, or to a rotation in the hand."""
+    held = _in_hand(sim, "Need to be holding something to rotate it!")
+    if rotation is None:
+        turned = held.matrix @ euler_matrix((pitch, yaw, -roll))
+    else:
+        turned = sim.world.agent.camera_matrix() @ euler_matrix(to_array(rotation))
+    sim.world.regrip(held.position, turned)
+    sim.world.touch()
+
+
+def _move_held(sim: Simulation, step: Array, force_visible: bool) -> None:
+    """Move the held object by `step` (right, up, ahead), unless it would leave reach or view, or go into something."""
+    held = _in_hand(sim, "Agent can only move hand if holding an item")
+    world = sim.world
+    offset = world.agent.camera_matrix() @ step
+    if np.linalg.norm(held.position + offset - world.agent.camera_position()) > sim.settings.visibility_distance:
+        raise ActionError("The target position is out of range- object cannot move outside of max visibility distance.")
+    if not force_visible and not sim.in_view((held.center + offset)[None])[0]:
+        raise ActionError("The target position is not in the Agent's Viewport!")
+    obstacle = obstacle_at(world, held, offset)
+    if obstacle is not None:
+        raise ActionError(f"{obstacle} is blocking the held object from moving there.")
+    world.regrip(held.position + offset, held.matrix)
+    world.touch()
+
+
+def _in_hand(sim: Simulation, otherwise: str) -> SimObject:
+    held = held_object(sim)
+    if held is None:
+        raise ActionError(otherwise, ErrorCode.NOT_IN_INVENTORY)
+    return held

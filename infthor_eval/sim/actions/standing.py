@@ -1,0 +1,68 @@
+"""Where the agent can stand, and from where it can interact with an object."""
+
+from typing import Any
+
+from infthor_eval.sim.actions.registry import Vector3, action
+from infthor_eval.sim.errors import ActionError
+from infthor_eval.sim.geometry import to_array
+from infthor_eval.sim.simulation import Simulation
+from infthor_eval.sim.world import MAX_DOWN, MAX_UP, Agent
+
+__all__ = ["reachable_positions"]
+
+_FINEST = 0.01  # metres; finer grids have millions of points
+_TILT = 30.0  # degrees between the horizons that are tried
+
+
+def reachable_positions(
+    sim: Simulation, size: float | None = None, relative: bool = False, most: int = 10000
+) -> list[dict[str, float]]:
+    """Positions that the agent can reach by steps of `size` metres, those of its own grid unless told.
+
+    Raises:
+        ActionError: the size is not positive, or there are more than `most` per square metre of a step.
+    """
+    step = sim.settings.grid_size if size is None else size
+    if step < _FINEST:
+        raise ActionError(f"gridSize must be at least {_FINEST}, not {step}")
+    agent = sim.world.agent
+    found = sim.world.nav.lattice(agent.position[0], agent.position[2], step, agent.yaw if relative else 0.0)
+    if len(found) > most / step**2:
+        raise ActionError("Too many steps taken in GetReachablePositions.")
+    return [{"x": x, "y": float(agent.position[1]), "z": z} for x, z in found]
+
+
+@action("GetInteractablePoses", query=True)
+def get_interactable_poses(
+    sim: Simulation,
+    objectId: str,
+    positions: list[Vector3] | None = None,
+    rotations: list[float] | None = None,
+    horizons: list[float] | None = None,
+    standings: list[bool] | None = None,
+    maxDistance: float | None = None,
+    maxPoses: int = 2**31 - 1,
+) -> list[dict[str, Any]]:
+    """Poses, as TeleportFull takes them, from which the agent sees an object within its reach."""
+    if maxPoses <= 0:
+        raise ActionError("maxPoses must be greater than 0")
+    item = sim.world.get(objectId)
+    reach = sim.settings.visibility_distance if maxDistance is None else maxDistance
+    turns = _steps(0.0, 360.0 - 1e-6, sim.settings.rotate_step) if rotations is None else rotations
+    tilts = _steps(-MAX_UP, MAX_DOWN, _TILT) if horizons is None else horizons
+    heights = [True, False] if standings is None else standings
+    found: list[dict[str, Any]] = []
+    for position in reachable_positions(sim) if positions is None else positions:
+        for tilt in tilts:
+            for turn in turns:
+                for standing in heights:
+                    stand = Agent(to_array(position), turn % 360.0, tilt, standing)
+                    if sim.sees_from(stand, item, reach):
+                        found.append({**position, "rotation": turn, "standing": standing, "horizon": tilt})
+                        if len(found) == maxPoses:
+                            return found
+    return found
+
+
+def _steps(first: float, last: float, size: float) -> list[float]:
+    return [first + index * size for index in range(int((last - first) / size) + 1)]

@@ -1,0 +1,32 @@
+"""Other colours and patterns than the usual ones, laid over a scene's primitives."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from infthor_eval.sim.appearance import Appearance
+from infthor_eval.sim.geometry import Array
+from infthor_eval.sim.render.primitives import COLOR, INSTANCE, MATERIAL, Material
+
+__all__ = ["PATTERNS", "refinished"]
+
+PATTERNS = tuple(int(m) for m in Material if m not in (Material.GLASS, Material.PLAIN))
+"""Patterns that a surface may be given for its own."""
+
+
+def refinished(prims: Array, names: Sequence[str], look: Appearance) -> Array:
+    """The primitives (n, COLUMNS) as they look now; `names` are those of the instances."""
+    if look.usual:
+        return prims
+    tints, patterns = np.tile(look.light, (len(names), 1)), np.full(len(names), -1)
+    for index, name in enumerate(names):
+        finish = look.finishes.get(name)
+        if finish is not None:
+            tints[index] *= finish.tint
+            patterns[index] = -1 if finish.pattern is None else finish.pattern
+    instance = prims[:, INSTANCE].astype(int)
+    out = prims.copy()
+    out[:, COLOR : COLOR + 3] = np.minimum(prims[:, COLOR : COLOR + 3] * tints[instance], 1.0)
+    solid = (prims[:, MATERIAL] != Material.GLASS) & (patterns[instance] >= 0)
+    out[solid, MATERIAL] = patterns[instance][solid]
+    return out

@@ -1,0 +1,34 @@
+"""Things that slide over what they stand on."""
+
+from infthor_eval.sim.clearance import obstacle_at
+from infthor_eval.sim.falling import let_fall, settle_in
+from infthor_eval.sim.geometry import Array
+from infthor_eval.sim.objects import SimObject
+from infthor_eval.sim.world import World
+
+__all__ = ["slide"]
+
+_STEP = 0.02  # metres between two looks at what is in the way
+_FARTHEST = 5.0  # metres; no room is much larger
+
+
+def slide(world: World, item: SimObject, direction: Array, distance: float) -> None:
+    """Move an object, with its contents, along `direction` (3,) for at most `distance` metres.
+
+    It stops before what is in its way. Once its middle is beyond the edge of what it stands on, it falls.
+    """
+    support = None if item.parent is None else world.objects[item.parent]
+    for _ in range(int(min(distance, _FARTHEST) / _STEP)):
+        if obstacle_at(world, item, direction * _STEP) is not None:
+            break
+        world.shift([item], direction * _STEP)
+        if support is not None and _beyond(support, item.center):
+            let_fall(world, item, item.center)
+            return
+    if item.type.pickupable:
+        settle_in(world, item)
+
+
+def _beyond(support: SimObject, point: Array) -> bool:
+    low, high = support.bounds()
+    return not (low[0] <= point[0] <= high[0] and low[2] <= point[2] <= high[2])

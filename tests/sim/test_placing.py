@@ -1,0 +1,167 @@
+"""Putting objects anywhere, pushing them, and taking them out of the scene for a time."""
+
+import numpy as np
+import pytest
+
+from .harness import Bench
+
+
+@pytest.fixture
+def bench() -> Bench:
+    made = Bench(size=40)
+    made.reset("kitchen-1")
+    return made
+
+
+def bottom(bench: Bench, object_id: str) -> float:
+    return min(corner[1] for corner in bench.object(object_id)["axisAlignedBoundingBox"]["cornerPoints"])
+
+
+def free_point(bench: Bench, receptacle: str, object_id: str) -> dict[str, float]:
+    for point in bench.ok("GetSpawnCoordinatesAboveReceptacle", objectId=receptacle)["actionReturn"]:
+        if bench.step("PlaceObjectAtPoint", objectId=object_id, position=point)["lastActionSuccess"]:
+            return point
+    raise AssertionError(f"no room on {receptacle}")
+
+
+def test_an_object_stands_on_a_point_of_a_receptacle(bench):
+    table, mug = bench.first("DiningTable"), bench.first("Mug")
+    point = free_point(bench, table, mug)
+    assert bottom(bench, mug) == pytest.approx(point["y"], abs=1e-3)
+    assert bench.object(mug)["parentReceptacles"] == [table]
+    apple = bench.first("Apple")
+    assert "not clear" in bench.refused("PlaceObjectAtPoint", objectId=apple, position=point)
+    outside = {"x": 40, "y": 0, "z": 0}
+    assert "not clear" in bench.refused("PlaceObjectAtPoint", objectId=apple, position=outside)
+
+
+def test_a_held_object_can_be_placed(bench):
+    apple = bench.first("Apple")
+    bench.ok("PickupObject", objectId=apple, forceAction=True)
+    free_point(bench, bench.first("DiningTable"), apple)
+    assert bench.metadata["inventoryObjects"] == []
+
+
+def test_points_above_a_receptacle(bench):
+    table = bench.first("DiningTable")
+    points = bench.ok("GetSpawnCoordinatesAboveReceptacle", objectId=table)["actionReturn"]
+    low, high = bench.sim.world.objects[table].bounds()
+    assert len(points) > 50
+    assert all(low[0] <= p["x"] <= high[0] and low[2] <= p["z"] <= high[2] for p in points)
+    bench.stand_before(table)
+    seen = bench.ok("GetSpawnCoordinatesAboveReceptacle", objectId=table, anywhere=False)["actionReturn"]
+    assert len(seen) < len(points)
+    assert "not a receptacle" in bench.refused("GetSpawnCoordinatesAboveReceptacle", objectId=bench.first("Apple"))
+
+
+def test_a_teleported_object_falls_unless_it_is_kinematic(bench):
+    apple = bench.first("Apple")
+    agent = bench.metadata["agent"]["position"]
+    high = {"x": agent["x"], "y": 2.0, "z": agent["z"]}
+    still = {"x": 0, "y": 0, "z": 0}
+    bench.ok("TeleportObject", objectId=apple, position=high, rotation=still, forceKinematic=True)
+    assert bench.object(apple)["position"] == pytest.approx(high)
+    bench.ok("TeleportObject", objectId=apple, rotation=still, **high)
+    assert bottom(bench, apple) == pytest.approx(0, abs=0.01)
+    wall = {"x": 50, "y": 2.0, "z": 0}
+    assert "in the way" in bench.refused("TeleportObject", objectId=apple, position=wall, rotation=still)
+    bench.ok("TeleportObject", objectId=apple, positions=[wall, high], rotation=still, forceKinematic=True)
+    assert bench.object(apple)["position"] == pytest.approx(high)
+
+
+def test_a_held_object_is_teleported_on_demand_only(bench):
+    apple = bench.first("Apple")
+    bench.ok("PickupObject", objectId=apple, forceAction=True)
+    place = {"objectId": apple, "position": {"x": 0, "y": 2, "z": 0}, "rotation": {"y": 0}, "forceAction": True}
+    assert "in hand" in bench.refused("TeleportObject", **place)
+    bench.ok("TeleportObject", **place, allowTeleportOutOfHand=True)
+    assert bench.metadata["inventoryObjects"] == []
+
+
+def test_furniture_can_be_teleported(bench):
+    fridge = bench.first("Fridge")
+    pose = bench.object(fridge)
+    aside = {**pose["position"], "x": pose["position"]["x"] + 0.1}
+    bench.ok("TeleportObject", objectId=fridge, position=aside, rotation=pose["rotation"], forceAction=True)
+    assert bench.object(fridge)["position"] == pytest.approx(aside)
+
+
+def test_a_disabled_object_is_gone_until_it_is_enabled(bench):
+    mug, table = bench.first("Mug"), bench.first("DiningTable")
+    free_point(bench, table, mug)
+    before = bench.object(mug)
+    bench.ok("DisableObject", objectId=mug)
+    assert mug not in {o["objectId"] for o in bench.metadata["objects"]}
+    assert mug not in bench.object(table)["receptacleObjectIds"]
+    bench.refused("PickupObject", objectId=mug, forceAction=True)
+    bench.ok("EnableObject", objectId=mug)
+    assert bench.object(mug)["position"] == before["position"]
+    assert bench.object(mug)["parentReceptacles"] == [table]
+    bench.ok("EnableObject", objectId=mug)
+    bench.refused("EnableObject", objectId="Mug|+09.00|+09.00|+09.00")
+
+
+def test_contents_of_a_disabled_receptacle_find_back_to_it(bench):
+    world = bench.sim.world
+    drawer = next(o for o in world.objects.values() if o.object_type == "Drawer" and o.contents)
+    inside = list(drawer.contents)
+    bench.ok("DisableObject", objectId=drawer.object_id)
+    assert all(bench.object(content)["parentReceptacles"] is None for content in inside)
+    bench.ok("EnableObject", objectId=drawer.object_id)
+    assert set(inside) <= set(bench.object(drawer.object_id)["receptacleObjectIds"])
+
+
+@pytest.mark.parametrize("angle", [0, 90, 180, 270, -90])
+def test_a_push_goes_the_way_of_its_angle(bench, angle):
+    apple, place = in_the_open(bench)
+    bench.ok("RotateLook", rotation={"y": 90})
+    bench.ok("DirectionalPush", objectId=apple, pushAngle=angle, moveMagnitude=15, forceAction=True)
+    now = bench.object(apple)["position"]
+    way = np.array([now["x"] - place["x"], now["z"] - place["z"]])
+    direction = np.array([np.sin(np.radians(90 + angle)), np.cos(np.radians(90 + angle))])
+    assert way @ direction > 0.02
+    assert abs(way @ direction[::-1] * (1, -1)[0]) < 1e-6 or np.linalg.norm(way - direction * (way @ direction)) < 1e-6
+
+
+def in_the_open(bench: Bench) -> tuple[str, dict[str, float]]:
+    """An apple on the free floor, and where it lies."""
+    apple = bench.first("Apple")
+    world = bench.sim.world
+    x, z = max(world.nav, key=lambda c: sum(world.nav.freedom(*c, yaw) for yaw in (0.0, 90.0, 180.0, 270.0)))
+    still = {"x": 0, "y": 0, "z": 0}
+    bench.ok("TeleportObject", objectId=apple, x=x, y=1.0, z=z, rotation=still, forceAction=True)
+    return apple, bench.object(apple)["position"]
+
+
+def test_a_stronger_push_goes_farther_and_nothing_goes_through_walls(bench):
+    low, high = bench.sim.world.scene_bounds()
+    ways = []
+    for force in (5, 15, 100000):
+        apple, place = in_the_open(bench)
+        bench.ok("PushObject", objectId=apple, moveMagnitude=force, forceAction=True)
+        now = bench.object(apple)["position"]
+        ways.append(np.hypot(now["x"] - place["x"], now["z"] - place["z"]))
+        assert low[0] <= now["x"] <= high[0]
+        assert low[2] <= now["z"] <= high[2]
+    assert ways == sorted(ways)
+    assert ways[0] < ways[2]
+
+
+def test_pushed_off_the_edge_it_falls(bench):
+    table, apple = bench.first("DiningTable"), bench.first("Apple")
+    free_point(bench, table, apple)
+    level = bottom(bench, apple)
+    for angle in (0, 90, 180, 270):
+        bench.ok("DirectionalPush", objectId=apple, pushAngle=angle, moveMagnitude=60, forceAction=True)
+        if bottom(bench, apple) < level - 0.2:
+            assert bench.object(apple)["parentReceptacles"] != [table]
+            return
+    pytest.fail("it never left the table")
+
+
+def test_what_cannot_be_pushed(bench):
+    assert "Pickupable or Moveable" in bench.refused("PushObject", objectId=bench.first("Fridge"), forceAction=True)
+    apple = bench.first("Apple")
+    bench.refused("PullObject", objectId=apple, moveMagnitude=0, forceAction=True)
+    bench.ok("PickupObject", objectId=apple, forceAction=True)
+    assert "Throw" in bench.refused("PullObject", objectId=apple, forceAction=True)

@@ -1,0 +1,129 @@
+"""What can be asked of a scene: standing places, poses, outlines, points; and what replies tell of."""
+
+import math
+
+import numpy as np
+import pytest
+
+from .harness import Bench
+
+
+@pytest.fixture
+def bench() -> Bench:
+    made = Bench(size=60)
+    made.reset("kitchen-1")
+    return made
+
+
+def positions(bench: Bench, **arguments: object) -> set[tuple[float, float]]:
+    return {(p["x"], p["z"]) for p in bench.ok("GetReachablePositions", **arguments)["actionReturn"]}
+
+
+def test_the_grid_of_standing_places(bench):
+    usual, fine = positions(bench), positions(bench, gridSize=0.125)
+    assert usual < fine
+    assert len(fine) > 3 * len(usual)
+    coarse = positions(bench, gridSize=0.5)
+    assert coarse < usual
+    bench.reset("kitchen-1", gridSize=0.125)
+    assert positions(bench) == fine
+    bench.refused("GetReachablePositions", gridSize=0)
+    bench.refused("GetReachablePositions", maxStepCount=1)
+
+
+def test_standing_places_in_the_directions_of_the_agent(bench):
+    usual = positions(bench)
+    bench.ok("RotateRight", degrees=30)
+    assert positions(bench) == usual
+    turned = positions(bench, directionsRelativeAgent=True)
+    here = bench.metadata["agent"]["position"]
+    assert len(turned) > len(usual) / 2
+    for x, z in turned:
+        dx, dz, angle = x - here["x"], z - here["z"], math.radians(30)
+        ahead, aside = dx * math.sin(angle) + dz * math.cos(angle), dx * math.cos(angle) - dz * math.sin(angle)
+        assert abs(ahead / 0.25 - round(ahead / 0.25)) < 1e-3
+        assert abs(aside / 0.25 - round(aside / 0.25)) < 1e-3
+
+
+def test_every_interactable_pose_sees_the_object(bench):
+    fridge = bench.first("Fridge")
+    poses = bench.ok("GetInteractablePoses", objectId=fridge, horizons=[0, 30])["actionReturn"]
+    assert len(poses) > 20
+    assert set(poses[0]) == {"x", "y", "z", "rotation", "standing", "horizon"}
+    for pose in poses[:: len(poses) // 8]:
+        bench.ok("TeleportFull", **{**pose, "rotation": {"y": pose["rotation"]}})
+        assert bench.object(fridge)["visible"]
+
+
+def test_interactable_poses_can_be_narrowed(bench):
+    fridge = bench.first("Fridge")
+    every = bench.ok("GetInteractablePoses", objectId=fridge, maxPoses=9)["actionReturn"]
+    assert bench.ok("GetInteractablePoses", objectId=fridge, maxPoses=5)["actionReturn"] == every[:5]
+    some = bench.ok(
+        "GetInteractablePoses", objectId=fridge, rotations=[0, 45], horizons=[0], standings=[True], maxDistance=4
+    )["actionReturn"]
+    assert all(p["rotation"] in (0, 45) and p["horizon"] == 0 and p["standing"] for p in some)
+    place = {key: every[0][key] for key in "xyz"}
+    here = bench.ok("GetInteractablePoses", objectId=fridge, positions=[place])["actionReturn"]
+    assert here
+    assert all({key: p[key] for key in "xyz"} == place for p in here)
+    inside = next(o.object_id for o in bench.sim.world.objects.values() if bench.sim.world.hidden(o))
+    assert bench.ok("GetInteractablePoses", objectId=inside)["actionReturn"] == []
+
+
+def test_outlines_from_above(bench):
+    table = bench.first("DiningTable")
+    hull = np.array(bench.ok("Get2DSemanticHull", objectId=table)["actionReturn"])
+    corners = np.array(bench.object(table)["axisAlignedBoundingBox"]["cornerPoints"])[:, [0, 2]]
+    assert hull.shape == (4, 2)
+    assert sorted(map(tuple, hull.round(3))) == sorted({tuple(c) for c in corners.round(3)})
+    every = bench.ok("Get2DSemanticHulls")["actionReturn"]
+    assert set(every) == {o["objectId"] for o in bench.metadata["objects"]}
+    some = bench.ok("Get2DSemanticHulls", objectTypes=["Fridge", "Mug"])["actionReturn"]
+    assert {name.split("|")[0] for name in some} == {"Fridge", "Mug"}
+    assert list(bench.ok("Get2DSemanticHulls", objectIds=[table])["actionReturn"]) == [table]
+    bench.refused("Get2DSemanticHulls", objectIds=[table], objectTypes=["Mug"])
+
+
+def test_points_that_the_frame_shows(bench):
+    fridge = bench.first("Fridge")
+    bench.stand_before(fridge)
+    camera = bench.metadata["cameraPosition"]
+    picture = bench.sim.view()
+    for x, y in ((0.5, 0.5), (0.2, 0.7), (0.8, 0.3)):
+        point = bench.ok("GetCoordinateFromRaycast", x=x, y=y)["actionReturn"]
+        away = np.array([point[k] - camera[k] for k in "xyz"]) @ picture.camera.matrix
+        depth = picture.depth[int((1 - y) * 60), int(x * 60)]
+        assert away[2] == pytest.approx(depth, rel=0.05)
+        slope = math.tan(math.radians(30))
+        assert away[0] / away[2] / slope == pytest.approx(2 * x - 1, abs=1e-6)
+        assert away[1] / away[2] / slope == pytest.approx(1 - 2 * y, abs=1e-6)
+    for x, y in ((1.5, 0.5), (-0.1, 0.8)):
+        assert "must be in [0:1]" in bench.refused("GetCoordinateFromRaycast", x=x, y=y)
+
+
+def test_a_wall_is_no_object(bench):
+    seen = set()
+    for _ in range(4):
+        bench.ok("RotateRight")
+        for x, y in ((0.5, 0.02), (0.5, 0.3), (0.1, 0.1), (0.5, 0.6)):
+            reply = bench.step("GetObjectInFrame", x=x, y=y)
+            seen.add(reply["lastActionSuccess"])
+            if reply["lastActionSuccess"]:
+                assert reply["actionReturn"] in bench.sim.world.objects
+            else:
+                assert reply["errorMessage"] == f"no sim objects found at ({x},{y})"
+    assert seen == {True, False}
+
+
+def test_replies_tell_of_the_wanted_objects_only(bench):
+    every = [o["objectId"] for o in bench.metadata["objects"]]
+    wanted = [bench.first("Fridge"), bench.first("Mug")]
+    told = bench.ok("SetObjectFilter", objectIds=wanted)["objects"]
+    assert {o["objectId"] for o in told} == set(wanted)
+    assert bench.ok("SetObjectFilter", objectIds=[])["objects"] == []
+    bench.ok("OpenObject", objectId=wanted[0], forceAction=True)
+    assert [o["objectId"] for o in bench.ok("ResetObjectFilter")["objects"]] == every
+    assert bench.object(wanted[0])["isOpen"]
+    bench.ok("SetObjectFilter", objectIds=[])
+    assert len(bench.reset("kitchen-1")["objects"]) == len(every)
