@@ -130,16 +130,37 @@ def test_ids_frame_names_every_object_by_its_colour():
     assert len(bench.frames[FieldType.CLASSES]) == 120 * 120 * 4
 
 
-def test_supersampling_changes_colours_only():
+def test_smoothing_changes_colours_only():
     bench = Bench(size=100)
     bench.reset("living-room-1", renderInstanceSegmentation=True, renderDepthImage=True)
-    plain = bench.frames
-    bench.ok("ChangeQuality", quality="Ultra")
     fine = bench.frames
+    bench.ok("ChangeQuality", quality="Low")
+    plain = bench.frames
     assert plain[FieldType.IDS] == fine[FieldType.IDS]
     assert plain[FieldType.DEPTH] == fine[FieldType.DEPTH]
     a, b = (np.frombuffer(f[FieldType.RGB], dtype=np.uint8).astype(int) for f in (plain, fine))
     assert 0 < np.abs(a - b).mean() < 12
+    bench.reset("living-room-1", renderInstanceSegmentation=True)
+    assert bench.frames[FieldType.RGB] == plain[FieldType.RGB], "the quality stays over a Reset, as Unity's does"
+    bench.ok("ChangeQuality", quality="Ultra")
+    assert bench.frames[FieldType.RGB] == fine[FieldType.RGB]
+
+
+@RASTERIZERS
+def test_a_smooth_edge_is_between_what_it_divides(name):
+    rasterizer = choose_rasterizer(name)
+    tilted = [ShapePart(Form.BOX, (0, 0, 0), (0.5, 0.5, 0.1), (0.9, 0.1, 0.1), matrix=euler_matrix((0, 0, 20)))]
+    behind = [ShapePart(Form.BOX, (0, 0, 1), (9, 9, 0.1), (0.1, 0.1, 0.9))]
+    straight = np.array([0.0, 0.0, 2.0])
+    prims = np.concatenate([rows(tilted, straight, STRAIGHT, 0), rows(behind, straight, STRAIGHT, 1)])
+    picture = cast_picture(prims, ("a", "b"), camera(), rasterizer)
+    smooth = colour_picture(picture, Lights.none(), rasterizer)[:, :, 0].astype(int)
+    sharp = colour_picture(picture, Lights.none(), rasterizer, antialias=False)[:, :, 0].astype(int)
+    changed = smooth != sharp
+    assert 40 < changed.sum() < 500
+    assert smooth.min() >= sharp.min()
+    assert smooth.max() <= sharp.max()
+    assert len(np.unique(smooth[changed])) > 3
 
 
 def test_a_held_object_floats_in_the_lower_middle():

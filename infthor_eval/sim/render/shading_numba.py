@@ -24,11 +24,11 @@ from infthor_eval.sim.render.primitives import (
     Material,
 )
 
-__all__ = ["shade"]
+__all__ = ["level_at", "shade"]
 
 _RIM = 1.0 - 1e-6
 _BANDS = 8
-_BOX, _ELLIPSOID, _CUP = int(Form.BOX), int(Form.ELLIPSOID), int(Form.CUP)
+_BOX, _ELLIPSOID, _CUP, _BOWL = int(Form.BOX), int(Form.ELLIPSOID), int(Form.CUP), int(Form.BOWL)
 _SUN_X, _SUN_Y, _SUN_Z = SUN_DIRECTION
 _WOOD, _PLANKS, _TILES = int(Material.WOOD), int(Material.PLANKS), int(Material.TILES)
 _FABRIC, _STONE, _METAL = int(Material.FABRIC), int(Material.STONE), int(Material.METAL)
@@ -39,14 +39,20 @@ _glass, _paper, _carpet = (njit(cache=True)(f) for f in (patterns.glass, pattern
 
 
 def shade(
-    prims: Array, seen: Projection, camera: Camera, depth: Array, nearest: NDArray[np.int32], lights: Lights
+    prims: Array,
+    seen: Projection,
+    camera: Camera,
+    depth: Array,
+    nearest: NDArray[np.int32],
+    factors: Array,
+    lights: Lights,
 ) -> NDArray[np.uint8]:
-    """RGB picture (h, w, 3), bottom row first, of what `cast` found."""
+    """RGB picture (h, w, 3), bottom row first, of what `cast` found, each pixel's brightness times its factor."""
     us, vs = camera.rays()
     rgb = np.zeros((*nearest.shape, 3), dtype=np.uint8)
     _shade(
         prims[seen.index], seen.origin, seen.steps, camera.position, camera.matrix, us, vs, depth, nearest,
-        lights.lamps, lights.daylight, rgb,
+        factors, lights.lamps, lights.daylight, rgb,
     )  # fmt: skip
     return rgb
 
@@ -88,6 +94,8 @@ def _surface(p: Array, x: float, y: float, z: float) -> Any:
             nx, nz, a, b = 0.0, 0.0, x * hx, z * hz
         else:
             nx, ny, a = 0.0, 0.0, x * hx
+    elif p[FORM] == _BOWL:
+        ny = (y - 1.0) * 0.25
     elif p[FORM] != _ELLIPSOID:
         if ay >= _RIM and not (y > 0 and p[FORM] == _CUP):
             nx, nz = 0.0, 0.0
@@ -120,6 +128,23 @@ def _light(n: Any, r: Any, w: Any, lamps: Array, daylight: float) -> float:
     return light
 
 
+@njit(cache=True)
+def level_at(p: Array, o: Array, s: Array, ray: Any, eye: Array, view: Array, lamps: Array, daylight: float) -> float:
+    """Brightness of what the primitive `p` shows at depth t on the ray (u, v, t)."""
+    u, v, t = ray
+    lx = o[0] + t * ((s[0, 0] + u * s[1, 0]) + v * s[2, 0])
+    ly = o[1] + t * ((s[0, 1] + u * s[1, 1]) + v * s[2, 1])
+    lz = o[2] + t * ((s[0, 2] + u * s[1, 2]) + v * s[2, 2])
+    nx, ny, nz, a, b = _surface(p, lx, ly, lz)
+    rx = (view[0, 2] + u * view[0, 0]) + v * view[0, 1]
+    ry = (view[1, 2] + u * view[1, 0]) + v * view[1, 1]
+    rz = (view[2, 2] + u * view[2, 0]) + v * view[2, 1]
+    w = (eye[0] + t * rx, eye[1] + t * ry, eye[2] + t * rz)
+    light = _light((nx, ny, nz), (rx, ry, rz), w, lamps, daylight)
+    glow = p[EMISSION]
+    return glow * 1.15 + (1.0 - glow) * (light * _pattern(p[MATERIAL], a, b))
+
+
 @njit(cache=True, parallel=True)
 def _shade(
     prims: Array,
@@ -131,6 +156,7 @@ def _shade(
     vs: Array,
     depth: Array,
     nearest: NDArray[np.int32],
+    factors: Array,
     lamps: Array,
     daylight: float,
     rgb: NDArray[np.uint8],
@@ -138,23 +164,11 @@ def _shade(
     height = len(vs)
     for band in prange(_BANDS):
         for y in range(band * height // _BANDS, (band + 1) * height // _BANDS):
-            v = vs[y]
             for x in range(len(us)):
                 order = nearest[y, x]
                 if order < 0:
                     continue
-                p, o, s = prims[order], origin[order], steps[order]
-                u, t = us[x], depth[y, x]
-                lx = o[0] + t * ((s[0, 0] + u * s[1, 0]) + v * s[2, 0])
-                ly = o[1] + t * ((s[0, 1] + u * s[1, 1]) + v * s[2, 1])
-                lz = o[2] + t * ((s[0, 2] + u * s[1, 2]) + v * s[2, 2])
-                nx, ny, nz, a, b = _surface(p, lx, ly, lz)
-                rx = (view[0, 2] + u * view[0, 0]) + v * view[0, 1]
-                ry = (view[1, 2] + u * view[1, 0]) + v * view[1, 1]
-                rz = (view[2, 2] + u * view[2, 0]) + v * view[2, 1]
-                w = (eye[0] + t * rx, eye[1] + t * ry, eye[2] + t * rz)
-                light = _light((nx, ny, nz), (rx, ry, rz), w, lamps, daylight)
-                glow = p[EMISSION]
-                level = glow * 1.15 + (1.0 - glow) * (light * _pattern(p[MATERIAL], a, b))
+                p, ray = prims[order], (us[x], vs[y], depth[y, x])
+                level = level_at(p, origin[order], steps[order], ray, eye, view, lamps, daylight) * factors[y, x]
                 for i in range(3):
                     rgb[y, x, i] = np.uint8(min(p[COLOR + i] * level * 255.0, 255.0))
