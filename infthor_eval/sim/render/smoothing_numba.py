@@ -1,7 +1,6 @@
 """Smoothing of jagged pixels, compiled by numba."""
 
 import math
-from typing import Any
 
 import numpy as np
 from numba import njit, prange
@@ -39,7 +38,7 @@ def smooth(
     )  # fmt: skip
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _candidates(nearest: NDArray[np.int32], y: int, x: int, found: NDArray[np.int64]) -> int:
     """Positions in `_AROUND` of pixels that each show another primitive, written to `found`; how many there are."""
     count = 0
@@ -49,20 +48,21 @@ def _candidates(nearest: NDArray[np.int32], y: int, x: int, found: NDArray[np.in
             continue
         known = False
         for k in range(count):
-            at = _AROUND[found[k]]
-            known = known or nearest[y + at[0], x + at[1]] == nearest[yy, xx]
+            seen_at = found[k]
+            known = known or nearest[y + _AROUND[seen_at, 0], x + _AROUND[seen_at, 1]] == nearest[yy, xx]
         if not known:
             found[count] = j
             count += 1
     return count
 
 
-@njit(cache=True)
-def _depth(p: Array, o: Array, s: Array, u: float, v: float, clip: float) -> Any:
-    dx = (s[0, 0] + u * s[1, 0]) + v * s[2, 0]
-    dy = (s[0, 1] + u * s[1, 1]) + v * s[2, 1]
-    dz = (s[0, 2] + u * s[1, 2]) + v * s[2, 2]
-    return hit(p[FORM], p[BOTTOM], p[TOP], o[0], o[1], o[2], dx, dy, dz, clip)
+@njit(cache=True, inline="always")
+def _depth(prims: Array, origin: Array, steps: Array, k: int, u: float, v: float, clip: float) -> float:
+    dx = (steps[k, 0, 0] + u * steps[k, 1, 0]) + v * steps[k, 2, 0]
+    dy = (steps[k, 0, 1] + u * steps[k, 1, 1]) + v * steps[k, 2, 1]
+    dz = (steps[k, 0, 2] + u * steps[k, 1, 2]) + v * steps[k, 2, 2]
+    ox, oy, oz = origin[k, 0], origin[k, 1], origin[k, 2]
+    return hit(prims[k, FORM], prims[k, BOTTOM], prims[k, TOP], ox, oy, oz, dx, dy, dz, clip)
 
 
 @njit(cache=True, parallel=True)
@@ -96,7 +96,7 @@ def _smooth(
                 best, chosen = math.inf, -1
                 for k in range(count):
                     order = nearest[y + _AROUND[found[k], 0], x + _AROUND[found[k], 1]]
-                    t = _depth(prims[order], origin[order], steps[order], u, v, clip)
+                    t = _depth(prims, origin, steps, order, u, v, clip)
                     if clip < t < far and t < best:
                         best, chosen = t, k
                 if chosen < 0:
@@ -104,12 +104,11 @@ def _smooth(
                     continue
                 yy, xx = y + _AROUND[found[chosen], 0], x + _AROUND[found[chosen], 1]
                 order = nearest[yy, xx]
-                p = prims[order]
-                level = level_at(p, origin[order], steps[order], (u, v, best), eye, view, lamps, daylight)
+                level = level_at(prims, origin, steps, order, (u, v, best), eye, view, lamps, daylight)
                 level = level * factors[yy, xx]
-                red += min(p[COLOR] * level * 255.0, 255.0)
-                green += min(p[COLOR + 1] * level * 255.0, 255.0)
-                blue += min(p[COLOR + 2] * level * 255.0, 255.0)
+                red += min(prims[order, COLOR] * level * 255.0, 255.0)
+                green += min(prims[order, COLOR + 1] * level * 255.0, 255.0)
+                blue += min(prims[order, COLOR + 2] * level * 255.0, 255.0)
             rgb[y, x, 0] = np.uint8(red / len(_PARTS))
             rgb[y, x, 1] = np.uint8(green / len(_PARTS))
             rgb[y, x, 2] = np.uint8(blue / len(_PARTS))
