@@ -114,7 +114,16 @@ def _hit_cylinder(
 
 @njit(cache=True, inline="always")
 def hit(
-    form: float, bottom: float, top: float, ox: float, oy: float, oz: float, dx: float, dy: float, dz: float, clip: float
+    form: float,
+    bottom: float,
+    top: float,
+    ox: float,
+    oy: float,
+    oz: float,
+    dx: float,
+    dy: float,
+    dz: float,
+    clip: float,
 ) -> float:
     """Depth at which a ray from o along d meets a primitive, in its scaled frame; infinity where it does not."""
     if form == _BOX:

@@ -38,9 +38,7 @@ def shade(
     return rgb
 
 
-def level_at(
-    p: Array, o: Array, s: Array, rays: tuple[Array, Array, Array], camera: Camera, lights: Lights
-) -> Array:
+def level_at(p: Array, o: Array, s: Array, rays: tuple[Array, Array, Array], camera: Camera, lights: Lights) -> Array:
     """Brightness (n,) of what the primitives `p` (n, COLUMNS) show at depth t on the rays (u, v, t)."""
     u, v, t = rays
     local = [o[:, i] + t * ((s[:, 0, i] + u * s[:, 1, i]) + v * s[:, 2, i]) for i in range(3)]

@@ -53,9 +53,7 @@ def smooth(
     rgb[ys, xs] = (total / len(_PARTS)).astype(np.uint8)
 
 
-def _depths(
-    prims: Array, seen: Projection, camera: Camera, orders: NDArray[np.int32], u: Array, v: Array
-) -> Array:
+def _depths(prims: Array, seen: Projection, camera: Camera, orders: NDArray[np.int32], u: Array, v: Array) -> Array:
     """Depth of each candidate (n, m) on the rays (u, v) (n,); infinity where it is not met."""
     depths = np.full(orders.shape, np.inf)
     for order in np.unique(orders[orders >= 0]):
