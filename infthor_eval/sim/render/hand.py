@@ -15,8 +15,8 @@ from infthor_eval.sim.render.primitives import AXES, CENTER, HALF
 __all__ = ["held_rows"]
 
 _AWAY = 0.16  # metres before the lens: nearer than anything that the agent can stand before
-_LOW = 0.68  # from the middle of the picture down, as a share of its half height
-_LEAST, _GROWTH, _MOST = 0.13, 0.34, 0.3  # shares of the picture's height: of all things, per metre of size, at most
+_LOW = 0.74  # from the middle of the picture down, as a share of its half height
+_LEAST, _GROWTH, _MOST = 0.13, 0.3, 0.25  # shares of the picture's height: of all things, per metre of size, at most
 _TILT = euler_matrix((-24.0, 0.0, 0.0))  # towards the eye: one sees into bowls and the faces of flat things
 _TURN = 155.0  # degrees: the front, which doors, screens and clocks have, faces the eye and a little aside
 
