@@ -75,7 +75,7 @@ def close_up(object_type: str) -> Image.Image:
     item.state.openness = float(object_type in _OPEN)
     item.hinge = -1
     reach = float(np.linalg.norm(item.box_size)) * (1.4 if item.state.openness else 1.0)
-    ground = ShapePart(Form.BOX, (0, -0.02, 0), (4, 0.02, 4), (0.62, 0.6, 0.56), Material.STONE)
+    ground = ShapePart(Form.BOX, (0, -0.02, 0), (30, 0.02, 30), (0.62, 0.6, 0.56), Material.STONE)
     under = np.array([0.0, float(item.bounds()[0][1]), 0.0])
     prims = np.concatenate([rows([ground], under, np.eye(3), 0), rows(shape(item), item.position, item.matrix, 1)])
     view = euler_matrix((34.0, 205.0, 0.0))
@@ -103,7 +103,7 @@ def main() -> None:
     ]  # fmt: skip
     tiles += [(object_type, close_up(object_type)) for object_type in _SHAPES]
     tiles += [(f"{name}, {object_type} in hand", in_hand(sim, name, object_type)) for name, object_type in _HELD]
-    lay(tiles).save(out, optimize=True)
+    lay(tiles).quantize(256, dither=Image.Dither.NONE).save(out, optimize=True)
 
 
 def lay(tiles: list[tuple[str, Image.Image]]) -> Image.Image:

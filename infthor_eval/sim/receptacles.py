@@ -134,7 +134,7 @@ def _neighbours(world: World, item: SimObject, receptacle: SimObject) -> Iterato
 def _standing(world: World, receptacle: SimObject, surface: Surface) -> Iterator[SimObject]:
     """What stands on the surface for good: lamps, screens, appliances, taps, burners."""
     for other in world.objects.values():
-        if other.type.pickupable or other.type.furniture or other.type.fitted or other is receptacle:
+        if other.type.pickupable or other.type.furniture or other.type.stacked or other is receptacle:
             continue
         if abs(float(other.bounds()[0][1]) - float(surface.center[1])) < _ON_IT:
             yield other

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 __all__ = ["AROUND", "PARTS", "jagged"]
 
-_JUMP = 36  # of the three channels' sum of 765
+_JUMP = 48  # of the three channels' sum of 765
 PARTS = ((-0.125, -0.375), (0.375, -0.125), (-0.375, 0.125), (0.125, 0.375))
 """Where the rays go through a pixel, from its middle, as shares of its width and height."""
 AROUND = ((0, 0), (0, -1), (0, 1), (-1, 0), (1, 0), (-1, -1), (-1, 1), (1, -1), (1, 1))

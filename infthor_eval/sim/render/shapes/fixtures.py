@@ -93,7 +93,7 @@ def window(b: Builder) -> None:
     """A bright pane in a white frame with a cross, at the wall side of its box."""
     x, y, z = b.thick(0.03, 0), b.thick(0.03, 1), b.thick(0.05, 2)
     at = z - 1
-    b.box((0, 0, at), (1, 1, z * 0.85), _SKY, Material.GLASS, glow=0.8)
+    b.box((0, 0, at), (1 - x, 1 - y, z * 0.85), _SKY, Material.GLASS, glow=0.8)
     for side in (-1, 1):
         b.box((side * (1 - x), 0, at), (x, 1, z), WHITE)
         b.box((0, side * (1 - y), at), (1, y, z), WHITE)

@@ -24,12 +24,12 @@ def cloth(b: Builder) -> None:
     """A striped cloth with one side folded over."""
     color: Color = (0.45, 0.38, 0.3) if b.state.dirty else pick(CLOTHS, b.style)
     stripe = shade_of(color, 0.75) if b.state.dirty else WHITE
-    b.box((0, -0.7, 0), (0.96, 0.3, 0.94), color, Material.FABRIC)
+    b.box((0, -0.5, 0), (0.97, 0.5, 0.96), color, Material.FABRIC)
     for at in (-0.8, -0.62, 0.62, 0.8):
-        b.box((0, -0.68, at), (0.965, 0.3, 0.05), stripe, Material.FABRIC)
-    b.box((-0.42, 0.0, 0.08), (0.5, 0.4, 0.8), shade_of(color, 1.2), Material.FABRIC, tilt=(0, 14, 2))
+        b.box((0, -0.48, at), (0.975, 0.5, 0.05), stripe, Material.FABRIC)
+    b.box((-0.4, 0.4, 0.06), (0.52, 0.55, 0.84), shade_of(color, 1.2), Material.FABRIC, tilt=(0, 14, 2))
     for at in (-0.62, 0.7):
-        b.box((-0.42 + 0.14 * at, 0.06, 0.08 + 0.85 * at), (0.5, 0.4, 0.06), stripe, Material.FABRIC, tilt=(0, 14, 2))
+        b.box((-0.4 + 0.14 * at, 0.46, 0.06 + 0.85 * at), (0.52, 0.55, 0.06), stripe, Material.FABRIC, tilt=(0, 14, 2))
 
 
 @draws
