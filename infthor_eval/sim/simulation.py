@@ -22,6 +22,7 @@ __all__ = ["Simulation", "ThirdPartyCamera"]
 
 
 _WELL_WITHIN = 0.9  # of half the frame
+_LENS_DIGITS = 5  # of the camera's position, metres
 
 
 @dataclass(frozen=True)
@@ -179,8 +180,13 @@ class Simulation:
                self.height, self.settings.field_of_view, self.settings.visibility_distance)  # fmt: skip
         if key == self._key:
             return
+        # The metadata rounds a pose: one that is told and set again must give the same picture.
         camera = Camera(
-            agent.camera_position(), agent.camera_matrix(), self.settings.field_of_view, self.width, self.height
+            np.round(agent.camera_position(), _LENS_DIGITS),
+            agent.camera_matrix(),
+            self.settings.field_of_view,
+            self.width,
+            self.height,
         )
         prims, _, names = self._model.primitives()
         self._view = cast_picture(prims, names, camera, self.rasterizer)
