@@ -1,4 +1,7 @@
-"""Draws `docs/contact_sheet.png`: three procedural rooms of each type, each from its most telling view.
+"""Draws `docs/contact_sheet.png`: rooms, close-ups of shapes, and what the hand holds.
+
+Three procedural rooms of each type, each from its most telling view; then shapes that took care to tell apart, from
+near; then frames in which the agent holds something.
 
 python benchmarks/contact_sheet.py [OUT.png]
 """
@@ -10,12 +13,26 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from infthor_eval.sim.actions import bind
+from infthor_eval.sim.default_objects import default_object
+from infthor_eval.sim.geometry import euler_matrix
+from infthor_eval.sim.objects import SimObject
+from infthor_eval.sim.render.camera import Camera
+from infthor_eval.sim.render.lighting import Lights
+from infthor_eval.sim.render.picture import cast_picture, choose_rasterizer, colour_picture
+from infthor_eval.sim.render.primitives import Form, Material, ShapePart, rows
+from infthor_eval.sim.render.shapes import shape
 from infthor_eval.sim.scenes.catalogue import Catalogue
 from infthor_eval.sim.simulation import Simulation
 
 _ROOMS = ("kitchen", "living-room", "bedroom", "bathroom")
 _SEEDS = (1, 2, 3)
 _SIZE, _LINE = 300, 16
+_NEAR = 150  # size of a close-up
+_OPEN = {"Box", "Fridge", "Drawer", "Cabinet"}
+_SHAPES = ("Bowl", "AppleSliced", "BreadSliced", "TomatoSliced", "PotatoSliced", "LettuceSliced", "BaseballBat",
+           "ButterKnife", "Knife", "Pencil", "Pen", "KeyChain", "Cloth", "Potato", "Pillow", "Bread", "Box", "Fridge",
+           "Drawer", "Cabinet", "SinkBasin", "DiningTable", "SideTable", "CoffeeTable")  # fmt: skip
+_HELD = (("kitchen-1", "Pan"), ("kitchen-2", "Bread"), ("bedroom-1", "BaseballBat"), ("living-room-1", "Box"))
 
 
 def do(sim: Simulation, action: str, **arguments: object) -> None:
@@ -24,12 +41,17 @@ def do(sim: Simulation, action: str, **arguments: object) -> None:
     found.run(sim, **checked)
 
 
+def picture(sim: Simulation) -> Image.Image:
+    """The agent's frame."""
+    return Image.fromarray(np.ascontiguousarray(sim.colours(sim.agent_picture())[::-1]))
+
+
 def interest(sim: Simulation) -> float:
     """How much a view shows: objects by the logarithm of their pixels, so that many middling ones beat one large."""
-    picture = sim.view()
-    counts = np.bincount(picture.instances.ravel() + 1, minlength=len(picture.names) + 1)[1:]
-    shown = [c for c, name in zip(counts, picture.names, strict=True) if "|" in name and c > 40]
-    crowding = float((picture.depth < 0.7).mean())
+    seen = sim.view()
+    counts = np.bincount(seen.instances.ravel() + 1, minlength=len(seen.names) + 1)[1:]
+    shown = [c for c, name in zip(counts, seen.names, strict=True) if "|" in name and c > 40]
+    crowding = float((seen.depth < 0.7).mean())
     return sum(float(np.log(c)) for c in shown) * (1 - crowding)
 
 
@@ -44,22 +66,60 @@ def best_view(sim: Simulation, name: str) -> Image.Image:
             views.append((interest(sim), x, z, yaw))
     _, x, z, yaw = max(views)
     do(sim, "Teleport", position={"x": x, "z": z}, rotation={"y": yaw}, horizon=20.0)
-    do(sim, "ChangeQuality", quality="Ultra")
-    return Image.fromarray(sim.colours(sim.agent_picture())[::-1])
+    return picture(sim)
+
+
+def close_up(object_type: str) -> Image.Image:
+    """A thing of the usual size on stone, from above and from its front's side."""
+    item: SimObject = default_object(object_type, np.zeros(3))
+    item.state.openness = float(object_type in _OPEN)
+    item.hinge = -1
+    reach = float(np.linalg.norm(item.box_size)) * (1.4 if item.state.openness else 1.0)
+    ground = ShapePart(Form.BOX, (0, -0.02, 0), (30, 0.02, 30), (0.62, 0.6, 0.56), Material.STONE)
+    under = np.array([0.0, float(item.bounds()[0][1]), 0.0])
+    prims = np.concatenate([rows([ground], under, np.eye(3), 0), rows(shape(item), item.position, item.matrix, 1)])
+    view = euler_matrix((34.0, 205.0, 0.0))
+    camera = Camera(item.center - view[:, 2] * reach * 2.5, view, 28.0, _NEAR, _NEAR)
+    rasterizer = choose_rasterizer()
+    seen = cast_picture(prims, ("ground", object_type), camera, rasterizer)
+    return Image.fromarray(np.ascontiguousarray(colour_picture(seen, Lights.none(), rasterizer)[::-1]))
+
+
+def in_hand(sim: Simulation, name: str, object_type: str) -> Image.Image:
+    """The frame of the view with the most to see, something in the hand."""
+    best_view(sim, name)
+    do(sim, "Initialize", fieldOfView=60)
+    item = next(o for o in sim.world.objects.values() if o.object_type == object_type)
+    do(sim, "PickupObject", objectId=item.object_id, forceAction=True)
+    return picture(sim)
 
 
 def main() -> None:
     """Draws the sheet."""
     out = Path(sys.argv[1] if len(sys.argv) > 1 else "docs/contact_sheet.png")
     sim = Simulation(Catalogue(), _SIZE, _SIZE)
-    sheet = Image.new("RGB", (_SIZE * len(_ROOMS), (_SIZE + _LINE) * len(_SEEDS)), "white")
+    tiles = [
+        (f"{room}-{seed}", best_view(sim, f"{room}-{seed}")) for seed in _SEEDS for room in _ROOMS
+    ]  # fmt: skip
+    tiles += [(object_type, close_up(object_type)) for object_type in _SHAPES]
+    tiles += [(f"{name}, {object_type} in hand", in_hand(sim, name, object_type)) for name, object_type in _HELD]
+    lay(tiles).quantize(256, dither=Image.Dither.NONE).save(out, optimize=True)
+
+
+def lay(tiles: list[tuple[str, Image.Image]]) -> Image.Image:
+    """The sheet of named pictures, in lines as wide as four rooms."""
+    places, x, y = [], 0, 0
+    for _, tile in tiles:
+        places.append((x, y))
+        x += tile.width
+        if x >= _SIZE * len(_ROOMS):
+            x, y = 0, y + tile.height + _LINE
+    sheet = Image.new("RGB", (_SIZE * len(_ROOMS), y), "white")
     draw = ImageDraw.Draw(sheet)
-    for column, room in enumerate(_ROOMS):
-        for row, seed in enumerate(_SEEDS):
-            x, y = column * _SIZE, row * (_SIZE + _LINE)
-            sheet.paste(best_view(sim, f"{room}-{seed}"), (x, y + _LINE))
-            draw.text((x + 4, y + 2), f"{room}-{seed}", fill="black")
-    sheet.save(out, optimize=True)
+    for (name, tile), (left, top) in zip(tiles, places, strict=True):
+        sheet.paste(tile, (left, top + _LINE))
+        draw.text((left + 4, top + 2), name, fill="black")
+    return sheet
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 """`python -m infthor_eval.sim [--data DIR] [--supplement FILE] <arguments of a Unity player>`.
 
 The Controller starts this process as if it were Unity and names the pipes in the environment. Of Unity's own
-arguments only the screen's size matters.
+arguments only the screen's size and the quality matter.
 """
 
 import os
@@ -21,6 +21,7 @@ def main(arguments: list[str] | None = None) -> int:
     from infthor_eval.sim.fifo import FifoPeer
     from infthor_eval.sim.peer import Peer
     from infthor_eval.sim.scenes.catalogue import Catalogue
+    from infthor_eval.sim.settings import SMOOTH_LEVELS
     from infthor_eval.sim.simulation import Simulation
 
     parser = ArgumentParser(
@@ -30,11 +31,13 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--supplement", type=Path)
     parser.add_argument("-screen-width", dest="width", type=int, default=300)
     parser.add_argument("-screen-height", dest="height", type=int, default=300)
+    parser.add_argument("-screen-quality", dest="quality", type=int, default=max(SMOOTH_LEVELS))
     options, _ = parser.parse_known_args(arguments)
     try:
         pipes = FifoPeer(_pipe("AI2THOR_FIFO_SERVER_PIPE_PATH"), _pipe("AI2THOR_FIFO_CLIENT_PIPE_PATH"))
         with pipes:
             sim = Simulation(Catalogue(options.data, options.supplement), options.width, options.height)
+            sim.antialias = options.quality in SMOOTH_LEVELS
             Peer(sim).serve(pipes)
     except BrokenPipeError:
         return 0  # the controller went away while a reply was under way

@@ -17,6 +17,7 @@ _WALL = 0.02  # thickness in metres of the sides and floors of hollow receptacle
 _STEP = 0.05
 _BELOW_HAND = 0.15  # metres below the agent's own height at which it likes best to put things
 _CLEARANCE = 0.008
+_ON_IT = 0.05  # metres between a surface and the underside of what stands on it
 
 
 PointFilter = Callable[[Array], NDArray[np.bool_]]
@@ -94,6 +95,7 @@ def find_place(
     crowd: float = 0.0,
     random: np.random.Generator | None = None,
     seen: PointFilter | None = None,
+    among_fixed: bool = False,
 ) -> SimObject | None:
     """A copy of `item` standing in the free place of `receptacle` that is nearest to the agent; None if it is full.
 
@@ -104,13 +106,15 @@ def find_place(
         crowd: how far, as a share of their size, neighbours may overlap.
         random: picks any free place instead of the nearest.
         seen: tells which of some points (n, 3) come into question; None: all.
+        among_fixed: it may stand in lamps, appliances and taps, whose boxes in recordings are coarser than they are.
     """
     boxes = [o.bounds() for o in _neighbours(world, item, receptacle)]
     ghost = item.duplicate(item.object_id)
     for surface in _by_reach(world, surfaces(receptacle)):
+        fixed = [] if among_fixed else [o.bounds() for o in _standing(world, receptacle, surface)]
         for turn in (0.0, 90.0):
             ghost.rotation = np.array([0.0, (surface.yaw + turn) % 360, 0.0])
-            place = _free_point(world, ghost, surface, boxes, crowd, random, seen)
+            place = _free_point(world, ghost, surface, boxes + fixed, crowd, random, seen)
             if place is not None:
                 ghost.place_bottom(place)
                 return ghost
@@ -124,6 +128,15 @@ def _neighbours(world: World, item: SimObject, receptacle: SimObject) -> Iterato
         if other.object_id in inside or other is receptacle or not other.type.pickupable:
             continue
         if other.parent == receptacle.object_id or (other.parent is not None and receptacle.parent != other.parent):
+            yield other
+
+
+def _standing(world: World, receptacle: SimObject, surface: Surface) -> Iterator[SimObject]:
+    """What stands on the surface for good: lamps, screens, appliances, taps, burners."""
+    for other in world.objects.values():
+        if other.type.pickupable or other.type.furniture or other.type.stacked or other is receptacle:
+            continue
+        if abs(float(other.bounds()[0][1]) - float(surface.center[1])) < _ON_IT:
             yield other
 
 

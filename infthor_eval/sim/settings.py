@@ -1,10 +1,13 @@
-"""What `Initialize` sets: how the agent moves and sees, and which pictures are sent."""
+"""What `Initialize` sets (how the agent moves and sees, which pictures are sent), and AI2-THOR's quality levels."""
 
 from dataclasses import dataclass
 
-__all__ = ["AGENT_MODES", "SimulatorSettings"]
+__all__ = ["AGENT_MODES", "SMOOTH_LEVELS", "SMOOTH_QUALITIES", "SimulatorSettings"]
 
 AGENT_MODES = ("default",)  # the arm agent registers its mode here when it comes
+SMOOTH_QUALITIES = {"High": 5, "Very High": 6, "Ultra": 7, "High WebGL": 8}
+"""The `quality` values whose pictures are anti-aliased, with the numbers that the Controller passes to the player."""
+SMOOTH_LEVELS = frozenset(SMOOTH_QUALITIES.values())
 
 
 @dataclass(frozen=True)
@@ -25,4 +28,3 @@ class SimulatorSettings:
     instances: bool = False
     classes: bool = False
     fast_emit: bool = True
-    supersample: bool = False

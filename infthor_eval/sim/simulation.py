@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from infthor_eval.sim.geometry import Array, euler_matrix, level_gaps
 from infthor_eval.sim.objects import SimObject
 from infthor_eval.sim.render.camera import FAR, NEAR, Camera, project
+from infthor_eval.sim.render.hand import held_rows
 from infthor_eval.sim.render.picture import Picture, Rasterizer, cast_picture, choose_rasterizer, colour_picture
 from infthor_eval.sim.render.primitives import INSTANCE
 from infthor_eval.sim.render.scene import SceneModel
@@ -21,6 +22,7 @@ __all__ = ["Simulation", "ThirdPartyCamera"]
 
 
 _WELL_WITHIN = 0.9  # of half the frame
+_LENS_DIGITS = 5  # of the camera's position, metres
 
 
 @dataclass(frozen=True)
@@ -41,6 +43,7 @@ class Simulation:
         width: of the pictures, pixels.
         height: of the pictures, pixels.
         catalogue: makes worlds from scene names.
+        antialias: whether edges in the pictures are smoothed; the player's quality decides, and a Reset leaves it.
         map_view: the agent's frame shows the scene from above.
         told: ids of the objects that replies tell of; None for all.
         failed_reset: why the last Reset found no scene; Initialize tells it again, as the client reads only that.
@@ -53,6 +56,7 @@ class Simulation:
     cameras: list[ThirdPartyCamera] = field(default_factory=list)
     random: np.random.Generator = field(default_factory=lambda: np.random.default_rng(0))
     rasterizer: Rasterizer = field(default_factory=choose_rasterizer)
+    antialias: bool = True
     map_view: bool = False
     told: frozenset[str] | None = None
     failed_reset: str = ""
@@ -105,10 +109,12 @@ class Simulation:
         """The agent's view with the held object in front."""
         self._refresh()
         _, held, names = self._model.primitives()
-        if not len(held):
+        if self.world.held is None or not len(held):
             return self._view
         if self._full is None:
-            self._full = cast_picture(held, names, self._view.camera, self.rasterizer, self._view)
+            camera = self._view.camera
+            shown = held_rows(held, self.world.objects[self.world.held], camera)
+            self._full = cast_picture(shown, names, camera, self.rasterizer, self._view)
         return self._full
 
     def agent_picture(self) -> Picture:
@@ -184,14 +190,8 @@ class Simulation:
         return item.object_id in visible_ids(self.world, picture, self.settings.visibility_distance)
 
     def colours(self, picture: Picture) -> NDArray[np.uint8]:
-        """RGB (h, w, 3), bottom row first; with supersampling the mean of 2x2 rays per pixel."""
-        lights = self._model.lights()
-        if not self.settings.supersample:
-            return colour_picture(picture, lights, self.rasterizer)
-        fine = cast_picture(picture.prims, picture.names, picture.camera.scaled(2), self.rasterizer)
-        rgb = colour_picture(fine, lights, self.rasterizer).astype(np.uint16)
-        total = rgb[0::2, 0::2] + rgb[1::2, 0::2] + rgb[0::2, 1::2] + rgb[1::2, 1::2]
-        return ((total + 2) // 4).astype(np.uint8)
+        """RGB (h, w, 3), bottom row first."""
+        return colour_picture(picture, self._model.lights(), self.rasterizer, self.antialias)
 
     def third_party(self, camera: ThirdPartyCamera) -> Picture:
         """What a third-party camera sees."""
@@ -201,7 +201,9 @@ class Simulation:
 
     def _agent_camera(self, agent: Agent) -> Camera:
         angle = self.settings.field_of_view
-        return Camera(agent.camera_position(), agent.camera_matrix(), angle, self.width, self.height)
+        # The metadata rounds a pose: one that is told and set again must give the same picture.
+        position = np.round(agent.camera_position(), _LENS_DIGITS)
+        return Camera(position, agent.camera_matrix(), angle, self.width, self.height)
 
     def _lens(self, camera: ThirdPartyCamera) -> Camera:
         matrix = euler_matrix(camera.rotation)

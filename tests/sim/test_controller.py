@@ -54,6 +54,14 @@ def test_unknown_scene_is_one_clear_error(launch):
         launch("FloorPlan1")
 
 
+def test_the_quality_of_the_controller_decides_on_smooth_edges(launch, kitchen):
+    smooth = kitchen.reset("kitchen-1")
+    jagged = launch("kitchen-1", quality="Low").last_event
+    assert np.array_equal(smooth.depth_frame, jagged.depth_frame)
+    assert np.array_equal(smooth.instance_segmentation_frame, jagged.instance_segmentation_frame)
+    assert not np.array_equal(smooth.frame, jagged.frame), "the Controller's own default is Ultra"
+
+
 def test_same_seed_same_bytes(kitchen):
     first = kitchen.reset("kitchen-5")
     again = kitchen.reset("kitchen-5")

@@ -47,7 +47,7 @@ def test_depth_is_that_of_geometry(name, form, depth):
 @RASTERIZERS
 def test_one_looks_into_a_cup_from_above(name):
     above = Camera(np.array([0.0, 2.0, 0.0]), euler_matrix((90, 0, 0)), 60.0, 101, 101)
-    for form, depth in ((Form.CYLINDER, 1.5), (Form.CUP, 2.5)):
+    for form, depth in ((Form.CYLINDER, 1.5), (Form.CUP, 2.5), (Form.BOWL, 2.5)):
         drawn = rows([ShapePart(form, (0, 0, 0), (0.5,) * 3, (1, 1, 1))], np.zeros(3), STRAIGHT, 0)
         picture = cast_picture(drawn, ("a",), above, choose_rasterizer(name))
         assert picture.depth[50, 50] == pytest.approx(depth, abs=1e-3)
@@ -57,7 +57,7 @@ def test_both_renderers_draw_the_same_picture():
     random = np.random.default_rng(3)
     parts = [
         rows(
-            [ShapePart(Form(i % 4), (0, 0, 0), random.uniform(0.03, 0.3, 3), tuple(random.uniform(0.2, 1, 3)),
+            [ShapePart(Form(i % len(Form)), (0, 0, 0), random.uniform(0.03, 0.3, 3), tuple(random.uniform(0.2, 1, 3)),
                   Material(i % len(Material)), bottom=0.6, emission=0.5 * (i % 7 == 0))],
             random.uniform((-1.5, -1.5, 0.5), (1.5, 1.5, 3.5)), euler_matrix(random.uniform(0, 360, 3)), i,
         ) for i in range(120)
@@ -130,16 +130,37 @@ def test_ids_frame_names_every_object_by_its_colour():
     assert len(bench.frames[FieldType.CLASSES]) == 120 * 120 * 4
 
 
-def test_supersampling_changes_colours_only():
+def test_smoothing_changes_colours_only():
     bench = Bench(size=100)
     bench.reset("living-room-1", renderInstanceSegmentation=True, renderDepthImage=True)
-    plain = bench.frames
-    bench.ok("ChangeQuality", quality="Ultra")
     fine = bench.frames
+    bench.ok("ChangeQuality", quality="Low")
+    plain = bench.frames
     assert plain[FieldType.IDS] == fine[FieldType.IDS]
     assert plain[FieldType.DEPTH] == fine[FieldType.DEPTH]
     a, b = (np.frombuffer(f[FieldType.RGB], dtype=np.uint8).astype(int) for f in (plain, fine))
     assert 0 < np.abs(a - b).mean() < 12
+    bench.reset("living-room-1", renderInstanceSegmentation=True)
+    assert bench.frames[FieldType.RGB] == plain[FieldType.RGB], "the quality stays over a Reset, as Unity's does"
+    bench.ok("ChangeQuality", quality="Ultra")
+    assert bench.frames[FieldType.RGB] == fine[FieldType.RGB]
+
+
+@RASTERIZERS
+def test_a_smooth_edge_is_between_what_it_divides(name):
+    rasterizer = choose_rasterizer(name)
+    tilted = [ShapePart(Form.BOX, (0, 0, 0), (0.5, 0.5, 0.1), (0.9, 0.1, 0.1), matrix=euler_matrix((0, 0, 20)))]
+    behind = [ShapePart(Form.BOX, (0, 0, 1), (9, 9, 0.1), (0.1, 0.1, 0.9))]
+    straight = np.array([0.0, 0.0, 2.0])
+    prims = np.concatenate([rows(tilted, straight, STRAIGHT, 0), rows(behind, straight, STRAIGHT, 1)])
+    picture = cast_picture(prims, ("a", "b"), camera(), rasterizer)
+    smooth = colour_picture(picture, Lights.none(), rasterizer)[:, :, 0].astype(int)
+    sharp = colour_picture(picture, Lights.none(), rasterizer, antialias=False)[:, :, 0].astype(int)
+    changed = smooth != sharp
+    assert 40 < changed.sum() < 500
+    assert smooth.min() >= sharp.min()
+    assert smooth.max() <= sharp.max()
+    assert len(np.unique(smooth[changed])) > 3
 
 
 def test_a_held_object_floats_in_the_lower_middle():
@@ -152,6 +173,23 @@ def test_a_held_object_floats_in_the_lower_middle():
     assert 70 < columns.mean() < 130
     assert rows_.mean() > 120
     assert len(rows_) > 300
+
+
+@pytest.mark.parametrize(("scene", "object_type"), [("living-room-1", "Box"), ("bedroom-1", "Pillow")])
+def test_what_the_hand_holds_hides_little_of_the_room(scene, object_type):
+    bench = Bench(size=150)
+    bench.reset(scene, renderInstanceSegmentation=True)
+    held = bench.first(object_type)
+    bench.ok("PickupObject", objectId=held, forceAction=True)
+    before = bench.object(held)["position"]
+    for horizon in (0.0, 30.0, 60.0):
+        bench.ok("TeleportFull", position=bench.metadata["agent"]["position"], rotation={"y": 90.0}, horizon=horizon,
+                 standing=True)  # fmt: skip
+        pixels = np.frombuffer(bench.frames[FieldType.IDS], dtype=np.uint8).reshape(150, 150, 4)[::-1, :, :3]
+        shown = (pixels == instance_color(held)).all(axis=2)
+        assert 0.005 < shown.mean() < 0.1
+        assert not shown[:75].any(), "it stays in the lower half"
+    assert bench.object(held)["position"] != before, "the metadata tells where the hand is, not where it is drawn"
 
 
 def test_lamps_and_switches_light_the_room():

@@ -1,5 +1,6 @@
 """Procedural rooms are furnished as their type needs, connected, and different from seed to seed."""
 
+import numpy as np
 import pytest
 
 from infthor_eval.sim.errors import ActionError
@@ -25,6 +26,22 @@ def test_furniture_of_the_room_type(room_type, seed):
     assert not missing
     assert 35 <= len(world.objects) <= 80
     assert len(world.nav.reachable(world.agent.position[0], world.agent.position[2])) == len(world.nav)
+
+
+STANDING = {"DeskLamp", "Television", "Microwave", "CoffeeMachine", "Toaster", "Faucet", "StoveBurner"}
+
+
+@pytest.mark.parametrize("scene", ["living-room-2", "bedroom-2", "kitchen-1", "kitchen-2", "bathroom-1"])
+def test_nothing_stands_in_another_thing(scene):
+    world = Catalogue().load(scene)
+    loose = [o for o in world.objects.values() if o.type.pickupable and not world.hidden(o)]
+    for item in loose:
+        for other in world.objects.values():
+            apart = other is item or other.object_id == item.parent or item.object_id == other.parent
+            if apart or not (other.type.pickupable or other.object_type in STANDING):
+                continue
+            overlap = np.minimum(item.bounds()[1], other.bounds()[1]) - np.maximum(item.bounds()[0], other.bounds()[0])
+            assert overlap.min() < 0.004, f"{item.object_id} stands in {other.object_id}"
 
 
 @pytest.mark.parametrize("scene_type", SCENE_TYPES)

@@ -8,6 +8,7 @@ import numpy as np
 from infthor_eval.sim.actions.registry import Vector3, action
 from infthor_eval.sim.errors import ActionError
 from infthor_eval.sim.geometry import Array, to_array
+from infthor_eval.sim.settings import SMOOTH_QUALITIES
 from infthor_eval.sim.simulation import Simulation, ThirdPartyCamera
 
 __all__: list[str] = []
@@ -26,8 +27,8 @@ def change_resolution(sim: Simulation, x: int, y: int) -> None:
 
 @action("ChangeQuality")
 def change_quality(sim: Simulation, quality: str) -> None:
-    """`Ultra` and `High WebGL` take four rays per pixel, the others one."""
-    sim.configure(supersample=quality in {"Ultra", "High WebGL"})
+    """From `High` on edges are smoothed; below they are not, which is faster."""
+    sim.antialias = quality in SMOOTH_QUALITIES
 
 
 @action("AddThirdPartyCamera")

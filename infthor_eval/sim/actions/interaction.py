@@ -14,7 +14,7 @@ from infthor_eval.sim.simulation import Simulation
 
 __all__: list[str] = []
 
-_CROWDED = 0.35  # overlap that `forceAction` tolerates when a receptacle is nearly full
+_CROWDED = (0.12, 0.24, 0.35)  # overlaps that `forceAction` tolerates, the least that will do, in a full receptacle
 
 
 @action("PickupObject", forms=BY_ID_OR_PIXEL)
@@ -74,11 +74,12 @@ def put(
 
 def _place(sim: Simulation, held: SimObject, target: SimObject, force: bool) -> SimObject | None:
     """A free place: one that the agent sees if there is one; a forced put squeezes in where it is crowded."""
-    for crowd in (0.0, _CROWDED) if force else (0.0,):
-        for seen in (sim.in_view, None):
-            placed = find_place(sim.world, held, target, crowd, seen=seen)
-            if placed is not None:
-                return placed
+    for crowd in (0.0, *_CROWDED) if force else (0.0,):
+        for among_fixed in (False, True):
+            for seen in (sim.in_view, None):
+                placed = find_place(sim.world, held, target, crowd, seen=seen, among_fixed=among_fixed)
+                if placed is not None:
+                    return placed
     return None
 
 

@@ -10,7 +10,10 @@ from infthor_eval.formats.digests import digest
 
 __all__ = ["drop_stale_kernels"]
 
-_SOURCES = ("camera.py", "lighting.py", "patterns.py", "primitives.py", "raster_numba.py", "shading_numba.py")
+_SOURCES = (
+    "camera.py", "lighting.py", "patterns.py", "primitives.py", "raster_numba.py", "shading_numba.py", "smoothing.py",
+    "smoothing_numba.py",
+)  # fmt: skip
 _HERE = Path(__file__).parent
 
 

@@ -12,20 +12,26 @@ from infthor_eval.sim.render.camera import Camera, Projection, project
 from infthor_eval.sim.render.kernel_cache import drop_stale_kernels
 from infthor_eval.sim.render.lighting import Lights
 from infthor_eval.sim.render.primitives import COLUMNS, INSTANCE
+from infthor_eval.sim.render.relief import relief
+from infthor_eval.sim.render.smoothing import jagged
 
 __all__ = ["Picture", "Rasterizer", "cast_picture", "choose_rasterizer", "colour_picture"]
 
 Cast = Callable[[Array, Projection, Camera], tuple[Array, NDArray[np.int32]]]
-Shade = Callable[[Array, Projection, Camera, Array, NDArray[np.int32], Lights], NDArray[np.uint8]]
+Pixels = NDArray[np.uint8]
+Places = tuple[NDArray[np.int64], NDArray[np.int64]]
+Shade = Callable[[Array, Projection, Camera, Array, NDArray[np.int32], Array, Lights], Pixels]
+Smooth = Callable[[Array, Projection, Camera, NDArray[np.int32], Array, Lights, Places, Pixels], None]
 
 
 @dataclass(frozen=True)
 class Rasterizer:
-    """One implementation of casting and shading."""
+    """One implementation of casting, shading and smoothing."""
 
     name: str
     cast: Cast
     shade: Shade
+    smooth: Smooth
 
 
 @dataclass(frozen=True)
@@ -53,15 +59,15 @@ def choose_rasterizer(name: str | None = None) -> Rasterizer:
     if chosen != "numpy":
         drop_stale_kernels()
         try:
-            from infthor_eval.sim.render import raster_numba, shading_numba
+            from infthor_eval.sim.render import raster_numba, shading_numba, smoothing_numba
         except ModuleNotFoundError:
             if chosen == "numba":
                 raise
         else:
-            return Rasterizer("numba", raster_numba.cast, shading_numba.shade)
-    from infthor_eval.sim.render import raster_numpy, shading_numpy
+            return Rasterizer("numba", raster_numba.cast, shading_numba.shade, smoothing_numba.smooth)
+    from infthor_eval.sim.render import raster_numpy, shading_numpy, smoothing_numpy
 
-    return Rasterizer("numpy", raster_numpy.cast, shading_numpy.shade)
+    return Rasterizer("numpy", raster_numpy.cast, shading_numpy.shade, smoothing_numpy.smooth)
 
 
 def cast_picture(
@@ -96,9 +102,14 @@ def cast_picture(
     )
 
 
-def colour_picture(picture: Picture, lights: Lights, rasterizer: Rasterizer) -> NDArray[np.uint8]:
-    """RGB (h, w, 3) of a cast picture."""
-    return rasterizer.shade(picture.prims, picture.seen, picture.camera, picture.depth, picture.nearest, lights)
+def colour_picture(picture: Picture, lights: Lights, rasterizer: Rasterizer, antialias: bool = True) -> Pixels:
+    """RGB (h, w, 3) of a cast picture; with `antialias`, its jagged places smoothed."""
+    factors = relief(picture.depth)
+    prims, seen, camera, nearest = picture.prims, picture.seen, picture.camera, picture.nearest
+    rgb = rasterizer.shade(prims, seen, camera, picture.depth, nearest, factors, lights)
+    if antialias:
+        rasterizer.smooth(prims, seen, camera, nearest, factors, lights, jagged(rgb), rgb)
+    return rgb
 
 
 def _nothing() -> Projection:

@@ -1,8 +1,9 @@
-"""What the ray caster draws: boxes, ellipsoids and (tapered) cylinders, one row of numbers each.
+"""What the ray caster draws: boxes, ellipsoids, (tapered) cylinders and bowls, one row of numbers each.
 
 A row holds the primitive's world pose, half extents, colour and material; see the column constants. In the
 primitive's own frame, scaled by its half extents, a box is [-1, 1]^3, an ellipsoid the unit sphere and a cylinder has
-its axis along y with radius `BOTTOM` at y = -1 and `TOP` at y = 1.
+its axis along y with radius `BOTTOM` at y = -1 and `TOP` at y = 1. A bowl is the lower half of an ellipsoid, its rim
+the unit circle at y = 1.
 """
 
 from collections.abc import Iterable, Sequence
@@ -46,6 +47,7 @@ class Form(IntEnum):
     ELLIPSOID = 1
     CYLINDER = 2
     CUP = 3  # a cylinder without its top: one sees its inside
+    BOWL = 4  # the lower half of an ellipsoid, open at the top
 
 
 class Material(IntEnum):

@@ -10,11 +10,11 @@ from infthor_eval.sim.geometry import Array
 from infthor_eval.sim.render.camera import Camera, Projection
 from infthor_eval.sim.render.primitives import BOTTOM, FORM, TOP, Form
 
-__all__ = ["cast"]
+__all__ = ["cast", "hit"]
 
 _TINY = 1e-12
 _BANDS = 8
-_BOX, _ELLIPSOID, _CUP = int(Form.BOX), int(Form.ELLIPSOID), int(Form.CUP)
+_BOX, _ELLIPSOID, _CUP, _BOWL = int(Form.BOX), int(Form.ELLIPSOID), int(Form.CUP), int(Form.BOWL)
 
 
 def cast(prims: Array, seen: Projection, camera: Camera) -> tuple[Array, NDArray[np.int32]]:
@@ -53,6 +53,23 @@ def _hit_sphere(ox: float, oy: float, oz: float, dx: float, dy: float, dz: float
     c = ox * ox + oy * oy + oz * oz - 1.0
     disc = b * b - a * c
     return (-b - math.sqrt(disc)) / a if disc >= 0.0 else math.inf
+
+
+@njit(cache=True)
+def _hit_bowl(ox: float, oy: float, oz: float, dx: float, dy: float, dz: float, clip: float) -> float:
+    oy, dy = (oy - 1.0) * 0.5, dy * 0.5
+    a = dx * dx + dy * dy + dz * dz
+    b = ox * dx + oy * dy + oz * dz
+    c = ox * ox + oy * oy + oz * oz - 1.0
+    disc = b * b - a * c
+    if disc < 0.0:
+        return math.inf
+    root = math.sqrt(disc)
+    for sign in (-1.0, 1.0):
+        t = (-b + sign * root) / a
+        if t > clip and oy + t * dy <= 0.0:
+            return t
+    return math.inf
 
 
 @njit(cache=True)
@@ -95,6 +112,29 @@ def _hit_cylinder(
     return best
 
 
+@njit(cache=True, inline="always")
+def hit(
+    form: float,
+    bottom: float,
+    top: float,
+    ox: float,
+    oy: float,
+    oz: float,
+    dx: float,
+    dy: float,
+    dz: float,
+    clip: float,
+) -> float:
+    """Depth at which a ray from o along d meets a primitive, in its scaled frame; infinity where it does not."""
+    if form == _BOX:
+        return _hit_box(ox, oy, oz, dx, dy, dz)
+    if form == _ELLIPSOID:
+        return _hit_sphere(ox, oy, oz, dx, dy, dz)
+    if form == _BOWL:
+        return _hit_bowl(ox, oy, oz, dx, dy, dz, clip)
+    return _hit_cylinder(ox, oy, oz, dx, dy, dz, bottom, top, form == _CUP, clip)
+
+
 @njit(cache=True, parallel=True)
 def _cast(
     profiles: Array,
@@ -128,12 +168,7 @@ def _cast(
                     dx = (step[0, 0] + u * step[1, 0]) + v * step[2, 0]
                     dy = (step[0, 1] + u * step[1, 1]) + v * step[2, 1]
                     dz = (step[0, 2] + u * step[1, 2]) + v * step[2, 2]
-                    if form == _BOX:
-                        t = _hit_box(ox, oy, oz, dx, dy, dz)
-                    elif form == _ELLIPSOID:
-                        t = _hit_sphere(ox, oy, oz, dx, dy, dz)
-                    else:
-                        t = _hit_cylinder(ox, oy, oz, dx, dy, dz, bottom, top, form == _CUP, clip)
+                    t = hit(form, bottom, top, ox, oy, oz, dx, dy, dz, clip)
                     if clip < t < limit:
                         depth[y, x] = t
                         nearest[y, x] = order

@@ -10,7 +10,7 @@ from infthor_eval.sim.geometry import Array
 from infthor_eval.sim.render.camera import Camera, Projection
 from infthor_eval.sim.render.primitives import BOTTOM, FORM, TOP, Form
 
-__all__ = ["cast"]
+__all__ = ["cast", "hit"]
 
 _TINY = 1e-12
 
@@ -25,7 +25,7 @@ def cast(prims: Array, seen: Projection, camera: Camera) -> tuple[Array, NDArray
         u, v = us[None, x0:x1], vs[y0:y1, None]
         steps = seen.steps[order]
         d = [(steps[0, i] + u * steps[1, i]) + v * steps[2, i] for i in range(3)]
-        t = _hit(prims[row], seen.origin[order], d, camera.near)
+        t = hit(prims[row], seen.origin[order], d, camera.near)
         window = depth[y0:y1, x0:x1]
         closer = (t > camera.near) & (t < window)
         window[closer] = t[closer]
@@ -33,12 +33,15 @@ def cast(prims: Array, seen: Projection, camera: Camera) -> tuple[Array, NDArray
     return depth, nearest
 
 
-def _hit(prim: Array, o: Array, d: list[Array], near: float) -> Array:
+def hit(prim: Array, o: Array, d: list[Array], near: float) -> Array:
+    """Depths at which rays from `o` along `d` meet a primitive, in its scaled frame; infinity where they do not."""
     form = prim[FORM]
     if form == Form.BOX:
         return _hit_box(o, d)
     if form == Form.ELLIPSOID:
         return _hit_sphere(o, d)
+    if form == Form.BOWL:
+        return _hit_bowl(o, d, near)
     return _hit_cylinder(o, d, prim[BOTTOM], prim[TOP], form == Form.CUP, near)
 
 
@@ -64,6 +67,20 @@ def _hit_sphere(o: Array, d: list[Array]) -> Array:
     disc = b * b - a * c
     root = np.sqrt(np.maximum(disc, 0.0))
     return np.where(disc >= 0.0, (-b - root) / a, np.inf)
+
+
+def _hit_bowl(o: Array, d: list[Array], near: float) -> Array:
+    oy, dy = (o[1] - 1.0) * 0.5, d[1] * 0.5
+    a = d[0] * d[0] + dy * dy + d[2] * d[2]
+    b = o[0] * d[0] + oy * dy + o[2] * d[2]
+    c = o[0] * o[0] + oy * oy + o[2] * o[2] - 1.0
+    disc = b * b - a * c
+    root = np.sqrt(np.maximum(disc, 0.0))
+    found = np.full(disc.shape, np.inf)
+    for sign in (1.0, -1.0):  # the nearer one last, so that it stays
+        t = (-b + sign * root) / a
+        found = np.where((disc >= 0.0) & (t > near) & (oy + t * dy <= 0.0), t, found)
+    return found
 
 
 def _hit_cylinder(o: Array, d: list[Array], bottom: float, top: float, is_open: bool, near: float) -> Array:

@@ -24,11 +24,11 @@ from infthor_eval.sim.render.primitives import (
     Material,
 )
 
-__all__ = ["shade"]
+__all__ = ["level_at", "shade"]
 
 _RIM = 1.0 - 1e-6
 _BANDS = 8
-_BOX, _ELLIPSOID, _CUP = int(Form.BOX), int(Form.ELLIPSOID), int(Form.CUP)
+_BOX, _ELLIPSOID, _CUP, _BOWL = int(Form.BOX), int(Form.ELLIPSOID), int(Form.CUP), int(Form.BOWL)
 _SUN_X, _SUN_Y, _SUN_Z = SUN_DIRECTION
 _WOOD, _PLANKS, _TILES = int(Material.WOOD), int(Material.PLANKS), int(Material.TILES)
 _FABRIC, _STONE, _METAL = int(Material.FABRIC), int(Material.STONE), int(Material.METAL)
@@ -39,14 +39,20 @@ _glass, _paper, _carpet = (njit(cache=True)(f) for f in (patterns.glass, pattern
 
 
 def shade(
-    prims: Array, seen: Projection, camera: Camera, depth: Array, nearest: NDArray[np.int32], lights: Lights
+    prims: Array,
+    seen: Projection,
+    camera: Camera,
+    depth: Array,
+    nearest: NDArray[np.int32],
+    factors: Array,
+    lights: Lights,
 ) -> NDArray[np.uint8]:
-    """RGB picture (h, w, 3), bottom row first, of what `cast` found."""
+    """RGB picture (h, w, 3), bottom row first, of what `cast` found, each pixel's brightness times its factor."""
     us, vs = camera.rays()
     rgb = np.zeros((*nearest.shape, 3), dtype=np.uint8)
     _shade(
         prims[seen.index], seen.origin, seen.steps, camera.position, camera.matrix, us, vs, depth, nearest,
-        lights.lamps, lights.daylight, rgb,
+        factors, lights.lamps, lights.daylight, rgb,
     )  # fmt: skip
     return rgb
 
@@ -74,31 +80,33 @@ def _pattern(material: float, a: float, b: float) -> float:  # noqa: PLR0911 - o
     return 1.0
 
 
-@njit(cache=True)
-def _surface(p: Array, x: float, y: float, z: float) -> Any:
+@njit(cache=True, inline="always")
+def _surface(prims: Array, order: int, x: float, y: float, z: float) -> Any:
     """World normal and the two metric surface coordinates of a hit point in the primitive's scaled frame."""
-    hx, hy, hz = p[HALF], p[HALF + 1], p[HALF + 2]
+    hx, hy, hz = prims[order, HALF], prims[order, HALF + 1], prims[order, HALF + 2]
     ax, ay, az = abs(x), abs(y), abs(z)
     nx, ny, nz = x, y, z
     a, b = x * hx + z * hz, y * hy
-    if p[FORM] == _BOX:
+    if prims[order, FORM] == _BOX:
         if ax >= ay and ax >= az:
             ny, nz, a = 0.0, 0.0, z * hz
         elif ay >= az:
             nx, nz, a, b = 0.0, 0.0, x * hx, z * hz
         else:
             nx, ny, a = 0.0, 0.0, x * hx
-    elif p[FORM] != _ELLIPSOID:
-        if ay >= _RIM and not (y > 0 and p[FORM] == _CUP):
+    elif prims[order, FORM] == _BOWL:
+        ny = (y - 1.0) * 0.25
+    elif prims[order, FORM] != _ELLIPSOID:
+        if ay >= _RIM and not (y > 0 and prims[order, FORM] == _CUP):
             nx, nz = 0.0, 0.0
         else:
-            k = (p[TOP] - p[BOTTOM]) * 0.5
-            m = (p[BOTTOM] + p[TOP]) * 0.5
+            k = (prims[order, TOP] - prims[order, BOTTOM]) * 0.5
+            m = (prims[order, BOTTOM] + prims[order, TOP]) * 0.5
             ny = -k * (m + k * y)
     nx, ny, nz = nx / hx, ny / hy, nz / hz
-    wx = p[AXES] * nx + p[AXES + 3] * ny + p[AXES + 6] * nz
-    wy = p[AXES + 1] * nx + p[AXES + 4] * ny + p[AXES + 7] * nz
-    wz = p[AXES + 2] * nx + p[AXES + 5] * ny + p[AXES + 8] * nz
+    wx = prims[order, AXES] * nx + prims[order, AXES + 3] * ny + prims[order, AXES + 6] * nz
+    wy = prims[order, AXES + 1] * nx + prims[order, AXES + 4] * ny + prims[order, AXES + 7] * nz
+    wz = prims[order, AXES + 2] * nx + prims[order, AXES + 5] * ny + prims[order, AXES + 8] * nz
     length = math.sqrt(wx * wx + wy * wy + wz * wz) + 1e-12
     return wx / length, wy / length, wz / length, a, b
 
@@ -120,6 +128,26 @@ def _light(n: Any, r: Any, w: Any, lamps: Array, daylight: float) -> float:
     return light
 
 
+@njit(cache=True, inline="always")
+def level_at(
+    prims: Array, origin: Array, steps: Array, order: int, ray: Any, eye: Array, view: Array, lamps: Array, day: float
+) -> float:
+    """Brightness of what primitive `order` shows at depth t on the ray (u, v, t); rows are indexed, as views cost."""
+    u, v, t = ray
+    k = order
+    lx = origin[k, 0] + t * ((steps[k, 0, 0] + u * steps[k, 1, 0]) + v * steps[k, 2, 0])
+    ly = origin[k, 1] + t * ((steps[k, 0, 1] + u * steps[k, 1, 1]) + v * steps[k, 2, 1])
+    lz = origin[k, 2] + t * ((steps[k, 0, 2] + u * steps[k, 1, 2]) + v * steps[k, 2, 2])
+    nx, ny, nz, a, b = _surface(prims, k, lx, ly, lz)
+    rx = (view[0, 2] + u * view[0, 0]) + v * view[0, 1]
+    ry = (view[1, 2] + u * view[1, 0]) + v * view[1, 1]
+    rz = (view[2, 2] + u * view[2, 0]) + v * view[2, 1]
+    w = (eye[0] + t * rx, eye[1] + t * ry, eye[2] + t * rz)
+    light = _light((nx, ny, nz), (rx, ry, rz), w, lamps, day)
+    glow = prims[k, EMISSION]
+    return glow * 1.15 + (1.0 - glow) * (light * _pattern(prims[k, MATERIAL], a, b))
+
+
 @njit(cache=True, parallel=True)
 def _shade(
     prims: Array,
@@ -131,6 +159,7 @@ def _shade(
     vs: Array,
     depth: Array,
     nearest: NDArray[np.int32],
+    factors: Array,
     lamps: Array,
     daylight: float,
     rgb: NDArray[np.uint8],
@@ -138,23 +167,11 @@ def _shade(
     height = len(vs)
     for band in prange(_BANDS):
         for y in range(band * height // _BANDS, (band + 1) * height // _BANDS):
-            v = vs[y]
             for x in range(len(us)):
                 order = nearest[y, x]
                 if order < 0:
                     continue
-                p, o, s = prims[order], origin[order], steps[order]
-                u, t = us[x], depth[y, x]
-                lx = o[0] + t * ((s[0, 0] + u * s[1, 0]) + v * s[2, 0])
-                ly = o[1] + t * ((s[0, 1] + u * s[1, 1]) + v * s[2, 1])
-                lz = o[2] + t * ((s[0, 2] + u * s[1, 2]) + v * s[2, 2])
-                nx, ny, nz, a, b = _surface(p, lx, ly, lz)
-                rx = (view[0, 2] + u * view[0, 0]) + v * view[0, 1]
-                ry = (view[1, 2] + u * view[1, 0]) + v * view[1, 1]
-                rz = (view[2, 2] + u * view[2, 0]) + v * view[2, 1]
-                w = (eye[0] + t * rx, eye[1] + t * ry, eye[2] + t * rz)
-                light = _light((nx, ny, nz), (rx, ry, rz), w, lamps, daylight)
-                glow = p[EMISSION]
-                level = glow * 1.15 + (1.0 - glow) * (light * _pattern(p[MATERIAL], a, b))
+                ray = (us[x], vs[y], depth[y, x])
+                level = level_at(prims, origin, steps, order, ray, eye, view, lamps, daylight) * factors[y, x]
                 for i in range(3):
-                    rgb[y, x, i] = np.uint8(min(p[COLOR + i] * level * 255.0, 255.0))
+                    rgb[y, x, i] = np.uint8(min(prims[order, COLOR + i] * level * 255.0, 255.0))

@@ -9,15 +9,21 @@ from infthor_eval.sim.render.lighting import AMBIENT, HEADLIGHT, LAMP_REACH, SKY
 from infthor_eval.sim.render.patterns import PATTERNS
 from infthor_eval.sim.render.primitives import AXES, BOTTOM, COLOR, EMISSION, FORM, HALF, MATERIAL, TOP, Form
 
-__all__ = ["shade", "surface_normals"]
+__all__ = ["level_at", "shade", "surface_normals"]
 
 _RIM = 1.0 - 1e-6
 
 
 def shade(
-    prims: Array, seen: Projection, camera: Camera, depth: Array, nearest: NDArray[np.int32], lights: Lights
+    prims: Array,
+    seen: Projection,
+    camera: Camera,
+    depth: Array,
+    nearest: NDArray[np.int32],
+    factors: Array,
+    lights: Lights,
 ) -> NDArray[np.uint8]:
-    """RGB picture (h, w, 3), bottom row first, of what `cast` found."""
+    """RGB picture (h, w, 3), bottom row first, of what `cast` found, each pixel's brightness times its factor."""
     us, vs = camera.rays()
     rgb = np.zeros((*nearest.shape, 3), dtype=np.uint8)
     ys, xs = np.nonzero(nearest >= 0)
@@ -25,22 +31,28 @@ def shade(
         return rgb
     order = nearest[ys, xs]
     p = prims[seen.index[order]]
-    u, v, t = us[xs], vs[ys], depth[ys, xs]
-    o, s = seen.origin[order], seen.steps[order]
+    rays = us[xs], vs[ys], depth[ys, xs]
+    level = level_at(p, seen.origin[order], seen.steps[order], rays, camera, lights) * factors[ys, xs]
+    for i in range(3):
+        rgb[ys, xs, i] = np.minimum(p[:, COLOR + i] * level * 255.0, 255.0).astype(np.uint8)
+    return rgb
+
+
+def level_at(p: Array, o: Array, s: Array, rays: tuple[Array, Array, Array], camera: Camera, lights: Lights) -> Array:
+    """Brightness (n,) of what the primitives `p` (n, COLUMNS) show at depth t on the rays (u, v, t)."""
+    u, v, t = rays
     local = [o[:, i] + t * ((s[:, 0, i] + u * s[:, 1, i]) + v * s[:, 2, i]) for i in range(3)]
     normal, a, b = _surface(p, local)
     ray = [(camera.matrix[i, 2] + u * camera.matrix[i, 0]) + v * camera.matrix[i, 1] for i in range(3)]
     world = [camera.position[i] + t * ray[i] for i in range(3)]
     light = _light(normal, ray, world, lights)
-    factor = np.ones(len(ys))
+    factor = np.ones(len(p))
     for material, pattern in PATTERNS.items():
         at = p[:, MATERIAL] == material
         factor[at] = pattern(a[at], b[at])
     glow = p[:, EMISSION]
-    level = glow * 1.15 + (1.0 - glow) * (light * factor)
-    for i in range(3):
-        rgb[ys, xs, i] = np.minimum(p[:, COLOR + i] * level * 255.0, 255.0).astype(np.uint8)
-    return rgb
+    level: Array = glow * 1.15 + (1.0 - glow) * (light * factor)
+    return level
 
 
 def surface_normals(
@@ -66,11 +78,12 @@ def _surface(p: Array, local: list[Array]) -> tuple[list[Array], Array, Array]:
     on_y = ~on_x & (ay >= az)
     k = (p[:, TOP] - p[:, BOTTOM]) * 0.5
     m = (p[:, BOTTOM] + p[:, TOP]) * 0.5
-    box, ball = form == Form.BOX, form == Form.ELLIPSOID
+    box, ball = form == Form.BOX, (form == Form.ELLIPSOID) | (form == Form.BOWL)
     cap = (ay >= _RIM) & ~((y > 0) & (form == Form.CUP))
     nx = np.where(box, np.where(on_x, x, 0.0), np.where(ball | ~cap, x, 0.0))
     nz = np.where(box, np.where(on_x | on_y, 0.0, z), np.where(ball | ~cap, z, 0.0))
     ny = np.where(box, np.where(on_y, y, 0.0), np.where(ball, y, np.where(cap, y, -k * (m + k * y))))
+    ny = np.where(form == Form.BOWL, (y - 1.0) * 0.25, ny)
     hx, hy, hz = p[:, HALF], p[:, HALF + 1], p[:, HALF + 2]
     nx, ny, nz = nx / hx, ny / hy, nz / hz
     normal = [p[:, AXES + i] * nx + p[:, AXES + 3 + i] * ny + p[:, AXES + 6 + i] * nz for i in range(3)]

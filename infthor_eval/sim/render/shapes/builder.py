@@ -103,23 +103,50 @@ class Builder:
         """Add a cylinder that is open at the top."""
         self.add(Form.CUP, at, half, color, material, **more)
 
-    def open_front(self, color: Color, material: Material, wall: float) -> None:
-        """Add a box without its front: five boards `wall` metres thick."""
+    def open_front(self, color: Color, material: Material, wall: float, glow: float = 0.0) -> None:
+        """Add a box without its front: five boards `wall` metres thick; `glow` lights its inside."""
         x, y, z = (self.thick(wall / 2, axis) for axis in range(3))
-        inner = shade_of(color, 0.8)
-        self.box((0, 0, -1 + z), (1, 1, z), inner, material)
+        self.box((0, 0, -1 + z), (1, 1, z), color, material, glow=glow)
         for side in (-1, 1):
-            self.box((side * (1 - x), 0, z), (x, 1, 1 - z), color, material)
-            self.box((0, side * (1 - y), z), (1 - 2 * x, y, 1 - z), color, material)
+            self.box((side * (1 - x), 0, z), (x, 1, 1 - z), color, material, glow=glow)
+            self.box((0, side * (1 - y), z), (1 - 2 * x, y, 1 - z), color, material, glow=glow)
 
-    def open_top(self, color: Color, material: Material, wall: float) -> None:
-        """Add a box without its lid: four sides `wall` metres thick on a thin bottom."""
+    def open_top(self, color: Color, material: Material, wall: float, glow: float = 0.0) -> None:
+        """Add a box without its lid: four sides `wall` metres thick on a thin bottom; `glow` lights its inside."""
         x, z = self.thick(wall / 2, 0), self.thick(wall / 2, 2)
         y = self.thick(min(wall / 2, 0.004), 1)
-        self.box((0, -1 + y, 0), (1, y, 1), shade_of(color, 0.85), material)
+        self.box((0, -1 + y, 0), (1, y, 1), shade_of(color, 0.88), material, glow=glow)
         for side in (-1, 1):
-            self.box((side * (1 - x), y, 0), (x, 1 - y, 1), color, material)
-            self.box((0, y, side * (1 - z)), (1 - 2 * x, 1 - y, z), color, material)
+            self.box((side * (1 - x), y, 0), (x, 1 - y, 1), color, material, glow=glow)
+            self.box((0, y, side * (1 - z)), (1 - 2 * x, 1 - y, z), color, material, glow=glow)
+
+    def bowl(
+        self, at: Vector, half: Vector, color: Color, material: Material = Material.PLAIN, **more: Unpack[Details]
+    ) -> None:
+        """Add the lower half of an ellipsoid, open at the top."""
+        self.add(Form.BOWL, at, half, color, material, **more)
+
+    @property
+    def longest(self) -> int:
+        """The axis of its longest side."""
+        return max(range(3), key=lambda i: float(self.half[i]))
+
+    def along(self, at: float, axis: int) -> tuple[float, float, float]:
+        """A position on one of the box's middle lines."""
+        return (at if axis == 0 else 0.0, at if axis == 1 else 0.0, at if axis == 2 else 0.0)
+
+    def bar(
+        self, axis: int, start: float, end: float, radii: tuple[float, float], color: Color,
+        material: Material = Material.PLAIN, *, glow: float = 0.0,
+    ) -> None:  # fmt: skip
+        """Add a round bar on the middle line of `axis` from `start` to `end`, with its radii in metres there."""
+        tilt = {0: (0.0, 0.0, -90.0), 1: (0.0, 0.0, 0.0), 2: (90.0, 0.0, 0.0)}[axis]
+        matrix = self._turn @ euler_matrix(tilt)
+        widest = max(radii)
+        half = (widest, (end - start) / 2 * float(self.half[axis]), widest)
+        bottom, top = radii[0] / widest, radii[1] / widest
+        at = self.metric(self.along((start + end) / 2, axis))
+        self.parts.append(ShapePart(Form.CYLINDER, at, half, color, material, matrix, bottom, top, glow))
 
     def rod(self, at: Vector, radius: float, length: float, axis: int, color: Color) -> None:
         """Add a round bar, `radius` and half `length` in metres, along axis 0 (x), 1 (y) or 2 (z)."""
@@ -134,8 +161,9 @@ class Builder:
         self.parts.append(ShapePart(Form.BOX, self.metric(at), tuple(metres), color, material, self._turn))
 
     def swung(
-        self, hinge: Vector, offset: Vector, metres: Vector, angle: float, color: Color, material: Material
-    ) -> None:
+        self, hinge: Vector, offset: Vector, metres: Vector, angle: float, color: Color, material: Material,
+        glow: float = 0.0,
+    ) -> None:  # fmt: skip
         """Add a box that has turned about an upright hinge.
 
         Args:
@@ -145,7 +173,8 @@ class Builder:
             angle: degrees of turn.
             color: its colour.
             material: its surface.
+            glow: 0 lit by the lights only, 1 shines by itself.
         """
         turn = self._turn @ yaw_matrix(angle)
         center = self.metric(hinge) + turn @ np.asarray(offset, dtype=float)
-        self.parts.append(ShapePart(Form.BOX, center, tuple(metres), color, material, turn))
+        self.parts.append(ShapePart(Form.BOX, center, tuple(metres), color, material, turn, emission=glow))

@@ -6,21 +6,27 @@ from infthor_eval.sim.objects import SimObject
 from infthor_eval.sim.render.primitives import Color, ShapePart
 from infthor_eval.sim.render.shapes import (  # noqa: F401 - imported to be registered
     appliances,
+    cutlery,
     fixtures,
     food,
     household,
     kitchenware,
     seats,
+    slices,
+    soft,
+    sport,
+    stationery,
     storage,
     tables,
 )
-from infthor_eval.sim.render.shapes.builder import Builder
+from infthor_eval.sim.render.shapes.builder import Builder, shade_of
 from infthor_eval.sim.render.shapes.register import SHAPES, draws
 
 __all__ = ["shape"]
 
 _DIRT: Color = (0.36, 0.27, 0.16)
 _DIRT_SHARE = 0.45
+_TINTS, _TINT = 5, 0.045  # objects of one colour differ a little in brightness, by their style
 
 
 def shape(item: SimObject) -> list[ShapePart]:
@@ -29,7 +35,8 @@ def shape(item: SimObject) -> list[ShapePart]:
     SHAPES[item.type.shape](board)
     if item.state.dirty:
         return [replace(part, color=_soiled(part.color)) for part in board.parts]
-    return board.parts
+    tint = 1.0 + _TINT * (item.style % _TINTS - _TINTS // 2) / (_TINTS // 2)
+    return [replace(part, color=shade_of(part.color, tint)) for part in board.parts]
 
 
 @draws

@@ -26,7 +26,7 @@ def sink(b: Builder) -> None:
     """A rim of steel or stone around the basins; a hollow tub where the basins are not objects of their own."""
     color = STEEL if b.style % 2 else _CERAMIC
     if not b.item.pieces:
-        b.open_top(color, Material.METAL, 0.02)
+        b.open_top(color, Material.METAL, 0.02, glow=0.22)
         return
     rim = b.thick(0.008, 1)
     cut_slab(b, 1 - rim, rim, color, Material.METAL)
@@ -46,8 +46,10 @@ def bathtub_basin(b: Builder) -> None:
 
 def _basin(b: Builder, steel: bool) -> None:
     """A tub with a drain."""
-    b.open_top(STEEL if steel else _CERAMIC, Material.METAL if steel else Material.PLAIN, 0.014)
-    b.tube((0, -0.93, 0), (b.thick(0.025, 0), 0.03, b.thick(0.025, 2)), DARK)
+    color = shade_of(STEEL, 1.12) if steel else _CERAMIC
+    b.open_top(color, Material.METAL if steel else Material.PLAIN, 0.014, glow=0.22)
+    b.tube((0, -0.92, 0), (b.thick(0.04, 0), 0.02, b.thick(0.04, 2)), CHROME, Material.METAL)
+    b.tube((0, -0.9, 0), (b.thick(0.028, 0), 0.02, b.thick(0.028, 2)), DARK)
 
 
 @draws
@@ -67,7 +69,7 @@ def faucet(b: Builder) -> None:
 @draws
 def bathtub(b: Builder) -> None:
     """A white tub; its bottom is an object of its own where the recording has one."""
-    b.open_top(_CERAMIC, Material.PLAIN, 0.07)
+    b.open_top(_CERAMIC, Material.PLAIN, 0.07, glow=0.15)
 
 
 @draws
@@ -91,7 +93,7 @@ def window(b: Builder) -> None:
     """A bright pane in a white frame with a cross, at the wall side of its box."""
     x, y, z = b.thick(0.03, 0), b.thick(0.03, 1), b.thick(0.05, 2)
     at = z - 1
-    b.box((0, 0, at), (1, 1, z * 0.85), _SKY, Material.GLASS, glow=0.8)
+    b.box((0, 0, at), (1 - x, 1 - y, z * 0.85), _SKY, Material.GLASS, glow=0.8)
     for side in (-1, 1):
         b.box((side * (1 - x), 0, at), (x, 1, z), WHITE)
         b.box((0, side * (1 - y), at), (1, y, z), WHITE)

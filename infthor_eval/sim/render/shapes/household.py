@@ -6,8 +6,6 @@ from infthor_eval.sim.render.shapes.palette import (
     BLACK,
     BRASS,
     CERAMICS,
-    CHROME,
-    CLOTHS,
     DARK,
     LEAF,
     PAPER,
@@ -47,30 +45,6 @@ def newspaper(b: Builder) -> None:
 
 
 @draws
-def card(b: Builder) -> None:
-    """A plastic card with a stripe and a chip."""
-    b.box((0, 0, 0), (1, 1, 1), pick(((0.15, 0.3, 0.65), (0.75, 0.6, 0.2), (0.5, 0.12, 0.2)), b.style))
-    b.box((0, 0.9, 0.6), (1, 0.2, 0.15), BLACK)
-    b.box((-0.5, 0.9, -0.2), (0.18, 0.2, 0.2), BRASS)
-
-
-@draws
-def pen(b: Builder) -> None:
-    """A pen with its cap."""
-    color = pick(((0.1, 0.15, 0.5), (0.1, 0.1, 0.1), (0.6, 0.1, 0.1)), b.style)
-    b.box((0, 0, 0.3), (0.9, 0.9, 0.7), color)
-    b.box((0, 0, -0.65), (1, 1, 0.35), shade_of(color, 1.6))
-
-
-@draws
-def pencil(b: Builder) -> None:
-    """A yellow pencil with a rubber and a point."""
-    b.box((0, 0, 0.05), (1, 1, 0.75), (0.93, 0.75, 0.15))
-    b.box((0, 0, 0.9), (1, 1, 0.1), (0.85, 0.45, 0.45))
-    b.box((0, 0, -0.85), (0.5, 0.5, 0.15), (0.75, 0.6, 0.4))
-
-
-@draws
 def disc(b: Builder) -> None:
     """A shiny disc with a hole."""
     b.tube((0, 0, 0), (1, 1, 1), (0.75, 0.8, 0.88), Material.METAL)
@@ -78,27 +52,10 @@ def disc(b: Builder) -> None:
 
 
 @draws
-def keys(b: Builder) -> None:
-    """A ring with two keys."""
-    b.tube((-0.6, 0, 0), (0.4, 0.6, 0.7), BRASS, Material.METAL)
-    b.tube((-0.6, 0.1, 0), (0.25, 0.7, 0.45), (0.3, 0.25, 0.15))
-    b.box((0.35, 0, 0.3), (0.65, 0.6, 0.15), STEEL, Material.METAL)
-    b.box((0.3, 0.2, -0.4), (0.6, 0.6, 0.15), BRASS, Material.METAL, tilt=(0, 15, 0))
-
-
-@draws
 def watch(b: Builder) -> None:
     """A face on a strap."""
     b.tube((0, 0, 0), (0.95, 0.7, 0.95), DARK)
     b.tube((0, 0.5, 0), (0.7, 0.5, 0.7), (0.9, 0.85, 0.6), Material.METAL)
-
-
-@draws
-def pillow(b: Builder) -> None:
-    """A soft cushion."""
-    color = pick(CLOTHS, b.style)
-    b.ball((0, 0, 0), (1, 1, 1), color, Material.FABRIC)
-    b.box((0, 0, 0), (0.85, 0.5, 0.85), shade_of(color, 1.05), Material.FABRIC)
 
 
 @draws
@@ -113,42 +70,6 @@ def teddy(b: Builder) -> None:
         b.ball((side * 0.72, -0.1, 0.1), (0.28, 0.2, 0.3), fur)
         b.ball((side * 0.4, -0.85, 0.45), (0.28, 0.18, 0.5), fur)
         b.ball((side * 0.18, 0.6, 0.6), (0.05, 0.05, 0.05), BLACK)
-
-
-@draws
-def ball(b: Builder) -> None:
-    """An orange ball with seams."""
-    b.ball((0, 0, 0), (0.99, 0.99, 0.99), (0.85, 0.42, 0.12), Material.STONE)
-    b.tube((0, 0, 0), (1.005, 0.02, 1.005), BLACK)
-    b.add(Form.CYLINDER, (0, 0, 0), (1.005, 0.02, 1.005), BLACK, tilt=(0, 0, 90))
-
-
-@draws
-def bat(b: Builder) -> None:
-    """A bat along its longest side."""
-    _club(b, (0.7, 0.5, 0.3), thick=1.0, handle=0.45)
-
-
-@draws
-def racket(b: Builder) -> None:
-    """A frame of strings on a handle, along its longest side."""
-    axis = max(range(3), key=lambda i: float(b.half[i]))
-    flat = min(range(3), key=lambda i: float(b.half[i]))
-    half, at, grip, low = [1.0] * 3, [0.0] * 3, [0.14] * 3, [0.0] * 3
-    half[axis], half[flat], at[axis] = 0.55, 0.5, 0.45
-    grip[axis], grip[flat], low[axis] = 0.5, 0.6, -0.5
-    b.ball(at, half, (0.85, 0.82, 0.6), Material.FABRIC)
-    b.box(low, grip, (0.25, 0.25, 0.5))
-
-
-def _club(b: Builder, color: Color, thick: float, handle: float) -> None:
-    axis = max(range(3), key=lambda i: float(b.half[i]))
-    radius = min(float(b.half[i]) for i in range(3) if i != axis)
-    at, low = [0.0] * 3, [0.0] * 3
-    at[axis], low[axis] = 0.4, -0.6
-    length = float(b.half[axis])
-    b.rod(at, radius * thick, length * 0.6, axis, color)
-    b.rod(low, radius * handle, length * 0.4, axis, shade_of(color, 0.7))
 
 
 @draws
@@ -233,26 +154,6 @@ def sponge(b: Builder) -> None:
 
 
 @draws
-def cloth(b: Builder) -> None:
-    """A crumpled rag."""
-    color: Color = (0.45, 0.38, 0.3) if b.state.dirty else pick(CLOTHS, b.style)
-    b.box((0, -0.3, 0), (1, 0.7, 1), color, Material.FABRIC)
-    b.box((0.1, 0.6, -0.1), (0.6, 0.4, 0.5), shade_of(color, 1.15), Material.FABRIC, tilt=(0, 25, 0))
-
-
-@draws
-def towel(b: Builder) -> None:
-    """A hanging or lying cloth with a border."""
-    color = pick(CLOTHS, b.style + 1)
-    b.box((0, 0, 0), (1, 1, 1), color, Material.FABRIC)
-    flat = min(range(3), key=lambda i: float(b.half[i]))
-    half, at = [1.005] * 3, [0.0] * 3
-    axis = 1 if flat != 1 else 2
-    half[axis], at[axis] = 0.06, -0.75
-    b.box(at, half, WHITE, Material.FABRIC)
-
-
-@draws
 def toilet_paper(b: Builder) -> None:
     """A roll with a core along its axis of equal sides."""
     color: Color = (0.7, 0.6, 0.45) if b.state.used_up else WHITE
@@ -302,14 +203,6 @@ def watering_can(b: Builder) -> None:
     b.tube((0, -0.3, -0.2), (0.9, 0.7, 0.55), color, Material.METAL)
     b.add(Form.CYLINDER, (0, 0.0, 0.65), (0.15, 0.6, 0.1), color, tilt=(45, 0, 0))
     b.box((0, 0.85, -0.2), (0.15, 0.1, 0.5), shade_of(color, 0.8))
-
-
-@draws
-def dumbbell(b: Builder) -> None:
-    """Two weights on a bar."""
-    b.box((0, 0, 0), (0.25, 0.25, 1), CHROME, Material.METAL)
-    for side in (-1, 1):
-        b.box((0, 0, side * 0.7), (1, 1, 0.3), DARK)
 
 
 @draws

@@ -42,11 +42,13 @@ def cup(b: Builder) -> None:
 
 @draws
 def bowl(b: Builder) -> None:
-    """A wide bowl on a foot."""
+    """A round bowl on a foot, its inside lighter and its rim of another shade."""
     color = pick(CERAMICS, b.style)
-    b.cup((0, 0.1, 0), (1, 0.9, 1), color, bottom=0.5)
-    b.tube((0, -0.9, 0), (0.5, 0.1, 0.5), shade_of(color, 0.85))
-    _liquid(b, 0.5, 0.85)
+    inside = shade_of(color, 1.25) if max(color) < 0.8 else (0.8, 0.86, 0.92)
+    b.tube((0, -0.86, 0), (0.46, 0.14, 0.46), shade_of(color, 0.8))
+    b.bowl((0, 0.06, 0), (1, 0.94, 1), color)
+    b.bowl((0, 0.1, 0), (0.92, 0.9, 0.92), inside)
+    _liquid(b, 0.45, 0.82)
 
 
 @draws
@@ -113,57 +115,6 @@ def wine_bottle(b: Builder) -> None:
 def bottle(b: Builder) -> None:
     """A clear bottle with a coloured label."""
     _bottle(b, GLASS, pick(((0.3, 0.5, 0.7), (0.75, 0.4, 0.25)), b.style), 0.4)
-
-
-def _handled(b: Builder, share: float, handle: Color) -> None:
-    """A handle over the last `share` of the length, towards +z."""
-    b.box((0, 0, 1 - share), (0.5, 0.9, share), handle)
-
-
-@draws
-def knife(b: Builder) -> None:
-    """A blade and a dark handle."""
-    _handled(b, 0.36, (0.15, 0.13, 0.12))
-    b.box((0.15, 0, -0.36), (0.85, 0.35, 0.64), CHROME, Material.METAL)
-
-
-@draws
-def butter_knife(b: Builder) -> None:
-    """All of steel."""
-    _handled(b, 0.45, shade_of(STEEL, 0.9))
-    b.box((0, 0, -0.45), (1, 0.5, 0.55), CHROME, Material.METAL)
-
-
-@draws
-def fork(b: Builder) -> None:
-    """A handle and tines."""
-    b.box((0, 0, 0.35), (0.3, 0.6, 0.65), STEEL, Material.METAL)
-    b.box((0, 0, -0.4), (1, 0.6, 0.14), STEEL, Material.METAL)
-    for at in (-0.8, -0.27, 0.27, 0.8):
-        b.box((at, 0.2, -0.75), (0.16, 0.5, 0.25), STEEL, Material.METAL)
-
-
-@draws
-def spoon(b: Builder) -> None:
-    """A handle and a bowl."""
-    b.box((0, 0.1, 0.35), (0.3, 0.5, 0.65), STEEL, Material.METAL)
-    b.ball((0, 0, -0.65), (1, 1, 0.35), CHROME, Material.METAL)
-
-
-@draws
-def spatula(b: Builder) -> None:
-    """A slotted blade on a long handle."""
-    b.box((0, 0.2, 0.35), (0.22, 0.6, 0.65), DARK)
-    b.box((0, -0.3, -0.65), (1, 0.5, 0.35), (0.3, 0.3, 0.32))
-    for at in (-0.4, 0.0, 0.4):
-        b.box((at, 0.25, -0.65), (0.1, 0.1, 0.22), (0.6, 0.6, 0.62))
-
-
-@draws
-def ladle(b: Builder) -> None:
-    """A cup at the end of a long handle."""
-    b.cup((0, -0.3, -0.68), (0.95, 0.7, 0.32), STEEL, Material.METAL, bottom=0.6)
-    b.box((0, 0.5, 0.3), (0.15, 0.2, 0.7), CHROME, Material.METAL)
 
 
 @draws

@@ -9,6 +9,9 @@ from infthor_eval.sim.render.shapes.register import draws
 __all__: list[str] = []
 
 _LEAF = 0.02  # thickness of a door, metres
+_LIT = 0.2  # how much the insides of open things shine, as no light of the room gets there
+_BODY = 0.82  # of a cardboard box's width, the rest being its flaps
+_COLD: Color = (0.93, 0.97, 1.0)
 
 
 def _door(b: Builder, color: Color, material: Material, grip: Color, low: float = -1.0, high: float = 1.0) -> None:
@@ -30,7 +33,7 @@ def cabinet(b: Builder) -> None:
     """A cupboard of wood with one door."""
     color = pick(WOODS, b.style // 7 if b.item.asset_id else 2)
     if b.state.openness > 0:
-        b.open_front(shade_of(color, 0.85), Material.WOOD, 0.018)
+        b.open_front(shade_of(color, 1.2), Material.WOOD, 0.018, glow=_LIT)
     elif not b.item.hollow:
         back = b.thick(_LEAF, 2)
         b.box((0, 0, -back / 2), (1, 1, 1 - back / 2), shade_of(color, 0.8), Material.WOOD)
@@ -45,10 +48,10 @@ def drawer(b: Builder) -> None:
     leaf = b.thick(_LEAF / 2, 2)
     if b.state.openness > 0:
         x, y = b.thick(0.008, 0), b.thick(0.008, 1)
-        b.box((0, -0.85 + y, out), (0.9, y, 1 - leaf), shade_of(color, 0.75), Material.WOOD)
+        b.box((0, -0.85 + y, out), (0.9, y, 1 - leaf), shade_of(color, 1.3), Material.PLAIN, glow=_LIT)
         for side in (-1, 1):
-            b.box((side * (0.92 - x), -0.15, out), (x, 0.7, 1 - leaf), shade_of(color, 0.85), Material.WOOD)
-        b.box((0, -0.15, out - 1 + leaf), (0.92, 0.7, leaf), shade_of(color, 0.85), Material.WOOD)
+            b.box((side * (0.92 - x), -0.15, out), (x, 0.7, 1 - leaf), shade_of(color, 1.1), Material.WOOD, glow=_LIT)
+        b.box((0, -0.15, out - 1 + leaf), (0.92, 0.7, leaf), shade_of(color, 1.1), Material.WOOD, glow=_LIT)
     else:
         b.box((0, 0, -leaf), (0.94, 0.92, 1 - leaf), shade_of(color, 0.75), Material.WOOD)
     b.box((0, 0, out + 1 - leaf), (0.985, 0.96, leaf), color, Material.WOOD)
@@ -63,13 +66,39 @@ def fridge(b: Builder) -> None:
         z = b.thick(0.025, 2)
         b.box((0, 0, -z), (1, 1, 1 - z), shade_of(color, 0.92), Material.METAL)
     else:
-        b.open_front(shade_of(color, 0.97), Material.PLAIN, 0.045)
-        for level in (-0.56, -0.18, 0.24):
-            b.box((0, level - 0.03, 0.8), (0.93, 0.006, 0.02), (0.78, 0.86, 0.9), Material.GLASS)
-            b.box((0, level - 0.03, -0.86), (0.93, 0.006, 0.05), (0.78, 0.86, 0.9), Material.GLASS)
-        b.box((0, 0.9, -0.2), (0.3, 0.02, 0.3), (1.0, 1.0, 0.9), glow=0.9)
+        _lit_inside(b, shade_of(color, 0.8))
     _door(b, color, Material.METAL, DARK, -0.97, 0.3)
     _door(b, shade_of(color, 1.03), Material.METAL, DARK, 0.33, 1.0)
+    if b.state.openness > 0:
+        _door_racks(b)
+
+
+def _lit_inside(b: Builder, outside: Color) -> None:
+    """The body of an open fridge: white and bright within, edges of glass shelves, a lamp."""
+    b.box((0, 0, -0.99), (1, 1, 0.01), outside, Material.METAL)
+    b.open_front(_COLD, Material.PLAIN, 0.045, glow=0.45)
+    for side in (-1, 1):
+        b.box((side * 0.995, 0, 0), (0.008, 1, 0.985), outside, Material.METAL)
+    b.box((0, 0.995, 0), (1, 0.006, 0.985), outside, Material.METAL)
+    for level in (-0.56, -0.18, 0.24):
+        b.box((0, level - 0.03, 0.8), (0.93, 0.008, 0.02), (0.45, 0.62, 0.7))
+        b.box((0, level - 0.03, -0.86), (0.93, 0.008, 0.05), (0.45, 0.62, 0.7))
+    b.box((0, 0.9, -0.2), (0.3, 0.02, 0.3), (1.0, 1.0, 0.9), glow=0.9)
+
+
+def _door_racks(b: Builder) -> None:
+    """The white inner side of the open doors, with racks."""
+    side = b.item.hinge or -1
+    angle = side * DOOR_SWING * b.state.openness
+    width, height, _ = (float(v) for v in b.half)
+    hinge, inward = (side, 0.0, 1.0), -_LEAF
+    for low, high in ((-0.93, 0.26), (0.37, 0.96)):
+        half, middle = (high - low) / 2 * height, (high + low) / 2 * height
+        b.swung(hinge, (-side * width, middle, inward - 0.006), (width * 0.9, half, 0.006), angle, _COLD,
+                Material.PLAIN, glow=0.3)  # fmt: skip
+        for share in (-0.6, 0.1):
+            b.swung(hinge, (-side * width, middle + share * half, inward - 0.035), (width * 0.8, 0.03, 0.03), angle,
+                    (0.6, 0.72, 0.8), Material.PLAIN, glow=0.15)  # fmt: skip
 
 
 @draws
@@ -85,7 +114,7 @@ def microwave(b: Builder) -> None:
         b.box((0.27, 0, 1 - z / 2), (0.58, 0.68, z), window, Material.GLASS, glow=lit)
         b.box((-0.44, 0, 1 + z), (x, 0.7, z), CHROME, Material.METAL)
     else:
-        b.open_front(body, Material.METAL, 0.03)
+        b.open_front(shade_of(STEEL, 1.1), Material.METAL, 0.03, glow=0.3)
         b.tube((0.2, -0.86, 0), (0.55, 0.03, 0.75), (0.8, 0.86, 0.88), Material.GLASS)
         b.box((-0.76, 0, 0), (0.22, 0.94, 0.98), shade_of(body, 0.9), Material.METAL)
         wide = float(b.half[0])
@@ -108,7 +137,7 @@ def safe(b: Builder) -> None:
         z = b.thick(0.02, 2)
         b.box((0, 0, -z), (1, 1, 1 - z), body, Material.METAL)
     else:
-        b.open_front(body, Material.METAL, 0.04)
+        b.open_front(shade_of(body, 1.5), Material.METAL, 0.04, glow=_LIT)
     _door(b, shade_of(body, 1.25), Material.METAL, CHROME)
     if b.state.openness == 0:
         b.add(Form.CYLINDER, (0, 0.2, 1), (0.2, 0.02, 0.2), CHROME, Material.METAL, tilt=(90, 0, 0))
@@ -120,9 +149,36 @@ def carton(b: Builder) -> None:
     color: Color = (0.72, 0.55, 0.35)
     if b.state.openness == 0:
         b.box((0, 0, 0), (1, 1, 1), color)
-        b.box((0, 1, 0), (1, 0.01, 0.06), shade_of(color, 1.2))
+        b.box((0, 1, 0), (1.003, 0.01, 0.12), (0.88, 0.78, 0.58))
+        b.box((0, 0.8, 0), (1.006, 0.2, 0.12), (0.88, 0.78, 0.58))
+        b.box((0.1, -0.1, 1.0), (0.4, 0.25, 0.01), (0.92, 0.9, 0.85), Material.PAPER)
         return
-    b.open_top(color, Material.PLAIN, 0.012)
+    _body(b, color)
+    _flaps(b, shade_of(color, 1.16))
+
+
+def _body(b: Builder, color: Color) -> None:
+    """Four sides and a bottom, as far within the box as the flaps take."""
+    y = b.thick(0.004, 1)
+    x, z = b.thick(0.006, 0), b.thick(0.006, 2)
+    b.box((0, -1 + y, 0), (_BODY, y, _BODY), shade_of(color, 0.88), glow=0.12)
+    for side in (-1, 1):
+        b.box((side * (_BODY - x), y, 0), (x, 1 - y, _BODY), color, glow=0.12)
+        b.box((0, y, side * (_BODY - z)), (_BODY - 2 * x, 1 - y, z), color, glow=0.12)
+
+
+def _flaps(b: Builder, color: Color) -> None:
+    """Four flaps that hang outwards from the rim, to the edges of the box."""
+    for axis in (0, 2):
+        out = (1 - _BODY) * float(b.half[axis])  # metres
+        length, drop = 2.2 * out, 1.96 * out
+        half = [_BODY, 0.005 / float(b.half[1]), _BODY]
+        half[axis] = length / 2 / float(b.half[axis])
+        lean = 63.0
+        for side in (-1, 1):
+            at = b.along(side * (1 + _BODY) / 2, axis)
+            tilt = (side * lean, 0.0, 0.0) if axis == 2 else (0.0, 0.0, -side * lean)
+            b.box((at[0], 1 - drop / 2 / float(b.half[1]), at[2]), half, color, tilt=tilt)
 
 
 @draws

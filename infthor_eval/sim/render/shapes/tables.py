@@ -66,27 +66,86 @@ def _surface(b: Builder) -> float:
     return 1.0 if b.item.support is None else b.item.support / float(b.half[1]) - 1
 
 
-@draws
-def table(b: Builder) -> None:
-    """A board on four legs; with a raised back where the surface is lower than the box."""
-    color = pick(WOODS, b.style)
+def _top(b: Builder, color: Color, edge: float) -> float:
+    """The board, and a raised back where the surface is lower than the box; the height of the board's underside."""
     surface = _surface(b)
     board = b.thick(0.02, 1)
     b.box((0, surface - board, 0), (1, board, 1), color, Material.WOOD)
+    b.box((0, surface - 1.3 * board, 0), (1.004, 0.5 * board, 1.004), shade_of(color, edge), Material.WOOD)
     if surface < 1 - b.thick(0.12, 1):
         z = b.thick(0.015, 2)
         b.box((0, (1 + surface) / 2, -1 + z), (1, (1 - surface) / 2, z), shade_of(color, 0.85), Material.WOOD)
-    if b.item.hollow:
-        _carcass(b, color, surface - 2 * board)
-        return
-    under = surface - 2 * board
-    x, z = b.thick(0.03, 0), b.thick(0.03, 2)
+    return surface - 2 * board
+
+
+def _legs(b: Builder, under: float, thick: float, color: Color) -> None:
+    x, z = b.thick(thick, 0), b.thick(thick, 2)
     for sx in (-1, 1):
         for sz in (-1, 1):
-            b.box((sx * (0.97 - x), (under - 1) / 2, sz * (0.97 - z)), (x, (under + 1) / 2, z), shade_of(color, 0.85),
-                  Material.WOOD)  # fmt: skip
+            b.box((sx * (0.97 - x), (under - 1) / 2, sz * (0.97 - z)), (x, (under + 1) / 2, z), color, Material.WOOD)
+
+
+@draws
+def table(b: Builder) -> None:
+    """A board on four square legs: desks and what else has no shape of its own."""
+    color = pick(WOODS, b.style)
+    under = _top(b, color, 0.7)
+    if b.item.hollow:
+        _carcass(b, color, under)
+        return
+    _legs(b, under, 0.03, shade_of(color, 0.85))
     apron = b.thick(0.035, 1)
     b.box((0, under - apron, 0), (0.9, apron, 0.9), shade_of(color, 0.8), Material.WOOD)
+
+
+@draws
+def dining_table(b: Builder) -> None:
+    """A large board on turned legs, thick above and slender at the foot, with a deep apron."""
+    color = shade_of(pick(WOODS, b.style + 2), 1.05)
+    under = _top(b, color, 0.6)
+    if b.item.hollow:
+        _carcass(b, color, under)
+        return
+    leg = shade_of(color, 0.78)
+    x, z = b.thick(0.05, 0), b.thick(0.05, 2)
+    low = -1 + b.thick(0.05, 1)
+    neck = under - b.thick(0.12, 1)
+    for sx in (-1, 1):
+        for sz in (-1, 1):
+            at_x, at_z = sx * (0.94 - x), sz * (0.94 - z)
+            b.box((at_x, (under + neck) / 2, at_z), (x, (under - neck) / 2, z), leg, Material.WOOD)
+            b.tube((at_x, (neck + low) / 2, at_z), (x, (neck - low) / 2, z), leg, Material.WOOD, bottom=0.55, top=0.95)
+            b.ball((at_x, low, at_z), (x * 0.8, b.thick(0.05, 1), z * 0.8), shade_of(leg, 0.85))
+    apron = b.thick(0.05, 1)
+    b.box((0, under - apron, 0), (0.9, apron, 0.88), shade_of(color, 0.85), Material.WOOD)
+
+
+@draws
+def side_table(b: Builder) -> None:
+    """A small stand: a drawer's front with a knob below the board, slim legs, a shelf near the floor."""
+    color = pick(WOODS, b.style)
+    under = _top(b, color, 0.7)
+    if b.item.hollow:
+        _carcass(b, color, under)
+        return
+    _legs(b, under, 0.018, shade_of(color, 0.85))
+    half = min(b.thick(0.07, 1), (under + 1) / 4)
+    b.box((0, under - half, 0), (0.93, half, 0.93), shade_of(color, 0.8), Material.WOOD)
+    b.box((0, under - half, 0.94), (0.8, half * 0.8, 0.02), shade_of(color, 1.12), Material.WOOD)
+    b.ball((0, under - half, 0.98), (b.thick(0.016, 0), b.thick(0.016, 1), b.thick(0.016, 2)), CHROME)
+    b.box((0, -0.72, 0), (0.92, b.thick(0.01, 1), 0.92), shade_of(color, 0.9), Material.WOOD)
+
+
+@draws
+def coffee_table(b: Builder) -> None:
+    """A low board on stout legs with a shelf between them."""
+    color = pick(WOODS, b.style)
+    under = _top(b, color, 0.7)
+    if b.item.hollow:
+        _carcass(b, color, under)
+        return
+    _legs(b, under, 0.035, shade_of(color, 0.8))
+    b.box((0, -0.55, 0), (0.93, b.thick(0.01, 1), 0.9), shade_of(color, 0.9), Material.WOOD)
 
 
 @draws
