@@ -1,5 +1,7 @@
 """When a task is done, in the symbolic state, and a lower bound on what is left to do."""
 
+from collections import Counter
+
 from infthor_eval.household.affordances import KNIVES
 from infthor_eval.household.symbolic import Room, State
 from infthor_eval.household.tasks import Task, TaskType
@@ -64,20 +66,23 @@ def _wanted(task: Task) -> int:
 
 
 def _placed(task: Task, room: Room, state: State) -> int:
-    """How many objects of the asked type, in the asked condition, are where they shall be."""
+    """How many objects of the asked type, in the asked condition, are together where they shall be.
+
+    Together is in one and the same receptacle: two objects on two side tables are not two on the side table.
+    """
     where = dict(state.where)
     treated = {
         TaskType.CLEAN: state.clean,
         TaskType.HEAT: state.hot,
         TaskType.COOL: state.cold,
     }.get(task.task_type)
-    count = 0
+    count = Counter[str]()
     for item, parent in state.where:
         if room.types[item] != task.target or (treated is not None and item not in treated):
             continue
         if task.task_type == TaskType.STACK:
             inside = room.types.get(parent) == task.movable
-            count += inside and room.types.get(where.get(parent, "")) == task.receptacle
+            count[parent] += inside and room.types.get(where.get(parent, "")) == task.receptacle
         else:
-            count += room.types.get(parent) == task.receptacle
-    return count
+            count[parent] += room.types.get(parent) == task.receptacle
+    return max(count.values(), default=0)
