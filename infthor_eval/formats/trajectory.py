@@ -1,8 +1,8 @@
 """Trajectory JSON: ∞-THOR's, ours, and its single-task ancestor, ALFRED's `traj_data.json`.
 
 One typed form serves all three; `_regular` levels what the published saver writes otherwise. What a file adds beyond
-the known fields is tolerated and left out, so whoever passes a trajectory on keeps `Source.raw`. Coordinates are metres but for `PlannerAction.location`,
-whose x and z are grid cells of 0.25 m; angles are degrees.
+the known fields is tolerated and left out, so whoever passes a trajectory on keeps `Source.raw`. Coordinates are metres
+but for `PlannerAction.location`, whose x and z are grid cells of 0.25 m; angles are degrees.
 """
 
 import gzip

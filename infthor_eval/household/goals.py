@@ -1,12 +1,14 @@
 """When a task is done, in the symbolic state, and a lower bound on what is left to do."""
 
 from collections import Counter
+from dataclasses import replace
 
 from infthor_eval.household.affordances import KNIVES
-from infthor_eval.household.symbolic import Room, State
+from infthor_eval.household.symbolic import Room, State, room_of
 from infthor_eval.household.tasks import Task, TaskType
+from infthor_eval.thor.view import View
 
-__all__ = ["APPLIANCE", "achieved", "least_remaining"]
+__all__ = ["APPLIANCE", "achieved", "holds_in", "least_remaining"]
 
 APPLIANCE = {TaskType.CLEAN: "SinkBasin", TaskType.HEAT: "Microwave", TaskType.COOL: "Fridge"}
 
@@ -17,6 +19,18 @@ def achieved(task: Task, room: Room, state: State) -> bool:
         held = state.held is not None and room.types[state.held] == task.target
         return held and state.at in state.lit and room.types.get(state.at or "") == task.light
     return _placed(task, room, state) >= _wanted(task)
+
+
+def holds_in(task: Task, view: View) -> bool:
+    """Whether things are in a view where a task wants them.
+
+    A view does not tell what was washed, heated or cooled, nor which lamp the agent stands at: what is there counts as
+    treated, and any lit lamp of the type will do.
+    """
+    room = room_of(view)
+    everything = frozenset(room.types)
+    lamp = next((key for key in sorted(room.start.lit) if room.types[key] == task.light), None)
+    return achieved(task, room, replace(room.start, at=lamp, clean=everything, hot=everything, cold=everything))
 
 
 def least_remaining(task: Task, room: Room, state: State) -> int:

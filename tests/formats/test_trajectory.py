@@ -81,7 +81,9 @@ def test_written_reads_back(tmp_path):
 
 def test_what_the_published_saver_leaves_empty(tmp_path):
     scene = {**MINIMAL["scene"], "floor_plan": "", "scene_num": 28, "dirty_and_empty": None}
-    trajectory = next(iter_trajectories(write(tmp_path / "a.json", {**MINIMAL, "scene": scene, "long_horizon_task": {}})))
+    trajectory = next(
+        iter_trajectories(write(tmp_path / "a.json", {**MINIMAL, "scene": scene, "long_horizon_task": {}}))
+    )
     assert (trajectory.scene.floor_plan, trajectory.scene.dirty_and_empty) == ("FloorPlan28", False)
     assert trajectory.long_horizon_task is None
 
