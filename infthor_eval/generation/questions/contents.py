@@ -5,7 +5,7 @@ the same answer (`readings`). Ours do say: what can be picked up, and is directl
 """
 
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 
 from infthor_eval.generation.questions.candidates import MANY, Candidate, answer_of, distinct, further, the, within
 from infthor_eval.generation.questions.evidence import cover
@@ -116,13 +116,12 @@ def _contents(
         yield Candidate(question_type, *asked, clues, answers, (place_type, *types))
 
 
-def _whole_types(history: History, frame: int, keys: Iterable[str]) -> list[str]:
+def _whole_types(history: History, frame: int, keys: frozenset[str]) -> list[str]:
     """The types of objects; of a fresh slice that of what was cut."""
     world = history.world(frame)
     cut = {event.target for event in history.events if event.action == "SliceObject" and event.frame == frame}
-    return [
-        world[key].type.removesuffix("Sliced") if key.split("|Slice")[0] in cut else world[key].type for key in keys
-    ]
+    fresh = {key for key in keys for whole in cut if key.startswith(f"{whole}|")}
+    return [world[key].type.removesuffix("Sliced") if key in fresh else world[key].type for key in keys]
 
 
 def _others(history: History, frame: int, place: str) -> bool:
