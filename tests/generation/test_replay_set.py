@@ -14,7 +14,7 @@ from infthor_eval.generation.replay import box_iou
 from infthor_eval.generation.replay_set import replay_set, select
 from infthor_eval.generation.replay_summary import summarise
 from infthor_eval.generation.settings import TrajectorySettings
-from infthor_eval.generation.supplement import supplement_file, write_supplement
+from infthor_eval.generation.supplement import write_supplement
 from infthor_eval.nieh.baselines import BASELINES
 from infthor_eval.nieh.scoring import score
 from infthor_eval.thor.launch import embedded
@@ -126,9 +126,9 @@ def test_recorded_trajectories_replay(tmp_path):
 @pytest.mark.skipif(not PUBLISHED.is_dir(), reason="published trajectories not at ../shared/data")
 def test_what_the_published_saver_writes_is_replayed_asked_about_and_evaluated(tmp_path):
     selection = select([PUBLISHED / f"floorplan28_{split}.json" for split in ("train", "test")])
-    with supplement_file(item for _, item in selection.items) as supplement:
-        with Simulator(embedded(SHARED, supplement)) as simulator:
-            summary = summarise(replay_set(selection, simulator, tmp_path / "set"))
+    write_supplement((item for _, item in selection.items), tmp_path / "supplement.json")
+    with Simulator(embedded(SHARED, tmp_path / "supplement.json")) as simulator:
+        summary = summarise(replay_set(selection, simulator, tmp_path / "set"))
     assert (summary.trajectories, summary.complete, summary.floor_plans) == (2, 2, 1), summary.diverged
     training, test = (item for _, item in selection.items)
     assert training.long_horizon_task is None
