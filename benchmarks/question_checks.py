@@ -1,6 +1,6 @@
 """How far the questions of a set can be trusted: a second opinion on all of them, and what can be had without looking.
 
-python benchmarks/question_checks.py SET [--per-trajectory 25] [--seed 0]
+python benchmarks/question_checks.py SET [--per-trajectory 25] [--seed 0] [--further]
 
 The checker answers every question that the rules can make, from the log, by another way than the rules; then once from
 the entries of the clue frames alone, and once with each clue left out. The baselines are those of the chosen questions.
@@ -16,7 +16,7 @@ from infthor_eval.formats.question import Question
 from infthor_eval.formats.step_log import read_steps
 from infthor_eval.generation.questions.checker import Checker
 from infthor_eval.generation.questions.history import DEFAULT_SHARE, History
-from infthor_eval.generation.questions.make import candidates_of, make_questions
+from infthor_eval.generation.questions.make import candidates_of, further_candidates_of, make_questions
 from infthor_eval.nieh.baselines import BASELINES, Predict
 from infthor_eval.nieh.scoring import score
 
@@ -29,9 +29,10 @@ def main() -> None:
     parser.add_argument("set", type=Path)
     parser.add_argument("--per-trajectory", type=int, default=25)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--further", action="store_true", help="choose among the further forms too")
     chosen = parser.parse_args()
     check_all(chosen.set)
-    made = make_questions(chosen.set, seed=chosen.seed, per_trajectory=chosen.per_trajectory)
+    made = make_questions(chosen.set, seed=chosen.seed, per_trajectory=chosen.per_trajectory, further=chosen.further)
     print(f"chosen: {len(made.questions)}, by number of clues {made.by_clues()}, by type {made.by_type()}")
     yes_no = [item for item in made.questions if item.answers[0] in _YES_NO]
     for name in ("oracle", "blind"):
@@ -46,7 +47,8 @@ def check_all(folder: Path) -> None:
     found: Counter[str] = Counter()
     for history in histories:
         checker = Checker(history.steps, DEFAULT_SHARE)
-        for candidate in candidates_of(history, vocabulary, random.Random(history.traj_id)):
+        rng = random.Random(history.traj_id)
+        for candidate in (*candidates_of(history, vocabulary, rng), *further_candidates_of(history, rng)):
             question = candidate.question(history.traj_id)
             verdict = checker.verdict(question)
             found.update(["all", *(name for name in ("right", "sufficient", "minimal") if getattr(verdict, name))])

@@ -1,7 +1,7 @@
 """Whether what the factory makes holds: trajectories with final tasks, replayed in a fresh simulator and checked.
 
 python benchmarks/replayed_trajectories.py --data FOLDER [--procedural 20] [--recorded 20] [--count 100]
-    [--min-steps 300] [--out FOLDER]
+    [--min-steps 300] [--min-subgoals 10] [--out FOLDER]
 
 Uses the commands as a person does: `generate --test-set`, then `replay`. A trajectory holds if every action of it is
 carried out again, the object log comes out the same in every step, and its final task is about types seen at both ends
@@ -36,6 +36,7 @@ def main() -> None:
     parser.add_argument("--recorded", type=int, default=20, help="recorded floor plans")
     parser.add_argument("--count", type=int, default=100, help="trajectories")
     parser.add_argument("--min-steps", type=int, default=300)
+    parser.add_argument("--min-subgoals", type=int, default=10)
     parser.add_argument("--out", type=Path, help="kept there; else in a folder that is removed")
     chosen = parser.parse_args()
     with tempfile.TemporaryDirectory() as scratch:
@@ -68,7 +69,8 @@ def make(scenes: list[str], chosen: argparse.Namespace, out: Path) -> dict[str, 
         if not names or not count:
             continue
         options = [word for name in names for word in ("--scene", name)]
-        options += ["--min-steps", str(chosen.min_steps), "--count", str(count), "--test-set", "--data", chosen.data]
+        options += ["--min-steps", str(chosen.min_steps), "--min-subgoals", str(chosen.min_subgoals)]
+        options += ["--count", str(count), "--test-set", "--data", chosen.data]
         document = run(["generate", *options, "--out", out, "--json"])
         total["failures"] += document["failures"]
     return total

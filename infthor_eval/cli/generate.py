@@ -21,8 +21,9 @@ _PATH = click.Path(path_type=Path)
 
 @click.command("generate")
 @click.option("--scene", "scenes", multiple=True, required=True, help="kitchen-3, FloorPlan10, ...; may be repeated.")
-@click.option("--min-steps", type=click.IntRange(1), default=100, show_default=True, help="Low-level actions at least.")
-@click.option("--min-subgoals", type=click.IntRange(1), default=1, show_default=True, help="Sub-goals at least.")
+@click.option("--min-steps", type=click.IntRange(1), default=300, show_default=True, help="Low-level actions at least.")
+@click.option("--min-subgoals", type=click.IntRange(1), default=10, show_default=True, help="Tasks at least.")
+@click.option("--max-fail", type=click.IntRange(1), default=20, show_default=True, help="Tasks that may fail, at most.")
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of the first trajectory.")
 @click.option("--count", type=click.IntRange(1), default=1, show_default=True, help="Trajectories for each scene.")
 @click.option("--final-task", is_flag=True, help="End with a task on what was seen at both ends of the trajectory.")
@@ -36,6 +37,7 @@ def command(
     scenes: tuple[str, ...],
     min_steps: int,
     min_subgoals: int,
+    max_fail: int,
     seed: int,
     count: int,
     final_task: bool,
@@ -67,6 +69,7 @@ def command(
         min_steps=min_steps,
         min_subgoals=min_subgoals,
         final_task=final_task or test_set,
+        max_fail=max_fail,
     )
     with Simulator(embedded(data)) as simulator, Progress(console=notes, transient=True) as progress:
         bar = progress.add_task("generate", total=len(jobs))

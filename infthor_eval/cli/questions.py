@@ -23,15 +23,21 @@ _PATH = click.Path(path_type=Path)
     show_default=True,
     help="Of a frame's pixels that an object must fill to count as shown.",
 )
+@click.option("--further", is_flag=True, help="Ask forms beside those of Table 3 too, under types of their own.")
 @click.pass_context
-def command(context: click.Context, folder: Path, out: Path, seed: int, per_trajectory: int, min_share: float) -> None:
-    """Make questions on a replayed set. Exit status 1 where a trajectory of it could not be read."""
+def command(
+    context: click.Context, folder: Path, out: Path, seed: int, per_trajectory: int, min_share: float, further: bool
+) -> None:
+    """Make questions on a replayed set, in the words of the paper's Table 3.
+
+    Exit status 1 where a trajectory of the set could not be read.
+    """
     from rich.console import Console
 
     from infthor_eval.formats.qa_csv import write_questions
     from infthor_eval.generation.questions.make import make_questions
 
-    made = make_questions(folder, seed=seed, per_trajectory=per_trajectory, share=min_share)
+    made = make_questions(folder, seed=seed, per_trajectory=per_trajectory, share=min_share, further=further)
     out.parent.mkdir(parents=True, exist_ok=True)
     write_questions(out, made.questions)
     output = Console(soft_wrap=True)

@@ -1,13 +1,13 @@
 """Trajectory JSON: ∞-THOR's, ours, and its single-task ancestor, ALFRED's `traj_data.json`.
 
-One typed form serves all three. What a file adds beyond the known fields is tolerated and left out, so
-whoever passes a trajectory on keeps `Source.raw`. Coordinates are metres but for `PlannerAction.location`,
-whose x and z are grid cells of 0.25 m; angles are degrees.
+One typed form serves all three; `_regular` levels what the published saver writes otherwise. What a file adds beyond
+the known fields is tolerated and left out, so whoever passes a trajectory on keeps `Source.raw`. Coordinates are metres
+but for `PlannerAction.location`, whose x and z are grid cells of 0.25 m; angles are degrees.
 """
 
 import gzip
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -42,6 +42,7 @@ __all__ = [
 _SUFFIXES = (".json", ".jsonl", ".jsonl.gz")
 _NOT_TRAJECTORIES = {"metadata.json", "expert_log.json"}  # what a replayed set holds beside its trajectories
 _MEND = "restore the file or leave it out"
+_ALWAYS: dict[str, Callable[[], Any]] = {"long_horizon_task": dict, "sub_tasks": list, "sub_trajs": list}
 
 
 class _Fields(msgspec.Struct, omit_defaults=True):
@@ -225,7 +226,7 @@ class Source:
             DataError: not JSON, or not the documented form.
         """
         try:
-            trajectory = msgspec.json.decode(self.raw, type=Trajectory)
+            trajectory = msgspec.convert(_regular(msgspec.json.decode(self.raw)), type=Trajectory)
         except (msgspec.DecodeError, UnicodeDecodeError) as error:
             raise DataError(f"{self.place}: not a trajectory ({error}); {_MEND}") from error
         trajectory.traj_id = trajectory.traj_id or trajectory.task_id or self._stem()
@@ -271,8 +272,27 @@ def iter_trajectories(path: Path) -> Iterator[Trajectory]:
 
 
 def encode_trajectory(trajectory: Trajectory) -> bytes:
-    """The trajectory as indented JSON."""
-    return msgspec.json.format(msgspec.json.encode(trajectory), indent=1) + b"\n"
+    """The trajectory as indented JSON, with the keys that the published saver always writes."""
+    document = {name: empty() for name, empty in _ALWAYS.items()} | msgspec.to_builtins(trajectory)
+    return msgspec.json.format(msgspec.json.encode(document), indent=1) + b"\n"
+
+
+def _regular(document: Any) -> Any:
+    """A decoded file in the form that `Trajectory` describes.
+
+    The published saver leaves `floor_plan` empty (`scene_num` names it), `dirty_and_empty` null, and
+    `long_horizon_task` without a key where there is no final task.
+    """
+    if not isinstance(document, dict):
+        return document  # which the typed form refuses, in its own words
+    regular = {name: value for name, value in document.items() if (name, value) != ("long_horizon_task", {})}
+    scene = regular.get("scene")
+    if isinstance(scene, dict):
+        scene = {name: value for name, value in scene.items() if (name, value) != ("dirty_and_empty", None)}
+        if not scene.get("floor_plan") and "scene_num" in scene:
+            scene["floor_plan"] = f"FloorPlan{str(scene['scene_num']).removeprefix('FloorPlan')}"
+        regular["scene"] = scene
+    return regular
 
 
 def folder_name(traj_id: str) -> str:

@@ -43,6 +43,7 @@ class Manifest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         trajectories: what to generate.
         per_trajectory: questions at most on one trajectory.
         question_seed: makes every choice among the questions.
+        further: whether questions of our further forms are asked too.
         colors: frames are stored with a palette of so many colours, which halves the set.
         files: digest by path of every file of the set; empty in a manifest that nothing was made from yet.
     """
@@ -51,6 +52,7 @@ class Manifest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     trajectories: tuple[TrajectoryRecipe, ...]
     per_trajectory: int = 25
     question_seed: int = 0
+    further: bool = False
     colors: int = 128
     files: dict[str, str] = {}
 
@@ -93,7 +95,9 @@ def make_bundle(
         _refuse(generate_set(jobs, simulator, Path(folder), progress).failures)
         replayed = replay_set(select([Path(folder)]), simulator, out, progress)
     _refuse([f"{item.place}: {item.message}" for item in replayed.failures])
-    made = make_questions(out, seed=manifest.question_seed, per_trajectory=manifest.per_trajectory)
+    made = make_questions(
+        out, seed=manifest.question_seed, per_trajectory=manifest.per_trajectory, further=manifest.further
+    )
     write_questions(out / f"qa_set_{manifest.name}.csv", made.questions)
     for frame in sorted(out.rglob("img/*.png")):
         _store_small(frame, manifest.colors)

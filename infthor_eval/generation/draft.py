@@ -79,6 +79,11 @@ class Draft:
         """How long it is so far."""
         return Length(len(self._low), len(self._high))
 
+    @property
+    def n_tasks(self) -> int:
+        """Number of tasks so far."""
+        return len(self._sub_tasks)
+
     def add(self, trace: Trace) -> None:
         """Add what a rollout did."""
         for acted in trace.acted:
@@ -104,8 +109,8 @@ class Draft:
         self._sub_tasks.append(task)
 
     def make_last_task_final(self) -> None:
-        """Take the last task for the final one."""
-        self._final = self._sub_tasks.pop()
+        """Take the last task for the final one, which a test set names once more beside the others."""
+        self._final = self._sub_tasks[-1]
 
     def object_log(self) -> list[dict[str, Any]]:
         """What each frame shows, by object type."""

@@ -14,10 +14,12 @@ from infthor_eval.generation.sampling import TaskPool
 from infthor_eval.generation.setbacks import Setbacks
 from infthor_eval.generation.settings import TrajectorySettings
 from infthor_eval.generation.trace import RolloutError
-from infthor_eval.household.affordances import goes_into
+from infthor_eval.household.affordances import MAX_PLAN_STEPS, goes_into
+from infthor_eval.household.goals import holds_in
 from infthor_eval.household.pddl import problem
 from infthor_eval.household.planner import plan
 from infthor_eval.household.possible_tasks import tasks_of
+from infthor_eval.household.scene_types import usual_tasks
 from infthor_eval.household.scout import reachable
 from infthor_eval.household.symbolic import Operator, Room, room_of
 from infthor_eval.household.tasks import Task, sub_task
@@ -26,7 +28,6 @@ from infthor_eval.thor.simulator import Simulator, SimulatorMark
 
 __all__ = ["GeneratedTrajectory", "TaskStatistics", "generate"]
 
-_TRIALS = 60  # tasks tried in a row without success before the scene counts as unsolvable
 _LONGER = 4  # how often a trajectory is made longer because no final task works
 
 
@@ -82,9 +83,10 @@ class _Factory:
         self._name = f"scene {settings.scene}, seed {settings.seed}"
         self._simulator = simulator
         self._rng = random.Random(f"{settings.scene}/{settings.seed}")
-        self._pool = TaskPool(settings.task_types, self._rng)
+        self._pool = TaskPool(usual_tasks(settings.scene).intersection(settings.task_types), self._rng)
         self._setbacks = Setbacks()
         self._statistics = TaskStatistics()
+        self._failures = 0
         self._problems: list[str] = []
         self._draft = self._begun()
 
@@ -101,8 +103,8 @@ class _Factory:
 
     def long_enough(self) -> bool:
         """Whether the asked length is reached."""
-        length = self._draft.length
-        return length.low >= self._settings.min_steps and length.high >= self._settings.min_subgoals
+        draft, settings = self._draft, self._settings
+        return draft.length.low >= settings.min_steps and draft.n_tasks >= settings.min_subgoals
 
     def result(self) -> GeneratedTrajectory:
         """What was made so far."""
@@ -115,49 +117,55 @@ class _Factory:
 
         What it leaves in the hand is put down, as a sub-goal of its own behind the task.
         """
-        if self._first_that_works(lambda _: True, _TRIALS) is None:
+        if self._first_that_works(lambda _: True) is None:
             reasons = "; ".join(f"{reason} ({count})" for reason, count in self._statistics.reasons.most_common(3))
+            mend = "choose another scene or seed" + (" or a higher --max-fail" if self._out_of_tries else "")
             raise UsageError(
-                f"{self._name}: no further task works after {self._draft.length.low} steps "
-                f"({reasons or 'nothing there to do'}); choose another scene or seed"
+                f"{self._name}: no further task works after {self._draft.length.low} steps and "
+                f"{self._failures} failed tasks ({reasons or 'nothing there to do'}); {mend}"
             )
 
     def finish(self) -> None:
         """Add the final task; where none works, another ordinary one comes before it."""
         for _ in range(_LONGER):
-            task = self._first_that_works(ends_of(self._draft.object_log()).allow_task, None, is_last=True)
-            if task is not None:
-                self._draft.make_last_task_final()
-                return
+            ways = list(ends_of(self._draft.object_log()))
+            self._rng.shuffle(ways)
+            for ends in ways:
+                self._failures = 0
+                if self._first_that_works(ends.allow_task, is_last=True) is not None:
+                    self._draft.make_last_task_final()
+                    return
+            self._failures = 0
             self.extend()
         raise UsageError(f"{self._name}: no final task works; choose another scene or seed")
 
-    def _first_that_works(
-        self, allowed: Callable[[Task], bool], trials: int | None, is_last: bool = False
-    ) -> Task | None:
+    @property
+    def _out_of_tries(self) -> bool:
+        return self._failures >= self._settings.max_fail
+
+    def _first_that_works(self, allowed: Callable[[Task], bool], is_last: bool = False) -> Task | None:
         """Try sampled tasks until one becomes part of the trajectory; None where none does."""
-        task = self._try_sampled(allowed, trials, is_last)
-        if task is None and self._setbacks:
+        task = self._try_sampled(allowed, is_last)
+        if task is None and self._setbacks and not self._out_of_tries:
             self._setbacks.forget()  # before giving up: they may be outdated
-            task = self._try_sampled(allowed, trials, is_last)
+            task = self._try_sampled(allowed, is_last)
         return task
 
-    def _try_sampled(self, allowed: Callable[[Task], bool], trials: int | None, is_last: bool) -> Task | None:
+    def _try_sampled(self, allowed: Callable[[Task], bool], is_last: bool) -> Task | None:
         view = self._simulator.view
         types = {item.object_type for item in view.objects.values()}
         room = self._setbacks.room(view)
         possible = set(tasks_of(room, types))
-        tried = 0
         for task in self._pool.sample(room, types):
+            if self._out_of_tries:
+                return None
             operators = plan(task, room) if task in possible and allowed(task) else None
             if not operators or all(step.name == "GotoLocation" for step in operators):
                 continue  # it holds already, or would by standing elsewhere
-            if tried == trials:
-                return None
-            tried += 1
             failure = self._try(task, room, operators, is_last)
             if failure is None:
                 return task
+            self._failures += 1
             if failure.item is not None:
                 self._setbacks.note(view, failure.item, failure.receptacle)
             room = self._setbacks.room(view)
@@ -168,7 +176,7 @@ class _Factory:
         name = f"{task.task_type}{' sliced' if task.sliced else ''}"
         self._statistics.tried[name] += 1
         mark, start = self._simulator.mark(), self._draft.length
-        failure = self._carry_out(operators)
+        failure = self._carry_out(operators) or self._unmet(task)
         end = self._draft.length
         if failure is None and not is_last:
             failure = self._put_down()
@@ -182,6 +190,14 @@ class _Factory:
         self._problems.append(problem(task, room, f"task-{len(self._problems):03d}"))
         self._draft.add_task(sub_task(task, self._settings.scene), start, end)
         return None
+
+    def _unmet(self, task: Task) -> RolloutError | None:
+        """What is wrong where a plan was carried out and its goal does not hold: things can slide."""
+        if holds_in(task, self._simulator.view):
+            return None
+        error = RolloutError(f"{task.task_type}: its plan was carried out and its goal does not hold")
+        self._statistics.reasons[str(error)] += 1
+        return error
 
     def _put_down(self) -> RolloutError | None:
         """Put a held object down, wherever there is room for it."""
@@ -212,6 +228,8 @@ class _Factory:
         rollout = Rollout(self._simulator, self._draft.length.high)
         try:
             rollout.run(list(operators))
+            if len(rollout.trace.acted) > MAX_PLAN_STEPS:
+                raise RolloutError(f"a plan of more than {MAX_PLAN_STEPS} steps")
         except RolloutError as error:
             self._statistics.reasons[str(error)] += 1
             self._simulator.rewind(mark)

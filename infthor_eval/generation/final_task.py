@@ -1,11 +1,12 @@
 """The final task: what it is about must have been seen at the two ends of the trajectory before it.
 
-The object to pick up is of a type seen in the first fifth and the receptacle (or lamp) of one seen in the last fifth,
-or the other way round, so that solving the task needs what was seen long ago.
+The object to pick up is among those `pickupable` in the first fifth of the steps and the receptacle (or lamp) among
+those `visible` in the last fifth, or the other way round, so that solving the task needs what was seen long ago.
 """
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from infthor_eval.formats.trajectory import Trajectory
@@ -16,33 +17,43 @@ __all__ = ["SHARE", "Ends", "ends_of", "violation"]
 SHARE = 0.2
 
 
+@dataclass(frozen=True)
 class Ends:
-    """The object types seen at the two ends of a trajectory."""
+    """The object types seen at the two ends of a trajectory: one end holds the object, the other the receptacle.
 
-    def __init__(self, early: set[str], late: set[str]) -> None:
-        self.early = early
-        self.late = late
+    Attributes:
+        pickupable: at the end that holds the object.
+        visible: at the end that holds the receptacle.
+        either: visible at any of the two.
+    """
+
+    pickupable: frozenset[str]
+    visible: frozenset[str]
+    either: frozenset[str]
 
     def allow(self, pickup: str, other: str | None, movable: str | None = None) -> bool:
         """Whether a task on these types meets the rule; a carried receptacle may be from either end."""
-        if movable is not None and movable not in self.early | self.late:
-            return False
-        return (pickup in self.early and other in self.late) or (pickup in self.late and other in self.early)
+        carried = movable is None or movable in self.either
+        return carried and pickup in self.pickupable and other in self.visible
 
     def allow_task(self, task: Task) -> bool:
         """Whether a task meets the rule."""
         return self.allow(task.pickup, task.receptacle or task.light, task.movable)
 
 
-def ends_of(object_log: Sequence[dict[str, Any]]) -> Ends:
-    """The ends of the trajectory that a log tells of.
+def ends_of(object_log: Sequence[dict[str, Any]]) -> tuple[Ends, Ends]:
+    """The ends of the trajectory that a log tells of: with the object early, and the other way round.
 
     Args:
-        object_log: one entry per frame, with the types that are visible there.
+        object_log: one entry per frame, with the types that are visible and pickupable there.
     """
     count = max(1, math.floor(SHARE * len(object_log)))
-    early, late = object_log[:count], object_log[-count:]
-    return Ends(*({object_type for entry in part for object_type in entry["visible"]} for part in (early, late)))
+    first, last = object_log[:count], object_log[-count:]
+    either = _types(first, "visible") | _types(last, "visible")
+    return (
+        Ends(_types(first, "pickupable"), _types(last, "visible"), either),
+        Ends(_types(last, "pickupable"), _types(first, "visible"), either),
+    )
 
 
 def violation(trajectory: Trajectory) -> str | None:
@@ -51,9 +62,13 @@ def violation(trajectory: Trajectory) -> str | None:
     if task is None:
         return "there is no final task"
     before = trajectory.sub_trajs[-1].low_pddl_idx[0]
-    ends = ends_of(trajectory.object_log[: before + 1])
     info = task.task_info
     other = info.receptacle or task.pddl_params.get("toggle_target")
-    if info.pickup is not None and ends.allow(info.pickup, other, info.movable):
+    either_way = ends_of(trajectory.object_log[: before + 1])
+    if info.pickup is not None and any(ends.allow(info.pickup, other, info.movable) for ends in either_way):
         return None
     return f"'{task.task_desc}' is not about types seen at both ends of the {before} steps before it"
+
+
+def _types(entries: Sequence[dict[str, Any]], name: str) -> frozenset[str]:
+    return frozenset(object_type for entry in entries for object_type in entry[name])

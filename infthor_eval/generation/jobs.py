@@ -3,15 +3,21 @@
 from collections.abc import Sequence
 
 from infthor_eval.errors import UsageError
-from infthor_eval.generation.settings import TrajectorySettings
+from infthor_eval.generation.settings import MAX_FAIL, TrajectorySettings
+from infthor_eval.household.scene_types import BATHROOM, scene_type
 
 __all__ = ["trajectory_jobs", "without_bathrooms"]
 
-_BATHROOMS = range(401, 431)  # numbers of floor plans
-
 
 def trajectory_jobs(
-    scenes: Sequence[str], *, seed: int, count: int, min_steps: int, min_subgoals: int, final_task: bool
+    scenes: Sequence[str],
+    *,
+    seed: int,
+    count: int,
+    min_steps: int,
+    min_subgoals: int,
+    final_task: bool,
+    max_fail: int = MAX_FAIL,
 ) -> list[TrajectorySettings]:
     """The settings of every trajectory of a set, scene by scene.
 
@@ -20,11 +26,16 @@ def trajectory_jobs(
         seed: of the first trajectory of each scene; the others have the seeds after it.
         count: trajectories for each scene.
         min_steps: low-level actions at least.
-        min_subgoals: sub-goals at least.
+        min_subgoals: tasks at least.
         final_task: whether a final task follows.
+        max_fail: tasks that may fail in one trajectory.
     """
     seeds = range(seed, seed + count)
-    return [TrajectorySettings(scene, k, min_steps, min_subgoals, final_task) for scene in scenes for k in seeds]
+    return [
+        TrajectorySettings(scene, k, min_steps, min_subgoals, final_task, max_fail=max_fail)
+        for scene in scenes
+        for k in seeds
+    ]
 
 
 def without_bathrooms(scenes: Sequence[str]) -> tuple[list[str], list[str]]:
@@ -33,14 +44,8 @@ def without_bathrooms(scenes: Sequence[str]) -> tuple[list[str], list[str]]:
     Raises:
         UsageError: all of them are bathrooms.
     """
-    chosen = [scene for scene in scenes if not _is_bathroom(scene)]
+    chosen = [scene for scene in scenes if scene_type(scene) != BATHROOM]
     skipped = sorted(set(scenes) - set(chosen))
     if not chosen:
         raise UsageError(f"{', '.join(skipped)}: bathrooms are left out of test sets; name other scenes")
     return chosen, skipped
-
-
-def _is_bathroom(scene: str) -> bool:
-    """Whether a scene is one by its name (`bathroom-3`, `FloorPlan401` to `FloorPlan430`)."""
-    number = scene.removeprefix("FloorPlan")
-    return scene.startswith("bathroom-") or (number.isdigit() and int(number) in _BATHROOMS)

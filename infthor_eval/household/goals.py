@@ -1,10 +1,14 @@
 """When a task is done, in the symbolic state, and a lower bound on what is left to do."""
 
-from infthor_eval.household.affordances import KNIVES
-from infthor_eval.household.symbolic import Room, State
-from infthor_eval.household.tasks import Task, TaskType
+from collections import Counter
+from dataclasses import replace
 
-__all__ = ["APPLIANCE", "achieved", "least_remaining"]
+from infthor_eval.household.affordances import KNIVES
+from infthor_eval.household.symbolic import Room, State, room_of
+from infthor_eval.household.tasks import Task, TaskType
+from infthor_eval.thor.view import View
+
+__all__ = ["APPLIANCE", "achieved", "holds_in", "least_remaining"]
 
 APPLIANCE = {TaskType.CLEAN: "SinkBasin", TaskType.HEAT: "Microwave", TaskType.COOL: "Fridge"}
 
@@ -15,6 +19,18 @@ def achieved(task: Task, room: Room, state: State) -> bool:
         held = state.held is not None and room.types[state.held] == task.target
         return held and state.at in state.lit and room.types.get(state.at or "") == task.light
     return _placed(task, room, state) >= _wanted(task)
+
+
+def holds_in(task: Task, view: View) -> bool:
+    """Whether things are in a view where a task wants them.
+
+    A view does not tell what was washed, heated or cooled, nor which lamp the agent stands at: what is there counts as
+    treated, and any lit lamp of the type will do.
+    """
+    room = room_of(view)
+    everything = frozenset(room.types)
+    lamp = next((key for key in sorted(room.start.lit) if room.types[key] == task.light), None)
+    return achieved(task, room, replace(room.start, at=lamp, clean=everything, hot=everything, cold=everything))
 
 
 def least_remaining(task: Task, room: Room, state: State) -> int:
@@ -64,20 +80,23 @@ def _wanted(task: Task) -> int:
 
 
 def _placed(task: Task, room: Room, state: State) -> int:
-    """How many objects of the asked type, in the asked condition, are where they shall be."""
+    """How many objects of the asked type, in the asked condition, are together where they shall be.
+
+    Together is in one and the same receptacle: two objects on two side tables are not two on the side table.
+    """
     where = dict(state.where)
     treated = {
         TaskType.CLEAN: state.clean,
         TaskType.HEAT: state.hot,
         TaskType.COOL: state.cold,
     }.get(task.task_type)
-    count = 0
+    count = Counter[str]()
     for item, parent in state.where:
         if room.types[item] != task.target or (treated is not None and item not in treated):
             continue
         if task.task_type == TaskType.STACK:
             inside = room.types.get(parent) == task.movable
-            count += inside and room.types.get(where.get(parent, "")) == task.receptacle
+            count[parent] += inside and room.types.get(where.get(parent, "")) == task.receptacle
         else:
-            count += room.types.get(parent) == task.receptacle
-    return count
+            count[parent] += room.types.get(parent) == task.receptacle
+    return max(count.values(), default=0)

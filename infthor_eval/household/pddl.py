@@ -16,8 +16,8 @@ __all__ = ["DOMAIN", "problem"]
 
 _FINISHES = {
     TaskType.PLACE: "(?i - item ?p - place) (and (target ?i) (goal-place ?p) (in ?i ?p))",
-    TaskType.PLACE_TWO: "(?i ?j - item ?p ?q - place) (and (target ?i) (target ?j) (not (= ?i ?j))"
-    " (goal-place ?p) (goal-place ?q) (in ?i ?p) (in ?j ?q))",
+    TaskType.PLACE_TWO: "(?i ?j - item ?p - place) (and (target ?i) (target ?j) (not (= ?i ?j))"
+    " (goal-place ?p) (in ?i ?p) (in ?j ?p))",
     TaskType.EXAMINE: "(?i - item ?p - place) (and (target ?i) (holding ?i) (at ?p) (goal-lamp ?p) (lit ?p))",
     TaskType.CLEAN: "(?i - item ?p - place) (and (target ?i) (goal-place ?p) (in ?i ?p) (clean ?i))",
     TaskType.HEAT: "(?i - item ?p - place) (and (target ?i) (goal-place ?p) (in ?i ?p) (hot ?i))",

@@ -20,7 +20,6 @@ __all__ = ["tasks_of"]
 
 _TREATED = {TaskType.CLEAN: CLEANABLE, TaskType.HEAT: HEATABLE, TaskType.COOL: COOLABLE}
 _APPLIANCES = {TaskType.CLEAN: {"SinkBasin", "Faucet"}, TaskType.HEAT: {"Microwave"}, TaskType.COOL: {"Fridge"}}
-_LIGHT_LOADS = {"Pan", "Pot", "Plate", "Bowl", "Cup", "Mug", "Laptop", "Box", "Pillow"}  # too big to be stacked
 
 
 def tasks_of(room: Room, extra_types: Iterable[str] = ()) -> list[Task]:
@@ -36,7 +35,7 @@ def tasks_of(room: Room, extra_types: Iterable[str] = ()) -> list[Task]:
         for sliced in (False, True) if _can_be_sliced(pickup, here) else (False,):
             tasks += [Task(TaskType.EXAMINE, pickup, light=lamp, sliced=sliced) for lamp in sorted(lamps)]
             for receptacle in sorted(furniture):
-                if goes_into(pickup, receptacle):
+                if goes_into(f"{pickup}Sliced" if sliced else pickup, receptacle):
                     tasks += _placements(pickup, receptacle, sliced, known, here, count)
     return [task for task in tasks if not task.pickup.endswith("Sliced")]
 
@@ -48,14 +47,14 @@ def _can_be_sliced(pickup: str, here: set[str]) -> bool:
 def _placements(
     pickup: str, receptacle: str, sliced: bool, known: set[str], here: set[str], count: Counter[str]
 ) -> Iterator[Task]:
-    yield Task(TaskType.PLACE, pickup, receptacle, sliced=sliced)
+    task = Task(TaskType.PLACE, pickup, receptacle, sliced=sliced)
+    target = task.target
+    yield task
     if sliced or count[pickup] > 1:
         yield Task(TaskType.PLACE_TWO, pickup, receptacle, sliced=sliced)
     for task_type, types in _TREATED.items():
-        if pickup in types and known >= _APPLIANCES[task_type] and receptacle not in _APPLIANCES[task_type]:
+        if target in types and known >= _APPLIANCES[task_type] and receptacle not in _APPLIANCES[task_type]:
             yield Task(task_type, pickup, receptacle, sliced=sliced)
-    if pickup in _LIGHT_LOADS:
-        return
     for movable in sorted(MOVABLE_RECEPTACLES & here - {pickup}):
-        if goes_into(pickup, movable) and goes_into(movable, receptacle):
+        if goes_into(target, movable) and goes_into(movable, receptacle):
             yield Task(TaskType.STACK, pickup, receptacle, movable=movable, sliced=sliced)

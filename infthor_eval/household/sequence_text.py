@@ -66,8 +66,4 @@ def sequence_text(trajectory: Trajectory, steps: list[Step]) -> str:
 
 def _task(trajectory: Trajectory, index: int | None) -> SubTask | None:
     tasks = trajectory.sub_tasks
-    if index is None:
-        return None
-    if index < len(tasks):
-        return tasks[index]
-    return trajectory.long_horizon_task
+    return tasks[index] if index is not None and index < len(tasks) else None

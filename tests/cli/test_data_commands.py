@@ -16,7 +16,7 @@ def made(tmp_path_factory):
 
 
 def test_the_three_commands_make_a_set(made, run):
-    scene = ("--scene", "kitchen-5", "--min-steps", 60, "--seed", 1)
+    scene = ("--scene", "kitchen-5", "--min-steps", 60, "--min-subgoals", 2, "--seed", 1)
     code, out, err = run("generate", *scene, "--out", made / "trajectories", "--json")
     assert code == 0, err
     assert json.loads(out)["trajectories"] == 1
@@ -43,7 +43,7 @@ def test_what_they_print_for_people(made, tmp_path, run):
     assert code == 0
     assert "1 trajectories on 1 floor plans (1 replayed earlier, 0 failed), 1 whole" in out
     assert "MoveAhead" in out
-    code, out, _ = run("generate", "--scene", "kitchen-5", "--min-steps", 1, "--out", tmp_path)
+    code, out, _ = run("generate", "--scene", "kitchen-5", "--min-steps", 1, "--min-subgoals", 1, "--out", tmp_path)
     assert code == 0
     assert "1 trajectories (0 made earlier)" in out
 

@@ -79,6 +79,28 @@ def test_written_reads_back(tmp_path):
     assert next(iter_trajectories(tmp_path / "b.json")) == trajectory
 
 
+def test_what_the_published_saver_leaves_empty(tmp_path):
+    scene = {**MINIMAL["scene"], "floor_plan": "", "scene_num": 28, "dirty_and_empty": None}
+    trajectory = next(
+        iter_trajectories(write(tmp_path / "a.json", {**MINIMAL, "scene": scene, "long_horizon_task": {}}))
+    )
+    assert (trajectory.scene.floor_plan, trajectory.scene.dirty_and_empty) == ("FloorPlan28", False)
+    assert trajectory.long_horizon_task is None
+
+
+def test_keys_that_readers_of_published_trajectories_look_up_are_always_written(tmp_path):
+    trajectory = next(iter_trajectories(write(tmp_path / "a.json", MINIMAL)))
+    document = json.loads(encode_trajectory(trajectory))
+    assert (document["long_horizon_task"], document["sub_tasks"], document["sub_trajs"]) == ({}, [], [])
+
+
+@pytest.mark.parametrize("document", [[], {"scene": {"scene_num": 1}}, {"scene": 3}, {}])
+def test_what_is_no_trajectory_is_one_line(tmp_path, document):
+    with pytest.raises(DataError, match=r"a\.json: not a trajectory") as error:
+        next(iter_trajectories(write(tmp_path / "a.json", document)))
+    assert "\n" not in str(error.value)
+
+
 @given(st.text(), st.text())
 def test_folder_names_are_one_safe_component(one, other):
     name = folder_name(one)

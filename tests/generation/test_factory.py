@@ -58,7 +58,8 @@ def test_sub_goals_and_actions_are_numbered_through(simulator):
 def test_the_final_task_is_about_both_ends_and_comes_last(simulator):
     trajectory = generate(TrajectorySettings("kitchen-2", 3, 60, 1, final_task=True), simulator).trajectory
     assert violation(trajectory) is None
-    assert len(trajectory.sub_trajs) == len(trajectory.sub_tasks) + 1
+    assert len(trajectory.sub_trajs) == len(trajectory.sub_tasks)
+    assert trajectory.sub_tasks[-1] == trajectory.long_horizon_task
     assert trajectory.sub_trajs[-1].subgoal == trajectory.long_horizon_task.task_desc
     assert trajectory.sub_trajs[-1].low_pddl_idx[1] == len(trajectory.plan.low_actions)
 

@@ -13,12 +13,14 @@ from infthor_eval.generation.final_task import ends_of, violation
 
 
 def log(*types):
-    return [{"visible": [object_type]} for object_type in types]
+    """Entries in which upper-case types can be picked up and all are visible."""
+    return [{"visible": list(shown), "pickupable": [name for name in shown if name.isupper()]} for shown in types]
 
 
 def test_the_ends_are_a_fifth_each():
-    ends = ends_of(log(*"AABBBBBBCC"))
-    assert (ends.early, ends.late) == ({"A"}, {"C"})
+    early, late = ends_of(log(*["Aa"] * 2, *"BBBBBB", *["Cc"] * 2))
+    assert (early.pickupable, early.visible) == ({"A"}, {"C", "c"})
+    assert (late.pickupable, late.visible) == ({"C"}, {"A", "a"})
 
 
 def trajectory(pickup, receptacle, movable=None, before=10):
@@ -28,7 +30,7 @@ def trajectory(pickup, receptacle, movable=None, before=10):
         Plan([]),
         sub_trajs=[SubTrajectory(0, (0, 1), (0, before)), SubTrajectory(1, (1, 2), (before, before + 3))],
         long_horizon_task=task,
-        object_log=log(*"AABBBBBBBCC", *"XXX"),
+        object_log=log("Aa", "Aa", *"BBBBBBB", "Cc", "Cc", *"XXX"),
     )
 
 
@@ -36,6 +38,9 @@ def trajectory(pickup, receptacle, movable=None, before=10):
     ("pickup", "receptacle", "movable", "fine"),
     [
         ("A", "C", None, True),
+        ("A", "c", None, True),
+        ("C", "a", None, True),
+        ("c", "A", None, False),
         ("C", "A", None, True),
         ("A", "C", "A", True),
         ("A", "A", None, False),

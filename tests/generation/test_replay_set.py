@@ -9,15 +9,19 @@ from infthor_eval.errors import SimulatorError
 from infthor_eval.formats.step_log import read_steps, worlds
 from infthor_eval.formats.trajectory import iter_sources, iter_trajectories
 from infthor_eval.generation.generate_set import generate_set
+from infthor_eval.generation.questions.make import make_questions
 from infthor_eval.generation.replay import box_iou
 from infthor_eval.generation.replay_set import replay_set, select
 from infthor_eval.generation.replay_summary import summarise
 from infthor_eval.generation.settings import TrajectorySettings
 from infthor_eval.generation.supplement import write_supplement
+from infthor_eval.nieh.baselines import BASELINES
+from infthor_eval.nieh.scoring import score
 from infthor_eval.thor.launch import embedded
 from infthor_eval.thor.simulator import Simulator
 
 SHARED = Path(__file__).parents[2] / "../shared/data"
+PUBLISHED = SHARED / "published_goldens"
 JOB = TrajectorySettings("kitchen-3", 4, min_steps=40, min_subgoals=1)
 
 
@@ -117,6 +121,23 @@ def test_recorded_trajectories_replay(tmp_path):
     # Passed on as it came, with what the typed form leaves out.
     raw = json.loads(next((tmp_path / "metadata").glob("*/traj_data.json")).read_bytes())
     assert raw["turk_annotations"]
+
+
+@pytest.mark.skipif(not PUBLISHED.is_dir(), reason="published trajectories not at ../shared/data")
+def test_what_the_published_saver_writes_is_replayed_asked_about_and_evaluated(tmp_path):
+    selection = select([PUBLISHED / f"floorplan28_{split}.json" for split in ("train", "test")])
+    write_supplement((item for _, item in selection.items), tmp_path / "supplement.json")
+    with Simulator(embedded(SHARED, tmp_path / "supplement.json")) as simulator:
+        summary = summarise(replay_set(selection, simulator, tmp_path / "set"))
+    assert (summary.trajectories, summary.complete, summary.floor_plans) == (2, 2, 1), summary.diverged
+    training, test = (item for _, item in selection.items)
+    assert training.long_horizon_task is None
+    assert test.long_horizon_task.task_desc == test.sub_tasks[-1].task_desc == test.sub_trajs[-1].subgoal
+    made = make_questions(tmp_path / "set", per_trajectory=20)
+    assert len(made.questions) == 40 and not made.doubted
+    assert "put a cold apple in the microwave" in (tmp_path / "set/metadata/floorplan28_test/traj.txt").read_text()
+    predict = BASELINES["oracle"](0).fit(made.questions)
+    assert all(score(predict(question), question.answers, "strict") == 1.0 for question in made.questions)
 
 
 def test_selection_limits(tmp_path):

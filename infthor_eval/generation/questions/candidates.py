@@ -8,7 +8,7 @@ from infthor_eval.formats.question import Answer, Question
 from infthor_eval.household.affordances import preposition
 from infthor_eval.household.wording import canonical, compact, noun
 
-__all__ = ["MANY", "Candidate", "answer_of", "distinct", "listing", "the", "within"]
+__all__ = ["MANY", "Candidate", "answer_of", "distinct", "further", "listing", "the", "within"]
 
 MANY = 6  # gold answers; longer lists are a test of writing, not of seeing
 _SIMILAR = 0.75  # the published scorer takes answers alike from 0.8 on
@@ -57,6 +57,11 @@ class Candidate:
     def question(self, traj_id: str) -> Question:
         """The question as sets hold it."""
         return Question(traj_id, self.text, self.clues, self.answers, self.question_type, self.absence)
+
+
+def further(question_type: str) -> str:
+    """The question type of our own forms beside those of Table 3's type."""
+    return f"{question_type}_further"
 
 
 def the(object_type: str) -> str:

@@ -1,16 +1,22 @@
-"""Slicing and container content: what was sliced, and what a receptacle held at a told moment."""
+"""Slicing and container content: what was sliced, and what a receptacle held, at a told moment or all along.
+
+Table 3's forms do not say what counts as an object in or on something, so they are asked only where every reading gives
+the same answer (`readings`). Ours do say: what can be picked up, and is directly there.
+"""
 
 from collections import Counter
 from collections.abc import Iterator
 
-from infthor_eval.generation.questions.candidates import MANY, Candidate, answer_of, distinct, the, within
+from infthor_eval.generation.questions.candidates import MANY, Candidate, answer_of, distinct, further, the, within
 from infthor_eval.generation.questions.evidence import cover
 from infthor_eval.generation.questions.history import Event, History, is_same
+from infthor_eval.generation.questions.readings import can_be_picked_up, is_plain
 from infthor_eval.household.wording import canonical
 
-__all__ = ["CONTENT", "SLICING", "at_opening", "at_pickup", "at_slicing", "slicings"]
+__all__ = ["CONTENT", "FURTHER", "SLICING", "at_opening", "at_pickup", "at_slicing", "contents", "slicings"]
 
 CONTENT = "container_content"
+FURTHER = further(CONTENT)
 SLICING = "slicing"
 Asked = tuple[str, tuple[str, ...]]  # a form and its names
 
@@ -27,16 +33,32 @@ def slicings(history: History) -> Iterator[Candidate]:
 
 
 def at_slicing(history: History) -> Iterator[Candidate]:
-    """What else lay where something was sliced."""
+    """What lay where something was sliced, that itself among it."""
     events = [event for event in history.events if event.action == "SliceObject"]
     count = Counter(event.object_type for event in events)
     for event in events:
         place = history.parent(event.frame - 1, event.target)
-        if count[event.object_type] == 1 and place is not None and history.shows_slices(event.frame, event.target):
+        if count[event.object_type] > 1 or place is None or not is_plain(history, event.frame, place):
+            continue
+        inside = history.contents(event.frame, place)
+        slices = sorted(key for key in inside if key.startswith(f"{event.target}|") and history.shows(event.frame, key))
+        others = frozenset(key for key in inside if not key.startswith(f"{event.target}|"))
+        if slices and others:
             place_type = history.world(event.frame)[place].type
-            asked = "What else was {} when you sliced {}?", (within(place_type), the(event.object_type))
-            skipped = frozenset({event.object_type, f"{event.object_type}Sliced"})
-            yield from _contents(history, SLICING, asked, event, place, skipped)
+            asked = "What objects were {} when you slice {}?", (within(place_type), the(event.object_type))
+            frames = _unchanged(history, event.frame, place)
+            yield from _contents(history, SLICING, asked, frames, place, others | {slices[0]})
+
+
+def contents(history: History) -> Iterator[Candidate]:
+    """What is in or on the only receptacle of its type all along."""
+    last = len(history) - 1
+    places = {parent for key in history.world(last) if (parent := history.parent(last, key)) is not None}
+    for place in sorted(places):
+        frames = _unchanged(history, 0, place)
+        if len(frames) == len(history) and history.only_one(last, place) and is_plain(history, last, place):
+            asked = "What objects were {}?", (within(history.world(last)[place].type),)
+            yield from _contents(history, CONTENT, asked, frames, place, history.contents(last, place))
 
 
 def at_opening(history: History) -> Iterator[Candidate]:
@@ -46,8 +68,9 @@ def at_opening(history: History) -> Iterator[Candidate]:
         first = event.action == "OpenObject" and event.target not in opened
         opened |= {event.target} if event.action == "OpenObject" else set()
         if first and history.only_one(event.frame, event.target):
-            asked = "What was {} when you first opened it?", (within(event.object_type),)
-            yield from _contents(history, CONTENT, asked, event, event.target, frozenset())
+            form = "Which things that can be picked up were directly {} when you first opened it?"
+            asked = form, (within(event.object_type),)
+            yield from _loose_contents(history, asked, event, event.target)
 
 
 def at_pickup(history: History) -> Iterator[Candidate]:
@@ -58,28 +81,47 @@ def at_pickup(history: History) -> Iterator[Candidate]:
         place = history.parent(event.frame - 1, event.target)
         if count[event.object_type] == 1 and place is not None and place in history.world(event.frame):
             place_type = history.world(event.frame)[place].type
-            asked = "What else was {} when you picked up {} from it?", (within(place_type), the(event.object_type))
-            yield from _contents(history, CONTENT, asked, event, place, frozenset())
+            form = "Which other things that can be picked up were directly {} when you picked up {} from it?"
+            yield from _loose_contents(history, (form, (within(place_type), the(event.object_type))), event, place)
+
+
+def _loose_contents(history: History, asked: Asked, event: Event, place: str) -> Iterator[Candidate]:
+    """A question on what can be picked up of what a receptacle holds right after an event."""
+    wanted = can_be_picked_up(history, event.frame, history.contents(event.frame, place))
+    if wanted is not None:
+        yield from _contents(history, FURTHER, asked, _unchanged(history, event.frame, place), place, wanted)
+
+
+def _unchanged(history: History, first: int, place: str) -> range:
+    """The frames from one on during which a receptacle holds the same."""
+    inside = history.contents(first, place)
+    changed = (frame for frame in range(first, len(history)) if history.contents(frame, place) != inside)
+    return range(first, next(changed, len(history)))
 
 
 def _contents(
-    history: History, question_type: str, asked: Asked, event: Event, place: str, skipped: frozenset[str]
+    history: History, question_type: str, asked: Asked, frames: range, place: str, wanted: frozenset[str]
 ) -> Iterator[Candidate]:
-    """A question on what a receptacle holds right after an event, shown while that does not change."""
-    inside = history.contents(event.frame, place)
-    wanted = {key for key in inside if history.world(event.frame)[key].type not in skipped}
-    shown = {}
-    for frame in range(event.frame, len(history)):
-        if history.contents(frame, place) != inside:
-            break
-        if history.shows(frame, place) and not _others(history, frame, place):
-            shown[frame] = frozenset(key for key in wanted if history.shows_inside(frame, key))
-    clues = cover(wanted, shown) if wanted else None
-    types = sorted(history.world(event.frame)[key].type for key in wanted)
+    """A question on objects in a receptacle, with the frames that show them there."""
+    shown = {
+        frame: frozenset(key for key in wanted if history.shows_inside(frame, key))
+        for frame in frames
+        if history.shows(frame, place) and not _others(history, frame, place)
+    }
+    clues = cover(wanted, shown, lambda frame, keys: history.clearness(frame, *keys)) if wanted else None
+    types = sorted(_whole_types(history, frames[0], wanted))
     if clues is not None and len(set(types)) == len(types) <= MANY and distinct(types):
-        place_type = history.world(event.frame)[place].type
+        place_type = history.world(frames[0])[place].type
         answers = tuple(answer_of(item) for item in types)
         yield Candidate(question_type, *asked, clues, answers, (place_type, *types))
+
+
+def _whole_types(history: History, frame: int, keys: frozenset[str]) -> list[str]:
+    """The types of objects; of a fresh slice that of what was cut."""
+    world = history.world(frame)
+    cut = {event.target for event in history.events if event.action == "SliceObject" and event.frame == frame}
+    fresh = {key for key in keys for whole in cut if key.startswith(f"{whole}|")}
+    return [world[key].type.removesuffix("Sliced") if key in fresh else world[key].type for key in keys]
 
 
 def _others(history: History, frame: int, place: str) -> bool:

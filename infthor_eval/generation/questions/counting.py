@@ -1,33 +1,53 @@
-"""Movement counting: how often something was moved, opened or put somewhere, and how many things were moved."""
+"""Movement counting: how often something was moved; and further forms: opened, put somewhere, different things.
 
+Of every count all occasions are shown, a frame each, so the number of clue frames gives the answer away to who sees
+nothing else. Some of the further questions therefore have frames among their clues that hold no occasion; these are of
+a type of their own.
+"""
+
+import random
 from collections import defaultdict
 from collections.abc import Iterator
+from dataclasses import replace
 
-from infthor_eval.generation.questions.candidates import Candidate, the, within
+from infthor_eval.generation.questions.candidates import Candidate, further, the, within
 from infthor_eval.generation.questions.history import Event, History, Move
 from infthor_eval.household.wording import an, noun
 
-__all__ = ["QUESTION_TYPE", "counts"]
+__all__ = ["FURTHER", "MIXED", "QUESTION_TYPE", "counts", "further_counts"]
 
 QUESTION_TYPE = "movement_counting"
+FURTHER = further(QUESTION_TYPE)
+MIXED = "movement_counting_mixed"
+_SHARE_MIXED = 0.5
+_MOST_ADDED = 3
 
 
 def counts(history: History) -> Iterator[Candidate]:
-    """Every count whose occasions are all shown, a frame each."""
-    yield from _moves(history)
-    yield from _openings(history)
-    yield from _puts(history)
-    yield from _items(history)
-
-
-def _moves(history: History) -> Iterator[Candidate]:
-    """Of every object that alone of its type was handled. A move ends when the object is put down."""
+    """How often what was picked up more than once, alone of its type, was moved: picked up and put down."""
     for object_type, items in sorted(history.handled.items()):
-        moves = history.moves_of(next(iter(items))) if len(items) == 1 else ()
-        if moves and all(history.shows(move.after, move.item, move.target) for move in moves):
+        item = min(items)
+        moves = history.moves_of(item)
+        shown = all(history.shows(move.after, move.item, move.target) for move in moves)
+        if len(items) == 1 and shown and len(moves) == history.pickups[item] > 1:
             frames = [move.after for move in moves]
-            form = "How many times did you pick up {} and put it down again?"
-            yield _count(form, (the(object_type),), frames, object_type)
+            yield _count(QUESTION_TYPE, "How many times did you move {}?", (the(object_type),), frames, object_type)
+
+
+def further_counts(history: History, rng: random.Random) -> Iterator[Candidate]:
+    """Every other count, some of them mixed with frames that hold no occasion.
+
+    Args:
+        history: the trajectory.
+        rng: chooses which, and the frames.
+    """
+    idle = sorted(set(range(1, len(history))) - {event.frame for event in history.events})
+    for candidate in (*_openings(history), *_puts(history), *_items(history)):
+        if idle and rng.random() < _SHARE_MIXED:
+            added = rng.sample(idle, min(len(idle), rng.randint(1, _MOST_ADDED)))
+            yield replace(candidate, question_type=MIXED, clues=tuple(sorted({*candidate.clues, *added})))
+        else:
+            yield candidate
 
 
 def _openings(history: History) -> Iterator[Candidate]:
@@ -40,7 +60,8 @@ def _openings(history: History) -> Iterator[Candidate]:
         if all(history.shows(event.frame, event.target) for event in events):
             single = all(history.only_one(event.frame, event.target) for event in events)
             name = the(object_type) if single else an(noun(object_type))
-            yield _count("How many times did you open {}?", (name,), [event.frame for event in events], object_type)
+            frames = [event.frame for event in events]
+            yield _count(FURTHER, "How many times did you open {}?", (name,), frames, object_type)
 
 
 def _puts(history: History) -> Iterator[Candidate]:
@@ -53,7 +74,8 @@ def _puts(history: History) -> Iterator[Candidate]:
         if shown and all(history.only_one(move.after, target) for move in moves):
             place_type = history.world(moves[0].after)[target].type
             frames = [move.after for move in moves]
-            yield _count("How many times did you put something {}?", (within(place_type),), frames, place_type)
+            form = "How many times did you put something {}?"
+            yield _count(FURTHER, form, (within(place_type),), frames, place_type)
 
 
 def _items(history: History) -> Iterator[Candidate]:
@@ -63,8 +85,8 @@ def _items(history: History) -> Iterator[Candidate]:
         if event.action == "PickupObject":
             first.setdefault(event.target, event.frame)
     if first and all(history.shows(frame, item) for item, frame in first.items()):
-        yield _count("How many different objects did you pick up?", (), sorted(first.values()), "#")
+        yield _count(FURTHER, "How many different objects did you pick up?", (), sorted(first.values()), "#")
 
 
-def _count(form: str, names: tuple[str, ...], frames: list[int], subject: str) -> Candidate:
-    return Candidate(QUESTION_TYPE, form, names, tuple(frames), (str(len(frames)),), (subject,))
+def _count(question_type: str, form: str, names: tuple[str, ...], frames: list[int], subject: str) -> Candidate:
+    return Candidate(question_type, form, names, tuple(frames), (str(len(frames)),), (subject,))

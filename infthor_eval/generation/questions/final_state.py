@@ -1,10 +1,11 @@
-"""Final object state: is it in, what is in, how many are in; as things are at the end."""
+"""Final object state, in Table 3's words: is it in, what is in, how many were in; as things are at the end."""
 
 from collections.abc import Iterator
 
 from infthor_eval.generation.questions.candidates import MANY, Candidate, answer_of, distinct, the, within
 from infthor_eval.generation.questions.evidence import cover
 from infthor_eval.generation.questions.history import History
+from infthor_eval.generation.questions.readings import is_plain
 from infthor_eval.household.wording import canonical
 
 __all__ = ["QUESTION_TYPE", "final_states"]
@@ -36,7 +37,7 @@ def _inside(history: History, receptacle: str) -> Iterator[Candidate]:
             place_type = world[receptacle].type
             names, subjects = (the(world[item].type), within(place_type)), (world[item].type, place_type)
             answer = "yes" if here == receptacle else "no"
-            yield Candidate(QUESTION_TYPE, "Is {} {} now?", names, (move.after,), (answer,), subjects)
+            yield Candidate(QUESTION_TYPE, "Is {} {}?", names, (move.after,), (answer,), subjects)
 
 
 def _what(history: History, receptacle: str) -> Iterator[Candidate]:
@@ -53,16 +54,16 @@ def _what(history: History, receptacle: str) -> Iterator[Candidate]:
         stays = held <= inside and all(frame >= since[key] for key in held)
         if history.shows(frame, receptacle) and stays:
             shown[frame] = frozenset(key for key in held if history.shows_inside(frame, key))
-    clues = cover(inside, shown) if inside else None
-    if clues is None or len(inside) > MANY:
+    clues = cover(inside, shown, lambda frame, keys: history.clearness(frame, *keys)) if inside else None
+    if clues is None or len(inside) > MANY or not is_plain(history, last, receptacle):
         return
     place_type = world[receptacle].type
     types = sorted(world[key].type for key in inside)
     where, count = (within(place_type),), str(len(inside))
-    yield Candidate(QUESTION_TYPE, "How many objects are {} now?", where, clues, (count,), (place_type, "#"))
+    yield Candidate(QUESTION_TYPE, "How many objects were {}?", where, clues, (count,), (place_type, "#"))
     if len({canonical(item) for item in types}) == len(types) and distinct(types):
         answers = tuple(answer_of(item) for item in types)
-        yield Candidate(QUESTION_TYPE, "What is {} now?", where, clues, answers, (place_type, *types))
+        yield Candidate(QUESTION_TYPE, "What objects are {}?", where, clues, answers, (place_type, *types))
 
 
 def _arrival(history: History, item: str, receptacle: str) -> int:

@@ -1,6 +1,7 @@
 """What happened in a trajectory and what its frames show, read from the step log."""
 
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -11,7 +12,9 @@ from infthor_eval.household.wording import canonical
 
 __all__ = ["DEFAULT_SHARE", "FRAME_PIXELS", "Event", "History", "Move", "is_same"]
 
-FRAME_PIXELS = 300 * 300
+_SIDE = 300
+FRAME_PIXELS = _SIDE * _SIDE
+_MARGIN = 15  # pixels between an object and the frame's edge from which on it is well inside
 DEFAULT_SHARE = 0.001  # of the frame: 90 pixels, about a fork on a table an arm's length away
 
 
@@ -98,6 +101,17 @@ class History:
         seen = self.seen(frame)
         return all(key in seen and seen[key].pixels >= self.least for key in ids)
 
+    def clearness(self, frame: int, *ids: str) -> tuple[bool, int]:
+        """How well a frame shows some of the objects that it shows: well inside it at best, then large."""
+        seen = [self.seen(frame)[key] for key in ids]
+        inside = all(_MARGIN <= edge < _SIDE - _MARGIN for item in seen for edge in item.box)
+        return inside, min((item.pixels for item in seen), default=0)
+
+    def clearest(self, frames: Iterable[int], *ids: str) -> int | None:
+        """Of the frames that show all these objects the one that does so best, the earliest of equals."""
+        shown = [frame for frame in frames if self.shows(frame, *ids)]
+        return max(shown, key=lambda frame: self.clearness(frame, *ids), default=None)
+
     def shows_put(self, move: Move) -> bool:
         """Whether the frame after a move shows the object where it was put."""
         shown = self.shows(move.after, move.item, move.target)
@@ -119,6 +133,16 @@ class History:
     def all_object_types(self) -> frozenset[str]:
         """The types that exist at any time."""
         return frozenset(canonical(state.type) for step in self.steps for state in step.changes.values())
+
+    @cached_property
+    def types_told(self) -> frozenset[str]:
+        """The types that the simulator calls visible at any time, so that the log tells what they are."""
+        return frozenset(name for step in self.steps for name in step.object_log.visible)
+
+    @cached_property
+    def types_picked_up(self) -> frozenset[str]:
+        """Those of them that can be picked up."""
+        return frozenset(name for step in self.steps for name in step.object_log.pickupable)
 
     @cached_property
     def events(self) -> tuple[Event, ...]:
@@ -146,6 +170,11 @@ class History:
     def moves_of(self, item: str) -> tuple[Move, ...]:
         """The moves of one object."""
         return tuple(move for move in self.moves if move.item == item)
+
+    @cached_property
+    def pickups(self) -> Counter[str]:
+        """How often each object was picked up, by id."""
+        return Counter(event.target for event in self.events if event.action == "PickupObject")
 
     @cached_property
     def handled(self) -> dict[str, set[str]]:

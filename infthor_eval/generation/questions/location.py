@@ -1,61 +1,116 @@
-"""Object location tracing: where something was, where it was moved, where it is now."""
+"""Object location tracing: where something was, where it was moved, where it is now.
 
-from collections.abc import Iterator
+Which pick-up or put is meant must be clear: what was picked up twice has no "before you picked it up".
+"""
 
-from infthor_eval.generation.questions.candidates import Candidate, answer_of, distinct, the
+from collections.abc import Iterator, Sequence
+
+from infthor_eval.generation.questions.candidates import Candidate, answer_of, distinct, further, the
 from infthor_eval.generation.questions.history import History, Move
+from infthor_eval.household.wording import canonical
 
-__all__ = ["QUESTION_TYPE", "locations"]
+__all__ = ["FURTHER", "QUESTION_TYPE", "further_locations", "locations"]
 
 QUESTION_TYPE = "location_tracing"
+FURTHER = further(QUESTION_TYPE)
 
 
 def locations(history: History) -> Iterator[Candidate]:
     """Questions on every object that alone of its type was handled."""
+    for object_type, moves in _traced(history):
+        yield from _before_put(history, object_type, moves)
+        yield from _moved_from(history, object_type, moves)
+        yield from _now(history, object_type, moves)
+
+
+def further_locations(history: History) -> Iterator[Candidate]:
+    """Further questions on the same objects."""
+    for object_type, moves in _traced(history):
+        yield from _origin(history, object_type, moves)
+        yield from _destination(history, object_type, moves)
+        yield from _journey(history, object_type, moves)
+
+
+def _traced(history: History) -> Iterator[tuple[str, tuple[Move, ...]]]:
     for object_type, items in sorted(history.handled.items()):
         moves = history.moves_of(next(iter(items))) if len(items) == 1 else ()
         if moves:
-            yield from _origin(history, object_type, moves)
-            yield from _destination(history, object_type, moves)
-            yield from _now(history, object_type, moves)
-            yield from _journey(history, object_type, moves)
+            yield object_type, moves
 
 
-def _origin(history: History, object_type: str, moves: tuple[Move, ...]) -> Iterator[Candidate]:
+def _before_put(history: History, object_type: str, moves: tuple[Move, ...]) -> Iterator[Candidate]:
+    """Of the first move, where nothing else led to such a container: it then was in one place before."""
     move = moves[0]
-    if not _left(history, move):
+    to = _end(history, move)
+    once = [_end(history, other) for other in moves].count(to) == 1
+    if once and _changes(history, move) and _left(history, move) and history.shows_put(move):
+        form = "Where was {} before you put it to {}?"
+        yield _candidate(QUESTION_TYPE, form, (move.before, move.after), [_start(history, move)], object_type, to)
+
+
+def _moved_from(history: History, object_type: str, moves: tuple[Move, ...]) -> Iterator[Candidate]:
+    """Of the last move, where no other began at such a container: it then was in one place after."""
+    move = moves[-1]
+    if not _left(history, move) or not history.shows_put(move) or not _is_down(history, move):
         return
-    when = "first picked it up" if len(moves) > 1 else "picked it up"
-    place = history.world(move.before)[move.origin or ""].type
-    yield _candidate(f"Where was {{}} before you {when}?", (move.before,), [place], object_type)
-
-
-def _destination(history: History, object_type: str, moves: tuple[Move, ...]) -> Iterator[Candidate]:
-    move = moves[0]
-    if len(moves) == 1 and history.shows_put(move):
-        place = history.world(move.after)[move.target].type
-        yield _candidate("Where did you move {} to?", (move.after,), [place], object_type)
+    origin = _start(history, move)
+    others = [_start(history, other) for other in moves[:-1]]
+    if _changes(history, move) and origin not in others and None not in others:
+        form = "Where did you move {} from {}?"
+        yield _candidate(QUESTION_TYPE, form, (move.before, move.after), [_end(history, move)], object_type, origin)
 
 
 def _now(history: History, object_type: str, moves: tuple[Move, ...]) -> Iterator[Candidate]:
     move, last = moves[-1], len(history) - 1
     alone = move.item in history.world(last) and history.only_one(last, move.item)
-    if alone and history.shows_put(move) and history.parent(last, move.item) == move.target:
+    if alone and history.shows_put(move) and _is_down(history, move):
         place = history.world(last)[move.target].type
-        yield _candidate("Where is {} now?", (move.after,), [place], object_type)
+        yield _candidate(QUESTION_TYPE, "Where is {} now?", (move.after,), [place], object_type)
+
+
+def _origin(history: History, object_type: str, moves: tuple[Move, ...]) -> Iterator[Candidate]:
+    move = moves[0]
+    if _left(history, move):
+        when = "first picked it up" if history.pickups[move.item] > 1 else "picked it up"
+        form = f"Where was {{}} before you {when}?"
+        yield _candidate(FURTHER, form, (move.before,), [_start(history, move)], object_type)
+
+
+def _destination(history: History, object_type: str, moves: tuple[Move, ...]) -> Iterator[Candidate]:
+    move = moves[0]
+    if history.pickups[move.item] == 1 and history.shows_put(move):
+        yield _candidate(FURTHER, "Where did you move {} to?", (move.after,), [_end(history, move)], object_type)
 
 
 def _journey(history: History, object_type: str, moves: tuple[Move, ...]) -> Iterator[Candidate]:
     first = moves[0]
-    if not _left(history, first):
+    if not _left(history, first) or not all(history.shows_put(move) for move in moves):
         return
-    if not all(history.shows_put(move) for move in moves):
-        return
-    places = [history.world(first.before)[first.origin or ""].type]
-    places += [history.world(move.after)[move.target].type for move in moves]
-    if distinct(places):
+    places = [_start(history, first), *(_end(history, move) for move in moves)]
+    if distinct([place or "" for place in places]):
         clues = (first.before, *(move.after for move in moves))
-        yield _candidate("In which places was {}, from first to last?", clues, places, object_type)
+        yield _candidate(FURTHER, "In which places was {}, from first to last?", clues, places, object_type)
+
+
+def _start(history: History, move: Move) -> str | None:
+    """The type of what an object was in or on before a move."""
+    return None if move.origin is None else history.world(move.before)[move.origin].type
+
+
+def _end(history: History, move: Move) -> str:
+    """The type of what an object was put into or onto."""
+    return history.world(move.after)[move.target].type
+
+
+def _changes(history: History, move: Move) -> bool:
+    """Whether a move led to another type of receptacle: else the question would hold the answer."""
+    start = _start(history, move)
+    return start is not None and canonical(start) != canonical(_end(history, move))
+
+
+def _is_down(history: History, move: Move) -> bool:
+    """Whether an object is still where its last move put it."""
+    return history.parent(len(history) - 1, move.item) == move.target
 
 
 def _left(history: History, move: Move) -> bool:
@@ -64,6 +119,16 @@ def _left(history: History, move: Move) -> bool:
     return shown and history.alone(move.before, move.item)
 
 
-def _candidate(form: str, clues: tuple[int, ...], places: list[str], object_type: str) -> Candidate:
-    answers = tuple(answer_of(place) for place in places)
-    return Candidate(QUESTION_TYPE, form, (the(object_type),), clues, answers, (object_type, *places))
+def _candidate(
+    question_type: str,
+    form: str,
+    clues: tuple[int, ...],
+    places: Sequence[str | None],
+    object_type: str,
+    named: str | None = None,
+) -> Candidate:
+    """A question on an object, and on a place where the form names one."""
+    types = [place for place in places if place is not None]
+    names = [object_type] if named is None else [object_type, named]
+    answers = tuple(map(answer_of, types))
+    return Candidate(question_type, form, tuple(map(the, names)), clues, answers, (object_type, *types))

@@ -1,4 +1,7 @@
-"""Questions on a whole set: every rule is applied to every trajectory, and a balanced part of it is chosen."""
+"""Questions on a whole set: every rule is applied to every trajectory, and a balanced part of it is chosen.
+
+The rules are those of Table 3; our further forms are asked where they are wanted, under question types of their own.
+"""
 
 import random
 from collections import Counter
@@ -23,7 +26,7 @@ from infthor_eval.generation.questions.candidates import Candidate
 from infthor_eval.generation.questions.checker import Checker
 from infthor_eval.generation.questions.history import DEFAULT_SHARE, History
 
-__all__ = ["MadeQuestions", "candidates_of", "make_questions"]
+__all__ = ["MadeQuestions", "candidates_of", "further_candidates_of", "make_questions"]
 
 
 @dataclass
@@ -59,7 +62,7 @@ class MadeQuestions:
 
 
 def make_questions(
-    folder: Path, *, seed: int = 0, per_trajectory: int = 25, share: float = DEFAULT_SHARE
+    folder: Path, *, seed: int = 0, per_trajectory: int = 25, share: float = DEFAULT_SHARE, further: bool = False
 ) -> MadeQuestions:
     """Make questions on a replayed set.
 
@@ -68,6 +71,7 @@ def make_questions(
         seed: makes every choice.
         per_trajectory: how many questions at most on one trajectory.
         share: of the frame's pixels that an object must fill to count as shown.
+        further: whether to ask our further forms too.
 
     Returns:
         The questions; trajectories whose log cannot be read are named in it.
@@ -88,7 +92,10 @@ def make_questions(
     chooser = _Chooser()
     for history in histories:
         rng = random.Random(f"{seed}/{history.traj_id}")
-        chosen = chooser.choose(candidates_of(history, vocabulary, rng), per_trajectory, rng)
+        candidates = candidates_of(history, vocabulary, rng)
+        if further:
+            candidates += further_candidates_of(history, rng)
+        chosen = chooser.choose(candidates, per_trajectory, rng)
         checker = Checker(history.steps, share)
         for question in (item.question(history.traj_id) for item in chosen):
             (made.questions if checker.verdict(question).sound else made.doubted).append(question)
@@ -104,7 +111,7 @@ def _folders(folder: Path) -> list[Path]:
 
 
 def candidates_of(history: History, vocabulary: frozenset[str], rng: random.Random) -> list[Candidate]:
-    """All questions that the rules make on one trajectory.
+    """All questions of Table 3's forms on one trajectory.
 
     Args:
         history: the trajectory.
@@ -118,11 +125,27 @@ def candidates_of(history: History, vocabulary: frozenset[str], rng: random.Rand
         *location.locations(history),
         *contents.slicings(history),
         *contents.at_slicing(history),
-        *contents.at_opening(history),
-        *contents.at_pickup(history),
+        *contents.contents(history),
         *put_action.puts(history),
         *final_state.final_states(history),
         *counting.counts(history),
+    ]
+
+
+def further_candidates_of(history: History, rng: random.Random) -> list[Candidate]:
+    """All questions of our further forms on one trajectory.
+
+    Args:
+        history: the trajectory.
+        rng: samples the frames that counts are mixed with.
+    """
+    return [
+        *open_state.further_open_states(history),
+        *location.further_locations(history),
+        *contents.at_opening(history),
+        *contents.at_pickup(history),
+        *put_action.further_puts(history),
+        *counting.further_counts(history, rng),
     ]
 
 

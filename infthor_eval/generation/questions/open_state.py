@@ -1,38 +1,56 @@
-"""Open state: "Was the fridge open when you picked up the mug?", "Is the fridge open now?", "What did you open?" """
+"""Open state: "Was the fridge open?" (at any time), and further forms: open when, open now, what was opened."""
 
 from collections import Counter
 from collections.abc import Iterator
 
-from infthor_eval.generation.questions.candidates import Candidate, listing, the, within
+from infthor_eval.generation.questions.candidates import Candidate, further, listing, the, within
 from infthor_eval.generation.questions.history import Event, History
 
-__all__ = ["QUESTION_TYPE", "open_states", "phrase"]
+__all__ = ["FURTHER", "QUESTION_TYPE", "further_open_states", "open_states"]
 
 QUESTION_TYPE = "open_state"
+FURTHER = further(QUESTION_TYPE)
+_CONTAINERS = frozenset({"Box", "Cabinet", "Drawer", "Fridge", "Microwave", "Safe"})
 _UNASKED = frozenset({"Blinds", "Curtains", "Book", "Kettle", "ShowerCurtain", "ShowerDoor", "Window"})
 _ASKED_AT = {"PickupObject", "PutObject", "SliceObject", "ToggleObjectOn"}
 
 
 def open_states(history: History) -> Iterator[Candidate]:
-    """Questions on what is the only one of its type and can be opened."""
-    last = len(history) - 1
-    singles = sorted(
-        key
-        for key, state in history.world(last).items()
-        if state.is_open is not None and state.type not in _UNASKED and history.only_one(last, key)
-    )
-    phrases = Counter(phrase(history, event) for event in history.events)
-    for key in singles:
+    """Whether a container that is the only one of its type was ever open: no where the log never has it open."""
+    frames = range(len(history))
+    for key in _singles(history):
+        open_at = [frame for frame in frames if key in history.world(frame) and history.world(frame)[key].is_open]
+        object_type = history.world(len(history) - 1)[key].type
+        frame = history.clearest(open_at or frames, key)
+        if object_type in _CONTAINERS and frame is not None:
+            answer = "yes" if open_at else "no"
+            yield Candidate(QUESTION_TYPE, "Was {} open?", (the(object_type),), (frame,), (answer,), (object_type,))
+
+
+def further_open_states(history: History) -> Iterator[Candidate]:
+    """Questions on when what is the only one of its type was open, and on all that was opened."""
+    phrases = Counter(_phrase(history, event) for event in history.events)
+    for key in _singles(history):
         yield from _now(history, key)
         for event in history.events:
-            told = phrase(history, event)
+            told = _phrase(history, event)
             about = key in {event.target, event.receptacle}
             if event.action in _ASKED_AT and phrases[told] == 1 and not about:
                 yield from _then(history, key, event, told)
     yield from _opened(history)
 
 
-def phrase(history: History, event: Event) -> str:
+def _singles(history: History) -> list[str]:
+    """What can be opened and is the only one of its type."""
+    last = len(history) - 1
+    return sorted(
+        key
+        for key, state in history.world(last).items()
+        if state.is_open is not None and state.type not in _UNASKED and history.only_one(last, key)
+    )
+
+
+def _phrase(history: History, event: Event) -> str:
     """What the agent did, as the end of a "when you ..." """
     if event.action == "PutObject" and event.receptacle is not None:
         place_type = history.world(event.frame)[event.receptacle].type
@@ -46,7 +64,7 @@ def _then(history: History, key: str, event: Event, told: str) -> Iterator[Candi
     if key in world and history.shows(event.frame, key) and _shows_event(history, event):
         answer = "yes" if world[key].is_open else "no"
         names, subjects = (the(world[key].type), told), (world[key].type, event.object_type)
-        yield Candidate(QUESTION_TYPE, "Was {} open when you {}?", names, (event.frame,), (answer,), subjects)
+        yield Candidate(FURTHER, "Was {} open when you {}?", names, (event.frame,), (answer,), subjects)
 
 
 def _shows_event(history: History, event: Event) -> bool:
@@ -62,16 +80,22 @@ def _shows_event(history: History, event: Event) -> bool:
 def _now(history: History, key: str) -> Iterator[Candidate]:
     last = len(history) - 1
     state = history.world(last)[key]
-    frame = next((frame for frame in range(last, -1, -1) if history.shows(frame, key)), None)
-    if frame is not None and history.world(frame)[key].is_open == state.is_open:
+    changed = next((frame for frame in range(last, -1, -1) if _is_open(history, frame, key) != state.is_open), -1)
+    frame = history.clearest(range(changed + 1, last + 1), key)
+    if frame is not None:
         answer = "yes" if state.is_open else "no"
-        yield Candidate(QUESTION_TYPE, "Is {} open now?", (the(state.type),), (frame,), (answer,), (state.type,))
+        yield Candidate(FURTHER, "Is {} open now?", (the(state.type),), (frame,), (answer,), (state.type,))
+
+
+def _is_open(history: History, frame: int, key: str) -> bool | None:
+    state = history.world(frame).get(key)
+    return None if state is None else state.is_open
 
 
 def _opened(history: History) -> Iterator[Candidate]:
     """Everything that was opened."""
     yield from listing(
-        QUESTION_TYPE,
+        FURTHER,
         "What did you open?",
         (
             (event.object_type, event.frame if history.shows(event.frame, event.target) else None)

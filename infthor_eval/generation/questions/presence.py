@@ -1,9 +1,10 @@
-"""Object presence: "Is there a mug in this place?"
+"""Object presence: "Is there any mug in this room?", "Have you seen a mug?"
 
-A no-question names a type that nowhere exists in the trajectory's scene and is not easily taken for one that does:
-one that other trajectories of the set have, so that its name does not give the answer away, and where there are few
-of these, another of AI2-THOR's. No frame proves an absence, so it carries a sampled frame instead of evidence: one, as
-a yes-question has one, because else the number of frames would give the answer away.
+A yes-question carries the frame of the first sighting. A no-question names a type that nowhere exists in the
+trajectory's scene and is not easily taken for one that does: one that other trajectories of the set have, so that its
+name does not give the answer away, and where there are few of these, another of AI2-THOR's. No frame proves an absence,
+so it carries a sampled frame instead of evidence: one, as a yes-question has one, because else the number of frames
+would give the answer away.
 """
 
 import random
@@ -18,7 +19,6 @@ __all__ = ["QUESTION_TYPE", "absent", "present"]
 QUESTION_TYPE = "object_presence"
 _FEW = 8  # types of other trajectories below which AI2-THOR's join them
 _BUSY = 3  # objects that a sampled frame shows at least, where the trajectory has such frames
-_FORM = "Did you see {}?"
 
 # Not asked about: surroundings, parts, and what people would not call by that name.
 _UNASKED = frozenset(
@@ -61,18 +61,16 @@ _TAKEN_FOR_EACH_OTHER = (
 
 
 def present(history: History) -> Iterator[Candidate]:
-    """Yes-questions, each with the frame that shows one such object best."""
-    best: dict[str, tuple[int, int]] = {}
+    """Yes-questions, each with the first frame that shows such an object."""
+    first: dict[str, int] = {}
     for frame in range(len(history)):
         world = history.world(frame)
-        for key, seen in history.seen(frame).items():
-            if seen.pixels >= history.least and key in world:
-                object_type = world[key].type
-                if seen.pixels > best.get(object_type, (0, 0))[0]:
-                    best[object_type] = (seen.pixels, frame)
-    for object_type, (_, frame) in sorted(best.items()):
+        for key in history.seen(frame):
+            if key in world and history.shows(frame, key):
+                first.setdefault(world[key].type, frame)
+    for object_type, frame in sorted(first.items()):
         if _asked(object_type):
-            yield Candidate(QUESTION_TYPE, _FORM, (an(noun(object_type)),), (frame,), ("yes",), (object_type,))
+            yield from _both(object_type, frame, "yes")
 
 
 def absent(history: History, vocabulary: frozenset[str], rng: random.Random) -> Iterator[Candidate]:
@@ -89,7 +87,14 @@ def absent(history: History, vocabulary: frozenset[str], rng: random.Random) -> 
         types |= _missing(history, _COMMON)
     for object_type in sorted(types):
         frame = rng.choice(frames)
-        yield Candidate(QUESTION_TYPE, _FORM, (an(noun(object_type)),), (frame,), ("no",), (object_type,), absence=True)
+        yield from _both(object_type, frame, "no")
+
+
+def _both(object_type: str, frame: int, answer: str) -> Iterator[Candidate]:
+    """The two forms."""
+    words = noun(object_type)
+    for form, name in (("Is there any {} in this room?", words), ("Have you seen {}?", an(words))):
+        yield Candidate(QUESTION_TYPE, form, (name,), (frame,), (answer,), (object_type,), absence=answer == "no")
 
 
 def _missing(history: History, vocabulary: frozenset[str]) -> set[str]:

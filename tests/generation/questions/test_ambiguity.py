@@ -1,0 +1,126 @@
+"""What is asked only where it is clear what is meant, on logs made by hand."""
+
+import pytest
+
+from infthor_eval.generation.questions import contents, counting, final_state, location, open_state, presence
+from infthor_eval.generation.questions.checker import Checker
+from infthor_eval.generation.questions.history import DEFAULT_SHARE
+
+from .logs import history, moved, state
+
+TABLE, DESK, FRIDGE = "DiningTable|1", "Desk|1", "Fridge|1"
+APPLE, MUG, BOOK, EGG, PAN = "Apple|1", "Mug|1", "Book|1", "Egg|1", "Pan|1"
+PLACES = {key: state(key) for key in (TABLE, DESK, FRIDGE)}
+FAR = (9.0, 0.0, 9.0)
+
+
+def texts(candidates):
+    return [candidate.text for candidate in candidates]
+
+
+def check(log, candidates):
+    found = list(candidates)
+    for candidate in found:
+        assert Checker(log.steps, DEFAULT_SHARE).verdict(candidate.question("made")).sound, candidate
+    return {candidate.text: candidate.answers for candidate in found}
+
+
+def test_contents_are_asked_of_what_never_changes():
+    log = history({**PLACES, APPLE: state(APPLE, TABLE), MUG: state(MUG, TABLE), BOOK: state(BOOK, DESK)})
+    assert check(log, contents.contents(log)) == {
+        "What objects were on the dining table?": ("apple", "mug"),
+        "What objects were on the desk?": ("book",),
+    }
+    changed = history({**PLACES, APPLE: state(APPLE, TABLE)}, *moved(APPLE, TABLE, FRIDGE))
+    assert not texts(contents.contents(changed))
+
+
+@pytest.mark.parametrize(
+    ("more", "asked"),
+    [
+        ({}, True),
+        ({"DeskLamp|1": state("DeskLamp|1", position=FAR)}, True),
+        ({"DeskLamp|1": state("DeskLamp|1")}, False),
+        ({"DeskLamp|1": state("DeskLamp|1", TABLE, position=FAR)}, False),
+        ({PAN: state(PAN, TABLE), EGG: state(EGG, PAN)}, False),
+        ({"DiningTable|2": state("DiningTable|2")}, False),
+    ],
+)
+def test_contents_are_asked_where_every_reading_gives_the_same(more, asked):
+    log = history({**PLACES, MUG: state(MUG, TABLE), **more})
+    assert any("dining table" in text for text in texts(contents.contents(log))) == asked
+
+
+def test_further_contents_say_what_counts_and_count_it_so():
+    lamp, loose = "DeskLamp|1", {PAN: state(PAN, TABLE), EGG: state(EGG, PAN), MUG: state(MUG, TABLE)}
+    start = {**PLACES, **loose, BOOK: state(BOOK, TABLE), lamp: state(lamp, TABLE)}
+    log = history(start, *moved(BOOK, TABLE, DESK))
+    ((text, answers),) = check(log, contents.at_pickup(log)).items()
+    assert text.startswith("Which other things that can be picked up were directly on the dining table when you picked")
+    assert answers == ("mug", "pan")
+
+
+def test_the_end_is_counted_where_every_reading_gives_the_same():
+    start = {**PLACES, APPLE: state(APPLE, TABLE), MUG: state(MUG, TABLE)}
+    log = history(start, *moved(APPLE, TABLE, DESK))
+    assert check(log, final_state.final_states(log)) == {
+        "Is the apple on the desk?": ("yes",),
+        "How many objects were on the desk?": ("1",),
+        "What objects are on the desk?": ("apple",),
+    }
+    lamp = history({**start, "DeskLamp|1": state("DeskLamp|1")}, *moved(APPLE, TABLE, DESK))
+    assert texts(final_state.final_states(lamp)) == ["Is the apple on the desk?"]
+
+
+def test_which_pickup_is_meant_is_clear():
+    start = {**PLACES, APPLE: state(APPLE, TABLE)}
+    once = history(start, *moved(APPLE, TABLE, FRIDGE))
+    assert check(once, location.locations(once)) == {
+        "Where was the apple before you put it to the fridge?": ("diningtable",),
+        "Where did you move the apple from the dining table?": ("fridge",),
+        "Where is the apple now?": ("fridge",),
+    }
+    assert "Where was the apple before you picked it up?" in check(once, location.further_locations(once))
+    held = history(start, *moved(APPLE, TABLE, FRIDGE), moved(APPLE, FRIDGE, DESK)[0])
+    assert not [text for text in texts(location.locations(held)) if "move the" in text or "now" in text]
+    further = texts(location.further_locations(held))
+    assert "Where was the apple before you picked it up?" not in further
+    assert "Where did you move the apple to?" not in further
+    assert "Where was the apple before you first picked it up?" in further
+
+
+def test_of_several_moves_only_those_at_the_ends_are_asked_about():
+    start = {**PLACES, APPLE: state(APPLE, TABLE)}
+    twice = history(start, *moved(APPLE, TABLE, FRIDGE), *moved(APPLE, FRIDGE, DESK))
+    assert check(twice, location.locations(twice)) == {
+        "Where was the apple before you put it to the fridge?": ("diningtable",),
+        "Where did you move the apple from the fridge?": ("desk",),
+        "Where is the apple now?": ("desk",),
+    }
+    back = history(start, *moved(APPLE, TABLE, FRIDGE), *moved(APPLE, FRIDGE, DESK), *moved(APPLE, DESK, FRIDGE))
+    assert not [text for text in texts(location.locations(back)) if "before you put" in text]
+
+
+def test_moves_are_counted_of_what_was_moved_more_than_once():
+    start = {**PLACES, APPLE: state(APPLE, TABLE), MUG: state(MUG, TABLE)}
+    log = history(start, *moved(APPLE, TABLE, FRIDGE), *moved(MUG, TABLE, DESK), *moved(APPLE, FRIDGE, DESK))
+    assert check(log, counting.counts(log)) == {"How many times did you move the apple?": ("2",)}
+
+
+def test_the_first_sighting_is_shown():
+    log = history({**PLACES, MUG: state(MUG, TABLE)}, ("LookUp", None, None, {}))
+    del log.steps[0].seen[MUG]
+    clues = {candidate.text: candidate.clues for candidate in presence.present(log)}
+    assert clues["Have you seen a mug?"] == clues["Is there any mug in this room?"] == (1,)
+    assert clues["Have you seen a fridge?"] == (0,)
+
+
+def test_a_view_well_inside_the_frame_is_preferred():
+    start = {**PLACES, FRIDGE: state(FRIDGE, is_open=False)}
+    look = ("LookUp", None, None, {})
+    log = history(start, look, look, boxes={0: {FRIDGE: (0, 0, 20, 20)}, 1: {FRIDGE: (10, 50, 30, 70)}})
+    (candidate,) = open_state.open_states(log)
+    assert (candidate.text, candidate.answers, candidate.clues) == ("Was the fridge open?", ("no",), (2,))
+    opened = history(start, ("OpenObject", FRIDGE, None, {FRIDGE: state(FRIDGE, is_open=True)}), look)
+    (candidate,) = open_state.open_states(opened)
+    assert (candidate.answers, candidate.clues) == (("yes",), (1,))
