@@ -41,6 +41,7 @@ def doc_of(found: TaskSamples, sample: Sample, pixels: bool = False) -> Doc:
         "frames": list(sample.frames),
         "notes": [sample.notes.window, sample.notes.max_new_tokens] if sample.notes else [],
         "set": str(found.data.root),
+        "trajectories": str(found.data.trajectories or ""),
         "pixels": pixels,
     }
 
@@ -62,7 +63,8 @@ def sample_of(doc: Doc) -> Sample:
 def samples_around(doc: Doc) -> TaskSamples:
     """The task's samples as far as one doc tells of them: that one."""
     context = context_named(doc["context"])
-    return TaskSamples(open_set(doc["set"]), doc["context"], context, [sample_of(doc)], [], {})
+    data = open_set(doc["set"], doc["trajectories"] or None)
+    return TaskSamples(data, doc["context"], context, [sample_of(doc)], [], {})
 
 
 def doc_parts(doc: Doc) -> list[ContextPart]:

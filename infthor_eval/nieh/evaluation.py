@@ -114,12 +114,20 @@ class NiehEvaluation:
                     f"--{name.replace('_', '-')} {getattr(self._options, name)}: no context of {asked} has a size in "
                     "tokens; leave it out, or ask nieh_haystack or nieh_truncate_head"
                 )
-        retrieves = any(task.found is not None and "retriever" in task.found.sources for task in self._tasks)
-        if (self._options.retriever or self._options.retriever_revision) and not retrieves:
+        if (self._options.retriever or self._options.retriever_revision) and not self._depends_on("retriever"):
             raise UsageError(
                 f"--retriever: no context of {asked} retrieves frames; "
                 "leave it out, or ask nieh_clip_retrieval or nieh_memory_frames"
             )
+        if self._options.trajectories and not self._depends_on("trajectories"):
+            raise UsageError(
+                f"--trajectories: no context of {asked} tells of the trajectory beside its frames; "
+                "leave it out, or ask nieh_interleaved or nieh_text_state"
+            )
+
+    def _depends_on(self, source: str) -> bool:
+        """Whether a context of the tasks looks at a source beside the set."""
+        return any(task.found is not None and source in task.found.sources for task in self._tasks)
 
 
 def _refuse_nothing(found: Sequence[TaskSamples | None], tasks: Sequence[NiehTask]) -> None:

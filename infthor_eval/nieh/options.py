@@ -16,6 +16,7 @@ class NiehOptions:
         tokens_per_frame: tokens of one frame for such contexts; None asks the model.
         retriever: CLIP model of contexts that retrieve frames, a hub id or a folder; None takes the published one.
         retriever_revision: branch, tag or commit of it on the hub; None is the default branch.
+        trajectories: folder of the set's trajectories (the published scripts' `--traj_dir`); None where they lie in it.
     """
 
     k_tokens: int | None = field(
@@ -37,6 +38,13 @@ class NiehOptions:
     )
     retriever_revision: str | None = field(
         default=None, metadata={"help": "Branch, tag or commit of the retriever on the hub.", "metavar": "REVISION"}
+    )
+    trajectories: str | None = field(
+        default=None,
+        metadata={
+            "help": "Folder of the set's trajectories (TRAJ_ID.json or .txt) where they do not lie in the set.",
+            "metavar": "DIR",
+        },
     )
 
     def __post_init__(self) -> None:

@@ -43,29 +43,32 @@ class TaskSamples:
 
 
 @lru_cache(maxsize=8)
-def open_set(root: str) -> NiehSet:
+def open_set(root: str, trajectories: str | None = None) -> NiehSet:
     """The set in a folder, read once per process; `open_set.cache_clear()` has it read again."""
-    return NiehSet(Path(root))
+    return NiehSet(Path(root), Path(trajectories) if trajectories else None)
 
 
-def find_set(data: str | None = None, bundled: str | None = None, **_: object) -> NiehSet:
+def find_set(
+    data: str | None = None, bundled: str | None = None, trajectories: str | None = None, **_: object
+) -> NiehSet:
     """The set of a task.
 
     Args:
         data: folder of an NIEH set; None is the published set where `infthor-eval fetch nieh` put it.
         bundled: name of a set that comes with the package; `data` is not looked at then.
+        trajectories: folder of the set's trajectories; None where they lie in the set.
 
     Raises:
         UsageError: there is none.
         DataError: it cannot be read.
     """
     if bundled:
-        return open_set(str(packaged_folder(f"sets/{bundled}")))
+        return open_set(str(packaged_folder(f"sets/{bundled}")), trajectories)
     if data is None and not default_folder().is_dir():
         raise UsageError(
             "no NIEH set to ask about; give its folder with --data, or fetch the published one: fetch nieh"
         )
-    return open_set(str(data or default_folder()))
+    return open_set(str(data or default_folder()), trajectories)
 
 
 def find_samples(config: Mapping[str, Any], limit: int | None = None) -> TaskSamples:
