@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 from infthor_eval.formats.published import PublishedRow, PublishedTable, published_tables
 from infthor_eval.formats.question import ABSENCE
-from infthor_eval.nieh.summary import CLUE_COLUMNS, Cell, NiehSummary, TaskSummary
+from infthor_eval.nieh.summary import CLUE_COLUMNS, OPEN_ENDED, Cell, NiehSummary, TaskSummary
 from infthor_eval.runs import RunSummary
 from infthor_eval.tables import Column, Row, Table
 
@@ -42,7 +42,7 @@ def _tasks(runs: Sequence[RunSummary]) -> Iterator[tuple[str, str, TaskSummary]]
 
 def clues_table(runs: Sequence[RunSummary]) -> Table:
     """Accuracy by number of clues: a row per run, task and metric, then the published rows."""
-    numbers = (*CLUE_COLUMNS, "95 %", "bootstrap", ABSENCE, "n", "skipped", "failed")
+    numbers = (*CLUE_COLUMNS, "95 %", "bootstrap", OPEN_ENDED, ABSENCE, "n", "skipped", "failed")
     rows = [row for run in runs for row in _rows_of(run)]
     for table in filter(_is_by_clues, published_tables("nieh")):
         rows += _published_rows(table, runs)
@@ -72,7 +72,8 @@ def _cells(task: TaskSummary, metric: str) -> list[str]:
     interval = _range(score.low, score.high) if score else "-"
     resampled = _range(*score.bootstrap) if score and score.bootstrap else "-"
     counts = [str(total.n), str(task.skipped.n), str(total.n_failed)]
-    return [*means, interval, resampled, _mean(task.by_clues[ABSENCE], metric), *counts]
+    apart = [_mean(task.by_clues[name], metric) for name in (OPEN_ENDED, ABSENCE)]
+    return [*means, interval, resampled, *apart, *counts]
 
 
 def _mean(cell: Cell, metric: str) -> str:
