@@ -1,7 +1,7 @@
 """NIEH set up for a run: what its tasks ask, and the doing of it, a trajectory at a time."""
 
 from collections.abc import Iterator, Sequence
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import groupby
 from typing import cast
 
@@ -53,7 +53,7 @@ class NiehEvaluation:
         tokens = self._tokens_per_frame()
         self._prepared = {task.name: task.prepared(tokens) for task in self._tasks}
         _refuse_nothing([prepared.found for prepared in self._prepared.values()], self._tasks)
-        self._respondent.read_tasks(self._prepared)
+        self._respondent.read_keys({task.name: partial(task.key, tokens) for task in self._tasks})
         tasks = {task.name: task.identity(self._prepared[task.name]) for task in self._tasks}
         costs = {name: self._respondent.cost(prepared) for name, prepared in self._prepared.items()}
         return Workload(

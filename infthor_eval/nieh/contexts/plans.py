@@ -1,4 +1,4 @@
-"""The whole trajectory as agents are trained on it (`traj.txt`): goals, plans, actions, special tokens, and the frames."""
+"""The whole trajectory as agents are trained on it (`traj.txt`): goals, plans, actions, special tokens and frames."""
 
 from collections.abc import Sequence
 from itertools import zip_longest
