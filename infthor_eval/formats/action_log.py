@@ -1,4 +1,4 @@
-"""Which frames show what each low-level action did (`expert_log.json`): one each in our sets, several in published ones."""
+"""Which frames show what each low-level action did (`expert_log.json`): one each in our sets, several in others."""
 
 import json
 from collections.abc import Mapping

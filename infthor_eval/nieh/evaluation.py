@@ -61,7 +61,12 @@ class NiehEvaluation:
             skipped=[
                 skipped for name, prepared in self._prepared.items() for skipped in _skipped(name, prepared.found)
             ],
-            identity={"tasks": tasks, "k_tokens": self._options.k_tokens, "tokens_per_frame": tokens},
+            identity={
+                "tasks": tasks,
+                "k_tokens": self._options.k_tokens,
+                "tokens_per_frame": tokens,
+                "frames": self._options.frames,
+            },
             costs=[Cost(name, cost) for name, cost in costs.items() if cost is not None],
         )
 

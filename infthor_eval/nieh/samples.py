@@ -1,7 +1,7 @@
 """What a task asks: every question of its set in every way its context knows, and what cannot be asked."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,7 @@ from infthor_eval.formats.nieh_set import NiehSet, SkippedQuestion
 from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.formats.question import Question
 from infthor_eval.nieh.contexts import Context, ContextPart, ContextSettings, Sample, context_named
+from infthor_eval.nieh.stand_ins import StandIns
 
 __all__ = ["TaskSamples", "find_samples", "find_set", "open_set"]
 
@@ -28,6 +29,7 @@ class TaskSamples:
         samples: what is asked, in the order of the set.
         skipped: what is not, and why.
         sources: what the frames depend on besides the set and the settings (`Context.sources`).
+        stand_ins: what is shown in the places of frames.
     """
 
     data: NiehSet
@@ -36,10 +38,12 @@ class TaskSamples:
     samples: Sequence[Sample]
     skipped: Sequence[SkippedQuestion]
     sources: Mapping[str, Any]
+    stand_ins: StandIns = field(default_factory=StandIns)
 
     def request(self, sample: Sample) -> tuple[list[ContextPart], str]:
         """All that a model is shown and told: the context, and the text with the question that follows it."""
-        return self.context.request(self.data, sample)
+        parts, text = self.context.request(self.data, sample)
+        return self.stand_ins.put(parts, self.data, self.context, sample.question.traj_id), text
 
 
 @lru_cache(maxsize=8)
@@ -80,10 +84,12 @@ def find_samples(config: Mapping[str, Any], limit: int | None = None) -> TaskSam
         limit: stop behind the first so many questions that can be asked.
 
     Raises:
-        UsageError: there is no set, the context is unknown, or it lacks a setting.
+        UsageError: there is no set, the context is unknown or lacks a setting, or the set has no such stand-ins.
         DataError: the set cannot be read.
     """
     context, settings, data = context_named(config["context"]), ContextSettings.read(config), find_set(**config)
+    stand_ins = StandIns(settings.frames, settings.seed)
+    stand_ins.check(data)
     samples: list[Sample] = []
     skipped: list[SkippedQuestion] = []
     for n_asked, found in enumerate(_asked(_by_question(data, context, settings)), 1):
@@ -91,7 +97,7 @@ def find_samples(config: Mapping[str, Any], limit: int | None = None) -> TaskSam
         skipped += [item for item in found if isinstance(item, SkippedQuestion)]
         if n_asked == limit:
             break
-    return TaskSamples(data, config["context"], context, samples, skipped, context.sources(data, settings))
+    return TaskSamples(data, config["context"], context, samples, skipped, context.sources(data, settings), stand_ins)
 
 
 _Found = list[Sample | SkippedQuestion]

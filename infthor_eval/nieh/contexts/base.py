@@ -51,6 +51,7 @@ class ContextSettings:
         note_window: how many frames the model reads for one note.
         note_tokens: most tokens of one note.
         seed: for what is sampled.
+        frames: what is shown in the frames' places (`infthor_eval.nieh.stand_ins`).
     """
 
     ctx_size: float | None = None
@@ -63,6 +64,7 @@ class ContextSettings:
     note_window: int = 20
     note_tokens: int = 64
     seed: int = 0
+    frames: str = "shown"
 
     @classmethod
     def read(cls, given: Mapping[str, Any]) -> "ContextSettings":

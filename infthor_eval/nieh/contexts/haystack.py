@@ -69,8 +69,10 @@ def _around(needle: int, n_all: int, n: int, d_index: int, last_end: int) -> tup
 
 
 def drawn_from(clues: Sequence[int], n_all: int, n: int) -> list[int]:
-    """What a window around clues that are apart is drawn from: the frames between them, or where those are too few, also
-    as many as are missing on either side of those, clues among them (as published: such a window may be shorter then).
+    """What a window around clues that are apart is drawn from: the frames between them.
+
+    Where those are too few, as many as are missing on either side of them too, clues among those as published: a clue
+    that is drawn takes no second place, and the window is shorter.
     """
     between = [place for place in range(clues[0] + 1, clues[-1]) if place not in clues]
     missing = n - len(clues)
