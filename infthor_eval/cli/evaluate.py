@@ -1,10 +1,10 @@
 """What `run` does with its requests, and what of it people see."""
 
-from collections import Counter
 from collections.abc import Sequence
 from itertools import groupby
 
 from infthor_eval.cli.progress import NOTES, execute_with_progress, say
+from infthor_eval.cli.reasons import counted_reasons
 from infthor_eval.harness.export import export
 from infthor_eval.report.terminal import print_table, table_console
 from infthor_eval.runs import RunOutcome, RunRequest, Suite, prepare
@@ -40,7 +40,7 @@ def _suite_name(outcome: RunOutcome) -> str:
 
 
 def _say_what_failed(outcome: RunOutcome) -> int:
-    reasons = Counter((record.task, record.failure) for record in outcome.records if record.failure is not None)
-    for (task, reason), n in sorted(reasons.items()):
+    failed = [(record.task, record.failure) for record in outcome.records if record.failure is not None]
+    for task, reason, n in counted_reasons(failed):
         say(f"{task}: {n} sample(s) failed, counted as wrong: {reason}", "red")
-    return sum(reasons.values())
+    return len(failed)

@@ -1,11 +1,11 @@
 """What people see of a run while it goes, on standard error."""
 
-from collections import Counter
 from typing import Any
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+from infthor_eval.cli.reasons import counted_reasons
 from infthor_eval.runs import PreparedRun, RunOutcome, UnitRecord, Workload, execute
 
 __all__ = ["NOTES", "execute_with_progress", "say"]
@@ -25,7 +25,7 @@ class _Bar:
         """See `Observer`."""
         if n_recovered:
             say(f"{self._name}: {n_recovered} bad line(s) of the journal set aside; those units are tried again")
-        for (task, reason), n in sorted(Counter((item.key.task, item.reason) for item in workload.skipped).items()):
+        for task, reason, n in counted_reasons((item.key.task, item.reason) for item in workload.skipped):
             say(f"{task}: {n} sample(s) skipped: {reason}", "yellow")
         for cost in workload.costs:
             say(f"{cost.task}: {cost.description}")

@@ -1,4 +1,4 @@
-"""From what was typed to the runs that it asks for: one per model and suite."""
+"""From what was typed to the runs that it asks for: one per model, suite, and value of an option that takes several."""
 
 import re
 from collections.abc import Mapping
@@ -59,17 +59,17 @@ def requests_for(
     by_suite = split_by_suite(Catalog.packaged().expand(asked.tasks))
     requests = []
     for suite_name, tasks in by_suite.items():
-        options = chosen_options(suite_name, asked.suite_options, by_suite.keys())
-        request = RunRequest(
-            model=model,
-            tasks=TaskRequest(tasks, options, asked.data, asked.limit, asked.seed),
-            # One suite's run is named as typed; where there are several, each by its own tasks.
-            asked=asked.tasks if len(by_suite) == 1 else tuple(task.name for task in tasks),
-            output=asked.output,
-            model_options=model_options,
-            name=name,
-            fresh=asked.fresh,
-            recover=asked.recover,
-        )
-        requests.append((request, suite_named(suite_name)))
+        for options in chosen_options(suite_name, asked.suite_options, by_suite.keys()):
+            request = RunRequest(
+                model=model,
+                tasks=TaskRequest(tasks, options, asked.data, asked.limit, asked.seed),
+                # One suite's run is named as typed; where there are several, each by its own tasks.
+                asked=asked.tasks if len(by_suite) == 1 else tuple(task.name for task in tasks),
+                output=asked.output,
+                model_options=model_options,
+                name=name,
+                fresh=asked.fresh,
+                recover=asked.recover,
+            )
+            requests.append((request, suite_named(suite_name)))
     return requests

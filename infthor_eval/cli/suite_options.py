@@ -3,11 +3,13 @@
 import typing
 from collections.abc import Callable, Mapping
 from dataclasses import fields
+from itertools import product
 from types import NoneType
 from typing import Any
 
 import click
 
+from infthor_eval.cli.options import names_in
 from infthor_eval.errors import UsageError
 from infthor_eval.suites import options_of, suite_names
 
@@ -29,8 +31,10 @@ def suite_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return command
 
 
-def chosen_options(suite: str, given: Mapping[str, Any], asked: typing.Collection[str]) -> Any:
-    """The options of one suite, of all that a command was given.
+def chosen_options(suite: str, given: Mapping[str, Any], asked: typing.Collection[str]) -> list[Any]:
+    """The options of one suite, of all that a command was given: for each run that they ask for.
+
+    An option with `each` in its metadata takes several values with commas, and a run is asked for with each.
 
     Args:
         suite: the suite.
@@ -45,8 +49,12 @@ def chosen_options(suite: str, given: Mapping[str, Any], asked: typing.Collectio
         if unused and other not in asked:
             raise UsageError(f"--{unused[0].replace('_', '-')} is for tasks of {other}; none of them is asked")
     known = typing.get_type_hints(options_of(suite))
-    values = {name: given[name] for name in known if given.get(name) is not None}
-    return options_of(suite)(**{name: _type(known[name])(value) for name, value in values.items()})
+    values: dict[str, list[Any]] = {}
+    for item in fields(options_of(suite)):
+        if given.get(item.name) is not None:
+            typed = names_in(given[item.name], f"--{item.name}") if item.metadata.get("each") else [given[item.name]]
+            values[item.name] = [_type(known[item.name])(value) for value in typed]
+    return [options_of(suite)(**dict(zip(values, chosen, strict=True))) for chosen in product(*values.values())]
 
 
 def _type(hint: Any) -> type:

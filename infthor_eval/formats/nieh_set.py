@@ -1,7 +1,8 @@
 """An NIEH set: questions about long egocentric trajectories, and the frames they are asked on.
 
 The folder form is that of the published data (hub dataset `PEARLS-Lab/infini-thor-nieh`): `qa_set*.csv` beside
-`metadata/<traj_id>/` with `img/` (or `img_768/`), `metadata.json` and, in some sets, `<traj_id>_10fps.mp4`.
+`metadata/<traj_id>/` with `img/` (or `img_768/`), `metadata.json`, `expert_log.json` and, in some sets,
+`<traj_id>_10fps.mp4`. Trajectories themselves lie in a folder beside the set, or in ours inside it.
 """
 
 import hashlib
@@ -11,7 +12,9 @@ from functools import cached_property
 from pathlib import Path
 
 from infthor_eval.errors import DataError
+from infthor_eval.formats.action_log import read_action_log
 from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.outline import Outline, find_outline, read_outline, read_states
 from infthor_eval.formats.qa_csv import read_questions
 from infthor_eval.formats.question import Question
 from infthor_eval.formats.set_info import simulator_of
@@ -44,14 +47,16 @@ class NiehSet:
 
     Attributes:
         root: the folder.
+        trajectories: the folder of its trajectories (`<traj_id>.json` or `.txt`); None where they lie in the set.
         simulator: what rendered the frames ("embedded", "unity"); None where the set does not say.
     """
 
-    def __init__(self, root: Path) -> None:
+    def __init__(self, root: Path, trajectories: Path | None = None) -> None:
         """Read the questions of the set in `root`.
 
         Raises:
-            DataError: there is no such set, it is of another version, or a question file is not what the format says.
+            DataError: there is no such set or folder, it is of another version, or a question file is not what the
+                format says.
         """
         if not root.is_dir():
             raise DataError(f"{root}: no such folder; give an NIEH set with --data")
@@ -61,11 +66,16 @@ class NiehSet:
             raise DataError(f"{root}: no qa_set*.csv in it; an NIEH set has question files beside metadata/")
         if not (root / "metadata").is_dir():
             raise DataError(f"{root}: no metadata/ in it; unpack the set's metadata.tar there")
+        if trajectories is not None and not trajectories.is_dir():
+            raise DataError(f"{trajectories}: no such folder; give the trajectories' folder with --trajectories")
+        self.trajectories = trajectories
         self.simulator = simulator_of(root)
         self._read = tuple(question for file in self._files for question in read_questions(file))
         self._frames: dict[str, dict[int, FrameRef]] = {}
         self._all_frames: dict[str, tuple[FrameRef, ...]] = {}  # shared by all questions on the whole trajectory
         self._videos: dict[str, tuple[FrameRef, ...] | DataError] = {}
+        self._outlines: dict[str, Outline] = {}
+        self._action_frames: dict[str, dict[int, tuple[int, ...]]] = {}
 
     @cached_property
     def rows(self) -> tuple[Question | SkippedQuestion, ...]:
@@ -125,6 +135,52 @@ class NiehSet:
         """The frames that hold a question's evidence, in the order of its clues."""
         frames = self._trajectory(question.traj_id)
         return tuple(frames[index] for index in question.clues)
+
+    def outline_file(self, traj_id: str) -> Path | None:
+        """Where the trajectory itself lies; None where it is not there."""
+        if self.trajectories is not None:
+            return find_outline(self.trajectories, traj_id)
+        path = self.folder(traj_id) / "traj_data.json"
+        return path if path.is_file() else None
+
+    def outline(self, traj_id: str) -> Outline | None:
+        """What the trajectory's own file tells; None where it is not there.
+
+        Raises:
+            DataError: it is no trajectory.
+        """
+        path = self.outline_file(traj_id)
+        if path is None:
+            return None
+        if traj_id not in self._outlines:
+            self._outlines[traj_id] = read_outline(path)
+        return self._outlines[traj_id]
+
+    @property
+    def no_outline(self) -> str:
+        """Why a trajectory's own file is not there."""
+        place = "metadata/" if self.trajectories is None else f"{self.trajectories}"
+        return f"the trajectory's JSON is not in {place}; name its folder with --trajectories"
+
+    def action_frames(self, traj_id: str) -> dict[int, tuple[int, ...]]:
+        """Positions, in time order, of the frames of each low-level action that has some.
+
+        Raises:
+            DataError: `expert_log.json` is missing, or names frames that the trajectory does not have.
+        """
+        if traj_id not in self._action_frames:
+            places = {frame.path.stem: place for place, frame in enumerate(self.frames(traj_id))}
+            self._action_frames[traj_id] = read_action_log(self.folder(traj_id) / "expert_log.json", places)
+        return self._action_frames[traj_id]
+
+    def states(self, traj_id: str) -> dict[int, str]:
+        """The states of a trajectory in words, by low-level action: the trajectory's own, else those beside its frames.
+
+        Raises:
+            DataError: they are not what the format says.
+        """
+        outline = self.outline(traj_id)
+        return (outline and outline.state_summary) or read_states(self.folder(traj_id) / "state_summary.json")
 
     def video(self, traj_id: str) -> Path | None:
         """The trajectory's video; None where it has none."""

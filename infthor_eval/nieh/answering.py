@@ -172,7 +172,7 @@ class BaselineAnswerer:
 
     def answer(self, asked: Sequence[_Asked]) -> list[Reply]:
         """See `Answerer`."""
-        return [Reply(self._predict(item.unit.sample.question)) for item in asked]
+        return [Reply(self._predict(item.unit.sample)) for item in asked]
 
 
 def answered(

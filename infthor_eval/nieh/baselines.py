@@ -2,18 +2,20 @@
 
 import random
 from collections import Counter, defaultdict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, Protocol, runtime_checkable
 
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.digests import seed_of
 from infthor_eval.formats.question import Question
+from infthor_eval.nieh.contexts import Sample
 from infthor_eval.nieh.docs import doc_target
+from infthor_eval.nieh.guessing import Chain, Guesser, chains_of_words, chains_of_words_and_count
 from model_adapters import Capabilities, Subject
 
 __all__ = ["BASELINES", "Baseline", "Predict", "question_type"]
 
-Predict = Callable[[Question], str]
+Predict = Callable[[Sample], str]
 _LEADING_WORDS = 2
 
 
@@ -24,13 +26,13 @@ def question_type(question: Question) -> str:
 
 @runtime_checkable
 class Baseline(Subject, Protocol):
-    """What answers from the answer key and the question's text, and never sees a frame.
+    """What answers from the answer key and what a sample tells without its frames, and never sees one.
 
     The key is no part of its identity: it is part of the data's own fingerprint.
     """
 
-    def fit(self, questions: Sequence[Question]) -> Predict:
-        """Read the whole answer key of one task; what comes of it answers that task's questions."""
+    def fit(self, samples: Sequence[Sample]) -> Predict:
+        """Read the whole answer key of one task; what comes of it answers that task's samples."""
         ...
 
 
@@ -60,25 +62,27 @@ class Oracle(_KeyReader):
 
     name = "oracle"
 
-    def fit(self, questions: Sequence[Question]) -> Predict:
+    def fit(self, samples: Sequence[Sample]) -> Predict:
         """Nothing to learn: every question carries its key."""
-        return doc_target
+        return lambda sample: doc_target(sample.question)
 
 
 class Blind(_KeyReader):
-    """The most frequent answer of the question's type: what can be had without looking."""
+    """The best guess from the question's words, learned on the other trajectories: what can be had without looking."""
 
     name = "blind"
+    _chains: Callable[[Sample], list[Chain]] = staticmethod(chains_of_words)
 
-    def fit(self, questions: Sequence[Question]) -> Predict:
-        """Of equally frequent answers the first in the alphabet."""
-        seen = _answers_by_type(questions)
+    def fit(self, samples: Sequence[Sample]) -> Predict:
+        """See `Guesser`."""
+        return Guesser(samples, self._chains).guess
 
-        def predict(question: Question) -> str:
-            counts = _counts(seen, question)
-            return min(counts, key=lambda text: (-counts[text], text))
 
-        return predict
+class BlindCount(Blind):
+    """The same, told how many frames are shown: what their number gives away."""
+
+    name = "blind-count"
+    _chains = staticmethod(chains_of_words_and_count)
 
 
 class Random(_KeyReader):
@@ -90,19 +94,19 @@ class Random(_KeyReader):
         """Name and seed."""
         return {"baseline": self.name, "seed": self._seed}
 
-    def fit(self, questions: Sequence[Question]) -> Predict:
+    def fit(self, samples: Sequence[Sample]) -> Predict:
         """The draw depends on the seed and the question alone, not on the order of asking."""
-        seen = _answers_by_type(questions)
+        seen = _answers_by_type({sample.question.id: sample.question for sample in samples}.values())
 
-        def predict(question: Question) -> str:
-            counts = _counts(seen, question)
-            draw, answers = random.Random(seed_of(f"{self._seed}\n{question.id}")), sorted(counts)
+        def predict(sample: Sample) -> str:
+            counts = _counts(seen, sample.question)
+            draw, answers = random.Random(seed_of(f"{self._seed}\n{sample.question.id}")), sorted(counts)
             return draw.choices(answers, weights=[counts[text] for text in answers])[0]
 
         return predict
 
 
-def _answers_by_type(questions: Sequence[Question]) -> dict[str, Counter[str]]:
+def _answers_by_type(questions: Iterable[Question]) -> dict[str, Counter[str]]:
     """How often each answer (several golds joined by commas) is right, by question type."""
     seen: dict[str, Counter[str]] = defaultdict(Counter)
     for question in questions:
@@ -117,4 +121,4 @@ def _counts(seen: Mapping[str, Counter[str]], question: Question) -> Counter[str
     return seen[asked]
 
 
-BASELINES: Mapping[str, Callable[[int], Baseline]] = {made.name: made for made in (Oracle, Blind, Random)}
+BASELINES: Mapping[str, Callable[[int], Baseline]] = {made.name: made for made in (Oracle, Blind, BlindCount, Random)}

@@ -5,6 +5,7 @@ trajectories of thousands of frames.
 """
 
 import json
+from dataclasses import asdict
 from typing import Any
 
 from infthor_eval.formats.frames import FrameRef
@@ -12,6 +13,7 @@ from infthor_eval.formats.question import Question
 from infthor_eval.nieh.contexts import ContextPart, Sample, context_named
 from infthor_eval.nieh.notes import Notes, Notetaking
 from infthor_eval.nieh.samples import TaskSamples, open_set
+from infthor_eval.nieh.stand_ins import StandIns
 
 __all__ = ["Doc", "doc_of", "doc_parts", "doc_prompt", "doc_target", "sample_of", "samples_around"]
 
@@ -41,6 +43,8 @@ def doc_of(found: TaskSamples, sample: Sample, pixels: bool = False) -> Doc:
         "frames": list(sample.frames),
         "notes": [sample.notes.window, sample.notes.max_new_tokens] if sample.notes else [],
         "set": str(found.data.root),
+        "stand_ins": asdict(found.stand_ins),
+        "trajectories": str(found.data.trajectories or ""),
         "pixels": pixels,
     }
 
@@ -62,7 +66,9 @@ def sample_of(doc: Doc) -> Sample:
 def samples_around(doc: Doc) -> TaskSamples:
     """The task's samples as far as one doc tells of them: that one."""
     context = context_named(doc["context"])
-    return TaskSamples(open_set(doc["set"]), doc["context"], context, [sample_of(doc)], [], {})
+    data = open_set(doc["set"], doc["trajectories"] or None)
+    stand_ins = StandIns(**doc["stand_ins"])
+    return TaskSamples(data, doc["context"], context, [sample_of(doc)], [], {}, stand_ins)
 
 
 def doc_parts(doc: Doc) -> list[ContextPart]:

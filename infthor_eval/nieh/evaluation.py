@@ -1,7 +1,7 @@
 """NIEH set up for a run: what its tasks ask, and the doing of it, a trajectory at a time."""
 
 from collections.abc import Iterator, Sequence
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import groupby
 from typing import cast
 
@@ -53,7 +53,7 @@ class NiehEvaluation:
         tokens = self._tokens_per_frame()
         self._prepared = {task.name: task.prepared(tokens) for task in self._tasks}
         _refuse_nothing([prepared.found for prepared in self._prepared.values()], self._tasks)
-        self._respondent.read_tasks(self._prepared)
+        self._respondent.read_keys({task.name: partial(task.key, tokens) for task in self._tasks})
         tasks = {task.name: task.identity(self._prepared[task.name]) for task in self._tasks}
         costs = {name: self._respondent.cost(prepared) for name, prepared in self._prepared.items()}
         return Workload(
@@ -61,7 +61,12 @@ class NiehEvaluation:
             skipped=[
                 skipped for name, prepared in self._prepared.items() for skipped in _skipped(name, prepared.found)
             ],
-            identity={"tasks": tasks, "k_tokens": self._options.k_tokens, "tokens_per_frame": tokens},
+            identity={
+                "tasks": tasks,
+                "k_tokens": self._options.k_tokens,
+                "tokens_per_frame": tokens,
+                "frames": self._options.frames,
+            },
             costs=[Cost(name, cost) for name, cost in costs.items() if cost is not None],
         )
 
@@ -114,12 +119,20 @@ class NiehEvaluation:
                     f"--{name.replace('_', '-')} {getattr(self._options, name)}: no context of {asked} has a size in "
                     "tokens; leave it out, or ask nieh_haystack or nieh_truncate_head"
                 )
-        retrieves = any(task.found is not None and "retriever" in task.found.sources for task in self._tasks)
-        if (self._options.retriever or self._options.retriever_revision) and not retrieves:
+        if (self._options.retriever or self._options.retriever_revision) and not self._depends_on("retriever"):
             raise UsageError(
                 f"--retriever: no context of {asked} retrieves frames; "
                 "leave it out, or ask nieh_clip_retrieval or nieh_memory_frames"
             )
+        if self._options.trajectories and not self._depends_on("trajectories"):
+            raise UsageError(
+                f"--trajectories: no context of {asked} tells of the trajectory beside its frames; "
+                "leave it out, or ask nieh_interleaved or nieh_text_state"
+            )
+
+    def _depends_on(self, source: str) -> bool:
+        """Whether a context of the tasks looks at a source beside the set."""
+        return any(task.found is not None and source in task.found.sources for task in self._tasks)
 
 
 def _refuse_nothing(found: Sequence[TaskSamples | None], tasks: Sequence[NiehTask]) -> None:

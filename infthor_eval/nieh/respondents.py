@@ -1,6 +1,6 @@
 """Who answers the questions of a run: a model through its conversation, or a baseline from the answer key."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
 from infthor_eval.errors import UsageError
@@ -8,6 +8,7 @@ from infthor_eval.formats.frames import FrameRef
 from infthor_eval.nieh.answering import Answerer, BaselineAnswerer, ModelAnswerer
 from infthor_eval.nieh.baselines import Baseline, Predict
 from infthor_eval.nieh.budget import budget_of
+from infthor_eval.nieh.contexts import Sample
 from infthor_eval.nieh.task import PreparedTask
 from infthor_eval.runs import Session
 from model_adapters import Model, Subject
@@ -29,8 +30,8 @@ class Respondent(Protocol):
         """
         ...
 
-    def read_tasks(self, prepared_tasks: Mapping[str, PreparedTask]) -> None:
-        """What will be asked, by task, once, before the first question."""
+    def read_keys(self, keys: Mapping[str, Callable[[], Sequence[Sample]]]) -> None:
+        """How to find all that each task asks, with the answers; once, before the first question."""
         ...
 
     def cost(self, prepared: PreparedTask) -> str | None:
@@ -54,7 +55,7 @@ class _ModelRespondent:
             )
         return tokens
 
-    def read_tasks(self, prepared_tasks: Mapping[str, PreparedTask]) -> None:
+    def read_keys(self, keys: Mapping[str, Callable[[], Sequence[Sample]]]) -> None:
         """A model learns nothing beforehand."""
 
     def cost(self, prepared: PreparedTask) -> str | None:
@@ -72,11 +73,9 @@ class _BaselineRespondent:
     def tokens_per_frame(self, frame: FrameRef) -> int:
         return _BASELINE_TOKENS_PER_FRAME
 
-    def read_tasks(self, prepared_tasks: Mapping[str, PreparedTask]) -> None:
+    def read_keys(self, keys: Mapping[str, Callable[[], Sequence[Sample]]]) -> None:
         """Fitted to each task apart: what one task asks is no clue to another."""
-        self._predictions = {
-            task: self._baseline.fit(prepared.found.data.questions) for task, prepared in prepared_tasks.items()
-        }
+        self._predictions = {task: self._baseline.fit(find()) for task, find in keys.items()}
 
     def cost(self, prepared: PreparedTask) -> str | None:
         return None

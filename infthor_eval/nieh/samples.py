@@ -1,7 +1,7 @@
 """What a task asks: every question of its set in every way its context knows, and what cannot be asked."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,7 @@ from infthor_eval.formats.nieh_set import NiehSet, SkippedQuestion
 from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.formats.question import Question
 from infthor_eval.nieh.contexts import Context, ContextPart, ContextSettings, Sample, context_named
+from infthor_eval.nieh.stand_ins import StandIns
 
 __all__ = ["TaskSamples", "find_samples", "find_set", "open_set"]
 
@@ -28,6 +29,7 @@ class TaskSamples:
         samples: what is asked, in the order of the set.
         skipped: what is not, and why.
         sources: what the frames depend on besides the set and the settings (`Context.sources`).
+        stand_ins: what is shown in the places of frames.
     """
 
     data: NiehSet
@@ -36,36 +38,41 @@ class TaskSamples:
     samples: Sequence[Sample]
     skipped: Sequence[SkippedQuestion]
     sources: Mapping[str, Any]
+    stand_ins: StandIns = field(default_factory=StandIns)
 
     def request(self, sample: Sample) -> tuple[list[ContextPart], str]:
         """All that a model is shown and told: the context, and the text with the question that follows it."""
-        return self.context.request(self.data, sample)
+        parts, text = self.context.request(self.data, sample)
+        return self.stand_ins.put(parts, self.data, self.context, sample.question.traj_id), text
 
 
 @lru_cache(maxsize=8)
-def open_set(root: str) -> NiehSet:
+def open_set(root: str, trajectories: str | None = None) -> NiehSet:
     """The set in a folder, read once per process; `open_set.cache_clear()` has it read again."""
-    return NiehSet(Path(root))
+    return NiehSet(Path(root), Path(trajectories) if trajectories else None)
 
 
-def find_set(data: str | None = None, bundled: str | None = None, **_: object) -> NiehSet:
+def find_set(
+    data: str | None = None, bundled: str | None = None, trajectories: str | None = None, **_: object
+) -> NiehSet:
     """The set of a task.
 
     Args:
         data: folder of an NIEH set; None is the published set where `infthor-eval fetch nieh` put it.
         bundled: name of a set that comes with the package; `data` is not looked at then.
+        trajectories: folder of the set's trajectories; None where they lie in the set.
 
     Raises:
         UsageError: there is none.
         DataError: it cannot be read.
     """
     if bundled:
-        return open_set(str(packaged_folder(f"sets/{bundled}")))
+        return open_set(str(packaged_folder(f"sets/{bundled}")), trajectories)
     if data is None and not default_folder().is_dir():
         raise UsageError(
             "no NIEH set to ask about; give its folder with --data, or fetch the published one: fetch nieh"
         )
-    return open_set(str(data or default_folder()))
+    return open_set(str(data or default_folder()), trajectories)
 
 
 def find_samples(config: Mapping[str, Any], limit: int | None = None) -> TaskSamples:
@@ -77,10 +84,12 @@ def find_samples(config: Mapping[str, Any], limit: int | None = None) -> TaskSam
         limit: stop behind the first so many questions that can be asked.
 
     Raises:
-        UsageError: there is no set, the context is unknown, or it lacks a setting.
+        UsageError: there is no set, the context is unknown or lacks a setting, or the set has no such stand-ins.
         DataError: the set cannot be read.
     """
     context, settings, data = context_named(config["context"]), ContextSettings.read(config), find_set(**config)
+    stand_ins = StandIns(settings.frames, settings.seed)
+    stand_ins.check(data)
     samples: list[Sample] = []
     skipped: list[SkippedQuestion] = []
     for n_asked, found in enumerate(_asked(_by_question(data, context, settings)), 1):
@@ -88,7 +97,7 @@ def find_samples(config: Mapping[str, Any], limit: int | None = None) -> TaskSam
         skipped += [item for item in found if isinstance(item, SkippedQuestion)]
         if n_asked == limit:
             break
-    return TaskSamples(data, config["context"], context, samples, skipped, context.sources(data, settings))
+    return TaskSamples(data, config["context"], context, samples, skipped, context.sources(data, settings), stand_ins)
 
 
 _Found = list[Sample | SkippedQuestion]

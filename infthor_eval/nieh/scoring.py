@@ -145,7 +145,7 @@ def _normalise(text: Answer) -> str:
 
 def _plain(text: str) -> str:
     bare = re.sub(r"[^\w\s]", "", text)
-    return re.sub(r"^\w+ is ", "", bare).strip()
+    return re.sub(r"^\s*\w+\s+is\s+", "", bare).strip()
 
 
 def _near(said: str, wanted: str) -> bool:

@@ -16,9 +16,20 @@ from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.runs import UnitRecord
 from infthor_eval.statistics import bootstrap_interval, clustered_mean
 
-__all__ = ["CLUE_COLUMNS", "Cell", "Failure", "NiehSummary", "Score", "SkippedSummary", "TaskSummary", "summarise"]
+__all__ = [
+    "CLUE_COLUMNS",
+    "OPEN_ENDED",
+    "Cell",
+    "Failure",
+    "NiehSummary",
+    "Score",
+    "SkippedSummary",
+    "TaskSummary",
+    "summarise",
+]
 
 CLUE_COLUMNS = ("1", "2", ">=3", "total")  # the columns of the paper's Table 4
+OPEN_ENDED = "open-ended"  # the column of questions to which the answer is neither yes, no nor a number, as published
 
 Record = UnitRecord[NiehAnswer]
 
@@ -86,7 +97,8 @@ class TaskSummary(msgspec.Struct, frozen=True):
         context: the context that they were asked in.
         simulator: what rendered the frames; None where the set does not say.
         metrics: names of the metrics.
-        by_clues: by the columns of Table 4, and of absence questions: apart from those with clues, and in the total.
+        by_clues: by the columns of Table 4; of absence questions: apart from those with clues, and in the total; and of
+            open-ended questions, which are in the others too.
         by_question_type: by type.
         by_variant: by way of asking.
         skipped: what was not asked.
@@ -160,7 +172,14 @@ def _score(record: Record, metric: str) -> float:
 def _by_clues(records: Sequence[Record], metrics: Sequence[str]) -> dict[str, Cell]:
     chosen = {name: [r for r in records if clue_column(r.payload.n_clues) == name] for name in (*CLUE_COLUMNS, ABSENCE)}
     chosen["total"] = list(records)
+    chosen[OPEN_ENDED] = [record for record in records if _is_open_ended(record)]
     return {name: _cell(found, metrics) for name, found in chosen.items()}
+
+
+def _is_open_ended(record: Record) -> bool:
+    """The published test: the first gold answer decides, and a number in quotes counts as a text."""
+    first = record.payload.answers[0]
+    return isinstance(first, str) and first.strip().lower() not in ("yes", "no")
 
 
 def _grouped(records: Sequence[Record], metrics: Sequence[str], name_of: Callable[[Record], str]) -> dict[str, Cell]:

@@ -1,10 +1,12 @@
-"""NIEH results as tables: accuracy by clues beside the published rows, by depth of the needle, and form of replies."""
+"""NIEH results as tables: accuracy by clues beside the published rows, by depth, gain by frames, form of replies."""
 
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 from infthor_eval.formats.published import PublishedRow, PublishedTable, published_tables
 from infthor_eval.formats.question import ABSENCE
-from infthor_eval.nieh.summary import CLUE_COLUMNS, Cell, NiehSummary, TaskSummary
+from infthor_eval.nieh.options import SHOWN
+from infthor_eval.nieh.summary import CLUE_COLUMNS, OPEN_ENDED, Cell, NiehSummary, TaskSummary
 from infthor_eval.runs import RunSummary
 from infthor_eval.tables import Column, Row, Table
 
@@ -15,14 +17,23 @@ _METRIC = Column("scorer", False)
 
 
 def tables(runs: Sequence[RunSummary]) -> list[Table]:
-    """The tables of some runs: by depth where a task has depths, by clues, and the form of the replies.
+    """The tables of some runs: by depth, by clues, the gain over blank frames, and the form of the replies.
+
+    Those by depth and of gains are there where a task has depths, and where runs on true and blank frames are shown.
 
     A published table by clues stands below our numbers; one by anything else (question types, depths) is a table of its
     own with ours in it.
     """
     by_depth = _depth_table(runs)
     others = [_beside(table, runs) for table in published_tables("nieh") if not _is_by_clues(table)]
-    return [*([by_depth] if by_depth else []), *others, clues_table(runs), _replies_table(runs)]
+    gains = _gains_table(runs)
+    return [
+        *([by_depth] if by_depth else []),
+        *others,
+        clues_table(runs),
+        *([gains] if gains else []),
+        _replies_table(runs),
+    ]
 
 
 def _is_by_clues(table: PublishedTable) -> bool:
@@ -34,7 +45,17 @@ def _tasks(runs: Sequence[RunSummary]) -> Iterator[tuple[str, str, TaskSummary]]
     for run in runs:
         assert isinstance(run.summary, NiehSummary)
         for name, task in run.summary.tasks.items():
-            yield run.header.name, name, task
+            yield _name(run), name, task
+
+
+def _name(run: RunSummary) -> str:
+    """A run's name, with what it was shown instead of frames."""
+    frames = _frames(run)
+    return run.header.name if frames == SHOWN else f"{run.header.name}, {frames} frames"
+
+
+def _frames(run: RunSummary) -> str:
+    return str(run.header.identity["frames"])
 
 
 # -- by number of clues
@@ -42,7 +63,7 @@ def _tasks(runs: Sequence[RunSummary]) -> Iterator[tuple[str, str, TaskSummary]]
 
 def clues_table(runs: Sequence[RunSummary]) -> Table:
     """Accuracy by number of clues: a row per run, task and metric, then the published rows."""
-    numbers = (*CLUE_COLUMNS, "95 %", "bootstrap", ABSENCE, "n", "skipped", "failed")
+    numbers = (*CLUE_COLUMNS, "95 %", "bootstrap", OPEN_ENDED, ABSENCE, "n", "skipped", "failed")
     rows = [row for run in runs for row in _rows_of(run)]
     for table in filter(_is_by_clues, published_tables("nieh")):
         rows += _published_rows(table, runs)
@@ -59,7 +80,7 @@ def clues_table(runs: Sequence[RunSummary]) -> Table:
 def _rows_of(run: RunSummary) -> list[Row]:
     found = [(name, task, metric) for _, name, task in _tasks([run]) for metric in task.metrics]
     return [
-        Row((run.header.name, name, metric, *_cells(task, metric)), ends_section=number == len(found))
+        Row((_name(run), name, metric, *_cells(task, metric)), ends_section=number == len(found))
         for number, (name, task, metric) in enumerate(found, 1)
     ]
 
@@ -72,7 +93,8 @@ def _cells(task: TaskSummary, metric: str) -> list[str]:
     interval = _range(score.low, score.high) if score else "-"
     resampled = _range(*score.bootstrap) if score and score.bootstrap else "-"
     counts = [str(total.n), str(task.skipped.n), str(total.n_failed)]
-    return [*means, interval, resampled, _mean(task.by_clues[ABSENCE], metric), *counts]
+    apart = [_mean(task.by_clues[name], metric) for name in (OPEN_ENDED, ABSENCE)]
+    return [*means, interval, resampled, *apart, *counts]
 
 
 def _mean(cell: Cell, metric: str) -> str:
@@ -95,7 +117,7 @@ def _published_rows(table: PublishedTable, runs: Sequence[RunSummary]) -> Iterat
 
 def _differences(run: RunSummary, row: PublishedRow, table: PublishedTable) -> Iterator[Row]:
     """How far a run of the published model is from its row, and whether its interval (=) holds the published value."""
-    if not row.is_of(run.header.identity["model"]):
+    if not row.is_of(run.header.identity["model"]) or _frames(run) != SHOWN:
         return
     for _, name, task in _tasks([run]):
         # Frames that a simulator of ours rendered are another data set.
@@ -123,12 +145,47 @@ def _beside(table: PublishedTable, runs: Sequence[RunSummary]) -> Table:
         Row((row.name, table.context, table.metric, *(f"{value:.2f}" for value in row.values)), is_published=True)
         for row in table.rows
     ]
-    for run, name, task in _tasks(runs):
+    for run, name, task in _tasks([run for run in runs if _frames(run) == SHOWN]):
         if task.context == table.context and table.metric in task.metrics:
             cells = task.by_clues | task.by_question_type | task.by_variant
             means = [_mean(cells[column], table.metric) if column in cells else "-" for column in table.columns]
             rows.append(Row((run, name, table.metric, *means)))
     return Table(f"{table.title}: {table.source}", (*_NAMES, _METRIC, *map(Column, table.columns)), tuple(rows))
+
+
+# -- gain by frames
+
+
+def _gains_table(runs: Sequence[RunSummary]) -> Table | None:
+    """What each run scores above the same run on blank frames; None where there is no such pair."""
+    columns = (*CLUE_COLUMNS, OPEN_ENDED, ABSENCE)
+    rows = []
+    for run in runs:
+        for blind in runs:
+            if _frames(run) != "blank" and _frames(blind) == "blank" and _without_frames(run) == _without_frames(blind):
+                rows += [Row((_name(run), *cells)) for cells in _gains(run.summary, blind.summary, columns)]
+    if not rows:
+        return None
+    note = "`infthor-eval compare` on the two runs' folders tells how sure a gain is."
+    title = "Gain over the same model's run on blank frames, in points"
+    return Table(title, (*_NAMES, _METRIC, *map(Column, columns)), tuple(rows), (note,))
+
+
+def _without_frames(run: RunSummary) -> dict[str, Any]:
+    return {name: value for name, value in run.header.identity.items() if name != "frames"}
+
+
+def _gains(seeing: NiehSummary, blind: NiehSummary, columns: Sequence[str]) -> Iterator[tuple[str, ...]]:
+    for name, task in seeing.tasks.items():
+        pairs = [(task.by_clues[column], blind.tasks[name].by_clues[column]) for column in columns]
+        for metric in task.metrics:
+            yield name, metric, *(_gain(ours, theirs, metric) for ours, theirs in pairs)
+
+
+def _gain(seeing: Cell, blind: Cell, metric: str) -> str:
+    if not seeing.n or not blind.n:
+        return "-"
+    return f"{100 * (seeing.scores[metric].mean - blind.scores[metric].mean):+.2f}"
 
 
 # -- by depth

@@ -1,11 +1,11 @@
 """A task of NIEH: what its file says, what it asks, and how its samples become records."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
 from infthor_eval.formats.nieh_set import NiehSet
-from infthor_eval.nieh.contexts import context_named
+from infthor_eval.nieh.contexts import Sample, context_named
 from infthor_eval.nieh.metrics import PUBLISHED, Metrics, metrics_of
 from infthor_eval.nieh.samples import TaskSamples, find_samples, find_set
 from infthor_eval.runs import TaskFile, TaskRequest
@@ -58,6 +58,11 @@ class NiehTask:
         if self.found is None:
             self.found = find_samples(self._config | {"tokens_per_frame": tokens_per_frame}, self._limit)
         return PreparedTask(self.found, self.decoding, self.metrics)
+
+    def key(self, tokens_per_frame: int | None) -> Sequence[Sample]:
+        """All that it would ask without a limit: the answer key that a baseline is fitted to."""
+        config = self._config | {"tokens_per_frame": tokens_per_frame}
+        return self.prepared(tokens_per_frame).found.samples if self._limit is None else find_samples(config).samples
 
     def identity(self, prepared: PreparedTask) -> dict[str, Any]:
         """What its numbers depend on, as JSON values."""

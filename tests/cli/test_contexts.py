@@ -70,6 +70,33 @@ def test_a_retriever_that_cannot_be_had_ends_in_one_line(data, tmp_path, run, mo
     assert not (tmp_path / "out").exists()
 
 
+def test_trajectories_are_read_from_the_folder_that_is_named(data, tmp_path, run):
+    folder, out = tmp_path / "trajectories", tmp_path / "out"
+    folder.mkdir()
+    actions = [{"api_action": {"action": "PickupObject", "objectId": "Mug|1|2|3"}}]
+    trajectory = {"plan": {"low_actions": actions}, "sub_tasks": [{"task_desc": "get a mug"}]}
+    trajectory |= {"sub_trajs": [{"low_pddl_idx": [0, 1]}], "state_summary": {"0": "a mug in the hand"}}
+    for traj_id in ("traj_a", "traj_b"):
+        (folder / f"{traj_id}.json").write_text(json.dumps(trajectory))
+        log = {"images": [{"low_idx": 0, "image_name": "000000007.png"}]}
+        (data / "metadata" / traj_id / "expert_log.json").write_text(json.dumps(log))
+    arguments = ["--model", "qwen2.5-vl-tiny", "--tasks", "nieh_interleaved,nieh_text_state", "--data", data]
+    code, _, err = run(*arguments, "--output", out, "--trajectories", folder)
+    assert code == 0, err
+    assert [doc["frames"] for doc in docs(out, "nieh_interleaved")] == [[0, 7]] * 6
+    assert [doc["frames"] for doc in docs(out, "nieh_text_state")] == [[44]] * 6
+    code, _, err = run(*arguments, "--output", tmp_path / "none")
+    assert code == 2
+    assert "can be asked (the trajectory's JSON is not in metadata/; name its folder with --trajectories)" in err
+    for tasks, given, said in (
+        ("nieh_gt", folder, "--trajectories: no context of nieh_gt tells of the trajectory"),
+        ("nieh_interleaved", tmp_path / "no", "no such folder; give the trajectories' folder with --trajectories"),
+    ):
+        code, shown, err = run("--model", "oracle", "--tasks", tasks, "--data", data, "--trajectories", given)
+        assert (code, shown, len(err.strip().splitlines())) == (2, "", 1)
+        assert said in err
+
+
 def test_videos_are_shown_where_they_are_and_a_broken_one_is_counted(data, write_video, tmp_path, run):
     metadata, out = data / "metadata", tmp_path / "out"
     write_video(metadata / "traj_a" / "traj_a_10fps.mp4", range(0, 250, 10))

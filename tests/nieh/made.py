@@ -43,6 +43,7 @@ def identity(
     skipped: tuple[str, ...] = (),
     context: str = "clues",
     metrics: tuple[str, ...] = SCORERS,
+    frames: str = "shown",
 ) -> dict[str, Any]:
     """Of a run of `nieh_gt`; `skipped` are the reasons."""
     about = {
@@ -53,7 +54,8 @@ def identity(
         "skipped": [{"question_id": f"x{i}", "variant": "", "reason": reason} for i, reason in enumerate(skipped)],
     }
     named = {"name": model, "checkpoint": checkpoint, "n_parameters": n_parameters}
-    return {"model": {key: value for key, value in named.items() if value is not None}, "tasks": {"nieh_gt": about}}
+    model_identity = {key: value for key, value in named.items() if value is not None}
+    return {"model": model_identity, "tasks": {"nieh_gt": about}, "frames": frames}
 
 
 def run_of(about: dict[str, Any], records: list[UnitRecord[NiehAnswer]], name: str = "a run") -> RunSummary:

@@ -12,17 +12,18 @@ from infthor_eval.runs import Catalog
 # By task: samples asked, samples skipped, digest of all requests (frames by name). Contexts that a CLIP model chooses
 # frames for are not among them.
 EXPECTED = {
-    "nieh_haystack_128k": (0, 578, "7ebb3c7c2a87b1a2f8a7ed729ecb040d"),
-    "nieh_haystack_16k": (14, 564, "79d6b8b8a7a9fd2be4cc63611f063e6b"),
-    "nieh_haystack_1m": (0, 578, "7ebb3c7c2a87b1a2f8a7ed729ecb040d"),
-    "nieh_haystack_256k": (0, 578, "7ebb3c7c2a87b1a2f8a7ed729ecb040d"),
-    "nieh_haystack_32k": (0, 578, "7ebb3c7c2a87b1a2f8a7ed729ecb040d"),
-    "nieh_haystack_512k": (0, 578, "7ebb3c7c2a87b1a2f8a7ed729ecb040d"),
-    "nieh_haystack_64k": (0, 578, "7ebb3c7c2a87b1a2f8a7ed729ecb040d"),
-    "nieh_haystack_8k": (235, 343, "6e28ab454ff8e36cfd533af173d75dfd"),
-    "nieh_interleaved": (150, 0, "6a8b35b9b802b47e4109c9ece7dd5d7a"),
+    "nieh_haystack_128k": (0, 690, "7ebb3c7c2a87b1a2f8a7ed729ecb040d"),
+    "nieh_haystack_16k": (55, 635, "901dec002efe54828b10d452cb655771"),
+    "nieh_haystack_1m": (0, 690, "7ebb3c7c2a87b1a2f8a7ed729ecb040d"),
+    "nieh_haystack_256k": (0, 690, "7ebb3c7c2a87b1a2f8a7ed729ecb040d"),
+    "nieh_haystack_32k": (0, 690, "7ebb3c7c2a87b1a2f8a7ed729ecb040d"),
+    "nieh_haystack_512k": (0, 690, "7ebb3c7c2a87b1a2f8a7ed729ecb040d"),
+    "nieh_haystack_64k": (0, 690, "7ebb3c7c2a87b1a2f8a7ed729ecb040d"),
+    "nieh_haystack_8k": (400, 290, "ea581bda08520ae6780b486b9d7f110c"),
+    "nieh_interleaved": (150, 0, "34d31a06dc5cbc051d69b800185145d9"),
+    "nieh_interleaved_plans": (150, 0, "6a8b35b9b802b47e4109c9ece7dd5d7a"),
     "nieh_memory_notes": (150, 0, "f0a5adb67f8f4ed996aa186a3efad23b"),
-    "nieh_text_state": (150, 0, "2c7ae9a87e84673308f47ce01a6eac84"),
+    "nieh_text_state": (150, 0, "143a276ea466e31e6467c0ab41f66ea9"),
     "nieh_truncate_head_128k": (150, 0, "26102c18ede530fd7e598b9badbc950f"),
     "nieh_truncate_head_16k": (150, 0, "032dae683eef8755e99569cbe177526c"),
     "nieh_truncate_head_1m": (150, 0, "26102c18ede530fd7e598b9badbc950f"),
@@ -33,9 +34,9 @@ EXPECTED = {
     "nieh_truncate_head_8k": (150, 0, "0cf3f4482316d62a17efab6c0319e711"),
     "nieh_video": (150, 0, "978d531e081b37e0d3e480a4e5fe09df"),
     "nieh_full": (150, 0, "26102c18ede530fd7e598b9badbc950f"),
-    "nieh_gt": (150, 0, "30650e9b7304b0215ed738ee47b4b30f"),
+    "nieh_gt": (150, 0, "a29e908f8d70e8090436dc4b224b409a"),
     "nieh_mini_full": (150, 0, "26102c18ede530fd7e598b9badbc950f"),
-    "nieh_mini_gt": (150, 0, "30650e9b7304b0215ed738ee47b4b30f"),
+    "nieh_mini_gt": (150, 0, "a29e908f8d70e8090436dc4b224b409a"),
 }
 
 

@@ -9,18 +9,78 @@ from hypothesis import strategies as st
 from infthor_eval.errors import UsageError
 from infthor_eval.nieh import score
 
-GOLDEN = Path(__file__).parents[3] / "shared" / "data" / "nieh_scoring" / "golden.jsonl.gz"
+DATA = Path(__file__).parents[3] / "shared" / "data"
+GOLDEN = ("nieh_scoring/golden.jsonl.gz", "published_goldens/adversarial_pairs.jsonl.gz")
 names = st.from_regex(r"[a-z]{3,9}( [a-z]{3,9})?", fullmatch=True).filter(lambda name: "and" not in name.split())
 answers = st.lists(names, min_size=1, max_size=5)
 
 
-@pytest.mark.skipif(not GOLDEN.is_file(), reason=f"no golden pairs at {GOLDEN}")
-def test_reference_equals_the_published_scorer_on_every_golden_pair():
-    with gzip.open(GOLDEN, "rt") as file:
+@pytest.mark.parametrize("name", GOLDEN)
+def test_reference_equals_the_published_scorer_on_every_golden_pair(name):
+    if not (DATA / name).is_file():
+        pytest.skip(f"no golden pairs at {DATA / name}")
+    with gzip.open(DATA / name, "rt") as file:
         pairs = [json.loads(line) for line in file]
-    wrong = [p for p in pairs if score(p["response"], p["answers"]) != pytest.approx(p["score"], abs=1e-9)]
+    wrong = [pair for pair in pairs if score(pair["response"], pair["answers"]) != pair["score"]]
     assert len(pairs) >= 4000
     assert wrong == []
+
+
+# The published scorer's rules one by one, so that a clone without the golden pairs is held to them too.
+EXACT = {
+    "numbers": [
+        ("3", [3], 1),
+        ("three", ["3"], 1),
+        ("twenty one", ["21"], 1),
+        ("two mugs", ["2"], 1),
+        ("3 mugs", ["3"], 0),
+        ("1", [1.0], 0),
+        ("thousand one", ["thousand one"], 1),
+    ],
+    "leading phrase": [
+        ("It is mug", ["mug"], 1),
+        ("  it  is\tmug", ["mug"], 1),
+        (" - It is mug", ["mug"], 1),
+        ("It is\u00a0mug", ["mug"], 1),
+        ("CD is  - plate", ["plate"], 1),
+        ("mug", ["It is mug"], 1),
+        ("x is y is mug", ["mug"], 0),
+        ("the object is mug", ["mug"], 0),
+        ("It ismug", ["mug"], 0),
+        ("it was mug", ["mug"], 0),
+    ],
+    "nothing": [("", ["-"], 1), ("-", ["?"], 1), ("", ["mug"], 0)],
+    "nearly": [("teddy bear", ["teddybear"], 1), ("Mugs!", ["mug"], 1), ("pan", ["pen"], 0)],
+    "synonyms": [
+        ("top shelf", ["to the shelf"], 1),
+        ("couch", ["loveseat"], 1),
+        ("marker", ["pencil"], 1),
+        ("stick", ["baseballbat"], 1),
+        ("the counter", ["countertop"], 0),
+    ],
+    "yes and no": [
+        ("'yes", ["yes"], 1),
+        ("- yes, it was", ["yes"], 1),
+        ("yes no", ["no"], 0),
+        ("oh yes", ["yes"], 0),
+        ("Nope", ["no"], 1),
+        ("un no", ["no"], 0),
+    ],
+    "several": [
+        ("plate, mug", ["mug", "plate"], 1),
+        ("mug, and plate", ["mug", "plate"], 1),
+        ("mug; plate", ["mug", "plate"], 0),
+        ("candle, sand", ["candle", "s"], 0.5),
+        ("mug,,", ["mug", ""], 1.5),
+        ("yes, 2", ["yes", 2], 1),
+        ("mug, plate", ["mug"], 0),
+    ],
+}
+
+
+@pytest.mark.parametrize("rule", EXACT)
+def test_reference_keeps_each_rule_of_the_published_scorer(rule):
+    assert [(said, gold, score(said, gold)) for said, gold, _ in EXACT[rule]] == EXACT[rule]
 
 
 @pytest.mark.parametrize(

@@ -18,11 +18,24 @@ def test_columns_are_those_of_table_4_and_both_denominators_are_told():
     records.append(record(4, "no", answers=("no",), n_clues=0))
     result = summarise(identity(skipped=("no clue frame", "no clue frame")), records).tasks["nieh_gt"]
     by_clues = {name: (cell.n, cell.scores["strict"].mean) for name, cell in result.by_clues.items()}
-    assert by_clues == {"1": (2, 0.5), "2": (1, 1.0), ">=3": (1, 1.0), "total": (5, 0.8), "absence": (1, 1.0)}
+    assert by_clues == {
+        "1": (2, 0.5),
+        "2": (1, 1.0),
+        ">=3": (1, 1.0),
+        "total": (5, 0.8),
+        "absence": (1, 1.0),
+        "open-ended": (4, 0.75),
+    }
     assert (result.n, result.context, result.metrics) == (5, "clues", ["reference", "strict"])
     assert (result.skipped.n, result.skipped.by_reason) == (2, {"no clue frame": 2})
     assert result.skipped.mean_counting_them_wrong["strict"] == 4 / 7
     assert result.below_full_marks["strict"] == ["q1"]
+
+
+def test_open_ended_is_what_begins_with_a_text_that_is_neither_yes_nor_no():
+    golds = [("mug",), ("Mug", "yes"), ("3",), ("yes",), ("No",), (3,), (2, "mug")]
+    records = [record(number, "?", answers=answers) for number, answers in enumerate(golds)]
+    assert summarise(identity(), records).tasks["nieh_gt"].by_clues["open-ended"].n == 3
 
 
 def test_a_column_without_a_question_has_no_score():

@@ -31,7 +31,22 @@ def test_a_row_has_every_column_of_the_table():
     (row,) = [row for row in shown(run) if row[:2] == ["a", "run"] and "strict" in row]
     total = run.summary.tasks["nieh_gt"].by_clues["total"].scores["strict"]
     said = [f"{100 * low:.1f}–{100 * high:.1f}" for low, high in ((total.low, total.high), total.bootstrap)]
-    assert row == ["a", "run", "nieh_gt", "strict", "75.00", "100.00", "0.00", "70.00", *said, "-", "10", "1", "1"]
+    assert row == [
+        "a",
+        "run",
+        "nieh_gt",
+        "strict",
+        "75.00",
+        "100.00",
+        "0.00",
+        "70.00",
+        *said,
+        "70.00",
+        "-",
+        "10",
+        "1",
+        "1",
+    ]
 
 
 def test_a_leaning_to_yes_and_the_form_of_replies_have_a_table():
@@ -101,3 +116,34 @@ def test_simulated_frames_are_said_not_to_be_comparable():
 def test_what_is_in_a_name_is_shown_as_text():
     run = run_of(identity(), [record(0, "mug")], "[red]run[/red]")
     assert any(row[:1] == ["[red]run[/red]"] for row in shown(run))
+
+
+# -- gain by frames
+
+
+def gains(*runs):
+    return [table for table in tables(runs) if table.title.startswith("Gain")]
+
+
+def test_a_run_is_set_against_the_same_models_run_on_blank_frames():
+    seeing, blank = run_of(identity(), right_but_every(4, 40)), run_of(identity(frames="blank"), right_but_every(2, 40))
+    (table,) = gains(seeing, blank)
+    assert [row.cells for row in table.rows] == [
+        ("a run", "nieh_gt", metric, "+25.00", "-", "-", "+25.00", "+25.00", "-") for metric in ("reference", "strict")
+    ]
+    assert gains(blank, seeing) == [table]
+    names = [row.cells[0] for row in clues_table([seeing, blank]).rows if not row.is_published]
+    assert names[:4] == ["a run", "a run", "a run, blank frames", "a run, blank frames"]
+
+
+def test_a_gain_is_over_the_same_run_alone():
+    blank = run_of(identity(frames="blank"), right_but_every(2, 40))
+    for other in (identity(model="other"), identity(frames="blank"), identity(context="trajectory")):
+        assert gains(run_of(other, right_but_every(4, 40)), blank) == []
+    shuffled = run_of(identity(frames="shuffled"), right_but_every(4, 40))
+    (table,) = gains(shuffled, blank)
+    assert {row.cells[0] for row in table.rows} == {"a run, shuffled frames"}
+
+
+def test_only_what_saw_its_frames_is_set_against_the_published_row():
+    assert minus(run_of(identity(frames="shuffled"), right_but_every(20, 200))) == []

@@ -1,11 +1,13 @@
 """Contexts by the names that task files use."""
 
 from infthor_eval.errors import UsageError
-from infthor_eval.nieh.contexts import memory, retrieval, sequence, video, views
-from infthor_eval.nieh.contexts.base import Context, ContextPart, ContextSettings, Sample
+from infthor_eval.nieh.contexts import interleaved, memory, plans, retrieval, text_state, video, views
+from infthor_eval.nieh.contexts.base import Context, ContextPart, ContextSettings, Sample, trajectories_identity
 from infthor_eval.nieh.contexts.haystack import haystack
 
 __all__ = ["CONTEXTS", "Context", "ContextPart", "ContextSettings", "Sample", "context_named"]
+
+_INTERLEAVED = "Answer the question given the state and action sequence of the embodied agent."
 
 CONTEXTS = {
     "clues": Context(views.clues),
@@ -13,14 +15,17 @@ CONTEXTS = {
     "truncate_head": Context(views.truncate_head, needs_model=True),
     "haystack": Context(haystack, needs_model=True),
     "interleaved": Context(
-        sequence.interleaved,
-        intro="Answer the question given the state and action sequence of the embodied agent.",
-        parts=sequence.interleaved_parts,
+        interleaved.interleaved,
+        intro=_INTERLEAVED,
+        parts=interleaved.interleaved_parts,
+        sources=trajectories_identity,
     ),
+    "interleaved_plans": Context(plans.interleaved_plans, intro=_INTERLEAVED, parts=plans.plans_parts),
     "text_state": Context(
-        sequence.last_state,
+        text_state.text_state,
         intro="Answer the question given the description of the environment and the agent's state (the last image).",
-        parts=sequence.state_parts,
+        parts=text_state.state_parts,
+        sources=trajectories_identity,
     ),
     "clip_retrieval": Context(retrieval.clip_retrieval, sources=retrieval.retriever_identity),
     "video": Context(

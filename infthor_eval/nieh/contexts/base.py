@@ -5,13 +5,14 @@ from dataclasses import dataclass, field, fields
 from typing import Any
 
 from infthor_eval.errors import UsageError
+from infthor_eval.formats.digests import digest_of_file, fingerprint
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet, SkippedQuestion
 from infthor_eval.formats.question import Question
 from infthor_eval.nieh.notes import Notes, Notetaking
 from infthor_eval.nieh.prompts import question_text
 
-__all__ = ["Context", "ContextPart", "ContextSettings", "Sample", "clue_positions"]
+__all__ = ["Context", "ContextPart", "ContextSettings", "Sample", "clue_positions", "trajectories_identity"]
 
 ContextPart = str | FrameRef | Notes
 
@@ -50,6 +51,7 @@ class ContextSettings:
         note_window: how many frames the model reads for one note.
         note_tokens: most tokens of one note.
         seed: for what is sampled.
+        frames: what is shown in the frames' places (`infthor_eval.nieh.stand_ins`).
     """
 
     ctx_size: float | None = None
@@ -57,11 +59,12 @@ class ContextSettings:
     tokens_per_frame: int | None = None
     depths: tuple[float, ...] = (0.0, 0.2, 0.4, 0.6, 0.8)
     top_k: int = 10
-    retriever: str = "openai/clip-vit-base-patch32"
+    retriever: str = "openai/clip-vit-large-patch14"
     retriever_revision: str | None = None
     note_window: int = 20
     note_tokens: int = 64
     seed: int = 0
+    frames: str = "shown"
 
     @classmethod
     def read(cls, given: Mapping[str, Any]) -> "ContextSettings":
@@ -143,3 +146,10 @@ def clue_positions(data: NiehSet, question: Question) -> tuple[int, ...]:
     """Where in the trajectory's time order the clues lie, each once, ascending."""
     order = {frame: position for position, frame in enumerate(data.frames(question.traj_id))}
     return tuple(sorted({order[frame] for frame in data.clue_frames(question)}))
+
+
+def trajectories_identity(data: NiehSet, _settings: ContextSettings) -> dict[str, Any]:
+    """Hash of the trajectories' own files: the set's fingerprint does not know them."""
+    ids = sorted({question.traj_id for question in data.questions})
+    files = {traj_id: path for traj_id in ids if (path := data.outline_file(traj_id)) is not None}
+    return {"trajectories": fingerprint({traj_id: digest_of_file(path) for traj_id, path in files.items()})}

@@ -1,58 +1,91 @@
-"""The haystack: a window of a given size with the needle at a given depth (published: `haystack`).
+"""The haystack: a window of a given size with the needle in it (published: `haystack`).
 
-One needle lies at depth d of the window of n frames when the window starts d_index * (n // 5) frames before it, d_index
-being the depth's place in the published grid 0, .2, .4, .6, .8. Several needles have no depth: the window is the
-clues and frames sampled between them, then around them, in time order. The published code samples without a seed.
+Every question is asked once per depth, and reported there. One needle lies at depth d of the window of n frames when
+the window starts d_index * (n // 5) frames before it, d_index being the depth's place in the published grid 0, .2, .4,
+.6, .8. So do two that follow each other, a put. Needles that are apart have no depth: each time, other frames between
+and around them are drawn, from the run's seed (the published code has none). Three and more that follow each other
+lie at the last depth every time.
+
+A question without a needle (an absence) has no depth either: it is asked once, on a window drawn from the trajectory.
 """
 
 import random
+from collections.abc import Sequence
 
 from infthor_eval.formats.nieh_set import NiehSet, SkippedQuestion
 from infthor_eval.formats.question import Question
 from infthor_eval.nieh.contexts.base import ContextSettings, Sample, clue_positions
 
-__all__ = ["haystack"]
+__all__ = ["drawn_from", "haystack"]
 
 _K_TOKENS = 1000  # the published kilo-token
 _STEPS = 5  # depths of the published grid
+_OUTSIDE = "the window reaches outside the trajectory"
 
 
 def haystack(data: NiehSet, question: Question, settings: ContextSettings) -> list[Sample | SkippedQuestion]:
-    """The windows for one question: one per depth for one needle, a single one for several."""
-    clues = clue_positions(data, question)
+    """The windows for one question: one per depth."""
     n_all, n = len(data.frames(question.traj_id)), settings.n_frames(_K_TOKENS)
-    if _is_one_needle(clues):
-        return [_at_depth(question, clues, n_all, n, depth) for depth in settings.depths]
-    return [_around_several(question, clues, n_all, n, random.Random(f"{settings.seed}/{question.id}/{n}"))]
+    if question.absence:
+        return [_anywhere(question, n_all, n, settings.seed)]
+    clues = clue_positions(data, question)
+    found = []
+    for depth in settings.depths:
+        draw = random.Random(f"{settings.seed}/{question.id}/{n}/{depth:g}")
+        window = _window(clues, n_all, n, round(depth * _STEPS), draw)
+        variant = f"depth={depth:g}"
+        found.append(
+            SkippedQuestion(question, window, variant) if isinstance(window, str) else Sample(question, window, variant)
+        )
+    return found
 
 
-def _is_one_needle(clues: tuple[int, ...]) -> bool:
-    """One clue, or two with nothing between them."""
-    return len(clues) == 1 or (len(clues) == 2 and clues[1] - clues[0] == 1)
+def _window(clues: tuple[int, ...], n_all: int, n: int, d_index: int, draw: random.Random) -> tuple[int, ...] | str:
+    """Places of the frames, ascending; why there is no window where there is none."""
+    if n < 1:
+        return "no frame fits the window"
+    if len(clues) == 1:
+        return _around(clues[0], n_all, n, d_index, n_all)
+    if _follow_each_other(clues):
+        # Of a put the published code lets the window end one frame too late, and shows it one frame shorter.
+        return _around(clues[0], n_all, n, *((d_index, n_all + 1) if len(clues) == 2 else (_STEPS - 1, n_all)))
+    pool, missing = drawn_from(clues, n_all, n), n - len(clues)
+    if missing < 0:
+        return "the clues do not fit the window"
+    if missing > len(pool):
+        return "there are not enough frames between and around the clues"
+    return tuple(sorted({*clues, *draw.sample(pool, missing)}))
 
 
-def _at_depth(question: Question, clues: tuple[int, ...], n_all: int, n: int, depth: float) -> Sample | SkippedQuestion:
-    variant = f"depth={depth:g}"
-    if n < len(clues):
-        return SkippedQuestion(question, "the clues do not fit the window", variant)
-    start = clues[0] - round(depth * _STEPS) * (n // _STEPS)
-    if start < 0 or start + n > n_all:
-        return SkippedQuestion(question, "the window reaches outside the trajectory", variant)
-    if clues[-1] >= start + n:
-        return SkippedQuestion(question, "the second of two adjacent clues lies behind the window", variant)
-    return Sample(question, tuple(range(start, start + n)), variant)
+def _follow_each_other(clues: tuple[int, ...]) -> bool:
+    return clues[-1] - clues[0] == len(clues) - 1
 
 
-def _around_several(
-    question: Question, clues: tuple[int, ...], n_all: int, n: int, draw: random.Random
-) -> Sample | SkippedQuestion:
-    if n < len(clues):
-        return SkippedQuestion(question, "the clues do not fit the window")
-    if n > n_all:
-        return SkippedQuestion(question, "the window reaches outside the trajectory")
-    between = [position for position in range(clues[0], clues[-1]) if position not in clues]
-    around = [*range(clues[0]), *range(clues[-1] + 1, n_all)]
+def _around(needle: int, n_all: int, n: int, d_index: int, last_end: int) -> tuple[int, ...] | str:
+    start = needle - d_index * (n // _STEPS)
+    if start < 0 or start + n > last_end:
+        return _OUTSIDE
+    return tuple(range(start, min(start + n, n_all)))
+
+
+def drawn_from(clues: Sequence[int], n_all: int, n: int) -> list[int]:
+    """What a window around clues that are apart is drawn from: the frames between them.
+
+    Where those are too few, as many as are missing on either side of them too, clues among those as published: a clue
+    that is drawn takes no second place, and the window is shorter.
+    """
+    between = [place for place in range(clues[0] + 1, clues[-1]) if place not in clues]
     missing = n - len(clues)
-    chosen = draw.sample(between, min(missing, len(between)))
-    chosen += draw.sample(around, missing - len(chosen))
-    return Sample(question, tuple(sorted([*clues, *chosen])))
+    if len(between) >= missing:
+        return between
+    before = range(max(0, between[0] - missing), between[0])
+    after = range(between[-1] + 1, min(between[-1] + missing + 1, n_all))
+    return [*before, *between, *after]
+
+
+def _anywhere(question: Question, n_all: int, n: int, seed: int) -> Sample | SkippedQuestion:
+    variant = "no needle"
+    if n < 1 or n > n_all:
+        return SkippedQuestion(question, _OUTSIDE, variant)
+    start = random.Random(f"{seed}/{question.id}/{n}").randrange(n_all - n + 1)
+    return Sample(question, tuple(range(start, start + n)), variant)

@@ -10,9 +10,9 @@ _K_TOKENS = 1024  # truncate_head's published kilo-token
 
 
 def clues(data: NiehSet, question: Question, _settings: ContextSettings) -> list[Sample | SkippedQuestion]:
-    """The frames that hold the evidence and no others, in the order of the file (the paper's Table 4)."""
+    """The frames that hold the evidence and no others, in time order whatever the file's (the paper's Table 4)."""
     order = {frame: position for position, frame in enumerate(data.frames(question.traj_id))}
-    return [Sample(question, tuple(order[frame] for frame in data.clue_frames(question)))]
+    return [Sample(question, tuple(sorted(order[frame] for frame in data.clue_frames(question))))]
 
 
 def trajectory(data: NiehSet, question: Question, _settings: ContextSettings) -> list[Sample | SkippedQuestion]:

@@ -31,30 +31,20 @@ def folder(make_nieh_set):
     return folder
 
 
-def test_interleaved_puts_each_frame_where_the_text_has_it(folder):
-    assert shown("interleaved", folder.parents[1]) == [
+def test_puts_each_frame_where_the_text_has_it(folder):
+    assert shown("interleaved_plans", folder.parents[1]) == [
         *("<|goal|>A<|goal|>", 0, "<|act|>Go<|act|>", 1),
         *("<|goal|>B<|goal|>", 1, "<|act|>Take<|act|>", 2),
     ]
 
 
-def test_interleaved_takes_the_last_of_several_frames_of_an_action(folder):
+def test_takes_the_last_of_several_frames_of_an_action(folder):
     (folder / "traj.txt").write_text("Goal<image><|act|>Go<|act|><image>")
     log = {"images": [{"low_idx": 0, "image_name": "000000001.png"}, {"low_idx": 0, "image_name": "000000002.png"}]}
     (folder / "expert_log.json").write_text(json.dumps(log))
-    assert shown("interleaved", folder.parents[1]) == ["Goal", 0, "<|act|>Go<|act|>", 2]
+    assert shown("interleaved_plans", folder.parents[1]) == ["Goal", 0, "<|act|>Go<|act|>", 2]
     (folder / "traj.txt").write_text("Goal<image>")
-    assert "traj.txt has 0 actions" in shown("interleaved", folder.parents[1])
+    assert "traj.txt has 0 actions" in shown("interleaved_plans", folder.parents[1])
     (folder / "expert_log.json").write_text("{}")
     with pytest.raises(DataError, match=r"expert_log\.json: not a log"):
-        shown("interleaved", folder.parents[1])
-
-
-def test_text_state_shows_the_last_state_and_the_last_frame(folder):
-    root = folder.parents[1]
-    assert shown("text_state", root) == "the trajectory has no state_summary"
-    (folder / "traj_data.json").write_text(json.dumps({"state_summary": {"9": "nine", "10": "ten"}}))
-    assert shown("text_state", root) == ["ten", 2]
-    (folder / "traj_data.json").write_text(json.dumps({"state_summary": [1]}))
-    with pytest.raises(DataError, match="state_summary is not a mapping"):
-        shown("text_state", root)
+        shown("interleaved_plans", folder.parents[1])

@@ -1,0 +1,56 @@
+"""Frames that show nothing, of the size of those that they stand for."""
+
+import tempfile
+from functools import cache
+from pathlib import Path
+
+from PIL import Image
+
+from infthor_eval.errors import DataError
+from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.user_cache import user_cache
+
+__all__ = ["blank_like"]
+
+_GREY = (128, 128, 128)
+
+
+def blank_like(frame: FrameRef) -> FrameRef:
+    """A plain grey frame of the same size, so that it costs a model as many tokens.
+
+    One file per size is kept in the user's cache. A frame that cannot be read stands for itself: whoever wants its
+    pixels is told what is wrong with it.
+
+    Raises:
+        DataError: the file cannot be written.
+    """
+    size = _size(frame)
+    if size is None:
+        return frame
+    path = user_cache("blank_frames") / f"{size[0]}x{size[1]}.png"
+    if not path.is_file():
+        try:
+            _write(path, size)
+        except OSError as error:
+            raise DataError(
+                f"{path}: cannot be written ({error.strerror}); make room, or set XDG_CACHE_HOME"
+            ) from error
+    return FrameRef(path)
+
+
+@cache
+def _size(frame: FrameRef) -> tuple[int, int] | None:
+    try:
+        with Image.open(frame.path) as image:  # reads the head of the file alone
+            return image.size
+    except (OSError, SyntaxError):
+        return None
+
+
+def _write(path: Path, size: tuple[int, int]) -> None:
+    """Put the file there whole; another process may do the same."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=path.parent, prefix="partial-") as partial:
+        made = Path(partial) / path.name
+        Image.new("RGB", size, _GREY).save(made)
+        made.replace(path)

@@ -1,0 +1,118 @@
+"""What contexts tell of a trajectory beside its frames: goals, actions and states, out of its JSON.
+
+Only the fields looked at here need to be there: the published evaluation reads files that hold little else.
+"""
+
+from pathlib import Path
+
+import msgspec
+
+from infthor_eval.errors import DataError
+
+__all__ = ["Outline", "find_outline", "read_outline", "read_states"]
+
+_SUFFIXES = (".json", ".txt")  # both hold JSON; the published scripts know either
+
+
+class _Call(msgspec.Struct):
+    action: str
+    object_id: str | None = msgspec.field(name="objectId", default=None)
+    receptacle_id: str | None = msgspec.field(name="receptacleObjectId", default=None)
+
+    @property
+    def words(self) -> str:
+        """The action with the types of what it is done to: "PutObject Mug Fridge"."""
+        ids = [item for item in (self.object_id, self.receptacle_id) if item]
+        return " ".join([self.action, *(item.partition("|")[0] for item in ids)])
+
+
+class _LowAction(msgspec.Struct):
+    api_action: _Call
+
+
+class _Plan(msgspec.Struct):
+    low_actions: list[_LowAction] = []
+
+
+class _Goal(msgspec.Struct):
+    task_desc: str = ""
+
+
+class _Range(msgspec.Struct):
+    low_pddl_idx: tuple[int, int]
+
+
+class Outline(msgspec.Struct):
+    """A trajectory, as far as contexts tell of it.
+
+    Attributes:
+        plan: its low-level actions.
+        sub_tasks: its goals.
+        sub_trajs: which low-level actions, [first, end), belong to each goal.
+        long_horizon_task: the final task.
+        state_summary: low-level action to the state after it, in words.
+    """
+
+    plan: _Plan
+    sub_tasks: list[_Goal] = []
+    sub_trajs: list[_Range] = []
+    long_horizon_task: _Goal | None = None
+    state_summary: dict[int, str] | None = None
+
+    @property
+    def actions(self) -> list[str]:
+        """Every low-level action in words."""
+        return [item.api_action.words for item in self.plan.low_actions]
+
+    @property
+    def tasks(self) -> list[tuple[str, range]]:
+        """Goals with the actions towards them, paired one to one as published.
+
+        Published files repeat the final task as the last of the sub-tasks. Ours keep it apart; it is the last then.
+        """
+        goals = [item.task_desc for item in self.sub_tasks]
+        if len(self.sub_trajs) == len(goals) + 1 and self.long_horizon_task is not None:
+            goals.append(self.long_horizon_task.task_desc)
+        ranges = [range(*item.low_pddl_idx) for item in self.sub_trajs]
+        return list(zip(goals, ranges, strict=False))
+
+
+def find_outline(folder: Path, traj_id: str) -> Path | None:
+    """The file of a trajectory in a folder of trajectories; None where there is none."""
+    paths = (folder / f"{traj_id}{suffix}" for suffix in _SUFFIXES)
+    return next((path for path in paths if path.is_file()), None)
+
+
+def read_outline(path: Path) -> Outline:
+    """Read a trajectory's file.
+
+    Raises:
+        DataError: it cannot be read, or is no trajectory.
+    """
+    try:
+        found = msgspec.json.decode(path.read_bytes(), type=Outline, strict=False)
+    except OSError as error:
+        raise DataError(f"{path}: cannot be read ({error.strerror}); restore it") from error
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        raise DataError(f"{path}: not a trajectory ({error}); restore it") from error
+    if any(not 0 <= first <= end <= len(found.plan.low_actions) for first, end in _ends(found)):
+        raise DataError(f"{path}: sub_trajs reach outside the low-level actions; restore it")
+    return found
+
+
+def read_states(path: Path) -> dict[int, str]:
+    """States by low-level action, out of a file of nothing else; empty where there is no such file.
+
+    Raises:
+        DataError: it is of another form.
+    """
+    try:
+        return msgspec.json.decode(path.read_bytes(), type=dict[int, str], strict=False)
+    except FileNotFoundError:
+        return {}
+    except (OSError, msgspec.DecodeError, UnicodeDecodeError) as error:
+        raise DataError(f"{path}: not a mapping of low-level actions to states ({error}); replay it again") from error
+
+
+def _ends(found: Outline) -> list[tuple[int, int]]:
+    return [item.low_pddl_idx for item in found.sub_trajs]

@@ -1,0 +1,50 @@
+"""Goals, actions and frames of a trajectory in the published words (published: `interleaved`)."""
+
+from collections.abc import Iterator, Mapping, Sequence
+
+from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.nieh_set import NiehSet, SkippedQuestion
+from infthor_eval.formats.outline import Outline
+from infthor_eval.formats.question import Question
+from infthor_eval.nieh.contexts.base import ContextPart, ContextSettings, Sample
+
+__all__ = ["interleaved", "interleaved_parts"]
+
+_STATE = " State: "  # what comes before frames
+
+
+def interleaved(data: NiehSet, question: Question, _settings: ContextSettings) -> list[Sample | SkippedQuestion]:
+    """Per task its goal and the frame before it, then every action with its frames."""
+    outline = data.outline(question.traj_id)
+    if outline is None:
+        return [SkippedQuestion(question, data.no_outline)]
+    layout = _layout(outline, data.action_frames(question.traj_id))
+    return [Sample(question, tuple(item for item in layout if isinstance(item, int)))]
+
+
+def interleaved_parts(data: NiehSet, sample: Sample, frames: Sequence[FrameRef]) -> list[ContextPart]:
+    """The texts, with the frames in their places."""
+    outline = data.outline(sample.question.traj_id)
+    assert outline is not None  # or there were no sample
+    left = iter(frames)
+    layout = _layout(outline, data.action_frames(sample.question.traj_id))
+    return [next(left) if isinstance(item, int) else item for item in layout]
+
+
+def _layout(outline: Outline, frames_of: Mapping[int, tuple[int, ...]]) -> Iterator[str | int]:
+    """Texts, and frames by their place in the trajectory."""
+    actions = outline.actions
+    for goal, span in outline.tasks:
+        yield f"Your task goal: {goal}. "
+        yield _STATE
+        yield _before(span.start, frames_of)
+        for number in span:
+            yield f" Action: {actions[number]}"
+            if number in frames_of:
+                yield _STATE
+                yield from frames_of[number]
+
+
+def _before(action: int, frames_of: Mapping[int, tuple[int, ...]]) -> int:
+    """The frame that an action begins from: the last one of those before it, or the first of all."""
+    return next((frames_of[number][-1] for number in range(action - 1, -1, -1) if number in frames_of), 0)

@@ -1,0 +1,53 @@
+"""The whole trajectory as agents are trained on it (`traj.txt`): goals, plans, actions, special tokens and frames."""
+
+from collections.abc import Sequence
+from itertools import zip_longest
+from pathlib import Path
+
+from infthor_eval.errors import DataError
+from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.nieh_set import NiehSet, SkippedQuestion
+from infthor_eval.formats.question import Question
+from infthor_eval.nieh.contexts.base import ContextPart, ContextSettings, Sample
+
+__all__ = ["interleaved_plans", "plans_parts"]
+
+_MARK = "<image>"  # where a frame stands in traj.txt
+_ACT = "<|act|>"  # what ends an action there
+
+
+def interleaved_plans(data: NiehSet, question: Question, _settings: ContextSettings) -> list[Sample | SkippedQuestion]:
+    """Goals, plans, frames and actions in time order; of several frames of an action the last."""
+    n_frames = len(data.frames(question.traj_id))
+    done = _actions_before_marks(_sequence_text(data.folder(question.traj_id)))
+    n_actions = max(done, default=0)
+    if n_actions + 1 == n_frames:
+        return [Sample(question, tuple(done))]
+    after_actions = [0, *(frames[-1] for frames in data.action_frames(question.traj_id).values())]
+    if n_actions + 1 != len(after_actions):
+        reason = f"traj.txt has {n_actions} actions, which fit neither the frames nor expert_log.json"
+        return [SkippedQuestion(question, reason)]
+    return [Sample(question, tuple(after_actions[number] for number in done))]
+
+
+def _actions_before_marks(text: str) -> list[int]:
+    """How many actions each frame mark comes after. The frame behind a goal shows what the last action left."""
+    done, n_actions = [], 0
+    for before in text.split(_MARK)[:-1]:
+        n_actions += before.rstrip().endswith(_ACT)
+        done.append(n_actions)
+    return done
+
+
+def plans_parts(data: NiehSet, sample: Sample, frames: Sequence[FrameRef]) -> list[ContextPart]:
+    """The texts of traj.txt with the frames in their places."""
+    texts = _sequence_text(data.folder(sample.question.traj_id)).strip().split(_MARK)
+    parts = (part for pair in zip_longest(texts, frames) for part in pair)
+    return [part for part in parts if part]
+
+
+def _sequence_text(folder: Path) -> str:
+    try:
+        return (folder / "traj.txt").read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise DataError(f"{folder / 'traj.txt'}: cannot be read ({error}); replay the trajectory again") from error
