@@ -48,18 +48,17 @@ def command(
 
     Trajectories that the directory has already are not made again. Exit status 1 where one could not be made.
     """
-    from rich.console import Console
-    from rich.progress import Progress
-
+    from infthor_eval.formats.files import prepared_folder
     from infthor_eval.generation.generate_set import generate_set
     from infthor_eval.generation.jobs import trajectory_jobs, without_bathrooms
+    from infthor_eval.terminal import console, error_console, progress_bar
     from infthor_eval.thor.launch import embedded
     from infthor_eval.thor.simulator import Simulator
 
-    notes = Console(stderr=True, soft_wrap=True)
+    notes = error_console()
     chosen, skipped = without_bathrooms(scenes) if test_set else (scenes, [])
     if skipped:
-        notes.print(f"bathrooms are left out of test sets: {', '.join(skipped)}", highlight=False, markup=False)
+        notes.print(f"bathrooms are left out of test sets: {', '.join(skipped)}")
     jobs = trajectory_jobs(
         chosen,
         seed=seed,
@@ -68,7 +67,8 @@ def command(
         min_subgoals=min_subgoals,
         final_task=final_task or test_set,
     )
-    with Simulator(embedded(data)) as simulator, Progress(console=notes, transient=True) as progress:
+    prepared_folder(out)
+    with Simulator(embedded(data)) as simulator, progress_bar(notes) as progress:
         bar = progress.add_task("generate", total=len(jobs))
         result = generate_set(jobs, simulator, out, lambda: progress.advance(bar))
     if as_json:
@@ -76,9 +76,9 @@ def command(
 
         click.echo(msgspec.json.encode(result.summary()))
     else:
-        _print(result.summary(), out, Console(soft_wrap=True))
+        _print(result.summary(), out, console())
     for failure in result.failures:
-        notes.print(f"not made: {failure}", style="red", highlight=False, markup=False)
+        notes.print(f"not made: {failure}", style="red")
     context.exit(1 if result.failures else 0)
 
 
@@ -88,6 +88,5 @@ def _print(summary: GenerationSummary, out: Path, output: Console) -> None:
 
     output.print(
         f"{summary.trajectories} trajectories ({summary.resumed} made earlier), {summary.steps} steps: {out}",
-        highlight=False,
     )
     print_table(tasks_table(summary), output)

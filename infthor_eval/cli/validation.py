@@ -45,8 +45,6 @@ def validate(
     console.print(
         f"{len(questions)} questions: {len(verdicts.kept)} kept, {len(verdicts.rejected)} rejected, "
         f"{len(verdicts.to_inspect)} to inspect: {out}",
-        highlight=False,
-        markup=False,
     )
     return int(any(record.failure is not None for outcome in outcomes for record in outcome.records))
 

@@ -12,7 +12,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TypeVar
 
-from infthor_eval.errors import DataError, in_one_line
+from infthor_eval.errors import DataError, naming
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.qa_csv import read_questions
 from infthor_eval.formats.question import Question
@@ -23,6 +23,7 @@ from infthor_eval.formats.video import frames_per_second
 __all__ = ["NiehSet", "SkippedQuestion"]
 
 T = TypeVar("T")
+_LONGEST = 40  # characters of a name in a message
 _MEND = "unpack the trajectory again"
 _IMAGE_FOLDERS = ("img", "img_768")
 _IMAGE_SUFFIXES = {".png", ".jpg", ".jpeg"}
@@ -153,13 +154,6 @@ class NiehSet:
 
     def _problem(self, question: Question) -> str | None:
         """Why a question cannot be asked; None where it can."""
-        if Path(question.traj_id).name != question.traj_id or question.traj_id in {"", ".", ".."}:
-            return f"trajectory {question.traj_id!r} is not a plain folder name"
-        try:
-            if not self.folder(question.traj_id).is_dir():
-                return f"trajectory {question.traj_id} is not in metadata/"
-        except OSError as error:
-            return f"trajectory {question.traj_id[:40]}: its folder cannot be read ({in_one_line(error)})"
         if not question.answers:
             return "no gold answer"
         if not question.clues:
@@ -174,6 +168,8 @@ class NiehSet:
         return next(filter(None, (frames[index].problem() for index in question.clues)), None)
 
     def _trajectory(self, traj_id: str) -> dict[int, FrameRef]:
+        if Path(traj_id).name != traj_id or traj_id in {"", ".", ".."}:
+            raise DataError(f"trajectory {traj_id!r} is not a plain folder name")
         if traj_id not in self._frames:
             try:
                 self._frames[traj_id] = _read_frames(self.folder(traj_id))
@@ -187,6 +183,9 @@ class NiehSet:
 
 def _read_frames(folder: Path) -> dict[int, FrameRef]:
     """Frames by their number (`img_idx`), in time order."""
+    with naming(f"trajectory {folder.name[:_LONGEST]}: its folder cannot be read", _MEND):
+        if not folder.is_dir():
+            raise DataError(f"trajectory {folder.name} is not in metadata/")
     steps = sorted(read_steps(folder), key=lambda step: step.img_idx)
     home = _image_folder(folder)
     # By stem: published sets of other sizes (img_768) keep the names and change the suffix.

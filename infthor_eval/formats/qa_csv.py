@@ -7,6 +7,7 @@ no evidence) are ours and optional; other columns are left unread.
 
 import ast
 import csv
+import io
 import math
 from collections.abc import Iterable
 from pathlib import Path
@@ -17,7 +18,7 @@ from infthor_eval.formats.csv_files import read_rows
 from infthor_eval.formats.files import written_atomically
 from infthor_eval.formats.question import Question
 
-__all__ = ["read_questions", "write_questions"]
+__all__ = ["encode_questions", "read_questions", "write_questions"]
 
 _COLUMNS = ("traj_id", "question", "gt_img_idx", "answer")
 _TYPE = "question_type"
@@ -37,14 +38,21 @@ def read_questions(path: Path) -> list[Question]:
 
 def write_questions(path: Path, questions: Iterable[Question]) -> None:
     """Write a question file, whole or not at all."""
-    with written_atomically(path) as partial, partial.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow([*_COLUMNS, _TYPE, _ABSENCE])
-        for item in questions:
-            absence = "yes" if item.absence else ""
-            writer.writerow(
-                [item.traj_id, item.text, list(item.clues), list(item.answers), item.question_type or "", absence]
-            )
+    with written_atomically(path) as partial:
+        partial.write_bytes(encode_questions(questions))
+
+
+def encode_questions(questions: Iterable[Question]) -> bytes:
+    """The content of a question file."""
+    text = io.StringIO(newline="")
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow([*_COLUMNS, _TYPE, _ABSENCE])
+    for item in questions:
+        absence = "yes" if item.absence else ""
+        writer.writerow(
+            [item.traj_id, item.text, list(item.clues), list(item.answers), item.question_type or "", absence]
+        )
+    return text.getvalue().encode()
 
 
 def _question(row: dict[str, str], place: str) -> Question:

@@ -11,8 +11,9 @@ import lzma
 import stat
 import zlib
 from collections.abc import Iterator
+from io import BufferedIOBase
 from pathlib import Path
-from typing import IO, Any, TypeVar, overload
+from typing import Any, TypeVar, overload
 
 import msgspec
 
@@ -162,5 +163,5 @@ def json_lines_of(path: Path, mend: str) -> Iterator[dict[str, Any]]:
         yield found
 
 
-def _opened(path: Path) -> IO[bytes]:
+def _opened(path: Path) -> BufferedIOBase:
     return gzip.open(path) if path.suffix == ".gz" else path.open("rb")

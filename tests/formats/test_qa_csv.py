@@ -12,7 +12,7 @@ questions = st.builds(
     traj_id=words,
     text=words,
     clues=st.lists(st.integers(0, 3000), max_size=5).map(tuple),
-    answers=st.lists(words | st.integers(), max_size=3).map(tuple),
+    answers=st.lists(words | st.integers(-(2**62), 2**62), max_size=3).map(tuple),
     question_type=words | st.none(),
     absence=st.booleans(),
 )
