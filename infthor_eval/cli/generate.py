@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from infthor_eval.cli.options import floor_plans_option
+from infthor_eval.cli.options import LARGEST, floor_plans_option
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -23,7 +23,7 @@ _PATH = click.Path(path_type=Path)
 @click.option("--scene", "scenes", multiple=True, required=True, help="kitchen-3, FloorPlan10, ...; may be repeated.")
 @click.option("--min-steps", type=click.IntRange(1), default=100, show_default=True, help="Low-level actions at least.")
 @click.option("--min-subgoals", type=click.IntRange(1), default=1, show_default=True, help="Sub-goals at least.")
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of the first trajectory.")
+@click.option("--seed", type=click.IntRange(0, LARGEST), default=0, show_default=True, help="Of the first trajectory.")
 @click.option("--count", type=click.IntRange(1), default=1, show_default=True, help="Trajectories for each scene.")
 @click.option("--final-task", is_flag=True, help="End with a task on what was seen at both ends of the trajectory.")
 @click.option("--test-set", is_flag=True, help="As the published test sets: with a final task, without bathrooms.")

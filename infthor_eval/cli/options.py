@@ -6,7 +6,10 @@ from typing import Any
 
 import click
 
-__all__ = ["FiniteRange", "floor_plans_option", "model_options_in", "names_in"]
+__all__ = ["LARGEST", "SEED", "FiniteRange", "floor_plans_option", "model_options_in", "names_in"]
+
+LARGEST = 2**63 - 1  # of the numbers that a run's identity can hold
+SEED = click.IntRange(-LARGEST, LARGEST)
 
 floor_plans_option = click.option(
     "--data",

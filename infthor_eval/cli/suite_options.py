@@ -8,6 +8,7 @@ from typing import Any
 
 import click
 
+from infthor_eval.cli.options import LARGEST
 from infthor_eval.errors import UsageError
 from infthor_eval.suites import options_of, suite_names
 
@@ -22,7 +23,7 @@ def suite_options(command: Callable[..., Any]) -> Callable[..., Any]:
             choices = item.metadata.get("choices")
             command = click.option(
                 f"--{item.name.replace('_', '-')}",
-                type=click.Choice(choices) if choices else _type(hints[item.name]),
+                type=click.Choice(choices) if choices else _click_type(hints[item.name]),
                 metavar=item.metadata.get("metavar"),
                 help=f"{item.metadata['help']} [{suite}]",
             )(command)
@@ -47,6 +48,10 @@ def chosen_options(suite: str, given: Mapping[str, Any], asked: typing.Collectio
     known = typing.get_type_hints(options_of(suite))
     values = {name: given[name] for name in known if given.get(name) is not None}
     return options_of(suite)(**{name: _type(known[name])(value) for name, value in values.items()})
+
+
+def _click_type(hint: Any) -> Any:
+    return click.IntRange(-LARGEST, LARGEST) if _type(hint) is int else _type(hint)
 
 
 def _type(hint: Any) -> type:

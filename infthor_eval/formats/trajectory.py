@@ -37,6 +37,7 @@ __all__ = [
     "folder_name",
     "iter_sources",
     "iter_trajectories",
+    "trajectory_files",
 ]
 
 _SUFFIXES = (".json", ".jsonl", ".jsonl.gz")
@@ -247,10 +248,7 @@ def iter_sources(path: Path) -> Iterator[Source]:
     """
     path = Path(path)
     if path.is_dir():
-        files = [file for file in sorted(path.rglob("*")) if _is_trajectory_file(file)]
-        if not files:
-            raise DataError(f"{path}: no {', '.join(_SUFFIXES)} file in this directory; name another path")
-        for file in files:
+        for file in trajectory_files(path):
             yield from iter_sources(file)
     elif path.name.endswith(".json"):
         yield Source(path, None, read_bytes(path, _MEND))
@@ -258,6 +256,20 @@ def iter_sources(path: Path) -> Iterator[Source]:
         yield from (Source(path, line, raw) for line, raw in lines_of(path, _MEND))
     else:
         raise DataError(f"{path}: no trajectory file; name a {', '.join(_SUFFIXES)} file or a directory")
+
+
+def trajectory_files(path: Path) -> list[Path]:
+    """The files of trajectories in a directory, sorted; of a file, itself.
+
+    Raises:
+        DataError: a directory without any.
+    """
+    if not path.is_dir():
+        return [path]
+    files = [file for file in sorted(path.rglob("*")) if _is_trajectory_file(file)]
+    if not files:
+        raise DataError(f"{path}: no {', '.join(_SUFFIXES)} file in this directory; name another path")
+    return files
 
 
 def iter_trajectories(path: Path) -> Iterator[Trajectory]:
@@ -288,4 +300,5 @@ def folder_name(traj_id: str) -> str:
 
 
 def _is_trajectory_file(path: Path) -> bool:
-    return path.is_file() and path.name.endswith(_SUFFIXES) and path.name not in _NOT_TRAJECTORIES
+    # Pipes and devices too: whoever reads them is told what they are.
+    return not path.is_dir() and path.name.endswith(_SUFFIXES) and path.name not in _NOT_TRAJECTORIES

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 from infthor_eval.errors import UsageError
+from infthor_eval.formats.limits import TRAJECTORIES
 from infthor_eval.generation.settings import TrajectorySettings
 
 __all__ = ["trajectory_jobs", "without_bathrooms"]
@@ -22,7 +23,12 @@ def trajectory_jobs(
         min_steps: low-level actions at least.
         min_subgoals: sub-goals at least.
         final_task: whether a final task follows.
+
+    Raises:
+        UsageError: there would be more of them than the limit.
     """
+    if count * len(scenes) > TRAJECTORIES.value:
+        raise UsageError(f"{count} trajectories for each of {len(scenes)} scenes are too many; {TRAJECTORIES.mend}")
     seeds = range(seed, seed + count)
     return [TrajectorySettings(scene, k, min_steps, min_subgoals, final_task) for scene in scenes for k in seeds]
 
