@@ -5,9 +5,21 @@ traceback and exits with the error's `exit_code`.
 """
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 
-__all__ = ["DataError", "InfthorError", "ModelError", "SimulatorError", "UsageError", "unknown_name"]
+__all__ = [
+    "DataError",
+    "InfthorError",
+    "ModelError",
+    "SimulatorError",
+    "UsageError",
+    "in_one_line",
+    "naming",
+    "unknown_name",
+]
+
+_LONGEST = 200  # characters of another library's message
 
 
 class InfthorError(Exception):
@@ -46,3 +58,37 @@ def unknown_name(what: str, name: str, known: Iterable[str]) -> UsageError:
     near = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
     hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(names)}"
     return UsageError(f"unknown {what} {name!r}; {hint}")
+
+
+def in_one_line(error: BaseException) -> str:
+    """What an error of another library says, short enough to stand within a message of ours."""
+    reason = error.strerror if isinstance(error, OSError) else None
+    said = " ".join((reason or str(error)).split()) or type(error).__name__
+    return said if len(said) <= _LONGEST else said[: _LONGEST - 3] + "..."
+
+
+@contextmanager
+def naming(
+    problem: str,
+    mend: str,
+    *,
+    of: type[BaseException] | tuple[type[BaseException], ...] = OSError,
+    as_a: type[InfthorError] = DataError,
+) -> Iterator[None]:
+    """Turn the errors of another library, or of the system, into one line; ours pass as they are.
+
+    Args:
+        problem: what is wrong, and where ("set.json: not JSON").
+        mend: what to do about it.
+        of: the errors that are turned.
+        as_a: what they become.
+
+    Raises:
+        InfthorError: of the class `as_a`, as "PROBLEM (REASON); MEND".
+    """
+    try:
+        yield
+    except InfthorError:
+        raise
+    except of as error:
+        raise as_a(f"{problem} ({in_one_line(error)}); {mend}") from error

@@ -11,6 +11,7 @@ from infthor_eval.errors import UsageError
 
 __all__ = ["NoOptions", "describe", "parse"]
 
+_LARGEST = 2**63  # of the numbers that a run's identity can hold
 _BOOLEANS = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
 
 
@@ -57,7 +58,10 @@ def _value(name: str, hint: Any, text: str) -> Any:
         return None
     convert = next(each for each in taken if each is not types.NoneType)
     try:
-        return _BOOLEANS[text.lower()] if convert is bool else convert(text)
+        value = _BOOLEANS[text.lower()] if convert is bool else convert(text)
+        if convert in (int, float) and not abs(value) < _LARGEST:
+            raise ValueError("too large, or no number")
+        return value
     except (KeyError, ValueError) as error:
         wanted = "true or false" if convert is bool else convert.__name__
         raise ValueError(f"option {name}={text} is not {wanted}") from error

@@ -16,24 +16,24 @@ def command(manifest: Path, out: Path) -> int:
     Where the manifest has digests (that of a bundled set does), it says whether the same files came out; exit status 1
     where they differ.
     """
-    from rich.console import Console
-    from rich.progress import Progress
-
+    from infthor_eval.formats.files import prepared_folder
     from infthor_eval.generation.bundle import differing_files, make_bundle, read_manifest
+    from infthor_eval.terminal import error_console, progress_bar, tell
     from infthor_eval.thor.launch import embedded
     from infthor_eval.thor.simulator import Simulator
 
     wanted = read_manifest(manifest)
-    with Simulator(embedded()) as simulator, Progress(console=Console(stderr=True), transient=True) as progress:
+    prepared_folder(out)
+    with Simulator(embedded()) as simulator, progress_bar(error_console()) as progress:
         bar = progress.add_task(wanted.name, total=2 * len(wanted.trajectories))
         finished, made = make_bundle(wanted, simulator, out, lambda: progress.advance(bar))
     size = sum(path.stat().st_size for path in out.rglob("*") if path.is_file())
-    click.echo(f"{len(made.questions)} questions on {made.trajectories} trajectories, {size / 1e6:.1f} MB: {out}")
-    click.echo(made.words())
+    tell(f"{len(made.questions)} questions on {made.trajectories} trajectories, {size / 1e6:.1f} MB: {out}")
+    tell(made.words())
     if not wanted.files:
         return 0
     n_files, differing = len(wanted.files.keys() | finished.files.keys()), differing_files(wanted, finished)
-    click.echo(f"{n_files - len(differing)} of {n_files} files as in the manifest")
+    tell(f"{n_files - len(differing)} of {n_files} files as in the manifest")
     for name in differing[:10]:
-        click.echo(f"differs: {name}", err=True)
+        error_console().print(f"differs: {name}")
     return int(bool(differing))

@@ -30,7 +30,7 @@ def evaluate(requests: Sequence[tuple[RunRequest, Suite]]) -> int:
         for table in same[0].run.suite.tables([outcome.summary for outcome in same]):
             print_table(table, console)
     for outcome in outcomes:
-        console.print(f"{outcome.summary.header.name}: {outcome.folder}", highlight=False, markup=False)
+        console.print(f"{outcome.summary.header.name}: {outcome.folder}")
     n_failed = sum(map(_say_what_failed, outcomes))  # every run says what failed
     return int(n_failed > 0)
 

@@ -17,9 +17,11 @@ def command(what: str, folder: Path | None, token: str | None, endpoint: str | N
 
     `--tasks nieh` finds it afterwards; with --dir, pass the same folder as --data.
     """
+    from infthor_eval.formats.files import prepared_folder
     from infthor_eval.formats.hub_data import default_folder, fetch_nieh
+    from infthor_eval.terminal import error_console, tell
 
-    data = fetch_nieh(folder or default_folder(), token, endpoint)
-    click.echo(f"{what}: {len(data.questions)} questions in {data.root}")
+    data = fetch_nieh(prepared_folder(folder or default_folder(), "--dir"), token, endpoint)
+    tell(f"{what}: {len(data.questions)} questions in {data.root}")
     for reason, n in data.reasons().most_common():
-        click.echo(f"skipped {n}: {reason}", err=True)
+        error_console().print(f"skipped {n}: {reason}")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from infthor_eval.cli.options import floor_plans_option
+from infthor_eval.cli.options import LARGEST, floor_plans_option
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -24,7 +24,7 @@ _PATH = click.Path(path_type=Path)
 @click.option("--min-steps", type=click.IntRange(1), default=300, show_default=True, help="Low-level actions at least.")
 @click.option("--min-subgoals", type=click.IntRange(1), default=10, show_default=True, help="Tasks at least.")
 @click.option("--max-fail", type=click.IntRange(1), default=20, show_default=True, help="Tasks that may fail, at most.")
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of the first trajectory.")
+@click.option("--seed", type=click.IntRange(0, LARGEST), default=0, show_default=True, help="Of the first trajectory.")
 @click.option("--count", type=click.IntRange(1), default=1, show_default=True, help="Trajectories for each scene.")
 @click.option("--final-task", is_flag=True, help="End with a task on what was seen at both ends of the trajectory.")
 @click.option("--test-set", is_flag=True, help="As the published test sets: with a final task, without bathrooms.")
@@ -50,18 +50,17 @@ def command(
 
     Trajectories that the directory has already are not made again. Exit status 1 where one could not be made.
     """
-    from rich.console import Console
-    from rich.progress import Progress
-
+    from infthor_eval.formats.files import prepared_folder
     from infthor_eval.generation.generate_set import generate_set
     from infthor_eval.generation.jobs import trajectory_jobs, without_bathrooms
+    from infthor_eval.terminal import console, error_console, progress_bar
     from infthor_eval.thor.launch import embedded
     from infthor_eval.thor.simulator import Simulator
 
-    notes = Console(stderr=True, soft_wrap=True)
+    notes = error_console()
     chosen, skipped = without_bathrooms(scenes) if test_set else (scenes, [])
     if skipped:
-        notes.print(f"bathrooms are left out of test sets: {', '.join(skipped)}", highlight=False, markup=False)
+        notes.print(f"bathrooms are left out of test sets: {', '.join(skipped)}")
     jobs = trajectory_jobs(
         chosen,
         seed=seed,
@@ -71,7 +70,8 @@ def command(
         final_task=final_task or test_set,
         max_fail=max_fail,
     )
-    with Simulator(embedded(data)) as simulator, Progress(console=notes, transient=True) as progress:
+    prepared_folder(out)
+    with Simulator(embedded(data)) as simulator, progress_bar(notes) as progress:
         bar = progress.add_task("generate", total=len(jobs))
         result = generate_set(jobs, simulator, out, lambda: progress.advance(bar))
     if as_json:
@@ -79,9 +79,9 @@ def command(
 
         click.echo(msgspec.json.encode(result.summary()))
     else:
-        _print(result.summary(), out, Console(soft_wrap=True))
+        _print(result.summary(), out, console())
     for failure in result.failures:
-        notes.print(f"not made: {failure}", style="red", highlight=False, markup=False)
+        notes.print(f"not made: {failure}", style="red")
     context.exit(1 if result.failures else 0)
 
 
@@ -91,6 +91,5 @@ def _print(summary: GenerationSummary, out: Path, output: Console) -> None:
 
     output.print(
         f"{summary.trajectories} trajectories ({summary.resumed} made earlier), {summary.steps} steps: {out}",
-        highlight=False,
     )
     print_table(tasks_table(summary), output)

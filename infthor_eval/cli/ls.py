@@ -4,11 +4,11 @@ from pathlib import Path
 
 import click
 from rich import box
-from rich.console import Console
 from rich.table import Table
 
 from infthor_eval.cli.options import floor_plans_option
 from infthor_eval.errors import ModelError
+from infthor_eval.terminal import console
 
 __all__ = ["command"]
 
@@ -18,7 +18,8 @@ __all__ = ["command"]
 @floor_plans_option
 def command(what: str, data: Path | None) -> None:
     """List the models with their options, the tasks, or the embedded simulator's scenes."""
-    Console().print({"models": _models, "tasks": _tasks}[what]() if what != "scenes" else _scenes(data))
+    found = {"models": _models, "tasks": _tasks}[what]() if what != "scenes" else _scenes(data)
+    console().print(found, soft_wrap=False)
 
 
 def _models() -> Table:

@@ -1,12 +1,20 @@
 """Entry point: which commands there are, and how errors are shown."""
 
+import contextlib
 import importlib
+import io
+import signal
 import sys
+import threading
+from collections.abc import Iterator
+from types import FrameType
 
 import click
 
 import infthor_eval
-from infthor_eval.errors import InfthorError
+from infthor_eval.cli.repeated import refuse_repeated
+from infthor_eval.errors import InfthorError, in_one_line
+from infthor_eval.terminal import say_error
 
 __all__ = ["main"]
 
@@ -45,6 +53,14 @@ class _Commands(click.Group):
             args = [_DEFAULT, *args]
         return super().parse_args(ctx, args)
 
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        name, command, rest = super().resolve_command(ctx, args)
+        if command is not None:
+            refuse_repeated(ctx, command, rest)
+        return name, command, rest
+
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         # Not click's own, which would import every command for its first line of help.
         with formatter.section("Commands"):
@@ -62,8 +78,13 @@ def _infthor_eval() -> None:
 
 def main(args: list[str] | None = None) -> None:
     """Run the command line; errors meant for people end in one line on standard error."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")  # whatever the terminal's encoding, a name must not end a run
     try:
-        code = _infthor_eval.main(args, prog_name="infthor-eval", standalone_mode=False)
+        with _stopped_by_sigterm():
+            code = _infthor_eval.main(args, prog_name="infthor-eval", standalone_mode=False)
+        sys.stdout.flush()  # here, and not where Python ends: a full disk is an error like any other
     except click.exceptions.NoArgsIsHelpError as error:
         click.echo(error.format_message())
         sys.exit(2)
@@ -71,12 +92,38 @@ def main(args: list[str] | None = None) -> None:
         _fail(error.format_message(), error.exit_code)
     except InfthorError as error:
         _fail(str(error), error.exit_code)
+    except _Terminated:
+        _fail("stopped; the same command goes on where it was", 143)
     except (click.Abort, KeyboardInterrupt):
         _fail("stopped; the same command goes on where it was", 130)
+    except OSError as error:  # no command's own: a disk that is full, a file that was taken away in mid-work
+        place = error.filename if error.filename is not None else "standard output or a file"
+        _fail(f"{place}: cannot be read or written ({in_one_line(error)}); mend that and run the same command again", 2)
     else:
         sys.exit(code if isinstance(code, int) else 0)
 
 
+class _Terminated(BaseException):
+    """SIGTERM came: everything is to be tidied up, as on Ctrl-C."""
+
+
+@contextlib.contextmanager
+def _stopped_by_sigterm() -> Iterator[None]:
+    """SIGTERM as an exception, so that temporary folders and the simulator's processes go with the command."""
+
+    def stop(_number: int, _frame: FrameType | None) -> None:
+        raise _Terminated
+
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, stop)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
 def _fail(message: str, code: int) -> None:
-    click.echo(f"infthor-eval: {' '.join(message.split())}", err=True)
+    say_error(message)
     sys.exit(code)

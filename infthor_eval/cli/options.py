@@ -1,16 +1,32 @@
 """What several commands share: options, and how their values are written."""
 
+import math
 from pathlib import Path
+from typing import Any
 
 import click
 
-__all__ = ["floor_plans_option", "model_options_in", "names_in"]
+__all__ = ["LARGEST", "SEED", "FiniteRange", "floor_plans_option", "model_options_in", "names_in"]
+
+LARGEST = 2**63 - 1  # of the numbers that a run's identity can hold
+SEED = click.IntRange(-LARGEST, LARGEST)
 
 floor_plans_option = click.option(
     "--data",
     type=click.Path(exists=True, file_okay=False, path_type=Path),
     help="Folder with recorded floor plans (thor_scenes/, alfred/layouts/), for scenes among them.",
 )
+
+
+class FiniteRange(click.FloatRange):
+    """A number within a range; not the "nan" that is neither below nor above anything."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """See `click.FloatRange`."""
+        number = float(super().convert(value, param, ctx))
+        if not math.isfinite(number):
+            self.fail(f"{value!r} is not a number.", param, ctx)
+        return number
 
 
 def names_in(text: str, option: str) -> tuple[str, ...]:

@@ -2,15 +2,15 @@
 
 from typing import Any
 
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import Progress
 
 from infthor_eval.cli.reasons import counted_reasons
 from infthor_eval.runs import PreparedRun, RunOutcome, UnitRecord, Workload, execute
+from infthor_eval.terminal import error_console, progress_bar
 
 __all__ = ["NOTES", "execute_with_progress", "say"]
 
-NOTES = Console(stderr=True, soft_wrap=True)
+NOTES = error_console()
 
 
 class _Bar:
@@ -39,8 +39,7 @@ class _Bar:
 
 def execute_with_progress(run: PreparedRun) -> RunOutcome:
     """Execute one prepared run, with a progress bar, and with what is skipped and what failed."""
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=NOTES, transient=True) as progress:
+    with progress_bar(NOTES) as progress:
         bar = _Bar(run.request.label, progress)
         outcome = execute(run, bar)
     say(f"{run.request.label}: {bar.n_made} answered now, {bar.n_found} found in the journal of an earlier run")
@@ -49,4 +48,4 @@ def execute_with_progress(run: PreparedRun) -> RunOutcome:
 
 def say(text: str, style: str = "") -> None:
     """A line on standard error; whatever is in it is shown as text."""
-    NOTES.print(text, style=style, highlight=False, markup=False)
+    NOTES.print(text, style=style)

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import click
 
+from infthor_eval.cli.options import LARGEST, FiniteRange
+
 __all__ = ["command"]
 
 _PATH = click.Path(path_type=Path)
@@ -14,40 +16,50 @@ _PATH = click.Path(path_type=Path)
 @click.command("questions")
 @click.argument("folder", metavar="SET", type=_PATH)
 @click.option("--out", required=True, type=_PATH, help="The CSV file to write.")
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Makes every choice.")
+@click.option("--seed", type=click.IntRange(0, LARGEST), default=0, show_default=True, help="Makes every choice.")
 @click.option("--per-trajectory", type=click.IntRange(1), default=25, show_default=True, help="Questions at most.")
 @click.option(
     "--min-share",
-    type=click.FloatRange(0, 1),
+    type=FiniteRange(0, 1),
     default=0.001,
     show_default=True,
     help="Of a frame's pixels that an object must fill to count as shown.",
 )
 @click.option("--further", is_flag=True, help="Ask forms beside those of Table 3 too, under types of their own.")
+@click.option("--overwrite", is_flag=True, help="Replace a file that holds other questions.")
 @click.pass_context
 def command(
-    context: click.Context, folder: Path, out: Path, seed: int, per_trajectory: int, min_share: float, further: bool
+    context: click.Context,
+    folder: Path,
+    out: Path,
+    seed: int,
+    per_trajectory: int,
+    min_share: float,
+    further: bool,
+    overwrite: bool,
 ) -> None:
     """Make questions on a replayed set, in the words of the paper's Table 3.
 
     Exit status 1 where a trajectory of the set could not be read.
     """
-    from rich.console import Console
-
-    from infthor_eval.formats.qa_csv import write_questions
+    from infthor_eval.errors import naming
+    from infthor_eval.formats.files import prepared_file, refuse_loss, written_atomically
+    from infthor_eval.formats.qa_csv import encode_questions
     from infthor_eval.generation.questions.make import make_questions
+    from infthor_eval.terminal import error_console, tell
 
+    prepared_file(out)
     made = make_questions(folder, seed=seed, per_trajectory=per_trajectory, share=min_share, further=further)
-    out.parent.mkdir(parents=True, exist_ok=True)
-    write_questions(out, made.questions)
-    output = Console(soft_wrap=True)
+    content = encode_questions(made.questions)
+    if not overwrite:
+        refuse_loss(out, content, "give another --out, or --overwrite if nobody edited it")
+    with naming(f"{out}: cannot be written", "give another --out"), written_atomically(out) as partial:
+        partial.write_bytes(content)
     told = f"{len(made.questions)} questions on {made.trajectories} trajectories: {out}\n{made.words()}"
-    output.print(told, highlight=False, markup=False)
-    notes = Console(stderr=True, soft_wrap=True)
+    tell(told)
+    notes = error_console()
     for question in made.doubted:
-        notes.print(
-            f"skipped, the checker disagrees: {question.traj_id}: {question.text}", highlight=False, markup=False
-        )
+        notes.print(f"skipped, the checker disagrees: {question.traj_id}: {question.text}")
     for line in made.skipped:
-        notes.print(f"skipped: {line}", style="red", highlight=False, markup=False)
+        notes.print(f"skipped: {line}", style="red")
     context.exit(1 if made.skipped else 0)

@@ -47,20 +47,20 @@ def command(
     itself. Trajectories that the set has already are not replayed again. A refused action is reported and the
     replay goes on. Exit status 1 where a trajectory could not be replayed at all.
     """
-    from rich.console import Console
-    from rich.progress import Progress
-
+    from infthor_eval.formats.files import prepared_folder
     from infthor_eval.generation.replay_set import replay_set, select
     from infthor_eval.generation.replay_summary import summarise
     from infthor_eval.generation.supplement import supplement_file
+    from infthor_eval.terminal import console, error_console, progress_bar
     from infthor_eval.thor import launch
     from infthor_eval.thor.simulator import Simulator
 
-    notes = Console(stderr=True, soft_wrap=True)
+    notes = error_console()
+    prepared_folder(out)
     selection = select(trajectories, limit, per_floor_plan)
     with supplement_file(trajectory for _, trajectory in selection.items) as supplement:
         start = launch.unity() if unity else launch.embedded(data, supplement)
-        with Simulator(start) as simulator, Progress(console=notes, transient=True) as progress:
+        with Simulator(start) as simulator, progress_bar(notes) as progress:
             bar = progress.add_task("replay", total=len(selection.items))
             replayed = replay_set(selection, simulator, out, lambda: progress.advance(bar), frames)
     if as_json:
@@ -68,9 +68,9 @@ def command(
 
         click.echo(msgspec.json.encode(summarise(replayed)))
     else:
-        _print(summarise(replayed), Console(soft_wrap=True))
+        _print(summarise(replayed), console())
     for failure in replayed.failures[:_SHOWN]:
-        notes.print(f"not replayed: {failure.place}: {failure.message}", style="red", highlight=False, markup=False)
+        notes.print(f"not replayed: {failure.place}: {failure.message}", style="red")
     context.exit(1 if replayed.failures else 0)
 
 
@@ -81,7 +81,6 @@ def _print(summary: ReplaySummary, output: Console) -> None:
     output.print(
         f"{summary.trajectories} trajectories on {summary.floor_plans} floor plans ({summary.resumed} replayed "
         f"earlier, {summary.failed} failed), {summary.complete} whole, {summary.seconds} s",
-        highlight=False,
     )
     print_table(actions_table(summary), output)
     overlaps = overlaps_table(summary)
@@ -89,7 +88,7 @@ def _print(summary: ReplaySummary, output: Console) -> None:
         print_table(overlaps, output)
     for item in summary.diverged[:_SHOWN]:
         line = f"diverged: {item.traj_id}: step {item.step}: {item.action}: {item.error}"
-        output.print(line, highlight=False, markup=False)
+        output.print(line)
     hidden = len(summary.diverged) - _SHOWN
     if hidden > 0:
-        output.print(f"and {hidden} more; --json lists all", highlight=False)
+        output.print(f"and {hidden} more; --json lists all")

@@ -5,7 +5,7 @@ from typing import Any
 
 import click
 
-from infthor_eval.cli.options import model_options_in, names_in
+from infthor_eval.cli.options import LARGEST, SEED, model_options_in, names_in
 from infthor_eval.cli.suite_options import suite_options
 
 __all__ = ["command"]
@@ -22,7 +22,7 @@ __all__ = ["command"]
     help="Extend the model's context: yarn:4, linear:2, dynamic:4, longrope:8.",
 )
 @click.option("--name", help="What the run is called in tables and folders; else by its checkpoint, or its model.")
-@click.option("--limit", type=click.IntRange(min=1), help="Ask only the first N questions of each task.")
+@click.option("--limit", type=click.IntRange(1, LARGEST), help="Ask only the first N questions of each task.")
 @click.option(
     "--output",
     type=click.Path(path_type=Path),
@@ -30,7 +30,7 @@ __all__ = ["command"]
     show_default=True,
     help="Results folder.",
 )
-@click.option("--seed", type=int, default=0, show_default=True, help="For whatever is random.")
+@click.option("--seed", type=SEED, default=0, show_default=True, help="For whatever is random.")
 @click.option("--fresh", is_flag=True, help="Start anew; the journal of an earlier run is set aside.")
 @click.option("--recover", is_flag=True, help="Go on without the bad lines of a damaged journal.")
 @suite_options

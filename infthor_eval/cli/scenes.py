@@ -8,6 +8,8 @@ from infthor_eval.cli.options import floor_plans_option
 
 __all__ = ["command"]
 
+_PICTURES = (".png", ".jpg", ".jpeg")
+
 
 @click.group("scenes")
 def command() -> None:
@@ -23,18 +25,24 @@ def show(name: str, data: Path | None, out: Path | None, size: int) -> None:
     """Draw scene NAME from above and as the agent first sees it, side by side."""
     from PIL import Image
 
+    from infthor_eval.errors import naming
+    from infthor_eval.formats.files import prepared_file
+    from infthor_eval.terminal import tell
     from infthor_eval.thor.launch import embedded
     from infthor_eval.thor.scenes import scene_pictures
     from infthor_eval.thor.simulator import Simulator
 
+    path = prepared_file(out or Path(f"{name}.png"))
+    if path.suffix.lower() not in _PICTURES:
+        raise click.UsageError(f"--out {path}: not a picture; use {', '.join(_PICTURES)}")
     with Simulator(embedded(data), width=size, height=size, quality="Ultra") as simulator:
         above, first = scene_pictures(simulator, name)
     sheet = Image.new("RGB", (2 * size, size))
     sheet.paste(Image.fromarray(above), (0, 0))
     sheet.paste(Image.fromarray(first), (size, 0))
-    path = out or Path(f"{name}.png")
-    sheet.save(path)
-    click.echo(f"{name}: {path} (from above; first view)")
+    with naming(f"{path}: cannot be written", "give another place with --out"):
+        sheet.save(path)
+    tell(f"{name}: {path} (from above; first view)")
 
 
 @command.command("dump")
@@ -48,11 +56,14 @@ def dump(names: tuple[str, ...], out: Path, unity: Path | None, is_embedded: boo
 
     With that folder they run in the embedded simulator on machines without Unity.
     """
+    from infthor_eval.formats.files import prepared_folder
+    from infthor_eval.terminal import tell
     from infthor_eval.thor import launch
     from infthor_eval.thor.scenes import dump_scene
     from infthor_eval.thor.simulator import Simulator
 
+    prepared_folder(out)
     start = launch.embedded(data) if is_embedded else launch.unity(unity)
     with Simulator(start) as simulator:
         for name in names:
-            click.echo(f"{name}: {dump_scene(simulator, name, out)} objects in {out}")
+            tell(f"{name}: {dump_scene(simulator, name, out)} objects in {out}")

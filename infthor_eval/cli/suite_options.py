@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from infthor_eval.cli.options import names_in
+from infthor_eval.cli.options import LARGEST, names_in
 from infthor_eval.errors import UsageError
 from infthor_eval.suites import options_of, suite_names
 
@@ -24,7 +24,7 @@ def suite_options(command: Callable[..., Any]) -> Callable[..., Any]:
             choices = item.metadata.get("choices")
             command = click.option(
                 f"--{item.name.replace('_', '-')}",
-                type=click.Choice(choices) if choices else _type(hints[item.name]),
+                type=click.Choice(choices) if choices else _click_type(hints[item.name]),
                 metavar=item.metadata.get("metavar"),
                 help=f"{item.metadata['help']} [{suite}]",
             )(command)
@@ -55,6 +55,10 @@ def chosen_options(suite: str, given: Mapping[str, Any], asked: typing.Collectio
             typed = names_in(given[item.name], f"--{item.name}") if item.metadata.get("each") else [given[item.name]]
             values[item.name] = [_type(known[item.name])(value) for value in typed]
     return [options_of(suite)(**dict(zip(values, chosen, strict=True))) for chosen in product(*values.values())]
+
+
+def _click_type(hint: Any) -> Any:
+    return click.IntRange(-LARGEST, LARGEST) if _type(hint) is int else _type(hint)
 
 
 def _type(hint: Any) -> type:

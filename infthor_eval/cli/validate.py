@@ -5,7 +5,7 @@ from typing import Literal
 
 import click
 
-from infthor_eval.cli.options import model_options_in, names_in
+from infthor_eval.cli.options import SEED, model_options_in, names_in
 
 __all__ = ["command"]
 
@@ -17,7 +17,7 @@ __all__ = ["command"]
 @click.option("--out", type=click.Path(path_type=Path), required=True, help="Folder of the validated set.")
 @click.option("--decisions", type=click.Path(path_type=Path), help="The inspection list with keep or drop filled in.")
 @click.option("--scorer", type=click.Choice(["strict", "reference"]), default="strict", show_default=True)
-@click.option("--seed", type=int, default=0, show_default=True, help="For whatever is random.")
+@click.option("--seed", type=SEED, default=0, show_default=True, help="For whatever is random.")
 def command(
     set_folder: Path,
     models: str,
@@ -35,7 +35,11 @@ def command(
     from infthor_eval.cli.requests import Asked, requests_for
     from infthor_eval.cli.validation import validate
 
-    options = dict(item.partition(":")[::2] for item in model_args)
+    options: dict[str, str] = {}
+    for model, _, given in (item.partition(":") for item in model_args):
+        if model in options:
+            raise click.UsageError(f"--model-args for {model} is given twice; give it once")
+        options[model] = given
     asked = Asked(tasks=("nieh_gt",), data=set_folder, output=out / "runs", seed=seed)
     requests = [
         request

@@ -3,12 +3,12 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from infthor_eval.cli.progress import execute_with_progress
+from infthor_eval.cli.progress import execute_with_progress, say
 from infthor_eval.nieh.samples import find_set
 from infthor_eval.nieh.scoring import Scorer
 from infthor_eval.nieh.tables import clues_table
-from infthor_eval.nieh.validated_set import write_validated_set
-from infthor_eval.nieh.validation import Verdicts, judge, read_decisions
+from infthor_eval.nieh.validated_set import check_place, write_validated_set
+from infthor_eval.nieh.validation import Verdicts, check_decisions, judge, read_decisions
 from infthor_eval.report.inspection import write_inspection_page
 from infthor_eval.report.terminal import print_table, table_console
 from infthor_eval.runs import RunOutcome, RunRequest, RunSummary, Suite, prepare
@@ -31,22 +31,24 @@ def validate(
         Exit code: 1 where a model failed on a question, else 0.
     """
     decisions = read_decisions(decisions_file) if decisions_file else {}
+    data = find_set(str(requests[0][0].tasks.data))
+    check_decisions(decisions, data.questions)
+    check_place(out, data)
     runs = [prepare(request, suite) for request, suite in requests]
     outcomes = [execute_with_progress(run) for run in runs]
-    data = find_set(str(requests[0][0].tasks.data))
     asked = {record.id for record in outcomes[0].records}
     questions = [question for question in data.questions if question.id in asked]
     replies = {outcome.run.request.model: _replies(outcome) for outcome in outcomes}
     verdicts = judge(questions, replies, decisions, scorer)
-    write_validated_set(out, data, verdicts)
+    earlier = write_validated_set(out, data, verdicts)
+    if earlier is not None:
+        say(f"{earlier}: the earlier list, with decisions on questions that are not to be inspected any more")
     write_inspection_page(out / "inspection.html", verdicts.to_inspect, data)
     console = table_console()
     print_table(clues_table([_on_kept(outcome, verdicts) for outcome in outcomes]), console)
     console.print(
         f"{len(questions)} questions: {len(verdicts.kept)} kept, {len(verdicts.rejected)} rejected, "
         f"{len(verdicts.to_inspect)} to inspect: {out}",
-        highlight=False,
-        markup=False,
     )
     return int(any(record.failure is not None for outcome in outcomes for record in outcome.records))
 

@@ -9,7 +9,8 @@ import tarfile
 import tempfile
 from pathlib import Path, PurePosixPath
 
-from infthor_eval.errors import DataError
+from infthor_eval.errors import DataError, in_one_line
+from infthor_eval.formats.reading import DAMAGED, require_file
 
 __all__ = ["unpack_tar"]
 
@@ -28,8 +29,9 @@ def unpack_tar(archive: Path, target: Path, max_bytes: int = 500 * 2**30) -> Non
     Raises:
         DataError: the archive is damaged, has a member that is refused, or does not fit on the disk.
     """
-    target.parent.mkdir(parents=True, exist_ok=True)
+    require_file(archive, "fetch it again")
     try:
+        target.parent.mkdir(parents=True, exist_ok=True)
         with (
             tarfile.open(archive) as tar,
             tempfile.TemporaryDirectory(dir=target.parent, prefix=".unpacking-") as scratch,
@@ -37,16 +39,22 @@ def unpack_tar(archive: Path, target: Path, max_bytes: int = 500 * 2**30) -> Non
             members = _checked(tar, archive, target.name, min(max_bytes, shutil.disk_usage(target.parent).free))
             tar.extractall(scratch, members=members, filter="data")
             (Path(scratch) / target.name).rename(target)
-    except (tarfile.TarError, EOFError) as error:
-        raise DataError(f"{archive}: a damaged archive ({error}); delete it and fetch it again") from error
+    except (tarfile.TarError, *DAMAGED) as error:
+        raise DataError(f"{archive}: a damaged archive ({in_one_line(error)}); delete it and fetch it again") from error
     except OSError as error:
-        raise DataError(f"{archive}: cannot be unpacked to {target} ({error.strerror or error})") from error
+        raise DataError(
+            f"{archive}: cannot be unpacked to {target} ({in_one_line(error)}); make room, or fetch the archive again"
+        ) from error
 
 
 def _checked(tar: tarfile.TarFile, archive: Path, top: str, max_bytes: int) -> list[tarfile.TarInfo]:
     members, total = [], 0
+    seen: set[PurePosixPath] = set()
     for member in tar:
         path = PurePosixPath(member.name)
+        if path in seen and not member.isdir():
+            raise DataError(f"{archive}: {member.name!r} is in it twice; do not use this archive")
+        seen.add(path)
         if path.is_absolute() or ".." in path.parts:
             raise DataError(f"{archive}: {member.name!r} points outside the folder; do not use this archive")
         if not (member.isfile() or member.isdir()):

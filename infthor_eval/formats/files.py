@@ -1,11 +1,85 @@
-"""Files and folders that are there whole or not at all."""
+"""Files and folders that are there whole or not at all, and the places where they are to go."""
 
+import os
 import shutil
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-__all__ = ["written_atomically"]
+from infthor_eval.errors import DataError, naming
+
+__all__ = ["prepared_file", "prepared_folder", "refuse_loss", "require_writable", "written_atomically"]
+
+_MEND = "make room, or give another place with"
+_PROBE = b"x" * 4096  # a full disk may still take a name
+
+
+def prepared_folder(path: Path, option: str = "--out") -> Path:
+    """Make a folder, and see that it can be written to; called before the work, which would be lost after it.
+
+    Args:
+        path: of the folder.
+        option: how users name it, for the message.
+
+    Raises:
+        DataError: it is a file, or cannot be made or written to.
+    """
+    require_writable(path, option)
+    with naming(f"{path}: cannot be written to", f"{_MEND} {option}"):
+        path.mkdir(parents=True, exist_ok=True)
+    return path
+
+
+def require_writable(path: Path, option: str = "--out") -> None:
+    """See that a folder can be written to, or made where it is not there; nothing is left behind.
+
+    Args:
+        path: of the folder.
+        option: how users name it, for the message.
+
+    Raises:
+        DataError: it cannot.
+    """
+    with naming(f"{path}: cannot be written to", f"{_MEND} {option}", of=(OSError, ValueError)):  # ValueError: a null
+        there = next(folder for folder in (path, *path.absolute().parents) if os.path.lexists(folder))
+        with tempfile.TemporaryFile(dir=there) as probe:
+            probe.write(_PROBE)
+            probe.flush()
+            os.fsync(probe.fileno())
+
+
+def prepared_file(path: Path, option: str = "--out") -> Path:
+    """See that a file can be written, or replaced; called before the work.
+
+    Args:
+        path: of the file.
+        option: how users name it, for the message.
+
+    Raises:
+        DataError: it is a folder, a pipe or a device, or its folder cannot be written to.
+    """
+    prepared_folder(path.parent, option)
+    with naming(f"{path}: cannot be written to", f"{_MEND} {option}"):
+        if path.exists() and not path.is_file():
+            raise DataError(f"{path}: is not a file; give another place with {option}")
+    return path
+
+
+def refuse_loss(path: Path, content: bytes, mend: str) -> None:
+    """Refuse to replace a file by another content: somebody may have edited it.
+
+    Args:
+        path: of the file.
+        content: what would be written.
+        mend: what to do instead, for the message.
+
+    Raises:
+        DataError: the file holds something else.
+    """
+    with naming(f"{path}: cannot be read", mend):
+        if path.is_file() and path.read_bytes() != content:
+            raise DataError(f"{path}: is there already and holds something else; {mend}")
 
 
 @contextmanager

@@ -7,14 +7,15 @@ in metres.
 
 import gzip
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from infthor_eval.errors import DataError
+from infthor_eval.errors import DataError, naming
 from infthor_eval.formats.files import written_atomically
+from infthor_eval.formats.reading import json_lines_of
 
 __all__ = ["floor_plan_names", "write_floor_plan"]
 
@@ -27,14 +28,7 @@ def floor_plan_names(root: Path) -> list[str]:
     Raises:
         DataError: the folder's file of objects is missing or not what it should be.
     """
-    path = root / _OBJECTS
-    try:
-        with gzip.open(path, "rt", encoding="utf-8") as file:
-            return [str(json.loads(line)["scene"]) for line in file if line.strip()]
-    except (OSError, EOFError, ValueError, KeyError, TypeError) as error:
-        raise DataError(
-            f"{path}: not a file of recorded floor plans ({error}); give their folder with --data"
-        ) from error
+    return [scene for scene, _ in _recorded(root / _OBJECTS)]
 
 
 def write_floor_plan(
@@ -54,25 +48,24 @@ def write_floor_plan(
     path = root / _OBJECTS
     layouts = root / "alfred" / "layouts"
     line = json.dumps({"scene": scene, "objects": [_without_corners(item) for item in objects]})
-    try:
+    kept = [line for name, line in _recorded(path) if name != scene] if path.exists() else []
+    with naming(f"{path}: {scene} cannot be added", "give another folder"):
         path.parent.mkdir(parents=True, exist_ok=True)
         layouts.mkdir(parents=True, exist_ok=True)
         np.save(layouts / f"{scene}-layout.npy", np.array(cells, dtype=np.float64).reshape(-1, 2))
         types = sorted({item["objectType"] for item in objects})
         (layouts / f"{scene}-objects.json").write_text(json.dumps(types, indent=1) + "\n", encoding="utf-8")
         with written_atomically(path) as partial, gzip.open(partial, "wt", encoding="utf-8") as file:
-            file.writelines(f"{kept}\n" for kept in [*_others(path, scene), line])
-    except (OSError, EOFError, ValueError, KeyError) as error:
-        raise DataError(f"{path}: {scene} cannot be added ({error}); give another folder with --data") from error
+            file.writelines(f"{text}\n" for text in [*kept, line])
 
 
-def _others(path: Path, scene: str) -> list[str]:
-    """The lines of all other scenes, as they stand."""
-    if not path.is_file():
-        return []
-    with gzip.open(path, "rt", encoding="utf-8") as file:
-        lines = [line.rstrip("\n") for line in file if line.strip()]
-    return [line for line in lines if json.loads(line)["scene"] != scene]
+def _recorded(path: Path) -> Iterator[tuple[str, str]]:
+    """The scenes in a file of objects, each with its line."""
+    for entry in json_lines_of(path, "give a folder of recorded floor plans with --data"):
+        scene = entry.get("scene")
+        if not isinstance(scene, str):
+            raise DataError(f"{path}: a line has no scene's name; give a folder of recorded floor plans with --data")
+        yield scene, json.dumps(entry)
 
 
 def _without_corners(item: dict[str, Any]) -> dict[str, Any]:

@@ -4,18 +4,44 @@ A trajectory has thousands of frames and a question refers to many of them, so r
 model's adapter decodes. A reference knows the digest of its file's content, by which caches recognise a frame.
 """
 
+import struct
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from PIL import Image, UnidentifiedImageError
+from PIL import Image
 
-from infthor_eval.errors import DataError
+from infthor_eval.errors import DataError, naming
 from infthor_eval.formats.digests import digest_of_file
+from infthor_eval.formats.limits import IMAGE_ASPECT, IMAGE_MEGAPIXELS
+from infthor_eval.formats.reading import require_file, why_no_file
 
 __all__ = ["FrameRef"]
 
-_SIGNATURES = (b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff")  # PNG, JPEG
+Image.MAX_IMAGE_PIXELS = None  # how large an image may be is judged here, and can be set
+
+_PNG = b"\x89PNG\r\n\x1a\n"
+_SIGNATURES = (_PNG, b"\xff\xd8\xff")  # PNG, JPEG
+_HEAD = 24  # bytes, of a PNG to behind its size
+_MEND = "restore the frame"
+# What Pillow's decoders raise on headers and content that somebody damaged or made up.
+_DAMAGED = (
+    OSError,
+    SyntaxError,
+    ValueError,
+    ArithmeticError,
+    LookupError,
+    TypeError,
+    AttributeError,
+    EOFError,
+    MemoryError,
+    struct.error,
+    zlib.error,
+    Image.DecompressionBombError,
+)
 
 
 @dataclass(frozen=True)
@@ -31,28 +57,65 @@ class FrameRef:
         Raises:
             DataError: the file cannot be read.
         """
-        try:
+        require_file(self.path, _MEND)
+        with naming(f"{self.path}: cannot be read", _MEND):
             return digest_of_file(self.path)
-        except OSError as error:
-            raise DataError(f"{self.path}: cannot be read ({error.strerror}); restore the frame") from error
+
+    @cached_property
+    def size(self) -> tuple[int, int]:
+        """Width and height from the file's header; no pixel is decoded.
+
+        Raises:
+            DataError: as `load`, as far as the header tells.
+        """
+        with self._opened() as image:
+            return image.size
 
     def problem(self) -> str | None:
         """Why this cannot be a frame, judged by the first bytes alone; None where nothing speaks against it."""
+        reason = why_no_file(self.path)
+        if reason is not None:
+            return f"{self.path}: {reason}"
         try:
             with self.path.open("rb") as file:
-                head = file.read(8)
+                head = file.read(_HEAD)
         except OSError as error:
             return f"{self.path}: cannot be read ({error.strerror})"
-        return None if head.startswith(_SIGNATURES) else f"{self.path}: not a PNG or JPEG image"
+        if not head.startswith(_SIGNATURES):
+            return f"{self.path}: not a PNG or JPEG image"
+        return self._wrong_size(*struct.unpack(">II", head[16:])) if _is_whole_png_head(head) else None
 
     def load(self) -> Image.Image:
         """The frame as an RGB image.
 
         Raises:
-            DataError: the file is missing, not an image, or cut off.
+            DataError: the file is missing, no image of a frame, or cut off.
         """
-        try:
-            with Image.open(self.path) as image:
-                return image.convert("RGB")
-        except (UnidentifiedImageError, OSError, SyntaxError) as error:
-            raise DataError(f"{self.path}: not a readable image ({error}); restore the frame") from error
+        with self._opened() as image:
+            return image.convert("RGB")
+
+    @contextmanager
+    def _opened(self) -> Iterator[Image.Image]:
+        require_file(self.path, _MEND)
+        with (
+            naming(f"{self.path}: not a readable image", _MEND, of=_DAMAGED),
+            Image.open(self.path, formats=("PNG", "JPEG")) as image,
+        ):
+            problem = self._wrong_size(*image.size)
+            if problem is not None:
+                raise DataError(f"{problem}; {_MEND}")
+            yield image
+
+    def _wrong_size(self, width: int, height: int) -> str | None:
+        """Why an image of this size is no frame: it would take all memory, or no model can take it."""
+        if min(width, height) < 1:
+            return f"{self.path}: an image of {width}x{height} pixels"
+        if width * height > IMAGE_MEGAPIXELS.value * 1_000_000:
+            return f"{self.path}: an image of {width}x{height} pixels is too large; {IMAGE_MEGAPIXELS.mend}"
+        if max(width, height) > IMAGE_ASPECT.value * min(width, height):
+            return f"{self.path}: an image of {width}x{height} pixels is too narrow; {IMAGE_ASPECT.mend}"
+        return None
+
+
+def _is_whole_png_head(head: bytes) -> bool:
+    return head.startswith(_PNG) and len(head) == _HEAD and head[12:16] == b"IHDR"

@@ -7,11 +7,13 @@ The folder form is that of the published data (hub dataset `PEARLS-Lab/infini-th
 
 import hashlib
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import TypeVar
 
-from infthor_eval.errors import DataError
+from infthor_eval.errors import DataError, naming
 from infthor_eval.formats.action_log import read_action_log
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.outline import Outline, find_outline, read_outline, read_states
@@ -23,6 +25,9 @@ from infthor_eval.formats.video import frames_per_second
 
 __all__ = ["NiehSet", "SkippedQuestion"]
 
+T = TypeVar("T")
+_LONGEST = 40  # characters of a name in a message
+_MEND = "unpack the trajectory again"
 _IMAGE_FOLDERS = ("img", "img_768")
 _IMAGE_SUFFIXES = {".png", ".jpg", ".jpeg"}
 
@@ -71,7 +76,7 @@ class NiehSet:
         self.trajectories = trajectories
         self.simulator = simulator_of(root)
         self._read = tuple(question for file in self._files for question in read_questions(file))
-        self._frames: dict[str, dict[int, FrameRef]] = {}
+        self._frames: dict[str, dict[int, FrameRef] | DataError] = {}
         self._all_frames: dict[str, tuple[FrameRef, ...]] = {}  # shared by all questions on the whole trajectory
         self._videos: dict[str, tuple[FrameRef, ...] | DataError] = {}
         self._outlines: dict[str, Outline] = {}
@@ -110,7 +115,7 @@ class NiehSet:
         for traj_id in sorted({question.traj_id for question in self.questions}):
             digest.update((self.folder(traj_id) / "metadata.json").read_bytes())
             for index, frame in self._trajectory(traj_id).items():
-                digest.update(f"{traj_id}/{index}:{frame.path.name}:{frame.path.stat().st_size}\n".encode())
+                digest.update(f"{traj_id}/{index}:{frame.path.name}:{_size(frame.path)}\n".encode())
         return digest.hexdigest()
 
     def reasons(self) -> Counter[str]:
@@ -205,51 +210,84 @@ class NiehSet:
 
     def _problem(self, question: Question) -> str | None:
         """Why a question cannot be asked; None where it can."""
-        if Path(question.traj_id).name != question.traj_id or question.traj_id in {"", ".", ".."}:
-            return f"trajectory {question.traj_id!r} is not a plain folder name"
-        if not self.folder(question.traj_id).is_dir():
-            return f"trajectory {question.traj_id} is not in metadata/"
         if not question.answers:
             return "no gold answer"
         if not question.clues:
             return "no clue frame"
-        frames = self._trajectory(question.traj_id)
+        try:
+            frames = self._trajectory(question.traj_id)
+        except DataError as error:
+            return str(error)
         outside = [index for index in question.clues if index not in frames]
         if outside:
             return f"clue {outside[0]} is outside trajectory {question.traj_id} ({len(frames)} frames)"
         return next(filter(None, (frames[index].problem() for index in question.clues)), None)
 
     def _trajectory(self, traj_id: str) -> dict[int, FrameRef]:
+        if Path(traj_id).name != traj_id or traj_id in {"", ".", ".."}:
+            raise DataError(f"trajectory {traj_id!r} is not a plain folder name")
         if traj_id not in self._frames:
-            self._frames[traj_id] = _read_frames(self.folder(traj_id))
-        return self._frames[traj_id]
+            try:
+                self._frames[traj_id] = _read_frames(self.folder(traj_id))
+            except DataError as error:
+                self._frames[traj_id] = error  # a broken log is not read again for every question on it
+        found = self._frames[traj_id]
+        if isinstance(found, DataError):
+            raise found
+        return found
 
 
 def _read_frames(folder: Path) -> dict[int, FrameRef]:
     """Frames by their number (`img_idx`), in time order."""
-    steps = read_steps(folder)
-    images = _images(folder)
-    if len(images) != len(steps):
+    with naming(f"trajectory {folder.name[:_LONGEST]}: its folder cannot be read", _MEND):
+        if not folder.is_dir():
+            raise DataError(f"trajectory {folder.name} is not in metadata/")
+    steps = sorted(read_steps(folder), key=lambda step: step.img_idx)
+    home = _image_folder(folder)
+    # By stem: published sets of other sizes (img_768) keep the names and change the suffix.
+    names = [Path(step.img_filename).stem for step in steps]
+    for alike, what in ((_twice(names), "img_filename"), (_twice([step.img_idx for step in steps]), "img_idx")):
+        if alike is not None:
+            raise DataError(
+                f"trajectory {folder.name}: metadata.json numbers two frames alike ({what} {alike}); {_MEND}"
+            )
+    by_stem = _images(home)
+    unknown = sorted(by_stem.keys() - set(names))
+    if len(unknown) > len(set(names) - by_stem.keys()):  # a frame under another name is one that is missing
         raise DataError(
-            f"trajectory {folder.name}: {len(images)} frames but {len(steps)} entries in metadata.json; "
-            "unpack the trajectory again"
+            f"trajectory {folder.name}: {len(by_stem)} frames but {len(steps)} entries in metadata.json "
+            f"(none for {unknown[0]}); {_MEND}"
         )
-    steps = sorted(steps, key=lambda step: step.img_idx)
-    if all(step.img_filename for step in steps):
-        # By stem: published sets of other sizes (img_768) keep the names and change the suffix.
-        by_stem = {path.stem: path for path in images}
-        names = [step.img_filename or "" for step in steps]
-        paths = [by_stem.get(Path(name).stem, images[0].parent / Path(name).name) for name in names]
-    else:
-        paths = images
-    frames = {step.img_idx: FrameRef(path) for step, path in zip(steps, paths, strict=True)}
-    if len(frames) != len(steps):
-        raise DataError(f"trajectory {folder.name}: metadata.json numbers two frames alike (img_idx)")
-    return frames
+    # A file that is missing spoils the questions that show it, and no other: whoever asks for it is told.
+    return {
+        step.img_idx: FrameRef(by_stem.get(name, home / Path(step.img_filename).name))
+        for step, name in zip(steps, names, strict=True)
+    }
 
 
-def _images(folder: Path) -> list[Path]:
+def _image_folder(folder: Path) -> Path:
     for name in _IMAGE_FOLDERS:
         if (folder / name).is_dir():
-            return sorted(path for path in (folder / name).iterdir() if path.suffix.lower() in _IMAGE_SUFFIXES)
-    raise DataError(f"trajectory {folder.name}: neither img/ nor img_768/ in {folder}; unpack it again")
+            return folder / name
+    raise DataError(f"trajectory {folder.name}: neither img/ nor img_768/ in {folder}; {_MEND}")
+
+
+def _images(folder: Path) -> dict[str, Path]:
+    images = sorted(path for path in folder.iterdir() if path.suffix.lower() in _IMAGE_SUFFIXES)
+    twice = _twice([path.stem for path in images])
+    if twice is not None:
+        raise DataError(f"{folder}: two frames of the name {twice} (.png, .jpg); take one of them out")
+    return {path.stem: path for path in images}
+
+
+def _twice(values: Sequence[T]) -> T | None:
+    """The first value that stands twice."""
+    return next((value for value, count in Counter(values).items() if count > 1), None)
+
+
+def _size(path: Path) -> int | None:
+    """Of a file, in bytes; None where there is none."""
+    try:
+        return path.stat().st_size
+    except OSError:
+        return None

@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
-import yaml
 
-from infthor_eval.errors import DataError
+from infthor_eval.errors import DataError, naming
 from infthor_eval.formats.packaged import packaged_folder
+from infthor_eval.formats.yaml_files import read_yaml
 
 __all__ = ["PublishedRow", "PublishedTable", "published_tables"]
 
@@ -79,10 +79,8 @@ def published_tables(suite: str) -> tuple[PublishedTable, ...]:
 
 
 def _read(path: Path) -> PublishedTable:
-    try:
-        table = msgspec.convert(yaml.safe_load(path.read_text(encoding="utf-8")), PublishedTable)
-    except (OSError, yaml.YAMLError, msgspec.ValidationError) as error:
-        raise DataError(f"{path}: not a table of published numbers ({' '.join(str(error).split())})") from error
+    with naming(f"{path}: not a table of published numbers", "install infthor-eval again", of=msgspec.ValidationError):
+        table = msgspec.convert(read_yaml(path, "install infthor-eval again"), PublishedTable)
     for row in table.rows:
         if len(row.values) != len(table.columns):
             raise DataError(f"{path}: {row.name} has {len(row.values)} values for {len(table.columns)} columns")

@@ -7,83 +7,94 @@ no evidence) are ours and optional; other columns are left unread.
 
 import ast
 import csv
+import io
+import math
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 from infthor_eval.errors import DataError
+from infthor_eval.formats.csv_files import read_rows
 from infthor_eval.formats.files import written_atomically
 from infthor_eval.formats.question import Question
 
-__all__ = ["read_questions", "write_questions"]
+__all__ = ["encode_questions", "read_questions", "write_questions"]
 
 _COLUMNS = ("traj_id", "question", "gt_img_idx", "answer")
 _TYPE = "question_type"
 _ABSENCE = "absence"
+_LARGEST = 2**63  # of the numbers that JSON readers take
 
 
 def read_questions(path: Path) -> list[Question]:
     """Read a question file.
 
     Raises:
-        DataError: the file cannot be read, lacks a column, or a cell is not what the column holds.
+        DataError: the file cannot be read, is no CSV file of that form, or a cell is not what the column holds.
     """
-    try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            reader = csv.DictReader(file)
-            missing = [name for name in _COLUMNS if name not in (reader.fieldnames or ())]
-            if missing:
-                raise DataError(f"{path}: no column {', '.join(missing)}; a question file has {', '.join(_COLUMNS)}")
-            return [_question(row, f"{path}, line {reader.line_num}") for row in reader]
-    except OSError as error:
-        raise DataError(f"{path}: cannot be read ({error.strerror}); give a question file") from error
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise DataError(f"{path}: not a UTF-8 CSV file ({error})") from error
+    mend = f"a question file is a UTF-8 CSV file with the columns {', '.join(_COLUMNS)}"
+    return [_question(row, place) for place, row in read_rows(path, _COLUMNS, mend)]
 
 
 def write_questions(path: Path, questions: Iterable[Question]) -> None:
     """Write a question file, whole or not at all."""
-    with written_atomically(path) as partial, partial.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow([*_COLUMNS, _TYPE, _ABSENCE])
-        for item in questions:
-            absence = "yes" if item.absence else ""
-            writer.writerow(
-                [item.traj_id, item.text, list(item.clues), list(item.answers), item.question_type or "", absence]
-            )
+    with written_atomically(path) as partial:
+        partial.write_bytes(encode_questions(questions))
 
 
-def _question(row: dict[str, str | None], place: str) -> Question:
+def encode_questions(questions: Iterable[Question]) -> bytes:
+    """The content of a question file."""
+    text = io.StringIO(newline="")
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow([*_COLUMNS, _TYPE, _ABSENCE])
+    for item in questions:
+        absence = "yes" if item.absence else ""
+        writer.writerow(
+            [item.traj_id, item.text, list(item.clues), list(item.answers), item.question_type or "", absence]
+        )
+    return text.getvalue().encode()
+
+
+def _question(row: dict[str, str], place: str) -> Question:
     for name in _COLUMNS:
-        if not (row[name] or "").strip():
+        if not row[name].strip():
             raise DataError(f"{place}: {name} is empty; fill it or take the row out")
-    absence = (row.get(_ABSENCE) or "").strip().lower()
+    absence = row.get(_ABSENCE, "").strip().lower()
     if absence not in {"", "yes", "no"}:
         raise DataError(f"{place}: {_ABSENCE} is {_short(absence)}; it is yes, no or empty")
     clues = _literal_list(row["gt_img_idx"], f"{place}: gt_img_idx", int)
     answers = _literal_list(row["answer"], f"{place}: answer", (str, int, float))
+    if not all(map(_can_be_given, answers)):
+        raise DataError(f"{place}: answer has an entry that nobody can give: {_short(row['answer'])}; write it out")
     return Question(
-        traj_id=(row["traj_id"] or "").strip(),
-        text=(row["question"] or "").strip(),
+        traj_id=row["traj_id"].strip(),
+        text=row["question"].strip(),
         clues=tuple(clues),
         answers=tuple(answers),
-        question_type=(row.get(_TYPE) or "").strip() or None,
+        question_type=row.get(_TYPE, "").strip() or None,
         absence=absence == "yes",
     )
 
 
-def _literal_list(cell: str | None, place: str, types: type | tuple[type, ...]) -> list[Any]:
+def _literal_list(cell: str, place: str, types: type | tuple[type, ...]) -> list[Any]:
     try:
-        value = ast.literal_eval((cell or "").strip())
+        value = ast.literal_eval(cell.strip())
     except (ValueError, SyntaxError, MemoryError, RecursionError):
         value = None
     if not isinstance(value, list):
         raise DataError(f"{place} is not a list: {_short(cell)}; write it as in [12, 13] or ['yes']")
     if not all(isinstance(item, types) and not isinstance(item, bool) for item in value):
-        raise DataError(f"{place} has an entry of the wrong type: {_short(cell)}")
+        raise DataError(f"{place} has an entry of the wrong type: {_short(cell)}; write it as in [12, 13] or ['yes']")
     return value
 
 
-def _short(cell: str | None) -> str:
-    text = repr(cell or "")
+def _can_be_given(answer: str | int | float) -> bool:
+    """Whether an answer is a text with something in it, or a number that a file of ours can hold."""
+    if not isinstance(answer, str):
+        return math.isfinite(answer) and abs(answer) < _LARGEST
+    return bool(answer.strip()) and not any("\ud800" <= letter <= "\udfff" for letter in answer)
+
+
+def _short(cell: str) -> str:
+    text = repr(cell)
     return text if len(text) <= 60 else text[:57] + "..."

@@ -5,7 +5,8 @@ from pathlib import Path
 from typing import Any
 
 import infthor_eval
-from infthor_eval.errors import DataError
+from infthor_eval.errors import DataError, naming
+from infthor_eval.formats.reading import read_json
 
 __all__ = ["FORMAT", "claim_for_simulator", "simulator_of"]
 
@@ -20,8 +21,10 @@ def simulator_of(root: Path) -> str | None:
         DataError: `set.json` is not a JSON object, or is of another version than this one reads.
     """
     path = root / _FILE
-    simulator = _read(path).get("simulator") if path.is_file() else None
-    return None if simulator is None else str(simulator)
+    simulator = _read(path).get("simulator") if path.exists() else None
+    if simulator is not None and not isinstance(simulator, str):
+        raise DataError(f"{path}: simulator is {simulator!r:.40}, not a name; write the set again")
+    return simulator
 
 
 def claim_for_simulator(root: Path, simulator: str) -> None:
@@ -31,9 +34,10 @@ def claim_for_simulator(root: Path, simulator: str) -> None:
         DataError: another simulator, or another version of this one, has rendered the frames that are there.
     """
     path, version = root / _FILE, infthor_eval.__version__
-    if not path.is_file():
+    if not path.exists():
         info = {"format": FORMAT, "simulator": simulator, "infthor_eval": version}
-        path.write_text(json.dumps(info) + "\n", encoding="utf-8")
+        with naming(f"{path}: cannot be written", "make room, or give another folder"):
+            path.write_text(json.dumps(info) + "\n", encoding="utf-8")
         return
     known = _read(path)
     if known.get("simulator") != simulator:
@@ -49,10 +53,7 @@ def claim_for_simulator(root: Path, simulator: str) -> None:
 
 
 def _read(path: Path) -> dict[str, Any]:
-    try:
-        info = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise DataError(f"{path}: not JSON ({error}); write the set again") from error
+    info = read_json(path, "write the set again")
     if not isinstance(info, dict):
         raise DataError(f"{path}: not a JSON object; write the set again")
     if info.get("format", FORMAT) != FORMAT:

@@ -17,6 +17,7 @@ from typing import Any
 import msgspec
 
 from infthor_eval.errors import DataError
+from infthor_eval.formats.reading import read_json
 
 __all__ = ["ObjectLog", "ObjectState", "Pose", "Seen", "Step", "read_steps", "worlds", "write_steps"]
 
@@ -144,12 +145,7 @@ def read_steps(folder: Path) -> list[Step]:
         DataError: the file is missing, not JSON, or not in one of the known layouts.
     """
     path = Path(folder) / _FILE
-    try:
-        document = msgspec.json.decode(path.read_bytes())
-    except OSError as error:
-        raise DataError(f"{path}: cannot be read ({error.strerror}); {_MEND}") from error
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise DataError(f"{path}: not valid JSON ({error}); {_MEND}") from error
+    document = read_json(path, _MEND)
     return [_step(path, index, entry) for index, entry in enumerate(_entries(path, document))]
 
 

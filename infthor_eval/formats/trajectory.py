@@ -5,7 +5,6 @@ the known fields is tolerated and left out, so whoever passes a trajectory on ke
 but for `PlannerAction.location`, whose x and z are grid cells of 0.25 m; angles are degrees.
 """
 
-import gzip
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -16,6 +15,7 @@ import msgspec
 
 from infthor_eval.errors import DataError
 from infthor_eval.formats.digests import digest
+from infthor_eval.formats.reading import lines_of, read_bytes
 
 __all__ = [
     "ApiAction",
@@ -37,6 +37,7 @@ __all__ = [
     "folder_name",
     "iter_sources",
     "iter_trajectories",
+    "trajectory_files",
 ]
 
 _SUFFIXES = (".json", ".jsonl", ".jsonl.gz")
@@ -227,7 +228,7 @@ class Source:
         """
         try:
             trajectory = msgspec.convert(_regular(msgspec.json.decode(self.raw)), type=Trajectory)
-        except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
             raise DataError(f"{self.place}: not a trajectory ({error}); {_MEND}") from error
         trajectory.traj_id = trajectory.traj_id or trajectory.task_id or self._stem()
         return trajectory
@@ -248,17 +249,28 @@ def iter_sources(path: Path) -> Iterator[Source]:
     """
     path = Path(path)
     if path.is_dir():
-        files = [file for file in sorted(path.rglob("*")) if _is_trajectory_file(file)]
-        if not files:
-            raise DataError(f"{path}: no {', '.join(_SUFFIXES)} file in this directory; name another path")
-        for file in files:
+        for file in trajectory_files(path):
             yield from iter_sources(file)
     elif path.name.endswith(".json"):
-        yield Source(path, None, _read(path))
+        yield Source(path, None, read_bytes(path, _MEND))
     elif path.name.endswith((".jsonl", ".jsonl.gz")):
-        yield from _lines(path)
+        yield from (Source(path, line, raw) for line, raw in lines_of(path, _MEND))
     else:
         raise DataError(f"{path}: no trajectory file; name a {', '.join(_SUFFIXES)} file or a directory")
+
+
+def trajectory_files(path: Path) -> list[Path]:
+    """The files of trajectories in a directory, sorted; of a file, itself.
+
+    Raises:
+        DataError: a directory without any.
+    """
+    if not path.is_dir():
+        return [path]
+    files = [file for file in sorted(path.rglob("*")) if _is_trajectory_file(file)]
+    if not files:
+        raise DataError(f"{path}: no {', '.join(_SUFFIXES)} file in this directory; name another path")
+    return files
 
 
 def iter_trajectories(path: Path) -> Iterator[Trajectory]:
@@ -308,22 +320,5 @@ def folder_name(traj_id: str) -> str:
 
 
 def _is_trajectory_file(path: Path) -> bool:
-    return path.is_file() and path.name.endswith(_SUFFIXES) and path.name not in _NOT_TRAJECTORIES
-
-
-def _read(path: Path) -> bytes:
-    try:
-        return path.read_bytes()
-    except OSError as error:
-        raise DataError(f"{path}: cannot be read ({error.strerror}); {_MEND}") from error
-
-
-def _lines(path: Path) -> Iterator[Source]:
-    line = 0
-    try:
-        with gzip.open(path) if path.suffix == ".gz" else path.open("rb") as file:
-            for line, raw in enumerate(file, start=1):
-                if raw.strip():
-                    yield Source(path, line, raw)
-    except (OSError, EOFError) as error:
-        raise DataError(f"{path}: cannot be read after line {line} ({error}); {_MEND}") from error
+    # Pipes and devices too: whoever reads them is told what they are.
+    return not path.is_dir() and path.name.endswith(_SUFFIXES) and path.name not in _NOT_TRAJECTORIES

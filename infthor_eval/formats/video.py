@@ -11,9 +11,10 @@ from pathlib import Path
 
 from PIL import Image
 
-from infthor_eval.errors import DataError
+from infthor_eval.errors import DataError, naming
 from infthor_eval.formats.digests import digest_of_file
 from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.reading import require_file
 from infthor_eval.formats.user_cache import user_cache
 
 __all__ = ["frames_per_second"]
@@ -23,7 +24,7 @@ __all__ = ["frames_per_second"]
 os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
 
 _COUNT = "n_frames"  # the file with the number of frames beside them
-_MEND = "make it again, or take it away to show the frames instead"
+_MEND = "make the video again, or delete it to show the frames instead"
 
 
 def frames_per_second(path: Path) -> tuple[FrameRef, ...]:
@@ -37,10 +38,9 @@ def frames_per_second(path: Path) -> tuple[FrameRef, ...]:
     """
     import cv2
 
-    try:
+    require_file(path, _MEND)
+    with naming(f"{path}: cannot be read", _MEND):
         digest = digest_of_file(path)
-    except OSError as error:
-        raise DataError(f"{path}: cannot be read ({error.strerror}); {_MEND}") from error
     folder = user_cache("video_frames") / f"{digest}-1fps-opencv{cv2.__version__}"
     if not _is_complete(folder):
         try:

@@ -7,13 +7,16 @@ digest of every file, by which a test tells that the same set comes out again.
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
+from typing import Annotated
 
 import msgspec
+from msgspec import Meta
 from PIL import Image
 
 from infthor_eval.errors import DataError
 from infthor_eval.formats.digests import digest_of_file
 from infthor_eval.formats.qa_csv import write_questions
+from infthor_eval.formats.reading import read_json
 from infthor_eval.generation.generate_set import generate_set
 from infthor_eval.generation.questions.make import MadeQuestions, make_questions
 from infthor_eval.generation.replay_set import replay_set, select
@@ -30,9 +33,9 @@ class TrajectoryRecipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """One trajectory: the arguments of `generate`."""
 
     scene: str
-    seed: int
-    min_steps: int
-    min_subgoals: int = 1
+    seed: Annotated[int, Meta(ge=0)]
+    min_steps: Annotated[int, Meta(ge=1)]
+    min_subgoals: Annotated[int, Meta(ge=1)] = 1
 
 
 class Manifest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -48,12 +51,12 @@ class Manifest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         files: digest by path of every file of the set; empty in a manifest that nothing was made from yet.
     """
 
-    name: str
-    trajectories: tuple[TrajectoryRecipe, ...]
-    per_trajectory: int = 25
+    name: Annotated[str, Meta(pattern=r"^[\w.-]+$")]
+    trajectories: Annotated[tuple[TrajectoryRecipe, ...], Meta(min_length=1)]
+    per_trajectory: Annotated[int, Meta(ge=1)] = 25
     question_seed: int = 0
     further: bool = False
-    colors: int = 128
+    colors: Annotated[int, Meta(ge=2, le=256)] = 128
     files: dict[str, str] = {}
 
 
@@ -63,12 +66,7 @@ def read_manifest(path: Path) -> Manifest:
     Raises:
         DataError: it cannot be read or is none.
     """
-    try:
-        return msgspec.json.decode(path.read_bytes(), type=Manifest)
-    except OSError as error:
-        raise DataError(f"{path}: cannot be read ({error.strerror}); give a manifest") from error
-    except msgspec.DecodeError as error:
-        raise DataError(f"{path}: not a manifest ({error}); restore it or give another") from error
+    return read_json(path, "give a manifest", Manifest)
 
 
 def make_bundle(

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 from infthor_eval.errors import UsageError
+from infthor_eval.formats.limits import TRAJECTORIES
 from infthor_eval.generation.settings import MAX_FAIL, TrajectorySettings
 from infthor_eval.household.scene_types import BATHROOM, scene_type
 
@@ -29,7 +30,12 @@ def trajectory_jobs(
         min_subgoals: tasks at least.
         final_task: whether a final task follows.
         max_fail: tasks that may fail in one trajectory.
+
+    Raises:
+        UsageError: there would be more of them than the limit.
     """
+    if count * len(scenes) > TRAJECTORIES.value:
+        raise UsageError(f"{count} trajectories for each of {len(scenes)} scenes are too many; {TRAJECTORIES.mend}")
     seeds = range(seed, seed + count)
     return [
         TrajectorySettings(scene, k, min_steps, min_subgoals, final_task, max_fail=max_fail)

@@ -8,18 +8,21 @@ again.
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import msgspec
 
-from infthor_eval.errors import DataError, InfthorError, SimulatorError
+from infthor_eval.errors import DataError, InfthorError, SimulatorError, naming
 from infthor_eval.formats.digests import digest
 from infthor_eval.formats.files import written_atomically
+from infthor_eval.formats.reading import read_json
 from infthor_eval.formats.set_info import claim_for_simulator
-from infthor_eval.formats.trajectory import Source, Trajectory, folder_name, iter_sources
+from infthor_eval.formats.trajectory import Source, Trajectory, folder_name, iter_sources, trajectory_files
 from infthor_eval.generation.garbage import libraries_set_aside
 from infthor_eval.generation.replay import ReplayReport, replay
+from infthor_eval.generation.supplement import agent_path
 from infthor_eval.thor.simulator import Simulator
 
 __all__ = ["Failure", "ReplayedSet", "Selection", "replay_set", "select"]
@@ -74,11 +77,13 @@ def select(paths: Iterable[Path], limit: int | None = None, per_floor_plan: int 
     """
     selection = Selection()
     taken: Counter[str] = Counter()
-    for source in _all_sources(paths):
+    for source in _all_sources(paths, selection.failures):
         if limit is not None and len(selection.items) >= limit:
             break
         try:
             trajectory = source.read()
+            with _malformed(source):
+                agent_path(trajectory)  # what the scene is supplemented with, before the first replay
         except DataError as error:
             selection.failures.append(Failure(source.place, str(error)))
             continue
@@ -115,7 +120,7 @@ def replay_set(
     result = ReplayedSet(failures=list(selection.failures))
     for source, trajectory in selection.items:
         try:
-            with libraries_set_aside():
+            with libraries_set_aside(), _malformed(source):
                 report, new = _one(source, trajectory, simulator, metadata, frames)
         except InfthorError as error:
             result.failures.append(Failure(source.place, f"{trajectory.traj_id}: {error}"))
@@ -127,9 +132,26 @@ def replay_set(
     return result
 
 
-def _all_sources(paths: Iterable[Path]) -> Iterator[Source]:
+def _all_sources(paths: Iterable[Path], failures: list[Failure]) -> Iterator[Source]:
+    """What is in the files; one of several that cannot be read to its end is a failure, and the others go on."""
     for path in paths:
-        yield from iter_sources(path)
+        files = trajectory_files(path)
+        for file in files:
+            n_found = 0
+            try:
+                for source in iter_sources(file):
+                    n_found += 1
+                    yield source
+            except DataError as error:
+                if not n_found and files == [path]:
+                    raise
+                failures.append(Failure(str(file), str(error)))
+
+
+def _malformed(source: Source) -> AbstractContextManager[None]:
+    """Names what a trajectory that is JSON of the right form can still be wrong in."""
+    wrong = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError)
+    return naming(f"{source.place}: not a trajectory that can be replayed", "restore it or leave it out", of=wrong)
 
 
 def _one(
@@ -157,10 +179,7 @@ def _one(
 def _earlier(folder: Path, wanted: str, frames: int) -> ReplayReport:
     """The report of a trajectory that an earlier run replayed."""
     path = folder / _REPORT
-    try:
-        report = msgspec.json.decode(path.read_bytes(), type=ReplayReport)
-    except (OSError, msgspec.DecodeError) as error:
-        raise DataError(f"{path}: not readable ({error}); remove the folder to replay it again") from error
+    report = read_json(path, "remove the folder to replay it again", ReplayReport)
     if report.digest != wanted:
         raise DataError(f"{folder}: made from another trajectory of this name; remove it or choose another --out")
     if report.frames != frames:

@@ -26,7 +26,9 @@ _PLANS = {
 def plan_text(high: HighAction) -> str:
     """A sub-goal in words ("put the mug in the fridge"); one without a template keeps its name."""
     action = high.discrete_action
-    template = _PLANS.get(action.action, action.action)
+    template = _PLANS.get(action.action)
+    if template is None:  # a name out of a file, which is no template whatever is in it
+        return action.action
     names = [str(name) for name in action.args] if isinstance(action.args, list) else []
     return template.format(*names) if len(names) >= template.count("{") else action.action
 

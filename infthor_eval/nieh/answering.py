@@ -183,8 +183,13 @@ def answered(
     Neighbours share as long a prefix as there is, which a model's conversation encodes once. The order depends on the
     units alone, so it is the same when a run is resumed.
     """
-    asked = sorted((_Asked.of(unit, prepared) for unit in units), key=_names)
-    for _, in_one_context in groupby(asked, key=_names):
+    asked = []
+    for unit in units:
+        try:
+            asked.append(_Asked.of(unit, prepared))
+        except DataError as error:
+            yield unit.failed(str(error))
+    for _, in_one_context in groupby(sorted(asked, key=_names), key=_names):
         yield from _in_context(list(in_one_context), answerer, session)
 
 

@@ -5,7 +5,8 @@ from functools import cached_property, partial
 from itertools import groupby
 from typing import cast
 
-from infthor_eval.errors import UsageError
+from infthor_eval.errors import DataError, InfthorError, ModelError, UsageError
+from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.nieh.answering import NiehUnit, answered
 from infthor_eval.nieh.docs import doc_of, doc_prompt, doc_target
 from infthor_eval.nieh.options import NiehOptions
@@ -106,8 +107,19 @@ class NiehEvaluation:
         measured = next((task for task in self._tasks if task.needs_size), None)
         if measured is None or self._options.tokens_per_frame is not None:
             return self._options.tokens_per_frame
-        data = measured.data
-        return self._respondent.tokens_per_frame(data.frames(data.questions[0].traj_id)[0])
+        return self._measured(measured.data)
+
+    def _measured(self, data: NiehSet) -> int:
+        """The subject's size of a frame, by the first frame of the questions that can be read."""
+        problems: list[InfthorError] = []
+        for question in data.questions:
+            for frame in data.clue_frames(question):
+                try:
+                    return self._respondent.tokens_per_frame(frame)
+                except (DataError, ModelError) as error:
+                    problems.append(error)
+        reasons = [str(problem) for problem in problems] or sorted(data.reasons()) or ["its files are empty"]
+        raise UsageError(f"no question of {data.root} can be asked ({reasons[0]}); mend the set, or give another")
 
     def _refuse_unused(self) -> None:
         """A kilo-token that no context is measured in would only give the run another identity; others mislead."""
@@ -141,7 +153,7 @@ def _refuse_nothing(found: Sequence[TaskSamples | None], tasks: Sequence[NiehTas
         return
     reasons = {item.reason for samples in found if samples is not None for item in samples.skipped}
     said = "; ".join(sorted(reasons)[:3]) or "its files are empty"
-    raise UsageError(f"no question of {tasks[0].data.root} can be asked ({said})")
+    raise UsageError(f"no question of {tasks[0].data.root} can be asked ({said}); mend the set, or give another")
 
 
 def _groups(task: str, prepared: PreparedTask) -> Iterator[Group]:

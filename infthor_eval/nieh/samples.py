@@ -6,7 +6,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from infthor_eval.errors import UsageError
+from infthor_eval.errors import DataError, UsageError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.hub_data import default_folder
 from infthor_eval.formats.nieh_set import NiehSet, SkippedQuestion
@@ -112,8 +112,15 @@ def _by_question(data: NiehSet, context: Context, settings: ContextSettings) -> 
         return SkippedQuestion(sample.question, problem, sample.variant) if problem else sample
 
     for row in data.rows:
-        found = context.samples(data, row, settings) if isinstance(row, Question) else [row]
+        found = _samples(context, data, row, settings) if isinstance(row, Question) else [row]
         yield [checked(item) if isinstance(item, Sample) else item for item in found]
+
+
+def _samples(context: Context, data: NiehSet, question: Question, settings: ContextSettings) -> _Found:
+    try:
+        return context.samples(data, question, settings)
+    except DataError as error:  # of this trajectory's frames; the others can be asked about
+        return [SkippedQuestion(question, str(error))]
 
 
 def _asked(questions: Iterator[_Found]) -> Iterator[_Found]:

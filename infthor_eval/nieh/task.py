@@ -1,11 +1,13 @@
 """A task of NIEH: what its file says, what it asks, and how its samples become records."""
 
+import difflib
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from typing import Any
 
+from infthor_eval.errors import DataError
 from infthor_eval.formats.nieh_set import NiehSet
-from infthor_eval.nieh.contexts import Sample, context_named
+from infthor_eval.nieh.contexts import ContextSettings, Sample, context_named
 from infthor_eval.nieh.metrics import PUBLISHED, Metrics, metrics_of
 from infthor_eval.nieh.samples import TaskSamples, find_samples, find_set
 from infthor_eval.runs import TaskFile, TaskRequest
@@ -14,6 +16,7 @@ from model_adapters import Decoding
 
 __all__ = ["NiehTask", "PreparedTask"]
 
+_OF_SETS = ("context", "data", "bundled")  # what `dataset_kwargs` takes beside the settings of contexts
 _NEEDED = ("custom_dataset", "dataset_kwargs", "doc_to_text", "generation_kwargs", "process_results", "test_split")
 
 
@@ -43,6 +46,7 @@ class NiehTask:
             DataError: the file or the set is not what it should be.
         """
         file.require(*_NEEDED)
+        _check(file)
         self.name = file.name
         self.settings: Mapping[str, Any] = file.settings
         self._limit = request.limit
@@ -78,6 +82,22 @@ class NiehTask:
             "n_samples": len(found.samples),
             "skipped": skipped,
         }
+
+
+def _check(file: TaskFile) -> None:
+    """Refuse a file with a setting that would not act, as a slip of the pen has it."""
+    given = file.settings["dataset_kwargs"]
+    if not isinstance(given, Mapping) or not isinstance(given.get("context"), str):
+        raise DataError(f"{file.path}: dataset_kwargs must be a mapping with the name of a context (context: NAME)")
+    known = (*_OF_SETS, *(item.name for item in fields(ContextSettings)))
+    for key in given:
+        if key not in known:
+            near = difflib.get_close_matches(str(key), known, n=1)
+            hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(sorted(known))}"
+            raise DataError(f"{file.path}: dataset_kwargs: {key} is not known; {hint}")
+    for key in _OF_SETS:
+        if not isinstance(given.get(key, ""), str):
+            raise DataError(f"{file.path}: dataset_kwargs: {key} is {given[key]!r:.60}; it is a name")
 
 
 def _told(request: TaskRequest) -> dict[str, Any]:

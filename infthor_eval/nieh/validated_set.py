@@ -1,26 +1,54 @@
 """The files of a validated set."""
 
+import os
 import shutil
 from pathlib import Path
 from typing import Any
 
 import msgspec
 
-from infthor_eval.errors import DataError
+from infthor_eval.errors import DataError, UsageError
+from infthor_eval.formats.files import prepared_folder, written_atomically
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.qa_csv import write_questions
-from infthor_eval.nieh.validation import Judged, Verdicts, write_inspection_list
+from infthor_eval.nieh.validation import Judged, Verdicts, read_decisions, write_inspection_list
 
-__all__ = ["write_validated_set"]
+__all__ = ["INSPECTION", "check_place", "write_validated_set"]
+
+INSPECTION = "inspection.csv"
 
 
-def write_validated_set(out: Path, data: NiehSet, verdicts: Verdicts) -> None:
+def check_place(out: Path, data: NiehSet) -> None:
+    """Refuse a folder in which the validated set would spoil what is there; called before the models run.
+
+    Args:
+        out: folder of the validated set.
+        data: the set that is to be validated.
+
+    Raises:
+        UsageError: it is the set itself.
+        DataError: it holds the frames of another set, or an inspection list that cannot be read.
+    """
+    prepared_folder(out)
+    if out.resolve() == data.root.resolve():
+        raise UsageError(f"--out {out}: is the set itself, in which every question would stand twice; give another")
+    link = out / "metadata"
+    if os.path.lexists(link) and link.resolve() != (data.root / "metadata").resolve():
+        raise DataError(f"{link}: holds the frames of another set; give another --out")
+    if (out / INSPECTION).exists():
+        read_decisions(out / INSPECTION)
+
+
+def write_validated_set(out: Path, data: NiehSet, verdicts: Verdicts) -> Path | None:
     """Write a set that is whole enough to be evaluated: its frames stay where they are, linked.
 
     Args:
         out: folder of the set; made where it does not exist.
         data: the set that was validated.
         verdicts: what became of its questions.
+
+    Returns:
+        Where an earlier inspection list is kept, if it held decisions that the new one has no rows for.
 
     Raises:
         DataError: it cannot be written.
@@ -34,8 +62,9 @@ def write_validated_set(out: Path, data: NiehSet, verdicts: Verdicts) -> None:
             shutil.copy(data.root / "set.json", out / "set.json")
         write_questions(out / "qa_set_validated.csv", [item.question for item in verdicts.kept])
         lines = [msgspec.json.encode(_as_json(item)) for item in verdicts.rejected]
-        (out / "rejected.jsonl").write_bytes(b"".join(line + b"\n" for line in lines))
-        write_inspection_list(out / "inspection.csv", verdicts.to_inspect)
+        with written_atomically(out / "rejected.jsonl") as partial:
+            partial.write_bytes(b"".join(line + b"\n" for line in lines))
+        return write_inspection_list(out / INSPECTION, verdicts.to_inspect)
     except OSError as error:
         raise DataError(f"{out}: cannot be written ({error.strerror}); give another --out") from error
 

@@ -4,17 +4,18 @@ A question stays if at least one model answers it correctly. One with several cl
 good, hard question: a person looks at it and decides. The rest is rejected.
 """
 
-import csv
+import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from infthor_eval.errors import DataError
+from infthor_eval.formats.csv_files import read_rows, unshielded, write_sheet
 from infthor_eval.formats.question import Question
 from infthor_eval.nieh.prompts import last_line
 from infthor_eval.nieh.scoring import Scorer, score
 
-__all__ = ["DECISIONS", "Judged", "Verdicts", "judge", "read_decisions", "write_inspection_list"]
+__all__ = ["DECISIONS", "Judged", "Verdicts", "check_decisions", "judge", "read_decisions", "write_inspection_list"]
 
 DECISIONS = ("keep", "drop")
 _COLUMNS = ("question_id", "traj_id", "question", "gt_img_idx", "answer", "replies", "decision")
@@ -69,9 +70,7 @@ def judge(
     Raises:
         DataError: a model was not asked one of the questions, or a decision is about a question that is not there.
     """
-    unknown = sorted(set(decisions) - {question.id for question in questions})
-    if unknown:
-        raise DataError(f"the decisions are about {unknown[0]}, which is not in the set; take the list of this set")
+    check_decisions(decisions, questions)
     verdicts = Verdicts()
     for question in questions:
         said = {model: _reply(question, model, found) for model, found in replies.items()}
@@ -79,6 +78,17 @@ def judge(
         judged = Judged(question, said, right, decisions.get(question.id))
         _place(judged, verdicts).append(judged)
     return verdicts
+
+
+def check_decisions(decisions: Mapping[str, str], questions: Iterable[Question]) -> None:
+    """Refuse decisions that are about another set.
+
+    Raises:
+        DataError: one is about a question that is not there.
+    """
+    unknown = sorted(set(decisions) - {question.id for question in questions})
+    if unknown:
+        raise DataError(f"the decisions are about {unknown[0]}, which is not in the set; take the list of this set")
 
 
 def _place(judged: Judged, verdicts: Verdicts) -> list[Judged]:
@@ -99,16 +109,34 @@ def _correct(text: str, question: Question, scorer: Scorer) -> bool:
     return score(last_line(text), question.answers, scorer) >= 1.0
 
 
-def write_inspection_list(path: Path, items: Iterable[Judged]) -> None:
-    """Write the questions that a person must decide on; the last column is to be filled with keep or drop."""
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(_COLUMNS)
-        for item in items:
-            question = item.question
-            said = "; ".join(f"{model}: {text}" for model, text in item.replies.items())
-            row = [question.id, question.traj_id, question.text, list(question.clues), list(question.answers), said, ""]
-            writer.writerow(row)
+def write_inspection_list(path: Path, items: Iterable[Judged]) -> Path | None:
+    """Write the questions that a person must decide on; the last column is to be filled with keep or drop.
+
+    What was filled in already, in a list that is there, is taken over; a list with decisions on other questions is kept
+    under another name.
+
+    Returns:
+        Where the earlier list is kept; None where nothing of it would be lost.
+
+    Raises:
+        DataError: the list that is there cannot be read.
+        OSError: the list cannot be written.
+    """
+    earlier = read_decisions(path) if path.exists() else {}
+    listed = list(items)
+    kept = None
+    if earlier.keys() - {item.question.id for item in listed}:
+        names = (path.with_name(f"{path.stem}.{number}{path.suffix}") for number in itertools.count(1))
+        kept = path.rename(next(name for name in names if not name.exists()))
+    write_sheet(path, _COLUMNS, (_row(item, earlier.get(item.question.id, "")) for item in listed))
+    return kept
+
+
+def _row(item: Judged, decision: str) -> list[object]:
+    question = item.question
+    said = "; ".join(f"{model}: {text}" for model, text in item.replies.items())
+    clues, answers = list(question.clues), list(question.answers)
+    return [question.id, question.traj_id, question.text, clues, answers, said, decision]
 
 
 def read_decisions(path: Path) -> dict[str, str]:
@@ -117,18 +145,14 @@ def read_decisions(path: Path) -> dict[str, str]:
     Raises:
         DataError: the file cannot be read, lacks a column, or a decision is neither keep nor drop.
     """
-    try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            rows = list(csv.DictReader(file))
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise DataError(f"{path}: cannot be read as a list of decisions ({error})") from error
-    decisions = {}
-    for line, row in enumerate(rows, 2):
-        name, decision = row.get("question_id"), (row.get("decision") or "").strip().lower()
-        if name is None or "decision" not in row:
-            raise DataError(f"{path}: no column question_id or decision; fill the list that `validate` wrote")
+    decisions: dict[str, str] = {}
+    mend = "fill the list that `validate` wrote"
+    for place, row in read_rows(path, ("question_id", "decision"), mend, line_breaks=True):
+        name, decision = unshielded(row["question_id"]), row["decision"].strip().lower()
         if decision and decision not in DECISIONS:
-            raise DataError(f"{path}, line {line}: decision is {decision!r}; write keep or drop")
+            raise DataError(f"{place}: decision is {decision!r:.60}; write keep or drop")
+        if decisions.get(name, decision) != decision:
+            raise DataError(f"{place}: {name} is decided otherwise above; take one of the rows out")
         if decision:
             decisions[name] = decision
     return decisions

@@ -6,6 +6,7 @@ from rich.table import Table as RichTable
 from rich.text import Text
 
 from infthor_eval.tables import Column, Row, Table
+from infthor_eval.terminal import console, shown
 
 __all__ = ["print_table", "table_console"]
 
@@ -14,34 +15,34 @@ _WIDTH = 180  # on a narrower terminal lines wrap; cut-off numbers would be wors
 
 def table_console() -> Console:
     """Standard output for tables of results."""
-    return Console(soft_wrap=True, width=max(Console().width, _WIDTH))
+    return console(width=max(Console().width, _WIDTH))
 
 
-def print_table(table: Table, console: Console) -> None:
+def print_table(table: Table, on: Console) -> None:
     """Show a table; whatever its cells hold is shown as text."""
-    shown = RichTable(
+    drawn = RichTable(
         box=box.SIMPLE_HEAD,
-        title=Text(table.title) if table.title else None,
+        title=Text(shown(table.title)) if table.title else None,
         title_justify="left",
         caption_justify="left",
     )
     for column in table.columns:
-        _add_column(shown, column)
+        _add_column(drawn, column)
     for row in table.rows:
-        _add_row(shown, row)
+        _add_row(drawn, row)
     if table.notes:
-        shown.caption = Text("\n".join(table.notes))
-    console.print(shown)
+        drawn.caption = Text(shown("\n".join(table.notes)))
+    on.print(drawn)
 
 
-def _add_column(shown: RichTable, column: Column) -> None:
+def _add_column(drawn: RichTable, column: Column) -> None:
     if column.is_number:
-        shown.add_column(Text(column.name), justify="right", overflow="fold")
+        drawn.add_column(Text(shown(column.name)), justify="right", overflow="fold")
     else:
-        shown.add_column(Text(column.name), no_wrap=True, overflow="fold")
+        drawn.add_column(Text(shown(column.name)), no_wrap=True, overflow="fold")
 
 
-def _add_row(shown: RichTable, row: Row) -> None:
-    shown.add_row(*map(Text, row.cells), style="dim" if row.is_published else "")
+def _add_row(drawn: RichTable, row: Row) -> None:
+    drawn.add_row(*(Text(shown(cell)) for cell in row.cells), style="dim" if row.is_published else "")
     if row.ends_section:
-        shown.add_section()
+        drawn.add_section()

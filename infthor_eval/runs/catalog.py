@@ -12,13 +12,18 @@ from typing import Any
 
 import yaml
 
-from infthor_eval.errors import DataError, unknown_name
+from infthor_eval.errors import DataError, naming, unknown_name
+from infthor_eval.formats.digests import canonical_json
 from infthor_eval.formats.packaged import packaged_folder
+from infthor_eval.formats.yaml_files import PlainLoader, read_yaml
 
 __all__ = ["Catalog", "TaskFile"]
 
 
-class _Loader(yaml.SafeLoader):
+_MEND = "mend the task file"
+
+
+class _Loader(PlainLoader):
     """Plain YAML, with lm-eval's `!function module.name` kept as the name."""
 
 
@@ -87,12 +92,21 @@ class Catalog:
         found: dict[str, TaskFile] = {}
         for name in names:
             if name in self.groups:
-                found.update((task.name, task) for task in self.expand(self.groups[name]))
+                found.update((task.name, task) for task in self._members(name, (name,)))
             elif name in self.tasks:
                 found[name] = self.tasks[name]
             else:
                 raise unknown_name("task", name, [*self.groups, *self.tasks])
         return list(found.values())
+
+    def _members(self, group: str, inside: tuple[str, ...]) -> list[TaskFile]:
+        """The single tasks of a group, and of the groups in it."""
+        found: list[TaskFile] = []
+        for name in self.groups[group]:
+            if name in inside:
+                raise DataError(f"{self._entries[group][0]}: the group {name} is in itself; take it out")
+            found += self._members(name, (*inside, name)) if name in self.groups else self.expand([name])
+        return found
 
     @cached_property
     def _entries(self) -> dict[str, tuple[Path, dict[str, Any]]]:
@@ -100,13 +114,15 @@ class Catalog:
         for path in sorted(self.folder.rglob("*.yaml")):
             if path.name.startswith("_"):
                 continue
-            settings = _read(path)
+            settings = _read(path, ())
+            with naming(f"{path}: holds what JSON cannot", _MEND, of=(TypeError, ValueError)):
+                canonical_json(settings)  # it is part of a run's identity
             name = settings.get("group") or settings.get("task")
             if not isinstance(name, str):
                 raise DataError(f"{path}: neither a task nor a group name; a task file has a key 'task' or 'group'")
             if name in entries:
                 raise DataError(f"{path}: {name!r} is the name of another task file too; rename one")
-            if "group" in settings and not isinstance(settings.get("task"), list):
+            if "group" in settings and not _are_names(settings.get("task")):
                 raise DataError(f"{path}: 'task' of a group must be a list of task names")
             entries[name] = path, settings
         return entries
@@ -120,14 +136,20 @@ def _task(name: str, path: Path, settings: Mapping[str, Any]) -> TaskFile:
     return TaskFile(name, suite, path, settings)
 
 
-def _read(path: Path) -> dict[str, Any]:
-    try:
-        config = yaml.load(path.read_text(encoding="utf-8"), Loader=_Loader)
-    except OSError as error:
-        raise DataError(f"{path}: cannot be read ({error.strerror})") from error
-    except yaml.YAMLError as error:
-        raise DataError(f"{path}: not YAML ({' '.join(str(error).split())})") from error
-    if not isinstance(config, dict):
-        raise DataError(f"{path}: not a mapping of settings")
+def _are_names(value: object) -> bool:
+    return isinstance(value, list) and all(isinstance(name, str) for name in value)
+
+
+def _read(path: Path, including: tuple[Path, ...]) -> dict[str, Any]:
+    config = read_yaml(path, _MEND, _Loader)
+    if not isinstance(config, dict) or not all(isinstance(key, str) for key in config):
+        raise DataError(f"{path}: not a mapping of settings; {_MEND}")
     included = config.pop("include", None)
-    return {**(_read(path.parent / included) if included else {}), **config}
+    if included is None:
+        return config
+    if not isinstance(included, str):
+        raise DataError(f"{path}: include is {included!r:.60}, not the name of a file; {_MEND}")
+    other = (path.parent / included).resolve()
+    if other in (*including, path.resolve()):
+        raise DataError(f"{path}: includes {included}, which includes it; {_MEND}")
+    return {**_read(path.parent / included, (*including, path.resolve())), **config}

@@ -7,9 +7,9 @@ from typing import Any, Protocol
 
 import msgspec
 
-from infthor_eval.errors import DataError, InfthorError, UsageError, unknown_name
+from infthor_eval.errors import InfthorError, UsageError, naming, unknown_name
 from infthor_eval.formats.digests import fingerprint
-from infthor_eval.formats.files import written_atomically
+from infthor_eval.formats.files import require_writable, written_atomically
 from infthor_eval.runs import journal as journals
 from infthor_eval.runs.executor import evaluated
 from infthor_eval.runs.identity import identity_of
@@ -107,7 +107,7 @@ def prepare(request: RunRequest, suite: Suite) -> PreparedRun:
 
     Raises:
         UsageError: an unknown model or option, or what the suite refuses.
-        DataError: the suite's data are not what their format says.
+        DataError: the suite's data are not what their format says, or the results folder cannot be written to.
     """
     if request.model not in {*suite.baselines, *names()}:
         raise unknown_name("model", request.model, [*suite.baselines, *names()])
@@ -115,6 +115,7 @@ def prepare(request: RunRequest, suite: Suite) -> PreparedRun:
         check_options(request.model, request.model_options)  # refused before the data are read
     elif request.model_options:
         raise UsageError(f"{request.model} has no option {next(iter(request.model_options))}, nor any other")
+    require_writable(request.output / request.label, "--output")
     return PreparedRun(request, suite, suite.prepare(request.tasks))
 
 
@@ -143,6 +144,7 @@ def execute(run: PreparedRun, observer: Observer | None = None) -> RunOutcome:
             observer.begin(workload, n_recovered)
             _evaluate(run.evaluation, workload, JournalSession(subject, journal), observer)
             records = _asked(workload, journal)
+            journal.require_there()
     finally:
         subject.close()
     summary = RunSummary(header, run.suite.summarise(header, records))
@@ -209,9 +211,9 @@ def _write_results(folder: Path, found: RunSummary) -> None:
     header = found.header
     document = {"suite": header.suite, "name": header.name, "identity": header.identity, "summary": found.summary}
     path = folder / _RESULTS
-    try:
-        with written_atomically(path) as partial:
-            encoded = msgspec.json.encode(document, order="sorted")
-            partial.write_bytes(msgspec.json.format(encoded, indent=2) + b"\n")
-    except OSError as error:
-        raise DataError(f"{path}: cannot be written ({error.strerror}); make room, the journal holds it all") from error
+    with (
+        naming(f"{path}: cannot be written", "make room, the journal holds it all"),
+        written_atomically(path) as partial,
+    ):
+        encoded = msgspec.json.encode(document, order="sorted")
+        partial.write_bytes(msgspec.json.format(encoded, indent=2) + b"\n")

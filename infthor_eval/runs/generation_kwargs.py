@@ -1,6 +1,6 @@
 """How a task file's `generation_kwargs`, in lm-eval's words, decode a reply."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 from infthor_eval.errors import UsageError
@@ -22,7 +22,9 @@ def decoding_of(given: Mapping[str, Any], seed: int, place: str) -> Decoding:
     Raises:
         UsageError: a setting that is not known, or that contradicts another.
     """
-    unknown = sorted(set(given) - set(_KNOWN))
+    if not isinstance(given, Mapping):
+        raise UsageError(f"{place}: generation_kwargs is {given!r:.60}; it is a mapping of settings")
+    unknown = sorted(set(given) - set(_KNOWN), key=str)
     if unknown:
         raise UsageError(f"{place}: generation_kwargs: {unknown[0]} is not known; there are {', '.join(_KNOWN)}")
     limit = given.get("max_gen_toks")
@@ -57,7 +59,9 @@ def _number(given: Any, name: str, place: str) -> float:
     return float(given)
 
 
-def _texts(given: str | Sequence[str] | None, name: str, place: str) -> tuple[str, ...]:
+def _texts(given: object, name: str, place: str) -> tuple[str, ...]:
+    if given is not None and not isinstance(given, str | list | tuple):
+        raise UsageError(f"{place}: generation_kwargs: {name} is {given!r:.60}; it is a text or a list of texts")
     texts = (given,) if isinstance(given, str) else tuple(given or ())
     if not all(isinstance(text, str) for text in texts):
         raise UsageError(f"{place}: generation_kwargs: {name} is {given!r}; it is a text or a list of texts")

@@ -11,6 +11,7 @@ import itertools
 import os
 from contextlib import ExitStack
 from dataclasses import dataclass, field
+from io import FileIO
 from pathlib import Path
 from threading import Lock
 from types import TracebackType
@@ -18,9 +19,10 @@ from typing import Any, BinaryIO, Self
 
 import msgspec
 
-from infthor_eval.errors import DataError, UsageError
+from infthor_eval.errors import DataError, UsageError, in_one_line, naming
 from infthor_eval.formats.digests import canonical_json
 from infthor_eval.formats.files import written_atomically
+from infthor_eval.formats.reading import read_bytes, require_file
 from infthor_eval.runs.records import FORMAT, MemoRecord, RecordTypes, RunHeader, UnitKey, UnitRecord
 
 __all__ = ["FOLDER", "Journal", "RunLog", "read_header", "read_run", "recover", "set_aside"]
@@ -29,6 +31,7 @@ FOLDER = "journal"  # of a run's folder
 _SHARD = "worker-{:d}.jsonl"
 _BAD_LINES = "bad_lines.txt"
 _OLD = "journal.jsonl"  # the one file of format 1, in the run's folder
+_BAD = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
 _MEND = "run the same command with --recover to go on without such lines, or with --fresh to start anew"
 
 
@@ -84,9 +87,13 @@ class Journal:
         path = run / FOLDER / _SHARD.format(worker)
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            self._file: BinaryIO = path.open("a+b")
+            if path.exists():
+                require_file(path, "take it out of the run's folder")
+            # Unbuffered: what a full disk did not take is not tried again when the file is closed.
+            self._file: FileIO = path.open("a+b", buffering=0)
         except OSError as error:
-            raise UsageError(f"{path}: cannot be written ({error.strerror}); give another --output") from error
+            raise UsageError(f"{path}: cannot be written ({in_one_line(error)}); give another --output") from error
+        self._path = path
         self._writing = Lock()
         try:
             _lock(self._file, path)
@@ -121,7 +128,12 @@ class Journal:
         return self._log.units.get(record.key) is record
 
     def append(self, record: UnitRecord[Any]) -> UnitRecord[Any]:
-        """Record a unit; the record is on disk when this returns, numbered as the attempt that it is."""
+        """Record a unit; the record is on disk when this returns, numbered as the attempt that it is.
+
+        Raises:
+            DataError: it cannot be written, or the journal is no longer there.
+        """
+        self.require_there()
         known = self._log.units.get(record.key)
         if known is not None:
             record = msgspec.structs.replace(record, attempt=known.attempt + 1)
@@ -153,13 +165,28 @@ class Journal:
             self._write(header)
 
     def _write(self, record: msgspec.Struct) -> None:
-        with self._writing:
-            self._file.write(msgspec.json.encode(record) + b"\n")
-            self._file.flush()
+        line = memoryview(msgspec.json.encode(record) + b"\n")
+        mend = "make room and run the same command again, which goes on where it was"
+        with self._writing, naming(f"{self._path}: cannot be written", mend):
+            while line:
+                line = line[self._file.write(line) :]
             os.fsync(self._file.fileno())
 
+    def require_there(self) -> None:
+        """Refuse to go on where the file is no longer where it was: nothing that is recorded would last.
 
-def _lock(file: BinaryIO, path: Path) -> None:
+        Raises:
+            DataError: it was deleted, or another took its place.
+        """
+        try:
+            there = os.path.samestat(self._path.stat(), os.fstat(self._file.fileno()))
+        except OSError:
+            there = False
+        if not there:
+            raise DataError(f"{self._path}: was deleted or replaced while the run wrote it; run the same command again")
+
+
+def _lock(file: BinaryIO | FileIO, path: Path) -> None:
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError as error:
@@ -195,7 +222,10 @@ def _no_journal(run: Path) -> str:
 
 
 def _shards(run: Path) -> list[Path]:
-    return sorted((run / FOLDER).glob("worker-*.jsonl"))
+    shards = sorted((run / FOLDER).glob("worker-*.jsonl"))
+    for path in shards:
+        require_file(path, "take it out of the run's folder")
+    return shards
 
 
 def _read_shards(run: Path, types: RecordTypes) -> RunLog:
@@ -212,7 +242,7 @@ def _read_shards(run: Path, types: RecordTypes) -> RunLog:
         for number, line in enumerate(lines[1:], 2):
             try:
                 record = decoder.decode(line)
-            except msgspec.DecodeError as error:
+            except _BAD as error:
                 raise DataError(f"{path}, line {number}: not a line of a journal ({error}); {_MEND}") from error
             if isinstance(record, RunHeader):
                 raise DataError(f"{path}, line {number}: the first line of a journal amid its records; {_MEND}")
@@ -222,10 +252,7 @@ def _read_shards(run: Path, types: RecordTypes) -> RunLog:
 
 def _lines(path: Path) -> list[bytes]:
     """The whole lines of a shard; one that is not finished is none yet."""
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise DataError(f"{path}: cannot be read ({error.strerror}); restore the file") from error
+    content = read_bytes(path, "restore the file")
     return content[: content.rfind(b"\n") + 1].splitlines()
 
 
@@ -237,13 +264,13 @@ def _header(path: Path, lines: list[bytes]) -> RunHeader:
     first = lines[0] if lines else b""
     try:
         version = msgspec.json.decode(first, type=_AnyFormat).format
-    except msgspec.DecodeError as error:
+    except _BAD as error:
         raise DataError(f"{path}, line 1: not the first line of a journal ({error}); {_MEND}") from error
     if version != FORMAT:
         raise DataError(f"{path}: a journal of format {version}, this version reads {FORMAT}; start anew with --fresh")
     try:
         return msgspec.json.decode(first, type=RunHeader)
-    except msgspec.DecodeError as error:
+    except _BAD as error:
         raise DataError(f"{path}, line 1: not the first line of a journal ({error}); {_MEND}") from error
 
 
@@ -287,7 +314,7 @@ def _recover_shard(path: Path, header: RunHeader, types: RecordTypes) -> int:
 def _is_good(line: bytes, decoder: msgspec.json.Decoder[Any], *, is_first: bool) -> bool:
     try:
         return isinstance(decoder.decode(line), RunHeader) == is_first
-    except msgspec.DecodeError:
+    except _BAD:
         return False
 
 

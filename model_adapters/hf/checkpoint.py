@@ -16,10 +16,10 @@ import PIL
 import tokenizers
 import torch
 import transformers
-from safetensors import SafetensorError
 
-from infthor_eval.errors import ModelError, UsageError
+from infthor_eval.errors import ModelError, UsageError, naming
 from infthor_eval.formats.digests import digest, digest_of_files
+from infthor_eval.formats.reading import require_plain_files
 from model_adapters.hf.decoding import read_generation
 from model_adapters.hf.family import Family, MakeFamily
 from model_adapters.hf.hub import fetch
@@ -39,6 +39,7 @@ __all__ = [
     "versions",
 ]
 
+_DTYPES = (torch.bfloat16, torch.float16, torch.float32, torch.float64)
 _FINGERPRINTED = {".bin", ".jinja", ".json", ".model", ".safetensors", ".txt"}
 
 
@@ -66,6 +67,7 @@ def locate(options: CheckpointOptions) -> LocatedCheckpoint:
         ModelError: there is none, or it cannot be had.
     """
     folder, commit = fetch(options.pretrained, options.revision)
+    require_plain_files(folder, "restore the checkpoint")
     with loading(options):
         config = transformers.AutoConfig.from_pretrained(folder, trust_remote_code=options.trust_remote_code)
     return LocatedCheckpoint(folder, commit, config, options)
@@ -92,15 +94,15 @@ def load_checkpoint(located: LocatedCheckpoint, family: MakeFamily) -> Loaded:
         template = _chat_template(folder, tokenizer)
         max_tokens = apply_rope(located.config, options.rope)
         model = _load_model(located)
-    return assemble(
-        model,
-        tokenizer,
-        image_processor,
-        template=template,
-        family=family(model, image_processor, tokenizer),
-        max_tokens=max_tokens,
-        origin=origin(located.folder, located.commit, options.pretrained),
-    )
+        return assemble(
+            model,
+            tokenizer,
+            image_processor,
+            template=template,
+            family=family(model, image_processor, tokenizer),
+            max_tokens=max_tokens,
+            origin=origin(located.folder, located.commit, options.pretrained),
+        )
 
 
 def assemble(
@@ -125,8 +127,9 @@ def assemble(
         origin: where the weights come from, for the identity.
 
     Raises:
-        ModelError: its generation settings are not supported.
+        ModelError: its generation settings are not supported, or its smallest frame is larger than its largest.
     """
+    _check_pixels(image_processor)
     identity = dict(origin) | {
         "class": type(model).__name__,
         "n_parameters": model.num_parameters(),
@@ -148,6 +151,13 @@ def assemble(
         max_tokens=max_tokens,
         identity=identity,
     )
+
+
+def _check_pixels(image_processor: Any) -> None:
+    size = dict(getattr(image_processor, "size", None) or {})
+    least, most = size.get("shortest_edge"), size.get("longest_edge")
+    if least is not None and most is not None and least > most:
+        raise ModelError(f"frames of {least} pixels at least and {most} at most; set min_pixels and max_pixels to fit")
 
 
 def origin(folder: Path, commit: str | None, pretrained: str) -> dict[str, Any]:
@@ -184,12 +194,15 @@ def resolve_device(options: HfOptions) -> torch.device:
     name = options.device
     if name == "auto":
         name = "cuda" if torch.cuda.is_available() else "cpu"
-    try:
+    with naming(f"device={name} is not a torch device", "use cpu, cuda, cuda:1, ...", of=RuntimeError, as_a=UsageError):
         device = torch.device(name)
-    except RuntimeError as error:
-        raise UsageError(f"device={name} is not a torch device; use cpu, cuda, cuda:1, ...") from error
+    if device.type == "meta":
+        raise UsageError(f"device={name} computes nothing; use cpu, cuda, cuda:1, ...")
     if device.type == "cuda" and not torch.cuda.is_available():
         raise ModelError(f"device={name}: torch {torch.__version__} finds no GPU here; use device=cpu")
+    # Each back end says in its own way that it is not there.
+    with naming(f"device={name}: torch {torch.__version__} has none here", "use cpu", of=Exception, as_a=ModelError):
+        torch.empty(1, device=device)
     return device
 
 
@@ -200,8 +213,8 @@ def resolve_dtype(options: HfOptions) -> torch.dtype | str:
         UsageError: torch has no such type.
     """
     dtype = "auto" if options.dtype == "auto" else getattr(torch, options.dtype, None)
-    if not (dtype == "auto" or isinstance(dtype, torch.dtype)):
-        raise UsageError(f"dtype={options.dtype} is not a torch type; use auto, bfloat16, float16 or float32")
+    if not (dtype == "auto" or dtype in _DTYPES):
+        raise UsageError(f"dtype={options.dtype} is no type of weights; use auto, bfloat16, float16 or float32")
     return dtype
 
 
@@ -212,11 +225,10 @@ def loading(options: CheckpointOptions) -> Iterator[None]:
     Raises:
         ModelError: something could not be loaded.
     """
-    try:
+    # There is no end to what transformers, tokenizers and safetensors raise on files that somebody damaged.
+    mend = "restore its files, or give another checkpoint"
+    with naming(f"the checkpoint {options.pretrained} cannot be loaded", mend, of=Exception, as_a=ModelError):
         yield
-    except (OSError, ValueError, ImportError, KeyError, SafetensorError) as error:
-        reason = " ".join(str(error).split())[:200]
-        raise ModelError(f"the checkpoint {options.pretrained} cannot be loaded: {reason}") from error
 
 
 def _load_model(located: LocatedCheckpoint) -> Any:
@@ -230,6 +242,7 @@ def _load_model(located: LocatedCheckpoint) -> Any:
         device_map=options.device_map or ({"": device} if options.quantization else None),
         quantization_config=_quantization(options),
         trust_remote_code=options.trust_remote_code,
+        use_safetensors=True,  # a pickle is code
         output_loading_info=True,
     )
     missing = sorted(report["missing_keys"])

@@ -3,6 +3,7 @@
 Draws are transformers' own: temperature, then the most likely tokens (`top_p`), in float32.
 """
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, cast
@@ -58,8 +59,13 @@ def read_generation(config: GenerationConfig) -> Generation:
         if getattr(config, name, None) not in off:
             raise ModelError(f"the checkpoint's generation config sets {name}, which is not supported; remove it")
     ends = config.eos_token_id
-    listed = [] if ends is None else [ends] if isinstance(ends, int) else list(ends)
-    return Generation(frozenset(listed), config.repetition_penalty or 1.0)
+    listed = [] if ends is None else [ends] if isinstance(ends, int) else ends
+    if not isinstance(listed, list | tuple) or not all(type(end) is int and end >= 0 for end in listed):
+        raise ModelError(f"the checkpoint's eos_token_id is {ends!r:.40}; it is the number of a token, or a list")
+    penalty = 1.0 if config.repetition_penalty is None else config.repetition_penalty
+    if isinstance(penalty, bool) or not isinstance(penalty, int | float) or not 0 < penalty < math.inf:
+        raise ModelError(f"the checkpoint's repetition_penalty is {penalty!r:.40}; it is a number above 0")
+    return Generation(frozenset(listed), float(penalty))
 
 
 class Writing:
@@ -105,7 +111,10 @@ class Writing:
     def extend(self, logits: torch.Tensor) -> None:
         """Choose the next token by its logits, (vocabulary,), or end the reply."""
         scores = _penalised(logits.float(), self._seen, self._generation.repetition_penalty)
-        token = self._chosen(self._held(scores))
+        held = self._held(scores)
+        if not held.max() > -torch.inf:  # the largest is NaN where one is
+            raise ModelError(f"no token has a score after {len(self.ids)} tokens of the reply (NaN); try dtype=float32")
+        token = self._chosen(held)
         if token in self._generation.end_ids:
             self.done = True
             return

@@ -5,9 +5,13 @@ from contextlib import contextmanager
 
 import torch
 
-from infthor_eval.errors import ModelError
+from infthor_eval.errors import ModelError, naming
 
-__all__ = ["check_limit", "naming_memory_errors"]
+__all__ = ["check_limit", "naming_memory_errors", "naming_model_errors"]
+
+
+# What torch and image processors raise on a request that does not suit them.
+_FAILURES = (RuntimeError, ValueError, IndexError, ArithmeticError, MemoryError)
 
 
 def check_limit(name: str, n_context: int, max_new_tokens: int, limit: int | None) -> None:
@@ -21,6 +25,17 @@ def check_limit(name: str, n_context: int, max_new_tokens: int, limit: int | Non
             f"a context of {n_context} tokens and {max_new_tokens} new ones is beyond the {limit} tokens "
             f"of {name}; use fewer frames, or set max_tokens if the model can take more"
         )
+
+
+@contextmanager
+def naming_model_errors(name: str) -> Iterator[None]:
+    """Turn what a model or its processor says to one request into one line, so that the others are answered.
+
+    Raises:
+        ModelError: it failed on the request.
+    """
+    with naming(f"{name} fails on the request", "ask otherwise, or report it", of=_FAILURES, as_a=ModelError):
+        yield
 
 
 @contextmanager

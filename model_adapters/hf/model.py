@@ -13,7 +13,7 @@ from model_adapters.hf.decoding import Writing, write
 from model_adapters.hf.description import capabilities, identity
 from model_adapters.hf.embedding import Embedder
 from model_adapters.hf.features import FeatureCache
-from model_adapters.hf.limits import check_limit, naming_memory_errors
+from model_adapters.hf.limits import check_limit, naming_memory_errors, naming_model_errors
 from model_adapters.hf.loaded import Loaded
 from model_adapters.hf.options import HfOptions
 from model_adapters.hf.prefix import Prefix
@@ -66,7 +66,8 @@ class TransformersModel:
 
     def tokens_per_frame(self, frame: FrameRef) -> int:
         """How many tokens one frame becomes, as the checkpoint's processor has it."""
-        return len(self._prompter.frame(frame).ids)
+        with naming_model_errors(self.name):
+            return len(self._prompter.frame(frame).ids)
 
     def conversation(self) -> BackendConversation:
         """A new, empty conversation."""
@@ -86,7 +87,8 @@ class TransformersModel:
 
     def count(self, turns: Sequence[Turn]) -> int:
         """Tokens that a reply to these turns would be made from."""
-        return n_tokens(self.pieces(turns))
+        with naming_model_errors(self.name):
+            return n_tokens(self.pieces(turns))
 
     def encode(self, pieces: Sequence[Piece]) -> torch.Tensor:
         """Encode a prompt from nothing, a few pieces at first; logits of the next token, (vocabulary,)."""
@@ -101,7 +103,8 @@ class TransformersModel:
 
     def answer_each(self, conversations: Sequence[Sequence[Turn]], decoding: Decoding) -> list[Reply]:
         """Answer several conversations, `batch_size` at a time; see `Conversation.replies`."""
-        prompts = [self.pieces(turns) for turns in conversations]
+        with naming_model_errors(self.name):
+            prompts = [self.pieces(turns) for turns in conversations]
         for prompt in prompts:
             check_limit(self.name, n_tokens(prompt), decoding.max_new_tokens, self.capabilities.max_tokens)
         size = self._batch_size
@@ -118,7 +121,7 @@ class TransformersModel:
             self._prefix.reset()
         replies = [begin_reply(self._loaded, decoding, token_ids(prompt)) for prompt in prompts]
         try:
-            with naming_memory_errors(self.name, sum(map(n_tokens, prompts))):
+            with naming_model_errors(self.name), naming_memory_errors(self.name, sum(map(n_tokens, prompts))):
                 n_cached = self._write(prompts, replies)
         except ModelError:
             # Where memory ran out, the next request is to find all of it free.

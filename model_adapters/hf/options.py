@@ -1,11 +1,14 @@
 """Options that every transformers model takes."""
 
+import importlib.util
 from dataclasses import dataclass
 from typing import Any
 
 __all__ = ["CheckpointOptions", "HfOptions", "parse_rope"]
 
 
+_ATTENTION = ("eager", "sdpa", "flex_attention", "flash_attention_2", "flash_attention_3")
+_LARGEST = 2**53  # of the numbers that options take; what is larger is a slip
 _ROPES = ("dynamic", "linear", "longrope", "yarn")
 
 
@@ -63,8 +66,22 @@ class HfOptions:
             raise ValueError(
                 "chunk_tokens and batch_size must be positive, feature_cache_mb and max_tokens not negative"
             )
+        for name in ("chunk_tokens", "batch_size", "feature_cache_mb", "max_tokens"):
+            if (getattr(self, name) or 0) > _LARGEST:
+                raise ValueError(f"{name} is above {_LARGEST}")
+        self._check_attention()
         if self.rope is not None:
             parse_rope(self.rope)
+
+    def _check_attention(self) -> None:
+        """Refuse what transformers would fetch from the hub and run, or does not know."""
+        name = self.attn_implementation
+        if "/" in name and not getattr(self, "trust_remote_code", False):
+            raise ValueError(f"attn_implementation={name} is code on the hub, which runs with trust_remote_code=true")
+        if "/" not in name and name not in _ATTENTION:
+            raise ValueError(f"attn_implementation={name} is not known; there are {', '.join(_ATTENTION)}")
+        if name.startswith("flash_") and importlib.util.find_spec("flash_attn") is None:
+            raise ValueError(f"attn_implementation={name} needs the package flash-attn; use sdpa")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,9 +9,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from PIL import Image, UnidentifiedImageError
-
-from infthor_eval.errors import DataError, ModelError
+from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
 from model_adapters.hf.family import Family, Size
 from model_adapters.hf.rendering import begins, render
@@ -108,17 +106,8 @@ class Prompter:
         """
         frame = self._frames.get(ref.digest)
         if frame is None:
-            size = _size(ref)
+            size = ref.size
             if size not in self._ids:
                 self._ids[size] = self._family.frame_ids(size)
             frame = self._frames[ref.digest] = Frame(ref.digest, size, self._ids[size], ref)
         return frame
-
-
-def _size(ref: FrameRef) -> Size:
-    """Width and height from the file's header; the pixels are decoded only when the frame is encoded."""
-    try:
-        with Image.open(ref.path) as image:
-            return image.size
-    except (UnidentifiedImageError, OSError, SyntaxError) as error:
-        raise DataError(f"{ref.path}: not a readable image ({error}); restore the frame") from error

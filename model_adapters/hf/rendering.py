@@ -7,12 +7,25 @@ from typing import Any
 
 from jinja2 import TemplateError
 
-from infthor_eval.errors import ModelError
+from infthor_eval.errors import ModelError, naming
 from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.limits import TEMPLATE_SECONDS
+from model_adapters.hf.time_limit import OutOfTimeError, computing_at_most
 from model_adapters.protocols import Part, Turn
 
 __all__ = ["begins", "render"]
 
+# What a template raises that does not fit or is broken: Jinja's own, and those of the Python that it computes.
+_REFUSALS = (
+    TemplateError,
+    TypeError,  # a list where the template joins strings
+    ValueError,
+    LookupError,
+    ArithmeticError,
+    AttributeError,
+    RecursionError,
+    MemoryError,
+)
 _PRINTED = "{'type': 'text'"  # how a content looks where a template that wants a string writes a list
 
 
@@ -80,13 +93,15 @@ def _string_message(turn: Turn) -> dict[str, Any]:
 
 
 def _written(tokenizer: Any, template: str, turns: Sequence[Turn], messages: Sequence[dict[str, Any]]) -> str:
-    try:
+    refused = f"the chat template refuses {_roles(turns)}"
+    with (
+        naming(refused, f"mend it; {TEMPLATE_SECONDS.mend}", of=OutOfTimeError, as_a=ModelError),
+        naming(refused, "ask in other turns, or mend it", of=_REFUSALS, as_a=ModelError),
+        computing_at_most(TEMPLATE_SECONDS.value),
+    ):
         text: str = tokenizer.apply_chat_template(
             list(messages), chat_template=template, tokenize=False, add_generation_prompt=True
         )
-    except (TemplateError, TypeError) as error:  # TypeError: a list where the template joins strings
-        reason = " ".join(str(error).split())[:200]
-        raise ModelError(f"the chat template refuses {_roles(turns)} ({reason}); ask in other turns") from error
     _check_texts(text, turns)
     return text
 

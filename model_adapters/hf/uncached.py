@@ -16,7 +16,7 @@ from infthor_eval.formats.frames import FrameRef
 from model_adapters.backend import BackendConversation
 from model_adapters.hf.decoding import Writing
 from model_adapters.hf.description import capabilities, identity
-from model_adapters.hf.limits import check_limit, naming_memory_errors
+from model_adapters.hf.limits import check_limit, naming_memory_errors, naming_model_errors
 from model_adapters.hf.loaded import Loaded
 from model_adapters.hf.options import HfOptions
 from model_adapters.hf.rendering import begins, render
@@ -114,7 +114,8 @@ class UncachedModel:
 
     def tokens_per_frame(self, frame: FrameRef) -> int:
         """How many tokens one frame becomes, as the checkpoint's processor has it."""
-        return len(expanded(self._processor, frame.load()))
+        with naming_model_errors(self.name):
+            return len(expanded(self._processor, frame.load()))
 
     def conversation(self) -> BackendConversation:
         """A new, empty conversation."""
@@ -128,7 +129,8 @@ class UncachedModel:
 
     def count(self, turns: Sequence[Turn]) -> int:
         """Tokens that a reply to these turns would be made from."""
-        return int(processed(self._processor, self._loaded.template, turns)["input_ids"].shape[1])
+        with naming_model_errors(self.name):
+            return int(processed(self._processor, self._loaded.template, turns)["input_ids"].shape[1])
 
     def answer_each(self, conversations: Sequence[Sequence[Turn]], decoding: Decoding) -> list[Reply]:
         """Answer several conversations, one after the other; see `Conversation.replies`."""
@@ -137,12 +139,13 @@ class UncachedModel:
     @torch.inference_mode()
     def answer(self, turns: Sequence[Turn], decoding: Decoding) -> Reply:
         """Answer a conversation; see `Conversation.reply`."""
-        inputs = processed(self._processor, self._loaded.template, turns)
+        with naming_model_errors(self.name):
+            inputs = processed(self._processor, self._loaded.template, turns)
         n_context = int(inputs["input_ids"].shape[1])
         check_limit(self.name, n_context, decoding.max_new_tokens, self.capabilities.max_tokens)
         reply = begin_reply(self._loaded, decoding, inputs["input_ids"][0].tolist())
         weight = self._loaded.model.get_input_embeddings().weight
-        with naming_memory_errors(self.name, n_context):
+        with naming_model_errors(self.name), naming_memory_errors(self.name, n_context):
             self._loaded.model.generate(
                 **inputs.to(weight.device, self._loaded.model.dtype),
                 do_sample=False,

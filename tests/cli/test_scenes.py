@@ -40,7 +40,7 @@ def test_a_scene_is_drawn_from_above_and_from_the_agent(tmp_path, run):
         (["scenes", "show", "FloorPlan1"], "FloorPlan1"),
         (["scenes", "dump", "FloorPlan1", "--out", "x", "--unity", "/nowhere/thor"], "/nowhere/thor"),
         (["ls", "scenes", "--data", "nowhere"], "does not exist"),
-        (["ls", "scenes", "--data", "."], "not a file of recorded floor plans"),
+        (["ls", "scenes", "--data", "."], "give a folder of recorded floor plans"),
     ],
 )
 def test_a_scene_that_is_not_there_is_one_line(arguments, said, run, tmp_path, monkeypatch):

@@ -130,7 +130,7 @@ def test_decisions_are_applied(data, tmp_path, run):
     [
         ("question_id,decision\nx,keep\n", "about x, which is not in the set"),
         ("question_id,decision\nx,maybe\n", "line 2: decision is 'maybe'; write keep or drop"),
-        ("question_id\nx\n", "no column question_id or decision"),
+        ("question_id\nx\n", "no column decision"),
     ],
 )
 def test_decisions_that_do_not_fit_are_refused(data, tmp_path, run, content, said):

@@ -63,7 +63,7 @@ def test_a_broken_video_is_one_line_and_leaves_nothing_behind(write_video, tmp_p
     path = tmp_path / "a.mp4"
     write_video(path, [4 * index for index in range(60)])
     path.write_bytes(spoil(path.read_bytes()))
-    with pytest.raises(DataError, match=f"a.mp4: {said}.*take it away to show the frames instead"):
+    with pytest.raises(DataError, match=f"a.mp4: {said}.*delete it to show the frames instead"):
         frames_per_second(path)
     assert capfd.readouterr() == ("", "")
     assert list(user_cache("video_frames").iterdir()) == []

@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from infthor_eval.errors import DataError
+from infthor_eval.errors import DataError, naming
 from infthor_eval.formats.question import ABSENCE, Question, clue_column
 from infthor_eval.formats.set_info import simulator_of
 from infthor_eval.formats.step_log import read_steps
@@ -27,6 +27,10 @@ from infthor_eval.generation.questions.checker import Checker
 from infthor_eval.generation.questions.history import DEFAULT_SHARE, History
 
 __all__ = ["MadeQuestions", "candidates_of", "further_candidates_of", "make_questions"]
+
+
+# What a log that is JSON of the right form can still be wrong in.
+_WRONG = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError)
 
 
 @dataclass
@@ -84,7 +88,8 @@ def make_questions(
     histories = []
     for path in _folders(folder):
         try:
-            histories.append(History(path.name, read_steps(path), share))
+            with naming(f"{path}: its log does not hang together", "replay the trajectory again", of=_WRONG):
+                histories.append(History(path.name, read_steps(path), share))
         except DataError as error:
             made.skipped.append(str(error))
     made.trajectories = len(histories)

@@ -4,7 +4,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any
 
-from infthor_eval.errors import UsageError
+import msgspec
+
+from infthor_eval.errors import UsageError, naming
 from infthor_eval.formats.digests import digest_of_file, fingerprint
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet, SkippedQuestion
@@ -14,6 +16,7 @@ from infthor_eval.nieh.prompts import question_text
 
 __all__ = ["Context", "ContextPart", "ContextSettings", "Sample", "clue_positions", "trajectories_identity"]
 
+_LARGEST = 1e9  # kilo-tokens; more is a slip
 ContextPart = str | FrameRef | Notes
 
 
@@ -74,13 +77,19 @@ class ContextSettings:
             UsageError: a value that cannot be.
         """
         known = {item.name for item in fields(cls)}
-        settings = cls(**{key: value for key, value in given.items() if key in known and value is not None})
+        told = {key: value for key, value in given.items() if key in known and value is not None}
+        wrong = "a context's settings (dataset_kwargs of a task file) are not what they should be"
+        with naming(wrong, "mend them", of=msgspec.ValidationError, as_a=UsageError):
+            settings = msgspec.convert(told, cls)
         if settings.k_tokens not in (None, 1000, 1024):
             raise UsageError(f"k_tokens is {settings.k_tokens}; a kilo-token is 1000 or 1024 tokens")
         for name in ("top_k", "note_window", "note_tokens"):
-            value = getattr(settings, name)
-            if not isinstance(value, int) or value < 1:
-                raise UsageError(f"{name} is {value!r}; it is a whole number from 1 on")
+            if getattr(settings, name) < 1:
+                raise UsageError(f"{name} is {getattr(settings, name)!r}; it is a whole number from 1 on")
+        if settings.ctx_size is not None and not 0 < settings.ctx_size < _LARGEST:
+            raise UsageError(f"ctx_size is {settings.ctx_size}; it is a number of kilo-tokens above 0")
+        if not settings.depths or not all(0 <= depth <= 1 for depth in settings.depths):
+            raise UsageError(f"depths are {settings.depths}; they are between 0 and 1")
         return settings
 
     def n_frames(self, k_tokens: int) -> int:

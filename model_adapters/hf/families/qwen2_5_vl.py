@@ -8,6 +8,7 @@ from typing import Any
 import torch
 from PIL import Image
 
+from infthor_eval.formats.limits import IMAGE_MEGAPIXELS
 from model_adapters.hf.adapter import CheckpointAdapter
 from model_adapters.hf.families.plain import PlainFamily
 from model_adapters.hf.family import Size
@@ -75,6 +76,16 @@ class PixelLimits:
 
     min_pixels: int | None = None
     max_pixels: int | None = None
+
+    def __post_init__(self) -> None:
+        most = IMAGE_MEGAPIXELS.value * 1_000_000
+        for name in ("min_pixels", "max_pixels"):
+            value = getattr(self, name)
+            if value is not None and not 1 <= value <= most:
+                raise ValueError(f"{name}={value} is not between 1 and {most}")
+        if self.min_pixels is not None and self.max_pixels is not None and self.min_pixels > self.max_pixels:
+            raise ValueError(f"min_pixels={self.min_pixels} is above max_pixels={self.max_pixels}")
+        super().__post_init__()  # type: ignore[misc]  # it is mixed into options, which have one
 
     def image_settings(self) -> dict[str, int]:
         """Settings of the image processor that differ from the checkpoint's."""

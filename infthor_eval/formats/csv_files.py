@@ -1,0 +1,78 @@
+"""CSV files: read strictly, so that no row is lost in another's cell, and written so that no cell is a formula."""
+
+import csv
+import io
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+
+from infthor_eval.errors import DataError, naming
+from infthor_eval.formats.files import written_atomically
+from infthor_eval.formats.reading import read_text
+
+__all__ = ["read_rows", "unshielded", "write_sheet"]
+
+_FORMULA = ("=", "+", "-", "@", "\t", "\r")  # how spreadsheets recognise one
+_SHIELD = "'"  # how they recognise a text all the same
+
+
+def read_rows(
+    path: Path, columns: Sequence[str], mend: str, *, line_breaks: bool = False
+) -> Iterator[tuple[str, dict[str, str]]]:
+    """The rows of a CSV file: each with its place, for messages, and its cells by column.
+
+    Args:
+        path: of the file.
+        columns: those that it must have.
+        mend: what to do where it is not what it should be, for the message.
+        line_breaks: whether a cell may have several lines; where not, one that has is a quote that was not closed.
+
+    Raises:
+        DataError: it cannot be read, lacks a column or has it twice, has a row of more cells than columns, or a quote
+            that is not closed.
+    """
+    text = read_text(path, mend)
+    reader = csv.reader(io.StringIO(text, newline=""), strict=True)
+    with naming(f"{path}: not a UTF-8 CSV file", mend, of=csv.Error):
+        header = next(reader, [])
+        _check_header(path, header, columns, mend)
+        for cells in reader:
+            place = f"{path}, line {reader.line_num}"
+            if not cells:
+                continue
+            if len(cells) > len(header):
+                raise DataError(f"{place}: has {len(cells)} cells for {len(header)} columns; {mend}")
+            row = dict.fromkeys(header, "") | dict(zip(header, cells, strict=False))
+            broken = next((name for name, cell in row.items() if "\n" in cell or "\r" in cell), None)
+            if broken is not None and not line_breaks:
+                raise DataError(f"{place}: {broken} goes on over several lines; close its quote before the line's end")
+            yield place, row
+
+
+def _check_header(path: Path, header: Sequence[str], columns: Sequence[str], mend: str) -> None:
+    missing = [name for name in columns if name not in header]
+    if missing:
+        raise DataError(f"{path}: no column {', '.join(missing)}; {mend}")
+    twice = next((name for name in header if name and header.count(name) > 1), None)
+    if twice is not None:
+        raise DataError(f"{path}: column {twice!r} stands twice; take one out")
+
+
+def write_sheet(path: Path, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
+    """Write a CSV file that people open as a sheet, whole or not at all.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+    with written_atomically(path) as partial, partial.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(columns)
+        writer.writerows([_shielded(str(cell)) for cell in row] for row in rows)
+
+
+def unshielded(cell: str) -> str:
+    """What `write_sheet` was given for a cell."""
+    return cell[1:] if cell.startswith(_SHIELD) and cell[1:].startswith((*_FORMULA, _SHIELD)) else cell
+
+
+def _shielded(cell: str) -> str:
+    return _SHIELD + cell if cell.startswith((*_FORMULA, _SHIELD)) else cell
