@@ -33,7 +33,9 @@ def main() -> None:
     per_step = []
     for steps in chosen.steps:
         before = processor_seconds()
-        seconds, made, subgoals, simulator_mb = make(TrajectorySettings(chosen.scene, chosen.seed, steps, 1, max_fail=steps))
+        seconds, made, subgoals, simulator_mb = make(
+            TrajectorySettings(chosen.scene, chosen.seed, steps, 1, max_fail=steps)
+        )
         per_step.append(1000 * (processor_seconds() - before) / made)
         own_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
         print(
