@@ -20,6 +20,7 @@ __all__ = [
     "MAX_PLAN_STEPS",
     "MOVABLE_RECEPTACLES",
     "SLICEABLE",
+    "STOWABLE",
     "goes_into",
     "preposition",
 ]
@@ -36,8 +37,9 @@ _HOLDS = {receptacle: _types(names) for receptacle, names in _TABLES["receptacle
 _ACTIONS = {action: _types(names) for action, names in _TABLES["action_objects"].items()}
 
 CLEANABLE, COOLABLE, HEATABLE = (_ACTIONS[name] for name in ("Cleanable", "Coolable", "Heatable"))
+STOWABLE = frozenset[str]().union(*_HOLDS.values())  # what goes anywhere at all
 # The table has the egg too, but a cut egg is cracked: it leaves nothing that could be put anywhere.
-SLICEABLE = frozenset(name for name in _ACTIONS["Sliceable"] if f"{name}Sliced" in frozenset().union(*_HOLDS.values()))
+SLICEABLE = frozenset(name for name in _ACTIONS["Sliceable"] if f"{name}Sliced" in STOWABLE)
 KNIVES = frozenset({"ButterKnife", "Knife"})
 LIGHTS = _ACTIONS["Toggleable"]
 MOVABLE_RECEPTACLES = _types(_TABLES["movable_receptacles"])

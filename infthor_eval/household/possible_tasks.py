@@ -11,6 +11,7 @@ from infthor_eval.household.affordances import (
     LIGHTS,
     MOVABLE_RECEPTACLES,
     SLICEABLE,
+    STOWABLE,
     goes_into,
 )
 from infthor_eval.household.symbolic import ABSENT, Room
@@ -31,7 +32,7 @@ def tasks_of(room: Room, extra_types: Iterable[str] = ()) -> list[Task]:
     known = here | furniture | set(extra_types)
     count = Counter(room.types[item] for item, parent in where.items() if parent != ABSENT)
     tasks: list[Task] = []
-    for pickup in sorted(here):
+    for pickup in sorted(here & STOWABLE):
         for sliced in (False, True) if _can_be_sliced(pickup, here) else (False,):
             tasks += [Task(TaskType.EXAMINE, pickup, light=lamp, sliced=sliced) for lamp in sorted(lamps)]
             for receptacle in sorted(furniture):

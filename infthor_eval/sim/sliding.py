@@ -15,11 +15,13 @@ _FARTHEST = 5.0  # metres; no room is much larger
 def slide(world: World, item: SimObject, direction: Array, distance: float) -> None:
     """Move an object, with its contents, along `direction` (3,) for at most `distance` metres.
 
-    It stops before what is in its way. Once its middle is beyond the edge of what it stands on, it falls.
+    It stops before what is in its way, and inside what is closed. Once its middle is beyond the edge of what it stands
+    on, it falls.
     """
     support = None if item.parent is None else world.objects[item.parent]
     for _ in range(int(min(distance, _FARTHEST) / _STEP)):
-        if obstacle_at(world, item, direction * _STEP) is not None:
+        shut_in = support is not None and world.hidden(item) and _beyond(support, item.center + direction * _STEP)
+        if shut_in or obstacle_at(world, item, direction * _STEP) is not None:
             break
         world.shift([item], direction * _STEP)
         if support is not None and _beyond(support, item.center):

@@ -28,15 +28,15 @@ def simulator():
 
 
 def test_every_task_begins_with_an_empty_hand(simulator):
-    # This room's first lit object, a bowl, finds no place to be put down: the task is taken back.
-    made = generate(TrajectorySettings("bedroom-3", 0, 80, 1), simulator)
+    # What was looked at is still in the hand, and is put down between the tasks.
+    made = generate(TrajectorySettings("bedroom-3", 0, 60, 3, task_types=(TaskType.EXAMINE,)), simulator)
     trajectory = made.trajectory
-    assert made.statistics.reasons["no place takes Bowl"] == 1
     assert [entry["step"] for entry in trajectory.object_log] == list(range(len(trajectory.plan.low_actions) + 1))
     for part in trajectory.sub_trajs:
         assert trajectory.object_log[part.low_pddl_idx[0]]["inven_obj"] == []
     assert trajectory.object_log[-1]["inven_obj"] == []
-    assert sum(made.statistics.tried.values()) > sum(made.statistics.accepted.values()) == len(made.problems)
+    assert len(trajectory.plan.high_pddl) > sum(len(range(*part.high_pddl_idx)) for part in trajectory.sub_trajs)
+    assert sum(made.statistics.tried.values()) >= sum(made.statistics.accepted.values()) == len(made.problems) >= 3
 
 
 def test_sub_goals_and_actions_are_numbered_through(simulator):
@@ -79,6 +79,13 @@ def test_looking_for_places_leaves_no_trace(scene, seed, tmp_path):
     made = [{key: value for key, value in entry.items() if key != "step"} for entry in trajectory.object_log]
     steps = read_steps(tmp_path / "set" / "metadata" / trajectory.traj_id)
     assert made == [msgspec.to_builtins(step.object_log) for step in steps]
+
+
+def test_the_lengths_are_in_steps_and_tasks_and_failures_have_an_end(simulator):
+    made = generate(TrajectorySettings("living-room-2", 1, 1, 3), simulator)
+    assert len(made.trajectory.sub_tasks) == len(made.trajectory.sub_trajs) == 3
+    with pytest.raises(UsageError, match=r"and 2 failed tasks \(PutObject: .*or a higher --max-fail"):
+        generate(TrajectorySettings("living-room-2", 0, 100_000, 1, max_fail=2), simulator)
 
 
 def test_a_task_type_that_the_room_offers_nothing_for_is_one_line(simulator):

@@ -19,8 +19,8 @@ OBJECT: dict[str, Any] = {
     "axisAlignedBoundingBox": BOX, "objectOrientedBoundingBox": "box or null",
 }  # fmt: skip
 AGENT: dict[str, Any] = {
-    "lastAction": str, "lastActionSuccess": bool, "errorMessage": str, "errorCode": "string or null", "actionReturn": "any",
-    "isSceneAtRest": bool,
+    "lastAction": str, "lastActionSuccess": bool, "errorMessage": str, "errorCode": "string or null",
+    "actionReturn": "any", "isSceneAtRest": bool,
     "agent": {"name": str, "position": XYZ, "rotation": XYZ, "cameraHorizon": float, "isStanding": bool,
               "inHighFrictionArea": bool},
     "heldObjectPose": POSE, "hand": POSE, "arm": "any", "fov": float, "cameraPosition": XYZ, "cameraOrthSize": float,

@@ -165,3 +165,11 @@ def test_what_cannot_be_pushed(bench):
     bench.refused("PullObject", objectId=apple, moveMagnitude=0, forceAction=True)
     bench.ok("PickupObject", objectId=apple, forceAction=True)
     assert "Throw" in bench.refused("PullObject", objectId=apple, forceAction=True)
+
+
+def test_a_push_leaves_things_in_what_is_closed(bench):
+    world = bench.sim.world
+    inside = next(o for o in world.objects.values() if world.hidden(o) and o.type.pickupable)
+    outer = inside.parent
+    bench.ok("PushObject", objectId=inside.object_id, moveMagnitude=500, forceAction=True)
+    assert bench.object(inside.object_id)["parentReceptacles"] == [outer]
