@@ -21,8 +21,8 @@ def only(folder, pattern):
     return path
 
 
-# By clues, total, interval, bootstrap, open-ended, absence, samples, skipped, failed. Two trajectories tell little, even
-# where all is right: Wilson's interval on 5 / (5 / 2) questions, with the t quantile of one degree of freedom.
+# By clues, total, interval, bootstrap, open-ended, absence, samples, skipped, failed. Two trajectories tell little
+# even where all is right: Wilson's interval on 5 / (5 / 2) questions, with the t quantile of one degree of freedom.
 FULL_MARKS = ["100.00"] * 4 + ["1.2–100.0", "100.0–100.0", "100.00", "-", "5", "0", "0"]
 
 
