@@ -12,12 +12,12 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
-from infthor_eval.formats.question import Question
 from infthor_eval.formats.step_log import read_steps
 from infthor_eval.generation.questions.checker import Checker
 from infthor_eval.generation.questions.history import DEFAULT_SHARE, History
 from infthor_eval.generation.questions.make import candidates_of, further_candidates_of, make_questions
 from infthor_eval.nieh.baselines import BASELINES, Predict
+from infthor_eval.nieh.contexts import Sample
 from infthor_eval.nieh.scoring import score
 
 _YES_NO = {"yes", "no"}
@@ -34,10 +34,11 @@ def main() -> None:
     check_all(chosen.set)
     made = make_questions(chosen.set, seed=chosen.seed, per_trajectory=chosen.per_trajectory, further=chosen.further)
     print(f"chosen: {len(made.questions)}, by number of clues {made.by_clues()}, by type {made.by_type()}")
-    yes_no = [item for item in made.questions if item.answers[0] in _YES_NO]
-    for name in ("oracle", "blind"):
-        predict = BASELINES[name](0).fit(made.questions)
-        print(f"{name}, strict: {mean(predict, made.questions):.3f}; yes/no alone {mean(predict, yes_no):.3f}")
+    asked = [Sample(question, question.clues) for question in made.questions]
+    yes_no = [item for item in asked if item.question.answers[0] in _YES_NO]
+    for name in ("oracle", "blind", "blind-count"):
+        predict = BASELINES[name](0).fit(asked)
+        print(f"{name}, strict: {mean(predict, asked):.3f}; yes/no alone {mean(predict, yes_no):.3f}")
 
 
 def check_all(folder: Path) -> None:
@@ -58,9 +59,9 @@ def check_all(folder: Path) -> None:
     print(f"{len(histories)} trajectories, {found['all']} candidates: {shares}")
 
 
-def mean(predict: Predict, questions: Sequence[Question]) -> float:
+def mean(predict: Predict, samples: Sequence[Sample]) -> float:
     """A baseline's mean under the strict scorer."""
-    return sum(score(predict(item), item.answers, "strict") for item in questions) / len(questions)
+    return sum(score(predict(item), item.question.answers, "strict") for item in samples) / len(samples)
 
 
 if __name__ == "__main__":
