@@ -8,14 +8,15 @@ from numpy.typing import NDArray
 
 from infthor_eval.sim.geometry import Array, euler_matrix, level_gaps
 from infthor_eval.sim.objects import SimObject
-from infthor_eval.sim.render.camera import FAR, NEAR, Camera, project
+from infthor_eval.sim.render.camera import FAR, NEAR, Camera
+from infthor_eval.sim.render.glimpse import pixels_of
 from infthor_eval.sim.render.hand import held_rows
 from infthor_eval.sim.render.picture import Picture, Rasterizer, cast_picture, choose_rasterizer, colour_picture
 from infthor_eval.sim.render.primitives import INSTANCE
 from infthor_eval.sim.render.scene import SceneModel
 from infthor_eval.sim.scenes.catalogue import Catalogue
 from infthor_eval.sim.settings import SimulatorSettings
-from infthor_eval.sim.visibility import enclosures, shows, visible_ids
+from infthor_eval.sim.visibility import enclosures, least_pixels, visible_ids
 from infthor_eval.sim.world import Agent, World
 
 __all__ = ["Simulation", "ThirdPartyCamera"]
@@ -144,10 +145,7 @@ class Simulation:
             return False
         prims, _, names = self._model.primitives()
         lens = self._agent_camera(agent)
-        own = prims[prims[:, INSTANCE] == names.index(item.object_id)]
-        if not len(project(own, lens).index):
-            return False
-        return shows(cast_picture(prims, names, lens, self.rasterizer), item.object_id)
+        return pixels_of(prims, names.index(item.object_id), lens, self.rasterizer) >= least_pixels(lens)
 
     def hit(self, x: float, y: float) -> Array | None:
         """The point (3,) that the agent sees at (x, y), shares of the frame from its bottom left; None for the void."""

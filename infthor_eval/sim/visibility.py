@@ -3,10 +3,11 @@
 import numpy as np
 
 from infthor_eval.sim.objects import SimObject
+from infthor_eval.sim.render.camera import Camera
 from infthor_eval.sim.render.picture import Picture
 from infthor_eval.sim.world import World
 
-__all__ = ["enclosures", "shows", "visible_ids"]
+__all__ = ["enclosures", "least_pixels", "visible_ids"]
 
 _SHARE = 2.5e-5  # of the picture's pixels that must show an object: 2 pixels at 300x300
 
@@ -21,7 +22,7 @@ def visible_ids(world: World, picture: Picture, max_distance: float) -> frozense
     """
     counts = np.bincount(picture.instances.ravel() + 1, minlength=len(picture.names) + 1)[1:]
     seen = set()
-    for index in np.nonzero(counts >= _least(picture))[0]:
+    for index in np.nonzero(counts >= least_pixels(picture.camera))[0]:
         item = world.objects.get(picture.names[index])
         if item is not None and world.reach(item) <= max_distance:
             seen.add(item.object_id)
@@ -32,14 +33,9 @@ def visible_ids(world: World, picture: Picture, max_distance: float) -> frozense
     return frozenset(seen)
 
 
-def shows(picture: Picture, object_id: str) -> bool:
-    """Whether enough of an object is to be seen in a picture."""
-    count = int(np.count_nonzero(picture.instances == picture.names.index(object_id)))
-    return count >= _least(picture)
-
-
-def _least(picture: Picture) -> int:
-    return max(1, round(_SHARE * picture.instances.size))
+def least_pixels(camera: Camera) -> int:
+    """Pixels of a camera's picture that must show an object for it to be visible."""
+    return max(1, round(_SHARE * camera.width * camera.height))
 
 
 def enclosures(world: World, item: SimObject) -> list[SimObject]:
