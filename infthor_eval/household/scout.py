@@ -24,6 +24,8 @@ _REACH = 1.5  # the simulator's visibility distance, metres
 _SIDEWAYS = 32.0  # degrees off the camera's axis; half the field of view is 30
 _TOO_NEAR = 0.5  # closer than this a door may hit the agent and an object fills the frame
 _TRIALS = 30
+_PATIENCE = 4  # viewpoints more that are tried for one that has a small object well inside the frame
+_MARGIN, _SIDE = 15, 300  # pixels: of the frame's edge, and of the frame
 _UNSEEN: dict[str, Any] = {"renderImage": False}  # the id image tells what is in the frame
 
 
@@ -44,6 +46,9 @@ def find_viewpoint(
 ) -> Viewpoint | None:
     """The viewpoint that is the fewest actions away and from which all asked objects are visible.
 
+    One a little farther away is taken where it has an object that can be carried well inside the frame, and not at the
+    edge: what is done with it then can be seen.
+
     Args:
         simulator: its agent is back where it was afterwards.
         grid: the reachable cells.
@@ -57,13 +62,17 @@ def find_viewpoint(
     here = simulator.view
     focus = here.objects[inside or shown[0]]
     distances = grid.distances(stand_of(here, grid))
-    found = None
+    found, patience = None, _PATIENCE
     for viewpoint in list(_candidates(here, grid, focus, distances))[:_TRIALS]:
         there = _teleport(simulator, grid, here, viewpoint)
-        if not there.success or not _shows(there, shown, min_pixels):
-            continue
-        if inside is None or _comes_into_view(simulator, shown[0], inside, min_pixels):
-            found = viewpoint
+        shows = there.success and _shows(there, shown, min_pixels)
+        if shows and (inside is None or _comes_into_view(simulator, shown[0], inside, min_pixels)):
+            well = inside is not None or not focus.pickupable or _is_well_inside(there, shown[0])
+            found = viewpoint if well or found is None else found
+            if well:
+                break
+        patience -= found is not None
+        if not patience:
             break
     simulator.query(**teleport_call(here.agent), **_UNSEEN)
     return found
@@ -86,6 +95,12 @@ def _shows(view: View, shown: list[str], min_pixels: int) -> bool:
         return False
     instances = view.instances
     return instances is None or (shown[0] in instances and instances[shown[0]].pixels >= min_pixels)
+
+
+def _is_well_inside(view: View, item: str) -> bool:
+    """Whether the frame has an object off its edges."""
+    shown = (view.instances or {}).get(item)
+    return shown is None or all(_MARGIN <= edge < _SIDE - _MARGIN for edge in shown.box)
 
 
 def _comes_into_view(simulator: Simulator, holder: str, inside: str, min_pixels: int) -> bool:
