@@ -3,6 +3,7 @@
 import contextlib
 import importlib
 import io
+import os
 import signal
 import sys
 import threading
@@ -97,6 +98,7 @@ def main(args: list[str] | None = None) -> None:
     except (click.Abort, KeyboardInterrupt):
         _fail("stopped; the same command goes on where it was", 130)
     except OSError as error:  # no command's own: a disk that is full, a file that was taken away in mid-work
+        _discard_output()
         place = error.filename if error.filename is not None else "standard output or a file"
         _fail(f"{place}: cannot be read or written ({in_one_line(error)}); mend that and run the same command again", 2)
     else:
@@ -122,6 +124,16 @@ def _stopped_by_sigterm() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGTERM, before)
+
+
+def _discard_output() -> None:
+    """What standard output cannot take is dropped now; Python would try again, and complain, where it ends."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        nothing = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nothing, sys.stdout.fileno())
+        os.close(nothing)
 
 
 def _fail(message: str, code: int) -> None:

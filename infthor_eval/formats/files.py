@@ -42,11 +42,20 @@ def require_writable(path: Path, option: str = "--out") -> None:
         DataError: it cannot.
     """
     with naming(f"{path}: cannot be written to", f"{_MEND} {option}", of=(OSError, ValueError)):  # ValueError: a null
-        there = next(folder for folder in (path, *path.absolute().parents) if os.path.lexists(folder))
+        there = next(folder for folder in (path, *path.absolute().parents) if _is_there(folder))
         with tempfile.TemporaryFile(dir=there) as probe:
             probe.write(_PROBE)
             probe.flush()
             os.fsync(probe.fileno())
+
+
+def _is_there(path: Path) -> bool:
+    """Whether there is anything; not `exists`, which takes a name that cannot be for one that is not there."""
+    try:
+        path.lstat()
+    except (FileNotFoundError, NotADirectoryError):
+        return False
+    return True
 
 
 def prepared_file(path: Path, option: str = "--out") -> Path:

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from PIL import Image
 
-from infthor_eval.errors import ModelError
+from infthor_eval.errors import ModelError, naming
 from model_adapters.hf.checkpoint import LocatedCheckpoint, load_checkpoint, locate
 from model_adapters.hf.family import MakeFamily
 from model_adapters.hf.model import TransformersModel
@@ -76,11 +76,7 @@ def fitting(pretrained: str) -> Iterator[None]:
     Raises:
         ModelError: the model failed on them.
     """
-    try:
+    # Whatever it raises: settings of the processor come from a file, and end up in arithmetic and shapes.
+    problem = f"{pretrained}: the model fails on what the processor makes of a frame"
+    with naming(problem, "do they belong to one checkpoint?", of=Exception, as_a=ModelError):
         yield
-    except (RuntimeError, ValueError, IndexError) as error:
-        reason = " ".join(str(error).split())[:200]
-        raise ModelError(
-            f"{pretrained}: the model fails on what the processor makes of a frame ({reason}); "
-            "do they belong to one checkpoint?"
-        ) from error

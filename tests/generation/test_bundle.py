@@ -56,5 +56,5 @@ def test_a_folder_that_is_not_empty_and_a_scene_that_is_not_there_are_refused(tm
 def test_what_is_no_manifest_is_named(tmp_path, content):
     path = tmp_path / "manifest.json"
     path.write_text(content)
-    with pytest.raises(DataError, match=r"manifest\.json: not a manifest"):
+    with pytest.raises(DataError, match=r"manifest\.json: not in its documented form"):
         read_manifest(path)

@@ -1,0 +1,171 @@
+"""What is typed, and where the output is to go: one line and exit code 2 before any work."""
+
+import json
+import os
+from pathlib import Path
+
+import pytest
+
+from .told import said_in_one_line
+
+RUN = ["--model", "oracle", "--tasks", "nieh_gt", "--data", "SET"]
+TINY = ["--model", "qwen2.5-vl-tiny", "--tasks", "nieh_gt", "--data", "SET", "--output", "OUT", "--model-args"]
+GENERATE = ["generate", "--scene", "kitchen-1", "--min-steps", 1]
+MANIFEST = {"name": "x", "trajectories": [{"scene": "kitchen-1", "seed": 0, "min_steps": 1}]}
+
+
+@pytest.fixture
+def typed(make_nieh_set, tmp_path, run, monkeypatch):
+    """Runs a command with SET, OUT and FILE put in, in an empty folder that has a set and a file."""
+    monkeypatch.chdir(tmp_path)
+    data = make_nieh_set(size=56)
+    (tmp_path / "file").write_text("of somebody's")
+    (tmp_path / "manifest.json").write_text(json.dumps(MANIFEST))
+
+    def typed(*arguments: object) -> tuple[int, str, str]:
+        places = {"SET": data, "OUT": tmp_path / "out"}
+        return run(*(places.get(argument, argument) for argument in arguments))
+
+    return typed
+
+
+OUTPUTS = {
+    "run": [*RUN, "--output"],
+    "validate": ["validate", "SET", "--models", "oracle", "--out"],
+    "generate": [*GENERATE, "--out"],
+    "replay": ["replay", "file.json", "--out"],
+    "bundle": ["bundle", "manifest.json", "--out"],
+    "scenes dump": ["scenes", "dump", "kitchen-1", "--embedded", "--out"],
+    "fetch": ["fetch", "nieh", "--dir"],
+}
+PLACES = {
+    "a file": ("file", "cannot be written to"),
+    "below a file": ("file/below", "cannot be written to"),
+    "a device": ("/dev/full", "cannot be written to"),
+    "below a device": ("/dev/null/x", "cannot be written to"),
+    "no file system's": ("/proc/x", "cannot be written to"),
+    "a name that is too long": ("n" * 300, "cannot be written to"),
+}
+
+
+@pytest.mark.parametrize("place", PLACES)
+@pytest.mark.parametrize("command", OUTPUTS)
+def test_a_folder_that_cannot_be_written_is_told_before_the_work(typed, tmp_path, monkeypatch, command, place):
+    def work(*_: object, **__: object) -> None:
+        raise AssertionError("work was begun")
+
+    for begins in ("thor.simulator.Simulator.__enter__", "runs.driver._subject", "formats.hub_data._download"):
+        monkeypatch.setattr(f"infthor_eval.{begins}", work)
+    (tmp_path / "file.json").write_text("{}")
+    where, said = PLACES[place]
+    said_in_one_line(typed(*OUTPUTS[command], where), said)
+    assert (tmp_path / "file").read_text() == "of somebody's"
+
+
+@pytest.mark.parametrize("where", ["/dev/full", "SET", "file/below.csv", "/proc/x/y.csv"])
+@pytest.mark.parametrize("command", ["questions", "scenes show"])
+def test_a_file_that_cannot_be_written_is_told_before_the_work(typed, monkeypatch, command, where):
+    def work(*_: object, **__: object) -> None:
+        raise AssertionError("work was begun")
+
+    monkeypatch.setattr("infthor_eval.thor.simulator.Simulator.__enter__", work)
+    arguments = ["questions", "SET"] if command == "questions" else ["scenes", "show", "kitchen-1"]
+    code, _, err = typed(*arguments, "--out", where)
+    assert code == 2
+    assert "Traceback" not in err
+    assert "; give another place with --out" in err or "make room, or give another place with --out" in err
+    assert Path("/dev/full").is_char_device()
+
+
+TYPED = [
+    ([*RUN, "--data", "SET", "--output", "OUT"], "--data is given twice; give it once"),
+    ([*RUN, "--tasks=nieh_full", "--output", "OUT"], "--tasks is given twice"),
+    ([*RUN, "--output", "OUT", "--output", "OUT"], "--output is given twice"),
+    (["run", *RUN, "--output", "OUT", "--seed", "1", "--seed=2"], "--seed is given twice"),
+    (["scenes", "show", "kitchen-1", "--size", "64", "--size", "65"], "--size is given twice"),
+    (["questions", "SET", "--out", "a.csv", "--out", "b.csv"], "--out is given twice"),
+    (["validate", "SET", "--models", "oracle", "--out", "OUT", "--scorer", "strict", "--scorer", "strict"], "--scorer"),
+    (["questions", "SET", "--out", "a.csv", "--min-share", "nan"], "is not a number"),
+    ([*GENERATE, "--out", "OUT", "--count", "1000000000"], "set INFTHOR_EVAL_MAX_TRAJECTORIES to more than"),
+    ([*GENERATE, "--out", "OUT", "--count", "9" * 30], "are too many"),
+    ([*GENERATE, "--out", "OUT", "--seed", "9" * 30], "--seed"),
+    ([*RUN, "--output", "OUT", "--seed", "9" * 30], "--seed"),
+    ([*RUN, "--output", "OUT", "--limit", "9" * 30], "--limit"),
+    ([*TINY, "dtype=int8"], "dtype=int8 is no type of weights"),
+    ([*TINY, "dtype=complex64"], "dtype=complex64 is no type of weights"),
+    ([*TINY, "dtype=float8_e4m3fn"], "dtype=float8_e4m3fn is no type of weights"),
+    ([*TINY, "dtype=nn"], "dtype=nn is no type of weights"),
+    ([*TINY, "device=xpu"], "device=xpu: torch"),
+    ([*TINY, "device=mps"], "device=mps: torch"),
+    ([*TINY, "device=hpu"], "device=hpu: torch"),
+    ([*TINY, "device=meta"], "device=meta computes nothing"),
+    ([*TINY, "device=gpu"], "device=gpu is not a torch device"),
+    ([*TINY, "device=cuda:99"], "device=cuda:99"),
+    ([*TINY, "attn_implementation=bogus"], "attn_implementation=bogus is not known"),
+    ([*TINY, "attn_implementation=kernels-community/flash-attn"], "is code on the hub"),
+    ([*TINY, "attn_implementation=flash_attention_2"], "needs the package flash-attn"),
+    ([*TINY, f"chunk_tokens={10**30}"], "chunk_tokens"),
+    ([*TINY, f"batch_size={2**60}"], "batch_size is above"),
+    ([*TINY, f"max_tokens={10**400}"], "max_tokens"),
+    ([*TINY, f"feature_cache_mb={10**18}"], "feature_cache_mb is above"),
+    ([*TINY, "min_pixels=5000,max_pixels=4000"], "min_pixels=5000 is above max_pixels=4000"),
+    ([*TINY, "min_pixels=0"], "min_pixels=0 is not between"),
+    ([*TINY, "max_pixels=-5"], "max_pixels=-5 is not between"),
+    ([*TINY, f"min_pixels={10**12}"], "is not between 1 and"),
+    ([*TINY, "min_pixels=40000000"], "pixels at least and"),
+    (["validate", "SET", "--models", "oracle", "--out", "SET"], "is the set itself"),
+    (["validate", "SET", "--models", "oracle", "--out", "OUT", "--decisions", "file"], "no column question_id"),
+    (
+        ["validate", "SET", "--models", "blind", "--out", "OUT", *["--model-args", "blind:a=1"] * 2],
+        "--model-args for blind is given twice",
+    ),
+    (["bundle", "file", "--out", "OUT"], "not in its documented form"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "said"), TYPED, ids=[f"{n}: {said}" for n, (_, said) in enumerate(TYPED)])
+def test_what_cannot_be_meant_is_refused(typed, arguments, said):
+    said_in_one_line(typed(*arguments), said)
+
+
+@pytest.mark.parametrize("arguments", [["ls", "models"], ["ls", "tasks"], RUN, ["--version"]])
+def test_a_full_disk_behind_standard_output_is_one_line(make_nieh_set, tmp_path, monkeypatch, capfd, arguments):
+    from infthor_eval.cli import main
+
+    data = make_nieh_set(size=56)
+    monkeypatch.chdir(tmp_path)
+    with open("/dev/full", "w") as full, pytest.raises(SystemExit) as ended:  # noqa: PTH123 - a stream for sys.stdout
+        monkeypatch.setattr("sys.stdout", full)
+        try:
+            main([str(data) if argument == "SET" else argument for argument in arguments])
+        finally:
+            monkeypatch.undo()
+    err = capfd.readouterr().err
+    assert ended.value.code == 2
+    assert "cannot be read or written (No space left on device)" in err
+    assert "Traceback" not in err
+
+
+def test_questions_do_not_replace_what_somebody_edited(tmp_path, run, monkeypatch):
+    from infthor_eval.generation.questions.make import MadeQuestions
+
+    from ..conftest import QUESTIONS
+
+    monkeypatch.setattr(
+        "infthor_eval.generation.questions.make.make_questions", lambda *_, **__: MadeQuestions(list(QUESTIONS))
+    )
+    arguments = ["questions", tmp_path, "--out", tmp_path / "qa.csv"]
+    assert run(*arguments)[0] == 0
+    assert run(*arguments)[0] == 0
+    made = (tmp_path / "qa.csv").read_bytes()
+    (tmp_path / "qa.csv").write_bytes(made.replace(b"mug", b"cup"))
+    said_in_one_line(run(*arguments), "is there already and holds something else")
+    assert b"cup" in (tmp_path / "qa.csv").read_bytes()
+    assert run(*arguments, "--overwrite")[0] == 0
+    assert (tmp_path / "qa.csv").read_bytes() == made
+
+
+def test_a_run_outside_git_says_nothing_of_git(typed, capfd):
+    assert typed(*RUN, "--output", "OUT")[0] == 0
+    assert "git" not in capfd.readouterr().err
+    assert not os.path.exists(".git")  # noqa: PTH110 - of the folder that the run was started in

@@ -1,0 +1,278 @@
+"""A run survives its worst sample, its disk and its end; nothing that counts is lost, and nothing wrong counts."""
+
+import csv
+import errno
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+import torch
+from PIL import Image
+
+from infthor_eval.formats.question import Question
+from infthor_eval.formats.trajectory import DiscreteAction, HighAction, PlannerAction
+from infthor_eval.generation.replay_set import select
+from infthor_eval.household.sequence_text import plan_text
+from infthor_eval.nieh.records import RECORDS
+from infthor_eval.runs import read_run
+from infthor_eval.runs.journal import Journal
+from model_adapters.hf.decoding import Generation, Writing
+from model_adapters.protocols import Decoding
+
+from ..conftest import QUESTIONS
+from .test_files import IMAGES
+from .told import refused, said_in_one_line
+
+SOUND = QUESTIONS
+
+
+def _frame(data, traj_id, index):
+    return data / "metadata" / traj_id / "img" / f"{index:09d}.png"
+
+
+def _write(path, content):
+    path.write_bytes(content)
+
+
+def _twice(data):
+    Image.new("RGB", (56, 56)).save(_frame(data, "traj_b", 0).with_suffix(".jpg"))
+
+
+# What is done to a set of five sound questions, and how many of them are answered, are skipped, and fail then.
+SETS = {
+    "a frame is missing that no question shows": (lambda data: _frame(data, "traj_a", 5).unlink(), 5, 0),
+    "a clue is missing": (lambda data: _frame(data, "traj_b", 0).unlink(), 4, 1),
+    "a clue is a pipe": (lambda data: _pipe(_frame(data, "traj_b", 0)), 4, 1),
+    "a clue is a folder": (lambda data: _folder(_frame(data, "traj_b", 0)), 4, 1),
+    "a clue is a bomb": (lambda data: _write(_frame(data, "traj_b", 0), IMAGES["bomb"][0]), 4, 1),
+    "a clue is a sliver": (lambda data: _write(_frame(data, "traj_b", 0), IMAGES["sliver"][0]), 4, 1),
+    "a clue is no image": (lambda data: _write(_frame(data, "traj_b", 0), b"text"), 4, 1),
+    "a log is gone": (lambda data: (data / "metadata/traj_b/metadata.json").unlink(), 3, 2),
+    "a log is no JSON": (lambda data: (data / "metadata/traj_b/metadata.json").write_text("["), 3, 2),
+    "a log is deep": (lambda data: (data / "metadata/traj_b/metadata.json").write_text("[" * 200_000), 3, 2),
+    "a log is of another form": (lambda data: (data / "metadata/traj_b/metadata.json").write_text("5"), 3, 2),
+    "a log is a pipe": (lambda data: _pipe(data / "metadata/traj_b/metadata.json"), 3, 2),
+    "a log names two frames alike": (lambda data: _rename(data, "img_filename", "000000000.png"), 3, 2),
+    "a log numbers two frames alike": (lambda data: _rename(data, "img_idx", 0), 3, 2),
+    "two frames have one name": (_twice, 3, 2),
+    "the images are gone": (lambda data: shutil.rmtree(data / "metadata/traj_b/img"), 3, 2),
+    "a frame too many": (lambda data: shutil.copy(_frame(data, "traj_b", 0), _frame(data, "traj_b", 77)), 3, 2),
+    "a trajectory's name is too long": (lambda data: _ask(data, "n" * 300), 5, 1),
+    "a trajectory's name has a null": (lambda data: _ask(data, "a\0b"), 5, 1),
+    "a trajectory's name climbs": (lambda data: _ask(data, "../metadata/traj_b"), 5, 1),
+}
+
+
+def _pipe(path):
+    path.unlink()
+    os.mkfifo(path)
+
+
+def _folder(path):
+    path.unlink()
+    path.mkdir()
+
+
+def _rename(data, field, value):
+    path = data / "metadata/traj_b/metadata.json"
+    entries = json.loads(path.read_text())
+    for entry in entries[:2]:
+        entry[field] = value
+    path.write_text(json.dumps(entries))
+
+
+def _ask(data, traj_id):
+    with (data / "qa_set_more.csv").open("w", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerows([["traj_id", "question", "gt_img_idx", "answer"], [traj_id, "q", "[1]", "['a']"]])
+
+
+@pytest.mark.timeout(60)
+@pytest.mark.parametrize("name", SETS)
+def test_what_is_damaged_in_a_set_costs_its_own_questions(make_nieh_set, tmp_path, run, name):
+    damage, n_answered, n_skipped = SETS[name]
+    data = make_nieh_set(size=56)
+    damage(data)
+    arguments = ["--model", "oracle", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out"]
+    code, _, err = run(*arguments)
+    assert code == 0, err
+    assert f"{n_answered} answered now" in err
+    skipped = [line for line in err.splitlines() if "sample(s) skipped: " in line]
+    assert sum(int(line.split()[1]) for line in skipped) == n_skipped
+
+
+LATE = {
+    "a header of nonsense": lambda data: _write(_frame(data, "traj_b", 0), b"\xff\xd8\xff\xe0" + b"\xaa" * 300),
+    "a cut header": lambda data: _write(_frame(data, "traj_b", 0), b"\x89PNG\r\n\x1a\n\0\0"),
+    "pixels that are cut": lambda data: _write(_frame(data, "traj_b", 0), _frame(data, "traj_b", 0).read_bytes()[:60]),
+    "a sliver as JPEG": lambda data: _sliver(_frame(data, "traj_b", 0)),
+}
+
+
+def _sliver(path):
+    Image.new("RGB", (60_000, 2)).save(path, format="JPEG")
+
+
+@pytest.mark.parametrize("batch_size", [1, 4])
+@pytest.mark.parametrize("name", LATE)
+def test_a_frame_that_no_model_can_take_fails_alone(make_nieh_set, tmp_path, run, name, batch_size):
+    data = make_nieh_set(size=56)
+    LATE[name](data)
+    arguments = ["--model", "qwen2.5-vl-tiny", "--model-args", f"batch_size={batch_size}", "--tasks", "nieh_gt"]
+    code, _, err = run(*arguments, "--data", data, "--output", tmp_path / "out")
+    assert code == 1
+    assert "5 answered now" in err
+    assert "nieh_gt: 1 sample(s) failed, counted as wrong: " in err
+    assert "Traceback" not in err
+
+
+@pytest.mark.parametrize("batch_size", [1, 4])
+def test_a_question_that_is_too_long_fails_alone(make_nieh_set, tmp_path, run, batch_size):
+    long = Question("traj_b", "Is there " + "a very large " * 2000 + "sink?", (0,), ("no",))
+    data = make_nieh_set([*SOUND, long], size=56)
+    model_args = f"batch_size={batch_size},max_tokens=1000"
+    arguments = ["--model", "qwen2.5-vl-tiny", "--model-args", model_args, "--tasks", "nieh_gt", "--data", data]
+    code, _, err = run(*arguments, "--output", tmp_path / "out")
+    assert code == 1
+    assert "nieh_gt: 1 sample(s) failed" in err
+
+
+@pytest.mark.parametrize("model", ["oracle", "qwen2.5-vl-tiny"])
+def test_a_haystack_without_a_usable_question_ends_the_same_way(make_nieh_set, tmp_path, run, model):
+    data = make_nieh_set([Question("t", "q", (99,), ("a",))], size=56)
+    arguments = ["--model", model, "--tasks", "nieh_haystack_8k", "--data", data, "--output", tmp_path / "out"]
+    said_in_one_line(run(*arguments), "can be asked (clue 99 is outside trajectory t (6 frames))")
+
+
+def test_a_context_is_measured_by_a_frame_that_can_be_read(make_nieh_set, tmp_path, run):
+    asked = [Question("t", "Is there a mug?", (1,), ("yes",)), Question("u", "Is there a mug?", (1,), ("yes",))]
+    data = make_nieh_set(asked, size=56)
+    _frame(data, "t", 1).write_bytes(b"\xff\xd8\xff\xe0")
+    arguments = ["--model", "qwen2.5-vl-tiny", "--tasks", "nieh_truncate_head_8k", "--data", data]
+    code, _, err = run(*arguments, "--output", tmp_path / "out")
+    assert code == 1
+    assert "nieh_truncate_head_8k: 1 sample(s) failed" in err
+
+
+def test_a_run_whose_folder_is_deleted_does_not_end_well(make_nieh_set, tmp_path, run, monkeypatch):
+    append = Journal.append
+
+    def append_and_delete(self, record):
+        shutil.rmtree(tmp_path / "out", ignore_errors=True)
+        return append(self, record)
+
+    monkeypatch.setattr(Journal, "append", append_and_delete)
+    arguments = ["--model", "oracle", "--tasks", "nieh_gt", "--data", make_nieh_set(size=56)]
+    code, out, err = run(*arguments, "--output", tmp_path / "out")
+    assert (code, out) == (2, "")
+    assert "was deleted or replaced while the run wrote it" in err
+
+
+def test_a_full_disk_in_mid_run_is_one_line_and_the_run_goes_on_later(make_nieh_set, tmp_path, run, monkeypatch):
+    arguments = ["--model", "oracle", "--tasks", "nieh_gt", "--data", make_nieh_set(size=56)]
+    n_synced = []
+    fsync = os.fsync
+
+    def full(descriptor):
+        n_synced.append(descriptor)
+        if len(n_synced) > 4:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        fsync(descriptor)
+
+    with monkeypatch.context() as patched:
+        patched.setattr("infthor_eval.runs.journal.os.fsync", full)
+        code, out, err = run(*arguments, "--output", tmp_path / "out")
+    assert (code, out) == (2, "")
+    assert "cannot be written (No space left on device); make room" in err
+    assert "Traceback" not in err
+    code, _, err = run(*arguments, "--output", tmp_path / "out")
+    assert code == 0
+    (journal,) = (tmp_path / "out").rglob("journal")
+    assert len(read_run(journal.parent, RECORDS)[1]) == 5
+
+
+@pytest.mark.parametrize("scores", [[torch.nan] * 4, [1.0, torch.nan, 2.0, 0.0], [-torch.inf] * 4])
+@pytest.mark.parametrize("temperature", [0.0, 1.0])
+def test_scores_that_are_no_numbers_are_no_answer(scores, temperature):
+    decoding = Decoding(max_new_tokens=2, temperature=temperature)
+    writing = Writing(Generation(frozenset()), decoding, context=(), choices=None, finished=lambda _: False)
+    refused(lambda: writing.extend(torch.tensor(scores)), "no token has a score")
+
+
+def _trajectory(**changes):
+    scene = {"floor_plan": "kitchen-1", "init_action": {"x": 0.0, "y": 0.9, "z": 0.0}}
+    turn = {"api_action": {"action": "RotateLeft"}, "high_idx": 0}
+    return {"scene": scene, "plan": {"low_actions": [turn]}, "traj_id": "sound"} | changes
+
+
+def _odd_turn():
+    turn = {"api_action": {"action": "RotateLeft"}, "discrete_action": {"action": "Rotate_²", "args": {}}}
+    return json.dumps(_trajectory(plan={"low_actions": [turn]})).encode()
+
+
+MALFORMED = {
+    "no JSON": b"{",
+    "deep": b"[" * 200_000,
+    "of another form": b"[]",
+    "a turn by no number": _odd_turn(),
+}
+
+
+@pytest.mark.parametrize("name", MALFORMED)
+def test_a_malformed_trajectory_leaves_the_others_to_be_replayed(tmp_path, name):
+    (tmp_path / "a.json").write_bytes(MALFORMED[name])
+    (tmp_path / "b.json").write_text(json.dumps(_trajectory()))
+    found = select([tmp_path])
+    assert [trajectory.traj_id for _, trajectory in found.items] == ["sound"]
+    assert [failure.place for failure in found.failures] == [str(tmp_path / "a.json")]
+
+
+@pytest.mark.timeout(20)
+@pytest.mark.parametrize("damage", [os.mkfifo, lambda path: path.write_bytes(b"no gzip")])
+def test_a_file_that_cannot_be_read_leaves_the_others_to_be_replayed(tmp_path, damage):
+    damage(tmp_path / "a.jsonl.gz")
+    (tmp_path / "b.json").write_text(json.dumps(_trajectory()))
+    found = select([tmp_path])
+    assert len(found.items) == 1
+    assert [failure.place for failure in found.failures] == [str(tmp_path / "a.jsonl.gz")]
+
+
+@pytest.mark.parametrize("action", ["{0.__class__}", "{", "{0:>9999999999}", "{missing}", "%s{}"])
+def test_a_format_string_in_a_plan_is_a_name(action):
+    high = HighAction(0, DiscreteAction(action, ["mug"]), PlannerAction("x"))
+    assert plan_text(high) == action
+
+
+def test_sigterm_leaves_no_temporary_folder(tmp_path):
+    # A command that waits with a temporary folder open, as a replay does.
+    code = (
+        "import sys, tempfile, time\n"
+        "from infthor_eval.cli import main\n"
+        "import infthor_eval.cli.ls as ls\n"
+        "def wait(*_):\n"
+        "    with tempfile.TemporaryDirectory(prefix='infthor-'):\n"
+        "        print('waiting', flush=True)\n"
+        "        time.sleep(60)\n"
+        "ls._tasks = wait\n"
+        "main(['ls', 'tasks'])\n"
+    )
+    process = subprocess.Popen(
+        [sys.executable, "-c", code],
+        env=os.environ | {"TMPDIR": str(tmp_path)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdout is not None
+    assert process.stdout.readline() == "waiting\n"
+    time.sleep(0.1)
+    process.send_signal(signal.SIGTERM)
+    _, err = process.communicate(timeout=30)
+    assert process.returncode == 143
+    assert "stopped; the same command goes on where it was" in err
+    assert list(tmp_path.iterdir()) == []

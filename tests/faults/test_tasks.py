@@ -1,0 +1,87 @@
+"""Task files with wrong types, circles, slips and bombs: one line, exit code 2."""
+
+import pytest
+
+from .told import said_in_one_line
+
+HEAD = "include: _nieh.yaml\ntask: own\n"
+CLUES = HEAD + "dataset_kwargs: {context: clues"
+BOMB = "a0: &a0 [1, 1, 1, 1, 1, 1, 1, 1, 1, 1]\n" + "".join(
+    f"a{n}: &a{n} [{', '.join([f'*a{n - 1}'] * 10)}]\n" for n in range(1, 9)
+)
+
+FILES = [
+    (CLUES + ", depthz: [0.2]}", "depthz is not known; did you mean depths?"),
+    (CLUES + ", top-k: 3}", "top-k is not known; did you mean top_k?"),
+    (CLUES + ", 5: 3}", "not"),
+    (CLUES + ", ctx_size: 8k}", "Expected `float"),
+    (CLUES + ", ctx_size: -8}", "ctx_size is -8"),
+    (CLUES + ", ctx_size: .nan}", "holds what JSON cannot"),
+    (CLUES + ", depths: 0.2}", "Expected `array`"),
+    (CLUES + ", depths: [a]}", "Expected `float`"),
+    (CLUES + ", depths: [2]}", "they are between 0 and 1"),
+    (CLUES + ", depths: []}", "they are between 0 and 1"),
+    (CLUES + ", top_k: true}", "Expected `int`"),
+    (CLUES + ", retriever: 5}", "Expected `str`"),
+    (CLUES + ", bundled: 5}", "bundled is 5; it is a name"),
+    (HEAD + "dataset_kwargs: {context: [clues]}", "name of a context"),
+    (HEAD + "dataset_kwargs: {}", "name of a context"),
+    (HEAD + "dataset_kwargs: 5", "must be a mapping"),
+    (HEAD + "dataset_kwargs: [context]", "must be a mapping"),
+    (CLUES + "}\ngeneration_kwargs: 5", "it is a mapping of settings"),
+    (CLUES + "}\ngeneration_kwargs: [until]", "it is a mapping of settings"),
+    (CLUES + "}\ngeneration_kwargs: {max_gen_toks: 5, until: 5}", "it is a text or a list of texts"),
+    (CLUES + "}\ngeneration_kwargs: {max_gen_toks: 5, until: {a: 1}}", "it is a text or a list of texts"),
+    (CLUES + "}\ngeneration_kwargs: {max_gen_toks: 5, 7: 1}", "not"),
+    (CLUES + "}\ndescription: 2020-01-01", "holds what JSON cannot"),
+    (CLUES + "}\ndescription: !!binary aGk=", "holds what JSON cannot"),
+    (CLUES + "}\ndescription: !!set {a, b}", "holds what JSON cannot"),
+    (CLUES + "}\ndescription: !!python/object/apply:os.system [ls]", "not YAML"),
+    (CLUES + "}\ntask: again", "the key 'task' stands twice"),
+    (CLUES + "}\n" + BOMB, "set INFTHOR_EVAL_MAX_YAML_NODES to more than"),
+    (CLUES + "}\na: &a [*a]", "a part of it holds itself"),
+    (CLUES + "}\na: &a {b: *a}", "a part of it holds itself"),
+    (CLUES + "}\na: *nothing", "not YAML"),
+    (CLUES + "}\na: " + "[" * 5000, "not YAML"),
+    (CLUES + "}\n\x07: 1", "not YAML"),
+    ("include: own.yaml\ntask: own", "includes own.yaml, which includes it"),
+    ("include: ../nieh/own.yaml\ntask: own", "which includes it"),
+    ("include: 5\ntask: own", "include is 5, not the name of a file"),
+    ("include: [a]\ntask: own", "not the name of a file"),
+    ("include: nothing.yaml\ntask: own", "cannot be read (No such file or directory)"),
+    ("include: .\ntask: own", "is a folder, not a file"),
+    ("include: /dev/zero\ntask: own", "is a pipe or a device, not a file"),
+    ("group: own\ntask: [own]", "the group own is in itself"),
+    ("group: own\ntask: [5]", "must be a list of task names"),
+    ("group: own\ntask: {a: 1}", "must be a list of task names"),
+    ("group: own\ntask: [nieh_gtt]", "did you mean"),
+    ("task: own\nmetadata: [suite]", "no suite"),
+    ("task: [own]", "neither a task nor a group name"),
+    ("5: 6", "not a mapping of settings"),
+    ("text", "not a mapping of settings"),
+    ("", "not a mapping of settings"),
+]
+
+
+@pytest.mark.timeout(60)
+@pytest.mark.parametrize(("content", "said"), FILES, ids=[f"{n}: {said}" for n, (_, said) in enumerate(FILES)])
+def test_a_task_file_that_is_not_what_it_should_be(make_nieh_set, tmp_path, run, task_files, content, said):
+    (task_files / "nieh" / "own.yaml").write_text(content)
+    data = make_nieh_set(size=56)
+    ended = run("--model", "oracle", "--tasks", "own", "--data", data, "--output", tmp_path / "out")
+    said_in_one_line(ended, said)
+
+
+def test_groups_in_a_circle_are_told(tmp_path, run, task_files):
+    (task_files / "nieh" / "one.yaml").write_text("group: one\ntask: [other]")
+    (task_files / "nieh" / "other.yaml").write_text("group: other\ntask: [one]")
+    said_in_one_line(run("--model", "oracle", "--tasks", "one", "--output", tmp_path), "is in itself")
+
+
+def test_a_larger_document_is_read_where_the_limit_is_raised(make_nieh_set, tmp_path, run, task_files, monkeypatch):
+    (task_files / "nieh" / "own.yaml").write_text(CLUES + "}\na: &a [1, 1, 1, 1]\nb: [*a, *a]\n")
+    arguments = ["--model", "oracle", "--tasks", "own", "--data", make_nieh_set(size=56), "--output", tmp_path / "out"]
+    monkeypatch.setenv("INFTHOR_EVAL_MAX_YAML_NODES", "10")
+    said_in_one_line(run(*arguments), "holds more than 10 values")
+    monkeypatch.delenv("INFTHOR_EVAL_MAX_YAML_NODES")
+    assert run(*arguments)[0] == 0
