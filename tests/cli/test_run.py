@@ -21,8 +21,8 @@ def only(folder, pattern):
     return path
 
 
-# By clues, total, interval, bootstrap, open-ended, absence, samples, skipped, failed. Two trajectories tell little, even
-# if all is right: Wilson's interval on 2 questions; a bootstrap of equal scores tells nothing.
+# By clues, total, interval, bootstrap, open-ended, absence, samples, skipped, failed. Two trajectories tell little,
+# also where all is right: Wilson's interval on 2 questions. A bootstrap of equal scores tells nothing.
 FULL_MARKS = ["100.00"] * 4 + ["34.2–100.0", "-", "100.00", "-", "5", "0", "0"]
 
 
