@@ -64,6 +64,8 @@ def in_one_line(error: BaseException) -> str:
     """What an error of another library says, short enough to stand within a message of ours."""
     reason = error.strerror if isinstance(error, OSError) else None
     said = " ".join((reason or str(error)).split()) or type(error).__name__
+    if isinstance(error, KeyError):  # whose text is the key alone
+        said = f"no {said}"
     return said if len(said) <= _LONGEST else said[: _LONGEST - 3] + "..."
 
 

@@ -5,12 +5,13 @@ This is the one way from a sample to its record, whoever drives it: our own run,
 
 import time
 from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import groupby
 from typing import Protocol
 
-from infthor_eval.errors import DataError, ModelError
+from infthor_eval.errors import DataError, ModelError, naming
 from infthor_eval.formats.digests import fingerprint
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.nieh.baselines import Predict
@@ -23,6 +24,9 @@ from infthor_eval.runs import Session, Tokens, Unit, UnitKey, UnitRecord
 from model_adapters import Model, Reply
 
 __all__ = ["Answerer", "BaselineAnswerer", "ModelAnswerer", "NiehUnit", "answered"]
+
+
+_FAILURES = (RuntimeError, ValueError, TypeError, LookupError, AttributeError, ArithmeticError, OSError, MemoryError)
 
 
 @dataclass(frozen=True)
@@ -136,6 +140,7 @@ class ModelAnswerer:
 
     def __init__(self, model: Model, session: Session) -> None:
         self.batch_size = model.capabilities.batch_size
+        self._name = model.name
         self._notebook = Notebook(model, session)
         self._conversation = model.conversation()
         self._start = self._conversation.mark()
@@ -144,18 +149,24 @@ class ModelAnswerer:
 
     def read(self, context: Sequence[ContextPart]) -> tuple[str | FrameRef, ...]:
         """See `Answerer`."""
-        return tuple(self._notebook.text(part) if isinstance(part, Notes) else part for part in context)
+        with self._failing():
+            return tuple(self._notebook.text(part) if isinstance(part, Notes) else part for part in context)
 
     def answer(self, asked: Sequence[_Asked]) -> list[Reply]:
         """See `Answerer`."""
         context = asked[0].shown
-        if context != self._context:
-            self._conversation.rewind(self._start)
-            self._context = None
-            self._conversation.append(*context)
-            self._context, self._after_context = context, self._conversation.mark()
-        self._conversation.rewind(self._after_context)
-        return self._conversation.replies([[item.text] for item in asked], asked[0].prepared.decoding)
+        with self._failing():
+            if context != self._context:
+                self._conversation.rewind(self._start)
+                self._context = None
+                self._conversation.append(*context)
+                self._context, self._after_context = context, self._conversation.mark()
+            self._conversation.rewind(self._after_context)
+            return self._conversation.replies([[item.text] for item in asked], asked[0].prepared.decoding)
+
+    def _failing(self) -> AbstractContextManager[None]:
+        """Turns what an adapter, anybody's, raises on a request into a failure of that request: the others go on."""
+        return naming(f"{self._name} fails on the request", "report it to who made it", of=_FAILURES, as_a=ModelError)
 
 
 class BaselineAnswerer:

@@ -22,6 +22,7 @@ from infthor_eval.nieh.records import RECORDS
 from infthor_eval.runs import read_run
 from infthor_eval.runs.journal import Journal
 from model_adapters.hf.decoding import Generation, Writing
+from model_adapters.hf.model import TransformersModel
 from model_adapters.protocols import Decoding
 
 from ..conftest import QUESTIONS
@@ -129,6 +130,22 @@ def test_a_frame_that_no_model_can_take_fails_alone(make_nieh_set, tmp_path, run
     assert "5 answered now" in err
     assert "nieh_gt: 1 sample(s) failed, counted as wrong: " in err
     assert "Traceback" not in err
+
+
+@pytest.mark.parametrize("error", [RuntimeError, ValueError, KeyError, ZeroDivisionError, OSError, MemoryError])
+def test_what_an_adapter_raises_on_one_question_fails_alone(make_nieh_set, tmp_path, run, monkeypatch, error):
+    reply = TransformersModel.answer_each
+
+    def answer_each(self, conversations, decoding):
+        if any("fridge" in str(turns[-1].parts[-1]) for turns in conversations):
+            raise error("of its own")
+        return reply(self, conversations, decoding)
+
+    monkeypatch.setattr(TransformersModel, "answer_each", answer_each)
+    arguments = ["--model", "qwen2.5-vl-tiny", "--model-args", "batch_size=4", "--tasks", "nieh_gt"]
+    code, _, err = run(*arguments, "--data", make_nieh_set(size=56), "--output", tmp_path / "out")
+    assert code == 1
+    assert "nieh_gt: 1 sample(s) failed, counted as wrong: qwen2.5-vl-tiny fails on the request" in err
 
 
 @pytest.mark.parametrize("batch_size", [1, 4])
