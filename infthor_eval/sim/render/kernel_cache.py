@@ -30,6 +30,6 @@ def drop_stale_kernels(folder: Path = _HERE) -> bool:
             path.unlink(missing_ok=True)
         cache.mkdir(exist_ok=True)
         stamp.write_text(sources, encoding="ascii")
-    except PermissionError:  # a read-only installation: its files change together, with an upgrade
+    except OSError:  # a read-only installation: its files change together, with an upgrade
         return False
     return bool(stale)
