@@ -16,6 +16,7 @@ from infthor_eval.generation.replay_summary import summarise
 from infthor_eval.generation.settings import TrajectorySettings
 from infthor_eval.generation.supplement import write_supplement
 from infthor_eval.nieh.baselines import BASELINES
+from infthor_eval.nieh.contexts import Sample
 from infthor_eval.nieh.scoring import score
 from infthor_eval.thor.launch import embedded
 from infthor_eval.thor.simulator import Simulator
@@ -137,7 +138,8 @@ def test_what_the_published_saver_writes_is_replayed_asked_about_and_evaluated(t
     assert len(made.questions) == 40 and not made.doubted
     assert "put a cold apple in the microwave" in (tmp_path / "set/metadata/floorplan28_test/traj.txt").read_text()
     predict = BASELINES["oracle"](0).fit(made.questions)
-    assert all(score(predict(question), question.answers, "strict") == 1.0 for question in made.questions)
+    said = {question: predict(Sample(question, question.clues)) for question in made.questions}
+    assert all(score(reply, question.answers, "strict") == 1.0 for question, reply in said.items())
 
 
 def test_selection_limits(tmp_path):
