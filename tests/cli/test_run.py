@@ -196,10 +196,11 @@ def test_misuse_ends_in_one_line_and_exit_code_2(make_nieh_set, tmp_path, run, a
 
 def test_bad_data_ends_in_one_line_and_exit_code_2(make_nieh_set, tmp_path, run):
     data = make_nieh_set(size=56)
-    (data / "metadata" / "traj_a" / "img" / "000000005.png").unlink()
+    for traj_id in ("traj_a", "traj_b"):
+        (data / "metadata" / traj_id / "img" / "extra.png").write_bytes(b"")
     code, _, err = run("--model", "oracle", "--tasks", "nieh", "--data", data, "--output", tmp_path / "out")
     assert code == 2
-    assert "trajectory traj_a: 5 frames but 6 entries" in err
+    assert "trajectory traj_a: 7 frames but 6 entries" in err
     assert len(err.strip().splitlines()) == 1
 
 
