@@ -7,7 +7,7 @@ The folder form is that of the published data (hub dataset `PEARLS-Lab/infini-th
 
 import hashlib
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -198,15 +198,8 @@ class NiehSet:
         Raises:
             DataError: the video cannot be decoded.
         """
-        if traj_id not in self._videos:
-            try:
-                self._videos[traj_id] = frames_per_second(self.folder(traj_id) / f"{traj_id}_10fps.mp4")
-            except DataError as error:
-                self._videos[traj_id] = error  # a broken video is not decoded again for every question on it
-        found = self._videos[traj_id]
-        if isinstance(found, DataError):
-            raise found
-        return found
+        video = self.folder(traj_id) / f"{traj_id}_10fps.mp4"
+        return _once(self._videos, traj_id, lambda: frames_per_second(video))
 
     def _problem(self, question: Question) -> str | None:
         """Why a question cannot be asked; None where it can."""
@@ -226,15 +219,20 @@ class NiehSet:
     def _trajectory(self, traj_id: str) -> dict[int, FrameRef]:
         if Path(traj_id).name != traj_id or traj_id in {"", ".", ".."}:
             raise DataError(f"trajectory {traj_id!r} is not a plain folder name")
-        if traj_id not in self._frames:
-            try:
-                self._frames[traj_id] = _read_frames(self.folder(traj_id))
-            except DataError as error:
-                self._frames[traj_id] = error  # a broken log is not read again for every question on it
-        found = self._frames[traj_id]
-        if isinstance(found, DataError):
-            raise found
-        return found
+        return _once(self._frames, traj_id, lambda: _read_frames(self.folder(traj_id)))
+
+
+def _once(known: dict[str, T | DataError], traj_id: str, read: Callable[[], T]) -> T:
+    """What was read for a trajectory, or the error it ended in: the broken is not read again for every question."""
+    if traj_id not in known:
+        try:
+            known[traj_id] = read()
+        except DataError as error:
+            known[traj_id] = error
+    found = known[traj_id]
+    if isinstance(found, DataError):
+        raise found
+    return found
 
 
 def _read_frames(folder: Path) -> dict[int, FrameRef]:

@@ -2,13 +2,15 @@
 
 import json
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from datetime import datetime
+from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from infthor_eval.errors import DataError
+from infthor_eval.errors import naming
 from infthor_eval.formats.digests import canonical_json
 from infthor_eval.formats.files import written_atomically
 from infthor_eval.harness.registration import NAME
@@ -32,11 +34,11 @@ def export(outcome: RunOutcome) -> Path:
     model = _sanitised(outcome.run.request.model)
     folder = outcome.folder / "lm_eval" / model
     stamp = datetime.now().isoformat().replace(":", "-")
-    hashes = {}
-    try:
+    tasks, hashes = _tasks(outcome), {}
+    with naming(f"{folder}: cannot be written", "make room, the journal holds it all"):
         folder.mkdir(parents=True, exist_ok=True)
-        for task in _tasks(outcome):
-            rows = list(_rows(outcome, task))
+        for task in tasks:
+            rows = _rows(outcome, task)
             hashes[task.name] = _hash(
                 "".join(row["doc_hash"] + row["prompt_hash"] + row["target_hash"] for row in rows)
             )
@@ -44,37 +46,56 @@ def export(outcome: RunOutcome) -> Path:
                 lines = (json.dumps(row, ensure_ascii=False) + "\n" for row in rows)
                 partial.write_text("".join(lines), encoding="utf-8")
         with written_atomically(folder / f"results_{stamp}.json") as partial:
-            document = _results(outcome) | {"task_hashes": hashes, "model_name_sanitized": model}
+            document = _results(outcome, tasks) | {"task_hashes": hashes, "model_name_sanitized": model}
             partial.write_text(json.dumps(document, indent=2, ensure_ascii=False), encoding="utf-8")
-    except OSError as error:
-        raise DataError(
-            f"{folder}: cannot be written ({error.strerror}); make room, the journal holds it all"
-        ) from error
     return folder
 
 
-def _tasks(outcome: RunOutcome) -> list[TaskFile]:
+@dataclass(frozen=True)
+class _Scored:
+    """A task with its records.
+
+    Attributes:
+        file: the task.
+        records: of its units; at least one.
+        scores: of each, by metric; a failed one has none.
+    """
+
+    file: TaskFile
+    records: Sequence[UnitRecord[Any]]
+    scores: Sequence[Mapping[str, float]]
+
+    @property
+    def name(self) -> str:
+        return self.file.name
+
+    @cached_property
+    def metrics(self) -> list[str]:
+        """Names of the metrics, of all records together."""
+        return list(dict.fromkeys(name for scores in self.scores for name in scores))
+
+
+def _tasks(outcome: RunOutcome) -> list[_Scored]:
     """The tasks of which there are records."""
-    there = {record.task for record in outcome.records}
-    return [task for task in outcome.run.request.tasks.tasks if task.name in there]
+    by_task: dict[str, list[UnitRecord[Any]]] = {}
+    for record in outcome.records:
+        by_task.setdefault(record.task, []).append(record)
+    return [
+        _Scored(file, by_task[file.name], [outcome.run.suite.scores(record) for record in by_task[file.name]])
+        for file in outcome.run.request.tasks.tasks
+        if file.name in by_task
+    ]
 
 
-def _of(outcome: RunOutcome, task: TaskFile) -> list[UnitRecord[Any]]:
-    return [record for record in outcome.records if record.task == task.name]
-
-
-def _rows(outcome: RunOutcome, task: TaskFile) -> Iterator[dict[str, Any]]:
+def _rows(outcome: RunOutcome, task: _Scored) -> list[dict[str, Any]]:
     """A sample per line, in the task's order."""
-    viewed = [(outcome.run.evaluation.view(record), record) for record in _of(outcome, task)]
-    metrics = _metrics([record for _, record in viewed], outcome)
-    for view, record in sorted(viewed, key=lambda pair: pair[0].number):
-        scores = outcome.run.suite.scores(record)
-        yield _row(view) | {"metrics": metrics} | {name: scores.get(name, 0.0) for name in metrics}
-
-
-def _metrics(records: Sequence[UnitRecord[Any]], outcome: RunOutcome) -> list[str]:
-    """Names of the metrics; a failed record has none."""
-    return list(dict.fromkeys(name for record in records for name in outcome.run.suite.scores(record)))
+    rows = [
+        _row(outcome.run.evaluation.view(record))
+        | {"metrics": task.metrics}
+        | {name: scores.get(name, 0.0) for name in task.metrics}
+        for record, scores in zip(task.records, task.scores, strict=True)
+    ]
+    return sorted(rows, key=lambda row: row["doc_id"])
 
 
 def _row(view: SampleView) -> dict[str, Any]:
@@ -98,17 +119,16 @@ def _hash(text: str) -> str:
     return str(hash_string(text))
 
 
-def _results(outcome: RunOutcome) -> dict[str, Any]:
-    tasks, request = _tasks(outcome), outcome.run.request
-    counts = {task.name: len(_of(outcome, task)) for task in tasks}
+def _results(outcome: RunOutcome, tasks: Sequence[_Scored]) -> dict[str, Any]:
+    request = outcome.run.request
     return {
-        "results": {task.name: _means(outcome, task) for task in tasks},
+        "results": {task.name: _means(task) for task in tasks},
         "group_subtasks": {task.name: [] for task in tasks},
-        "configs": {task.name: _plain(task.settings) for task in tasks},
-        "versions": {task.name: task.settings.get("metadata", {}).get("version") for task in tasks},
+        "configs": {task.name: _plain(task.file.settings) for task in tasks},
+        "versions": {task.name: task.file.settings.get("metadata", {}).get("version") for task in tasks},
         "n-shot": {task.name: 0 for task in tasks},
-        "higher_is_better": {task.name: dict.fromkeys(_metrics(_of(outcome, task), outcome), True) for task in tasks},
-        "n-samples": {name: {"original": n, "effective": n} for name, n in counts.items()},
+        "higher_is_better": {task.name: dict.fromkeys(task.metrics, True) for task in tasks},
+        "n-samples": {task.name: dict.fromkeys(("original", "effective"), len(task.records)) for task in tasks},
         "config": {
             "model": NAME,
             "model_args": {"adapter": request.model, **request.model_options},
@@ -127,12 +147,11 @@ def _results(outcome: RunOutcome) -> dict[str, Any]:
     }
 
 
-def _means(outcome: RunOutcome, task: TaskFile) -> dict[str, Any]:
-    records = _of(outcome, task)
-    found: dict[str, Any] = {"name": task.name, "alias": task.name, "sample_len": len(records)}
-    for metric in _metrics(records, outcome):
-        scores = [outcome.run.suite.scores(record).get(metric, 0.0) for record in records]
-        estimate = clustered_mean(scores, [record.cluster for record in records])
+def _means(task: _Scored) -> dict[str, Any]:
+    found: dict[str, Any] = {"name": task.name, "alias": task.name, "sample_len": len(task.records)}
+    for metric in task.metrics:
+        scores = [scores.get(metric, 0.0) for scores in task.scores]
+        estimate = clustered_mean(scores, [record.cluster for record in task.records])
         found[f"{metric},{_FILTER}"] = estimate.mean
         found[f"{metric}_stderr,{_FILTER}"] = "N/A" if estimate.stderr is None else estimate.stderr
     return found

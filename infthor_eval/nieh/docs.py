@@ -15,7 +15,7 @@ from infthor_eval.nieh.notes import Notes, Notetaking
 from infthor_eval.nieh.samples import TaskSamples, open_set
 from infthor_eval.nieh.stand_ins import StandIns
 
-__all__ = ["Doc", "doc_of", "doc_parts", "doc_prompt", "doc_target", "sample_of", "samples_around"]
+__all__ = ["Doc", "doc_of", "doc_parts", "doc_prompt", "doc_target", "prompt_of", "sample_of", "samples_around"]
 
 Doc = dict[str, Any]
 _PLACEHOLDERS = {FrameRef: "<image>", Notes: "<notes>"}  # the first is lm-eval's own mark for an image in a text
@@ -79,7 +79,13 @@ def doc_parts(doc: Doc) -> list[ContextPart]:
 
 def doc_prompt(doc: Doc) -> str:
     """The request's text, with a placeholder where each frame, and the model's notes, go."""
-    return "".join(part if isinstance(part, str) else _PLACEHOLDERS[type(part)] for part in doc_parts(doc))
+    return prompt_of(samples_around(doc), sample_of(doc))
+
+
+def prompt_of(found: TaskSamples, sample: Sample) -> str:
+    """A sample's request as text; see `doc_prompt`."""
+    context, text = found.request(sample)
+    return "".join(part if isinstance(part, str) else _PLACEHOLDERS[type(part)] for part in (*context, text))
 
 
 def doc_target(question: Question) -> str:

@@ -8,7 +8,7 @@ from typing import cast
 from infthor_eval.errors import DataError, InfthorError, ModelError, UsageError
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.nieh.answering import NiehUnit, answered
-from infthor_eval.nieh.docs import doc_of, doc_prompt, doc_target
+from infthor_eval.nieh.docs import doc_of, doc_target, prompt_of
 from infthor_eval.nieh.options import NiehOptions
 from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.nieh.respondents import respondent
@@ -82,13 +82,12 @@ class NiehEvaluation:
         prepared = self._prepared[record.task]
         number = self._numbers[record.key]
         sample = prepared.found.samples[number]
-        doc = doc_of(prepared.found, sample)
         settings = next(task.settings for task in self._tasks if task.name == record.task)
         return SampleView(
             number=number,
-            doc=doc,
+            doc=doc_of(prepared.found, sample),
             target=doc_target(sample.question),
-            prompt=doc_prompt(doc),
+            prompt=prompt_of(prepared.found, sample),
             settings=settings["generation_kwargs"],
             reply=record.payload.reply or "",
         )

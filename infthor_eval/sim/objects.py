@@ -102,11 +102,6 @@ class SimObject:
             self._bounds = (key, points.min(axis=0), points.max(axis=0))
         return self._bounds[1], self._bounds[2]
 
-    def axis_aligned(self) -> tuple[Array, Array]:
-        """Centre and size of the axis-aligned box in the world, metres."""
-        low, high = self.bounds()
-        return (low + high) / 2, high - low
-
     def surface_height(self) -> float:
         """World height in metres of the surface that things stand on."""
         low, high = self.bounds()

@@ -5,7 +5,7 @@ parameter t is the depth along the camera's forward axis in metres. Rows count f
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,10 +31,6 @@ class Camera:
     height: int
     near: float = NEAR
     far: float = FAR
-
-    def scaled(self, factor: int) -> "Camera":
-        """The same camera with `factor` times as many pixels each way."""
-        return replace(self, width=self.width * factor, height=self.height * factor)
 
     def rays(self) -> tuple[Array, Array]:
         """Horizontal (width,) and vertical (height,) components of the rays; row 0 is the bottom one."""
