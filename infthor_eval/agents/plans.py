@@ -1,0 +1,169 @@
+"""The plans of a trajectory: what an agent is asked to do, one after the other."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+from infthor_eval.errors import DataError
+from infthor_eval.formats.trajectory import HighAction, SubTask, TaskInfo, Trajectory
+from infthor_eval.household.sequence_text import goal_text, plan_text
+from infthor_eval.household.tasks import Task, task_of
+
+__all__ = ["Plan", "PlanKind", "TrajectoryTask", "plans_of", "tasks_of"]
+
+
+class PlanKind(StrEnum):
+    """ALFRED's sub-goals."""
+
+    GOTO = "GotoLocation"
+    PICKUP = "PickupObject"
+    PUT = "PutObject"
+    OPEN = "OpenObject"
+    CLOSE = "CloseObject"
+    TOGGLE = "ToggleObject"
+    SLICE = "SliceObject"
+    CLEAN = "CleanObject"
+    HEAT = "HeatObject"
+    COOL = "CoolObject"
+
+
+@dataclass(frozen=True)
+class TrajectoryTask:
+    """One task of a trajectory.
+
+    Attributes:
+        text: its goal in words.
+        task: what must hold in the end.
+        first_high: its first sub-goal.
+        end_high: the sub-goal behind its last one.
+    """
+
+    text: str
+    task: Task
+    first_high: int
+    end_high: int
+
+
+@dataclass(frozen=True)
+class Plan:
+    """One plan.
+
+    Attributes:
+        index: its place among the trajectory's plans.
+        kind: what is to be done.
+        text: in words ("pick up the mug").
+        task: index of the task that it belongs to; the one before where it stands between two tasks.
+        low: the expert's low-level actions of it, [first, end).
+        object_id: what it is about, as recorded; None where the recording names none.
+        receptacle_id: where to, as recorded; None likewise.
+        is_final: whether it belongs to the final long-horizon task.
+    """
+
+    index: int
+    kind: PlanKind
+    text: str
+    task: int
+    low: tuple[int, int]
+    object_id: str | None = None
+    receptacle_id: str | None = None
+    is_final: bool = False
+
+
+def tasks_of(trajectory: Trajectory) -> list[TrajectoryTask]:
+    """The tasks of a trajectory, in time order; of ALFRED's demonstrations the one.
+
+    Raises:
+        DataError: a task without a goal, or its sub-goals are not there.
+    """
+    n_high = len(trajectory.plan.high_pddl)
+    if not trajectory.sub_trajs:
+        return [TrajectoryTask(goal_text(trajectory, None), task_of(_single_task(trajectory)), 0, n_high)]
+    found = []
+    for sub_task, span in zip(_sub_tasks(trajectory), trajectory.sub_trajs, strict=True):
+        first, end = span.high_pddl_idx
+        if not 0 <= first <= end <= n_high:
+            raise DataError(
+                f"trajectory {trajectory.traj_id}: task {span.sub_traj_idx} has sub-goals {first} to {end} of {n_high}"
+            )
+        found.append(TrajectoryTask(goal_text(trajectory, sub_task), task_of(sub_task), first, end))
+    return found
+
+
+def plans_of(trajectory: Trajectory) -> list[Plan]:
+    """The plans of a trajectory, in time order; sub-goals without an action (ALFRED's last one) are none.
+
+    Raises:
+        DataError: a task without a goal, an unknown kind of sub-goal, or actions that belong to none.
+    """
+    tasks = tasks_of(trajectory)
+    spans = _spans(trajectory)
+    final = len(tasks) - 1 if trajectory.long_horizon_task is not None else None
+    plans: list[Plan] = []
+    for high in trajectory.plan.high_pddl:
+        low = spans.get(high.high_idx)
+        if low is None:
+            continue
+        task = max((number for number, item in enumerate(tasks) if item.first_high <= high.high_idx), default=0)
+        plans.append(
+            Plan(
+                index=len(plans),
+                kind=_kind(trajectory, high),
+                text=plan_text(high),
+                task=task,
+                low=low,
+                object_id=high.planner_action.object_id,
+                receptacle_id=high.planner_action.receptacle_id,
+                is_final=task == final,
+            )
+        )
+    return plans
+
+
+def _sub_tasks(trajectory: Trajectory) -> Sequence[SubTask]:
+    """A task for each part of the trajectory; some files keep the final task apart from the others."""
+    tasks, parts, final = trajectory.sub_tasks, trajectory.sub_trajs, trajectory.long_horizon_task
+    if len(parts) == len(tasks) + 1 and final is not None:
+        return [*tasks, final]
+    if len(parts) != len(tasks):
+        raise DataError(f"trajectory {trajectory.traj_id}: {len(parts)} parts for {len(tasks)} tasks; restore the file")
+    return tasks
+
+
+def _single_task(trajectory: Trajectory) -> SubTask:
+    """The task of an ALFRED demonstration."""
+    params = trajectory.pddl_params or {}
+    info = TaskInfo(
+        goal=trajectory.task_type or "",
+        pickup=params.get("object_target"),
+        movable=params.get("mrecep_target") or None,
+        receptacle=params.get("parent_target") or None,
+    )
+    return SubTask(info, pddl_params=params)
+
+
+def _spans(trajectory: Trajectory) -> dict[int, tuple[int, int]]:
+    """The actions of each sub-goal, [first, end)."""
+    spans: dict[int, tuple[int, int]] = {}
+    previous = -1
+    for number, low in enumerate(trajectory.plan.low_actions):
+        if low.high_idx != previous and low.high_idx in spans or low.high_idx < previous:
+            raise DataError(
+                f"trajectory {trajectory.traj_id}: action {number} belongs to sub-goal {low.high_idx}, out of order"
+            )
+        first, _ = spans.get(low.high_idx, (number, number))
+        spans[low.high_idx] = (first, number + 1)
+        previous = low.high_idx
+    unknown = spans.keys() - {high.high_idx for high in trajectory.plan.high_pddl}
+    if unknown:
+        raise DataError(f"trajectory {trajectory.traj_id}: there is no sub-goal {min(unknown)}, which actions belong to")
+    return spans
+
+
+def _kind(trajectory: Trajectory, high: HighAction) -> PlanKind:
+    try:
+        return PlanKind(high.discrete_action.action)
+    except ValueError as error:
+        raise DataError(
+            f"trajectory {trajectory.traj_id}: sub-goal {high.high_idx} is {high.discrete_action.action!r:.60}; "
+            f"there are {', '.join(PlanKind)}"
+        ) from error
