@@ -19,17 +19,17 @@ from infthor_eval.thor.view import View, view_of
 
 __all__ = ["Simulator", "SimulatorMark"]
 
+_Done = tuple[dict[str, Any], bool]  # a call, and whether it was carried out
 _LOG = logging.getLogger(__name__)
 _INITIAL = {"gridSize": 0.25, "fieldOfView": 60, "visibilityDistance": 1.5, "snapToGrid": True}
-_SLOTS = 2  # states that the embedded simulator is asked to keep
 _WALKING = {"MoveAhead", "MoveBack", "MoveLeft", "MoveRight", "RotateLeft", "RotateRight", "LookUp", "LookDown"}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SimulatorMark:
-    """A moment of an episode: how many actions led to it, and the world then."""
+    """A moment since the scene was loaded: the actions that led to it, and the world then."""
 
-    length: int
+    episode: tuple["_Done", ...]
     view: View
 
 
@@ -50,6 +50,7 @@ class Simulator:
         instances: bool = True,
         depth: bool = False,
         max_restarts: int = 3,
+        max_copies: int = 2,
         **options: Any,
     ) -> None:
         """Describe the simulator; it starts with the first `reset`.
@@ -61,6 +62,7 @@ class Simulator:
             instances: whether views tell which object each pixel shows.
             depth: whether views have depth.
             max_restarts: how many failures one episode may survive.
+            max_copies: of how many marks the embedded simulator keeps a copy of its state (0.2 MB each).
             options: further initialisation parameters of AI2-THOR (`fieldOfView`, `agentMode`, ...).
         """
         self._launch = launch
@@ -73,11 +75,12 @@ class Simulator:
             **options,
         }
         self._max_restarts = max_restarts
+        self._max_copies = max_copies
         self._controller: SafeController | None = None
         self._scene: str | dict[str, Any] | None = None
-        self._episode: list[tuple[dict[str, Any], bool]] = []
+        self._episode: list[_Done] = []
         self._failures = 0
-        self._saved: dict[int, int] = {}  # by slot: length of the episode of which the process keeps a copy
+        self._copies: dict[SimulatorMark, int] = {}  # to the slot of the process's copy; the longest unused first
         self._view: View | None = None
         self.restarts = 0
 
@@ -127,7 +130,7 @@ class Simulator:
             SimulatorError: the simulator cannot be started, or refuses the scene.
         """
         self._scene, self._episode, self._failures = scene or self._scene, [], 0
-        self._saved = {}
+        self._copies = {}
         while True:
             try:
                 self._view = self._load()
@@ -169,48 +172,65 @@ class Simulator:
         return answer
 
     def mark(self) -> SimulatorMark:
-        """Remember where the episode is now, for `rewind`; the last two marks are cheap to go back to.
+        """Remember this moment, for `rewind`; of marks that were not used for long the simulator keeps no copy.
 
         The embedded simulator keeps a copy of its state. Unity cannot: there `rewind` may repeat the episode.
         """
-        length = len(self._episode)
-        if length not in self._saved.values():
-            slot = min(range(_SLOTS), key=lambda slot: self._saved.get(slot, -1))
-            if self.query("SaveState", slot=slot).success:
-                self._saved[slot] = length
-        return SimulatorMark(length, self.view)
+        latest = next(reversed(self._copies), None)
+        if latest is not None and self._is_at(latest):
+            return latest
+        mark = SimulatorMark(tuple(self._episode), self.view)
+        if len(self._copies) == self._max_copies:
+            self._copies.pop(next(iter(self._copies)))
+        slot = min(set(range(self._max_copies)) - set(self._copies.values()))
+        if self.query("SaveState", slot=slot).success:
+            self._copies[mark] = slot
+        return mark
 
-    def rewind(self, mark: SimulatorMark) -> View:
-        """Bring the world back to where it was at a mark of this episode.
+    def rewind(self, mark: SimulatorMark, *, exactly: bool = False) -> View:
+        """Bring the world to where it was at a mark, behind or beside the present moment, of the scene loaded.
+
+        Args:
+            mark: where to.
+            exactly: whether it matters that walking back is off by the rounding errors of the steps, and single
+                pixels with it; else an agent that only walked since is put back, which is faster.
 
         Raises:
             SimulatorError: as `step`.
         """
-        self._saved = {slot: length for slot, length in self._saved.items() if length <= mark.length}
-        since = self._episode[mark.length :]
-        walked = all(call["action"] in _WALKING for call, _ in since)
-        if (walked and self._walk_back(mark)) or self._restore(mark.length):
-            del self._episode[mark.length :]
-            self._view = mark.view
-            return mark.view
-        calls = [call for call, _ in self._episode[: mark.length]]
-        self.reset(None)
-        for call in calls:
-            self.step(**call)
-        return self.view
+        if not (not exactly and self._walk_back(mark)) and not self._restore(mark):
+            self.reset(None)
+            for call, _ in mark.episode:
+                self.step(**call)
+            return self.view
+        self._episode = list(mark.episode)
+        self._view = mark.view
+        return mark.view
 
-    def _restore(self, length: int) -> bool:
-        slot = next((slot for slot, known in self._saved.items() if known == length), None)
-        return slot is not None and self.query("RestoreState", slot=slot).success
+    def _is_at(self, mark: SimulatorMark) -> bool:
+        return len(self._episode) == len(mark.episode) and self._began_with(mark)
+
+    def _began_with(self, mark: SimulatorMark) -> bool:
+        return tuple(self._episode[: len(mark.episode)]) == mark.episode
+
+    def _restore(self, mark: SimulatorMark) -> bool:
+        slot = self._copies.pop(mark, None)
+        if slot is None or not self.query("RestoreState", slot=slot).success:
+            return False
+        self._copies[mark] = slot  # the last one used
+        return True
 
     def _walk_back(self, mark: SimulatorMark) -> bool:
-        """Put the agent where it was; enough where it only walked and looked about since."""
+        """Put the agent where it was, where it only walked and looked about since."""
+        since = self._episode[len(mark.episode) :]
+        if not self._began_with(mark) or any(call["action"] not in _WALKING for call, _ in since):
+            return False
         back = self.query(**teleport_call(mark.view.agent))
         return back.success and back.agent == mark.view.agent
 
     def close(self) -> None:
         """Stop the simulator; a later `reset` starts it again."""
-        self._saved = {}
+        self._copies = {}
         if self._controller is not None:
             self._controller.stop()
             self._controller = None

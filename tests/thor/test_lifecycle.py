@@ -39,7 +39,7 @@ def test_a_query_is_no_part_of_the_episode():
         before = simulator.reset(SCENE)
         assert simulator.query("GetReachablePositions").result
         assert simulator.view is before
-        assert simulator.mark().length == 0
+        assert simulator.mark().episode == ()
 
 
 @pytest.mark.parametrize("actions", [["MoveAhead", "RotateRight", "LookDown"], ["RotateLeft", "Crouch", "MoveAhead"]])
@@ -79,6 +79,41 @@ def test_the_last_two_marks_are_gone_back_to_without_repeating_the_episode(monke
         assert simulator.rewind(marks[0]).agent == views[0].agent
 
 
+@pytest.mark.parametrize("exactly", [False, True])
+def test_any_mark_of_the_scene_can_be_gone_to_from_any_moment(exactly):
+    with Simulator(embedded(), max_copies=8) as simulator:
+        simulator.reset(SCENE)
+        marks = []
+        for action in ("RotateRight", "MoveAhead", "Crouch", "RotateRight", "MoveAhead"):
+            simulator.step(action)
+            marks.append(simulator.mark())
+        calls = []
+        simulator._controller.step = _counted(simulator._controller.step, calls)
+        for number in (0, 4, 2, 3, 1, 4):
+            view = simulator.rewind(marks[number], exactly=exactly)
+            assert view is marks[number].view
+            again = simulator.query("Pass")
+            assert again.agent == view.agent
+            assert np.array_equal(again.frame, view.frame)
+            simulator.step("Stand")
+            simulator.step("RotateLeft")
+        assert len(calls) == 6 * 4  # none of them goes the way again
+
+
+def test_without_copies_the_way_is_gone_again():
+    with Simulator(embedded(), max_copies=1) as simulator:
+        simulator.reset(SCENE)
+        marks = []
+        for action in ("RotateRight", "MoveAhead", "Crouch"):
+            simulator.step(action)
+            marks.append(simulator.mark())
+        simulator.step("RotateLeft")
+        for mark in (marks[1], marks[0], marks[2]):
+            view = simulator.rewind(mark, exactly=True)
+            assert view.agent == mark.view.agent
+            assert np.array_equal(view.frame, mark.view.frame)
+
+
 @pytest.mark.parametrize("scene", ["FloorPlan9999", "nowhere"])
 def test_an_unknown_scene_is_one_line(scene):
     with Simulator(embedded()) as simulator, pytest.raises(SimulatorError, match=scene) as caught:
@@ -115,3 +150,11 @@ def resident():
     """Resident memory of this process, MB."""
     pages = int(Path("/proc/self/statm").read_text().split()[1])
     return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+def _counted(step, calls):
+    def counted(*args, **kwargs):
+        calls.append(args)
+        return step(*args, **kwargs)
+
+    return counted
