@@ -146,7 +146,7 @@ def _spans(trajectory: Trajectory) -> dict[int, tuple[int, int]]:
     spans: dict[int, tuple[int, int]] = {}
     previous = -1
     for number, low in enumerate(trajectory.plan.low_actions):
-        if low.high_idx != previous and low.high_idx in spans or low.high_idx < previous:
+        if (low.high_idx != previous and low.high_idx in spans) or low.high_idx < previous:
             raise DataError(
                 f"trajectory {trajectory.traj_id}: action {number} belongs to sub-goal {low.high_idx}, out of order"
             )
@@ -155,7 +155,9 @@ def _spans(trajectory: Trajectory) -> dict[int, tuple[int, int]]:
         previous = low.high_idx
     unknown = spans.keys() - {high.high_idx for high in trajectory.plan.high_pddl}
     if unknown:
-        raise DataError(f"trajectory {trajectory.traj_id}: there is no sub-goal {min(unknown)}, which actions belong to")
+        raise DataError(
+            f"trajectory {trajectory.traj_id}: there is no sub-goal {min(unknown)}, which actions belong to"
+        )
     return spans
 
 

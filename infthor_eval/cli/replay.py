@@ -50,10 +50,10 @@ def command(
     from infthor_eval.formats.files import prepared_folder
     from infthor_eval.generation.replay_set import replay_set, select
     from infthor_eval.generation.replay_summary import summarise
-    from infthor_eval.generation.supplement import supplement_file
     from infthor_eval.terminal import console, error_console, progress_bar
     from infthor_eval.thor import launch
     from infthor_eval.thor.simulator import Simulator
+    from infthor_eval.thor.supplement import supplement_file
 
     notes = error_console()
     prepared_folder(out)

@@ -17,9 +17,9 @@ from infthor_eval.formats.trajectory import (
     SubTrajectory,
     Trajectory,
 )
-from infthor_eval.generation.recorder import object_log
 from infthor_eval.generation.settings import TrajectorySettings
 from infthor_eval.generation.trace import Trace
+from infthor_eval.thor.recorder import object_log
 from infthor_eval.thor.view import Vector, View
 
 __all__ = ["Draft", "Length", "initial_scene"]

@@ -12,12 +12,12 @@ import msgspec
 from infthor_eval.formats.step_log import write_steps
 from infthor_eval.formats.trajectory import LowAction, Trajectory
 from infthor_eval.generation.motion import between
-from infthor_eval.generation.recorder import Recorder
 from infthor_eval.household.sequence_text import sequence_text
 from infthor_eval.household.state_summary import state_summaries
 from infthor_eval.thor.actions import text_of
 from infthor_eval.thor.grounding import Grounding
 from infthor_eval.thor.recorded import MissingObjectError, translate
+from infthor_eval.thor.recorder import Recorder
 from infthor_eval.thor.restore import restore
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import View

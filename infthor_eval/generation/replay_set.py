@@ -22,8 +22,8 @@ from infthor_eval.formats.set_info import claim_for_simulator
 from infthor_eval.formats.trajectory import Source, Trajectory, folder_name, iter_sources, trajectory_files
 from infthor_eval.generation.garbage import libraries_set_aside
 from infthor_eval.generation.replay import ReplayReport, replay
-from infthor_eval.generation.supplement import agent_path
 from infthor_eval.thor.simulator import Simulator
+from infthor_eval.thor.supplement import agent_path
 
 __all__ = ["Failure", "ReplayedSet", "Selection", "replay_set", "select"]
 

@@ -7,7 +7,9 @@ Per task: `<|goal|>Your main goal: ...<|goal|>`, the frame at its start, then pe
 from infthor_eval.formats.step_log import Step
 from infthor_eval.formats.trajectory import HighAction, SubTask, Trajectory
 
-__all__ = ["goal_text", "plan_text", "sequence_text"]
+__all__ = ["ACT", "action_part", "goal_part", "goal_text", "plan_part", "plan_text", "sequence_text"]
+
+ACT, _PLAN, _GOAL = "<|act|>", "<|plan|>", "<|goal|>"
 
 _PLANS = {
     "GotoLocation": "go to the {0}",
@@ -41,6 +43,21 @@ def goal_text(trajectory: Trajectory, task: SubTask | None) -> str:
     return str(annotations[0].get("task_desc", trajectory.task_type or ""))
 
 
+def goal_part(goal: str) -> str:
+    """A goal in the sequence; the frame at its start follows."""
+    return f"{_GOAL}Your main goal: {goal}{_GOAL}"
+
+
+def plan_part(plan: str) -> str:
+    """A plan in the sequence; its actions follow."""
+    return f"{_PLAN}Plan: {plan}{_PLAN}"
+
+
+def action_part(action: str) -> str:
+    """An action in the sequence; the frame after it follows. A model is asked behind the first mark."""
+    return f"{ACT}{action}{ACT}"
+
+
 def sequence_text(trajectory: Trajectory, steps: list[Step]) -> str:
     """The whole trajectory.
 
@@ -58,11 +75,11 @@ def sequence_text(trajectory: Trajectory, steps: list[Step]) -> str:
             continue
         if step.step in starts:
             task = _task(trajectory, starts[step.step])
-            parts.append(f"<|goal|>Your main goal: {goal_text(trajectory, task)}<|goal|><image>")
+            parts.append(f"{goal_part(goal_text(trajectory, task))}<image>")
         if step.high_idx is not None and step.high_idx != shown:
             shown = step.high_idx
-            parts.append(f"<|plan|>Plan: {plans.get(shown, '')}<|plan|>")
-        parts.append(f"<|act|>{step.action}<|act|><image>")
+            parts.append(plan_part(plans.get(shown, "")))
+        parts.append(f"{action_part(step.action)}<image>")
     return "".join(parts)
 
 

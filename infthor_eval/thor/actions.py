@@ -5,13 +5,14 @@ object types; a call names objects by id. A text is grounded to the nearest visi
 the action applies to.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Container
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import Any
 
 from infthor_eval.thor.view import ThorObject, View
 
-__all__ = ["ActionText", "UngroundedError", "ground", "object_type_of", "parse_action", "text_of"]
+__all__ = ["ActionText", "Misuse", "UngroundedError", "applicable", "ground", "object_type_of", "parse_action", "text_of"]
 
 _APPLIES: dict[str, Callable[[ThorObject], bool]] = {
     "OpenObject": lambda item: item.openable and not item.is_open,
@@ -26,8 +27,25 @@ _PLAIN = {"RotateLeft", "RotateRight", "MoveAhead", "LookUp", "LookDown", "NoOp"
 _LOOK_DEGREES = 30.0
 
 
+class Misuse(StrEnum):
+    """Why a text is no call."""
+
+    NO_ACTION = "no action"
+    UNKNOWN_OBJECT = "unknown object"
+    NOT_IN_VIEW = "not in view"
+    NOT_POSSIBLE = "not possible"
+
+
 class UngroundedError(ValueError):
-    """A text names no known action, lacks an argument, or fits no object in sight; the message says which."""
+    """A text names no known action, lacks an argument, or fits no object in sight; the message says which.
+
+    Attributes:
+        misuse: which of these.
+    """
+
+    def __init__(self, misuse: Misuse, message: str) -> None:
+        super().__init__(message)
+        self.misuse = misuse
 
 
 @dataclass(frozen=True)
@@ -49,13 +67,13 @@ def parse_action(text: str) -> ActionText:
     """
     words = text.split()
     if not words:
-        raise UngroundedError("empty action")
+        raise UngroundedError(Misuse.NO_ACTION, "empty action")
     action, *types = words
     if action not in _APPLIES and action not in _PLAIN:
-        raise UngroundedError(f"unknown action '{action}'")
+        raise UngroundedError(Misuse.NO_ACTION, f"unknown action '{action}'")
     wanted = 0 if action in _PLAIN else 2 if action == "PutObject" else 1
     if len(types) != wanted:
-        raise UngroundedError(f"{action} takes {wanted} object types, got {len(types)}")
+        raise UngroundedError(Misuse.NO_ACTION, f"{action} takes {wanted} object types, got {len(types)}")
     return ActionText(action, tuple(types))
 
 
@@ -71,13 +89,16 @@ def text_of(action: str, object_id: str | None = None, receptacle_id: str | None
     return ActionText(action, tuple(object_type_of(item) for item in ids))
 
 
-def ground(text: ActionText, view: View, degrees: float = _LOOK_DEGREES) -> dict[str, Any]:
+def ground(
+    text: ActionText, view: View, degrees: float = _LOOK_DEGREES, preferred: Container[str] = ()
+) -> dict[str, Any]:
     """Turn an action text into a call.
 
     Args:
         text: the action.
         view: what the agent sees now.
         degrees: by which LookUp and LookDown turn the camera.
+        preferred: ids of objects that are meant where several of their type will do; else the nearest one is.
 
     Returns:
         `{"action": ..., arguments}` as `Simulator.step(**call)` takes it.
@@ -91,9 +112,23 @@ def ground(text: ActionText, view: View, degrees: float = _LOOK_DEGREES) -> dict
         return {"action": text.action, "degrees": degrees}
     if text.action in _PLAIN:
         return {"action": text.action}
+    _refuse_unknown(text, view)
     if text.action == "PutObject" and text.types[0] not in map(object_type_of, view.inventory):
-        raise UngroundedError(f"{text}: no {text.types[0]} in the hand")
-    return {"action": text.action, "objectId": _nearest(text, view).object_id}
+        raise UngroundedError(Misuse.NOT_POSSIBLE, f"{text}: no {text.types[0]} in the hand")
+    return {"action": text.action, "objectId": _chosen(text, view, preferred).object_id}
+
+
+def applicable(view: View) -> list[ActionText]:
+    """Every action text that can be grounded in a view, in a fixed order."""
+    found = [ActionText(name) for name in sorted(_PLAIN)]
+    visible = sorted({item.object_type for item in view.objects.values() if item.visible})
+    held = [object_type_of(key) for key in view.inventory]
+    for action, applies in _APPLIES.items():
+        able = {item.object_type for item in view.objects.values() if item.visible and applies(item)}
+        names = [name for name in visible if name in able]
+        pairs = [(item, name) for item in held for name in names] if action == "PutObject" else [(name,) for name in names]
+        found += [ActionText(action, types) for types in pairs]
+    return found
 
 
 def object_type_of(object_id: str) -> str:
@@ -106,11 +141,19 @@ def object_type_of(object_id: str) -> str:
     return parts[4].split("_")[0] if len(parts) > 4 else parts[0]
 
 
-def _nearest(text: ActionText, view: View) -> ThorObject:
+def _refuse_unknown(text: ActionText, view: View) -> None:
+    here = {item.object_type for item in view.objects.values()}
+    for name in text.types:
+        if name not in here:
+            raise UngroundedError(Misuse.UNKNOWN_OBJECT, f"{text}: {name}: none in this scene")
+
+
+def _chosen(text: ActionText, view: View, preferred: Container[str]) -> ThorObject:
     object_type, applies = text.types[-1], _APPLIES[text.action]
     fitting = [item for item in view.objects.values() if item.object_type == object_type and item.visible]
     able = [item for item in fitting if applies(item)]
+    if not fitting:
+        raise UngroundedError(Misuse.NOT_IN_VIEW, f"{text}: {object_type}: none in sight")
     if not able:
-        why = "none of those in sight allows it" if fitting else "none in sight"
-        raise UngroundedError(f"{text}: {object_type}: {why}")
-    return min(able, key=lambda item: (item.distance, item.object_id))
+        raise UngroundedError(Misuse.NOT_POSSIBLE, f"{text}: {object_type}: none of those in sight allows it")
+    return min(able, key=lambda item: (item.object_id not in preferred, item.distance, item.object_id))

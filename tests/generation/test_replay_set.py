@@ -14,12 +14,12 @@ from infthor_eval.generation.replay import box_iou
 from infthor_eval.generation.replay_set import replay_set, select
 from infthor_eval.generation.replay_summary import summarise
 from infthor_eval.generation.settings import TrajectorySettings
-from infthor_eval.generation.supplement import write_supplement
 from infthor_eval.nieh.baselines import BASELINES
 from infthor_eval.nieh.contexts import Sample
 from infthor_eval.nieh.scoring import score
 from infthor_eval.thor.launch import embedded
 from infthor_eval.thor.simulator import Simulator
+from infthor_eval.thor.supplement import write_supplement
 
 SHARED = Path(__file__).parents[2] / "../shared/data"
 PUBLISHED = SHARED / "published_goldens"

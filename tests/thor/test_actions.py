@@ -37,10 +37,10 @@ def test_the_nearest_visible_object_is_meant():
 @pytest.mark.parametrize(
     ("text", "world", "words"),
     [
-        ("PickupObject Cup", view(MUG), "none in sight"),
+        ("PickupObject Cup", view(MUG), "none in this scene"),
         ("PickupObject Mug", view(HIDDEN_MUG), "none in sight"),
         ("OpenObject Fridge", view(FRIDGE), "none of those in sight allows it"),
-        ("PutObject Mug Fridge", view(FRIDGE), "no Mug in the hand"),
+        ("PutObject Mug Fridge", view(MUG, FRIDGE), "no Mug in the hand"),
     ],
 )
 def test_what_does_not_apply_is_told(text, world, words):

@@ -12,7 +12,7 @@ from infthor_eval.formats.trajectory import (
     Trajectory,
     iter_trajectories,
 )
-from infthor_eval.generation.supplement import agent_path, write_supplement
+from infthor_eval.thor.supplement import agent_path, write_supplement
 
 SHARED = Path(__file__).parents[2] / "../shared/data"
 

@@ -1,0 +1,150 @@
+"""The expert's actions of one trajectory, carried out as far as they are needed: the true history."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from infthor_eval.agents.frames import FrameKeeper
+from infthor_eval.agents.history import Chapter
+from infthor_eval.agents.plans import Plan, TrajectoryTask
+from infthor_eval.errors import DataError
+from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.trajectory import Trajectory
+from infthor_eval.household.treatments import Treatments
+from infthor_eval.thor.actions import text_of
+from infthor_eval.thor.grounding import Grounding
+from infthor_eval.thor.recorded import MissingObjectError, translate
+from infthor_eval.thor.restore import restore
+from infthor_eval.thor.simulator import Simulator, SimulatorMark
+from infthor_eval.thor.view import AgentPose, View
+
+__all__ = ["Expert", "ExpertRefusedError", "PlanStart"]
+
+
+class ExpertRefusedError(DataError):
+    """This simulator refuses an action of the expert: there is no true history from its plan on."""
+
+
+@dataclass(frozen=True)
+class ExpertAction:
+    """An action of the expert: as a call, in words, and where the agent stood after it."""
+
+    call: Mapping[str, Any]
+    text: str
+    pose: AgentPose
+
+
+@dataclass(frozen=True)
+class PlanStart:
+    """The true state before a plan.
+
+    Attributes:
+        mark: of the simulator.
+        frame: what the agent sees; None where nobody looks.
+        treatments: what was done to objects so far.
+    """
+
+    mark: SimulatorMark
+    frame: FrameRef | None
+    treatments: Treatments
+
+
+class Expert:
+    """Goes through a trajectory as its expert did."""
+
+    def __init__(
+        self,
+        trajectory: Trajectory,
+        plans: Sequence[Plan],
+        tasks: Sequence[TrajectoryTask],
+        simulator: Simulator,
+        frames: FrameKeeper,
+    ) -> None:
+        """Restore the scene.
+
+        Raises:
+            SimulatorError: the simulator has no such scene or fails.
+        """
+        self._trajectory, self._plans, self._tasks = trajectory, plans, tasks
+        self._simulator, self._frames = simulator, frames
+        restore(simulator, trajectory.scene)
+        self.grounding = Grounding(simulator.view)
+        self._starts = [PlanStart(simulator.mark(), frames.keep(simulator.view), Treatments())]
+        self._actions: list[list[ExpertAction]] = []
+        self._chapters: list[Chapter] = []
+        self._refused: ExpertRefusedError | None = None
+
+    def start(self, plan: int) -> PlanStart:
+        """The true state before a plan; what comes before it is carried out the first time.
+
+        The number of plans stands for the end of the trajectory. The simulator is anywhere afterwards.
+
+        Raises:
+            ExpertRefusedError: an action before it is refused here.
+            SimulatorError: the simulator fails.
+        """
+        while len(self._starts) <= plan:
+            if self._refused is not None:
+                raise self._refused
+            self._carry_out(self._plans[len(self._starts) - 1])
+        return self._starts[plan]
+
+    def actions(self, plan: int) -> Sequence[ExpertAction]:
+        """What the expert did for a plan.
+
+        Raises:
+            ExpertRefusedError: as `start` of the next one.
+        """
+        self.start(plan + 1)
+        return self._actions[plan]
+
+    def chapters(self, plan: int) -> Sequence[Chapter]:
+        """The history before a plan, a chapter a plan; only where frames are kept."""
+        self.start(plan)
+        return self._chapters[:plan]
+
+    def chapter(self, plan: int) -> Chapter:
+        """What a plan's own chapter begins with; only where frames are kept."""
+        found = self._plans[plan]
+        begins = plan == 0 or self._plans[plan - 1].task != found.task
+        frame = self.start(plan).frame
+        assert frame is not None
+        return Chapter(found.text, self._tasks[found.task].text if begins else None, frame)
+
+    def _carry_out(self, plan: Plan) -> None:
+        simulator, start = self._simulator, self._starts[-1]
+        view = simulator.rewind(start.mark, exactly=True)
+        treatments, frame = start.treatments, start.frame
+        actions: list[ExpertAction] = []
+        steps: list[tuple[str, FrameRef]] = []
+        for number in range(*plan.low):
+            call, before = self._call(plan, number, view), view
+            view = simulator.step(**call)
+            if not view.success:
+                raise self._refusal(plan, number, view.error or "refused without a message")
+            treatments = treatments.after(call, before, view)
+            frame = self._frames.keep(view)
+            actions.append(ExpertAction(call, self._text(number), view.agent))
+            if frame is not None:
+                steps.append((actions[-1].text, frame))
+        if start.frame is not None:
+            opening = self.chapter(plan.index)
+            self._chapters.append(Chapter(opening.plan, opening.goal, opening.before, tuple(steps)))
+        self._actions.append(actions)
+        self._starts.append(PlanStart(simulator.mark(), frame, treatments))
+
+    def _call(self, plan: Plan, number: int, view: View) -> dict[str, Any]:
+        try:
+            return translate(self._trajectory.plan.low_actions[number], self.grounding, view)
+        except MissingObjectError as error:
+            raise self._refusal(plan, number, str(error)) from error
+
+    def _text(self, number: int) -> str:
+        api = self._trajectory.plan.low_actions[number].api_action
+        return str(text_of(api.action, api.object_id, api.receptacle_id))
+
+    def _refusal(self, plan: Plan, number: int, why: str) -> ExpertRefusedError:
+        self._refused = ExpertRefusedError(
+            f"the expert's action {number} ({self._text(number)}, in plan {plan.index}) is refused here: {why}"
+        )
+        return self._refused
