@@ -15,7 +15,10 @@ if TYPE_CHECKING:
 __all__ = ["baseline_names", "options_of", "split_by_suite", "suite_named", "suite_names"]
 
 # "module:Class" of the suite, and of its options.
-_SUITES = {"nieh": ("infthor_eval.nieh.suite:NiehSuite", "infthor_eval.nieh.options:NiehOptions")}
+_SUITES = {
+    "nieh": ("infthor_eval.nieh.suite:NiehSuite", "infthor_eval.nieh.options:NiehOptions"),
+    "plans": ("infthor_eval.agents.suite:PlansSuite", "infthor_eval.agents.options:PlansOptions"),
+}
 
 
 def suite_names() -> tuple[str, ...]:

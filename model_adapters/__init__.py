@@ -21,7 +21,7 @@ from model_adapters.protocols import (
     Subject,
     Turn,
 )
-from model_adapters.refusals import check_decoding, check_turns
+from model_adapters.refusals import check_decoding, check_turns, requesting
 from model_adapters.registry import adapter_identity, check_options, label, load, names, options, takes
 from model_adapters.transcript import Transcript
 
@@ -54,5 +54,6 @@ __all__ = [
     "load",
     "names",
     "options",
+    "requesting",
     "takes",
 ]

@@ -1,11 +1,14 @@
 """What a model refuses to be asked, in the same words whichever model it is."""
 
 from collections.abc import Sequence
+from contextlib import AbstractContextManager
 
-from infthor_eval.errors import ModelError
+from infthor_eval.errors import ModelError, naming
 from model_adapters.protocols import Capabilities, Decoding, Turn
 
-__all__ = ["check_decoding", "check_turns"]
+__all__ = ["check_decoding", "check_turns", "requesting"]
+
+_FAILURES = (RuntimeError, ValueError, TypeError, LookupError, AttributeError, ArithmeticError, OSError, MemoryError)
 
 
 def check_decoding(name: str, capabilities: Capabilities, decoding: Decoding) -> None:
@@ -40,3 +43,12 @@ def check_turns(name: str, turns: Sequence[Turn]) -> None:
     if not turns or turns[-1].role != "user":
         found = f"the last turn is the {turns[-1].role}'s" if turns else "the conversation is empty"
         raise ModelError(f"{name} has nothing to reply to: {found}; append a user turn")
+
+
+def requesting(name: str) -> AbstractContextManager[None]:
+    """Turns what an adapter, anybody's, raises on a request into a failure of that request: the others go on.
+
+    Args:
+        name: of the model, for the message.
+    """
+    return naming(f"{name} fails on the request", "report it to who made it", of=_FAILURES, as_a=ModelError)

@@ -45,4 +45,3 @@ class Chapter:
 def chapter_parts(chapters: Sequence[Chapter]) -> list[Part]:
     """The parts of chapters that follow each other."""
     return [part for chapter in chapters for part in chapter.parts()]
-

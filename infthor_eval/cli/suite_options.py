@@ -2,7 +2,7 @@
 
 import typing
 from collections.abc import Callable, Mapping
-from dataclasses import fields
+from dataclasses import Field, fields
 from itertools import product
 from types import NoneType
 from typing import Any
@@ -17,17 +17,26 @@ __all__ = ["chosen_options", "suite_options"]
 
 
 def suite_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add every suite's options to a command; a value that is not given is None."""
-    for suite in reversed(suite_names()):
-        hints = typing.get_type_hints(options_of(suite))
-        for item in reversed(fields(options_of(suite))):
-            choices = item.metadata.get("choices")
-            command = click.option(
-                f"--{item.name.replace('_', '-')}",
-                type=click.Choice(choices) if choices else _click_type(hints[item.name]),
-                metavar=item.metadata.get("metavar"),
-                help=f"{item.metadata['help']} [{suite}]",
-            )(command)
+    """Add every suite's options to a command; a value that is not given is None.
+
+    Suites share an option of one name, each with what it says of it.
+    """
+    found: dict[str, dict[str, Field[Any]]] = {}
+    for suite in suite_names():
+        for item in fields(options_of(suite)):
+            found.setdefault(item.name, {})[suite] = item
+    for name, by_suite in reversed(found.items()):
+        first, item = next(iter(by_suite.items()))
+        kind = _type(typing.get_type_hints(options_of(first))[name])
+        choices = item.metadata.get("choices")
+        command = click.option(
+            f"--{name.replace('_', '-')}",
+            type=None if kind is bool else click.Choice(choices) if choices else _click_type(kind),
+            is_flag=kind is bool,
+            default=None,
+            metavar=item.metadata.get("metavar"),
+            help=" ".join(f"{item.metadata['help']} [{suite}]" for suite, item in by_suite.items()),
+        )(command)
     return command
 
 
@@ -44,10 +53,7 @@ def chosen_options(suite: str, given: Mapping[str, Any], asked: typing.Collectio
     Raises:
         UsageError: an option belongs to a suite that is not asked.
     """
-    for other in suite_names():
-        unused = [item.name for item in fields(options_of(other)) if given.get(item.name) is not None]
-        if unused and other not in asked:
-            raise UsageError(f"--{unused[0].replace('_', '-')} is for tasks of {other}; none of them is asked")
+    _refuse_unasked(given, asked)
     known = typing.get_type_hints(options_of(suite))
     values: dict[str, list[Any]] = {}
     for item in fields(options_of(suite)):
@@ -57,8 +63,17 @@ def chosen_options(suite: str, given: Mapping[str, Any], asked: typing.Collectio
     return [options_of(suite)(**dict(zip(values, chosen, strict=True))) for chosen in product(*values.values())]
 
 
-def _click_type(hint: Any) -> Any:
-    return click.IntRange(-LARGEST, LARGEST) if _type(hint) is int else _type(hint)
+def _refuse_unasked(given: Mapping[str, Any], asked: typing.Collection[str]) -> None:
+    for name, value in given.items():
+        having = [suite for suite in suite_names() if name in {item.name for item in fields(options_of(suite))}]
+        if value is not None and having and not set(having) & set(asked):
+            raise UsageError(
+                f"--{name.replace('_', '-')} is for tasks of {' and '.join(having)}; none of them is asked"
+            )
+
+
+def _click_type(kind: type) -> Any:
+    return click.IntRange(-LARGEST, LARGEST) if kind is int else kind
 
 
 def _type(hint: Any) -> type:

@@ -73,7 +73,7 @@ class Walker:
     def _moves(self, viewpoint: Viewpoint) -> list[str] | None:
         """The actions that lead to a viewpoint."""
         grid = self._cells()
-        path = grid.path(stand_of(self._trace.view, grid), viewpoint.stand)
+        path = grid.path(stand_of(self._trace.view.agent, grid), viewpoint.stand)
         return None if path is None else path + self._looks(viewpoint)
 
     def _cells(self) -> Grid:
@@ -92,7 +92,7 @@ class Walker:
             self._trace.act(ApiAction(action), {"degrees": float(degrees)}, str(degrees))
             return True
         grid = self._cells()
-        stand = stand_of(self._trace.view, grid)
+        stand = stand_of(self._trace.view.agent, grid)
         try:
             self._trace.act(ApiAction(action, move_magnitude=GRID), {"moveMagnitude": GRID}, "25")
         except RolloutError:

@@ -16,6 +16,7 @@ __all__ = [
     "GOALS_BY_ROOM",
     "HEATABLE",
     "KNIVES",
+    "KNOWN_TYPES",
     "LIGHTS",
     "MAX_PLAN_STEPS",
     "MOVABLE_RECEPTACLES",
@@ -44,6 +45,7 @@ KNIVES = frozenset({"ButterKnife", "Knife"})
 LIGHTS = _ACTIONS["Toggleable"]
 MOVABLE_RECEPTACLES = _types(_TABLES["movable_receptacles"])
 GOALS_BY_ROOM: dict[str, frozenset[str]] = {name: frozenset(rooms) for name, rooms in _TABLES["goals_by_room"].items()}
+KNOWN_TYPES = STOWABLE.union(_HOLDS, KNIVES, *_ACTIONS.values(), {"Faucet", "Microwave"})  # that tasks are about
 MAX_PLAN_STEPS: int = _TABLES["planner_max_steps"]
 
 _INSIDE = frozenset(

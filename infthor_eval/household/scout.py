@@ -61,7 +61,7 @@ def find_viewpoint(
     """
     here = simulator.view
     focus = here.objects[inside or shown[0]]
-    distances = grid.distances(stand_of(here, grid))
+    distances = grid.distances(stand_of(here.agent, grid))
     found, patience = None, _PATIENCE
     for viewpoint in list(_candidates(here, grid, focus, distances))[:_TRIALS]:
         there = _teleport(simulator, grid, here, viewpoint)
@@ -84,10 +84,9 @@ def reachable(simulator: Simulator) -> Grid:
     return Grid((position["x"], position["z"]) for position in positions)
 
 
-def stand_of(view: View, grid: Grid) -> Stand:
-    """The stand at which the agent is."""
-    at = view.agent.position
-    return Stand(grid.cell(at.x, at.z), round(view.agent.rotation / 90) * 90 % 360)
+def stand_of(pose: AgentPose, grid: Grid) -> Stand:
+    """The stand of a pose."""
+    return Stand(grid.cell(pose.position.x, pose.position.z), round(pose.rotation / 90) * 90 % 360)
 
 
 def _shows(view: View, shown: list[str], min_pixels: int) -> bool:

@@ -5,13 +5,12 @@ This is the one way from a sample to its record, whoever drives it: our own run,
 
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import groupby
 from typing import Protocol
 
-from infthor_eval.errors import DataError, ModelError, naming
+from infthor_eval.errors import DataError, ModelError
 from infthor_eval.formats.digests import fingerprint
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.nieh.baselines import Predict
@@ -21,12 +20,9 @@ from infthor_eval.nieh.notes import Notes
 from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.nieh.task import PreparedTask
 from infthor_eval.runs import Session, Tokens, Unit, UnitKey, UnitRecord
-from model_adapters import Model, Reply
+from model_adapters import Model, Reply, requesting
 
 __all__ = ["Answerer", "BaselineAnswerer", "ModelAnswerer", "NiehUnit", "answered"]
-
-
-_FAILURES = (RuntimeError, ValueError, TypeError, LookupError, AttributeError, ArithmeticError, OSError, MemoryError)
 
 
 @dataclass(frozen=True)
@@ -149,13 +145,13 @@ class ModelAnswerer:
 
     def read(self, context: Sequence[ContextPart]) -> tuple[str | FrameRef, ...]:
         """See `Answerer`."""
-        with self._failing():
+        with requesting(self._name):
             return tuple(self._notebook.text(part) if isinstance(part, Notes) else part for part in context)
 
     def answer(self, asked: Sequence[_Asked]) -> list[Reply]:
         """See `Answerer`."""
         context = asked[0].shown
-        with self._failing():
+        with requesting(self._name):
             if context != self._context:
                 self._conversation.rewind(self._start)
                 self._context = None
@@ -163,10 +159,6 @@ class ModelAnswerer:
                 self._context, self._after_context = context, self._conversation.mark()
             self._conversation.rewind(self._after_context)
             return self._conversation.replies([[item.text] for item in asked], asked[0].prepared.decoding)
-
-    def _failing(self) -> AbstractContextManager[None]:
-        """Turns what an adapter, anybody's, raises on a request into a failure of that request: the others go on."""
-        return naming(f"{self._name} fails on the request", "report it to who made it", of=_FAILURES, as_a=ModelError)
 
 
 class BaselineAnswerer:

@@ -77,6 +77,7 @@ class UnitRecord(
         payload: what the suite has to say of it.
         attempt: how many times it has been tried, this one included.
         failure: why there is no result; None where there is one.
+        excluded: why it does not count, through no fault of the subject; None where it does.
         faults: what went wrong and was survived on the way, a line each.
         seconds: time that it took.
         tokens: tokens that it took.
@@ -90,6 +91,7 @@ class UnitRecord(
     variant: str = ""
     attempt: int = 1
     failure: str | None = None
+    excluded: str | None = None
     faults: tuple[str, ...] = ()
     seconds: float = 0.0
     tokens: Tokens = Tokens()
@@ -153,3 +155,7 @@ class Unit(Generic[P]):
     def failed(self, reason: str, fingerprint: str = "", **envelope: Any) -> UnitRecord[P]:
         """Its record where there is no result."""
         return self.record(fingerprint, self.payload, failure=reason, **envelope)
+
+    def excluded(self, reason: str, fingerprint: str, **envelope: Any) -> UnitRecord[P]:
+        """Its record where it turns out, when its turn comes, that nobody could be evaluated on it."""
+        return self.record(fingerprint, self.payload, excluded=reason, **envelope)

@@ -12,7 +12,16 @@ from typing import Any
 
 from infthor_eval.thor.view import ThorObject, View
 
-__all__ = ["ActionText", "Misuse", "UngroundedError", "applicable", "ground", "object_type_of", "parse_action", "text_of"]
+__all__ = [
+    "ActionText",
+    "Misuse",
+    "UngroundedError",
+    "applicable",
+    "ground",
+    "object_type_of",
+    "parse_action",
+    "text_of",
+]
 
 _APPLIES: dict[str, Callable[[ThorObject], bool]] = {
     "OpenObject": lambda item: item.openable and not item.is_open,
@@ -126,7 +135,9 @@ def applicable(view: View) -> list[ActionText]:
     for action, applies in _APPLIES.items():
         able = {item.object_type for item in view.objects.values() if item.visible and applies(item)}
         names = [name for name in visible if name in able]
-        pairs = [(item, name) for item in held for name in names] if action == "PutObject" else [(name,) for name in names]
+        pairs = (
+            [(item, name) for item in held for name in names] if action == "PutObject" else [(name,) for name in names]
+        )
         found += [ActionText(action, types) for types in pairs]
     return found
 

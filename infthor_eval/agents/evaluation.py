@@ -1,0 +1,163 @@
+"""Plans set up for a run: which plans of which trajectories, and the doing of it, a trajectory at a time."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import msgspec
+
+from infthor_eval.agents.cast import Cast, cast_of
+from infthor_eval.agents.episodes import Episode, described, episode
+from infthor_eval.agents.expert import ExpertRefusedError
+from infthor_eval.agents.plans import Plan
+from infthor_eval.agents.records import NOT_COME_TO, PlanRecord
+from infthor_eval.agents.simulators import Simulators
+from infthor_eval.agents.task import PlansTask
+from infthor_eval.agents.trajectories import Course
+from infthor_eval.errors import InfthorError, UsageError
+from infthor_eval.formats.digests import fingerprint
+from infthor_eval.runs import (
+    Group,
+    SampleView,
+    Session,
+    Skipped,
+    TaskRequest,
+    Unit,
+    UnitKey,
+    UnitRecord,
+    Workload,
+)
+from model_adapters import Subject
+
+__all__ = ["PlanUnit", "PlansEvaluation"]
+
+
+@dataclass(frozen=True)
+class PlanUnit(Unit[PlanRecord]):
+    """A unit that is a plan.
+
+    Attributes:
+        course: its trajectory.
+        plan: which plan of it.
+    """
+
+    course: Course
+    plan: Plan
+
+    @classmethod
+    def of(cls, task: str, course: Course, plan: Plan) -> "PlanUnit":
+        """The unit of a task's plan."""
+        key = UnitKey(task, f"{course.traj_id}/{plan.index:04d}")
+        return cls(key, course.traj_id, described(course, plan), course, plan)
+
+
+class PlansEvaluation:
+    """Plans set up for a run; see `infthor_eval.runs.Evaluation`."""
+
+    def __init__(self, request: TaskRequest) -> None:
+        """Read the tasks and their trajectories.
+
+        Raises:
+            UsageError: a task without its trajectories, or with no plan that it is about.
+            DataError: a task file or all of its trajectories are not what they should be.
+        """
+        self._seed = request.seed
+        self._options = request.options
+        self._tasks = {file.name: PlansTask(file, request) for file in request.tasks}
+        for task in self._tasks.values():
+            if not task.limited:
+                raise UsageError(f"{task.name}: no trajectory there has a final task; make some with --test-set")
+        every = {course.traj_id: course for task in self._tasks.values() for course in task.courses.found}
+        self._trajectories = [course.trajectory for course in every.values()]
+        scenes = Path(self._options.scenes) if self._options.scenes is not None else None
+        self._simulators = Simulators(self._options.simulator, scenes, self._trajectories)
+        self._cast: Cast | None = None
+
+    def workload(self, subject: Subject) -> Workload:
+        """See `infthor_eval.runs.Evaluation.workload`."""
+        self._cast = cast_of(subject)
+        self._cast.prepare(self._trajectories)
+        self._identity = {
+            "tasks": {name: task.identity() for name, task in self._tasks.items()},
+            "simulator": self._options.simulator,
+            "constrained": self._options.constrained,
+            "frames": self._options.frames,
+        }
+        return Workload(
+            groups=[
+                Group([PlanUnit.of(task.name, course, plan) for plan in task.plans(course)])
+                for task in self._tasks.values()
+                for course in task.limited
+            ],
+            skipped=[
+                Skipped(UnitKey(task.name, place), reason)
+                for task in self._tasks.values()
+                for place, reason in task.courses.broken
+            ],
+            identity=self._identity,
+        )
+
+    def run(self, group: Group, session: Session) -> Iterator[UnitRecord[PlanRecord]]:
+        """See `infthor_eval.runs.Evaluation.run`."""
+        units: list[PlanUnit] = list(group.units)  # type: ignore[arg-type]  # its own groups
+        prints = {unit.key: self._fingerprint(unit) for unit in units}
+        known = {unit.key: session.known(unit, prints[unit.key]) for unit in units}
+        first = units[0]
+        if all(record is not None for record in known.values()):
+            yield from (record for record in known.values() if record is not None)
+            return
+        task = self._tasks[first.key.task]
+        assert self._cast is not None  # the workload comes first
+        with episode(task, first.course, self._cast, self._simulators, self._seed) as stage:
+            over = False
+            for unit in units:
+                record = known[unit.key]
+                if record is None:
+                    record = _not_come_to(unit, prints[unit.key]) if over else _played(unit, prints[unit.key], stage)
+                yield record
+                over = over or (task.settings.after_failure == "stop" and not record.payload.done)
+
+    def view(self, record: UnitRecord[PlanRecord]) -> SampleView:
+        """See `infthor_eval.runs.Evaluation.view`."""
+        payload, task = record.payload, self._tasks[record.task]
+        return SampleView(
+            number=self._numbers(record.task)[record.key],
+            doc={"traj_id": record.cluster, "plan": payload.index, "kind": payload.kind, "goal": payload.goal},
+            target=payload.plan,
+            prompt=f"{payload.goal}\n{payload.plan}",
+            settings=task.file.settings["generation_kwargs"],
+            reply=", ".join(step.action or (step.reply or "") for step in payload.steps),
+        )
+
+    def _numbers(self, task: str) -> dict[UnitKey, int]:
+        """Places of the plans in their task."""
+        found = self._tasks[task]
+        keys = [PlanUnit.of(task, course, plan).key for course in found.limited for plan in found.plans(course)]
+        return {key: number for number, key in enumerate(keys)}
+
+    def _fingerprint(self, unit: PlanUnit) -> str:
+        return fingerprint(
+            {
+                "task": self._tasks[unit.key.task].identity() | {"trajectories": None, "broken": None},
+                "trajectory": unit.course.digest,
+                "plan": unit.plan.index,
+                "seed": self._seed,
+                **{name: value for name, value in self._identity.items() if name != "tasks"},
+            }
+        )
+
+
+def _not_come_to(unit: PlanUnit, inputs: str) -> UnitRecord[PlanRecord]:
+    return unit.record(inputs, msgspec.structs.replace(unit.payload, ended=NOT_COME_TO))
+
+
+def _played(unit: PlanUnit, inputs: str, stage: Episode) -> UnitRecord[PlanRecord]:
+    try:
+        played = stage.play(unit.plan)
+    except ExpertRefusedError as error:
+        return unit.excluded(str(error), inputs)
+    except InfthorError as error:
+        return unit.failed(str(error), inputs)
+    return unit.record(
+        inputs, played.record, faults=played.faults, seconds=round(played.seconds, 4), tokens=played.tokens
+    )

@@ -1,0 +1,56 @@
+"""Simulator processes for episodes that run at the same time: each has one to itself, and they are used again."""
+
+import weakref
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from queue import Empty, SimpleQueue
+from typing import Any
+
+from infthor_eval.formats.trajectory import Trajectory
+from infthor_eval.thor import launch
+from infthor_eval.thor.launch import Launch
+from infthor_eval.thor.simulator import Simulator
+from infthor_eval.thor.supplement import supplement_file
+
+__all__ = ["Simulators"]
+
+_COPIES = 512  # of the simulator's state: one for each plan of a long trajectory
+
+
+class Simulators:
+    """Starts simulators as they are needed; they are stopped when nobody holds this any more."""
+
+    def __init__(self, name: str, scenes: Path | None, trajectories: Sequence[Trajectory], **options: Any) -> None:
+        """Say which.
+
+        Args:
+            name: "embedded", "unity", or the path of a Unity executable.
+            scenes: folder with recorded floor plans, for the embedded one.
+            trajectories: what they tell of their floor plans is added to the recorded ones.
+            options: initialisation parameters of AI2-THOR.
+        """
+        self._name, self._scenes, self._options = name, scenes, options
+        self._open = ExitStack()
+        weakref.finalize(self, self._open.close)  # with the run, or with the process: whichever is first
+        self._idle: SimpleQueue[Simulator] = SimpleQueue()
+        supplement = self._open.enter_context(supplement_file(trajectories)) if scenes is not None else None
+        self._launch = self._described(supplement)
+
+    @contextmanager
+    def one(self) -> Iterator[Simulator]:
+        """A simulator that nobody else has, for as long as the context lasts."""
+        try:
+            simulator = self._idle.get_nowait()
+        except Empty:
+            simulator = Simulator(self._launch, instances=False, max_copies=_COPIES, **self._options)
+            self._open.callback(simulator.close)
+        try:
+            yield simulator
+        finally:
+            self._idle.put(simulator)
+
+    def _described(self, supplement: Path | None) -> Launch:
+        if self._name == "embedded":
+            return launch.embedded(self._scenes, supplement)
+        return launch.unity(None if self._name == "unity" else Path(self._name))

@@ -1,0 +1,43 @@
+"""Plans as a suite: an agent carries out a long trajectory plan by plan."""
+
+from collections.abc import Mapping, Sequence
+from typing import ClassVar
+
+from infthor_eval.agents.baselines import BASELINES
+from infthor_eval.agents.evaluation import PlansEvaluation
+from infthor_eval.agents.options import PlansOptions
+from infthor_eval.agents.records import RECORDS, PlanRecord
+from infthor_eval.agents.summary import PlansSummary, summarise
+from infthor_eval.agents.tables import tables
+from infthor_eval.runs import RecordTypes, RunHeader, RunSummary, TaskRequest, UnitRecord
+from infthor_eval.runs.suite import Need
+from infthor_eval.tables import Table
+
+__all__ = ["PlansSuite"]
+
+
+class PlansSuite:
+    """The suite."""
+
+    name: ClassVar[str] = "plans"
+    needs: ClassVar[Need] = "conversation"
+    options: ClassVar[type] = PlansOptions
+    baselines = BASELINES
+    records: ClassVar[RecordTypes] = RECORDS
+
+    def prepare(self, request: TaskRequest) -> "PlansEvaluation":
+        """See `Suite.prepare`."""
+        return PlansEvaluation(request)
+
+    def summarise(self, header: RunHeader, records: Sequence[UnitRecord[PlanRecord]]) -> PlansSummary:
+        """See `Suite.summarise`."""
+        return summarise(header.identity, records)
+
+    def scores(self, record: UnitRecord[PlanRecord]) -> Mapping[str, float]:
+        """See `Suite.scores`: whether the plan was carried out, and what it earned."""
+        payload = record.payload
+        return {"success": float(payload.done), "reward": payload.reward} if payload.steps else {}
+
+    def tables(self, runs: Sequence[RunSummary]) -> list[Table]:
+        """See `Suite.tables`."""
+        return tables(runs)

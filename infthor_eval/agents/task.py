@@ -1,0 +1,127 @@
+"""A task of plans: what its file says, and whom it leads through which trajectories."""
+
+import difflib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, get_type_hints
+
+from infthor_eval.agents.environment import MAX_STEPS
+from infthor_eval.agents.memory import Memory, memory_named
+from infthor_eval.agents.model_actor import Manner
+from infthor_eval.agents.options import PlansOptions
+from infthor_eval.agents.plans import Plan
+from infthor_eval.agents.rewards import RewardRules, reward_rules
+from infthor_eval.agents.trajectories import Course, Courses, find_courses
+from infthor_eval.errors import DataError
+from infthor_eval.runs import TaskFile, TaskRequest
+from infthor_eval.runs.generation_kwargs import decoding_of
+from model_adapters import Decoding
+
+__all__ = ["PlansTask", "TaskSettings"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class TaskSettings:
+    """What `dataset_kwargs` of a task can say.
+
+    Attributes:
+        plans: "all" of them, or those of the "final" long-horizon task.
+        bundled: name of a set of trajectories that comes with the package.
+        rewards: name of the rules.
+        history: what a model is given of the past.
+        after_failure: whether an episode is to "continue" from the true state after a failed plan, or to "stop".
+        max_steps: of one plan.
+        preamble: what a model is told before everything else.
+    """
+
+    plans: str = "all"
+    bundled: str | None = None
+    rewards: str = "default"
+    history: str = "full"
+    after_failure: str = "continue"
+    max_steps: int = MAX_STEPS
+    preamble: str = ""
+
+
+_CHOICES = {"plans": ("all", "final"), "after_failure": ("continue", "stop")}
+
+
+class PlansTask:
+    """A task file, read."""
+
+    def __init__(self, file: TaskFile, request: TaskRequest) -> None:
+        """Check the file and find its trajectories.
+
+        Raises:
+            UsageError: a setting that does not fit, or there are no trajectories.
+            DataError: the file or all of its trajectories are not what they should be.
+        """
+        file.require("dataset_kwargs", "generation_kwargs")
+        self.file = file
+        self.name = file.name
+        self._options: PlansOptions = request.options
+        self.settings = _settings(file, self._options)
+        self.rules: RewardRules = reward_rules(self.settings.rewards)
+        self.decoding: Decoding = self._decoding(request.seed)
+        self.memory: Memory = memory_named(self.settings.history, self._options.retriever)
+        data = str(request.data) if request.data is not None else None
+        self.courses: Courses = find_courses(data, self.settings.bundled)
+        self._limit = request.limit
+
+    @property
+    def limited(self) -> list[Course]:
+        """The trajectories that are gone through."""
+        having = [course for course in self.courses.found if self.plans(course)]
+        return having[: self._limit]
+
+    def plans(self, course: Course) -> list[Plan]:
+        """The plans of a trajectory that are evaluated."""
+        return [plan for plan in course.plans if plan.is_final or self.settings.plans == "all"]
+
+    def manner(self) -> Manner:
+        """How a model is led."""
+        return Manner(
+            decoding=self.decoding,
+            memory=self.memory,
+            preamble=self.settings.preamble,
+            constrained=self._options.constrained,
+            blank=self._options.frames == "blank",
+        )
+
+    def identity(self) -> dict[str, Any]:
+        """What its numbers depend on, as JSON values."""
+        return {
+            "config": dict(self.file.settings),
+            "history": self.settings.history,
+            "after_failure": self.settings.after_failure,
+            "rewards": self.rules.document(),
+            "decoding": self.decoding.document(),
+            "trajectories": {course.traj_id: course.digest for course in self.limited},
+            "broken": [list(item) for item in self.courses.broken],
+        }
+
+    def _decoding(self, seed: int) -> Decoding:
+        given: Mapping[str, Any] = self.file.settings["generation_kwargs"]
+        if self._options.greedy and isinstance(given, Mapping):
+            given = {**given, "do_sample": False, "temperature": 0.0}
+        return decoding_of(given, seed, self.name)
+
+
+def _settings(file: TaskFile, options: PlansOptions) -> TaskSettings:
+    given = file.settings["dataset_kwargs"]
+    if not isinstance(given, Mapping):
+        raise DataError(f"{file.path}: dataset_kwargs must be a mapping of settings")
+    hints = get_type_hints(TaskSettings)
+    for key, value in given.items():
+        if key not in hints:
+            near = difflib.get_close_matches(str(key), hints, n=1)
+            hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(hints)}"
+            raise DataError(f"{file.path}: dataset_kwargs: {key} is not known; {hint}")
+        kind = int if hints[key] is int else str
+        if not isinstance(value, kind) or isinstance(value, bool) or (kind is int and value < 1):
+            wanted = "a whole number above 0" if kind is int else "a text"
+            raise DataError(f"{file.path}: dataset_kwargs: {key} is {value!r:.60}; it is {wanted}")
+        if value not in _CHOICES.get(key, (value,)):
+            raise DataError(f"{file.path}: dataset_kwargs: {key} is {value!r}; there are {', '.join(_CHOICES[key])}")
+    told = {name: getattr(options, name) for name in ("rewards", "history", "after_failure")}
+    return TaskSettings(**{**given, **{name: value for name, value in told.items() if value is not None}})
