@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from infthor_eval.agents.expert import Expert, ExpertAction
 from infthor_eval.agents.frames import FrameKeeper, NoFrames
-from infthor_eval.agents.history import Chapter
+from infthor_eval.agents.memory import Past
 from infthor_eval.agents.plans import Plan, PlanKind, plans_of, tasks_of
 from infthor_eval.agents.rewards import PlanReward, PlanTarget, RewardRules, StepReward, max_reward, reward_rules
 from infthor_eval.formats.frames import FrameRef
@@ -98,6 +98,7 @@ class PlanEnvironment:
         rules: RewardRules | None = None,
         max_steps: int = MAX_STEPS,
         frames: FrameKeeper | None = None,
+        in_words: bool = False,
     ) -> None:
         """Restore the scene.
 
@@ -107,6 +108,7 @@ class PlanEnvironment:
             rules: of rewards; the default ones where None.
             max_steps: of one plan, after which it is truncated.
             frames: keeps what is seen; nothing is kept where None.
+            in_words: whether the past is to be told in words too; the simulator must tell what each pixel shows then.
 
         Raises:
             DataError: the trajectory has a task without a goal, or an unknown kind of plan.
@@ -119,7 +121,7 @@ class PlanEnvironment:
         self._max_steps = max_steps
         self._frames = frames or NoFrames()
         self._look_degrees = _look_degrees(trajectory)
-        self._expert = Expert(trajectory, self.plans, self.tasks, simulator, self._frames)
+        self._expert = Expert(trajectory, self.plans, self.tasks, simulator, self._frames, in_words)
         self._plan: Plan | None = None
         self._n_steps = 0
 
@@ -167,21 +169,13 @@ class PlanEnvironment:
             return StepOutcome(Observation(before, None), 0.0, True, False, info)
         return self._carried_out(text, call, before)
 
-    def chapters(self, plan: int) -> Sequence[Chapter]:
-        """The true history before a plan, a chapter a plan; only where frames are kept.
+    def past(self, plan: int) -> Past:
+        """What there is to remember before a plan; only where frames are kept.
 
         Raises:
             ExpertRefusedError: as `reset`.
         """
-        return self._expert.chapters(plan)
-
-    def chapter(self, plan: int) -> Chapter:
-        """What a plan's own chapter begins with; only where frames are kept.
-
-        Raises:
-            ExpertRefusedError: as `reset`.
-        """
-        return self._expert.chapter(plan)
+        return self._expert.past(plan)
 
     def expert_actions(self, plan: int) -> Sequence[ExpertAction]:
         """What the expert did for a plan.

@@ -76,6 +76,7 @@ class Episode:
         self._task, self._course, self._simulator = task, course, simulator
         self._actor = cast.actor(task, course.trajectory)
         self._frames = FrameFolder(folder) if cast.sees else NoFrames()
+        self._in_words = cast.sees and task.memory.needs_state
         self._seed = f"{seed}/{task.name}/{course.traj_id}"
         self._environment: PlanEnvironment | None = None
 
@@ -125,6 +126,7 @@ class Episode:
                 rules=self._task.rules,
                 max_steps=self._task.settings.max_steps,
                 frames=self._frames,
+                in_words=self._in_words,
             )
         return self._environment
 

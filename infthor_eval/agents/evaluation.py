@@ -70,7 +70,8 @@ class PlansEvaluation:
         every = {course.traj_id: course for task in self._tasks.values() for course in task.courses.found}
         self._trajectories = [course.trajectory for course in every.values()]
         scenes = Path(self._options.scenes) if self._options.scenes is not None else None
-        self._simulators = Simulators(self._options.simulator, scenes, self._trajectories)
+        in_words = any(task.memory.needs_state for task in self._tasks.values())
+        self._simulators = Simulators(self._options.simulator, scenes, self._trajectories, instances=in_words)
         self._cast: Cast | None = None
 
     def workload(self, subject: Subject) -> Workload:

@@ -6,14 +6,17 @@ from typing import Any
 
 from infthor_eval.agents.frames import FrameKeeper
 from infthor_eval.agents.history import Chapter
+from infthor_eval.agents.memory import Past
 from infthor_eval.agents.plans import Plan, TrajectoryTask
 from infthor_eval.errors import DataError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.trajectory import Trajectory
+from infthor_eval.household.state_summary import state_summaries
 from infthor_eval.household.treatments import Treatments
 from infthor_eval.thor.actions import text_of
 from infthor_eval.thor.grounding import Grounding
 from infthor_eval.thor.recorded import MissingObjectError, translate
+from infthor_eval.thor.recorder import Recorder
 from infthor_eval.thor.restore import restore
 from infthor_eval.thor.simulator import Simulator, SimulatorMark
 from infthor_eval.thor.view import AgentPose, View
@@ -59,6 +62,7 @@ class Expert:
         tasks: Sequence[TrajectoryTask],
         simulator: Simulator,
         frames: FrameKeeper,
+        in_words: bool = False,
     ) -> None:
         """Restore the scene.
 
@@ -73,6 +77,9 @@ class Expert:
         self._actions: list[list[ExpertAction]] = []
         self._chapters: list[Chapter] = []
         self._refused: ExpertRefusedError | None = None
+        self._log = Recorder() if in_words else None
+        if self._log is not None:
+            self._log.record(simulator.view)
 
     def start(self, plan: int) -> PlanStart:
         """The true state before a plan; what comes before it is carried out the first time.
@@ -98,18 +105,28 @@ class Expert:
         self.start(plan + 1)
         return self._actions[plan]
 
-    def chapters(self, plan: int) -> Sequence[Chapter]:
-        """The history before a plan, a chapter a plan; only where frames are kept."""
-        self.start(plan)
-        return self._chapters[:plan]
+    def past(self, plan: int) -> Past:
+        """What there is to remember before a plan; only where frames are kept.
 
-    def chapter(self, plan: int) -> Chapter:
-        """What a plan's own chapter begins with; only where frames are kept."""
+        Raises:
+            ExpertRefusedError: as `start`.
+        """
+        present = self._chapter(plan)
+        return Past(self._chapters[:plan], present, self._state(self._plans[plan].low[0]) if self._log else "")
+
+    def _chapter(self, plan: int) -> Chapter:
+        """What a plan's own chapter begins with."""
         found = self._plans[plan]
         begins = plan == 0 or self._plans[plan - 1].task != found.task
         frame = self.start(plan).frame
         assert frame is not None
         return Chapter(found.text, self._tasks[found.task].text if begins else None, frame)
+
+    def _state(self, n_actions: int) -> str:
+        """The state after so many actions, in words."""
+        assert self._log is not None
+        told = state_summaries(self._log.steps[: n_actions + 1], {n_actions - 1})
+        return told.get(n_actions - 1, "")
 
     def _carry_out(self, plan: Plan) -> None:
         simulator, start = self._simulator, self._starts[-1]
@@ -124,11 +141,13 @@ class Expert:
                 raise self._refusal(plan, number, view.error or "refused without a message")
             treatments = treatments.after(call, before, view)
             frame = self._frames.keep(view)
+            if self._log is not None:
+                self._log.record(view, step=number, action=self._text(number))
             actions.append(ExpertAction(call, self._text(number), view.agent))
             if frame is not None:
                 steps.append((actions[-1].text, frame))
         if start.frame is not None:
-            opening = self.chapter(plan.index)
+            opening = self._chapter(plan.index)
             self._chapters.append(Chapter(opening.plan, opening.goal, opening.before, tuple(steps)))
         self._actions.append(actions)
         self._starts.append(PlanStart(simulator.mark(), frame, treatments))

@@ -54,7 +54,7 @@ class ModelActor:
         self._seed, self._n_acts = situation.seed, 0
         self._observation = situation.observation
         with requesting(self._model.name):
-            parts = self._manner.memory.recall(environment.chapters(plan), environment.chapter(plan), self._count)
+            parts = self._manner.memory.recall(environment.past(plan), self._count)
             self._conversation.rewind(self._start)
             self._conversation.append(self._manner.preamble, *self._shown(parts), ACT)
 

@@ -44,7 +44,7 @@ class PlanRecord(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, 
         steps: what the agent did; empty where the plan was not come to.
         reward: of all steps.
         max_reward: the most that the rules allow from its start; None where it was not come to.
-        ended: how it ended ("done", "step limit", ...); "not come to" where an earlier plan's failure ended the episode.
+        ended: how it ended ("done", "step limit", ...); "not come to" where an earlier plan ended the episode.
         goal_reached: whether the task's goal came to hold in it.
     """
 

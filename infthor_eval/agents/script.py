@@ -43,35 +43,29 @@ def scripted(plan: str, done: Sequence[str]) -> str:
 
 
 def _actions(verb: str, types: tuple[str, ...]) -> list[str]:
-    """The whole script; of the last action more follow."""
-    item = types[0] if types else ""
-    match verb:
-        case "open" | "close" | "slice":
-            return [f"{verb.capitalize()}Object {item}"]
-        case "pick up":
-            return [f"PickupObject {item}"]
-        case "toggle":
-            return [f"ToggleObjectOn {item}"]
-        case "put" if len(types) == 2:
-            return _inside(types[1], [f"PutObject {item} {types[1]}"])
-        case "wash":
-            return [
-                f"PutObject {item} SinkBasin",
-                "ToggleObjectOn Faucet",
-                "ToggleObjectOff Faucet",
-                f"PickupObject {item}",
-            ]
-        case "heat":
-            put, take = (_inside("Microwave", [act]) for act in (f"PutObject {item} Microwave", f"PickupObject {item}"))
-            return [*put, "ToggleObjectOn Microwave", "ToggleObjectOff Microwave", *take]
-        case "cool":
-            put, take = (_inside("Fridge", [act]) for act in (f"PutObject {item} Fridge", f"PickupObject {item}"))
-            return [*put, *take]
-    return ["MoveAhead"]
+    """The whole script; its last action is said again where more are asked for."""
+    item, receptacle = (*types, "", "")[:2]
+    scripts = {
+        "open": [f"OpenObject {item}"],
+        "close": [f"CloseObject {item}"],
+        "slice": [f"SliceObject {item}"],
+        "pick up": [f"PickupObject {item}"],
+        "toggle": [f"ToggleObjectOn {item}"],
+        "put": _inside(receptacle, f"PutObject {item} {receptacle}"),
+        "wash": _treated(item, "SinkBasin", ["ToggleObjectOn Faucet", "ToggleObjectOff Faucet"]),
+        "heat": _treated(item, "Microwave", ["ToggleObjectOn Microwave", "ToggleObjectOff Microwave"]),
+        "cool": _treated(item, "Fridge", []),
+    }
+    return scripts.get(verb, ["MoveAhead"])
 
 
-def _inside(receptacle: str, actions: list[str]) -> list[str]:
-    """The actions with the receptacle opened before and closed behind them, where such a one is closed at first."""
+def _treated(item: str, appliance: str, treatment: list[str]) -> list[str]:
+    put, take = f"PutObject {item} {appliance}", f"PickupObject {item}"
+    return [*_inside(appliance, put), *treatment, *_inside(appliance, take)]
+
+
+def _inside(receptacle: str, action: str) -> list[str]:
+    """The action with the receptacle opened before and closed behind it, where such a one is closed at first."""
     if receptacle not in _CLOSED:
-        return actions
-    return [f"OpenObject {receptacle}", *actions, f"CloseObject {receptacle}"]
+        return [action]
+    return [f"OpenObject {receptacle}", action, f"CloseObject {receptacle}"]

@@ -28,7 +28,7 @@ class Simulators:
             name: "embedded", "unity", or the path of a Unity executable.
             scenes: folder with recorded floor plans, for the embedded one.
             trajectories: what they tell of their floor plans is added to the recorded ones.
-            options: initialisation parameters of AI2-THOR.
+            options: of each simulator, see `Simulator`.
         """
         self._name, self._scenes, self._options = name, scenes, options
         self._open = ExitStack()
@@ -43,7 +43,7 @@ class Simulators:
         try:
             simulator = self._idle.get_nowait()
         except Empty:
-            simulator = Simulator(self._launch, instances=False, max_copies=_COPIES, **self._options)
+            simulator = Simulator(self._launch, max_copies=_COPIES, **self._options)
             self._open.callback(simulator.close)
         try:
             yield simulator

@@ -47,19 +47,10 @@ def _success_table(runs: Sequence[RunSummary]) -> Table:
 
 
 def _reward_table(runs: Sequence[RunSummary]) -> Table:
-    rows = [
-        Row(
-            (
-                name,
-                task_name,
-                _number(task.reward),
-                _number(task.max_reward),
-                _percent(task.reward_share),
-                _percent(task.goals),
-            )
-        )
-        for name, task_name, task in _tasks(runs)
-    ]
+    rows = []
+    for name, task_name, task in _tasks(runs):
+        of_trajectory = _number(task.reward), _number(task.max_reward), _percent(task.reward_share)
+        rows.append(Row((name, task_name, *of_trajectory, _percent(task.goals))))
     columns = (*_NAMES, *map(Column, ("reward", "at most", "% of it", "goals reached, %")))
     return Table("Reward of a trajectory, 95 % interval in brackets", columns, tuple(rows))
 

@@ -9,7 +9,9 @@ import numpy as np
 
 from infthor_eval.errors import DataError
 
-__all__ = ["VectorFile"]
+__all__ = ["VectorFile", "nearest"]
+
+_DIGITS = 6  # of a similarity; what is beyond is rounding, which must not decide between equal vectors
 
 
 class VectorFile:
@@ -78,3 +80,16 @@ class VectorFile:
         if not n_rows:  # nothing cannot be mapped
             return np.zeros(0, self._row_type)
         return np.memmap(self._file, self._row_type, mode="r", shape=(n_rows,))
+
+
+def nearest(vectors: np.ndarray, wanted: np.ndarray, top_k: int) -> tuple[int, ...]:
+    """Rows with the largest cosine, ascending.
+
+    Args:
+        vectors: (rows, dimensions), of length 1.
+        wanted: (dimensions,), of length 1.
+        top_k: how many.
+    """
+    similarity = np.round(vectors.astype(np.float64) @ wanted.astype(np.float64), _DIGITS)
+    order = np.argsort(-similarity, kind="stable")
+    return tuple(sorted(order[:top_k].tolist()))

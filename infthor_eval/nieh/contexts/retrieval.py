@@ -2,19 +2,16 @@
 
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from infthor_eval.errors import DataError
 from infthor_eval.formats.nieh_set import NiehSet, SkippedQuestion
 from infthor_eval.formats.question import Question
 from infthor_eval.nieh.contexts.base import ContextSettings, Sample
+from model_adapters.hf.vectors import nearest
 
 if TYPE_CHECKING:
     from model_adapters.hf.retrieval import Retriever
 
 __all__ = ["clip_retrieval", "memory_frames", "retriever_identity"]
-
-_DIGITS = 6  # of a similarity; what is beyond is rounding, which must not decide between equal frames
 
 
 def clip_retrieval(data: NiehSet, question: Question, settings: ContextSettings) -> list[Sample | SkippedQuestion]:
@@ -27,7 +24,7 @@ def clip_retrieval(data: NiehSet, question: Question, settings: ContextSettings)
         vectors = retriever.frames(data.frames(question.traj_id))
     except DataError as error:
         return [SkippedQuestion(question, str(error))]
-    return [Sample(question, _nearest(vectors, retriever.text(question.text), settings.top_k))]
+    return [Sample(question, nearest(vectors, retriever.text(question.text), settings.top_k))]
 
 
 def memory_frames(data: NiehSet, question: Question, settings: ContextSettings) -> list[Sample | SkippedQuestion]:
@@ -40,7 +37,7 @@ def memory_frames(data: NiehSet, question: Question, settings: ContextSettings) 
         vectors = _retriever(settings).frames(data.frames(question.traj_id))
     except DataError as error:
         return [SkippedQuestion(question, str(error))]
-    return [Sample(question, (*_nearest(vectors[:-1], vectors[-1], settings.top_k), len(vectors) - 1))]
+    return [Sample(question, (*nearest(vectors[:-1], vectors[-1], settings.top_k), len(vectors) - 1))]
 
 
 def retriever_identity(_data: NiehSet, settings: ContextSettings) -> dict[str, Any]:
@@ -52,16 +49,3 @@ def _retriever(settings: ContextSettings) -> "Retriever":
     from model_adapters.hf.retrieval import open_retriever
 
     return open_retriever(settings.retriever, settings.retriever_revision)
-
-
-def _nearest(vectors: np.ndarray, wanted: np.ndarray, top_k: int) -> tuple[int, ...]:
-    """Rows with the largest cosine, ascending.
-
-    Args:
-        vectors: (rows, dimensions), of length 1.
-        wanted: (dimensions,), of length 1.
-        top_k: how many.
-    """
-    similarity = np.round(vectors.astype(np.float64) @ wanted.astype(np.float64), _DIGITS)
-    order = np.argsort(-similarity, kind="stable")
-    return tuple(sorted(order[:top_k].tolist()))
