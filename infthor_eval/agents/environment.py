@@ -10,10 +10,10 @@ from infthor_eval.agents.expert import Expert, ExpertAction
 from infthor_eval.agents.frames import FrameKeeper, NoFrames
 from infthor_eval.agents.memory import Past
 from infthor_eval.agents.plans import Plan, PlanKind, plans_of, tasks_of
-from infthor_eval.agents.rewards import PlanReward, PlanTarget, RewardRules, StepReward, max_reward, reward_rules
+from infthor_eval.agents.rewards import PlanReward, RewardRules, StepReward, max_reward, reward_rules
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.trajectory import Trajectory
-from infthor_eval.household.scout import HORIZON_STEP, reachable, stand_of
+from infthor_eval.household.scout import HORIZON_STEP, reachable
 from infthor_eval.thor.actions import ActionText, UngroundedError, ground, parse_action
 from infthor_eval.thor.recorded import degrees_of
 from infthor_eval.thor.simulator import Simulator
@@ -138,14 +138,16 @@ class PlanEnvironment:
         """
         found = self.plans[plan]
         expert_actions = self._expert.actions(plan)
-        start = self._expert.start(plan)
+        start, end = self._expert.start(plan), self._expert.start(plan + 1)
         view = self._simulator.rewind(start.mark, exactly=True)
-        target, distances = self._target(found, expert_actions, view)
         task = self.tasks[found.task].task
-        self._reward = PlanReward(self._rules, target, task, view, start.treatments, distances)
+        grid = self._grid(found, expert_actions, view)
+        target = target_of(found, self._expert.grounding, view, end.mark.view.agent, grid)
+        self._reward = PlanReward(self._rules, target, task, view, start.treatments, grid)
         self._target_ids = {key for key in (target.object_id, target.receptacle_id) if key is not None}
         self._plan, self._n_steps = found, 0
-        most = max_reward(self._rules, target, task, view, start.treatments, distances, self._completes(plan))
+        completes = task if _completes(task, start, end) else None
+        most = max_reward(self._rules, target, view, grid, completes)
         return Observation(view, start.frame), {"max_reward": most, "n_expert": len(expert_actions)}
 
     def step(self, action: str | Mapping[str, Any]) -> StepOutcome:
@@ -211,20 +213,18 @@ class PlanEnvironment:
             return None
         return Ended.WRONG if after.success else Ended.REFUSED
 
-    def _target(
-        self, plan: Plan, expert_actions: Sequence[ExpertAction], view: View
-    ) -> tuple[PlanTarget, Mapping[Any, int]]:
-        ids = [
-            None if recorded is None else self._expert.grounding.ground(recorded, view)
-            for recorded in (plan.object_id, plan.receptacle_id)
-        ]
+    def _grid(self, plan: Plan, expert_actions: Sequence[ExpertAction], view: View) -> Grid | None:
+        """Where the agent can stand; where the expert went in this plan it can, whatever the simulator says."""
         if plan.kind != PlanKind.GOTO:
-            return PlanTarget(plan.kind, *ids), {}
-        end = expert_actions[-1].pose
+            return None
         walked = [view.agent, *(action.pose for action in expert_actions)]
-        grid = reachable(self._simulator).joined((pose.position.x, pose.position.z) for pose in walked)
-        goal = stand_of(end, grid)
-        return PlanTarget(plan.kind, *ids, goal, end.horizon), grid.distances_to(goal)
+        return reachable(self._simulator).joined((pose.position.x, pose.position.z) for pose in walked)
+
+
+def _completes(task: Task, start: PlanStart, end: PlanStart) -> bool:
+    """Whether the task's goal comes to hold in a plan as the expert carries it out."""
+    before, after = (goal_holds(task, moment.mark.view, moment.treatments) for moment in (start, end))
+    return after and not before
 
 
 def _look_degrees(trajectory: Trajectory) -> float:

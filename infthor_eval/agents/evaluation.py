@@ -74,6 +74,14 @@ class PlansEvaluation:
         self._simulators = Simulators(self._options.simulator, scenes, self._trajectories, instances=in_words)
         self._cast: Cast | None = None
 
+    def outline(self) -> list[tuple[str, list[str]]]:
+        """The trajectories that are gone through, by name, each with the texts of its plans."""
+        return [
+            (course.traj_id, [plan.text for plan in task.plans(course)])
+            for task in self._tasks.values()
+            for course in task.limited
+        ]
+
     def workload(self, subject: Subject) -> Workload:
         """See `infthor_eval.runs.Evaluation.workload`."""
         self._cast = cast_of(subject)

@@ -135,11 +135,11 @@ class Expert:
         actions: list[ExpertAction] = []
         steps: list[tuple[str, FrameRef]] = []
         for number in range(*plan.low):
-            call, before = self._call(plan, number, view), view
+            call = self._call(plan, number, view)
             view = simulator.step(**call)
             if not view.success:
                 raise self._refusal(plan, number, view.error or "refused without a message")
-            treatments = treatments.after(call, before, view)
+            treatments = treatments.after(call["action"], call.get("objectId"), view)
             frame = self._frames.keep(view)
             if self._log is not None:
                 self._log.record(view, step=number, action=self._text(number))

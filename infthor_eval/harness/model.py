@@ -8,14 +8,17 @@ from pathlib import Path
 from lm_eval.api.instance import Instance
 from lm_eval.api.model import LM
 
+from infthor_eval.agents import records as plan_records
+from infthor_eval.agents.evaluation import PlansEvaluation
 from infthor_eval.errors import ModelError, UsageError
+from infthor_eval.harness.plans_task import episode_response, evaluation_around
 from infthor_eval.harness.registration import NAME, say_model_takes_references
+from infthor_eval.nieh import records as nieh_records
 from infthor_eval.nieh.answering import ModelAnswerer, NiehUnit, answered
 from infthor_eval.nieh.baselines import BASELINES
 from infthor_eval.nieh.docs import sample_of, samples_around
-from infthor_eval.nieh.records import RECORDS
 from infthor_eval.nieh.task import PreparedTask
-from infthor_eval.runs import RunHeader
+from infthor_eval.runs import Group, RunHeader
 from infthor_eval.runs.generation_kwargs import decoding_of
 from infthor_eval.runs.identity import identity_of
 from infthor_eval.runs.journal import Journal
@@ -25,6 +28,7 @@ from model_adapters import Model, adapter_identity, label, load, takes
 
 __all__ = ["InfthorLM"]
 
+_RECORDS = {"nieh": nieh_records.RECORDS, "plans": plan_records.RECORDS}
 _DEFAULT_DEVICE = "cuda:0"  # what lm-eval says where nobody said anything
 
 
@@ -75,11 +79,12 @@ class InfthorLM(LM):
         say_model_takes_references()
         self._model = model
         self._seed = seed
+        self._name, self._code = label(adapter, given), adapter_identity(adapter)
         self._scratch = None if journal else tempfile.TemporaryDirectory(prefix="infthor-")
-        identity = identity_of("nieh", model, adapter_identity(adapter), {"host": "lm-eval"}, None, seed)
-        header = RunHeader(suite="nieh", name=label(adapter, given), identity=identity)
-        folder = Path(journal or str(self._scratch and self._scratch.name))
-        self._session = JournalSession(model, Journal(folder, header, RECORDS))
+        self._folder = Path(journal or str(self._scratch and self._scratch.name))
+        self._sessions: dict[str, JournalSession] = {}
+        self._plans: dict[str, PlansEvaluation] = {}
+        self._groups: dict[str, dict[str, Group]] = {}
 
     @property
     def tokenizer_name(self) -> str:
@@ -91,7 +96,12 @@ class InfthorLM(LM):
         return {"model_source": NAME, "model_name": self._model.name}
 
     def generate_until(self, requests: Sequence[Instance]) -> list[str]:
-        """One response per request; empty where the model could not answer (the journal has the reason)."""
+        """One response per request; empty where the model could not answer (the journal has the reason).
+
+        A request of a task of plans is an episode, and is answered with what came of it.
+        """
+        if any(isinstance(request.doc, dict) and "plans" in request.doc for request in requests):
+            return [self._episode(request) for request in requests]
         replies: dict[UnitKey, str] = {}
         units = [_unit(request) for request in requests]
         order = sorted(range(len(units)), key=lambda number: (units[number].key.task, units[number].cluster))
@@ -112,9 +122,30 @@ class InfthorLM(LM):
         unit, request = group[0]
         decoding = decoding_of(request.args[1], self._seed, unit.key.task)
         prepared = PreparedTask(samples_around(request.doc), decoding)
-        answerer = ModelAnswerer(self._model, self._session)
-        records = answered([unit for unit, _ in group], prepared, answerer, self._session)
-        return {record.key: self._session.recorded(record)[0].payload.reply or "" for record in records}
+        session = self._session("nieh")
+        records = answered([unit for unit, _ in group], prepared, ModelAnswerer(self._model, session), session)
+        return {record.key: session.recorded(record)[0].payload.reply or "" for record in records}
+
+    def _episode(self, request: Instance) -> str:
+        """What came of a trajectory."""
+        doc, task, session = request.doc, str(request.task_name), self._session("plans")
+        if task not in self._plans:
+            self._plans[task] = evaluation_around(doc, task, request.args[1], self._seed)
+            self._groups[task] = {
+                group.units[0].cluster: group for group in self._plans[task].workload(self._model).groups
+            }
+        records = self._plans[task].run(self._groups[task][doc["traj_id"]], session)
+        return episode_response(session.recorded(record)[0] for record in records)
+
+    def _session(self, suite: str) -> JournalSession:
+        """Where the records of a suite go: those of NIEH into the folder itself, others into one of theirs."""
+        if suite not in self._sessions:
+            identity = identity_of(suite, self._model, self._code, {"host": "lm-eval"}, None, self._seed)
+            header = RunHeader(suite=suite, name=self._name, identity=identity)
+            folder = self._folder if suite == "nieh" else self._folder / suite
+            journal = Journal(folder, header, _RECORDS[suite])
+            self._sessions[suite] = JournalSession(self._model, journal)
+        return self._sessions[suite]
 
 
 def _unit(request: Instance) -> NiehUnit:

@@ -1,0 +1,101 @@
+"""The functions behind the task files in `tasks/plans/`, called by lm-eval: an episode is one request.
+
+lm-eval has no simulator, so our model class alone can answer. It goes through the trajectory that a doc names, and its
+response tells what came of every plan (`episode_response`).
+"""
+
+import json
+from collections.abc import Iterable, Sequence
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+from infthor_eval.agents.evaluation import PlansEvaluation
+from infthor_eval.agents.options import PlansOptions
+from infthor_eval.agents.records import PlanRecord
+from infthor_eval.agents.task import TaskSettings
+from infthor_eval.errors import UsageError
+from infthor_eval.harness.registration import model_takes_references, register
+from infthor_eval.runs import TaskFile, TaskRequest, UnitRecord
+
+__all__ = ["dataset", "doc_to_target", "doc_to_text", "episode_response", "evaluation_around", "process_results"]
+
+register()  # see `nieh_task`
+
+Doc = dict[str, Any]
+_SETTINGS = tuple(item.name for item in fields(TaskSettings))
+_OPTIONS = tuple(item.name for item in fields(PlansOptions))
+
+
+def dataset(**config: Any) -> dict[str, Any]:
+    """The docs of a task, one per trajectory (`custom_dataset` of the task files).
+
+    Args:
+        config: the task's settings, and of what lm-eval hands over as metadata: `data`, and the suite's options.
+
+    Raises:
+        UsageError: the model is not ours, or there are no trajectories.
+        DataError: none of them can be read.
+    """
+    from datasets import Dataset
+
+    if not model_takes_references():
+        raise UsageError(
+            "plans are carried out in a simulator, which infthor-eval's models alone do; use --model infthor"
+        )
+    about = {
+        "settings": json.dumps({name: config[name] for name in _SETTINGS if config.get(name) is not None}),
+        "options": json.dumps({name: config[name] for name in _OPTIONS if name in config and name not in _SETTINGS}),
+        "data": str(config.get("data") or ""),
+    }
+    plans = evaluation_around({**about, "traj_id": ""}, "dataset", {"max_gen_toks": 1}, 0)
+    return {"test": Dataset.from_list([{**about, "traj_id": name, "plans": texts} for name, texts in plans.outline()])}
+
+
+def doc_to_text(doc: Doc) -> str:
+    """What is to be done, a plan a line."""
+    return "\n".join(doc["plans"])
+
+
+def doc_to_target(doc: Doc) -> str:
+    """That every plan is carried out."""
+    return f"{len(doc['plans'])} plans done"
+
+
+def process_results(doc: Doc, results: Sequence[str]) -> dict[str, float]:
+    """Share of the plans carried out, and the reward of all of them together; see `episode_response`."""
+    plans = json.loads(results[0] or "[]")
+    return {
+        "success": sum(plan["done"] for plan in plans) / len(plans) if plans else 0.0,
+        "reward": sum(plan["reward"] for plan in plans),
+    }
+
+
+def evaluation_around(doc: Doc, task: str, generation_kwargs: dict[str, Any], seed: int) -> PlansEvaluation:
+    """The suite set up for the task of a doc.
+
+    Args:
+        doc: any of the task's.
+        task: its name.
+        generation_kwargs: as lm-eval hands them over.
+        seed: of the run.
+    """
+    settings = {"dataset_kwargs": json.loads(doc["settings"]), "generation_kwargs": generation_kwargs}
+    file = TaskFile(task, "plans", Path(task), settings)
+    data = Path(doc["data"]) if doc["data"] else None
+    return PlansEvaluation(TaskRequest([file], PlansOptions(**json.loads(doc["options"])), data, None, seed))
+
+
+def episode_response(records: Iterable[UnitRecord[PlanRecord]]) -> str:
+    """What came of the plans of a trajectory, as JSON; those that do not count are left out."""
+    plans = [
+        {
+            "plan": item.payload.plan,
+            "done": item.payload.done,
+            "reward": item.payload.reward,
+            "ended": item.payload.ended,
+        }
+        for item in records
+        if item.excluded is None
+    ]
+    return json.dumps(plans)
