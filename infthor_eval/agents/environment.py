@@ -6,14 +6,18 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, NamedTuple
 
-from infthor_eval.agents.expert import Expert, ExpertAction
+from infthor_eval.agents.expert import Expert, ExpertAction, PlanStart
 from infthor_eval.agents.frames import FrameKeeper, NoFrames
 from infthor_eval.agents.memory import Past
 from infthor_eval.agents.plans import Plan, PlanKind, plans_of, tasks_of
 from infthor_eval.agents.rewards import PlanReward, RewardRules, StepReward, max_reward, reward_rules
+from infthor_eval.agents.targets import target_of
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.trajectory import Trajectory
+from infthor_eval.household.goals import goal_holds
+from infthor_eval.household.navigation import Grid
 from infthor_eval.household.scout import HORIZON_STEP, reachable
+from infthor_eval.household.tasks import Task
 from infthor_eval.thor.actions import ActionText, UngroundedError, ground, parse_action
 from infthor_eval.thor.recorded import degrees_of
 from infthor_eval.thor.simulator import Simulator

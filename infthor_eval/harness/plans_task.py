@@ -62,7 +62,7 @@ def doc_to_target(doc: Doc) -> str:
     return f"{len(doc['plans'])} plans done"
 
 
-def process_results(doc: Doc, results: Sequence[str]) -> dict[str, float]:
+def process_results(_doc: Doc, results: Sequence[str]) -> dict[str, float]:
     """Share of the plans carried out, and the reward of all of them together; see `episode_response`."""
     plans = json.loads(results[0] or "[]")
     return {
