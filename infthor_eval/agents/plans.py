@@ -56,6 +56,7 @@ class Plan:
         low: the expert's low-level actions of it, [first, end).
         object_id: what it is about, as recorded; None where the recording names none.
         receptacle_id: where to, as recorded; None likewise.
+        location: for GotoLocation the pose to reach, "loc|x|z|turn|horizon": cells of 0.25 m, quarter turns, degrees.
         is_final: whether it belongs to the final long-horizon task.
     """
 
@@ -66,6 +67,7 @@ class Plan:
     low: tuple[int, int]
     object_id: str | None = None
     receptacle_id: str | None = None
+    location: str | None = None
     is_final: bool = False
 
 
@@ -77,7 +79,7 @@ def tasks_of(trajectory: Trajectory) -> list[TrajectoryTask]:
     """
     n_high = len(trajectory.plan.high_pddl)
     if not trajectory.sub_trajs:
-        return [TrajectoryTask(goal_text(trajectory, None), task_of(_single_task(trajectory)), 0, n_high)]
+        return [TrajectoryTask(goal_text(trajectory, None), _task(trajectory, 0, _single_task(trajectory)), 0, n_high)]
     found = []
     for sub_task, span in zip(_sub_tasks(trajectory), trajectory.sub_trajs, strict=True):
         first, end = span.high_pddl_idx
@@ -85,7 +87,8 @@ def tasks_of(trajectory: Trajectory) -> list[TrajectoryTask]:
             raise DataError(
                 f"trajectory {trajectory.traj_id}: task {span.sub_traj_idx} has sub-goals {first} to {end} of {n_high}"
             )
-        found.append(TrajectoryTask(goal_text(trajectory, sub_task), task_of(sub_task), first, end))
+        task = _task(trajectory, span.sub_traj_idx, sub_task)
+        found.append(TrajectoryTask(goal_text(trajectory, sub_task), task, first, end))
     return found
 
 
@@ -113,6 +116,7 @@ def plans_of(trajectory: Trajectory) -> list[Plan]:
                 low=low,
                 object_id=high.planner_action.object_id,
                 receptacle_id=high.planner_action.receptacle_id,
+                location=high.planner_action.location,
                 is_final=task == final,
             )
         )
@@ -127,6 +131,13 @@ def _sub_tasks(trajectory: Trajectory) -> Sequence[SubTask]:
     if len(parts) != len(tasks):
         raise DataError(f"trajectory {trajectory.traj_id}: {len(parts)} parts for {len(tasks)} tasks; restore the file")
     return tasks
+
+
+def _task(trajectory: Trajectory, number: int, recorded: SubTask) -> Task:
+    try:
+        return task_of(recorded)
+    except DataError as error:
+        raise DataError(f"trajectory {trajectory.traj_id}, task {number}: {error}") from error
 
 
 def _single_task(trajectory: Trajectory) -> SubTask:
@@ -146,7 +157,7 @@ def _spans(trajectory: Trajectory) -> dict[int, tuple[int, int]]:
     spans: dict[int, tuple[int, int]] = {}
     previous = -1
     for number, low in enumerate(trajectory.plan.low_actions):
-        if (low.high_idx != previous and low.high_idx in spans) or low.high_idx < previous:
+        if low.high_idx < previous:
             raise DataError(
                 f"trajectory {trajectory.traj_id}: action {number} belongs to sub-goal {low.high_idx}, out of order"
             )

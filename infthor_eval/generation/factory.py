@@ -15,7 +15,7 @@ from infthor_eval.generation.setbacks import Setbacks
 from infthor_eval.generation.settings import TrajectorySettings
 from infthor_eval.generation.trace import RolloutError
 from infthor_eval.household.affordances import MAX_PLAN_STEPS, goes_into
-from infthor_eval.household.goals import holds_in
+from infthor_eval.household.goals import goal_holds
 from infthor_eval.household.pddl import problem
 from infthor_eval.household.planner import plan
 from infthor_eval.household.possible_tasks import tasks_of
@@ -193,7 +193,7 @@ class _Factory:
 
     def _unmet(self, task: Task) -> RolloutError | None:
         """What is wrong where a plan was carried out and its goal does not hold: things can slide."""
-        if holds_in(task, self._simulator.view):
+        if goal_holds(task, self._simulator.view):
             return None
         error = RolloutError(f"{task.task_type}: its plan was carried out and its goal does not hold")
         self._statistics.reasons[str(error)] += 1

@@ -23,6 +23,7 @@ __all__ = [
     "SLICEABLE",
     "STOWABLE",
     "goes_into",
+    "modern_type",
     "preposition",
 ]
 
@@ -30,8 +31,13 @@ _TABLES: dict[str, Any] = yaml.safe_load(Path(__file__).with_name("affordances.y
 _RENAMED = {"Glassbottle": "Bottle", "PaperTowel": "PaperTowelRoll", "ToiletPaperRoll": "ToiletPaper"}  # 2.1.0 to 5.x
 
 
+def modern_type(name: str) -> str:
+    """The name that AI2-THOR 5.x has for an object type of 2.1.0; one of 5.x stays as it is."""
+    return _RENAMED.get(name, name)
+
+
 def _types(names: Iterable[str]) -> frozenset[str]:
-    return frozenset(_RENAMED.get(name, name) for name in names)
+    return frozenset(map(modern_type, names))
 
 
 _HOLDS = {receptacle: _types(names) for receptacle, names in _TABLES["receptacle_holds"].items()}

@@ -7,7 +7,19 @@ from infthor_eval.formats.step_log import ObjectState
 from infthor_eval.household.wording import canonical
 from infthor_eval.thor.view import ThorObject
 
-__all__ = ["direct_parent", "logged_parent"]
+__all__ = ["contents_of", "direct_parent", "logged_parent"]
+
+
+def contents_of(holder: str, objects: Mapping[str, ThorObject]) -> frozenset[str]:
+    """Ids of what is in or on a receptacle, and of what is in or on that."""
+    found: set[str] = set()
+    new = {holder}
+    while new:
+        inside = {key for parent in new for key in objects[parent].receptacle_object_ids or ()}
+        inside |= {key for key, item in objects.items() if new & set(item.parent_receptacles or ())}
+        new = (inside & objects.keys()) - found - {holder}
+        found |= new
+    return frozenset(found)
 
 
 def direct_parent(item: ThorObject, objects: Mapping[str, ThorObject]) -> str | None:

@@ -6,9 +6,10 @@ from dataclasses import replace
 from infthor_eval.household.affordances import KNIVES
 from infthor_eval.household.symbolic import Room, State, room_of
 from infthor_eval.household.tasks import Task, TaskType
+from infthor_eval.household.treatments import Treatments
 from infthor_eval.thor.view import View
 
-__all__ = ["APPLIANCE", "achieved", "holds_in", "least_remaining"]
+__all__ = ["APPLIANCE", "achieved", "goal_holds", "least_remaining"]
 
 APPLIANCE = {TaskType.CLEAN: "SinkBasin", TaskType.HEAT: "Microwave", TaskType.COOL: "Fridge"}
 
@@ -21,16 +22,25 @@ def achieved(task: Task, room: Room, state: State) -> bool:
     return _placed(task, room, state) >= _wanted(task)
 
 
-def holds_in(task: Task, view: View) -> bool:
-    """Whether things are in a view where a task wants them.
+def goal_holds(task: Task, view: View, treatments: Treatments | None = None) -> bool:
+    """Whether the goal of a task holds in what the simulator reports.
 
-    A view does not tell what was washed, heated or cooled, nor which lamp the agent stands at: what is there counts as
-    treated, and any lit lamp of the type will do.
+    The conditions are ALFRED's, but for names: an `Apple` is no `AppleSliced`, which ALFRED's comparison of ids takes
+    it for. Which object of a type it is, or which slice, does not matter. A lamp must be lit and visible.
+
+    Args:
+        task: the task.
+        view: the world now.
+        treatments: what was washed, heated and cooled; None where only the view is known: then everything counts as
+            treated, and a lit lamp as visible from where the agent was to go.
     """
     room = room_of(view)
     everything = frozenset(room.types)
-    lamp = next((key for key in sorted(room.start.lit) if room.types[key] == task.light), None)
-    return achieved(task, room, replace(room.start, at=lamp, clean=everything, hot=everything, cold=everything))
+    known = Treatments(everything, everything, everything) if treatments is None else treatments
+    lamps = [key for key in sorted(room.start.lit) if room.types[key] == task.light]
+    seen = [key for key in lamps if treatments is None or view.objects[key].visible]
+    state = replace(room.start, at=next(iter(seen), None), clean=known.clean, hot=known.hot, cold=known.cold)
+    return achieved(task, room, state)
 
 
 def least_remaining(task: Task, room: Room, state: State) -> int:

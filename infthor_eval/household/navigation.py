@@ -1,7 +1,7 @@
 """Walking on the grid of reachable positions: shortest action sequences between poses."""
 
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 from dataclasses import dataclass
 
 __all__ = ["GRID", "Cell", "Grid", "Stand"]
@@ -51,6 +51,23 @@ class Grid:
         """Number of actions from a stand to every stand that can be reached."""
         return {stand: length for stand, (length, _) in self._search(start, None).items()}
 
+    def distances_to(self, goal: Stand) -> dict[Stand, int]:
+        """Number of actions to a stand from every stand that it can be reached from.
+
+        The goal's own cell counts as reachable, whether the grid has it or not. Cells beside the grid are among the
+        starts, as with `path`: one can step from there onto it.
+        """
+        cells = self.cells | {goal.cell}
+        found = {goal: 0}
+        queue = deque([goal])
+        while queue:
+            stand = queue.popleft()
+            for previous in _stands_before(stand, cells):
+                if previous not in found:
+                    found[previous] = found[stand] + 1
+                    queue.append(previous)
+        return found
+
     def path(self, start: Stand, goal: Stand) -> list[str] | None:
         """The shortest sequence of MoveAhead, RotateLeft, RotateRight; None where there is none."""
         found = self._search(start, goal)
@@ -87,3 +104,12 @@ class Grid:
         if stand.ahead in self.cells:
             moves.insert(0, ("MoveAhead", Stand(stand.ahead, facing)))
         return moves
+
+
+def _stands_before(stand: Stand, cells: Container[Cell]) -> list[Stand]:
+    """The stands from which one action leads to a stand."""
+    before = [Stand(stand.cell, (stand.facing + turn) % 360) for turn in (-90, 90)]
+    if stand.cell in cells:
+        dx, dz = _AHEAD[stand.facing]
+        before.append(Stand((stand.cell[0] - dx, stand.cell[1] - dz), stand.facing))
+    return before

@@ -1,14 +1,16 @@
 """The task pool: ALFRED's seven task types over the object types of a room."""
 
 from enum import StrEnum
+from typing import Any
 
 import msgspec
 
+from infthor_eval.errors import DataError
 from infthor_eval.formats.trajectory import SubTask, TaskInfo
-from infthor_eval.household.affordances import preposition
+from infthor_eval.household.affordances import modern_type, preposition
 from infthor_eval.household.wording import an, noun, plural
 
-__all__ = ["Task", "TaskType", "sub_task"]
+__all__ = ["Task", "TaskType", "sub_task", "task_of"]
 
 
 class TaskType(StrEnum):
@@ -76,6 +78,57 @@ def sub_task(task: Task, scene: str) -> SubTask:
         "toggle_target": task.light or "",
     }
     return SubTask(info, _describe(task), params)
+
+
+def task_of(recorded: SubTask) -> Task:
+    """The task that a trajectory holds: the inverse of `sub_task`, for the published data and ALFRED's too.
+
+    Types are named as AI2-THOR 5.x does; what a task of its type has no use for is left out.
+
+    Raises:
+        DataError: no goal or one of an unknown type, or a type of object that its goal needs is missing.
+    """
+    info, params = recorded.task_info, recorded.pddl_params
+    task_type = _task_type(info.goal)
+    examines, stacks = task_type == TaskType.EXAMINE, task_type == TaskType.STACK
+    pickup = _object_type(task_type, params, "object_target", info.pickup)
+    whole = pickup.removesuffix("Sliced")
+    return Task(
+        task_type,
+        whole,
+        receptacle=None if examines else _object_type(task_type, params, "parent_target", info.receptacle),
+        movable=_object_type(task_type, params, "mrecep_target", info.movable) if stacks else None,
+        light=_object_type(task_type, params, "toggle_target", None) if examines else None,
+        sliced=whole != pickup or _is_sliced(params),
+    )
+
+
+def _task_type(goal: str) -> TaskType:
+    if not goal:
+        raise DataError(f"a task has no goal; name one of {', '.join(TaskType)}")
+    try:
+        return TaskType(goal)
+    except ValueError as error:
+        raise DataError(f"a task's goal is {goal!r:.60}; there are {', '.join(TaskType)}") from error
+
+
+_IN_INFO = {"object_target": "pickup", "parent_target": "receptacle", "mrecep_target": "movable"}
+
+
+def _object_type(task_type: TaskType, params: dict[str, Any], name: str, in_info: str | None) -> str:
+    """A type that a goal needs; where `task_info` does not name it, `pddl_params` does."""
+    found = in_info or params.get(name)
+    if isinstance(found, str) and found:
+        return modern_type(found)
+    places = f"task_info's {_IN_INFO[name]} or pddl_params' {name}" if name in _IN_INFO else f"pddl_params' {name}"
+    raise DataError(f"a task of type {task_type} has no {places}; name an object type there")
+
+
+def _is_sliced(params: dict[str, Any]) -> bool:
+    sliced = params.get("object_sliced")
+    if sliced is not None and not isinstance(sliced, bool):
+        raise DataError(f"a task's pddl_params have object_sliced {sliced!r:.60}; make it true or false")
+    return sliced is True
 
 
 def _describe(task: Task) -> str:

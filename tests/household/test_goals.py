@@ -1,12 +1,15 @@
-"""Goals on symbolic states written by hand: planner and PDDL play no part."""
+"""Goals on symbolic states and views written by hand: planner and PDDL play no part."""
 
 from dataclasses import replace
 
 import pytest
 
-from infthor_eval.household.goals import achieved
+from infthor_eval.household.goals import achieved, goal_holds
 from infthor_eval.household.symbolic import ABSENT, FLOOR, Room, State
 from infthor_eval.household.tasks import Task, TaskType
+from infthor_eval.household.treatments import Treatments
+from tests.agents import building
+from tests.agents.building import kitchen
 
 TYPES = {
     "table-1": "SideTable",
@@ -91,3 +94,53 @@ def test_a_treatment_is_of_the_object_that_is_there():
     there = state(mug_1="table-1", mug_2="table-1", clean=["mug-2"])
     assert holds(CLEAN, there)
     assert not holds(CLEAN, replace(there, clean=frozenset({"plate"})))
+
+
+THERE, HERE = building.OTHER_TABLE, building.FRIDGE
+ALL = Treatments(*[frozenset({building.MUG, building.SLICE_2})] * 3)
+STACKED = {building.APPLE: building.PLATE, building.PLATE: THERE}
+
+
+def all_in(*things):
+    """The things on one table, everything else in the fridge."""
+    everything = (building.MUG, building.CUP, building.PLATE, building.APPLE, building.SLICE_1, building.SLICE_2)
+    return kitchen({key: THERE if key in things else HERE for key in everything})
+
+
+TWO_SLICES = Task(TaskType.PLACE_TWO, "Apple", "SideTable", sliced=True)
+HOT_SLICE = Task(TaskType.HEAT, "Apple", "SideTable", sliced=True)
+
+
+@pytest.mark.parametrize(
+    ("task", "view", "treatments", "expected"),
+    [
+        (PLACE, all_in(building.MUG), Treatments(), True),
+        (PLACE, all_in(building.CUP), Treatments(), False),
+        (PLACE, all_in(), Treatments(), False),
+        (SLICE, all_in(building.SLICE_2), Treatments(), True),
+        (SLICE, all_in(building.APPLE), Treatments(), False),
+        (TWO_SLICES, all_in(building.SLICE_1, building.SLICE_2), Treatments(), True),
+        (TWO_SLICES, kitchen({building.SLICE_1: THERE}), Treatments(), False),
+        (EXAMINE, kitchen(held=building.MUG, on=[building.LAMP]), Treatments(), True),
+        (EXAMINE, kitchen(held=building.MUG), Treatments(), False),
+        (EXAMINE, kitchen(held=building.CUP, on=[building.LAMP]), Treatments(), False),
+        (EXAMINE, kitchen(held=building.MUG, on=[building.LAMP], hidden=[building.LAMP]), Treatments(), False),
+        (EXAMINE, kitchen(held=building.MUG, on=[building.LAMP], hidden=[building.LAMP]), None, True),
+        (EXAMINE, kitchen(on=[building.LAMP]), Treatments(), False),
+        (CLEAN, all_in(building.MUG), Treatments(clean=frozenset({building.MUG})), True),
+        (CLEAN, all_in(building.MUG), Treatments(clean=frozenset({building.CUP})), False),
+        (CLEAN, all_in(building.CUP), ALL, False),
+        (HEAT, all_in(building.MUG), ALL, True),
+        (HEAT, all_in(building.MUG), Treatments(cold=frozenset({building.MUG})), False),
+        (HOT_SLICE, all_in(building.SLICE_2), ALL, True),
+        (HOT_SLICE, all_in(building.SLICE_1), ALL, False),
+        (COOL, all_in(building.MUG), ALL, True),
+        (COOL, all_in(building.MUG), Treatments(hot=frozenset({building.MUG})), False),
+        (COOL, all_in(building.MUG), None, True),
+        (STACK, kitchen(STACKED), Treatments(), True),
+        (STACK, kitchen({**STACKED, building.PLATE: HERE}), Treatments(), False),
+        (STACK, kitchen({building.PLATE: THERE, building.APPLE: THERE}), Treatments(), False),
+    ],
+)
+def test_a_goal_holds_in_a_view_or_does_not(task, view, treatments, expected):
+    assert goal_holds(task, view, treatments) is expected

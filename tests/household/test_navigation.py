@@ -23,6 +23,26 @@ def test_paths_lead_where_they_should_and_are_shortest(chosen, data):
         assert walk(grid, start, path) == goal
 
 
+@given(cells, st.data())
+def test_distances_to_a_goal_are_the_lengths_of_the_paths_there(chosen, data):
+    grid = grid_of(chosen)
+    facing = st.sampled_from((0, 90, 180, 270))
+    goal = Stand(data.draw(st.sampled_from(sorted(grid.cells))), data.draw(facing))
+    x, z = data.draw(st.sampled_from(sorted(grid.cells)))
+    start = Stand((x + data.draw(st.integers(-1, 1)), z + data.draw(st.integers(-1, 1))), data.draw(facing))
+    path = grid.path(start, goal)
+    assert grid.distances_to(goal).get(start) == (None if path is None else len(path))
+
+
+def test_a_goal_off_the_grid_is_stepped_onto():
+    grid = grid_of([(0, 0), (0, 1)])
+    goal = Stand(max(grid.cells), 0)
+    beyond = Stand(goal.ahead, 0)
+    assert grid.path(goal, beyond) is None
+    distances = grid.distances_to(beyond)
+    assert distances[goal] == 1 and distances[Stand(min(grid.cells), 180)] == 4
+
+
 def walk(grid, stand, path):
     ahead = {0: (0, 1), 90: (1, 0), 180: (0, -1), 270: (-1, 0)}
     for action in path:

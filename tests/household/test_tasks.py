@@ -1,4 +1,9 @@
-from infthor_eval.household.tasks import Task, TaskType, sub_task
+import msgspec
+import pytest
+
+from infthor_eval.errors import DataError
+from infthor_eval.formats.trajectory import SubTask, TaskInfo
+from infthor_eval.household.tasks import Task, TaskType, sub_task, task_of
 
 
 def test_descriptions():
@@ -11,3 +16,53 @@ def test_descriptions():
     assert words(Task(TaskType.EXAMINE, "Mug", light="DeskLamp")) == "look at a mug under the desk lamp"
     stack = Task(TaskType.STACK, "Apple", "CounterTop", movable="Plate")
     assert words(stack) == "put a plate with an apple on it on the counter top"
+
+
+TASKS = [
+    Task(TaskType.PLACE, "Apple", "Fridge", sliced=True),
+    Task(TaskType.PLACE_TWO, "Knife", "CounterTop"),
+    Task(TaskType.EXAMINE, "Mug", light="DeskLamp"),
+    Task(TaskType.CLEAN, "Mug", "SideTable"),
+    Task(TaskType.HEAT, "Potato", "Fridge", sliced=True),
+    Task(TaskType.COOL, "Mug", "SideTable"),
+    Task(TaskType.STACK, "Apple", "CounterTop", movable="Plate", sliced=True),
+]
+
+
+@pytest.mark.parametrize("task", TASKS, ids=lambda task: str(task.task_type))
+def test_a_task_comes_back_as_it_was(task):
+    stored = msgspec.json.decode(msgspec.json.encode(sub_task(task, "kitchen-1")), type=SubTask)
+    assert task_of(stored) == task
+
+
+def recorded(goal, pickup=None, movable=None, receptacle=None, **params):
+    return SubTask(TaskInfo(goal, pickup, movable, receptacle), pddl_params=params)
+
+
+def test_types_out_of_the_parameters_and_of_another_version():
+    place = recorded("pick_and_place_simple", object_target="Glassbottle", parent_target="Desk", mrecep_target="")
+    assert task_of(place) == Task(TaskType.PLACE, "Bottle", "Desk")
+    assert task_of(recorded("pick_and_place_simple", "AppleSliced", receptacle="Desk")).target == "AppleSliced"
+    examine = recorded("look_at_obj_in_light", "Book", None, "Desk", toggle_target="FloorLamp", object_sliced=None)
+    assert task_of(examine) == Task(TaskType.EXAMINE, "Book", light="FloorLamp")
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        (recorded(""), "a task has no goal; name one of pick_and_place_simple, "),
+        (recorded("juggle", "Mug"), "a task's goal is 'juggle'; there are pick_and_place_simple, "),
+        (
+            recorded("pick_and_place_simple", receptacle="Desk"),
+            "has no task_info's pickup or pddl_params' object_target",
+        ),
+        (recorded("pick_clean_then_place_in_recep", "Mug"), "has no task_info's receptacle or .*' parent_target"),
+        (recorded("pick_and_place_with_movable_recep", "Mug", "", "Desk"), "task_info's movable or .*' mrecep_target"),
+        (recorded("look_at_obj_in_light", "Mug", toggle_target=""), "has no pddl_params' toggle_target"),
+        (recorded("look_at_obj_in_light", "Mug", toggle_target=3), "has no pddl_params' toggle_target"),
+        (recorded("pick_and_place_simple", "Mug", None, "Desk", object_sliced="no"), "object_sliced 'no'"),
+    ],
+)
+def test_what_a_task_lacks_is_named(given, words):
+    with pytest.raises(DataError, match=words):
+        task_of(given)

@@ -1,0 +1,116 @@
+"""What a plan is about, in the simulator at hand."""
+
+import re
+from dataclasses import dataclass
+
+from infthor_eval.agents.plans import Plan, PlanKind
+from infthor_eval.errors import DataError
+from infthor_eval.household.navigation import GRID, Grid, Stand
+from infthor_eval.thor.grounding import Grounding
+from infthor_eval.thor.view import View
+
+__all__ = ["PlanTarget", "in_hand", "is_in", "subject_of", "target_of"]
+
+_LOCATION = re.compile(r"loc\|(-?\d+)\|(-?\d+)\|([0-3])\|(-?\d+)")
+_TREATMENTS = {PlanKind.CLEAN, PlanKind.HEAT, PlanKind.COOL}
+
+
+@dataclass(frozen=True)
+class PlanTarget:
+    """What a plan asks for.
+
+    Attributes:
+        kind: what is to be done.
+        object_id: with what, as this simulator names it.
+        receptacle_id: where to, likewise; PutObject alone needs it.
+        goal_stand: for GotoLocation, where to stand, in the cells of the plan's grid.
+        goal_horizon: for GotoLocation, the camera's angle there, degrees downwards.
+    """
+
+    kind: PlanKind
+    object_id: str | None = None
+    receptacle_id: str | None = None
+    goal_stand: Stand | None = None
+    goal_horizon: float = 0.0
+
+
+def target_of(plan: Plan, grounding: Grounding, view: View, grid: Grid | None = None) -> PlanTarget:
+    """What a recorded plan asks for here.
+
+    Args:
+        plan: the plan.
+        grounding: the episode's ids.
+        view: the world at the plan's start.
+        grid: the cells that can be reached; for GotoLocation.
+
+    Raises:
+        DataError: GotoLocation without a location, or the scene has no object for an id.
+    """
+    if plan.kind == PlanKind.GOTO:
+        if grid is None:
+            raise ValueError("the target of GotoLocation needs the grid")
+        stand, horizon = _pose(plan, grid)
+        return PlanTarget(plan.kind, goal_stand=stand, goal_horizon=horizon)
+    return PlanTarget(plan.kind, _here(plan.object_id, grounding, view), _here(plan.receptacle_id, grounding, view))
+
+
+def subject_of(target: PlanTarget, start: View) -> str | None:
+    """The object that a plan is about.
+
+    ALFRED's plans of washing, heating and cooling name the appliance: there it is what is in the hand at the start.
+
+    Args:
+        target: the plan's.
+        start: the world at its start.
+
+    Returns:
+        None where nothing is named, and nothing held.
+    """
+    if target.kind in _TREATMENTS:
+        named = start.objects.get(target.object_id or "")
+        if named is None or not named.pickupable:
+            return next(iter(start.inventory), None)
+    return target.object_id
+
+
+def in_hand(wanted: str, view: View) -> bool:
+    """Whether an object is held, or another slice of the same thing: words do not tell slices apart."""
+    return any(held == wanted or _are_slices_of_one(held, wanted) for held in view.inventory)
+
+
+def is_in(wanted: str, receptacle_id: str, view: View) -> bool:
+    """Whether an object lies in or on a receptacle itself.
+
+    In a bowl that stands in it is not in it; of furniture within furniture, each that the simulator names will do.
+    """
+    item, holder = view.objects.get(wanted), view.objects.get(receptacle_id)
+    if item is None or holder is None:
+        return False
+    parents = set(item.parent_receptacles or ())
+    carried = any(key in view.objects and view.objects[key].pickupable for key in parents - {receptacle_id})
+    named = receptacle_id in parents or wanted in (holder.receptacle_object_ids or ())
+    return named and (holder.pickupable or not carried)
+
+
+def _are_slices_of_one(one: str, other: str) -> bool:
+    parts = [key.rpartition("|") for key in (one, other)]
+    return parts[0][0] == parts[1][0] and all("Sliced" in part for _, _, part in parts)
+
+
+def _pose(plan: Plan, grid: Grid) -> tuple[Stand, float]:
+    found = _LOCATION.fullmatch(plan.location or "")
+    if found is None:
+        raise DataError(
+            f"plan {plan.index} ({plan.text}): its location is {plan.location!r:.60}, not loc|x|z|turn|horizon"
+        )
+    x, z, turn, horizon = map(int, found.groups())
+    return Stand(grid.cell(x * GRID, z * GRID), turn * 90), float(horizon)
+
+
+def _here(recorded: str | None, grounding: Grounding, view: View) -> str | None:
+    if recorded is None:
+        return None
+    found = grounding.ground(recorded, view)
+    if found is None:
+        raise DataError(f"the scene has no object for {recorded!r:.80}; leave the trajectory out")
+    return found
