@@ -7,13 +7,21 @@ repeats is the trajectory. Every interval here resamples or sums over trajectori
 import math
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 from scipy import stats
 
 from infthor_eval.errors import DataError
 
-__all__ = ["Difference", "Estimate", "bootstrap_interval", "clustered_mean", "paired_difference"]
+__all__ = [
+    "Difference",
+    "Estimate",
+    "bootstrap_interval",
+    "clustered_mean",
+    "mean_over_clusters",
+    "paired_difference",
+]
 
 _LEVEL = 0.95
 
@@ -73,6 +81,21 @@ def clustered_mean(scores: Sequence[float], clusters: Sequence[Hashable]) -> Est
     return replace(estimate, low=low, high=high)
 
 
+def mean_over_clusters(values: Sequence[float]) -> Estimate:
+    """The mean of numbers of which each cluster has one (a trajectory's reward), with a t interval.
+
+    Unlike `clustered_mean` it takes no number for a share: points of a curve that happen to lie between 0 and 1 get the
+    same kind of interval as those that do not.
+
+    Args:
+        values: one per cluster.
+
+    Raises:
+        DataError: there is none.
+    """
+    return _with_t_interval(*_partition(values, range(len(values))))
+
+
 def _with_t_interval(totals: np.ndarray, sizes: np.ndarray) -> Estimate:
     n, n_clusters = int(sizes.sum()), len(sizes)
     mean = float(totals.sum() / n)
@@ -85,6 +108,7 @@ def _with_t_interval(totals: np.ndarray, sizes: np.ndarray) -> Estimate:
     return Estimate(mean, stderr, mean - reach, mean + reach, n, n_clusters)
 
 
+@cache
 def _quantile(n_clusters: int) -> float:
     return float(stats.t.ppf(0.5 + _LEVEL / 2, n_clusters - 1))
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from infthor_eval.errors import DataError
-from infthor_eval.statistics import bootstrap_interval, clustered_mean, paired_difference
+from infthor_eval.statistics import bootstrap_interval, clustered_mean, mean_over_clusters, paired_difference
 
 scores = st.lists(st.tuples(st.sampled_from([0.0, 0.5, 1.0]), st.integers(0, 6)), min_size=2, max_size=60)
 
@@ -103,3 +103,12 @@ def test_the_interval_covers_the_truth_as_often_as_it_says():
     assert independent < 0.8
     few_wrong, _ = module.coverage(300, 12, 0.98)
     assert few_wrong >= 0.93
+
+
+def test_a_mean_over_clusters_takes_no_number_for_a_share():
+    found = mean_over_clusters([0.0, 1.0])
+    assert (found.mean, found.stderr, found.n_clusters) == (0.5, 0.5, 2)
+    assert (found.low, found.high) == (pytest.approx(0.5 - 6.3531, abs=1e-4), pytest.approx(0.5 + 6.3531, abs=1e-4))
+    assert mean_over_clusters([3.0]).low is None
+    with pytest.raises(DataError):
+        mean_over_clusters([])

@@ -25,6 +25,7 @@ _COMMANDS = {
     "fetch": "Download the published data.",
     "validate": "Keep the questions of a set that one of several models answers.",
     "compare": "Compare two runs on the same data.",
+    "report": "Draw a figure of the paper of your own runs.",
     "ls": "List the models, the tasks or the scenes.",
     "scenes": "Look at a scene, or carry it to machines without Unity.",
     "generate": "Make long-horizon trajectories in a scene.",

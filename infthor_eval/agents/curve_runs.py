@@ -1,0 +1,184 @@
+"""Runs of plans that are drawn together: the task, the trajectories and the plans that all of them have."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import msgspec
+
+from infthor_eval.agents.records import PlanRecord
+from infthor_eval.errors import DataError, UsageError, naming, unknown_name
+from infthor_eval.runs import RunHeader, UnitRecord
+
+__all__ = ["About", "PlansRun", "SharedPlans", "shared_plans"]
+
+_PLANNER = "planner"  # `baselines.Planner.name`, which would bring the simulator with it
+_EMBEDDED = "embedded"  # as the option --simulator names it
+
+Record = UnitRecord[PlanRecord]
+
+
+class _TaskAbout(msgspec.Struct, frozen=True):
+    """What an identity says of a task, as far as curves need it."""
+
+    trajectories: dict[str, str]  # name to digest
+    rewards: Any
+    after_failure: str
+
+
+class About(msgspec.Struct, frozen=True):
+    """What a run's identity says, as far as curves need it.
+
+    Attributes:
+        model: the subject.
+        simulator: what it acted in.
+        tasks: by name.
+    """
+
+    model: dict[str, Any]
+    simulator: str
+    tasks: dict[str, _TaskAbout]
+
+    @property
+    def is_planner(self) -> bool:
+        """Whether the subject is the expert itself."""
+        return self.model.get("baseline") == _PLANNER
+
+    @property
+    def is_embedded(self) -> bool:
+        """Whether its numbers are of the embedded simulator."""
+        return self.simulator == _EMBEDDED
+
+
+@dataclass(frozen=True)
+class PlansRun:
+    """A run's journal, read.
+
+    Attributes:
+        label: what the run is called beside the others.
+        header: who it is.
+        records: of all its plans.
+    """
+
+    label: str
+    header: RunHeader
+    records: Sequence[Record]
+
+    @cached_property
+    def about(self) -> About:
+        """What its identity says.
+
+        Raises:
+            DataError: it is not that of a run of plans.
+        """
+        with naming(f"{self.label}: not the identity of a run of plans", "start it anew", of=msgspec.ValidationError):
+            return msgspec.convert(self.header.identity, About)
+
+
+@dataclass(frozen=True)
+class SharedPlans:
+    """What runs have in common.
+
+    Attributes:
+        task: the task.
+        trajectories: names.
+        records: by run, then by trajectory: those of the plans that count in every run, in time order.
+        notes: what was left out, and in what the runs differ; a line each.
+    """
+
+    task: str
+    trajectories: tuple[str, ...]
+    records: tuple[tuple[tuple[Record, ...], ...], ...]
+    notes: tuple[str, ...]
+
+
+def shared_plans(runs: Sequence[PlansRun], task: str | None) -> SharedPlans:
+    """Find the plans that all runs have: of one task, in trajectories of which each run has a record of every plan.
+
+    Raises:
+        UsageError: they share no task or several, or their rewards follow different rules.
+        DataError: they share no trajectory, or an identity is not that of a run of plans.
+    """
+    name = _shared_task(runs, task)
+    settings = [run.about.tasks[name] for run in runs]
+    _require_same_rewards(runs, settings)
+    plans = [_by_trajectory(run, name) for run in runs]
+    every = sorted(
+        {*(key for about in settings for key in about.trajectories), *(key for item in plans for key in item)}
+    )
+    excluded = {key: _excluded(item[key] for item in plans if key in item) for key in every}
+    shared = [key for key in every if _is_shared(key, settings, plans) and plans[0][key].keys() - excluded[key]]
+    if not shared:
+        raise DataError(
+            f"the runs share no trajectory of {name} that all of them have in full; draw runs on the same data"
+        )
+    records = tuple(
+        tuple(tuple(item[key][index] for index in sorted(item[key].keys() - excluded[key])) for key in shared)
+        for item in plans
+    )
+    notes = _notes(runs, settings, len(shared), len(every), sum(len(excluded[key]) for key in shared))
+    return SharedPlans(name, tuple(shared), records, tuple(notes))
+
+
+def _shared_task(runs: Sequence[PlansRun], task: str | None) -> str:
+    shared = [name for name in runs[0].about.tasks if all(name in run.about.tasks for run in runs)]
+    if not shared:
+        first = runs[0]
+        other = next(run for run in runs if not run.about.tasks.keys() & first.about.tasks.keys())
+        raise UsageError(f"{first.label} and {other.label} share no task; draw runs of the same task")
+    if task is None and len(shared) > 1:
+        raise UsageError(f"the runs share several tasks; give one of them with --task: {', '.join(shared)}")
+    if task is not None and task not in shared:
+        raise unknown_name("task of all these runs", task, shared)
+    return task or shared[0]
+
+
+def _require_same_rewards(runs: Sequence[PlansRun], settings: Sequence[_TaskAbout]) -> None:
+    for run, about in zip(runs, settings, strict=True):
+        if about.rewards != settings[0].rewards:
+            raise UsageError(
+                f"{runs[0].label} and {run.label} have different rules of rewards; draw runs with the same --rewards"
+            )
+
+
+def _by_trajectory(run: PlansRun, task: str) -> dict[str, dict[int, Record]]:
+    """Records of a task by trajectory and by the plan's place in it."""
+    found: dict[str, dict[int, Record]] = {}
+    for record in run.records:
+        if record.task == task:
+            found.setdefault(record.cluster, {})[record.payload.index] = record
+    return found
+
+
+def _excluded(trajectory: Iterable[Mapping[int, Record]]) -> set[int]:
+    """Plans of a trajectory that some run excludes."""
+    return {index for plans in trajectory for index, record in plans.items() if record.excluded is not None}
+
+
+def _is_shared(key: str, settings: Sequence[_TaskAbout], plans: Sequence[Mapping[str, Mapping[int, Record]]]) -> bool:
+    """Whether all runs have the same trajectory of that name, with the same plans: none stopped amid it."""
+    if any(key not in item for item in plans) or len({about.trajectories.get(key) for about in settings}) > 1:
+        return False
+    return all(item[key].keys() == plans[0][key].keys() for item in plans)
+
+
+def _notes(
+    runs: Sequence[PlansRun], settings: Sequence[_TaskAbout], n_shared: int, n_every: int, n_excluded: int
+) -> list[str]:
+    found = []
+    if n_shared < n_every:
+        found.append(f"{n_shared} of {n_every} trajectories are drawn: those that all of these runs have in full")
+    if n_shared == 1:
+        found.append("of one trajectory there is no interval")
+    if n_excluded:
+        found.append(f"plans left out, whose own expert a simulator refused: {n_excluded}")
+    found += _differing("course after a failed plan", runs, [about.after_failure for about in settings])
+    return found + _differing("simulator", runs, [run.about.simulator for run in runs])
+
+
+def _differing(what: str, runs: Sequence[PlansRun], values: Sequence[str]) -> list[str]:
+    if len(set(values)) < 2:
+        return []
+    told = ", ".join(f"{value} ({run.label})" for run, value in zip(runs, values, strict=True))
+    return [f"the runs differ in the {what}: {told}"]

@@ -1,0 +1,107 @@
+"""Curves of reward in words: the table of their ends, and which runs stand in which panel."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from infthor_eval.agents.curves import Axis, RewardCurves, RunCurves
+from infthor_eval.errors import DataError
+from infthor_eval.formats.yaml_files import read_yaml
+from infthor_eval.runs import RunHeader
+from infthor_eval.tables import Column, Row, Table
+
+__all__ = ["Panel", "curves_table", "embedded_label", "one_panel", "read_panels", "run_labels", "trajectories_told"]
+
+_MOST_PANELS = 12  # a picture of more cannot be read
+_COLUMNS = ("reward", "95 % interval", "of the bound, %", "at step", "at context tokens")
+_COUNTS = ("plans", "failed", "not come to")
+
+
+@dataclass(frozen=True)
+class Panel:
+    """A panel of a picture.
+
+    Attributes:
+        title: above it; empty for none.
+        labels: of the runs in it; the bound is in all of them.
+    """
+
+    title: str
+    labels: tuple[str, ...]
+
+
+def run_labels(folders: Sequence[Path], headers: Sequence[RunHeader]) -> list[str]:
+    """What runs are called beside each other: by their names, and where these are alike by their folders too."""
+    named = [_name(header) for header in headers]
+    places = [f"{name} ({folder.name})" for name, folder in zip(named, folders, strict=True)]
+    told = [place if named.count(name) > 1 else name for name, place in zip(named, places, strict=True)]
+    return [str(folder) if told.count(name) > 1 else name for name, folder in zip(told, folders, strict=True)]
+
+
+def _name(header: RunHeader) -> str:
+    frames = header.identity.get("frames", "shown")
+    return header.name if frames == "shown" else f"{header.name}, {frames} frames"
+
+
+def one_panel(curves: RewardCurves) -> list[Panel]:
+    """All runs in one."""
+    return [Panel("", tuple(run.label for run in curves.runs))]
+
+
+def read_panels(path: Path, curves: RewardCurves) -> list[Panel]:
+    """The panels that a YAML file names: titles, each with a list of runs by their names in the table.
+
+    Raises:
+        DataError: it cannot be read, is of another form, or names a run that is not there.
+    """
+    mend = "write titles, each with a list of runs (docs/figures.md)"
+    found = read_yaml(path, mend)
+    if not isinstance(found, dict) or not found:
+        raise DataError(f"{path}: not a mapping; {mend}")
+    if len(found) > _MOST_PANELS:
+        raise DataError(f"{path}: {len(found)} panels, and a picture takes {_MOST_PANELS}; write several files")
+    return [_panel(path, str(title), named, curves) for title, named in found.items()]
+
+
+def _panel(path: Path, title: str, named: object, curves: RewardCurves) -> Panel:
+    if not isinstance(named, list) or not named:
+        raise DataError(f"{path}: {title!r:.60} is not a list of runs; write their names")
+    labels = [run.label for run in curves.runs]
+    for name in map(str, named):
+        if name not in labels:
+            raise DataError(f"{path}: {title!r:.60}: {name!r:.60} is none of the runs; there are {', '.join(labels)}")
+    return Panel(title, tuple(dict.fromkeys(map(str, named))))
+
+
+def embedded_label(curves: RewardCurves) -> str | None:
+    """What must stand on a picture with numbers of the embedded simulator; None where none are."""
+    embedded = [run.label for run in curves.runs if run.is_embedded]
+    if not embedded:
+        return None
+    which = "" if len(embedded) == len(curves.runs) else f" ({', '.join(embedded)})"
+    return f"embedded simulator{which}: not comparable with the paper's curves"
+
+
+def curves_table(curves: RewardCurves) -> Table:
+    """Where the curves end: a row per run."""
+    bound = next(run for run in curves.runs if run.is_bound).curves[Axis.STEPS].end.mean
+    columns = (Column("run", False), *map(Column, (*_COLUMNS, *_COUNTS)))
+    label = embedded_label(curves)
+    notes = ((label,) if label else ()) + curves.notes
+    title = f"{curves.task}: reward at the end, mean over {trajectories_told(curves.n_trajectories)}"
+    return Table(title, columns, tuple(_row(run, bound) for run in curves.runs), notes)
+
+
+def trajectories_told(count: int) -> str:
+    """So many trajectories, in words."""
+    return "1 trajectory" if count == 1 else f"{count} trajectories"
+
+
+def _row(run: RunCurves, bound: float) -> Row:
+    curve, tokens = run.curves[Axis.STEPS], run.curves.get(Axis.TOKENS)
+    end = curve.end
+    interval = "-" if end.low is None or end.high is None else f"[{end.low:.2f}, {end.high:.2f}]"
+    share = f"{100 * end.mean / bound:.1f}" if bound > 0 else "-"
+    places = f"{curve.places[-1]:.0f}", "-" if tokens is None else f"{tokens.places[-1]:.0f}"
+    counts = run.n_plans, run.n_failed, run.n_not_come_to
+    return Row((run.label, f"{end.mean:.2f}", interval, share, *places, *map(str, counts)))
