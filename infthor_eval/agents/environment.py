@@ -6,22 +6,20 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, NamedTuple
 
-from infthor_eval.agents.expert import Expert, ExpertAction, PlanStart
+from infthor_eval.agents.expert import Expert, ExpertAction
 from infthor_eval.agents.frames import FrameKeeper, NoFrames
 from infthor_eval.agents.memory import Past
 from infthor_eval.agents.plans import Plan, PlanKind, plans_of, tasks_of
 from infthor_eval.agents.rewards import PlanReward, RewardRules, StepReward, max_reward, reward_rules
-from infthor_eval.agents.targets import target_of
+from infthor_eval.agents.targets import PlanTarget, target_of
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.trajectory import Trajectory
-from infthor_eval.household.goals import goal_holds
 from infthor_eval.household.navigation import Grid
-from infthor_eval.household.scout import HORIZON_STEP, reachable
-from infthor_eval.household.tasks import Task
+from infthor_eval.household.scout import HORIZON_STEP, reachable, stand_of
 from infthor_eval.thor.actions import ActionText, UngroundedError, ground, parse_action
 from infthor_eval.thor.recorded import degrees_of
 from infthor_eval.thor.simulator import Simulator
-from infthor_eval.thor.view import View
+from infthor_eval.thor.view import AgentPose, View
 
 __all__ = ["Ended", "Observation", "PlanEnvironment", "StepInfo", "StepOutcome"]
 
@@ -146,12 +144,11 @@ class PlanEnvironment:
         view = self._simulator.rewind(start.mark, exactly=True)
         task = self.tasks[found.task].task
         grid = self._grid(found, expert_actions, view)
-        target = target_of(found, self._expert.grounding, view, end.mark.view.agent, grid)
+        target = self._target(found, view, end.mark.view.agent, grid)
         self._reward = PlanReward(self._rules, target, task, view, start.treatments, grid)
         self._target_ids = {key for key in (target.object_id, target.receptacle_id) if key is not None}
         self._plan, self._n_steps = found, 0
-        completes = task if _completes(task, start, end) else None
-        most = max_reward(self._rules, target, view, grid, completes)
+        most = max_reward(self._rules, target, view, grid, task if self._expert.completes(plan) else None)
         return Observation(view, start.frame), {"max_reward": most, "n_expert": len(expert_actions)}
 
     def step(self, action: str | Mapping[str, Any]) -> StepOutcome:
@@ -205,7 +202,7 @@ class PlanEnvironment:
         truncated = ended is None and self._n_steps >= self._max_steps
         if ended is not None or truncated:
             self._plan = None
-        info = StepInfo(call, text, after.error, Ended.LIMIT if truncated else ended, earned.goal_reached)
+        info = StepInfo(call, text, after.error, Ended.LIMIT if truncated else ended, self._reward.goal_reached)
         seen = Observation(after, self._frames.keep(after))
         return StepOutcome(seen, earned.reward, ended is not None, truncated, info)
 
@@ -217,18 +214,18 @@ class PlanEnvironment:
             return None
         return Ended.WRONG if after.success else Ended.REFUSED
 
+    def _target(self, plan: Plan, view: View, end: AgentPose, grid: Grid | None) -> PlanTarget:
+        """What the plan asks for; to go somewhere is to stand and look as the expert did in the end."""
+        if grid is not None:
+            return PlanTarget(plan.kind, goal_stand=stand_of(end, grid), goal_horizon=end.horizon)
+        return target_of(plan, self._expert.grounding, view)
+
     def _grid(self, plan: Plan, expert_actions: Sequence[ExpertAction], view: View) -> Grid | None:
         """Where the agent can stand; where the expert went in this plan it can, whatever the simulator says."""
         if plan.kind != PlanKind.GOTO:
             return None
         walked = [view.agent, *(action.pose for action in expert_actions)]
         return reachable(self._simulator).joined((pose.position.x, pose.position.z) for pose in walked)
-
-
-def _completes(task: Task, start: PlanStart, end: PlanStart) -> bool:
-    """Whether the task's goal comes to hold in a plan as the expert carries it out."""
-    before, after = (goal_holds(task, moment.mark.view, moment.treatments) for moment in (start, end))
-    return after and not before
 
 
 def _look_degrees(trajectory: Trajectory) -> float:

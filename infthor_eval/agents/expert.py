@@ -11,6 +11,7 @@ from infthor_eval.agents.plans import Plan, TrajectoryTask
 from infthor_eval.errors import DataError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.trajectory import Trajectory
+from infthor_eval.household.goals import goal_holds
 from infthor_eval.household.state_summary import state_summaries
 from infthor_eval.household.treatments import Treatments
 from infthor_eval.thor.actions import text_of
@@ -44,7 +45,7 @@ class PlanStart:
     Attributes:
         mark: of the simulator.
         frame: what the agent sees; None where nobody looks.
-        treatments: what was done to objects so far.
+        treatments: what was done to objects so far in the plan's task.
     """
 
     mark: SimulatorMark
@@ -75,6 +76,7 @@ class Expert:
         self.grounding = Grounding(simulator.view)
         self._starts = [PlanStart(simulator.mark(), frames.keep(simulator.view), Treatments())]
         self._actions: list[list[ExpertAction]] = []
+        self._completing: list[bool] = []
         self._chapters: list[Chapter] = []
         self._refused: ExpertRefusedError | None = None
         self._log = Recorder() if in_words else None
@@ -104,6 +106,15 @@ class Expert:
         """
         self.start(plan + 1)
         return self._actions[plan]
+
+    def completes(self, plan: int) -> bool:
+        """Whether the goal of a plan's task comes to hold in it, as the expert carries it out.
+
+        Raises:
+            ExpertRefusedError: as `start` of the next one.
+        """
+        self.start(plan + 1)
+        return self._completing[plan]
 
     def past(self, plan: int) -> Past:
         """What there is to remember before a plan; only where frames are kept.
@@ -150,7 +161,12 @@ class Expert:
             opening = self._chapter(plan.index)
             self._chapters.append(Chapter(opening.plan, opening.goal, opening.before, tuple(steps)))
         self._actions.append(actions)
-        self._starts.append(PlanStart(simulator.mark(), frame, treatments))
+        task = self._tasks[plan.task].task
+        before = goal_holds(task, start.mark.view, start.treatments)
+        self._completing.append(not before and goal_holds(task, view, treatments))
+        following = self._plans[plan.index + 1 : plan.index + 2]
+        goes_on = any(item.task == plan.task for item in following)
+        self._starts.append(PlanStart(simulator.mark(), frame, treatments if goes_on else Treatments()))
 
     def _call(self, plan: Plan, number: int, view: View) -> dict[str, Any]:
         try:

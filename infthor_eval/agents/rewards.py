@@ -60,6 +60,11 @@ class RewardRules(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     treatments_unnoticed: bool
     puts_fail: bool
 
+    def document(self) -> dict[str, Any]:
+        """All of it as JSON values, for fingerprints."""
+        document: dict[str, Any] = msgspec.json.decode(msgspec.json.encode(self, order="sorted"))
+        return document
+
 
 @dataclass(frozen=True)
 class StepReward:
@@ -127,7 +132,12 @@ class PlanReward:
         self._closest = math.inf if self._way is None else self._way.left(start)
         self._stages: set[str] = set()
         self._task_open = not goal_holds(task, start, self.treatments)
-        self._over = False
+        self._goal_reached = self._over = False
+
+    @property
+    def goal_reached(self) -> bool:
+        """Whether the task's goal came to hold in this plan."""
+        return self._goal_reached
 
     def after(self, call: Mapping[str, Any], before: View, after: View) -> StepReward:
         """What an action gave.
@@ -164,7 +174,7 @@ class PlanReward:
         """The same, and the task's reward where its goal holds for the first time."""
         if not self._task_open or not goal_holds(self._task, after, self.treatments):
             return step
-        self._task_open = False
+        self._task_open, self._goal_reached = False, True
         return StepReward(step.reward + self._rules.task_done, step.done, step.failed)
 
     # -- the kinds
@@ -302,7 +312,7 @@ class _Way:
 
     def left(self, view: View) -> float:
         """Number of actions left; a look begun counts whole. Infinite where there is no way."""
-        steps = self._distances.get(stand_of(view, self._grid), math.inf)
+        steps = self._distances.get(stand_of(view.agent, self._grid), math.inf)
         looks = abs(self._horizon - view.agent.horizon) / self._look
         return steps + math.ceil(looks - _SMALL_ANGLE)
 

@@ -111,17 +111,23 @@ def _settings(file: TaskFile, options: PlansOptions) -> TaskSettings:
     given = file.settings["dataset_kwargs"]
     if not isinstance(given, Mapping):
         raise DataError(f"{file.path}: dataset_kwargs must be a mapping of settings")
-    hints = get_type_hints(TaskSettings)
     for key, value in given.items():
-        if key not in hints:
-            near = difflib.get_close_matches(str(key), hints, n=1)
-            hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(hints)}"
-            raise DataError(f"{file.path}: dataset_kwargs: {key} is not known; {hint}")
-        kind = int if hints[key] is int else str
-        if not isinstance(value, kind) or isinstance(value, bool) or (kind is int and value < 1):
-            wanted = "a whole number above 0" if kind is int else "a text"
-            raise DataError(f"{file.path}: dataset_kwargs: {key} is {value!r:.60}; it is {wanted}")
-        if value not in _CHOICES.get(key, (value,)):
-            raise DataError(f"{file.path}: dataset_kwargs: {key} is {value!r}; there are {', '.join(_CHOICES[key])}")
+        _check(file, str(key), value)
     told = {name: getattr(options, name) for name in ("rewards", "history", "after_failure")}
     return TaskSettings(**{**given, **{name: value for name, value in told.items() if value is not None}})
+
+
+def _check(file: TaskFile, key: str, value: object) -> None:
+    """Refuse a setting that would not act, or not as it was meant."""
+    hints = get_type_hints(TaskSettings)
+    if key not in hints:
+        near = difflib.get_close_matches(key, hints, n=1)
+        hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(hints)}"
+        raise DataError(f"{file.path}: dataset_kwargs: {key} is not known; {hint}")
+    if hints[key] is int:
+        if not isinstance(value, int) or isinstance(value, bool) or value < 1:
+            raise DataError(f"{file.path}: dataset_kwargs: {key} is {value!r:.60}; it is a whole number above 0")
+    elif not isinstance(value, str):
+        raise DataError(f"{file.path}: dataset_kwargs: {key} is {value!r:.60}; it is a text")
+    elif value not in _CHOICES.get(key, (value,)):
+        raise DataError(f"{file.path}: dataset_kwargs: {key} is {value!r:.60}; there are {', '.join(_CHOICES[key])}")

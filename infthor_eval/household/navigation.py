@@ -47,6 +47,10 @@ class Grid:
         """The same grid, one cell less."""
         return Grid(self.position(other) for other in self.cells if other != cell)
 
+    def joined(self, positions: Iterable[tuple[float, float]]) -> "Grid":
+        """The same grid with the cells of more positions, (x, z) in metres."""
+        return Grid([*map(self.position, self.cells), *positions])
+
     def distances(self, start: Stand) -> dict[Stand, int]:
         """Number of actions from a stand to every stand that can be reached."""
         return {stand: length for stand, (length, _) in self._search(start, None).items()}
