@@ -38,8 +38,10 @@ class Rollout:
         Raises:
             RolloutError: an action was refused, or there is no place to act from.
         """
-        for operator in operators:
-            if operator.name != "GotoLocation":  # walked to when it is known what for
+        for number, operator in enumerate(operators, 1):
+            if operator.name == "GotoLocation" and number == len(operators):
+                self._walker.go([operator.item])  # to a lamp that is lit already
+            elif operator.name != "GotoLocation":  # walked to when it is known what for
                 _SUBGOALS[operator.name](self, operator)
 
     # -- sub-goals

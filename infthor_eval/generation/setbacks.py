@@ -1,11 +1,14 @@
 """What turned out not to work in a room, so that it is not tried again while things are as they were."""
 
+from collections.abc import Iterator
+
 from infthor_eval.household.containment import direct_parent
 from infthor_eval.household.symbolic import Room, room_of
-from infthor_eval.thor.view import View
+from infthor_eval.thor.view import ThorObject, View
 
 __all__ = ["Setbacks"]
 
+_Size = tuple[float, ...]
 _BELIEVED = 8  # tasks that a setback is believed for: other things move too and may clear the way
 _NEAR = 0.02  # metres within which an object has not moved
 
@@ -17,6 +20,7 @@ class Setbacks:
         self._tasks = 0
         self._blocked: dict[str, tuple[int, tuple[float, float, float]]] = {}
         self._refused: dict[tuple[str, str], tuple[int, frozenset[str]]] = {}
+        self._sizes: dict[str, _Size | None] = {}
 
     def __bool__(self) -> bool:
         return bool(self._blocked or self._refused)
@@ -31,6 +35,8 @@ class Setbacks:
         """
         if receptacle is not None:
             self._refused[item, receptacle] = self._tasks, _contents(view, receptacle)
+            if item in view.objects:
+                self._sizes[item] = _size(view.objects[item])
         elif item in view.objects:
             self._blocked[item] = self._tasks, _position(view, item)
 
@@ -57,7 +63,26 @@ class Setbacks:
             for pair, (since, contents) in self._refused.items()
             if since > oldest and contents <= _contents(view, pair[1])
         }
-        return room_of(view, self._blocked.keys(), self._refused.keys())
+        return room_of(view, self._blocked.keys(), set(self._without_room(view)))
+
+    def _without_room(self, view: View) -> Iterator[tuple[str, str]]:
+        """Where there was no room for a thing there is none for a larger one either."""
+        yield from self._refused
+        for item, receptacle in self._refused:
+            least = self._sizes.get(item)
+            for key, other in view.objects.items():
+                if least is not None and other.pickupable and _is_as_large(_size(other), least):
+                    yield key, receptacle
+
+
+def _size(item: ThorObject) -> _Size | None:
+    """Width, depth (the larger first) and height, metres."""
+    box = item.axis_aligned_bounding_box
+    return None if box is None else (*sorted((box.size.x, box.size.z), reverse=True), box.size.y)
+
+
+def _is_as_large(one: _Size | None, other: _Size) -> bool:
+    return one is not None and all(a >= b - _NEAR for a, b in zip(one, other, strict=True))
 
 
 def _position(view: View, item: str) -> tuple[float, float, float]:
