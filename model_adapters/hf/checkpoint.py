@@ -26,6 +26,7 @@ from model_adapters.hf.hub import fetch
 from model_adapters.hf.loaded import Loaded
 from model_adapters.hf.options import CheckpointOptions, HfOptions
 from model_adapters.hf.rope import apply_rope
+from model_adapters.hf.templates import chat_template, plain_template
 
 __all__ = [
     "LocatedCheckpoint",
@@ -91,15 +92,16 @@ def load_checkpoint(located: LocatedCheckpoint, family: MakeFamily) -> Loaded:
             folder, backend="pil", **remote, **options.image_settings()
         )
         tokenizer = transformers.AutoTokenizer.from_pretrained(folder, **remote)
-        template = _chat_template(folder, tokenizer)
+        template = chat_template(folder, tokenizer) if options.prompt == "chat" else None
         max_tokens = apply_rope(located.config, options.rope)
         model = _load_model(located)
+        made = family(model, image_processor, tokenizer)
         return assemble(
             model,
             tokenizer,
             image_processor,
-            template=template,
-            family=family(model, image_processor, tokenizer),
+            template=plain_template(tokenizer, made) if template is None else template,
+            family=made,
             max_tokens=max_tokens,
             origin=origin(located.folder, located.commit, options.pretrained),
         )
@@ -121,7 +123,7 @@ def assemble(
         model: the transformers model.
         tokenizer: its tokenizer.
         image_processor: its image processor.
-        template: its chat template.
+        template: what writes a conversation (Jinja).
         family: its family.
         max_tokens: its context limit.
         origin: where the weights come from, for the identity.
@@ -263,20 +265,6 @@ def _quantized(model: Any) -> str | None:
     settings = getattr(model.config, "quantization_config", None)
     method = settings.get("quant_method") if isinstance(settings, dict) else getattr(settings, "quant_method", None)
     return None if method is None else str(getattr(method, "value", method))
-
-
-def _chat_template(folder: Path, tokenizer: Any) -> str:
-    """The processor's template if the checkpoint has one of its own, else the tokenizer's."""
-    jinja, legacy = folder / "chat_template.jinja", folder / "chat_template.json"
-    if jinja.is_file():
-        return jinja.read_text(encoding="utf-8")
-    if legacy.is_file():
-        template = json.loads(legacy.read_text(encoding="utf-8")).get("chat_template")
-    else:
-        template = tokenizer.chat_template
-    if not isinstance(template, str):
-        raise ModelError(f"{folder} has no chat template; add a chat_template.jinja to it")
-    return template
 
 
 def _fingerprint(folder: Path) -> str:

@@ -33,6 +33,7 @@ def identity(name: str, loaded: Loaded, options: HfOptions) -> dict[str, Any]:
     return loaded.identity | {
         "adapter": name,
         "max_tokens": _context_limit(loaded, options),
+        "prompt": options.prompt,
         "share_prefix": options.share_prefix,
         "chunk_tokens": options.chunk_tokens,
         "batch_size": options.batch_size,

@@ -26,6 +26,10 @@ class Family(Protocol):
         """The ids that the placeholder of a frame of this size expands to."""
         ...
 
+    def written_ids(self) -> tuple[int, ...]:
+        """The ids that a chat template writes for a frame: the placeholder and, in some families, markers around it."""
+        ...
+
     def features(self, images: Sequence[Image.Image]) -> list[torch.Tensor]:
         """Embeddings for the slots of each image, (slots, hidden), on the embedding layer's device."""
         ...

@@ -16,7 +16,7 @@ class Loaded:
     Attributes:
         model: the transformers model, in evaluation mode.
         tokenizer: its tokenizer.
-        template: its chat template (Jinja).
+        template: what writes a conversation (Jinja): its chat template, or a plain one.
         family: how its frames become tokens, features and positions.
         generation: end tokens and penalties.
         max_tokens: its context limit; None where the config names none.

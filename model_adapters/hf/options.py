@@ -9,6 +9,7 @@ __all__ = ["CheckpointOptions", "HfOptions", "parse_rope"]
 
 _ATTENTION = ("eager", "sdpa", "flex_attention", "flash_attention_2", "flash_attention_3")
 _LARGEST = 2**53  # of the numbers that options take; what is larger is a slip
+_PROMPTS = ("chat", "plain")
 _ROPES = ("dynamic", "linear", "longrope", "yarn")
 
 
@@ -36,6 +37,8 @@ class HfOptions:
         dtype: torch's name of the weights' type, or auto: as in the checkpoint.
         device: cpu, cuda, cuda:1, ..., or auto: a GPU where there is one.
         attn_implementation: sdpa, eager, flash_attention_2, ...
+        prompt: chat writes conversations by the checkpoint's own chat template; plain writes the turns one after the
+            other, texts and frames in their places, without roles.
         share_prefix: encode what two replies have in common once; false encodes everything for every reply.
         chunk_tokens: most tokens encoded in one forward pass.
         batch_size: most continuations of one prefix that are answered together; each has its own copy of the prefix's
@@ -49,6 +52,7 @@ class HfOptions:
     dtype: str = "auto"
     device: str = "auto"
     attn_implementation: str = "sdpa"
+    prompt: str = "chat"
     share_prefix: bool = True
     chunk_tokens: int = 1024
     batch_size: int = 1
@@ -69,6 +73,8 @@ class HfOptions:
         for name in ("chunk_tokens", "batch_size", "feature_cache_mb", "max_tokens"):
             if (getattr(self, name) or 0) > _LARGEST:
                 raise ValueError(f"{name} is above {_LARGEST}")
+        if self.prompt not in _PROMPTS:
+            raise ValueError(f"prompt={self.prompt} is not {' or '.join(_PROMPTS)}")
         self._check_attention()
         if self.rope is not None:
             parse_rope(self.rope)

@@ -1,7 +1,7 @@
 """From the turns of a conversation to the text that the checkpoint's own chat template makes of them."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -11,7 +11,7 @@ from infthor_eval.errors import ModelError, naming
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.limits import TEMPLATE_SECONDS
 from model_adapters.hf.time_limit import OutOfTimeError, computing_at_most
-from model_adapters.protocols import Part, Turn
+from model_adapters.protocols import Turn
 
 __all__ = ["begins", "render"]
 
@@ -45,7 +45,10 @@ def render(tokenizer: Any, template: str, turns: Sequence[Turn], image_token: st
     Raises:
         ModelError: the template refuses the turns, or leaves a text out.
     """
-    shown = [_inline(tokenizer, template, turn, image_token) for turn in turns]
+    trials = [_trial(tokenizer, template, turn) for turn in turns]
+    shown = [_in_place(turn, trial, image_token) for turn, trial in zip(turns, trials, strict=True)]
+    if len(turns) == 1 and trials[0] is not None and shown[0] == replace(turns[0], role="user"):
+        return trials[0]  # what was tried is the whole conversation
     listed = [_message(turn) for turn in shown]
     try:
         return _written(tokenizer, template, shown, listed)
@@ -61,17 +64,22 @@ def begins(tokenizer: Any, text: str) -> bool:
     return tokenizer.bos_token is not None and text.startswith(tokenizer.bos_token)
 
 
-def _inline(tokenizer: Any, template: str, turn: Turn, image_token: str) -> Turn:
-    """The turn with its image tokens in one text, where the template would not leave frames in their places.
+def _trial(tokenizer: Any, template: str, turn: Turn) -> str | None:
+    """What is written of a turn of frames and texts alone, as the user's; None for other turns.
 
-    Every turn is tried alone and as the user's, so that what comes after it does not change how it is written.
+    It is tried alone so that what comes after it does not change how it is written.
     """
-    n_frames = sum(isinstance(part, FrameRef) for part in turn.parts)
-    if n_frames in (0, len(turn.parts)):
-        return turn
+    if len({isinstance(part, FrameRef) for part in turn.parts}) < 2:
+        return None
     alone = replace(turn, role="user")
-    text = _written(tokenizer, template, [alone], [_message(alone)])
-    if text.count(image_token) != n_frames or _keeps_order(text, turn.parts, image_token):
+    return _written(tokenizer, template, [alone], [_message(alone)])
+
+
+def _in_place(turn: Turn, trial: str | None, image_token: str) -> Turn:
+    """The turn with its image tokens in one text, where the template would not leave frames in their places."""
+    parts = [part.strip() if isinstance(part, str) else image_token for part in turn.parts]
+    n_frames = sum(isinstance(part, FrameRef) for part in turn.parts)
+    if trial is None or trial.count(image_token) != n_frames or _in_order(trial, parts):
         return turn
     return replace(turn, parts=("".join(part if isinstance(part, str) else image_token for part in turn.parts),))
 
@@ -113,7 +121,9 @@ def _check_texts(text: str, turns: Sequence[Turn]) -> None:
         ModelError: one is left out.
     """
     said = [(turn.role, part.strip()) for turn in turns for part in turn.parts if isinstance(part, str)]
-    for part, count in Counter(part for _, part in said).items():
+    # Counting reads the whole text for every part, and is only needed where they are not there in order.
+    counts = {} if _in_order(text, (part for _, part in said)) else Counter(part for _, part in said)
+    for part, count in counts.items():
         if text.count(part) < count:
             roles = " or ".join(sorted({role for role, other in said if other == part}))
             raise ModelError(
@@ -127,13 +137,12 @@ def _roles(turns: Sequence[Turn]) -> str:
     return "the turns " + ", ".join(turn.role for turn in turns)
 
 
-def _keeps_order(text: str, parts: Sequence[Part], image_token: str) -> bool:
+def _in_order(text: str, parts: Iterable[str]) -> bool:
     """Whether the parts stand in a rendered text one after the other."""
     at = 0
     for part in parts:
-        written = part.strip() if isinstance(part, str) else image_token
-        at = text.find(written, at)
+        at = text.find(part, at)
         if at < 0:
             return False
-        at += len(written)
+        at += len(part)
     return True

@@ -21,9 +21,12 @@ def begin_reply(loaded: Loaded, decoding: Decoding, context: Iterable[int]) -> W
     Raises:
         ModelError: the reply may have too few tokens for one of the choices.
     """
+    stop_ids = _stop_ids(loaded, decoding)
 
     def stopped(ids: list[int]) -> bool:
-        return bool(decoding.stop) and cut_at_stop(_text(loaded, ids), decoding.stop) is not None
+        if not decoding.stop:  # nothing has to be decoded then
+            return False
+        return ids[-1] in stop_ids or cut_at_stop(_text(loaded, ids), decoding.stop) is not None
 
     choices = read_choices(loaded.tokenizer, decoding)
     return Writing(loaded.generation, decoding, context=context, choices=choices, finished=stopped)
@@ -47,6 +50,14 @@ def end_reply(loaded: Loaded, writing: Writing, n_context: int, n_cached: int) -
         n_cached_tokens=n_cached,
         token_ids=tuple(writing.ids),
     )
+
+
+def _stop_ids(loaded: Loaded, decoding: Decoding) -> set[int]:
+    """Stop strings that are tokens of their own; where they are special ones, a reply's text never shows them."""
+    if not decoding.stop:
+        return set()
+    added: dict[str, int] = loaded.tokenizer.get_added_vocab()
+    return {added[string] for string in decoding.stop if string in added}
 
 
 def _text(loaded: Loaded, ids: list[int]) -> str:

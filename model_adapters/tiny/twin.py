@@ -14,6 +14,7 @@ from model_adapters.hf.family import MakeFamily
 from model_adapters.hf.model import TransformersModel
 from model_adapters.hf.options import HfOptions
 from model_adapters.hf.rope import apply_rope
+from model_adapters.hf.templates import plain_template
 from model_adapters.tiny.tokenizer import train_tokenizer
 
 __all__ = ["SPREAD", "TinyAdapter", "TinyOptions", "Twin"]
@@ -131,12 +132,13 @@ class TinyAdapter:
         model = twin.model(tokenizer, config, seed, options.attn_implementation)
         model = model.to(resolve_device(options), torch.float32 if isinstance(dtype, str) else dtype)
         image_processor = twin.image_processor(**{**twin.image_settings, **options.image_settings()})
+        family = twin.family(model, image_processor, tokenizer)
         loaded = assemble(
             model,
             tokenizer,
             image_processor,
-            template=twin.template,
-            family=twin.family(model, image_processor, tokenizer),
+            template=twin.template if options.prompt == "chat" else plain_template(tokenizer, family),
+            family=family,
             max_tokens=max_tokens,
             origin={"checkpoint": name, "seed": seed},
         )

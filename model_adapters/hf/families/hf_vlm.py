@@ -42,6 +42,7 @@ __all__ = ["HfVlm", "ProcessorFamily"]
 
 _TOLERANCE = {torch.float32: 1e-3, torch.float64: 1e-3}  # of the largest logit; half precision is compared more loosely
 _HALF_TOLERANCE = 0.1
+_BLANK = (300, 300)  # width and height of an image that shows what the processor expands one to
 
 
 class ProcessorFamily(PlainFamily):
@@ -61,23 +62,39 @@ class ProcessorFamily(PlainFamily):
         super().__init__(model, image_processor, tokenizer)
         self._processor = processor
         self.placeholder_id = tokenizer.convert_tokens_to_ids(image_token(processor))
-        self._image_features = getattr(model, "get_image_features", None) or model.model.get_image_features
 
     def frame_ids(self, size: Size) -> tuple[int, ...]:
         """What the processor expands the placeholder of one image to."""
         return tuple(expanded(self._processor, Image.new("RGB", size, "gray")))
 
+    def written_ids(self) -> tuple[int, ...]:
+        """The placeholder, between markers where the config names some that the processor does not write itself."""
+        markers = _markers(self._model.config)
+        if markers is None or markers[0] in self.frame_ids(_BLANK):
+            return (self.placeholder_id,)
+        return (markers[0], self.placeholder_id, markers[1])
+
     @torch.inference_mode()
     def features(self, images: Sequence[Image.Image]) -> list[torch.Tensor]:
         """The model's own features, (slots, hidden), for each image."""
-        takes = inspect.signature(self._image_features).parameters
+        compute = getattr(self._model, "get_image_features", None) or self._model.model.get_image_features
+        takes = inspect.signature(compute).parameters
         found = []
         for image in images:
             inputs = {name: value for name, value in self._inputs([image]).items() if name in takes}
-            pooled = self._image_features(**inputs, return_dict=True).pooler_output
+            pooled = compute(**inputs, return_dict=True).pooler_output
             parts = pooled if isinstance(pooled, list | tuple) else [pooled]
             found.append(torch.cat([part.reshape(-1, part.shape[-1]) for part in parts]))
         return found
+
+
+def _markers(config: Any) -> tuple[int, int] | None:
+    """The tokens that begin and end an image, as the families call them that have some in their configs."""
+    for kind in ("vision", "image"):
+        start, end = (getattr(config, f"{kind}_{side}_token_id", None) for side in ("start", "end"))
+        if start is not None and end is not None:
+            return start, end
+    return None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,11 +127,10 @@ class HfVlm:
             return load_model(name, located, known)
         processor = _processor(located)
         model: TransformersModel | UncachedModel
+        loaded = load_checkpoint(located, functools.partial(ProcessorFamily, processor=processor))
         if options.share_prefix:
-            loaded = load_checkpoint(located, functools.partial(ProcessorFamily, processor=processor))
             model = TransformersModel(name, loaded, options)
         else:
-            loaded = load_checkpoint(located, PlainFamily)
             model = UncachedModel(name, loaded, processor, options)
         _try(model, loaded, processor, options.pretrained)
         return model

@@ -33,6 +33,10 @@ class PlainFamily:
         """As many slots as a frame of this size has features."""
         return (self.slot_id,) * len(self.features([Image.new("RGB", size)])[0])
 
+    def written_ids(self) -> tuple[int, ...]:
+        """The placeholder alone."""
+        return (self.placeholder_id,)
+
     def features(self, images: Sequence[Image.Image]) -> list[torch.Tensor]:
         """Embeddings for the slots of each image, (slots, hidden)."""
         raise NotImplementedError

@@ -34,6 +34,11 @@ class Qwen25VLFamily(PlainFamily):
         """One token for each square of merged patches."""
         return (self.slot_id,) * (math.prod(self._grid(size)) // self._image_processor.merge_size**2)
 
+    def written_ids(self) -> tuple[int, ...]:
+        """The placeholder between the markers of vision, which the processor leaves to whoever writes the text."""
+        config = self._model.config
+        return (config.vision_start_token_id, self.placeholder_id, config.vision_end_token_id)
+
     @torch.inference_mode()
     def features(self, images: Sequence[Image.Image]) -> list[torch.Tensor]:
         """The vision tower's merged patches, (tokens, hidden), for each image."""
