@@ -6,6 +6,7 @@ import numpy as np
 
 from infthor_eval.sim.geometry import Array, aabb_overlap
 from infthor_eval.sim.objects import SimObject
+from infthor_eval.sim.receptacles import has_within
 from infthor_eval.sim.world import World
 
 __all__ = ["obstacle_at", "occupant"]
@@ -37,7 +38,7 @@ def _met(world: World, item: SimObject, low: Array, high: Array) -> Iterator[tup
         yield "Wall", (np.full(3, np.inf), np.full(3, -np.inf))
     for other in _solid(world, item):
         box = _body(other)
-        if _overlap(low, high, box):
+        if _overlap(low, high, box) and not has_within(other, low + _SKIN, high - _SKIN):
             yield other.name, box
 
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from infthor_eval.sim.geometry import Array, object_id
 from infthor_eval.sim.object_types import type_named
-from infthor_eval.sim.objects import SimObject
+from infthor_eval.sim.objects import SimObject, SimObjectState
 
 __all__ = ["default_object", "style_of"]
 
@@ -29,4 +29,5 @@ def default_object(object_type: str, position: Array, yaw: float = 0.0, size: Ar
         box_size=box,
         support=declared.support_height(float(box[1])),
         style=style_of(found),
+        state=SimObjectState(openness=1.0 if declared.starts_open else 0.0),
     )

@@ -11,7 +11,7 @@ from infthor_eval.sim.geometry import Array, yaw_matrix
 from infthor_eval.sim.objects import DRAWER_SLIDE, SimObject
 from infthor_eval.sim.world import World
 
-__all__ = ["PointFilter", "Surface", "find_place", "owner_of", "surfaces"]
+__all__ = ["PointFilter", "Surface", "find_place", "has_within", "owner_of", "surfaces"]
 
 _WALL = 0.02  # thickness in metres of the sides and floors of hollow receptacles
 _STEP = 0.05
@@ -86,6 +86,19 @@ def drawer_offset(receptacle: SimObject) -> Array:
         return np.zeros(3)
     matrix = yaw_matrix(float(receptacle.rotation[1]) + receptacle.front)
     return matrix @ np.array([0.0, 0.0, DRAWER_SLIDE * receptacle.front_size[2] * receptacle.state.openness])
+
+
+def has_within(vessel: SimObject, low: Array, high: Array) -> bool:
+    """Whether a box, given by its corners, is within the walls of an open vessel and above its floor; not its rim."""
+    if not vessel.type.open_top or (vessel.type.encloses and vessel.state.openness == 0):
+        return False
+    (cavity,) = surfaces(vessel)
+    middle, half = (low + high) / 2, (high - low) / 2
+    # The middles of its sides, not its corners: most of what lies in vessels is round.
+    sides = np.array([[half[0], 0, 0], [-half[0], 0, 0], [0, 0, half[2]], [0, 0, -half[2]]])
+    points = (middle + sides - cavity.center) @ yaw_matrix(cavity.yaw)
+    beside = np.abs(points[:, [0, 2]]).max(axis=0) > cavity.half
+    return bool(low[1] > cavity.center[1] - _CLEARANCE and not beside.any())
 
 
 def find_place(

@@ -6,10 +6,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from infthor_eval.sim.geometry import Array, euler_matrix, level_gaps
+from infthor_eval.sim.geometry import Array, euler_matrix
 from infthor_eval.sim.objects import SimObject
 from infthor_eval.sim.render.camera import FAR, NEAR, Camera
-from infthor_eval.sim.render.glimpse import pixels_of
+from infthor_eval.sim.render.glimpse import Glimpse
 from infthor_eval.sim.render.hand import held_rows
 from infthor_eval.sim.render.picture import Picture, Rasterizer, cast_picture, choose_rasterizer, colour_picture
 from infthor_eval.sim.render.primitives import INSTANCE
@@ -139,13 +139,15 @@ class Simulation:
             self._visible = visible_ids(self.world, self._view, self.settings.visibility_distance)
         return self._visible
 
-    def sees_from(self, agent: Agent, item: SimObject, distance: float) -> bool:
-        """Whether the agent would see an object within `distance` metres if it stood like `agent`."""
-        if level_gaps(agent.position[[0, 2]], *item.bounds()) > distance or self.world.hidden(item):
-            return False
+    def glimpse(self, item: SimObject) -> Glimpse:
+        """Looks for an object from many poses; good until the next change of the world."""
         prims, _, names = self._model.primitives()
+        return Glimpse(prims, names.index(item.object_id), self.rasterizer)
+
+    def sees_from(self, agent: Agent, glimpse: Glimpse) -> bool:
+        """Whether the agent would see what `glimpse` looks for, at any distance, if it stood like `agent`."""
         lens = self._agent_camera(agent)
-        return pixels_of(prims, names.index(item.object_id), lens, self.rasterizer) >= least_pixels(lens)
+        return glimpse.seen_by(lens, least_pixels(lens))
 
     def hit(self, x: float, y: float) -> Array | None:
         """The point (3,) that the agent sees at (x, y), shares of the frame from its bottom left; None for the void."""

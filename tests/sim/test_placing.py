@@ -3,6 +3,10 @@
 import numpy as np
 import pytest
 
+from infthor_eval.sim.default_objects import default_object
+from infthor_eval.sim.geometry import to_xyz
+from infthor_eval.sim.receptacles import surfaces
+
 from .harness import Bench
 
 
@@ -33,6 +37,41 @@ def test_an_object_stands_on_a_point_of_a_receptacle(bench):
     assert "not clear" in bench.refused("PlaceObjectAtPoint", objectId=apple, position=point)
     outside = {"x": 40, "y": 0, "z": 0}
     assert "not clear" in bench.refused("PlaceObjectAtPoint", objectId=apple, position=outside)
+
+
+@pytest.mark.parametrize(("vessel", "kind"), [("Bowl", "Apple"), ("Pot", "Egg"), ("Cup", "Pencil"), ("Box", "Bowl")])
+def test_vessels_are_hollow(bench, vessel, kind):
+    around, item = (
+        default_object(vessel, np.array([0.0, 1.2, 0.0]), 30.0),
+        default_object(kind, np.array([0.0, 2.2, 0.0])),
+    )
+    if kind == "Pencil":  # upright
+        item.box_size, item.box_center = item.box_size[[0, 2, 1]], np.array([0.0, item.box_size[2] / 2, 0.0])
+    for made in (around, item):
+        bench.sim.world.add(made)
+    (cavity,) = surfaces(around)
+    bench.ok("PlaceObjectAtPoint", objectId=item.object_id, position=to_xyz(cavity.center))
+    assert bench.object(item.object_id)["parentReceptacles"] == [around.object_id]
+    assert bottom(bench, item.object_id) == pytest.approx(cavity.center[1], abs=1e-4)
+    rim = cavity.center + np.array([around.box_size[0] / 2, 0.0, 0.0])
+    assert around.name in bench.refused("PlaceObjectAtPoint", objectId=item.object_id, position=to_xyz(rim))
+    below = cavity.center - [0.0, 0.05, 0.0]
+    assert around.name in bench.refused("PlaceObjectAtPoint", objectId=item.object_id, position=to_xyz(below))
+
+
+def test_a_closed_box_is_solid_and_so_is_what_is_too_small(bench):
+    carton, bowl = (default_object(kind, np.array([0.0, 1.2, 0.0])) for kind in ("Box", "Bowl"))
+    for made in (carton, bowl):
+        bench.sim.world.add(made)
+    inside = to_xyz(surfaces(carton)[0].center)
+    bench.ok("PlaceObjectAtPoint", objectId=bowl.object_id, position=inside)
+    bench.ok("PlaceObjectAtPoint", objectId=bowl.object_id, position={**inside, "y": 2.0})
+    bench.ok("CloseObject", objectId=carton.object_id, forceAction=True)
+    assert carton.name in bench.refused("PlaceObjectAtPoint", objectId=bowl.object_id, position=inside)
+    bread = default_object("Bread", np.array([0.0, 2.2, 0.0]))
+    bench.sim.world.add(bread)
+    within = to_xyz(surfaces(bowl)[0].center)
+    assert bowl.name in bench.refused("PlaceObjectAtPoint", objectId=bread.object_id, position=within)
 
 
 def test_a_held_object_can_be_placed(bench):

@@ -1,9 +1,14 @@
 """What can be asked of a scene: standing places, poses, outlines, points; and what replies tell of."""
 
 import math
+from itertools import product
 
 import numpy as np
 import pytest
+
+from infthor_eval.sim.geometry import to_array
+from infthor_eval.sim.render.picture import choose_rasterizer
+from infthor_eval.sim.world import Agent
 
 from .harness import Bench
 
@@ -53,6 +58,27 @@ def test_every_interactable_pose_sees_the_object(bench):
     for pose in poses[:: len(poses) // 8]:
         bench.ok("TeleportFull", **{**pose, "rotation": {"y": pose["rotation"]}})
         assert bench.object(fridge)["visible"]
+
+
+@pytest.mark.parametrize("renderer", ["numba", "numpy"])
+@pytest.mark.parametrize(("scene", "kinds"), [("kitchen-2", ("Fridge", "Faucet")), ("bathroom-1", ("Sink", "Towel"))])
+def test_interactable_poses_are_those_whose_whole_picture_shows_the_object(renderer, scene, kinds):
+    pytest.importorskip(renderer)
+    bench = Bench(size=40)
+    bench.reset(scene)
+    bench.sim.rasterizer = choose_rasterizer(renderer)
+    world = bench.sim.world
+    places = bench.ok("GetReachablePositions")["actionReturn"][::24]
+    for target in map(bench.first, kinds):
+        told = bench.ok("GetInteractablePoses", objectId=target, positions=places)["actionReturn"]
+        slow = []
+        for pose in product(places, (-30.0, 0.0, 30.0, 60.0), (0.0, 90.0, 180.0, 270.0), (True, False)):
+            place, tilt, turn, standing = pose
+            world.agent = Agent(to_array(place), turn, tilt, standing)
+            if target in bench.sim.visible():
+                slow.append({**place, "rotation": turn, "standing": standing, "horizon": tilt})
+        assert told == slow
+        assert slow
 
 
 def test_interactable_poses_can_be_narrowed(bench):

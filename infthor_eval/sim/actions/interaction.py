@@ -11,6 +11,7 @@ from infthor_eval.sim.object_types import allowed_in
 from infthor_eval.sim.objects import SimObject
 from infthor_eval.sim.receptacles import drawer_offset, find_place
 from infthor_eval.sim.simulation import Simulation
+from infthor_eval.sim.unfolding import unfold
 
 __all__: list[str] = []
 
@@ -141,6 +142,7 @@ def close_object(
 def set_openness(sim: Simulation, target: SimObject, openness: float) -> None:
     """Open or close; what lies in a drawer comes along."""
     before = drawer_offset(target)
+    unfold(target, openness)
     target.state.openness = float(openness)
     sim.world.shift(sim.world.children(target), drawer_offset(target) - before)
     sim.world.touch(target)

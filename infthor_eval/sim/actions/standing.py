@@ -1,10 +1,13 @@
 """Where the agent can stand, and from where it can interact with an object."""
 
+from collections.abc import Iterable, Iterator, Mapping
+from itertools import islice, product
 from typing import Any
 
 from infthor_eval.sim.actions.registry import Vector3, action
 from infthor_eval.sim.errors import ActionError
-from infthor_eval.sim.geometry import to_array
+from infthor_eval.sim.geometry import level_gaps, to_array
+from infthor_eval.sim.objects import SimObject
 from infthor_eval.sim.simulation import Simulation
 from infthor_eval.sim.world import MAX_DOWN, MAX_UP, Agent
 
@@ -51,17 +54,21 @@ def get_interactable_poses(
     turns = _steps(0.0, 360.0 - 1e-6, sim.settings.rotate_step) if rotations is None else rotations
     tilts = _steps(-MAX_UP, MAX_DOWN, _TILT) if horizons is None else horizons
     heights = [True, False] if standings is None else standings
-    found: list[dict[str, Any]] = []
-    for position in reachable_positions(sim) if positions is None else positions:
-        for tilt in tilts:
-            for turn in turns:
-                for standing in heights:
-                    stand = Agent(to_array(position), turn % 360.0, tilt, standing)
-                    if sim.sees_from(stand, item, reach):
-                        found.append({**position, "rotation": turn, "standing": standing, "horizon": tilt})
-                        if len(found) == maxPoses:
-                            return found
-    return found
+    places = reachable_positions(sim) if positions is None else positions
+    near = [p for p in places if level_gaps(to_array(p)[[0, 2]], *item.bounds()) <= reach]
+    if sim.world.hidden(item):
+        return []
+    return list(islice(_seeing(sim, item, product(near, tilts, turns, heights)), maxPoses))
+
+
+def _seeing(
+    sim: Simulation, item: SimObject, poses: Iterable[tuple[Mapping[str, float], float, float, bool]]
+) -> Iterator[dict[str, Any]]:
+    """Those of some poses (position, horizon, rotation, standing) from which the agent sees an object."""
+    glimpse = sim.glimpse(item)
+    for position, tilt, turn, standing in poses:
+        if sim.sees_from(Agent(to_array(position), turn % 360.0, tilt, standing), glimpse):
+            yield {**position, "rotation": turn, "standing": standing, "horizon": tilt}
 
 
 def _steps(first: float, last: float, size: float) -> list[float]:

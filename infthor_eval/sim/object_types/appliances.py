@@ -2,7 +2,7 @@
 
 from functools import partial
 
-from infthor_eval.sim.object_types.record import ObjectType, portable
+from infthor_eval.sim.object_types.record import ObjectType, Unfolding, portable
 
 __all__ = ["TYPES"]
 
@@ -20,7 +20,8 @@ TYPES = (
                materials=("Metal",), takes=("food", "dishes", "bottles", "knives"), encloses=True,
                levels=(0.22, 0.41, 0.62), hinged=True, tall=True, stock=4),
     portable("Laptop", (0.40, 0.30, 0.30), shape="laptop", categories=("lounge", "bulky"), openable=True,
-             toggleable=True, breakable=True, mass=1.8, materials=("Plastic",), starts_open=True),
+             toggleable=True, breakable=True, mass=1.8, materials=("Plastic",), starts_open=True,
+             unfolds=(Unfolding(1, stays=-1, closed=0.1),)),
     _machine("Microwave", (0.61, 0.35, 0.36), shape="microwave", receptacle=True, openable=True, heat_source=True,
              mass=5.0, materials=("Metal",), takes=("food", "tableware", "knives"), encloses=True, levels=(0.08,),
              hinged=True, runs_closed=True, fitted=True, stock=0),

@@ -2,7 +2,7 @@
 
 from functools import partial
 
-from infthor_eval.sim.object_types.record import ObjectType
+from infthor_eval.sim.object_types.record import ObjectType, Unfolding
 
 __all__ = ["TYPES"]
 
@@ -14,7 +14,7 @@ TYPES = (
     ObjectType("BathtubBasin", (1.20, 0.42, 1.02), shape="bathtub_basin", receptacle=True, takes=("washing", "Towel"),
                support=0.01, open_top=1.0, basin=True, stock=1),
     ObjectType("Blinds", (1.01, 0.20, 0.03), shape="blinds", openable=True, centered=True, faces_room=True,
-               beyond_room=True),
+               beyond_room=True, unfolds=(Unfolding(1, stays=1, reach=0.75),)),
     ObjectType("Curtains", (0.96, 2.17, 0.19), shape="curtains", materials=("Fabric",), faces_room=True,
                beyond_room=True),
     ObjectType("DoorFrame"),
@@ -26,7 +26,8 @@ TYPES = (
     _picture("Mirror", (0.54, 0.85, 0.07), shape="mirror", breakable=True, dirtyable=True, materials=("Glass",)),
     _picture("Painting", (0.88, 0.81, 0.09), shape="painting"),
     _picture("Poster", (0.62, 0.71, 0.09), shape="painting"),
-    ObjectType("ShowerCurtain", (0.43, 1.94, 0.37), shape="shower_curtain", openable=True),
+    ObjectType("ShowerCurtain", (0.43, 1.94, 0.37), shape="shower_curtain", openable=True,
+               unfolds=(Unfolding(0, stays=-1, reach=1.1),)),
     ObjectType("ShowerDoor", (0.07, 1.96, 0.82), shape="shower_door", openable=True, breakable=True, faces_room=True),
     ObjectType("ShowerGlass", (1.16, 1.92, 1.30), shape="shower_glass", breakable=True),
     ObjectType("ShowerHead", (0.20, 1.41, 0.25), shape="shower_head", toggleable=True, runs_water=True),

@@ -1,6 +1,6 @@
 """Things of living rooms, bedrooms and bathrooms, from pens to bins."""
 
-from infthor_eval.sim.object_types.record import ObjectType, portable
+from infthor_eval.sim.object_types.record import ObjectType, Unfolding, portable
 
 __all__ = ["TYPES"]
 
@@ -8,12 +8,14 @@ TYPES = (
     portable("AlarmClock", (0.19, 0.18, 0.10), shape="alarm_clock", categories=("lounge",)),
     portable("BaseballBat", (0.10, 0.10, 0.85), shape="bat", categories=("lounge", "bulky")),
     portable("BasketBall", (0.24, 0.24, 0.24), shape="ball", categories=("lounge", "bulky"), centered=True),
-    portable("Book", (0.22, 0.03, 0.30), shape="book", categories=("lounge",), openable=True, materials=("Paper",)),
+    portable("Book", (0.22, 0.03, 0.30), shape="book", categories=("lounge",), openable=True, materials=("Paper",),
+             unfolds=(Unfolding(0, stays=1, closed=0.5), Unfolding(1, stays=-1, closed=2.0))),
     portable("Boots", (0.28, 0.52, 0.23), shape="boots"),
     portable("Box", (0.43, 0.29, 0.43), shape="carton", categories=("lounge", "bulky"), receptacle=True, openable=True,
              mass=1.0, materials=("Paper",),
              takes=("small", "drinkware", "ornaments", "AlarmClock", "Book", "Bowl", "Newspaper"), encloses=True,
-             open_top=1.0, starts_open=True),
+             open_top=1.0, starts_open=True,
+             unfolds=(Unfolding(0, stays=0, closed=0.82), Unfolding(2, stays=0, closed=0.82))),
     portable("CD", (0.10, 0.005, 0.10), shape="disc", categories=("small", "lounge")),
     portable("Candle", (0.05, 0.13, 0.05), shape="candle", categories=("small", "toiletries"), toggleable=True,
              light=0.35),

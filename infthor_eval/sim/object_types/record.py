@@ -8,7 +8,29 @@ from dataclasses import KW_ONLY, dataclass
 from functools import partial
 from typing import Any
 
-__all__ = ["ObjectType", "portable"]
+__all__ = ["ObjectType", "Unfolding", "portable"]
+
+
+@dataclass(frozen=True)
+class Unfolding:
+    """How opening changes the box of a thing along one of its axes, in proportion to the openness.
+
+    Attributes:
+        axis: 0, 1 or 2: across, up, or towards its front.
+        stays: the end of the box that stays where it is, -1 or 1; 0: its middle.
+        closed: extent when closed, as a share of that when wide open.
+        reach: metres that wide opening adds whatever the extent.
+    """
+
+    axis: int
+    stays: int
+    closed: float = 1.0
+    reach: float = 0.0
+
+    def extent(self, size: float, before: float, after: float) -> float:
+        """Extent in metres at openness `after` of what measures `size` at openness `before`."""
+        share = (self.closed + (1 - self.closed) * after) / (self.closed + (1 - self.closed) * before)
+        return (size - self.reach * before) * share + self.reach * after
 
 
 @dataclass(frozen=True)
@@ -31,6 +53,7 @@ class ObjectType:
         overhang: things may stick out beyond its edge however far.
         hinged: it opens a door that stands in the agent's way.
         slides: it slides out with its contents, as drawers do.
+        unfolds: how its box changes as it opens, where it has no door and does not slide.
         runs_closed: it must be closed to be switched on, and switched off to be opened.
         switched_by: type of what switches it; it has no switch of its own.
         slice_type: what it falls into when cut.
@@ -49,7 +72,7 @@ class ObjectType:
         flat: its front is its thin side.
         yields: what lies on it tells how high its surface is, as its box does not.
         beyond_room: it reaches beyond the room's walls or floor.
-        starts_open: procedural rooms have it open.
+        starts_open: rooms have it open, and its size is measured so.
         stock: loose things that a procedural room puts into or onto it at most; None: it is not even considered.
     """
 
@@ -87,6 +110,7 @@ class ObjectType:
     # what it does
     hinged: bool = False
     slides: bool = False
+    unfolds: tuple[Unfolding, ...] = ()
     runs_closed: bool = False
     switched_by: str = ""
     slice_type: str = ""

@@ -11,8 +11,8 @@ from infthor_eval.formats.digests import digest
 __all__ = ["drop_stale_kernels"]
 
 _SOURCES = (
-    "camera.py", "lighting.py", "patterns.py", "primitives.py", "raster_numba.py", "shading_numba.py", "smoothing.py",
-    "smoothing_numba.py",
+    "camera.py", "glimpse_numba.py", "lighting.py", "patterns.py", "primitives.py", "raster_numba.py",
+    "shading_numba.py", "smoothing.py", "smoothing_numba.py",
 )  # fmt: skip
 _HERE = Path(__file__).parent
 

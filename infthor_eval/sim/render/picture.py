@@ -21,17 +21,19 @@ Cast = Callable[[Array, Projection, Camera], tuple[Array, NDArray[np.int32]]]
 Pixels = NDArray[np.uint8]
 Places = tuple[NDArray[np.int64], NDArray[np.int64]]
 Shade = Callable[[Array, Projection, Camera, Array, NDArray[np.int32], Array, Lights], Pixels]
+Shows = Callable[[Array, Projection, Camera, NDArray[np.bool_], int], bool]
 Smooth = Callable[[Array, Projection, Camera, NDArray[np.int32], Array, Lights, Places, Pixels], None]
 
 
 @dataclass(frozen=True)
 class Rasterizer:
-    """One implementation of casting, shading and smoothing."""
+    """One implementation of casting, shading, smoothing, and looking for one thing."""
 
     name: str
     cast: Cast
     shade: Shade
     smooth: Smooth
+    shows: Shows
 
 
 @dataclass(frozen=True)
@@ -59,15 +61,17 @@ def choose_rasterizer(name: str | None = None) -> Rasterizer:
     if chosen != "numpy":
         drop_stale_kernels()
         try:
-            from infthor_eval.sim.render import raster_numba, shading_numba, smoothing_numba
+            from infthor_eval.sim.render import glimpse_numba, raster_numba, shading_numba, smoothing_numba
         except ModuleNotFoundError:
             if chosen == "numba":
                 raise
         else:
-            return Rasterizer("numba", raster_numba.cast, shading_numba.shade, smoothing_numba.smooth)
-    from infthor_eval.sim.render import raster_numpy, shading_numpy, smoothing_numpy
+            return Rasterizer(
+                "numba", raster_numba.cast, shading_numba.shade, smoothing_numba.smooth, glimpse_numba.shows
+            )
+    from infthor_eval.sim.render import glimpse_numpy, raster_numpy, shading_numpy, smoothing_numpy
 
-    return Rasterizer("numpy", raster_numpy.cast, shading_numpy.shade, smoothing_numpy.smooth)
+    return Rasterizer("numpy", raster_numpy.cast, shading_numpy.shade, smoothing_numpy.smooth, glimpse_numpy.shows)
 
 
 def cast_picture(

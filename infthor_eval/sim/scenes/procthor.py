@@ -15,7 +15,7 @@ from infthor_eval.sim.footprints import Rect, polygon_rects
 from infthor_eval.sim.geometry import Array, level_gaps, to_array
 from infthor_eval.sim.navigation import CELL, NavGrid
 from infthor_eval.sim.object_types import type_named
-from infthor_eval.sim.objects import SimObject
+from infthor_eval.sim.objects import SimObject, SimObjectState
 from infthor_eval.sim.restore import settle_parents
 from infthor_eval.sim.scenes.arrangement import arrange
 from infthor_eval.sim.world import AGENT_HEIGHT, FLOOR_STYLES, Agent, RoomShell, Wall, World
@@ -124,6 +124,7 @@ def _object(entry: Mapping[str, Any], assets: Mapping[str, tuple[float, float, f
         asset_id=asset,
         support=declared.support_height(float(size[1])),
         style=style_of(asset or found),
+        state=SimObjectState(openness=1.0 if declared.starts_open else 0.0),
     )
 
 

@@ -192,7 +192,6 @@ def _scatter(world: World, plan: RoomPlan) -> None:
                 continue
             made = default_object(object_type, np.round(place.position, 4), float(place.rotation[1]))
             made.style = item.style
-            made.state.openness = 1.0 if made.type.starts_open else 0.0  # as AI2-THOR's rooms have them
             if made.object_id not in world.objects:
                 world.add(made)
                 world.attach(made, home)

@@ -64,12 +64,13 @@ def desktop(b: Builder) -> None:
 @draws
 def laptop(b: Builder) -> None:
     """Keyboard and lid; the lid lies flat when closed."""
+    if b.state.openness == 0:
+        b.box((0, -0.45, 0.1), (1, 0.55, 0.88), STEEL, Material.METAL)
+        b.box((0, 0.57, 0.1), (1, 0.43, 0.88), shade_of(STEEL, 0.9), Material.METAL)
+        return
     y = b.thick(0.01, 1)
     b.box((0, -1 + y, 0.1), (1, y, 0.88), STEEL, Material.METAL)
     b.box((0, -1 + 2 * y, 0.1), (0.88, 0.02, 0.5), DARK)
-    if b.state.openness == 0:
-        b.box((0, -1 + 3 * y, 0.1), (1, y * 0.8, 0.88), shade_of(STEEL, 0.9), Material.METAL)
-        return
     z = b.thick(0.008, 2)
     b.box((0, 0, -0.88), (1, 1, z), STEEL, Material.METAL)
     screen = _SCREEN if b.state.toggled else (0.07, 0.08, 0.1)

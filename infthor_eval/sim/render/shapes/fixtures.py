@@ -115,8 +115,8 @@ def curtains(b: Builder) -> None:
 
 @draws
 def blinds(b: Builder) -> None:
-    """Slats: a bundle at the top when open."""
-    count = 3 if b.state.openness > 0 else 9
+    """Slats: a bundle at the top when closed, let down when open, as in AI2-THOR."""
+    count = max(3, round(float(b.half[1]) / 0.06))
     for index in range(count):
         b.box((0, 0.95 - index * 1.9 / count, 0), (1, 0.75 / count, 0.6), (0.9, 0.88, 0.82))
 
@@ -200,14 +200,13 @@ def shower_door(b: Builder) -> None:
 
 @draws
 def shower_curtain(b: Builder) -> None:
-    """A curtain on a rail, gathered to one side when open."""
+    """A curtain on a rail: gathered when closed, drawn out when open, as in AI2-THOR."""
     color = pick(CLOTHS, b.style + 2)
     long = 0 if b.half[0] >= b.half[2] else 2
-    share = 0.35 if b.state.openness > 0 else 1.0
     for index in range(6):
-        at = -1 + share * (2 * index + 1) / 6
+        at = -1 + (2 * index + 1) / 6
         fold = shade_of(color, 0.95 + 0.1 * (index % 2))
-        b.tube(b.lengthwise(at, 0, 0), b.lengthwise(share / 5, 1, 0.5), fold, Material.FABRIC)
+        b.tube(b.lengthwise(at, 0, 0), b.lengthwise(0.2, 1, 0.5), fold, Material.FABRIC)
     b.rod((0, 0.99, 0), 0.012, float(b.half[long]), long, CHROME)
 
 

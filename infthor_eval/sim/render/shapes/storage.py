@@ -10,7 +10,7 @@ __all__: list[str] = []
 
 _LEAF = 0.02  # thickness of a door, metres
 _LIT = 0.2  # how much the insides of open things shine, as no light of the room gets there
-_BODY = 0.82  # of a cardboard box's width, the rest being its flaps
+_BODY = 0.82  # of a wide open cardboard box's width, the rest being its flaps, as its record has it closed
 _COLD: Color = (0.93, 0.97, 1.0)
 
 
@@ -153,30 +153,31 @@ def carton(b: Builder) -> None:
         b.box((0, 0.8, 0), (1.006, 0.2, 0.12), (0.88, 0.78, 0.58))
         b.box((0.1, -0.1, 1.0), (0.4, 0.25, 0.01), (0.92, 0.9, 0.85), Material.PAPER)
         return
-    _body(b, color)
-    _flaps(b, shade_of(color, 1.16))
+    body = _BODY / (_BODY + (1 - _BODY) * b.state.openness)  # of the box as it is now
+    _body(b, color, body)
+    _flaps(b, shade_of(color, 1.16), body)
 
 
-def _body(b: Builder, color: Color) -> None:
+def _body(b: Builder, color: Color, share: float) -> None:
     """Four sides and a bottom, as far within the box as the flaps take."""
     y = b.thick(0.004, 1)
     x, z = b.thick(0.006, 0), b.thick(0.006, 2)
-    b.box((0, -1 + y, 0), (_BODY, y, _BODY), shade_of(color, 0.88), glow=0.12)
+    b.box((0, -1 + y, 0), (share, y, share), shade_of(color, 0.88), glow=0.12)
     for side in (-1, 1):
-        b.box((side * (_BODY - x), y, 0), (x, 1 - y, _BODY), color, glow=0.12)
-        b.box((0, y, side * (_BODY - z)), (_BODY - 2 * x, 1 - y, z), color, glow=0.12)
+        b.box((side * (share - x), y, 0), (x, 1 - y, share), color, glow=0.12)
+        b.box((0, y, side * (share - z)), (share - 2 * x, 1 - y, z), color, glow=0.12)
 
 
-def _flaps(b: Builder, color: Color) -> None:
+def _flaps(b: Builder, color: Color, share: float) -> None:
     """Four flaps that hang outwards from the rim, to the edges of the box."""
     for axis in (0, 2):
-        out = (1 - _BODY) * float(b.half[axis])  # metres
+        out = (1 - share) * float(b.half[axis])  # metres
         length, drop = 2.2 * out, 1.96 * out
-        half = [_BODY, 0.005 / float(b.half[1]), _BODY]
+        half = [share, 0.005 / float(b.half[1]), share]
         half[axis] = length / 2 / float(b.half[axis])
         lean = 63.0
         for side in (-1, 1):
-            at = b.along(side * (1 + _BODY) / 2, axis)
+            at = b.along(side * (1 + share) / 2, axis)
             tilt = (side * lean, 0.0, 0.0) if axis == 2 else (0.0, 0.0, -side * lean)
             b.box((at[0], 1 - drop / 2 / float(b.half[1]), at[2]), half, color, tilt=tilt)
 
