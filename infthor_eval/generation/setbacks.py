@@ -66,13 +66,16 @@ class Setbacks:
         return room_of(view, self._blocked.keys(), set(self._without_room(view)))
 
     def _without_room(self, view: View) -> Iterator[tuple[str, str]]:
-        """Where there was no room for a thing there is none for a larger one either."""
+        """Where things find no room: as was found, and where they are larger than what did not, or than the place."""
         yield from self._refused
+        sizes = {key: size for key, item in view.objects.items() if (size := _size(item)) is not None}
+        things = [key for key in sizes if view.objects[key].pickupable]
         for item, receptacle in self._refused:
             least = self._sizes.get(item)
-            for key, other in view.objects.items():
-                if least is not None and other.pickupable and _is_as_large(_size(other), least):
-                    yield key, receptacle
+            yield from ((key, receptacle) for key in things if least is not None and _covers(sizes[key], least))
+        for place in (key for key in sizes if view.objects[key].receptacle):
+            ground = sizes[place][:2]
+            yield from ((key, place) for key in things if not _covers(ground, sizes[key][:2]))
 
 
 def _size(item: ThorObject) -> _Size | None:
@@ -81,8 +84,9 @@ def _size(item: ThorObject) -> _Size | None:
     return None if box is None else (*sorted((box.size.x, box.size.z), reverse=True), box.size.y)
 
 
-def _is_as_large(one: _Size | None, other: _Size) -> bool:
-    return one is not None and all(a >= b - _NEAR for a, b in zip(one, other, strict=True))
+def _covers(one: _Size, other: _Size) -> bool:
+    """Whether one thing is as large as the other, in each direction."""
+    return all(a >= b - _NEAR for a, b in zip(one, other, strict=True))
 
 
 def _position(view: View, item: str) -> tuple[float, float, float]:
