@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from queue import SimpleQueue
 
 import msgspec
 import pytest
@@ -243,6 +244,19 @@ def test_groups_in_flight_are_done_at_the_same_time_and_each_in_its_order():
     assert sorted(record.id for record in records) == sorted(u.key.id for g in groups(6) for u in g.units)
     for number in range(6):
         assert [r.id for r in records if r.id.startswith(f"{number}.")] == [f"{number}.{u}" for u in range(3)]
+
+
+@pytest.mark.timeout(20)
+def test_a_thread_that_finds_the_last_group_taken_ends(monkeypatch):
+    class Slow(SimpleQueue):
+        def empty(self):
+            found = super().empty()
+            time.sleep(0.02)
+            return found
+
+    monkeypatch.setattr("infthor_eval.runs.executor.SimpleQueue", Slow)
+    records = list(evaluated(groups(3), lambda group: (unit.record("f", unit.payload) for unit in group.units), 2))
+    assert len(records) == 9
 
 
 def test_an_error_in_a_thread_ends_the_run_with_that_error():
