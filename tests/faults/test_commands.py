@@ -121,6 +121,15 @@ TYPED = [
         "--model-args for blind is given twice",
     ),
     (["bundle", "file", "--out", "OUT"], "not in its documented form"),
+    (
+        ["validate", "nowhere", "--models", "oracle", "--out", "OUT"],
+        "nowhere: no such folder; give the folder of an NIEH set, or fetch the published one: fetch nieh",
+    ),
+    (
+        ["validate", ".", "--models", "oracle", "--out", "OUT"],
+        "no qa_set*.csv in it, which a set has beside metadata/; give the folder of an NIEH set, or fetch",
+    ),
+    ([*RUN[:-1], "nowhere", "--output", "OUT"], "nowhere: no such folder; give the folder of an NIEH set, or fetch"),
 ]
 
 
