@@ -52,7 +52,7 @@ def command(
     made = make_questions(folder, seed=seed, per_trajectory=per_trajectory, share=min_share, further=further)
     content = encode_questions(made.questions)
     if not overwrite:
-        refuse_loss(out, content, "give another --out, or --overwrite if nobody edited it")
+        refuse_loss(out, content)
     with naming(f"{out}: cannot be written", "give another --out"), written_atomically(out) as partial:
         partial.write_bytes(content)
     told = f"{len(made.questions)} questions on {made.trajectories} trajectories: {out}\n{made.words()}"

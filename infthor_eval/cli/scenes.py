@@ -21,12 +21,15 @@ def command() -> None:
 @floor_plans_option
 @click.option("--out", type=click.Path(path_type=Path), help="The picture to write; NAME.png otherwise.")
 @click.option("--size", type=click.IntRange(64, 2048), default=600, show_default=True, help="Of each view, pixels.")
-def show(name: str, data: Path | None, out: Path | None, size: int) -> None:
+@click.option("--overwrite", is_flag=True, help="Replace a file that holds something else.")
+def show(name: str, data: Path | None, out: Path | None, size: int, overwrite: bool) -> None:
     """Draw scene NAME from above and as the agent first sees it, side by side."""
+    import io
+
     from PIL import Image
 
     from infthor_eval.errors import naming
-    from infthor_eval.formats.files import prepared_file
+    from infthor_eval.formats.files import prepared_file, refuse_loss, written_atomically
     from infthor_eval.terminal import tell
     from infthor_eval.thor.launch import embedded
     from infthor_eval.thor.scenes import scene_pictures
@@ -40,8 +43,15 @@ def show(name: str, data: Path | None, out: Path | None, size: int) -> None:
     sheet = Image.new("RGB", (2 * size, size))
     sheet.paste(Image.fromarray(above), (0, 0))
     sheet.paste(Image.fromarray(first), (size, 0))
-    with naming(f"{path}: cannot be written", "give another place with --out"):
-        sheet.save(path)
+    picture = io.BytesIO()
+    sheet.save(picture, format=Image.registered_extensions()[path.suffix.lower()])
+    if not overwrite:
+        refuse_loss(path, picture.getvalue())
+    with (
+        naming(f"{path}: cannot be written", "give another place with --out"),
+        written_atomically(path) as partial,
+    ):
+        partial.write_bytes(picture.getvalue())
     tell(f"{name}: {path} (from above; first view)")
 
 
@@ -50,8 +60,11 @@ def show(name: str, data: Path | None, out: Path | None, size: int) -> None:
 @click.option("--out", type=click.Path(path_type=Path), required=True, help="Folder of floor plans, made or added to.")
 @click.option("--unity", type=click.Path(path_type=Path), help="Unity's executable, not the build ai2thor downloads.")
 @click.option("--embedded", "is_embedded", is_flag=True, help="Dump scenes of the embedded simulator instead.")
+@click.option("--overwrite", is_flag=True, help="Replace scenes of which the folder has something else.")
 @floor_plans_option
-def dump(names: tuple[str, ...], out: Path, unity: Path | None, is_embedded: bool, data: Path | None) -> None:
+def dump(
+    names: tuple[str, ...], out: Path, unity: Path | None, is_embedded: bool, overwrite: bool, data: Path | None
+) -> None:
     """Write what Unity reports of the scenes NAMES, for --data of the other commands.
 
     With that folder they run in the embedded simulator on machines without Unity.
@@ -66,4 +79,4 @@ def dump(names: tuple[str, ...], out: Path, unity: Path | None, is_embedded: boo
     start = launch.embedded(data) if is_embedded else launch.unity(unity)
     with Simulator(start) as simulator:
         for name in names:
-            tell(f"{name}: {dump_scene(simulator, name, out)} objects in {out}")
+            tell(f"{name}: {dump_scene(simulator, name, out, overwrite)} objects in {out}")

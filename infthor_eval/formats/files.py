@@ -9,8 +9,16 @@ from pathlib import Path
 
 from infthor_eval.errors import DataError, naming
 
-__all__ = ["prepared_file", "prepared_folder", "refuse_loss", "require_writable", "written_atomically"]
+__all__ = [
+    "INSTEAD_OF_LOSS",
+    "prepared_file",
+    "prepared_folder",
+    "refuse_loss",
+    "require_writable",
+    "written_atomically",
+]
 
+INSTEAD_OF_LOSS = "give another --out, or --overwrite if nobody edited it"
 _MEND = "make room, or give another place with"
 _PROBE = b"x" * 4096  # a full disk may still take a name
 
@@ -75,20 +83,19 @@ def prepared_file(path: Path, option: str = "--out") -> Path:
     return path
 
 
-def refuse_loss(path: Path, content: bytes, mend: str) -> None:
+def refuse_loss(path: Path, content: bytes) -> None:
     """Refuse to replace a file by another content: somebody may have edited it.
 
     Args:
         path: of the file.
         content: what would be written.
-        mend: what to do instead, for the message.
 
     Raises:
         DataError: the file holds something else.
     """
-    with naming(f"{path}: cannot be read", mend):
+    with naming(f"{path}: cannot be read", INSTEAD_OF_LOSS):
         if path.is_file() and path.read_bytes() != content:
-            raise DataError(f"{path}: is there already and holds something else; {mend}")
+            raise DataError(f"{path}: is there already and holds something else; {INSTEAD_OF_LOSS}")
 
 
 @contextmanager

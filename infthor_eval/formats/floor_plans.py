@@ -6,6 +6,7 @@ in metres.
 """
 
 import gzip
+import io
 import json
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -14,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from infthor_eval.errors import DataError, naming
-from infthor_eval.formats.files import written_atomically
+from infthor_eval.formats.files import INSTEAD_OF_LOSS, refuse_loss, written_atomically
 from infthor_eval.formats.reading import json_lines_of
 
 __all__ = ["floor_plan_names", "write_floor_plan"]
@@ -32,31 +33,56 @@ def floor_plan_names(root: Path) -> list[str]:
 
 
 def write_floor_plan(
-    root: Path, scene: str, objects: Sequence[dict[str, Any]], cells: Sequence[tuple[float, float]]
+    root: Path,
+    scene: str,
+    objects: Sequence[dict[str, Any]],
+    cells: Sequence[tuple[float, float]],
+    overwrite: bool = False,
 ) -> None:
-    """Add a floor plan to a folder of recorded ones, in place of what it has of that name.
+    """Add a floor plan to a folder of recorded ones.
 
     Args:
         root: the folder; made where it does not exist.
         scene: name of the floor plan.
         objects: metadata of every object, as AI2-THOR reports it.
         cells: reachable (x, z), metres.
+        overwrite: whether it may take the place of another recording of that name.
 
     Raises:
-        DataError: the folder's file of objects cannot be read or written.
+        DataError: the folder has another recording of it, or its file of objects cannot be read or written.
     """
     path = root / _OBJECTS
-    layouts = root / "alfred" / "layouts"
     line = json.dumps({"scene": scene, "objects": [_without_corners(item) for item in objects]})
-    kept = [line for name, line in _recorded(path) if name != scene] if path.exists() else []
+    recorded = dict(_recorded(path)) if path.exists() else {}
+    layout = _layout(root, scene, objects, cells)
+    if not overwrite:
+        if recorded.get(scene, line) != line:
+            raise DataError(f"{path}: has {scene} already and holds something else of it; {INSTEAD_OF_LOSS}")
+        for file, content in layout.items():
+            refuse_loss(file, content)
+    kept = [other for name, other in recorded.items() if name != scene]
     with naming(f"{path}: {scene} cannot be added", "give another folder"):
+        for file, content in layout.items():
+            file.parent.mkdir(parents=True, exist_ok=True)
+            with written_atomically(file) as partial:
+                partial.write_bytes(content)
         path.parent.mkdir(parents=True, exist_ok=True)
-        layouts.mkdir(parents=True, exist_ok=True)
-        np.save(layouts / f"{scene}-layout.npy", np.array(cells, dtype=np.float64).reshape(-1, 2))
-        types = sorted({item["objectType"] for item in objects})
-        (layouts / f"{scene}-objects.json").write_text(json.dumps(types, indent=1) + "\n", encoding="utf-8")
-        with written_atomically(path) as partial, gzip.open(partial, "wt", encoding="utf-8") as file:
-            file.writelines(f"{text}\n" for text in [*kept, line])
+        with written_atomically(path) as partial, gzip.open(partial, "wt", encoding="utf-8") as packed:
+            packed.writelines(f"{text}\n" for text in [*kept, line])
+
+
+def _layout(
+    root: Path, scene: str, objects: Sequence[dict[str, Any]], cells: Sequence[tuple[float, float]]
+) -> dict[Path, bytes]:
+    """The small files of a floor plan: the cells, and the types that there are."""
+    array = io.BytesIO()
+    np.save(array, np.array(cells, dtype=np.float64).reshape(-1, 2))
+    types = sorted({item["objectType"] for item in objects})
+    folder = root / "alfred" / "layouts"
+    return {
+        folder / f"{scene}-layout.npy": array.getvalue(),
+        folder / f"{scene}-objects.json": f"{json.dumps(types, indent=1)}\n".encode(),
+    }
 
 
 def _recorded(path: Path) -> Iterator[tuple[str, str]]:

@@ -15,6 +15,8 @@ __all__ = [
     "IMAGE_ASPECT",
     "IMAGE_MEGAPIXELS",
     "LINE_MB",
+    "TEMPLATE_CHARACTERS",
+    "TEMPLATE_MB",
     "TEMPLATE_SECONDS",
     "TRAJECTORIES",
     "Limit",
@@ -60,3 +62,5 @@ IMAGE_ASPECT = Limit("INFTHOR_EVAL_MAX_IMAGE_ASPECT", 100)  # longer side over s
 ALIAS_NODES = Limit("INFTHOR_EVAL_MAX_YAML_NODES", 100_000)  # of a YAML document with its aliases written out
 TRAJECTORIES = Limit("INFTHOR_EVAL_MAX_TRAJECTORIES", 1_000_000)  # that one command is to make
 TEMPLATE_SECONDS = Limit("INFTHOR_EVAL_MAX_TEMPLATE_SECONDS", 60)  # of computing, for one text from a chat template
+TEMPLATE_MB = Limit("INFTHOR_EVAL_MAX_TEMPLATE_MB", 2048)  # of memory, likewise
+TEMPLATE_CHARACTERS = Limit("INFTHOR_EVAL_MAX_TEMPLATE_CHARACTERS", 16_000_000)  # of that text

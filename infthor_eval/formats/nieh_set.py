@@ -28,6 +28,7 @@ __all__ = ["NiehSet", "SkippedQuestion"]
 T = TypeVar("T")
 _LONGEST = 40  # characters of a name in a message
 _MEND = "unpack the trajectory again"
+_GIVE_A_SET = "give the folder of an NIEH set, or fetch the published one: fetch nieh"  # wherever it was to be given
 _IMAGE_FOLDERS = ("img", "img_768")
 _IMAGE_SUFFIXES = {".png", ".jpg", ".jpeg"}
 
@@ -64,11 +65,11 @@ class NiehSet:
                 format says.
         """
         if not root.is_dir():
-            raise DataError(f"{root}: no such folder; give an NIEH set with --data")
+            raise DataError(f"{root}: no such folder; {_GIVE_A_SET}")
         self.root = root
         self._files = sorted(root.glob("qa_set*.csv"))
         if not self._files:
-            raise DataError(f"{root}: no qa_set*.csv in it; an NIEH set has question files beside metadata/")
+            raise DataError(f"{root}: no qa_set*.csv in it, which a set has beside metadata/; {_GIVE_A_SET}")
         if not (root / "metadata").is_dir():
             raise DataError(f"{root}: no metadata/ in it; unpack the set's metadata.tar there")
         if trajectories is not None and not trajectories.is_dir():

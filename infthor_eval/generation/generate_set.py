@@ -6,10 +6,10 @@ from pathlib import Path
 
 import msgspec
 
-from infthor_eval.errors import InfthorError, UsageError
+from infthor_eval.errors import InfthorError, UsageError, naming
 from infthor_eval.formats.files import written_atomically
 from infthor_eval.formats.trajectory import encode_trajectory, iter_sources
-from infthor_eval.generation.factory import TaskStatistics, generate
+from infthor_eval.generation.factory import GeneratedTrajectory, TaskStatistics, generate
 from infthor_eval.generation.garbage import libraries_set_aside
 from infthor_eval.generation.settings import TrajectorySettings
 from infthor_eval.household.pddl import DOMAIN
@@ -86,35 +86,44 @@ def generate_set(
         simulator: where it happens.
         out: directory of the files; made where it does not exist.
         progress: is called after each trajectory.
+
+    Raises:
+        DataError: a trajectory cannot be written; those before it stay.
     """
     out.mkdir(parents=True, exist_ok=True)
     result = GeneratedSet()
     for job in jobs:
         path = out / f"{job.traj_id}.json"
         try:
-            there = path.exists()
-            with libraries_set_aside():
-                result.steps += _earlier(path, job) if there else _make(path, job, simulator, result.statistics)
+            made = None if path.exists() else _made(job, simulator)
+            result.steps += _earlier(path, job) if made is None else len(made.trajectory.plan.low_actions)
         except InfthorError as error:
             result.failures.append(str(error))
         else:
             result.paths.append(path)
-            result.resumed += there
+            if made is None:
+                result.resumed += 1
+            else:  # not a failure of this one: where it has no room, the others would be made in vain
+                result.statistics.add(made.statistics)
+                _write(made, path)
         progress()
     return result
 
 
-def _make(path: Path, job: TrajectorySettings, simulator: Simulator, totals: TaskStatistics) -> int:
-    made = generate(job, simulator)
-    totals.add(made.statistics)
+def _made(job: TrajectorySettings, simulator: Simulator) -> GeneratedTrajectory:
+    with libraries_set_aside():
+        return generate(job, simulator)
+
+
+def _write(made: GeneratedTrajectory, path: Path) -> None:
     folder = path.with_suffix(".pddl")
-    folder.mkdir(exist_ok=True)
-    (folder / "domain.pddl").write_text(DOMAIN)
-    for number, problem in enumerate(made.problems):
-        (folder / f"task-{number:03d}.pddl").write_text(problem)
-    with written_atomically(path) as partial:  # it comes last: where it is, everything is
-        partial.write_bytes(encode_trajectory(made.trajectory))
-    return len(made.trajectory.plan.low_actions)
+    with naming(f"{path}: cannot be written", "make room and run the same command again, which goes on where it was"):
+        folder.mkdir(exist_ok=True)
+        (folder / "domain.pddl").write_text(DOMAIN)
+        for number, problem in enumerate(made.problems):
+            (folder / f"task-{number:03d}.pddl").write_text(problem)
+        with written_atomically(path) as partial:  # it comes last: where it is, everything is
+            partial.write_bytes(encode_trajectory(made.trajectory))
 
 
 def _earlier(path: Path, job: TrajectorySettings) -> int:

@@ -105,6 +105,7 @@ class TaskSummary(msgspec.Struct, frozen=True):
         yes_no: leaning to yes.
         format_failures: replies that are not of the form asked for, by reason.
         below_full_marks: by metric, which samples fell short of 1.
+        scores: by metric and trajectory, of every sample in the order of their keys: what runs are paired by.
         failures: which samples failed.
     """
 
@@ -119,6 +120,7 @@ class TaskSummary(msgspec.Struct, frozen=True):
     yes_no: YesNo
     format_failures: dict[str, int]
     below_full_marks: dict[str, list[str]]
+    scores: dict[str, dict[str, list[float]]]
     failures: list[Failure]
 
 
@@ -160,6 +162,7 @@ def _task(records: Sequence[Record], about: Mapping[str, Any]) -> TaskSummary:
         below_full_marks={
             name: [str(record.key) for record in records if _score(record, name) < 1.0] for name in metrics
         },
+        scores={name: _by_trajectory(records, name) for name in metrics},
         failures=[Failure(str(record.key), record.failure) for record in records if record.failure is not None],
     )
 
@@ -167,6 +170,13 @@ def _task(records: Sequence[Record], about: Mapping[str, Any]) -> TaskSummary:
 def _score(record: Record, metric: str) -> float:
     """The score of a recorded reply; 0 where there is none."""
     return record.payload.scores.get(metric, 0.0)
+
+
+def _by_trajectory(records: Sequence[Record], metric: str) -> dict[str, list[float]]:
+    found: dict[str, list[float]] = {}
+    for record in records:
+        found.setdefault(record.cluster, []).append(_score(record, metric))
+    return found
 
 
 def _by_clues(records: Sequence[Record], metrics: Sequence[str]) -> dict[str, Cell]:

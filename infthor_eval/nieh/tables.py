@@ -8,6 +8,7 @@ from infthor_eval.formats.question import ABSENCE
 from infthor_eval.nieh.options import SHOWN
 from infthor_eval.nieh.summary import CLUE_COLUMNS, OPEN_ENDED, Cell, NiehSummary, TaskSummary
 from infthor_eval.runs import RunSummary
+from infthor_eval.statistics import paired_difference
 from infthor_eval.tables import Column, Row, Table
 
 __all__ = ["clues_table", "tables"]
@@ -158,16 +159,16 @@ def _beside(table: PublishedTable, runs: Sequence[RunSummary]) -> Table:
 
 def _gains_table(runs: Sequence[RunSummary]) -> Table | None:
     """What each run scores above the same run on blank frames; None where there is no such pair."""
-    columns = (*CLUE_COLUMNS, OPEN_ENDED, ABSENCE)
     rows = []
     for run in runs:
         for blind in runs:
             if _frames(run) != "blank" and _frames(blind) == "blank" and _without_frames(run) == _without_frames(blind):
-                rows += [Row((_name(run), *cells)) for cells in _gains(run.summary, blind.summary, columns)]
+                rows += [Row((_name(run), *cells)) for cells in _gains(run.summary, blind.summary)]
     if not rows:
         return None
-    note = "`infthor-eval compare` on the two runs' folders tells how sure a gain is."
+    note = "95 %: of the total, paired by question and clustered by trajectory, as `infthor-eval compare` has it."
     title = "Gain over the same model's run on blank frames, in points"
+    columns = (*CLUE_COLUMNS, "95 %", OPEN_ENDED, ABSENCE)
     return Table(title, (*_NAMES, _METRIC, *map(Column, columns)), tuple(rows), (note,))
 
 
@@ -175,11 +176,27 @@ def _without_frames(run: RunSummary) -> dict[str, Any]:
     return {name: value for name, value in run.header.identity.items() if name != "frames"}
 
 
-def _gains(seeing: NiehSummary, blind: NiehSummary, columns: Sequence[str]) -> Iterator[tuple[str, ...]]:
+def _gains(seeing: NiehSummary, blind: NiehSummary) -> Iterator[tuple[str, ...]]:
     for name, task in seeing.tasks.items():
-        pairs = [(task.by_clues[column], blind.tasks[name].by_clues[column]) for column in columns]
+        other = blind.tasks[name]
         for metric in task.metrics:
-            yield name, metric, *(_gain(ours, theirs, metric) for ours, theirs in pairs)
+            by_clues, apart = (
+                [_gain(task.by_clues[column], other.by_clues[column], metric) for column in columns]
+                for columns in (CLUE_COLUMNS, (OPEN_ENDED, ABSENCE))
+            )
+            yield name, metric, *by_clues, _gain_interval(task.scores[metric], other.scores[metric]), *apart
+
+
+def _gain_interval(seeing: dict[str, list[float]], blind: dict[str, list[float]]) -> str:
+    """That of the mean gain; runs of one identity but for their frames ask the same questions, in the same order."""
+    clusters = [trajectory for trajectory, found in seeing.items() for _ in found]
+    if not clusters:
+        return "-"
+    ours, theirs = ([score for trajectory in seeing for score in scores[trajectory]] for scores in (seeing, blind))
+    gain = paired_difference(theirs, ours, clusters).estimate
+    if gain.low is None or gain.high is None:  # one trajectory alone tells nothing about others
+        return "-"
+    return f"[{100 * gain.low:+.2f}, {100 * gain.high:+.2f}]"
 
 
 def _gain(seeing: Cell, blind: Cell, metric: str) -> str:

@@ -1,5 +1,6 @@
 """One run of any suite: what is evaluated, its journal, and the order of its work."""
 
+import traceback
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -7,7 +8,7 @@ from typing import Any, Protocol
 
 import msgspec
 
-from infthor_eval.errors import InfthorError, UsageError, naming, unknown_name
+from infthor_eval.errors import InfthorError, UsageError, in_one_line, naming, unknown_name
 from infthor_eval.formats.digests import fingerprint
 from infthor_eval.formats.files import require_writable, written_atomically
 from infthor_eval.runs import journal as journals
@@ -196,15 +197,28 @@ def _evaluate(evaluation: Evaluation, workload: Workload, session: JournalSessio
 
 
 def _records(evaluation: Evaluation, group: Group, session: JournalSession) -> Iterator[UnitRecord[Any]]:
-    """The records of a group; units that it came to no record of have failed."""
+    """The records of a group; units that it came to no record of have failed, and no other group with them."""
     waiting = {unit.key: unit for unit in group.units}
+    reason = "the suite gives no record of it; mend the suite"
     try:
         for record in evaluation.run(group, session):
+            msgspec.json.encode(record)  # what cannot be written is to fail here, not where the journal writes it
             waiting.pop(record.key, None)
             yield record
     except InfthorError as error:
         reason = str(error)
-        yield from (unit.failed(reason) for unit in waiting.values())
+    except MemoryError:  # of the machine, and not of the group alone
+        raise
+    except Exception as error:  # noqa: BLE001 - a suite is anybody's code, and its fault is recorded whatever it is
+        reason = _fault(error)
+    yield from (unit.failed(reason) for unit in waiting.values())
+
+
+def _fault(error: Exception) -> str:
+    """What a programming error is, where, and what it says."""
+    place = traceback.extract_tb(error.__traceback__)[-1]
+    where = f"{Path(place.filename).name}:{place.lineno} ({place.name})"
+    return f"{type(error).__name__} in {where}: {in_one_line(error)}; mend the suite and run the same command again"
 
 
 def _write_results(folder: Path, found: RunSummary) -> None:

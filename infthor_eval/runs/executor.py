@@ -1,7 +1,7 @@
 """In which order, and how many at a time, groups are done."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from queue import SimpleQueue
+from queue import Empty, SimpleQueue
 from threading import Event, Thread
 from typing import TypeVar
 
@@ -56,8 +56,8 @@ def _work(
     waiting: "SimpleQueue[Group]", do: Do, made: "SimpleQueue[UnitRecord | BaseException | None]", stop: Event
 ) -> None:
     try:
-        while not stop.is_set() and not waiting.empty():
-            for record in do(waiting.get()):
+        while (group := _next(waiting)) is not None and not stop.is_set():
+            for record in do(group):
                 made.put(record)
                 if stop.is_set():
                     return
@@ -65,3 +65,11 @@ def _work(
         made.put(error)
     else:
         made.put(None)
+
+
+def _next(waiting: SimpleQueue[Group]) -> Group | None:
+    """The next group; None where there is none. Not by asking first: another thread may take the last one meanwhile."""
+    try:
+        return waiting.get_nowait()
+    except Empty:
+        return None

@@ -168,6 +168,8 @@ class Evaluation(Protocol):
 
         Raises:
             InfthorError: the units that have no record yet cannot be done; the run records them as failed, and goes on.
+                So it does where anything else is raised, which is a fault of the suite and recorded with its place;
+                MemoryError alone ends the run.
         """
         ...
 

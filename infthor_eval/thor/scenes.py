@@ -26,25 +26,26 @@ def scene_pictures(simulator: Simulator, scene: str) -> tuple[NDArray[np.uint8],
     return above, first
 
 
-def dump_scene(simulator: Simulator, scene: str, folder: Path) -> int:
+def dump_scene(simulator: Simulator, scene: str, folder: Path, overwrite: bool = False) -> int:
     """Write what the simulator reports of a scene into a folder of recorded floor plans.
 
     Args:
         simulator: Unity, to carry a scene to machines without it; any other serves.
         scene: its name.
         folder: the folder (`--data`).
+        overwrite: whether it may take the place of another recording of the scene.
 
     Returns:
         The number of objects.
 
     Raises:
         SimulatorError: the simulator does not have the scene.
-        DataError: the folder cannot be written.
+        DataError: the folder has another recording of the scene, or cannot be written.
     """
     simulator.reset(scene)
     objects = simulator.metadata["objects"]
     reachable = _asked(simulator, "GetReachablePositions").result
-    write_floor_plan(folder, scene, objects, [(place["x"], place["z"]) for place in reachable])
+    write_floor_plan(folder, scene, objects, [(place["x"], place["z"]) for place in reachable], overwrite)
     return len(objects)
 
 

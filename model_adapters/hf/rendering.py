@@ -9,7 +9,8 @@ from jinja2 import TemplateError
 
 from infthor_eval.errors import ModelError, naming
 from infthor_eval.formats.frames import FrameRef
-from infthor_eval.formats.limits import TEMPLATE_SECONDS
+from infthor_eval.formats.limits import TEMPLATE_CHARACTERS, TEMPLATE_MB, TEMPLATE_SECONDS
+from model_adapters.hf.memory_limit import OutOfMemoryError, taking_at_most
 from model_adapters.hf.time_limit import OutOfTimeError, computing_at_most
 from model_adapters.protocols import Turn
 
@@ -24,7 +25,6 @@ _REFUSALS = (
     ArithmeticError,
     AttributeError,
     RecursionError,
-    MemoryError,
 )
 _PRINTED = "{'type': 'text'"  # how a content looks where a template that wants a string writes a list
 
@@ -104,12 +104,16 @@ def _written(tokenizer: Any, template: str, turns: Sequence[Turn], messages: Seq
     refused = f"the chat template refuses {_roles(turns)}"
     with (
         naming(refused, f"mend it; {TEMPLATE_SECONDS.mend}", of=OutOfTimeError, as_a=ModelError),
+        naming(refused, f"mend it; {TEMPLATE_MB.mend}", of=OutOfMemoryError, as_a=ModelError),
         naming(refused, "ask in other turns, or mend it", of=_REFUSALS, as_a=ModelError),
         computing_at_most(TEMPLATE_SECONDS.value),
+        taking_at_most(TEMPLATE_MB.value),
     ):
         text: str = tokenizer.apply_chat_template(
             list(messages), chat_template=template, tokenize=False, add_generation_prompt=True
         )
+    if len(text) > TEMPLATE_CHARACTERS.value:  # which would take the tokenizer minutes, and gigabytes
+        raise ModelError(f"{refused} (it makes {len(text):,} characters); mend it; {TEMPLATE_CHARACTERS.mend}")
     _check_texts(text, turns)
     return text
 

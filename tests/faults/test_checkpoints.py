@@ -122,6 +122,30 @@ DAMAGES = {
         _template("{% for i in range(99999) %}{% for j in range(99999) %}{% endfor %}{% endfor %}"),
         "set INFTHOR_EVAL_MAX_TEMPLATE_SECONDS to more than 1",
     ),
+    "template repeats a text": (
+        _template("{{ 'x' * 10**10 }}"),
+        "set INFTHOR_EVAL_MAX_TEMPLATE_MB to more than 512",
+    ),
+    "template repeats a list": (
+        _template("{{ (messages * 10**9) | length }}"),
+        "set INFTHOR_EVAL_MAX_TEMPLATE_MB to more than 512",
+    ),
+    "template fills a line": (
+        _template("{{ 'x' | center(10**10) }}"),
+        "set INFTHOR_EVAL_MAX_TEMPLATE_MB to more than 512",
+    ),
+    "template doubles a text": (
+        _template("{% set a = namespace(t='x') %}{% for i in range(40) %}{% set a.t = a.t ~ a.t %}{% endfor %}"),
+        "set INFTHOR_EVAL_MAX_TEMPLATE_MB to more than 512",
+    ),
+    "template writes without end": (
+        _template("{% for i in range(99999) %}{{ 'x' * 10**5 }}{% endfor %}"),
+        "set INFTHOR_EVAL_MAX_TEMPLATE_MB to more than 512",
+    ),
+    "template makes a text of twenty million": (
+        _template("{% for i in range(2000) %}{{ 'x' * 10**4 }}{% endfor %}"),
+        "set INFTHOR_EVAL_MAX_TEMPLATE_CHARACTERS to more than 16000000",
+    ),
     "template is no UTF-8": (_content("chat_template.jinja", b"\xff"), "cannot be loaded"),
     "template of old is a list": (
         lambda folder: (_without("chat_template.jinja")(folder), _content("chat_template.json", b"[]")(folder)),
@@ -139,6 +163,7 @@ def test_a_damaged_checkpoint(whole, tmp_path, monkeypatch, name):
 
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("INFTHOR_EVAL_MAX_TEMPLATE_SECONDS", "1")
+    monkeypatch.setenv("INFTHOR_EVAL_MAX_TEMPLATE_MB", "512")
     folder = shutil.copytree(whole, tmp_path / "damaged")
     Image.new("RGB", (56, 56)).save(tmp_path / "a.png")
     damage, said = DAMAGES[name]

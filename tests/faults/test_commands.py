@@ -1,5 +1,6 @@
 """What is typed, and where the output is to go: one line and exit code 2 before any work."""
 
+import gzip
 import json
 import os
 from pathlib import Path
@@ -120,6 +121,15 @@ TYPED = [
         "--model-args for blind is given twice",
     ),
     (["bundle", "file", "--out", "OUT"], "not in its documented form"),
+    (
+        ["validate", "nowhere", "--models", "oracle", "--out", "OUT"],
+        "nowhere: no such folder; give the folder of an NIEH set, or fetch the published one: fetch nieh",
+    ),
+    (
+        ["validate", ".", "--models", "oracle", "--out", "OUT"],
+        "no qa_set*.csv in it, which a set has beside metadata/; give the folder of an NIEH set, or fetch",
+    ),
+    ([*RUN[:-1], "nowhere", "--output", "OUT"], "nowhere: no such folder; give the folder of an NIEH set, or fetch"),
 ]
 
 
@@ -163,6 +173,42 @@ def test_questions_do_not_replace_what_somebody_edited(tmp_path, run, monkeypatc
     assert b"cup" in (tmp_path / "qa.csv").read_bytes()
     assert run(*arguments, "--overwrite")[0] == 0
     assert (tmp_path / "qa.csv").read_bytes() == made
+
+
+# What a command writes, and one of the files that somebody may have edited since.
+REPLACES = {
+    "scenes show": (["scenes", "show", "kitchen-1", "--size", 64, "--out", "a.png"], "a.png"),
+    "scenes show as JPEG": (["scenes", "show", "kitchen-1", "--size", 64, "--out", "a.jpg"], "a.jpg"),
+    "scenes dump, cells": ([*OUTPUTS["scenes dump"], "d"], "d/alfred/layouts/kitchen-1-layout.npy"),
+    "scenes dump, types": ([*OUTPUTS["scenes dump"], "d"], "d/alfred/layouts/kitchen-1-objects.json"),
+}
+
+
+@pytest.mark.parametrize("name", REPLACES)
+def test_a_scene_does_not_replace_what_somebody_edited(typed, tmp_path, name):
+    arguments, edited = REPLACES[name]
+    assert typed(*arguments)[0] == 0
+    assert typed(*arguments)[0] == 0
+    made = (tmp_path / edited).read_bytes()
+    (tmp_path / edited).write_text("of somebody's")
+    said_in_one_line(
+        typed(*arguments), f"{edited}: is there already and holds something else; give another --out, or --overwrite"
+    )
+    assert (tmp_path / edited).read_text() == "of somebody's"
+    assert typed(*arguments, "--overwrite")[0] == 0
+    assert (tmp_path / edited).read_bytes() == made
+
+
+def test_a_dump_does_not_replace_another_recording_of_its_scene(typed, tmp_path):
+    path = tmp_path / "d" / "thor_scenes" / "objects.jsonl.gz"
+    path.parent.mkdir(parents=True)
+    others = '{"scene": "bedroom-1", "objects": []}\n'
+    path.write_bytes(gzip.compress(f'{{"scene": "kitchen-1", "objects": []}}\n{others}'.encode()))
+    arguments = [*OUTPUTS["scenes dump"], "d"]
+    said_in_one_line(typed(*arguments), "has kitchen-1 already and holds something else of it; give another --out")
+    assert not (tmp_path / "d" / "alfred").exists()
+    assert typed(*arguments, "--overwrite")[0] == 0
+    assert gzip.decompress(path.read_bytes()).decode().startswith(others)
 
 
 def test_a_run_outside_git_says_nothing_of_git(typed, capfd):

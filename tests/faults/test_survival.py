@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
 import torch
@@ -211,6 +212,35 @@ def test_a_full_disk_in_mid_run_is_one_line_and_the_run_goes_on_later(make_nieh_
     assert code == 0
     (journal,) = (tmp_path / "out").rglob("journal")
     assert len(read_run(journal.parent, RECORDS)[1]) == 5
+
+
+@pytest.mark.parametrize("full_at", ["kitchen-1-seed1.json", "task-000.pddl"])
+def test_a_disk_that_is_full_while_trajectories_are_made_keeps_those_that_are(tmp_path, run, monkeypatch, full_at):
+    arguments = ["generate", "--scene", "kitchen-1", "--min-steps", 1, "--min-subgoals", 1, "--out", tmp_path]
+    assert run(*arguments)[0] == 0
+    first = (tmp_path / "kitchen-1-seed0.json").read_bytes()
+    makes_more = [*arguments, "--count", 3]
+
+    def full(written):
+        def write(path, content, *args, **kwargs):
+            if full_at not in path.name:
+                return written(path, content, *args, **kwargs)
+            written(path, content[: len(content) // 2])
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+        return write
+
+    with monkeypatch.context() as patched:
+        for name in ("write_bytes", "write_text"):
+            patched.setattr(f"pathlib.Path.{name}", full(getattr(Path, name)))
+        said_in_one_line(
+            run(*makes_more), "kitchen-1-seed1.json: cannot be written (No space left on device); make room and run"
+        )
+    assert [path.name for path in tmp_path.glob("*.json")] == ["kitchen-1-seed0.json"]
+    assert [path.name for path in tmp_path.glob(".*partial")] == []
+    code, out, err = run(*makes_more)
+    assert (code, "3 trajectories (1 made earlier)" in out) == (0, True), err
+    assert (tmp_path / "kitchen-1-seed0.json").read_bytes() == first
 
 
 @pytest.mark.parametrize("scores", [[torch.nan] * 4, [1.0, torch.nan, 2.0, 0.0], [-torch.inf] * 4])

@@ -1,6 +1,8 @@
 from rich.console import Console
 
+from infthor_eval.nieh.suite import NiehSuite
 from infthor_eval.nieh.tables import clues_table, tables
+from infthor_eval.report.comparison import compare
 from infthor_eval.report.terminal import print_table
 
 from .made import identity, record, run_of
@@ -128,12 +130,33 @@ def gains(*runs):
 def test_a_run_is_set_against_the_same_models_run_on_blank_frames():
     seeing, blank = run_of(identity(), right_but_every(4, 40)), run_of(identity(frames="blank"), right_but_every(2, 40))
     (table,) = gains(seeing, blank)
+    # Two or three more of the ten questions of each of four trajectories are right: spread 0.0289, and t(3) is 3.182.
+    interval = "[+15.81, +34.19]"
     assert [row.cells for row in table.rows] == [
-        ("a run", "nieh_gt", metric, "+25.00", "-", "-", "+25.00", "+25.00", "-") for metric in ("reference", "strict")
+        ("a run", "nieh_gt", metric, "+25.00", "-", "-", "+25.00", interval, "+25.00", "-")
+        for metric in ("reference", "strict")
     ]
     assert gains(blank, seeing) == [table]
     names = [row.cells[0] for row in clues_table([seeing, blank]).rows if not row.is_published]
     assert names[:4] == ["a run", "a run", "a run, blank frames", "a run, blank frames"]
+
+
+def test_the_interval_of_a_gain_is_that_of_the_comparison_of_both_runs():
+    ours, theirs = ([*right_but_every(nth, 37), record(40, None, failure="too long")] for nth in (5, 3))
+    (table,) = gains(run_of(identity(), ours[::-1]), run_of(identity(frames="blank"), theirs))
+    for compared in compare(NiehSuite(), theirs, ours):
+        (row,) = [row for row in table.rows if row.cells[2] == compared.metric]
+        estimate = compared.difference.estimate
+        assert row.cells[6:8] == (
+            f"{100 * estimate.mean:+.2f}",
+            f"[{100 * estimate.low:+.2f}, {100 * estimate.high:+.2f}]",
+        )
+
+
+def test_a_gain_on_one_trajectory_has_no_interval():
+    runs = [run_of(identity(frames=frames), [record(0, "mug"), record(4, "cup")]) for frames in ("shown", "blank")]
+    (table,) = gains(*runs)
+    assert {row.cells[7] for row in table.rows} == {"-"}
 
 
 def test_a_gain_is_over_the_same_run_alone():

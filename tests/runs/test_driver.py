@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from queue import SimpleQueue
 
 import msgspec
 import pytest
@@ -60,6 +61,75 @@ def test_a_group_that_fails_takes_no_other_with_it_and_its_units_are_named(tmp_p
     assert outcome.summary.summary.numbers == (2, 2)
     assert [record.payload.answer for record in outcome.records] == [4, 5, None, None]
     assert read_run(outcome.folder, ToySuite.records) == (outcome.summary.header, outcome.records)
+
+
+def broken_by(error, answered=0):
+    """A suite whose second group raises when it has answered so many units."""
+
+    class Broken(Sums):
+        def run(self, group, session):
+            if group.context != "broken":
+                yield from super().run(group, session)
+                return
+            for unit in group.units[:answered]:
+                yield unit.record("f", Sum(unit.payload.numbers, sum(unit.payload.numbers)))
+            if error is not None:
+                raise error
+
+    return type("BrokenSuite", (ToySuite,), {"prepare": lambda self, request: Broken()})()
+
+
+FAULTS = {
+    "a value": (ValueError("no such\nsum"), "ValueError in test_driver.py:", ": no such sum; mend the suite"),
+    "a key": (KeyError("sum"), "KeyError in test_driver.py:", ": no 'sum'; mend the suite"),
+    "a bug": (RuntimeError(), "RuntimeError in test_driver.py:", ": RuntimeError; mend the suite"),
+    "of the system": (OSError(5, "Input/output error"), "OSError in test_driver.py:", ": Input/output error; mend"),
+    "an assertion": (AssertionError("odd"), "AssertionError in test_driver.py:", "(run): odd; mend the suite"),
+    "no record": (None, "the suite gives no record of it", "; mend the suite"),
+}
+
+
+@pytest.mark.parametrize("name", FAULTS)
+@pytest.mark.parametrize("answered", [0, 1])
+def test_a_programming_error_in_a_group_fails_its_units_alone_with_type_place_and_message(tmp_path, name, answered):
+    error, said, why = FAULTS[name]
+    outcome, watching = run(request(tmp_path), broken_by(error, answered))
+    assert outcome.summary.summary.numbers == (2 + answered, 2 - answered)
+    assert len(watching.seen) == 4
+    for failure in (record.failure for record in outcome.records[2 + answered :]):
+        assert said in failure
+        assert why in failure
+        assert "\n" not in failure
+    assert [resumed for _, _, resumed in run(request(tmp_path))[1].seen[:2]] == [True, True]
+
+
+def test_a_record_that_cannot_be_written_fails_alone(tmp_path):
+    class Odd(Sums):
+        def run(self, group, session):
+            for unit in group.units:
+                yield unit.record("f", Sum((object(), 0)) if group.context else unit.payload)
+
+    outcome, _ = run(request(tmp_path), type("OddSuite", (ToySuite,), {"prepare": lambda self, asked: Odd()})())
+    assert outcome.summary.summary.numbers == (2, 2)
+    assert outcome.records[3].failure.startswith("TypeError in ")
+    assert "Encoding objects of type object is unsupported" in outcome.records[3].failure
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, SystemExit, MemoryError])
+def test_what_is_no_fault_of_the_suite_ends_the_run_and_keeps_what_is_done(tmp_path, error):
+    with pytest.raises(error):
+        run(request(tmp_path), broken_by(error()))
+    assert [resumed for _, _, resumed in run(request(tmp_path))[1].seen[:2]] == [True, True]
+
+
+def test_a_programming_error_is_counted_and_told_at_the_end(tmp_path, capfd):
+    from infthor_eval.cli.evaluate import evaluate
+
+    assert evaluate([(request(tmp_path), broken_by(ZeroDivisionError("of its own")))]) == 1
+    shown, said = capfd.readouterr()
+    assert ["adder", "2"] in [line.split() for line in shown.splitlines()]
+    assert "sums: 2 sample(s) failed, counted as wrong: ZeroDivisionError in test_driver.py:" in said
+    assert "Traceback" not in said
 
 
 def test_what_is_known_is_not_done_again_and_what_failed_is_tried_again(tmp_path):
@@ -174,6 +244,19 @@ def test_groups_in_flight_are_done_at_the_same_time_and_each_in_its_order():
     assert sorted(record.id for record in records) == sorted(u.key.id for g in groups(6) for u in g.units)
     for number in range(6):
         assert [r.id for r in records if r.id.startswith(f"{number}.")] == [f"{number}.{u}" for u in range(3)]
+
+
+@pytest.mark.timeout(20)
+def test_a_thread_that_finds_the_last_group_taken_ends(monkeypatch):
+    class Slow(SimpleQueue):
+        def empty(self):
+            found = super().empty()
+            time.sleep(0.02)
+            return found
+
+    monkeypatch.setattr("infthor_eval.runs.executor.SimpleQueue", Slow)
+    records = list(evaluated(groups(3), lambda group: (unit.record("f", unit.payload) for unit in group.units), 2))
+    assert len(records) == 9
 
 
 def test_an_error_in_a_thread_ends_the_run_with_that_error():

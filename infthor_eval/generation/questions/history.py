@@ -135,6 +135,11 @@ class History:
         return frozenset(canonical(state.type) for step in self.steps for state in step.changes.values())
 
     @cached_property
+    def has_rooms(self) -> bool:
+        """Whether the scene is of several rooms, each of which has a floor of its own."""
+        return sum(state.type == "Floor" for state in self.world(0).values()) > 1
+
+    @cached_property
     def types_told(self) -> frozenset[str]:
         """The types that the simulator calls visible at any time, so that the log tells what they are."""
         return frozenset(name for step in self.steps for name in step.object_log.visible)

@@ -5,6 +5,8 @@ trajectory's scene and is not easily taken for one that does: one that other tra
 name does not give the answer away, and where there are few of these, another of AI2-THOR's. No frame proves an absence,
 so it carries a sampled frame instead of evidence: one, as a yes-question has one, because else the number of frames
 would give the answer away.
+
+In a house of several rooms nobody could say which one "this room" is, and only the second form is asked.
 """
 
 import random
@@ -70,7 +72,7 @@ def present(history: History) -> Iterator[Candidate]:
                 first.setdefault(world[key].type, frame)
     for object_type, frame in sorted(first.items()):
         if _asked(object_type):
-            yield from _both(object_type, frame, "yes")
+            yield from _asking(history, object_type, frame, "yes")
 
 
 def absent(history: History, vocabulary: frozenset[str], rng: random.Random) -> Iterator[Candidate]:
@@ -87,13 +89,14 @@ def absent(history: History, vocabulary: frozenset[str], rng: random.Random) -> 
         types |= _missing(history, _COMMON)
     for object_type in sorted(types):
         frame = rng.choice(frames)
-        yield from _both(object_type, frame, "no")
+        yield from _asking(history, object_type, frame, "no")
 
 
-def _both(object_type: str, frame: int, answer: str) -> Iterator[Candidate]:
-    """The two forms."""
+def _asking(history: History, object_type: str, frame: int, answer: str) -> Iterator[Candidate]:
+    """The forms that suit the scene."""
     words = noun(object_type)
-    for form, name in (("Is there any {} in this room?", words), ("Have you seen {}?", an(words))):
+    of_a_room = () if history.has_rooms else (("Is there any {} in this room?", words),)
+    for form, name in (*of_a_room, ("Have you seen {}?", an(words))):
         yield Candidate(QUESTION_TYPE, form, (name,), (frame,), (answer,), (object_type,), absence=answer == "no")
 
 

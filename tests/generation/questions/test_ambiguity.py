@@ -1,10 +1,15 @@
 """What is asked only where it is clear what is meant, on logs made by hand."""
 
+import random
+
 import pytest
 
 from infthor_eval.generation.questions import contents, counting, final_state, location, open_state, presence
 from infthor_eval.generation.questions.checker import Checker
-from infthor_eval.generation.questions.history import DEFAULT_SHARE
+from infthor_eval.generation.questions.history import DEFAULT_SHARE, History
+from infthor_eval.generation.recorder import Recorder
+from infthor_eval.thor.launch import embedded
+from infthor_eval.thor.simulator import Simulator
 
 from .logs import history, moved, state
 
@@ -113,6 +118,26 @@ def test_the_first_sighting_is_shown():
     clues = {candidate.text: candidate.clues for candidate in presence.present(log)}
     assert clues["Have you seen a mug?"] == clues["Is there any mug in this room?"] == (1,)
     assert clues["Have you seen a fridge?"] == (0,)
+
+
+def test_no_room_is_meant_in_a_house_of_several():
+    rooms = {"Floor|1": state("Floor|1"), "Floor|2": state("Floor|2")}
+    for floors, forms in (
+        (dict(list(rooms.items())[:1]), {"Is there any", "Have you seen"}),
+        (rooms, {"Have you seen"}),
+    ):
+        log = history({**PLACES, **floors, MUG: state(MUG, TABLE)})
+        asked = [*presence.present(log), *presence.absent(log, frozenset({"Toaster"}), random.Random(0))]
+        assert {" ".join(candidate.text.split()[:3]) for candidate in asked} == forms
+        assert {candidate.answers for candidate in asked} == {("yes",), ("no",)}
+
+
+def test_the_rules_know_a_house_by_its_floors():
+    with Simulator(embedded()) as simulator:
+        for scene, has_rooms in (("house-1", True), ("kitchen-1", False)):
+            recorder = Recorder()
+            recorder.record(simulator.reset(scene))
+            assert History(scene, recorder.steps).has_rooms is has_rooms
 
 
 def test_a_view_well_inside_the_frame_is_preferred():
