@@ -68,7 +68,13 @@ def episode(task: PlansTask, course: Course, cast: Cast, simulators: Simulators,
 
 
 class Episode:
-    """See `episode`. The scene is restored when the first plan is played."""
+    """See `episode`. The scene is restored when the first plan is played.
+
+    Attributes:
+        begun: what is known of the plan last begun, with the most that it can earn.
+    """
+
+    begun: PlanRecord | None = None
 
     def __init__(
         self, task: PlansTask, course: Course, cast: Cast, simulator: Simulator, folder: Path, seed: int
@@ -108,6 +114,8 @@ class Episode:
         began = time.perf_counter()
         environment = self._entered()
         observation, info = environment.reset(plan.index)
+        known = described(self._course, plan)
+        self.begun = msgspec.structs.replace(known, max_reward=round(info["max_reward"], _DIGITS))
         self._actor.begin(Situation(environment, plan, f"{self._seed}/{plan.index}", observation))
         acts: list[tuple[Act, StepOutcome]] = []
         while not acts or not (acts[-1][1].terminated or acts[-1][1].truncated):
@@ -115,8 +123,7 @@ class Episode:
                 self._actor.saw(acts[-1][1])
             act = self._actor.act()
             acts.append((act, environment.step(act.action)))
-        record = _record(described(self._course, plan), acts, info["max_reward"])
-        return Played(record, _tokens([act for act, _ in acts]), time.perf_counter() - began)
+        return Played(_record(self.begun, acts), _tokens([act for act, _ in acts]), time.perf_counter() - began)
 
     def _entered(self) -> PlanEnvironment:
         if self._environment is None:
@@ -131,13 +138,12 @@ class Episode:
         return self._environment
 
 
-def _record(known: PlanRecord, acts: Sequence[tuple[Act, StepOutcome]], max_reward: float) -> PlanRecord:
+def _record(begun: PlanRecord, acts: Sequence[tuple[Act, StepOutcome]]) -> PlanRecord:
     _, last = acts[-1]
     return msgspec.structs.replace(
-        known,
+        begun,
         steps=tuple(_step(act, outcome) for act, outcome in acts),
         reward=round(sum(outcome.reward for _, outcome in acts), _DIGITS),
-        max_reward=round(max_reward, _DIGITS),
         ended=str(last.info.ended),
         goal_reached=any(outcome.info.goal_reached for _, outcome in acts),
     )

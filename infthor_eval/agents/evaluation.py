@@ -1,7 +1,7 @@
 """Plans set up for a run: which plans of which trajectories, and the doing of it, a trajectory at a time."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import msgspec
@@ -166,7 +166,8 @@ def _played(unit: PlanUnit, inputs: str, stage: Episode) -> UnitRecord[PlanRecor
     except ExpertRefusedError as error:
         return unit.excluded(str(error), inputs)
     except InfthorError as error:
-        return unit.failed(str(error), inputs)
+        begun = stage.begun if stage.begun is not None and stage.begun.index == unit.plan.index else unit.payload
+        return replace(unit, payload=begun).failed(str(error), inputs)
     return unit.record(
         inputs, played.record, faults=played.faults, seconds=round(played.seconds, 4), tokens=played.tokens
     )
