@@ -135,9 +135,12 @@ class PlanEnvironment:
             number of actions that the expert took.
 
         Raises:
+            IndexError: there is no such plan.
             ExpertRefusedError: this simulator refuses an action of the expert before the plan's end.
             SimulatorError: the simulator fails.
         """
+        if not 0 <= plan < len(self.plans):
+            raise IndexError(f"there is no plan {plan}; there are 0 to {len(self.plans) - 1}")
         found = self.plans[plan]
         expert_actions = self._expert.actions(plan)
         start, end = self._expert.start(plan), self._expert.start(plan + 1)
