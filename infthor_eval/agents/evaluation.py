@@ -69,9 +69,6 @@ class PlansEvaluation:
                 raise UsageError(f"{task.name}: no trajectory there has a final task; make some with --test-set")
         every = {course.traj_id: course for task in self._tasks.values() for course in task.courses.found}
         self._trajectories = [course.trajectory for course in every.values()]
-        scenes = Path(self._options.scenes) if self._options.scenes is not None else None
-        in_words = any(task.memory.needs_state for task in self._tasks.values())
-        self._simulators = Simulators(self._options.simulator, scenes, self._trajectories, instances=in_words)
         self._cast: Cast | None = None
 
     def outline(self) -> list[tuple[str, list[str]]]:
@@ -86,6 +83,7 @@ class PlansEvaluation:
         """See `infthor_eval.runs.Evaluation.workload`."""
         self._cast = cast_of(subject)
         self._cast.prepare(self._trajectories)
+        self._simulators = self._described_simulators(self._cast.sees)
         self._identity = {
             "tasks": {name: task.identity() for name, task in self._tasks.items()},
             "simulator": self._options.simulator,
@@ -137,6 +135,12 @@ class PlansEvaluation:
             settings=task.file.settings["generation_kwargs"],
             reply=", ".join(step.action or (step.reply or "") for step in payload.steps),
         )
+
+    def _described_simulators(self, seen: bool) -> Simulators:
+        """What episodes run in; it draws nothing that nobody looks at."""
+        scenes = Path(self._options.scenes) if self._options.scenes is not None else None
+        in_words = seen and any(task.memory.needs_state for task in self._tasks.values())
+        return Simulators(self._options.simulator, scenes, self._trajectories, image=seen, instances=in_words)
 
     def _numbers(self, task: str) -> dict[UnitKey, int]:
         """Places of the plans in their task."""
