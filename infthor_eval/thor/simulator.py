@@ -201,7 +201,8 @@ class Simulator:
         Raises:
             SimulatorError: as `step`.
         """
-        if not (not exactly and self._walk_back(mark)) and not self._restore(mark):
+        there = self._is_at(mark) or (not exactly and self._walk_back(mark)) or self._restore(mark)
+        if not there:
             self.reset(None)
             for call, _ in mark.episode:
                 self.step(**call)
