@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from importlib.metadata import version
 from pathlib import Path
 
 import msgspec
@@ -16,6 +17,7 @@ from infthor_eval.agents.task import PlansTask
 from infthor_eval.agents.trajectories import Course
 from infthor_eval.errors import InfthorError, UsageError
 from infthor_eval.formats.digests import fingerprint
+from infthor_eval.formats.floor_plans import floor_plans_digest
 from infthor_eval.runs import (
     Group,
     SampleView,
@@ -67,6 +69,8 @@ class PlansEvaluation:
         for task in self._tasks.values():
             if not task.limited:
                 raise UsageError(f"{task.name}: no trajectory there has a final task; make some with --test-set")
+        self._scenes = Path(self._options.scenes) if self._options.scenes is not None else None
+        self._floor_plans = floor_plans_digest(self._scenes) if self._scenes is not None else None
         every = {course.traj_id: course for task in self._tasks.values() for course in task.courses.found}
         self._trajectories = [course.trajectory for course in every.values()]
         self._cast: Cast | None = None
@@ -87,6 +91,8 @@ class PlansEvaluation:
         self._identity = {
             "tasks": {name: task.identity() for name, task in self._tasks.items()},
             "simulator": self._options.simulator,
+            "ai2thor": version("ai2thor"),
+            "floor_plans": self._floor_plans,
             "constrained": self._options.constrained,
             "frames": self._options.frames,
         }
@@ -138,9 +144,8 @@ class PlansEvaluation:
 
     def _described_simulators(self, seen: bool) -> Simulators:
         """What episodes run in; it draws nothing that nobody looks at."""
-        scenes = Path(self._options.scenes) if self._options.scenes is not None else None
         in_words = seen and any(task.memory.needs_state for task in self._tasks.values())
-        return Simulators(self._options.simulator, scenes, self._trajectories, image=seen, instances=in_words)
+        return Simulators(self._options.simulator, self._scenes, self._trajectories, image=seen, instances=in_words)
 
     def _numbers(self, task: str) -> dict[UnitKey, int]:
         """Places of the plans in their task."""
