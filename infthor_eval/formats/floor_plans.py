@@ -41,7 +41,8 @@ def floor_plans_digest(root: Path) -> str:
     """
     if not (root / _OBJECTS).is_file():
         raise DataError(f"{root}: no {_OBJECTS} in it; give the folder of recorded floor plans")
-    return digest_of_files([root / _OBJECTS, *sorted(root.glob("alfred/layouts/*.npy"))])
+    with naming(f"{root}: cannot be read", "restore it, or give another folder"):
+        return digest_of_files([root / _OBJECTS, *sorted(root.glob("alfred/layouts/*.npy"))])
 
 
 def write_floor_plan(
