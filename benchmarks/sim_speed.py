@@ -1,16 +1,20 @@
 """How fast the embedded simulator is through the real Controller, beside the transport's own rate.
 
-    python benchmarks/sim_speed.py [--scene kitchen-1] [--steps 600]
+    python benchmarks/sim_speed.py [--scene kitchen-1] [--steps 600] [--against CHECKOUT]
 
 Prints one JSON object: steps per second with RGB, with RGB, ids and depth, and of a process that answers every
 action with the same ready-made reply of the same size ("transport"); seconds from start to first frame; megabytes of
 the simulator's process at the start and at the end. The frames are 300x300.
+
+With --against it compares this simulator with that of another checkout instead, both at work in turn: steps per second
+(median of eight rounds) and the process's own milliseconds of processor time a step, with and without smooth edges.
 """
 
 import argparse
 import json
 import os
 import shlex
+import statistics
 import sys
 import tempfile
 import time
@@ -93,11 +97,43 @@ def measure(scene: str, steps: int) -> dict[str, Any]:
     return result
 
 
+def processor_time(client: Any) -> float:
+    """Milliseconds that the stand-in has computed so far."""
+    status = Path(f"/proc/{client.server.unity_proc.pid}/stat").read_text(encoding="ascii")
+    ticks = status.rpartition(")")[2].split()[11:13]
+    return sum(map(int, ticks)) * 1000 / os.sysconf("SC_CLK_TCK")
+
+
+def compare(scene: str, steps: int, other: str) -> dict[str, Any]:
+    """This simulator and another checkout's; see the module."""
+    python, here = shlex.quote(sys.executable), str(Path(__file__).parents[1])
+    result: dict[str, Any] = {"scene": scene, "rounds": 8}
+    for load, init in (("rgb", {}), ("rgb_ids_depth", _FULL)):
+        clients = {}
+        for name, root, more in (("other", other, {}), ("ours", here, {}), ("ours_low", here, {"quality": "Low"})):
+            os.environ["PYTHONPATH"] = root
+            clients[name] = controller(f"{python} -m infthor_eval.sim", scene, **init, **more)
+        began = {name: processor_time(client) for name, client in clients.items()}
+        rates = [{name: rate(client, steps // 8) for name, client in clients.items()} for _ in range(8)]
+        n_steps = 8 * (steps // 8 + 20)
+        result[load] = {
+            name: {
+                "steps_per_second": round(statistics.median(found[name] for found in rates), 1),
+                "processor_ms_a_step": round((processor_time(client) - began[name]) / n_steps, 2),
+            }
+            for name, client in clients.items()
+        }
+        for client in clients.values():
+            client.stop()
+    return result
+
+
 def main() -> None:
     """Parses the arguments; see the module."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--scene", default="kitchen-1")
     parser.add_argument("--steps", type=int, default=600)
+    parser.add_argument("--against", metavar="CHECKOUT", help="compare with the simulator of another checkout")
     parser.add_argument("--echo", choices=("rgb", "full"), help=argparse.SUPPRESS)
     options, _ = parser.parse_known_args()
     if options.echo:
@@ -105,7 +141,12 @@ def main() -> None:
         return
     with tempfile.TemporaryDirectory() as home:
         os.environ["HOME"] = home  # ai2thor writes logs below HOME and prunes what it finds there
-        print(json.dumps(measure(options.scene, options.steps), indent=1))
+        found = (
+            compare(options.scene, options.steps, str(Path(options.against).resolve()))
+            if options.against
+            else measure(options.scene, options.steps)
+        )
+        print(json.dumps(found, indent=1))
 
 
 if __name__ == "__main__":

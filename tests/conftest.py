@@ -10,6 +10,7 @@ import pytest
 from PIL import Image
 
 from infthor_eval.cli import main
+from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.formats.qa_csv import write_questions
 from infthor_eval.formats.question import Question
 from infthor_eval.runs import Catalog
@@ -65,6 +66,18 @@ def run(capfd: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]
         return ended.value.code, *capfd.readouterr()
 
     return run
+
+
+@pytest.fixture(scope="session")
+def scripted_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a run of plans: the baseline `scripted` in the first trajectory of the bundled set."""
+    output, data = tmp_path_factory.mktemp("scripted"), packaged_folder("sets/nieh_mini")
+    words = ("--model", "scripted", "--tasks", "infthor_plans", "--data", data, "--limit", 1, "--output", output)
+    with pytest.raises(SystemExit) as ended:
+        main([str(word) for word in words])
+    assert ended.value.code == 0
+    (folder,) = (output / "scripted").iterdir()
+    return folder
 
 
 @pytest.fixture

@@ -25,6 +25,7 @@ class _TaskAbout(msgspec.Struct, frozen=True):
     trajectories: dict[str, str]  # name to digest
     rewards: Any
     after_failure: str
+    config: dict[str, Any] = {}  # the task file's settings
 
 
 class About(msgspec.Struct, frozen=True):

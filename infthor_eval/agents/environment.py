@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from copy import deepcopy
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, NamedTuple
@@ -190,6 +191,17 @@ class PlanEnvironment:
             ExpertRefusedError: as `reset`.
         """
         return self._expert.actions(plan)
+
+    def named(self, plan: int) -> Sequence[str]:
+        """Ids of the objects that a plan names, as far as they are there; for looking at, not for rewards.
+
+        Raises:
+            ExpertRefusedError: as `reset`.
+        """
+        found, view = self.plans[plan], self._expert.start(plan).mark.view
+        grounding = deepcopy(self._expert.grounding)  # what is chosen here must not decide what an action is about
+        ids = (grounding.ground(key, view) for key in (found.object_id, found.receptacle_id) if key is not None)
+        return [key for key in ids if key is not None]
 
     def _grounded(self, action: str | Mapping[str, Any], view: View) -> tuple[str, Mapping[str, Any]]:
         if not isinstance(action, str):

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from importlib.metadata import version
 from pathlib import Path
 
 import msgspec
@@ -16,6 +17,7 @@ from infthor_eval.agents.task import PlansTask
 from infthor_eval.agents.trajectories import Course
 from infthor_eval.errors import InfthorError, UsageError
 from infthor_eval.formats.digests import fingerprint
+from infthor_eval.formats.floor_plans import floor_plans_digest
 from infthor_eval.runs import (
     Group,
     SampleView,
@@ -67,11 +69,10 @@ class PlansEvaluation:
         for task in self._tasks.values():
             if not task.limited:
                 raise UsageError(f"{task.name}: no trajectory there has a final task; make some with --test-set")
+        self._scenes = Path(self._options.scenes) if self._options.scenes is not None else None
+        self._floor_plans = floor_plans_digest(self._scenes) if self._scenes is not None else None
         every = {course.traj_id: course for task in self._tasks.values() for course in task.courses.found}
         self._trajectories = [course.trajectory for course in every.values()]
-        scenes = Path(self._options.scenes) if self._options.scenes is not None else None
-        in_words = any(task.memory.needs_state for task in self._tasks.values())
-        self._simulators = Simulators(self._options.simulator, scenes, self._trajectories, instances=in_words)
         self._cast: Cast | None = None
 
     def outline(self) -> list[tuple[str, list[str]]]:
@@ -86,9 +87,12 @@ class PlansEvaluation:
         """See `infthor_eval.runs.Evaluation.workload`."""
         self._cast = cast_of(subject)
         self._cast.prepare(self._trajectories)
+        self._simulators = self._described_simulators(self._cast.sees)
         self._identity = {
             "tasks": {name: task.identity() for name, task in self._tasks.items()},
             "simulator": self._options.simulator,
+            "ai2thor": version("ai2thor"),
+            "floor_plans": self._floor_plans,
             "constrained": self._options.constrained,
             "frames": self._options.frames,
         }
@@ -138,6 +142,11 @@ class PlansEvaluation:
             settings=task.file.settings["generation_kwargs"],
             reply=", ".join(step.action or (step.reply or "") for step in payload.steps),
         )
+
+    def _described_simulators(self, seen: bool) -> Simulators:
+        """What episodes run in; it draws nothing that nobody looks at."""
+        in_words = seen and any(task.memory.needs_state for task in self._tasks.values())
+        return Simulators(self._options.simulator, self._scenes, self._trajectories, image=seen, instances=in_words)
 
     def _numbers(self, task: str) -> dict[UnitKey, int]:
         """Places of the plans in their task."""

@@ -9,7 +9,7 @@ import msgspec
 from infthor_eval.agents.plans import PlanKind
 from infthor_eval.agents.records import PlanRecord
 from infthor_eval.runs import UnitRecord
-from infthor_eval.statistics import clustered_mean
+from infthor_eval.statistics import clustered_mean, mean_over_clusters
 
 __all__ = ["FINAL_COLUMNS", "PlansSummary", "Rate", "TaskSummary", "summarise"]
 
@@ -140,7 +140,10 @@ def _of_trajectories(records: Sequence[Record], measure: Callable[[float, float]
     for record in records:
         got, most = sums.get(record.cluster, (0.0, 0.0))
         sums[record.cluster] = got + record.payload.reward, most + (record.payload.max_reward or 0.0)
-    return _rate([measure(*sums[name]) for name in sorted(sums)], sorted(sums))
+    if not sums:
+        return None
+    estimate = mean_over_clusters([measure(*sums[name]) for name in sorted(sums)])
+    return Rate(estimate.mean, estimate.low, estimate.high, estimate.n)
 
 
 def _rate(values: Sequence[float], clusters: Sequence[str]) -> Rate | None:

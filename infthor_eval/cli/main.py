@@ -26,6 +26,7 @@ _COMMANDS = {
     "validate": "Keep the questions of a set that one of several models answers.",
     "compare": "Compare two runs on the same data.",
     "report": "Draw a figure of the paper of your own runs.",
+    "watch": "Show what an agent did in a run of plans, as MP4 or GIF.",
     "ls": "List the models, the tasks or the scenes.",
     "scenes": "Look at a scene, or carry it to machines without Unity.",
     "generate": "Make long-horizon trajectories in a scene.",

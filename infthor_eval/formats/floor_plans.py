@@ -15,10 +15,11 @@ from typing import Any
 import numpy as np
 
 from infthor_eval.errors import DataError, naming
+from infthor_eval.formats.digests import digest_of_files
 from infthor_eval.formats.files import INSTEAD_OF_LOSS, refuse_loss, written_atomically
 from infthor_eval.formats.reading import json_lines_of
 
-__all__ = ["floor_plan_names", "write_floor_plan"]
+__all__ = ["floor_plan_names", "floor_plans_digest", "write_floor_plan"]
 
 _OBJECTS = Path("thor_scenes") / "objects.jsonl.gz"
 
@@ -30,6 +31,18 @@ def floor_plan_names(root: Path) -> list[str]:
         DataError: the folder's file of objects is missing or not what it should be.
     """
     return [scene for scene, _ in _recorded(root / _OBJECTS)]
+
+
+def floor_plans_digest(root: Path) -> str:
+    """Hash of all that a folder of recorded floor plans has.
+
+    Raises:
+        DataError: the folder's file of objects is not there, or a file cannot be read.
+    """
+    if not (root / _OBJECTS).is_file():
+        raise DataError(f"{root}: no {_OBJECTS} in it; give the folder of recorded floor plans")
+    with naming(f"{root}: cannot be read", "restore it, or give another folder"):
+        return digest_of_files([root / _OBJECTS, *sorted(root.glob("alfred/layouts/*.npy"))])
 
 
 def write_floor_plan(

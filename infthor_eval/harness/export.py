@@ -76,10 +76,11 @@ class _Scored:
 
 
 def _tasks(outcome: RunOutcome) -> list[_Scored]:
-    """The tasks of which there are records."""
+    """The tasks of which there are records that count."""
     by_task: dict[str, list[UnitRecord[Any]]] = {}
     for record in outcome.records:
-        by_task.setdefault(record.task, []).append(record)
+        if record.excluded is None:
+            by_task.setdefault(record.task, []).append(record)
     return [
         _Scored(file, by_task[file.name], [outcome.run.suite.scores(record) for record in by_task[file.name]])
         for file in outcome.run.request.tasks.tasks

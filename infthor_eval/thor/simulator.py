@@ -47,6 +47,7 @@ class Simulator:
         *,
         width: int = 300,
         height: int = 300,
+        image: bool = True,
         instances: bool = True,
         depth: bool = False,
         max_restarts: int = 3,
@@ -59,6 +60,7 @@ class Simulator:
             launch: what to start.
             width: of the frames, pixels.
             height: of the frames, pixels.
+            image: whether views after actions have a frame; half of an action's time is spent on it.
             instances: whether views tell which object each pixel shows.
             depth: whether views have depth.
             max_restarts: how many failures one episode may survive from one mark to the next.
@@ -74,6 +76,7 @@ class Simulator:
             "renderDepthImage": depth,
             **options,
         }
+        self._unseen = {} if image else {"renderImage": False}
         self._max_restarts = max_restarts
         self._max_copies = max_copies
         self._controller: SafeController | None = None
@@ -195,7 +198,8 @@ class Simulator:
         Raises:
             SimulatorError: as `step`.
         """
-        if not (not exactly and self._walk_back(mark)) and not self._restore(mark):
+        there = self._is_at(mark) or (not exactly and self._walk_back(mark)) or self._restore(mark)
+        if not there:
             self.reset(None)
             for call, _ in mark.episode:
                 self.step(**call)
@@ -257,7 +261,7 @@ class Simulator:
     def _call(self, call: dict[str, Any]) -> View:
         assert self._controller is not None
         try:
-            return view_of(self._controller.step(dict(call)))
+            return view_of(self._controller.step({**self._unseen, **call}))
         except ValueError:
             # ai2thor raises it for unknown actions and arguments; the reply is kept and says so itself.
             return view_of(self._controller.last_event)

@@ -151,3 +151,19 @@ def test_preparing_a_plan_does_not_take_longer_the_later_it_is(simulator):
             assert len(calls) <= 4  # nothing is repeated
     finally:
         del simulator.step
+
+
+def test_a_simulator_that_keeps_no_copies_repeats_what_was_done(simulator, monkeypatch):
+    """As Unity does."""
+    found = trajectory("bedroom-1-seed7")
+    expected = PlanEnvironment(found, simulator).reset(3)
+    query = simulator.query
+    unsaved = query("Pass")
+    object.__setattr__(unsaved, "success", False)
+    monkeypatch.setattr(simulator, "query", lambda action, **kw: unsaved if "State" in action else query(action, **kw))
+    environment = PlanEnvironment(found, simulator)
+    environment.reset(1)
+    environment.step("RotateLeft")
+    observation, info = environment.reset(3)
+    assert (observation.view.agent, info) == (expected[0].view.agent, expected[1])
+    assert np.array_equal(observation.view.frame, expected[0].view.frame)

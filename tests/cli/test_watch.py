@@ -1,0 +1,112 @@
+"""The command that shows what an agent did."""
+
+import json
+
+import cv2
+import msgspec
+import pytest
+from PIL import Image
+
+from infthor_eval.agents.records import RECORDS
+from infthor_eval.formats.packaged import packaged_folder
+from infthor_eval.report.recording import END_HELD, SIZE, TITLE_HELD
+from infthor_eval.runs import read_run
+from infthor_eval.runs.journal import Journal
+
+SET = packaged_folder("sets/nieh_mini")
+NAME = "bedroom-1-seed7"
+
+
+def refused(found, *said):
+    code, out, err = found
+    assert (code, out, len(err.splitlines())) == (2, "", 1)
+    for words in said:
+        assert words in err
+
+
+def n_pictures(folder, *numbers):
+    """Of plans by their numbers."""
+    plans = {record.payload.index + 1: record.payload for record in read_run(folder, RECORDS)[1]}
+    return sum(TITLE_HELD + len(plans[number].steps) + END_HELD for number in numbers)
+
+
+def test_two_plans_become_an_mp4(scripted_run, tmp_path, run):
+    out = tmp_path / "new" / "watched.mp4"
+    code, said, err = run("watch", scripted_run, "--trajectory", NAME, "--plans", "2-3", "--data", SET, "--out", out)
+    wanted = n_pictures(scripted_run, 2, 3)
+    assert (code, err.strip()) == (0, "")
+    assert said.splitlines() == [f"2 of 12 plans, {wanted / 2:.0f} s: {out}"]
+    video = cv2.VideoCapture(str(out))
+    sizes = []
+    while (picture := video.read())[0]:
+        sizes.append(picture[1].shape)
+    assert sizes == [(SIZE[1], SIZE[0], 3)] * wanted
+    assert [path.name for path in out.parent.iterdir()] == ["watched.mp4"]
+
+
+def test_a_gif_is_as_long_as_its_plans(scripted_run, tmp_path, run):
+    out = tmp_path / "watched.gif"
+    code, _, _ = run("watch", scripted_run, "--plans", 2, "--data", SET, "--out", out, "--fps", 5)
+    assert code == 0
+    with Image.open(out) as gif:
+        assert gif.size == SIZE
+        durations = []
+        for number in range(gif.n_frames):
+            gif.seek(number)
+            durations.append(gif.info["duration"])
+    assert sum(durations) == 200 * n_pictures(scripted_run, 2)
+
+
+def test_a_file_is_named_for_what_it_shows(scripted_run, tmp_path, run, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    code, said, _ = run("watch", scripted_run, "--plans", "2", "--data", SET)
+    path = f"results/recordings/scripted-infthor_plans-{NAME}-2.mp4"
+    assert (code, said.split()[-1]) == (0, path)
+    assert (tmp_path / path).stat().st_size > 1000
+
+
+def test_what_ends_otherwise_than_recorded_is_said_in_a_line(scripted_run, tmp_path, run):
+    header, records = read_run(scripted_run, RECORDS)
+    with Journal(tmp_path / "run", header, RECORDS) as journal:
+        for record in records:
+            steps = tuple(msgspec.structs.replace(step, reward=9.0) for step in record.payload.steps)
+            journal.append(
+                msgspec.structs.replace(record, payload=msgspec.structs.replace(record.payload, steps=steps))
+            )
+    code, said, err = run("watch", tmp_path / "run", "--plans", 2, "--data", SET, "--out", tmp_path / "a.gif")
+    line = "otherwise than recorded: plan 2, action 1: PickupObject Mug earns 2 now, and 9 in the run"
+    assert (code, err.strip()) == (0, line)
+    assert "1 of 12 plans" in said
+
+
+def test_what_cannot_be_watched_is_one_line(scripted_run, make_nieh_set, tmp_path, run):
+    def watch(*words):
+        return run("watch", scripted_run, "--data", SET, *words)
+
+    refused(watch("--trajectory", "hall-9"), f"unknown trajectory of this run 'hall-9'; there are {NAME}")
+    refused(watch("--task", "infthor"), "unknown task of this run 'infthor'; did you mean 'infthor_plans'?")
+    refused(watch("--plans", "3-99"), "--plans 3-99: the run has plans 1 to 12")
+    refused(watch("--plans", "99"), "--plans 99: the run has plans 1 to 12")
+    refused(watch("--plans", "two"), "--plans 'two': is neither a plan's number nor two of them; write 7, or 3-7")
+    refused(watch("--out", tmp_path / "a.avi"), "a.avi: a recording is .mp4 or .gif")
+    refused(watch("--out", tmp_path / "a.mp4", "--fps", "0"), "--fps")
+    (tmp_path / "a.mp4").mkdir()
+    refused(watch("--out", tmp_path / "a.mp4"), "is not a file; give another place with --out")
+    refused(run("watch", scripted_run), "do not come with the package; give them as --data FILE or FOLDER")
+    refused(run("watch", scripted_run, "--data", tmp_path / "none"), "there is no such file or folder")
+    refused(run("watch", tmp_path), f"{tmp_path}: no journal in it; give the folder of a run")
+    run("--model", "oracle", "--tasks", "nieh_gt", "--data", make_nieh_set(size=56), "--output", tmp_path / "nieh")
+    (asked,) = (tmp_path / "nieh" / "oracle").iterdir()
+    refused(run("watch", asked), f"{asked}: is a run of nieh, and only runs of plans can be watched")
+
+
+@pytest.mark.parametrize("name", [NAME, "kitchen-1-seed7"])
+def test_a_trajectory_that_is_not_the_runs_is_one_line(scripted_run, tmp_path, run, name):
+    content = json.loads((SET / "metadata" / name / "traj_data.json").read_text())
+    content["more"] = 1
+    (tmp_path / "changed.json").write_text(json.dumps(content))
+    said = (
+        "is not what it was when the run was made" if name == NAME else f"not among the trajectories of --data ({name}"
+    )
+    refused(run("watch", scripted_run, "--data", tmp_path / "changed.json", "--out", tmp_path / "a.gif"), NAME, said)
+    assert not (tmp_path / "a.gif").exists()

@@ -1,0 +1,69 @@
+"""Files that move."""
+
+import cv2
+import pytest
+from PIL import Image
+
+from infthor_eval.errors import DataError, UsageError
+from infthor_eval.formats.moving_pictures import require_moving, write_moving
+
+SHADES = (0, 60, 60, 120, 180, 240)
+
+
+def shades():
+    return (Image.new("RGB", (64, 48), (shade, shade, shade)) for shade in SHADES)
+
+
+def test_an_mp4_has_every_picture_in_its_size_and_time(tmp_path):
+    path = tmp_path / "a.mp4"
+    assert write_moving(path, shades(), 3.0) == len(SHADES)
+    video = cv2.VideoCapture(str(path))
+    assert video.get(cv2.CAP_PROP_FPS) == 3.0
+    for shade in SHADES:
+        decoded, pixels = video.read()
+        assert decoded
+        assert pixels.shape == (48, 64, 3)
+        assert abs(float(pixels.mean()) - shade) < 6
+    assert not video.read()[0]
+
+
+def test_a_gif_shows_every_picture_for_its_time(tmp_path):
+    path = tmp_path / "a.GIF"
+    assert write_moving(path, shades(), 4.0) == len(SHADES)
+    with Image.open(path) as gif:
+        assert gif.size == (64, 48)
+        durations, seen = [], []
+        for number in range(gif.n_frames):
+            gif.seek(number)
+            durations.append(gif.info["duration"])
+            seen.append(gif.convert("RGB").getpixel((5, 5))[0])
+    assert sum(durations) == pytest.approx(len(SHADES) * 250, abs=10 * len(SHADES))
+    assert seen == sorted(set(SHADES))  # two alike are one, shown for twice as long
+
+
+@pytest.mark.parametrize("name", ["a.mp4", "a.gif"])
+def test_the_same_pictures_are_the_same_bytes(tmp_path, name):
+    (tmp_path / "other").mkdir()
+    paths = tmp_path / name, tmp_path / "other" / name
+    for path in paths:
+        write_moving(path, shades(), 2.0)
+    assert paths[0].read_bytes() == paths[1].read_bytes()
+
+
+@pytest.mark.parametrize("name", ["a.mp4", "a.gif"])
+def test_nothing_is_left_where_a_picture_fails(tmp_path, name):
+    def failing():
+        yield from shades()
+        raise DataError("no frame")
+
+    with pytest.raises(DataError, match="no frame"):
+        write_moving(tmp_path / name, failing(), 2.0)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_other_names_are_refused(tmp_path):
+    for name in ("a.avi", "a", ".mp4"):
+        with pytest.raises(UsageError, match=r"a recording is \.mp4 or \.gif"):
+            require_moving(tmp_path / name)
+    with pytest.raises(DataError, match="cannot be written"):
+        write_moving(tmp_path / "none" / "a.mp4", shades(), 2.0)
