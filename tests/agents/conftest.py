@@ -21,18 +21,16 @@ class SharedSimulators:
 
     def __init__(self) -> None:
         self.open = ExitStack()
-        self._found: dict[bool, Simulator] = {}
+        self._found: dict[tuple[tuple[str, bool], ...], Simulator] = {}
         self._lock = Lock()
 
     @contextmanager
-    def one(self, instances: bool) -> Iterator[Simulator]:
+    def one(self, **options: bool) -> Iterator[Simulator]:
+        key = tuple(sorted(options.items()))
         with self._lock:
-            if instances not in self._found:
-                self._found[instances] = self.simulator(instances)
-            yield self._found[instances]
-
-    def simulator(self, instances: bool = False) -> Simulator:
-        return self.open.enter_context(Simulator(embedded(), instances=instances, max_copies=64))
+            if key not in self._found:
+                self._found[key] = self.open.enter_context(Simulator(embedded(), max_copies=64, **options))
+            yield self._found[key]
 
 
 @pytest.fixture(scope="session")
@@ -47,11 +45,11 @@ def shared_simulator(simulators: SharedSimulators, monkeypatch: pytest.MonkeyPat
     """Has runs of plans use the shared processes instead of starting their own."""
 
     class Shared:
-        def __init__(self, name: str, scenes: Path | None, trajectories: object, instances: bool) -> None:
-            self._instances = instances
+        def __init__(self, name: str, scenes: Path | None, trajectories: object, **options: bool) -> None:
+            self._options = options
 
         def one(self) -> Any:
-            return simulators.one(self._instances)
+            return simulators.one(**self._options)
 
     monkeypatch.setattr("infthor_eval.agents.evaluation.Simulators", Shared)
 
