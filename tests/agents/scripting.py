@@ -28,7 +28,7 @@ class Talk(Transcript):
         check_turns(self._model.name, self.turns)
         for part in self.parts:
             if isinstance(part, FrameRef):
-                part.load()
+                assert part.digest  # it is there, and known when it no longer is
         self._model.asked.append((self.parts, decoding))
         return Reply(self._model.say(self.parts, decoding), 1, self.n_tokens, 0)
 
@@ -59,6 +59,12 @@ def plan_asked(parts: Sequence[Part]) -> str:
     """The plan that is to be carried out."""
     text = "".join(part if isinstance(part, str) else "" for part in parts)
     return text.rpartition("<|plan|>Plan: ")[2].partition("<|plan|>")[0]
+
+
+def goal_asked(parts: Sequence[Part]) -> str:
+    """The goal that it serves."""
+    text = "".join(part if isinstance(part, str) else "" for part in parts)
+    return text.rpartition("<|goal|>Your main goal: ")[2].partition("<|goal|>")[0]
 
 
 def done_so_far(parts: Sequence[Part]) -> list[str]:
