@@ -1,0 +1,71 @@
+"""Plans with lm-eval as the host: an episode is one request, which our models alone can answer."""
+
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+
+from infthor_eval.agents.records import RECORDS
+from infthor_eval.formats.packaged import packaged_folder
+from infthor_eval.runs import read_run
+from tests.agents.cut import FORK, MUG, cut, write
+from tests.harness.conftest import LM_EVAL, only, samples
+
+PACKAGED = packaged_folder("tasks") / "plans" / "infthor_plans.yaml"
+TINY = "qwen2.5-vl-tiny"
+
+
+def asked(task, data, out, model, *more, **options):
+    metadata = json.dumps({"data": str(data), **options})
+    return ["run", *model, "--tasks", task, "--metadata", metadata, "--output_path", out, *more]
+
+
+def test_one_request_a_trajectory_and_what_our_own_run_finds(tmp_path, task_files, run, start):
+    task = task_files / "plans" / "infthor_plans.yaml"
+    task.write_text("include: _plans.yaml\ntask: infthor_plans\ndataset_kwargs: {plans: all, max_steps: 3}\n")
+    data = write(tmp_path / "data", cut(FORK, 3), cut(MUG, 2))
+    arguments = ["--model", TINY, "--tasks", "infthor_plans", "--data", data, "--output", tmp_path / "ours"]
+    code, _, err = run(*arguments, "--greedy", "--constrained")
+    assert code == 0, err
+    _, records = read_run(only(tmp_path / "ours", "journal").parent, RECORDS)
+    expected = {}
+    for record in records:
+        expected.setdefault(record.cluster, []).append(record.payload)
+    out, journal = tmp_path / "theirs", tmp_path / "journal"
+    model = ["--model", "infthor", "--model_args", f"adapter={TINY},journal={journal}"]
+    start(LM_EVAL, *asked(task, data, out, model, "--log_samples", greedy=True, constrained=True))
+    (rows,) = samples(out).values()
+    assert [row["doc"]["traj_id"] for row in rows] == [MUG, FORK]
+    assert {row["doc"]["traj_id"]: row["doc"]["plans"] for row in rows} == {
+        name: [plan.plan for plan in plans] for name, plans in expected.items()
+    }
+    for row in rows:
+        plans = expected[row["doc"]["traj_id"]]
+        assert row["success"] == sum(plan.done for plan in plans) / len(plans)
+        assert row["reward"] == pytest.approx(sum(plan.reward for plan in plans))
+        assert row["target"] == f"{len(plans)} plans done"
+        assert [plan["ended"] for plan in json.loads(row["resps"][0][0])] == [plan.ended for plan in plans]
+    found = json.loads(only(out, "results_*.json").read_text())["results"]["infthor_plans"]
+    assert found["reward,none"] == pytest.approx(sum(row["reward"] for row in rows) / 2)
+    # What it did is in the journal, as in ours.
+    _, theirs = read_run(journal / "plans", RECORDS)
+    assert [record.payload for record in theirs] == [record.payload for record in records]
+
+
+def test_another_model_of_lm_evals_is_refused_in_one_line(tmp_path):
+    data = write(tmp_path / "data", cut(FORK, 1))
+    arguments = asked(PACKAGED, data, tmp_path / "out", ["--model", "dummy"])
+    done = subprocess.run(
+        [sys.executable, "-c", LM_EVAL, *map(str, arguments)],
+        env=os.environ | {"HF_HUB_OFFLINE": "1"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode != 0
+    last = done.stderr.strip().splitlines()[-1]
+    assert last.endswith(
+        "UsageError: plans are carried out in a simulator, which infthor-eval's models alone do; use --model infthor"
+    )
