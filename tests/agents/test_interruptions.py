@@ -78,12 +78,12 @@ def kill_and_go_on(data, output, n_kills, draw):
 
 @pytest.mark.timeout(300)
 def test_a_run_that_is_killed_again_and_again_ends_as_one_that_is_not(tmp_path):
-    data = write(tmp_path / "data", cut(FORK, 6), cut(MUG, 5))
+    data = write(tmp_path / "data", cut(FORK, 4), cut(MUG, 3))
     finish(start(data, tmp_path / "whole"))
     killed = kill_and_go_on(data, tmp_path / "killed", 4, random.Random(0))
     assert killed >= 2
     assert found(tmp_path / "killed") == found(tmp_path / "whole")
-    assert len(found(tmp_path / "whole")[0]) == 11
+    assert len(found(tmp_path / "whole")[0]) == 7
 
 
 class Calls:
