@@ -33,7 +33,7 @@ def embedded(
     supplement: Path | None = None,
     *,
     timeout: float = 60.0,
-    start_timeout: float = 60.0,
+    start_timeout: float = 300.0,
 ) -> Launch:
     """The simulator that comes with this package.
 
