@@ -281,6 +281,6 @@ class Simulator:
         self.close()
         self._failures += 1
         if self._failures > self._max_restarts:
-            raise SimulatorError(f"{fault} (failure {self._failures} since the episode last came on, giving up)") from fault
+            raise SimulatorError(f"{fault} (failure {self._failures} since the last mark, giving up)") from fault
         self.restarts += 1
         _LOG.warning("%s; starting it again (%d of %d)", fault, self._failures, self._max_restarts)
