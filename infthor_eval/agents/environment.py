@@ -136,9 +136,12 @@ class PlanEnvironment:
             number of actions that the expert took.
 
         Raises:
+            IndexError: there is no such plan.
             ExpertRefusedError: this simulator refuses an action of the expert before the plan's end.
             SimulatorError: the simulator fails.
         """
+        if not 0 <= plan < len(self.plans):
+            raise IndexError(f"there is no plan {plan}; there are 0 to {len(self.plans) - 1}")
         found = self.plans[plan]
         expert_actions = self._expert.actions(plan)
         start, end = self._expert.start(plan), self._expert.start(plan + 1)
@@ -147,7 +150,7 @@ class PlanEnvironment:
         grid = self._grid(found, expert_actions, view)
         target = self._target(found, view, end.mark.view.agent, grid)
         self._reward = PlanReward(self._rules, target, task, view, start.treatments, grid)
-        self._target_ids = {key for key in (target.object_id, target.receptacle_id) if key is not None}
+        self._meant = _meant(target, view)
         self._plan, self._n_steps = found, 0
         n_acts = n_on_the_way(self._rules, target, [action.pose for action in expert_actions], grid)
         completes = any(action.completes for action in expert_actions[:n_acts])
@@ -206,7 +209,7 @@ class PlanEnvironment:
         if not isinstance(action, str):
             return str(action["action"]), action
         text: ActionText = parse_action(action)
-        return str(text), ground(text, view, self._look_degrees, self._target_ids)
+        return str(text), ground(text, view, self._look_degrees, self._meant)
 
     def _carried_out(self, text: str, call: Mapping[str, Any], before: View) -> StepOutcome:
         after = self._simulator.step(**call)
@@ -240,6 +243,12 @@ class PlanEnvironment:
             return None
         walked = [view.agent, *(action.pose for action in expert_actions)]
         return reachable(self._simulator).joined((pose.position.x, pose.position.z) for pose in walked)
+
+
+def _meant(target: PlanTarget, start: View) -> set[str]:
+    """What a plan means where words do not tell: its objects, and what they are in (a thing in one of ten drawers)."""
+    named = [start.objects[key] for key in (target.object_id, target.receptacle_id) if key in start.objects]
+    return {key for item in named for key in (item.object_id, *(item.parent_receptacles or ()))}
 
 
 def _look_degrees(trajectory: Trajectory) -> float:

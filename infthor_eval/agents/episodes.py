@@ -2,10 +2,11 @@
 
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TypeVar
 
 import msgspec
 
@@ -24,6 +25,7 @@ from infthor_eval.thor.simulator import Simulator
 
 __all__ = ["Episode", "Played", "described", "episode"]
 
+_T = TypeVar("_T")
 _TRIALS = 3  # of one plan, where the simulator fails
 _DIGITS = 6  # of rewards: what is beyond is rounding
 
@@ -95,11 +97,25 @@ class Episode:
             ModelError: the model fails.
             SimulatorError: the simulator failed every time.
         """
+        played, faults = self._survived(lambda: self._played(plan))
+        return replace(played, faults=tuple(faults))
+
+    def pass_over(self, plan: Plan) -> None:
+        """See whether a plan could have been come to at all: what nobody can do counts for nobody.
+
+        Raises:
+            ExpertRefusedError: as `play`.
+            SimulatorError: as `play`.
+        """
+        self._survived(lambda: self._entered().expert_actions(plan.index))
+
+    def _survived(self, do: Callable[[], _T]) -> tuple[_T, list[str]]:
+        """What comes of something, and the faults of the simulator on the way."""
         faults: list[str] = []
         while True:
             restarts = self._simulator.restarts
             try:
-                played = self._played(plan)
+                made = do()
             except SimulatorError as error:
                 self._environment = None
                 faults.append(str(error))
@@ -108,7 +124,7 @@ class Episode:
             else:
                 if self._simulator.restarts > restarts:
                     faults.append(f"simulator started again: {self._simulator.restarts - restarts}")
-                return replace(played, faults=tuple(faults))
+                return made, faults
 
     def _played(self, plan: Plan) -> Played:
         began = time.perf_counter()

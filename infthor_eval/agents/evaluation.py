@@ -125,10 +125,11 @@ class PlansEvaluation:
             over = False
             for unit in units:
                 record = known[unit.key]
-                if record is None:
-                    record = _not_come_to(unit, prints[unit.key]) if over else _played(unit, prints[unit.key], stage)
+                if record is None or (record.payload.ended == NOT_COME_TO and not over):
+                    record = _recorded(unit, prints[unit.key], stage, over)
                 yield record
-                over = over or (task.settings.after_failure == "stop" and not record.payload.done)
+                failed = record.excluded is None and not record.payload.done
+                over = over or (failed and task.settings.after_failure == "stop")
 
     def view(self, record: UnitRecord[PlanRecord]) -> SampleView:
         """See `infthor_eval.runs.Evaluation.view`."""
@@ -165,12 +166,12 @@ class PlansEvaluation:
         )
 
 
-def _not_come_to(unit: PlanUnit, inputs: str) -> UnitRecord[PlanRecord]:
-    return unit.record(inputs, msgspec.structs.replace(unit.payload, ended=NOT_COME_TO))
-
-
-def _played(unit: PlanUnit, inputs: str, stage: Episode) -> UnitRecord[PlanRecord]:
+def _recorded(unit: PlanUnit, inputs: str, stage: Episode, over: bool) -> UnitRecord[PlanRecord]:
+    """The record of a plan that is played now, or passed over where the episode is over."""
     try:
+        if over:
+            stage.pass_over(unit.plan)
+            return unit.record(inputs, msgspec.structs.replace(unit.payload, ended=NOT_COME_TO))
         played = stage.play(unit.plan)
     except ExpertRefusedError as error:
         return unit.excluded(str(error), inputs)

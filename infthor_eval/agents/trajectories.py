@@ -8,7 +8,7 @@ from infthor_eval.agents.plans import Plan, TrajectoryTask, plans_of, tasks_of
 from infthor_eval.errors import DataError, UsageError
 from infthor_eval.formats.digests import digest
 from infthor_eval.formats.packaged import packaged_folder
-from infthor_eval.formats.trajectory import Source, Trajectory, iter_sources
+from infthor_eval.formats.trajectory import Source, Trajectory, iter_sources, trajectory_files
 
 __all__ = ["Course", "Courses", "find_courses"]
 
@@ -65,8 +65,8 @@ def find_courses(data: str | None, bundled: str | None) -> Courses:
     if not root.exists():
         raise UsageError(f"--data {root}: there is no such file or folder")
     found: dict[str, Course] = {}
-    broken = []
-    for source in _sources(root):
+    broken: list[tuple[str, str]] = []
+    for source in _sources(root, broken):
         try:
             course = _course(source)
         except DataError as error:
@@ -81,11 +81,16 @@ def find_courses(data: str | None, bundled: str | None) -> Courses:
     return Courses([found[name] for name in sorted(found)], broken)
 
 
-def _sources(root: Path) -> Iterator[Source]:
-    """The trajectories of an NIEH set lie beside the logs of their replay."""
-    files = sorted(root.glob("metadata/*/traj_data.json"))
-    for path in files or [root]:
-        yield from iter_sources(path)
+def _sources(root: Path, broken: list[tuple[str, str]]) -> Iterator[Source]:
+    """What is there; files that cannot be read to their end are added to the broken ones.
+
+    The trajectories of an NIEH set lie beside the logs of their replay.
+    """
+    for path in sorted(root.glob("metadata/*/traj_data.json")) or trajectory_files(root):
+        try:
+            yield from iter_sources(path)
+        except DataError as error:
+            broken.append((str(path), str(error)))
 
 
 def _course(source: Source) -> Course:

@@ -64,7 +64,7 @@ class Simulator:
             image: whether views after actions have a frame; half of an action's time is spent on it.
             instances: whether views tell which object each pixel shows.
             depth: whether views have depth.
-            max_restarts: how many failures one episode may survive.
+            max_restarts: how many failures one episode may survive from one mark to the next.
             max_copies: of how many marks the embedded simulator keeps a copy of its state (0.2 MB each).
             options: further initialisation parameters of AI2-THOR (`fieldOfView`, `agentMode`, ...).
         """
@@ -184,11 +184,8 @@ class Simulator:
         if latest is not None and self._is_at(latest):
             return latest
         mark = SimulatorMark(tuple(self._episode), self.view)
-        if len(self._copies) == self._max_copies:
-            self._copies.pop(next(iter(self._copies)))
-        slot = min(set(range(self._max_copies)) - set(self._copies.values()))
-        if self.query("SaveState", slot=slot).success:
-            self._copies[mark] = slot
+        self._copy(mark)
+        self._failures = 0  # the episode has come on
         return mark
 
     def rewind(self, mark: SimulatorMark, *, exactly: bool = False) -> View:
@@ -207,6 +204,7 @@ class Simulator:
             self.reset(None)
             for call, _ in mark.episode:
                 self.step(**call)
+            self._copy(mark)
             return self.view
         self._episode = list(mark.episode)
         self._view = mark.view
@@ -217,6 +215,14 @@ class Simulator:
 
     def _began_with(self, mark: SimulatorMark) -> bool:
         return tuple(self._episode[: len(mark.episode)]) == mark.episode
+
+    def _copy(self, mark: SimulatorMark) -> None:
+        """Have the process keep a copy of the present state, which is the mark's."""
+        if len(self._copies) == self._max_copies:
+            self._copies.pop(next(iter(self._copies)))
+        slot = min(set(range(self._max_copies)) - set(self._copies.values()))
+        if self.query("SaveState", slot=slot).success:
+            self._copies[mark] = slot
 
     def _restore(self, mark: SimulatorMark) -> bool:
         slot = self._copies.pop(mark, None)
@@ -275,6 +281,6 @@ class Simulator:
         self.close()
         self._failures += 1
         if self._failures > self._max_restarts:
-            raise SimulatorError(f"{fault} (failure {self._failures} of this episode, giving up)") from fault
+            raise SimulatorError(f"{fault} (failure {self._failures} since the last mark, giving up)") from fault
         self.restarts += 1
         _LOG.warning("%s; starting it again (%d of %d)", fault, self._failures, self._max_restarts)

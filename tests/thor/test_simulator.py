@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from infthor_eval.errors import SimulatorError
-from infthor_eval.thor.launch import Launch
+from infthor_eval.thor.launch import Launch, embedded
 from infthor_eval.thor.simulator import Simulator
 
 PEER = Path(__file__).with_name("scripted_peer.py")
@@ -85,6 +85,36 @@ def test_a_fault_that_stays_is_told(tmp_path, fault, words):
     assert "\n" not in str(caught.value)
     assert "MoveAhead" in str(caught.value)
     assert time.monotonic() - started < 10
+
+
+def test_an_episode_may_survive_as_many_failures_from_each_mark_on(tmp_path):
+    with Simulator(scripted(tmp_path, "die!", "Deadly", 1), max_restarts=2) as simulator:
+        simulator.reset("kitchen-1")
+        for n_steps in range(1, 5):
+            with pytest.raises(SimulatorError, match="failure 3 since the last mark, giving up"):
+                simulator.step("Deadly")
+            assert simulator.step("MoveAhead").agent.position.x == n_steps
+            simulator.mark()
+        assert simulator.restarts == 8
+        with pytest.raises(SimulatorError, match="giving up"):
+            simulator.step("Deadly")
+        with pytest.raises(SimulatorError, match="failure 4"):  # no mark, no new chance
+            simulator.step("Deadly")
+
+
+def test_what_is_repeated_to_come_to_a_mark_is_kept_for_the_next_time():
+    with Simulator(embedded(), instances=False, image=False) as simulator:
+        simulator.reset("kitchen-2")
+        simulator.step("RotateRight")
+        mark = simulator.mark()
+        simulator.step("RotateRight")
+        simulator.close()  # with it goes the process's copy
+        assert simulator.rewind(mark, exactly=True).agent == mark.view.agent
+        simulator.step("RotateRight")
+        calls, step = [], simulator.step
+        simulator.step = lambda action, **arguments: calls.append(action) or step(action, **arguments)
+        assert simulator.rewind(mark, exactly=True).agent == mark.view.agent
+        assert calls == ["RestoreState"]
 
 
 @pytest.mark.parametrize("fault", ["die!", "hang!"])

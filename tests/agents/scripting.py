@@ -1,0 +1,67 @@
+"""A model without weights that says what it is told to say."""
+
+from collections.abc import Callable, Sequence
+
+from infthor_eval.formats.frames import FrameRef
+from model_adapters import Capabilities, Part, Reply, Transcript, check_turns
+
+CAPABILITIES = Capabilities(token_ids=False, sampling=True, choices=True)
+
+
+class Talk(Transcript):
+    """A word counts as a token, and so does a frame."""
+
+    def __init__(self, model):
+        super().__init__()
+        self._model = model
+
+    @property
+    def parts(self) -> list[Part]:
+        (turn,) = self.turns
+        return list(turn.parts)
+
+    @property
+    def n_tokens(self):
+        return sum(1 if isinstance(part, FrameRef) else len(part.split()) for part in self.parts)
+
+    def reply(self, decoding):
+        check_turns(self._model.name, self.turns)
+        for part in self.parts:
+            if isinstance(part, FrameRef):
+                part.load()
+        self._model.asked.append((self.parts, decoding))
+        return Reply(self._model.say(self.parts, decoding), 1, self.n_tokens, 0)
+
+
+class ScriptedModel:
+    """Replies by a function of what was asked and the decoding; keeps what it was asked."""
+
+    name, capabilities = "qwen2.5-vl-tiny", CAPABILITIES
+
+    def __init__(self, say: Callable[[Sequence[Part], object], str]):
+        self.say = say
+        self.asked: list[tuple[list[Part], object]] = []
+
+    def identity(self):
+        return {}
+
+    def tokens_per_frame(self, frame):
+        return 1
+
+    def conversation(self):
+        return Talk(self)
+
+    def close(self):
+        pass
+
+
+def plan_asked(parts: Sequence[Part]) -> str:
+    """The plan that is to be carried out."""
+    text = "".join(part if isinstance(part, str) else "" for part in parts)
+    return text.rpartition("<|plan|>Plan: ")[2].partition("<|plan|>")[0]
+
+
+def done_so_far(parts: Sequence[Part]) -> list[str]:
+    """The actions of that plan up to now."""
+    text = "".join(part if isinstance(part, str) else "" for part in parts)
+    return text.rpartition("<|plan|>")[2].split("<|act|>")[1:-1:2]
