@@ -11,7 +11,7 @@ from infthor_eval.agents.expert import Expert, ExpertAction
 from infthor_eval.agents.frames import FrameKeeper, NoFrames
 from infthor_eval.agents.memory import Past
 from infthor_eval.agents.plans import Plan, PlanKind, plans_of, tasks_of
-from infthor_eval.agents.rewards import PlanReward, RewardRules, StepReward, max_reward, reward_rules
+from infthor_eval.agents.rewards import PlanReward, RewardRules, StepReward, max_reward, n_on_the_way, reward_rules
 from infthor_eval.agents.targets import PlanTarget, target_of
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.trajectory import Trajectory
@@ -152,7 +152,9 @@ class PlanEnvironment:
         self._reward = PlanReward(self._rules, target, task, view, start.treatments, grid)
         self._meant = _meant(target, view)
         self._plan, self._n_steps = found, 0
-        most = max_reward(self._rules, target, view, grid, task if self._expert.completes(plan) else None)
+        n_acts = n_on_the_way(self._rules, target, [action.pose for action in expert_actions], grid)
+        completes = any(action.completes for action in expert_actions[:n_acts])
+        most = max_reward(self._rules, target, view, grid, task if completes else None)
         return Observation(view, start.frame), {"max_reward": most, "n_expert": len(expert_actions)}
 
     def step(self, action: str | Mapping[str, Any]) -> StepOutcome:

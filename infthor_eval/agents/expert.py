@@ -31,11 +31,19 @@ class ExpertRefusedError(DataError):
 
 @dataclass(frozen=True)
 class ExpertAction:
-    """An action of the expert: as a call, in words, and where the agent stood after it."""
+    """An action of the expert.
+
+    Attributes:
+        call: what the simulator is asked.
+        text: in words.
+        pose: where the agent stands after it.
+        completes: whether the goal of the plan's task holds after it, and did not when the plan began.
+    """
 
     call: Mapping[str, Any]
     text: str
     pose: AgentPose
+    completes: bool
 
 
 @dataclass(frozen=True)
@@ -76,7 +84,6 @@ class Expert:
         self.grounding = Grounding(simulator.view)
         self._starts = [PlanStart(simulator.mark(), frames.keep(simulator.view), Treatments())]
         self._actions: list[list[ExpertAction]] = []
-        self._completing: list[bool] = []
         self._chapters: list[Chapter] = []
         self._refused: ExpertRefusedError | None = None
         self._log = Recorder() if in_words else None
@@ -107,15 +114,6 @@ class Expert:
         self.start(plan + 1)
         return self._actions[plan]
 
-    def completes(self, plan: int) -> bool:
-        """Whether the goal of a plan's task comes to hold in it, as the expert carries it out.
-
-        Raises:
-            ExpertRefusedError: as `start` of the next one.
-        """
-        self.start(plan + 1)
-        return self._completing[plan]
-
     def past(self, plan: int) -> Past:
         """What there is to remember before a plan; only where frames are kept.
 
@@ -143,6 +141,8 @@ class Expert:
         simulator, start = self._simulator, self._starts[-1]
         view = simulator.rewind(start.mark, exactly=True)
         treatments, frame = start.treatments, start.frame
+        task = self._tasks[plan.task].task
+        task_open = not goal_holds(task, view, treatments)
         actions: list[ExpertAction] = []
         steps: list[tuple[str, FrameRef]] = []
         for number in range(*plan.low):
@@ -154,16 +154,14 @@ class Expert:
             frame = self._frames.keep(view)
             if self._log is not None:
                 self._log.record(view, step=number, action=self._text(number))
-            actions.append(ExpertAction(call, self._text(number), view.agent))
+            completes = task_open and goal_holds(task, view, treatments)
+            actions.append(ExpertAction(call, self._text(number), view.agent, completes))
             if frame is not None:
                 steps.append((actions[-1].text, frame))
         if start.frame is not None:
             opening = self._chapter(plan.index)
             self._chapters.append(Chapter(opening.plan, opening.goal, opening.before, tuple(steps)))
         self._actions.append(actions)
-        task = self._tasks[plan.task].task
-        before = goal_holds(task, start.mark.view, start.treatments)
-        self._completing.append(not before and goal_holds(task, view, treatments))
         following = self._plans[plan.index + 1 : plan.index + 2]
         goes_on = any(item.task == plan.task for item in following)
         self._starts.append(PlanStart(simulator.mark(), frame, treatments if goes_on else Treatments()))

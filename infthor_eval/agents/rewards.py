@@ -6,7 +6,7 @@ hold with an action that neither fails nor is of no use.
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -23,9 +23,9 @@ from infthor_eval.household.navigation import Grid, Stand
 from infthor_eval.household.scout import stand_of
 from infthor_eval.household.tasks import Task
 from infthor_eval.household.treatments import Treatments
-from infthor_eval.thor.view import ThorObject, View
+from infthor_eval.thor.view import AgentPose, ThorObject, View
 
-__all__ = ["PlanReward", "RewardRules", "StepReward", "max_reward", "reward_rules"]
+__all__ = ["PlanReward", "RewardRules", "StepReward", "max_reward", "n_on_the_way", "reward_rules"]
 
 _FILE = Path(__file__).with_name("rewards.yaml")
 _SMALL_ANGLE = 0.01  # of a look; below it the camera is where it should be
@@ -129,7 +129,7 @@ class PlanReward:
         self._in_plan = Treatments()  # a thing washed before is to be washed again where a plan says so
         self._subject = subject_of(target, start)
         self._way = _way(rules, target, grid)
-        self._closest = math.inf if self._way is None else self._way.left(start)
+        self._closest = math.inf if self._way is None else self._way.left(start.agent)
         self._stages: set[str] = set()
         self._task_open = not goal_holds(task, start, self.treatments)
         self._goal_reached = self._over = False
@@ -181,8 +181,8 @@ class PlanReward:
 
     def _goto(self, action: str, object_id: str | None, before: View, after: View) -> StepReward:
         assert self._way is not None  # as of every GotoLocation
-        left = self._way.left(after)
-        reference = self._closest if self._rules.steps_count_once else self._way.left(before)
+        left = self._way.left(after.agent)
+        reference = self._closest if self._rules.steps_count_once else self._way.left(before.agent)
         self._closest = min(self._closest, left)
         gained = max(0.0, reference - left) if math.isfinite(reference) else 0.0
         arrived = left < self._rules.nearer_than
@@ -293,10 +293,24 @@ def max_reward(
     return most if unnoticed else most + rules.task_done
 
 
+def n_on_the_way(rules: RewardRules, target: PlanTarget, poses: Sequence[AgentPose], grid: Grid | None = None) -> int:
+    """How many of some actions GotoLocation takes: it is done some steps before the end of a way. Other plans take all.
+
+    Args:
+        rules: what is paid.
+        target: what the plan asks for.
+        poses: after each of the actions.
+        grid: the cells that can be reached; GotoLocation needs it.
+    """
+    way = _way(rules, target, grid)
+    lefts = [math.inf if way is None else way.left(pose) for pose in poses]
+    return next((number for number, left in enumerate(lefts, 1) if left < rules.nearer_than), len(poses))
+
+
 def _most_on_the_way(rules: RewardRules, target: PlanTarget, start: View, grid: Grid | None) -> float:
     """Every step of the shortest way up to where it is done, and arriving; at least one step has to be made."""
     way = _way(rules, target, grid)
-    left = math.inf if way is None else way.left(start)
+    left = math.inf if way is None else way.left(start.agent)
     if math.isinf(left):
         return 0.0
     gained = max(left - (rules.nearer_than - 1), min(left, 1))
@@ -310,10 +324,10 @@ class _Way:
         self._grid, self._horizon, self._look = grid, horizon, look_degrees
         self._distances = grid.distances_to(goal)
 
-    def left(self, view: View) -> float:
+    def left(self, pose: AgentPose) -> float:
         """Number of actions left; a look begun counts whole. Infinite where there is no way."""
-        steps = self._distances.get(stand_of(view.agent, self._grid), math.inf)
-        looks = abs(self._horizon - view.agent.horizon) / self._look
+        steps = self._distances.get(stand_of(pose, self._grid), math.inf)
+        looks = abs(self._horizon - pose.horizon) / self._look
         return steps + math.ceil(looks - _SMALL_ANGLE)
 
 

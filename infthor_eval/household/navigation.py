@@ -1,7 +1,7 @@
 """Walking on the grid of reachable positions: shortest action sequences between poses."""
 
 from collections import deque
-from collections.abc import Container, Iterable
+from collections.abc import Container, Iterable, Mapping
 from dataclasses import dataclass
 
 __all__ = ["GRID", "Cell", "Grid", "Stand"]
@@ -34,6 +34,7 @@ class Grid:
         points = sorted(positions)
         self._origin = (points[0][0] % GRID, points[0][1] % GRID) if points else (0.0, 0.0)
         self.cells = frozenset(self.cell(x, z) for x, z in points)
+        self._to: dict[Stand, dict[Stand, int]] = {}
 
     def cell(self, x: float, z: float) -> Cell:
         """The cell nearest to a position in metres."""
@@ -55,22 +56,15 @@ class Grid:
         """Number of actions from a stand to every stand that can be reached."""
         return {stand: length for stand, (length, _) in self._search(start, None).items()}
 
-    def distances_to(self, goal: Stand) -> dict[Stand, int]:
-        """Number of actions to a stand from every stand that it can be reached from.
+    def distances_to(self, goal: Stand) -> Mapping[Stand, int]:
+        """Number of actions to a stand from every stand that it can be reached from; searched for once.
 
         The goal's own cell counts as reachable, whether the grid has it or not. Cells beside the grid are among the
         starts, as with `path`: one can step from there onto it.
         """
-        cells = self.cells | {goal.cell}
-        found = {goal: 0}
-        queue = deque([goal])
-        while queue:
-            stand = queue.popleft()
-            for previous in _stands_before(stand, cells):
-                if previous not in found:
-                    found[previous] = found[stand] + 1
-                    queue.append(previous)
-        return found
+        if goal not in self._to:
+            self._to[goal] = self._search_back(goal)
+        return self._to[goal]
 
     def path(self, start: Stand, goal: Stand) -> list[str] | None:
         """The shortest sequence of MoveAhead, RotateLeft, RotateRight; None where there is none."""
@@ -97,6 +91,18 @@ class Grid:
                 if following not in found:
                     found[following] = (length + 1, (action, stand))
                     queue.append(following)
+        return found
+
+    def _search_back(self, goal: Stand) -> dict[Stand, int]:
+        cells = self.cells | {goal.cell}
+        found = {goal: 0}
+        queue = deque([goal])
+        while queue:
+            stand = queue.popleft()
+            for previous in _stands_before(stand, cells):
+                if previous not in found:
+                    found[previous] = found[stand] + 1
+                    queue.append(previous)
         return found
 
     def _moves(self, stand: Stand) -> list[tuple[str, Stand]]:

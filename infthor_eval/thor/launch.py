@@ -41,7 +41,9 @@ def embedded(
         data: folder with recorded floor plans; without it only procedural scenes exist.
         supplement: file with what the trajectories at hand tell of the floor plans beside it.
         timeout: seconds for one reply.
-        start_timeout: seconds until the first message.
+        start_timeout: seconds until the first message. The first start of an installation compiles the renderer, which
+            takes ten seconds of a processor; several at once on a busy machine take minutes, and one that is stopped
+            in the middle of it would have to begin anew.
     """
     words = [sys.executable, "-m", "infthor_eval.sim"]
     if data is not None:

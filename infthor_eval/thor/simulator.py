@@ -22,6 +22,7 @@ __all__ = ["Simulator", "SimulatorMark"]
 _Done = tuple[dict[str, Any], bool]  # a call, and whether it was carried out
 _LOG = logging.getLogger(__name__)
 _INITIAL = {"gridSize": 0.25, "fieldOfView": 60, "visibilityDistance": 1.5, "snapToGrid": True}
+_UNSEEN = {"renderImage": False, "renderInstanceSegmentation": False, "renderDepthImage": False}
 _WALKING = {"MoveAhead", "MoveBack", "MoveLeft", "MoveRight", "RotateLeft", "RotateRight", "LookUp", "LookDown"}
 
 
@@ -225,7 +226,7 @@ class Simulator:
 
     def _restore(self, mark: SimulatorMark) -> bool:
         slot = self._copies.pop(mark, None)
-        if slot is None or not self.query("RestoreState", slot=slot).success:
+        if slot is None or not self.query("RestoreState", slot=slot, **_UNSEEN).success:
             return False
         self._copies[mark] = slot  # the last one used
         return True
@@ -280,8 +281,6 @@ class Simulator:
         self.close()
         self._failures += 1
         if self._failures > self._max_restarts:
-            raise SimulatorError(
-                f"{fault} (failure {self._failures} since the episode last came on, giving up)"
-            ) from fault
+            raise SimulatorError(f"{fault} (failure {self._failures} since the last mark, giving up)") from fault
         self.restarts += 1
         _LOG.warning("%s; starting it again (%d of %d)", fault, self._failures, self._max_restarts)

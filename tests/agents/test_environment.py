@@ -1,6 +1,7 @@
 """One trajectory as an environment, on the embedded simulator."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -62,6 +63,18 @@ def test_the_expert_earns_all_there_is(simulator):
         outcomes = play(environment, plan.index)
         assert outcomes[-1].info.ended == Ended.DONE
         assert sum(outcome.reward for outcome in outcomes) == pytest.approx(info["max_reward"])
+
+
+def test_a_goal_that_comes_to_hold_when_the_way_is_over_is_not_counted_on(simulator):
+    """The lamp is on, and in view from the first step of the way on; often it is from the last steps on only."""
+    path = packaged_folder("sets/plans_mini") / "trajectories.jsonl.gz"
+    found = next(item for item in iter_trajectories(path) if item.traj_id == "bedroom-4-seed0")
+    environment, plan = PlanEnvironment(found, simulator), 18
+    assert environment.reset(plan)[1]["max_reward"] == pytest.approx(9.2)
+    assert sum(outcome.reward for outcome in play(environment, plan)) == pytest.approx(9.2)
+    actions = environment._expert._actions[plan]
+    actions[:] = [replace(action, completes=action is actions[-1]) for action in actions]
+    assert environment.reset(plan)[1]["max_reward"] == pytest.approx(4.2)
 
 
 @pytest.mark.parametrize(

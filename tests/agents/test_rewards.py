@@ -4,7 +4,7 @@ import msgspec
 import pytest
 
 from infthor_eval.agents.plans import PlanKind
-from infthor_eval.agents.rewards import PlanReward, StepReward, max_reward, reward_rules
+from infthor_eval.agents.rewards import PlanReward, StepReward, max_reward, n_on_the_way, reward_rules
 from infthor_eval.agents.targets import PlanTarget
 from infthor_eval.errors import DataError, UsageError
 from infthor_eval.household.navigation import Stand
@@ -487,6 +487,14 @@ MOST = [
 def test_the_most_that_a_plan_gives(target, start, completes, most, published):
     assert max_reward(DEFAULT, target, start, CORRIDOR, completes) == pytest.approx(most)
     assert max_reward(COMPAT, target, start, CORRIDOR, completes) == pytest.approx(published)
+
+
+def test_a_way_is_over_before_its_end_and_other_plans_go_on():
+    poses = [kitchen(at=(0, z)).agent for z in range(1, 8)]
+    ahead = PlanTarget(PlanKind.GOTO, goal_stand=Stand((0, 7), 0), goal_horizon=30.0)
+    assert n_on_the_way(DEFAULT, ahead, poses, CORRIDOR) == 5  # two steps are left
+    assert n_on_the_way(DEFAULT, ahead, poses[:4], CORRIDOR) == 4
+    assert n_on_the_way(DEFAULT, PICKUP, poses) == len(poses)
 
 
 # -- the rules, and what does not fit

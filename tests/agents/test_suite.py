@@ -38,8 +38,8 @@ def test_the_planner_carries_every_plan_out_and_earns_all_there_is(prepared, dat
     write(data / "more", cut(MUG, 2))
     outcome = execute(prepared())
     found = {(record.cluster, record.payload.index): record.payload for record in outcome.records}
-    # By hand: of the expert's steps the last two are not needed, as fewer than three to go is there; what is closed is
-    # opened and closed around a thing.
+    # By hand, from the expert's actions: eleven steps and a look, the last of which leaves a step (done with fewer
+    # than three to go); what is closed is opened and closed around a thing.
     assert {key: (plan.ended, len(plan.steps), plan.n_expert_steps) for key, plan in found.items()} == {
         (FORK, 0): ("done", 10, 12),
         (FORK, 1): ("done", 2, 3),

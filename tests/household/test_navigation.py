@@ -43,6 +43,13 @@ def test_a_goal_off_the_grid_is_stepped_onto():
     assert distances[goal] == 1 and distances[Stand(min(grid.cells), 180)] == 4
 
 
+def test_distances_to_a_goal_are_searched_for_once():
+    grid = grid_of([(0, 0), (0, 1)])
+    goal = Stand(min(grid.cells), 0)
+    assert grid.distances_to(goal) is grid.distances_to(goal)
+    assert grid.distances_to(goal) != grid.distances_to(Stand(goal.cell, 90))
+
+
 def walk(grid, stand, path):
     ahead = {0: (0, 1), 90: (1, 0), 180: (0, -1), 270: (-1, 0)}
     for action in path:

@@ -79,6 +79,17 @@ def test_the_last_two_marks_are_gone_back_to_without_repeating_the_episode(monke
         assert simulator.rewind(marks[0]).agent == views[0].agent
 
 
+def test_nothing_is_drawn_to_rewind():
+    with Simulator(embedded(), depth=True) as simulator:
+        simulator.reset(SCENE)
+        mark = simulator.mark()
+        simulator.step("RotateRight")
+        simulator.rewind(mark, exactly=True)
+        event = simulator._controller.last_event
+        assert event.metadata["lastAction"] == "RestoreState"
+        assert (event.frame, event.depth_frame, event.instance_segmentation_frame) == (None, None, None)
+
+
 @pytest.mark.parametrize("exactly", [False, True])
 def test_any_mark_of_the_scene_can_be_gone_to_from_any_moment(exactly):
     with Simulator(embedded(), max_copies=8) as simulator:

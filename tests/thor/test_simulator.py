@@ -91,7 +91,7 @@ def test_an_episode_may_survive_as_many_failures_from_each_mark_on(tmp_path):
     with Simulator(scripted(tmp_path, "die!", "Deadly", 1), max_restarts=2) as simulator:
         simulator.reset("kitchen-1")
         for n_steps in range(1, 5):
-            with pytest.raises(SimulatorError, match="failure 3 since the episode last came on, giving up"):
+            with pytest.raises(SimulatorError, match="failure 3 since the last mark, giving up"):
                 simulator.step("Deadly")
             assert simulator.step("MoveAhead").agent.position.x == n_steps
             simulator.mark()

@@ -3,12 +3,12 @@
 import random
 
 import pytest
-from infthor_eval.generation.recorder import Recorder
 
 from infthor_eval.generation.questions import contents, counting, final_state, location, open_state, presence
 from infthor_eval.generation.questions.checker import Checker
 from infthor_eval.generation.questions.history import DEFAULT_SHARE, History
 from infthor_eval.thor.launch import embedded
+from infthor_eval.thor.recorder import Recorder
 from infthor_eval.thor.simulator import Simulator
 
 from .logs import history, moved, state
