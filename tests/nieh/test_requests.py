@@ -62,4 +62,5 @@ def test_requests_are_what_they_were(task):
 
 def test_every_task_is_among_them():
     chosen_by_clip = {"nieh_clip_retrieval", "nieh_memory_frames"}
-    assert set(EXPECTED) == set(Catalog.packaged().tasks) - chosen_by_clip
+    ours = {name for name, task in Catalog.packaged().tasks.items() if task.suite == "nieh"}
+    assert set(EXPECTED) == ours - chosen_by_clip
