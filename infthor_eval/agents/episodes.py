@@ -1,6 +1,5 @@
 """Leading an actor through a trajectory, plan by plan (Algorithm 2)."""
 
-import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -20,6 +19,7 @@ from infthor_eval.agents.simulators import Simulators
 from infthor_eval.agents.task import PlansTask
 from infthor_eval.agents.trajectories import Course
 from infthor_eval.errors import SimulatorError
+from infthor_eval.formats.scratch import ScratchFolder
 from infthor_eval.runs import Tokens
 from infthor_eval.thor.simulator import Simulator
 
@@ -65,8 +65,8 @@ def described(course: Course, plan: Plan) -> PlanRecord:
 @contextmanager
 def episode(task: PlansTask, course: Course, cast: Cast, simulators: Simulators, seed: int) -> Iterator["Episode"]:
     """A trajectory with an actor in it, in a simulator that is there for as long as the context lasts."""
-    with simulators.one() as simulator, tempfile.TemporaryDirectory(prefix="infthor-frames-") as folder:
-        yield Episode(task, course, cast, simulator, Path(folder), seed)
+    with simulators.one() as simulator, ScratchFolder() as folder:
+        yield Episode(task, course, cast, simulator, folder, seed)
 
 
 class Episode:
