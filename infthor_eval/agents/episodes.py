@@ -15,13 +15,13 @@ from infthor_eval.agents.environment import PlanEnvironment, StepOutcome
 from infthor_eval.agents.frames import FrameFolder, NoFrames
 from infthor_eval.agents.plans import Plan
 from infthor_eval.agents.records import PlanRecord, StepRecord
-from infthor_eval.agents.simulators import Simulators
 from infthor_eval.agents.task import PlansTask
 from infthor_eval.agents.trajectories import Course
 from infthor_eval.errors import SimulatorError
 from infthor_eval.formats.scratch import ScratchFolder
 from infthor_eval.runs import Tokens
 from infthor_eval.thor.simulator import Simulator
+from infthor_eval.thor.simulators import Simulators
 
 __all__ = ["Episode", "Played", "described", "episode"]
 
