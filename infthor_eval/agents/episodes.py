@@ -17,7 +17,7 @@ from infthor_eval.agents.plans import Plan
 from infthor_eval.agents.records import PlanRecord, StepRecord
 from infthor_eval.agents.task import PlansTask
 from infthor_eval.agents.trajectories import Course
-from infthor_eval.errors import SimulatorError
+from infthor_eval.errors import SceneError, SimulatorError
 from infthor_eval.formats.scratch import ScratchFolder
 from infthor_eval.runs import Tokens
 from infthor_eval.thor.simulator import Simulator
@@ -92,9 +92,11 @@ class Episode:
         """One plan. Where the simulator fails for good it is begun anew, in a fresh one.
 
         Raises:
-            ExpertRefusedError: this simulator refuses an action of the expert before the plan's end.
+            UnfitPlanError: this simulator refuses an action of the expert before the plan's end, or has not what the
+                plan is about.
             DataError: a frame cannot be written or read.
             ModelError: the model fails.
+            SceneError: the simulator has no such scene.
             SimulatorError: the simulator failed every time.
         """
         played, faults = self._survived(lambda: self._played(plan))
@@ -116,6 +118,8 @@ class Episode:
             restarts = self._simulator.restarts
             try:
                 made = do()
+            except SceneError:
+                raise
             except SimulatorError as error:
                 self._environment = None
                 faults.append(str(error))

@@ -9,12 +9,11 @@ import msgspec
 
 from infthor_eval.agents.cast import Cast, cast_of
 from infthor_eval.agents.episodes import Episode, described, episode
-from infthor_eval.agents.expert import ExpertRefusedError
-from infthor_eval.agents.plans import Plan
+from infthor_eval.agents.plans import Plan, UnfitPlanError
 from infthor_eval.agents.records import NOT_COME_TO, PlanRecord
 from infthor_eval.agents.task import PlansTask
 from infthor_eval.agents.trajectories import Course
-from infthor_eval.errors import InfthorError, UsageError
+from infthor_eval.errors import InfthorError, SceneError, UsageError
 from infthor_eval.formats.digests import fingerprint
 from infthor_eval.formats.floor_plans import floor_plans_digest
 from infthor_eval.runs import (
@@ -179,7 +178,7 @@ def _recorded(unit: PlanUnit, inputs: str, stage: Episode, over: bool) -> UnitRe
             stage.pass_over(unit.plan)
             return unit.record(inputs, msgspec.structs.replace(unit.payload, ended=NOT_COME_TO))
         played = stage.play(unit.plan)
-    except ExpertRefusedError as error:
+    except (UnfitPlanError, SceneError) as error:
         return unit.excluded(str(error), inputs)
     except InfthorError as error:
         begun = stage.begun if stage.begun is not None and stage.begun.index == unit.plan.index else unit.payload

@@ -78,7 +78,12 @@ def find_courses(data: str | None, bundled: str | None) -> Courses:
     if not found:
         why = broken[0][1] if broken else "no trajectory there"
         raise DataError(f"{root}: nothing to evaluate ({why})")
-    return Courses([found[name] for name in sorted(found)], broken)
+    return Courses([found[name] for name in sorted(found)], [(_within(root, a), _within(root, b)) for a, b in broken])
+
+
+def _within(root: Path, text: str) -> str:
+    """The same without the folder's own path: a run is the same wherever its data lie."""
+    return text.replace(f"{root if root.is_dir() else root.parent}/", "")
 
 
 def _sources(root: Path, broken: list[tuple[str, str]]) -> Iterator[Source]:

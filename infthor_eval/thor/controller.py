@@ -5,7 +5,7 @@ from typing import Any
 
 import ai2thor.controller
 
-from infthor_eval.errors import SimulatorError
+from infthor_eval.errors import SceneError, SimulatorError
 from infthor_eval.formats.scratch import ScratchFolder
 from infthor_eval.thor.launch import Launch
 from infthor_eval.thor.transport import PeerFault, SafeFifoServer
@@ -30,7 +30,8 @@ class SafeController(ai2thor.controller.Controller):
             options: of ai2thor's Controller (`width`, `renderInstanceSegmentation`, ...).
 
         Raises:
-            SimulatorError: it does not start, or refuses the scene.
+            SceneError: it refuses the scene.
+            SimulatorError: it does not start.
         """
         self.server: SafeFifoServer | None = None
         self._folder = None if launch.executable is None else ScratchFolder()
@@ -59,7 +60,7 @@ class SafeController(ai2thor.controller.Controller):
                 raise SimulatorError(
                     "AI2-THOR's Unity build is neither here nor to be downloaded; go online once, or name an executable"
                 ) from error
-            raise SimulatorError(f"scene {_scene_name(scene)}: {message}") from error
+            raise SceneError(f"scene {_scene_name(scene)}: {message}") from error
         except BaseException:
             self.stop()
             raise
