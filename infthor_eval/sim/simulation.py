@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from infthor_eval.sim.agent import Agent
 from infthor_eval.sim.geometry import Array, euler_matrix
 from infthor_eval.sim.objects import SimObject
 from infthor_eval.sim.render.camera import FAR, NEAR, Camera
@@ -17,7 +18,7 @@ from infthor_eval.sim.render.scene import SceneModel
 from infthor_eval.sim.scenes.catalogue import Catalogue
 from infthor_eval.sim.settings import SimulatorSettings
 from infthor_eval.sim.visibility import enclosures, least_pixels, visible_ids
-from infthor_eval.sim.world import Agent, World
+from infthor_eval.sim.world import World
 
 __all__ = ["Simulation", "ThirdPartyCamera"]
 

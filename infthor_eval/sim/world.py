@@ -5,63 +5,17 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from infthor_eval.sim.agent import Agent, Grip
 from infthor_eval.sim.appearance import Appearance
 from infthor_eval.sim.errors import ActionError
 from infthor_eval.sim.geometry import Array, aabb_gap, euler_matrix, matrix_euler
 from infthor_eval.sim.navigation import NavGrid
 from infthor_eval.sim.objects import SimObject
 
-__all__ = [
-    "AGENT_HEIGHT",
-    "CAMERA_HEIGHT",
-    "FLOOR_STYLES",
-    "MAX_DOWN",
-    "MAX_UP",
-    "Agent",
-    "Grip",
-    "RoomShell",
-    "Wall",
-    "World",
-]
+__all__ = ["FLOOR_STYLES", "RoomShell", "Wall", "World"]
 
-AGENT_HEIGHT = 0.9009992  # agent.y of AI2-THOR's default agent on a floor at 0
-CAMERA_HEIGHT = 0.675  # camera above agent.y, fitted to the boxes recorded in ALFRED
-MAX_DOWN, MAX_UP = 60.0, 30.0  # degrees that the camera tilts below and above the horizon
 FLOOR_STYLES = ("wood", "tiles", "carpet")
-_CROUCH = 0.35
 _HAND = np.array([0.0, -0.16, 0.38])  # where AI2-THOR holds an object, in the camera's frame, metres
-
-
-@dataclass
-class Agent:
-    """The default agent: where it stands, which way it and its camera look (degrees, horizon down positive)."""
-
-    position: Array
-    yaw: float = 0.0
-    horizon: float = 0.0
-    standing: bool = True
-
-    def camera_position(self) -> Array:
-        """Position of the camera in the world, metres (3,)."""
-        lift = CAMERA_HEIGHT if self.standing else CAMERA_HEIGHT - _CROUCH
-        return self.position + np.array([0.0, lift, 0.0])
-
-    def camera_matrix(self) -> Array:
-        """Rotation matrix (3, 3) of the camera."""
-        return euler_matrix((self.horizon, self.yaw, 0.0))
-
-
-@dataclass(frozen=True)
-class Grip:
-    """How the agent holds an object that it moved or turned in its hand, in the camera's frame.
-
-    Attributes:
-        offset: the object's origin, metres (3,).
-        turn: the object's rotation (3, 3).
-    """
-
-    offset: Array
-    turn: Array
 
 
 @dataclass(frozen=True)
