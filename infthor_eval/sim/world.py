@@ -7,6 +7,7 @@ import numpy as np
 
 from infthor_eval.sim.agent import Agent, Grip
 from infthor_eval.sim.appearance import Appearance
+from infthor_eval.sim.arm.arm import Arm
 from infthor_eval.sim.errors import ActionError
 from infthor_eval.sim.geometry import Array, aabb_gap, euler_matrix, matrix_euler
 from infthor_eval.sim.navigation import NavGrid
@@ -58,6 +59,7 @@ class World:
         open_at_start: doors that are open in the recording; its cells already go around them.
         coarse: the shapes of its furniture are only known as boxes, as in recordings.
         grip: how the held object is held; None for as one holds what was just picked up.
+        arm: the agent's arm; None for an agent that holds things in front of its camera.
         disabled: objects that are taken out for a time, by id.
         appearance: what changes the colours of the scene.
         standing_height: height in metres of the agent's position on the floor.
@@ -76,6 +78,7 @@ class World:
     open_at_start: frozenset[str] = frozenset()
     templates: dict[str, list[SimObject]] = field(default_factory=dict)
     grip: Grip | None = None
+    arm: Arm | None = None
     disabled: dict[str, SimObject] = field(default_factory=dict)
     appearance: Appearance = field(default_factory=Appearance)
     standing_height: float = field(init=False)
@@ -113,6 +116,10 @@ class World:
             self.touch(content)
         if self.held == item.object_id:
             self.held = None
+        if self.arm is not None:
+            self.arm.let_go(item.object_id)
+            for content_id in item.contents:
+                self.arm.freight.pop(content_id, None)
         del self.objects[item.object_id]
         self.touch()
 
@@ -125,6 +132,8 @@ class World:
 
     def detach(self, item: SimObject) -> None:
         """Take `item` out of whatever contains it."""
+        if self.arm is not None:
+            self.arm.freight.pop(item.object_id, None)
         if item.parent is not None:
             receptacle = self.objects[item.parent]
             receptacle.contents.remove(item.object_id)
@@ -164,6 +173,21 @@ class World:
             self.grip = None
         if self.held is not None:
             self.set_pose(self.objects[self.held], *self._held_pose(self.objects[self.held]))
+        if self.arm is not None:
+            self._carry_with(self.arm)
+
+    def _carry_with(self, arm: Arm) -> None:
+        """Put what an arm holds, with its contents, where the wrist is."""
+        wrist = arm.wrist(self.agent)
+        for object_id, grip in arm.grips():
+            item = self.objects[object_id]
+            item.position, item.rotation = wrist.point(grip.offset), matrix_euler(wrist.turn @ grip.turn)
+            self.touch(item)
+
+    def carried(self) -> list[str]:
+        """Ids of what the agent holds itself, in its hand or with its arm; not of what is in it."""
+        by_arm = [] if self.arm is None else list(self.arm.held)
+        return by_arm if self.held is None else [self.held, *by_arm]
 
     def _held_pose(self, item: SimObject) -> tuple[Array, Array]:
         if self.grip is None:
@@ -173,10 +197,20 @@ class World:
         return self.agent.camera_position() + camera @ self.grip.offset, matrix_euler(camera @ self.grip.turn)
 
     def release(self) -> None:
-        """Take the held object out of the hand; it stays where it is."""
-        if self.held is not None:
-            self.objects[self.held].state.picked_up = False
+        """Let go of all that the agent holds; it stays where it is."""
+        for object_id in self.carried():
+            self.let_go(self.objects[object_id])
+
+    def let_go(self, item: SimObject) -> None:
+        """Let go of one thing, if it is held, with all that is in it; it stays where it is."""
+        if item.object_id == self.held:
             self.held = self.grip = None
+        if self.arm is not None:
+            for part in (item, *self.descendants(item)):
+                part.state.picked_up = part.state.picked_up and part.object_id not in self.arm.held
+                self.arm.let_go(part.object_id)
+        item.state.picked_up = False
+        self.touch(item)
 
     def regrip(self, position: Array, matrix: Array) -> None:
         """Move and turn the held object in the hand, to a position (3,) and rotation (3, 3) in the world."""

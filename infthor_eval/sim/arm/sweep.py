@@ -1,0 +1,88 @@
+"""Moving an arm, or the agent with its arm, along a path of small steps until something is in the way."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from infthor_eval.sim.arm.arm import Arm, Frame, base_frame
+from infthor_eval.sim.arm.boxes import Boxes, join, separations
+from infthor_eval.sim.arm.rig import ArmPose
+from infthor_eval.sim.arm.surroundings import Solids
+from infthor_eval.sim.geometry import Array
+from infthor_eval.sim.world import World
+
+__all__ = ["Stance", "assume", "first_contact", "moving_boxes", "stance"]
+
+_SKIN = 0.001  # metres that boxes may overlap: things that touch do
+
+
+@dataclass(frozen=True)
+class Stance:
+    """Where the agent stands, which way it looks (degrees), and how its arm is bent."""
+
+    position: Array
+    yaw: float
+    pose: ArmPose
+
+
+def stance(world: World, arm: Arm) -> Stance:
+    """How the agent stands now."""
+    return Stance(world.agent.position, world.agent.yaw, arm.pose)
+
+
+def assume(world: World, arm: Arm, to: Stance) -> None:
+    """Bring the agent and its arm to a stance, with all that it holds."""
+    world.agent.position, world.agent.yaw = to.position, to.yaw
+    arm.change(to.pose)
+    world.carry(keep_grip=True)
+
+
+def first_contact(world: World, arm: Arm, path: list[Stance], around: Solids) -> tuple[int, str] | None:
+    """The first of some stances (n) in which the arm, or what it holds, is in something; its index and the name of that.
+
+    The path begins where the agent is now. What is touched there is in the way only where the arm gets deeper into it:
+    it could not be got away otherwise.
+
+    Returns:
+        None where the whole path is free.
+    """
+    moving = moving_boxes(world, arm, [stance(world, arm), *path])
+    low, high = moving.bounds()
+    met = around.near(low.min(axis=0), high.max(axis=0))
+    if not len(met.boxes):
+        return None
+    gaps = separations(moving, met.boxes).reshape(len(path) + 1, -1, len(met.boxes))
+    depth = gaps[1:] - np.minimum(gaps[0], -_SKIN)
+    hit = np.argwhere(depth.min(axis=(1, 2)) < -1e-9)
+    if not len(hit):
+        return None
+    step = int(hit[0, 0])
+    box = int(depth[step].min(axis=0).argmin())
+    return step, met.names[met.owner[box]]
+
+
+def moving_boxes(world: World, arm: Arm, stances: list[Stance]) -> Boxes:
+    """The boxes (stances * n) of the arm and of what it holds in the world, stance after stance."""
+    freight = _freight(world, arm)
+    frames = [base_frame(arm.rig, s.position, s.yaw, s.pose) for s in stances]
+    origins, turns = np.stack([f.origin for f in frames]), np.stack([f.turn for f in frames])
+    if all(s.pose is stances[0].pose for s in stances):
+        return _local(arm, stances[0].pose, freight).moved(origins, turns)
+    return join([
+        _local(arm, s.pose, freight).moved(origins[i : i + 1], turns[i : i + 1]) for i, s in enumerate(stances)
+    ])  # fmt: skip
+
+
+def _local(arm: Arm, pose: ArmPose, freight: Boxes) -> Boxes:
+    """The boxes of the arm in the frame of its base."""
+    return join([arm.rig.boxes(pose), freight.moved(pose.wrist[None], pose.turn[None])])
+
+
+def _freight(world: World, arm: Arm) -> Boxes:
+    """The boxes of what moves with the hand, in the wrist's frame."""
+    parts = []
+    for object_id, grip in arm.grips():
+        item = world.objects[object_id]
+        held = Frame(grip.offset, grip.turn)
+        parts.append(Boxes(held.point(item.box_center)[None], grip.turn.T[None], item.box_size[None] / 2))
+    return join(parts)
