@@ -76,8 +76,9 @@ def _reach(
     start = arm.pose.wrist
     distance = float(np.linalg.norm(target - start))
     ahead = (target - start) / max(distance, 1e-9)
-    poses = [arm.rig.reaching(arm.pose, start + ahead * away) for away in away_steps(distance)[:-1]]
-    _bend(sim, arm, [*poses, arm.rig.reaching(arm.pose, target)], place_text(point), return_to_start)
+    targets = np.vstack([start + ahead * away_steps(distance)[:-1, None], target])
+    poses = arm.rig.reaching([arm.pose] * len(targets), targets)
+    _bend(sim, arm, poses, place_text(point), return_to_start)
 
 
 @action("MoveArmBase", modes=_ARMS)
@@ -188,10 +189,8 @@ def _turn_around(sim: Simulation, pivot: Array, turn: Array, return_to_start: bo
     arm = the_arm(sim)
     around = arm.base(sim.world.agent).local(pivot)
     lever = arm.pose.turn.T @ (arm.pose.wrist - around)
-    poses = []
-    for part in turning(turn, _TURN_STEP):
-        turned = replace(arm.pose, turn=arm.pose.turn @ part)
-        poses.append(arm.rig.reaching(turned, around + turned.turn @ lever))
+    turned = [replace(arm.pose, turn=arm.pose.turn @ part) for part in turning(turn, _TURN_STEP)]
+    poses = arm.rig.reaching(turned, np.stack([around + pose.turn @ lever for pose in turned]))
     _bend(sim, arm, poses, turn_text(arm.wrist(sim.world.agent).turn @ turn), return_to_start)
 
 

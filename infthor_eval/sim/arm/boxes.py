@@ -1,6 +1,7 @@
 """Turned boxes in bulk, and how far apart pairs of them are."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,60 +16,54 @@ _NEXT, _LAST = [1, 2, 0], [2, 0, 1]
 
 @dataclass(frozen=True)
 class Boxes:
-    """Some turned boxes.
+    """Some turned boxes, (n,) of them or, in groups of equal size, (k, n).
 
     Attributes:
-        center: metres (n, 3).
-        axes: unit axes (n, 3, 3), one axis of the box a row.
-        half: half extents along them, metres (n, 3).
+        center: metres (..., n, 3).
+        axes: unit axes (..., n, 3, 3), one axis of the box a row.
+        half: half extents along them, metres (..., n, 3).
     """
 
     center: Array
     axes: Array
     half: Array
 
-    def __len__(self) -> int:
-        return len(self.center)
-
     def __getitem__(self, index: NDArray[np.int64] | NDArray[np.bool_] | slice) -> "Boxes":
         return Boxes(self.center[index], self.axes[index], self.half[index])
 
+    def flat(self) -> "Boxes":
+        """The boxes without their groups (k * n), group after group."""
+        return Boxes(self.center.reshape(-1, 3), self.axes.reshape(-1, 3, 3), self.half.reshape(-1, 3))
+
     def bounds(self) -> tuple[Array, Array]:
-        """Low and high corners (n, 3) of the axis-aligned boxes around them."""
-        reach = np.einsum("nij,ni->nj", np.abs(self.axes), self.half)
+        """Low and high corners (..., n, 3) of the axis-aligned boxes around them."""
+        reach = (np.abs(self.axes) * self.half[..., None]).sum(axis=-2)
         return self.center - reach, self.center + reach
 
     def moved(self, origins: Array, frames: Array) -> "Boxes":
-        """The boxes (n) in the world from a frame that stands at each of some places: (k * n), the first place first.
+        """Groups (k, n) of the boxes in the world, from a frame that stands at some places.
 
         Args:
-            origins: where the frame stands, metres (k, 3).
+            origins: where the frame stands, metres (k, 3); one place for each group, or many for boxes of one group.
             frames: its rotations (k, 3, 3).
         """
-        center = origins[:, None] + np.einsum("kij,nj->kni", frames, self.center)
-        axes = np.einsum("kij,naj->knai", frames, self.axes)
-        half = np.broadcast_to(self.half, (len(origins), *self.half.shape))
-        return Boxes(center.reshape(-1, 3), axes.reshape(-1, 3, 3), half.reshape(-1, 3))
+        back = frames.transpose(0, 2, 1)
+        center = origins[:, None] + self.center @ back
+        return Boxes(center, self.axes @ back[:, None], np.broadcast_to(self.half, center.shape))
 
 
-def join(parts: list[Boxes]) -> Boxes:
-    """All boxes of some collections, in order; none where there are none."""
-    if not parts:
-        return Boxes(np.zeros((0, 3)), np.zeros((0, 3, 3)), np.zeros((0, 3)))
-    return Boxes(
-        np.concatenate([p.center for p in parts]),
-        np.concatenate([p.axes for p in parts]),
-        np.concatenate([p.half for p in parts]),
-    )
+def join(parts: Sequence[Boxes], axis: int = 0) -> Boxes:
+    """All boxes of some collections, in order; with `axis` 1, the groups of each beside those of the others."""
+    return Boxes(*(np.concatenate([getattr(p, f.name) for p in parts], axis=axis) for f in fields(Boxes)))
 
 
 def separations(first: Boxes, second: Boxes) -> Array:
-    """Gaps (n, m) in metres between each of n boxes and each of m others; negative: how deep they overlap.
+    """Gaps (n, m) in metres between each of n boxes and each of m others, ungrouped; negative: how deep they overlap.
 
     A gap is that along the best separating direction (of the faces and of pairs of edges), so it is at most the true
     distance, and negative exactly where the boxes overlap. Pairs that are far apart have infinity.
     """
-    gaps = np.full((len(first), len(second)), np.inf)
+    gaps = np.full((len(first.center), len(second.center)), np.inf)
     apart = np.linalg.norm(first.center[:, None] - second.center[None], axis=2)
     near = np.nonzero(apart < np.linalg.norm(first.half, axis=1)[:, None] + np.linalg.norm(second.half, axis=1))
     if len(near[0]):

@@ -2,17 +2,17 @@
 
 The reach (0.6335 m from the shoulder, 0.6325 m where restricted), the heights of the base, the resting pose and the
 order of joints are Unity's. The length of a link follows: Unity's solver exchanges them freely and two make the reach.
-Thicknesses, and that the elbow points up while `elbow` is 0, are ours.
+Thicknesses, and that the elbow points up and to the right while `elbow` is 0, are ours.
 """
 
-import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from infthor_eval.sim.arm.boxes import Boxes
 from infthor_eval.sim.arm.rig import ArmPose, Joints
-from infthor_eval.sim.geometry import Array
+from infthor_eval.sim.geometry import Array, cross
 
 __all__ = ["FINGERS", "LINK", "PALM", "SHOULDER", "Kinova", "forward", "inverse"]
 
@@ -29,40 +29,44 @@ _UP: Array = np.array([0.0, 1.0, 0.0])
 _RIGHT: Array = np.array([1.0, 0.0, 0.0])
 _AHEAD: Array = np.array([0.0, 0.0, 1.0])
 _LEVEL: Array = np.eye(3)
+_LEAN = 50.0  # degrees of the elbow from up to the right: the forearm must not hide the hand from the camera
+_NOWHERE = 1e-9  # metres from the shoulder at which the wrist is in no direction
+_UPRIGHT = 1e-6  # sine of an angle from the vertical at which the elbow's side is the base's
 
 
-def inverse(target: Array, elbow: float) -> Array:
-    """Rotations (2, 3, 3) of shoulder and elbow that bring the wrist to a target (3,), or as near as it gets.
+def inverse(targets: Array, elbows: Array) -> Array:
+    """Rotations (n, 2, 3, 3) of shoulder and elbow that bring the wrist to targets (n, 3), or as near as it gets.
 
     Args:
-        target: metres, in the frame of the base.
-        elbow: degrees that the elbow is turned about the line from shoulder to wrist; 0: up.
+        targets: metres, in the frame of the base.
+        elbows: degrees (n,) that the elbow is turned about the line from shoulder to wrist; 0: up and to the right.
     """
-    line = target - SHOULDER
-    distance = float(np.linalg.norm(line))
-    ahead = line / distance if distance > 1e-9 else _AHEAD
-    aside = np.cross(_UP, ahead)
-    if np.linalg.norm(aside) < 1e-6:
-        aside = _RIGHT - ahead * float(_RIGHT @ ahead)
-    aside /= np.linalg.norm(aside)
-    angle = math.radians(elbow)
-    out = math.cos(angle) * np.cross(ahead, aside) - math.sin(angle) * aside
-    along = min(distance / 2, LINK)
-    upper = (along * ahead + math.sqrt(max(LINK**2 - along**2, 0.0)) * out) / LINK
-    fore = (2 * along * ahead - LINK * upper) / LINK
-    normal = np.cross(out, ahead)
-    return np.stack([_looking(upper, normal), _looking(fore, normal)])
+    lines = targets - SHOULDER
+    distances = np.linalg.norm(lines, axis=1, keepdims=True)
+    ahead = np.where(distances > _NOWHERE, lines / np.maximum(distances, _NOWHERE), _AHEAD)
+    aside = cross(np.broadcast_to(_UP, ahead.shape), ahead)
+    upright = np.linalg.norm(aside, axis=1, keepdims=True) < _UPRIGHT
+    aside = np.where(upright, _RIGHT - ahead * ahead[:, :1], aside)
+    aside /= np.linalg.norm(aside, axis=1, keepdims=True)
+    angles = np.radians(elbows - _LEAN)[:, None]
+    out = np.cos(angles) * cross(ahead, aside) - np.sin(angles) * aside
+    along = np.minimum(distances / 2, LINK)
+    upper = (along * ahead + np.sqrt(np.maximum(LINK**2 - along**2, 0.0)) * out) / LINK
+    fore = 2 * along * ahead / LINK - upper
+    normal = cross(out, ahead)
+    return np.stack([_looking(upper, normal), _looking(fore, normal)], axis=1)
 
 
 def forward(turns: Array) -> Array:
-    """Positions (4, 3) in metres of base, shoulder, elbow and wrist by the rotations (2, 3, 3) of the middle two."""
-    elbow = SHOULDER + LINK * turns[0, :, 2]
-    return np.stack([np.zeros(3), SHOULDER, elbow, elbow + LINK * turns[1, :, 2]])
+    """Positions (n, 4, 3) in metres of base, shoulder, elbow and wrist by rotations (n, 2, 3, 3) of the middle two."""
+    elbows = SHOULDER + LINK * turns[:, 0, :, 2]
+    shoulders = np.broadcast_to(SHOULDER, elbows.shape)
+    return np.stack([np.zeros_like(elbows), shoulders, elbows, elbows + LINK * turns[:, 1, :, 2]], axis=1)
 
 
 def _looking(ahead: Array, aside: Array) -> Array:
-    """The rotation (3, 3) whose z is `ahead`, a unit vector, and whose x is `aside`, one at a right angle to it."""
-    return np.stack([aside, np.cross(ahead, aside), ahead], axis=1)
+    """Rotations (n, 3, 3) whose z is `ahead`, unit vectors, and whose x is `aside`, others at a right angle to them."""
+    return np.stack([aside, cross(ahead, aside), ahead], axis=2)
 
 
 @dataclass(frozen=True)
@@ -95,24 +99,26 @@ class Kinova:
         """Height of the base above the agent's position, metres."""
         return pose.base
 
-    def reaching(self, pose: ArmPose, target: Array) -> ArmPose:
-        """The pose with the wrist at a target (3,) in the frame of the base, or as near as it gets."""
-        return replace(pose, wrist=forward(inverse(target, pose.elbow))[3])
+    def reaching(self, poses: Sequence[ArmPose], targets: Array) -> list[ArmPose]:
+        """Poses (n) with the wrist at targets (n, 3) in the frame of the base, or as near as it gets."""
+        wrists = forward(inverse(targets, np.array([p.elbow for p in poses])))[:, 3]
+        return [replace(pose, wrist=wrist) for pose, wrist in zip(poses, wrists, strict=True)]
 
-    def joints(self, pose: ArmPose) -> Joints:
+    def joints(self, poses: Sequence[ArmPose]) -> Joints:
         """Where the joints are; the first looks ahead, the last as the wrist does."""
-        turns = inverse(pose.wrist, pose.elbow)
-        return Joints(forward(turns), np.stack([_LEVEL, *turns, pose.turn]))
+        turns = inverse(np.stack([p.wrist for p in poses]), np.array([p.elbow for p in poses]))
+        bases = np.broadcast_to(_LEVEL, (len(poses), 1, 3, 3))
+        wrists = np.stack([p.turn for p in poses])[:, None]
+        return Joints(forward(turns), np.concatenate([bases, turns, wrists], axis=1))
 
-    def boxes(self, pose: ArmPose) -> Boxes:
-        """Three links and the palm, in the frame of the base."""
-        joints = self.joints(pose)
-        centers = (joints.positions[:3] + joints.positions[1:]) / 2
-        halves = [(thick, thick, LINK / 2) for thick in _THICK]
-        palm = pose.wrist + pose.turn @ np.array(PALM[0])
-        return Boxes(
-            np.concatenate([centers, palm[None]]), joints.turns.transpose(0, 2, 1), np.array([*halves, PALM[1]])
-        )
+    def boxes(self, poses: Sequence[ArmPose]) -> Boxes:
+        """Three links and the palm of each pose (n, 4), in the frame of the base."""
+        joints = self.joints(poses)
+        links = (joints.positions[:, :3] + joints.positions[:, 1:]) / 2
+        palms = joints.positions[:, 3:] + joints.turns[:, 3:] @ np.array(PALM[0])
+        halves = np.array([*((thick, thick, LINK / 2) for thick in _THICK), PALM[1]])
+        centers = np.concatenate([links, palms], axis=1)
+        return Boxes(centers, joints.turns.transpose(0, 1, 3, 2), np.broadcast_to(halves, centers.shape))
 
     def allows(self, target: Array) -> bool:
         """Whether a target is in front of the shoulder and within reach."""

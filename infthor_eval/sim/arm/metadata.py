@@ -29,10 +29,10 @@ def arm_metadata(world: World, arm: Arm) -> dict[str, Any]:
 
 
 def _joints(world: World, arm: Arm) -> list[dict[str, Any]]:
-    base, joints = arm.base(world.agent), arm.rig.joints(arm.pose)
+    base, joints = arm.base(world.agent), arm.rig.joints([arm.pose])
     told: list[dict[str, Any]] = []
     parent = np.eye(3)
-    for name, position, turn in zip(arm.rig.joint_names, joints.positions, joints.turns, strict=True):
+    for name, position, turn in zip(arm.rig.joint_names, joints.positions[0], joints.turns[0], strict=True):
         told.append({
             "name": name,
             "position": _xyz(base.point(position)),

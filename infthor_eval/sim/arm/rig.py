@@ -1,5 +1,6 @@
 """What an arm is to the rest of the simulator: a pose, and a rig that turns it into joints and boxes."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -28,11 +29,11 @@ class ArmPose:
 
 @dataclass(frozen=True)
 class Joints:
-    """The joints of an arm in the frame of its base.
+    """The joints of an arm in some poses (n), in the frame of its base.
 
     Attributes:
-        positions: metres (n, 3), from the base to the wrist.
-        turns: rotations (n, 3, 3); a joint looks along the link that begins at it.
+        positions: metres (n, joints, 3), from the base to the wrist.
+        turns: rotations (n, joints, 3, 3); a joint looks along the link that begins at it.
     """
 
     positions: Array
@@ -74,14 +75,14 @@ class Rig(Protocol):
     def lift(self, pose: ArmPose) -> float:
         """Height above the agent's position of the base, or of the lift, metres."""
 
-    def reaching(self, pose: ArmPose, target: Array) -> ArmPose:
-        """The pose with the wrist at a target (3,) in the frame of the base, or as near as it gets."""
+    def reaching(self, poses: Sequence[ArmPose], targets: Array) -> list[ArmPose]:
+        """Poses (n) with the wrist at targets (n, 3) in the frame of the base, or as near as it gets."""
 
-    def joints(self, pose: ArmPose) -> Joints:
-        """Where the joints are."""
+    def joints(self, poses: Sequence[ArmPose]) -> Joints:
+        """Where the joints of some poses (n) are."""
 
-    def boxes(self, pose: ArmPose) -> Boxes:
-        """The links and the hand, in the frame of the base."""
+    def boxes(self, poses: Sequence[ArmPose]) -> Boxes:
+        """The links and the hand of some poses (n, m), the hand last, in the frame of the base."""
 
     def allows(self, target: Array) -> bool:
         """Whether `restrictMovement` lets the wrist be sent to a target (3,) in the frame of the base."""

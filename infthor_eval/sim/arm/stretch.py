@@ -5,6 +5,7 @@ Places of the joints were read off the metadata of a Unity build that somebody p
 thicknesses are ours.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,6 +24,7 @@ _TUBE = (0.083, 0.163, -0.0241)  # the first section of the telescope, likewise
 _SECTIONS = (0.0, 0.0130003, 0.0130005, 0.0130003, 0.0117463)  # of a section from the one before, drawn in
 _YAW_JOINT, _HAND_JOINT = 0.1494, 0.0987  # heights of the wrist's two joints above the hand
 _PALM = 0.2047 - 0.06  # the sphere's centre in the recorded pose, less its radius there
+_HALVES: Array = np.array([(0.03, 0.03, 0.0), (0.025, 0.05, 0.025), (0.03, 0.02, _PALM / 2)])
 _LEVEL: Array = np.eye(3)
 
 
@@ -55,34 +57,43 @@ class Stretch:
 
     def lifted(self, pose: ArmPose, height: float) -> ArmPose:
         """The pose with its wrist at a height above the agent's position, metres."""
-        return self.reaching(pose, np.array([0.0, height - _ORIGIN[1], pose.wrist[2]]))
+        return self.reaching([pose], np.array([[0.0, height - _ORIGIN[1], pose.wrist[2]]]))[0]
 
     def lift(self, pose: ArmPose) -> float:
         """Height of the wrist above the agent's position, metres."""
         return float(_ORIGIN[1] + pose.wrist[1])
 
-    def reaching(self, pose: ArmPose, target: Array) -> ArmPose:
-        """The pose with the wrist at a target (3,), of which only height and distance count, within its limits."""
-        return replace(pose, wrist=np.array([0.0, np.clip(target[1], *_LIFTS), np.clip(target[2], 0.0, _OUT)]))
+    def reaching(self, poses: Sequence[ArmPose], targets: Array) -> list[ArmPose]:
+        """Poses (n) with the wrist at targets (n, 3), of which only height and distance count, within its limits."""
+        wrists = np.zeros_like(targets)
+        wrists[:, 1], wrists[:, 2] = np.clip(targets[:, 1], *_LIFTS), np.clip(targets[:, 2], 0.0, _OUT)
+        return [replace(pose, wrist=wrist) for pose, wrist in zip(poses, wrists, strict=True)]
 
-    def joints(self, pose: ArmPose) -> Joints:
+    def joints(self, poses: Sequence[ArmPose]) -> Joints:
         """Where the joints are: the lift, five sections of the telescope, the wrist's two."""
-        rise = np.array([0.0, pose.wrist[1], 0.0])
-        steps = np.cumsum(_SECTIONS) + np.array([0, 1, 2, 3, 4]) * pose.wrist[2] / 4
-        sections = [rise + np.array(_TUBE) + (0.0, 0.0, step) for step in steps]
-        wrist = [pose.wrist + (0.0, height, 0.0) for height in (_YAW_JOINT, _HAND_JOINT)]
-        return Joints(np.stack([rise + np.array(_MAST), *sections, *wrist]), np.stack([_LEVEL] * 6 + [pose.turn] * 2))
+        wrists = np.stack([p.wrist for p in poses])
+        positions = np.zeros((len(poses), 8, 3))
+        positions[:, 0] = _MAST
+        positions[:, 1:6] = _TUBE
+        positions[:, 1:6, 2] += np.cumsum(_SECTIONS) + np.arange(5) * wrists[:, 2:] / 4
+        positions[:, :, 1] += wrists[:, 1:2]
+        positions[:, 6:] = wrists[:, None] + np.array([[0.0, _YAW_JOINT, 0.0], [0.0, _HAND_JOINT, 0.0]])
+        turns = np.broadcast_to(_LEVEL, (len(poses), 8, 3, 3)).copy()
+        turns[:, 6:] = np.stack([p.turn for p in poses])[:, None]
+        return Joints(positions, turns)
 
-    def boxes(self, pose: ArmPose) -> Boxes:
-        """The telescope, the wrist and the gripper, in the frame of the base."""
-        joints = self.joints(pose).positions
-        ends = np.array([joints[0], joints[5]])
-        tube = np.abs(ends[1, 2] - ends[0, 2]) / 2
-        gripper = pose.wrist + pose.turn @ np.array([0.0, 0.0, _PALM / 2])
+    def boxes(self, poses: Sequence[ArmPose]) -> Boxes:
+        """The telescope, the wrist and the gripper of each pose (n, 3), in the frame of the base."""
+        joints = self.joints(poses)
+        mast, out, wrist, turns = joints.positions[:, 0], joints.positions[:, 5], joints.positions[:, 7], joints.turns
+        tube = (np.stack([out[:, 0], out[:, 1], mast[:, 2]], axis=1) + out) / 2
+        palm = wrist - np.array([0.0, _HAND_JOINT, 0.0]) + turns[:, 7] @ np.array([0.0, 0.0, _PALM / 2])
+        halves = np.tile(_HALVES, (len(poses), 1, 1))
+        halves[:, 0, 2] = (out[:, 2] - mast[:, 2]) / 2
         return Boxes(
-            np.stack([[joints[1, 0], joints[1, 1], ends[:, 2].mean()], pose.wrist + (0.0, 0.07, 0.0), gripper]),
-            np.stack([_LEVEL, pose.turn.T, pose.turn.T]),
-            np.array([(0.03, 0.03, tube), (0.025, 0.07, 0.025), (0.03, 0.02, _PALM / 2)]),
+            np.stack([tube, wrist - np.array([0.0, _HAND_JOINT / 2, 0.0]), palm], axis=1),
+            np.stack([turns[:, 0], turns[:, 6], turns[:, 7]], axis=1).transpose(0, 1, 3, 2),
+            halves,
         )
 
     def allows(self, target: Array) -> bool:

@@ -16,6 +16,7 @@ from infthor_eval.sim.world import World
 __all__ = ["Solids", "solids"]
 
 _WALL = 0.08  # thickness of the sides and the floor of a hollow shape, as a share of its width
+_SIDES: Array = np.array([(0, -1, 0), (1, 0, 0), (-1, 0, 0), (0, 0, 1), (0, 0, -1)], dtype=float)  # of a hollow box
 _HOLLOW = (Form.CUP, Form.BOWL)
 
 
@@ -53,10 +54,9 @@ def solids(world: World, rows: Array, names: tuple[str, ...], mass_threshold: fl
     rows, owner = rows[kept], owner[kept]
     boxes = Boxes(rows[:, CENTER : CENTER + 3], rows[:, AXES : AXES + 9].reshape(-1, 3, 3), rows[:, HALF : HALF + 3])
     hollow = np.isin(rows[:, FORM], _HOLLOW)
-    shells = [_shell(boxes[hollow][index : index + 1]) for index in range(int(hollow.sum()))]
-    parts = [boxes[~hollow], *shells]
-    owners = [owner[~hollow], *(np.full(len(s), o) for s, o in zip(shells, owner[hollow], strict=True))]
-    return Solids(join(parts), np.concatenate(owners), names)
+    shells = _shells(boxes[hollow])
+    owners = np.concatenate([owner[~hollow], np.repeat(owner[hollow], len(_SIDES))])
+    return Solids(join([boxes[~hollow], shells]), owners, names)
 
 
 def _stops(world: World, name: str, mass_threshold: float | None) -> bool:
@@ -71,15 +71,12 @@ def _goes_along(world: World, item: SimObject) -> bool:
     return item.object_id in held or any(outer.object_id in held for outer in world.ancestors(item))
 
 
-def _shell(vessel: Boxes) -> Boxes:
-    """Floor and four sides of a hollow box (1)."""
-    center, axes, half = vessel.center[0], vessel.axes[0], vessel.half[0]
-    thick = _WALL * half
-    floor = (np.array([0.0, -half[1] + thick[1], 0.0]), np.array([half[0], thick[1], half[2]]))
-    sides = [
-        (np.eye(3)[axis] * sign * (half[axis] - thick[axis]), np.where(np.arange(3) == axis, thick, half))
-        for axis in (0, 2)
-        for sign in (-1.0, 1.0)
-    ]
-    offsets, halves = (np.stack(part) for part in zip(floor, *sides, strict=True))
-    return Boxes(center + offsets @ axes, np.repeat(axes[None], 5, axis=0), halves)
+def _shells(vessels: Boxes) -> Boxes:
+    """Floors and sides (n * 5) of hollow boxes (n)."""
+    thick = _WALL * vessels.half
+    offsets = _SIDES * (vessels.half - thick)[:, None]
+    return Boxes(
+        vessels.center[:, None] + offsets @ vessels.axes,
+        np.repeat(vessels.axes[:, None], len(_SIDES), axis=1),
+        np.where(_SIDES != 0, thick[:, None], vessels.half[:, None]),
+    ).flat()

@@ -38,7 +38,7 @@ def assume(world: World, arm: Arm, to: Stance) -> None:
 
 
 def first_contact(world: World, arm: Arm, path: list[Stance], around: Solids) -> tuple[int, str] | None:
-    """The first of some stances (n) in which the arm, or what it holds, is in something; its index and the name of that.
+    """The first of some stances (n) in which the arm, or what it holds, is in something: its index, and what that is.
 
     The path begins where the agent is now. What is touched there is in the way only where the arm gets deeper into it:
     it could not be got away otherwise.
@@ -48,10 +48,10 @@ def first_contact(world: World, arm: Arm, path: list[Stance], around: Solids) ->
     """
     moving = moving_boxes(world, arm, [stance(world, arm), *path])
     low, high = moving.bounds()
-    met = around.near(low.min(axis=0), high.max(axis=0))
-    if not len(met.boxes):
+    met = around.near(low.min(axis=(0, 1)), high.max(axis=(0, 1)))
+    if not len(met.owner):
         return None
-    gaps = separations(moving, met.boxes).reshape(len(path) + 1, -1, len(met.boxes))
+    gaps = separations(moving.flat(), met.boxes).reshape(len(path) + 1, -1, len(met.owner))
     depth = gaps[1:] - np.minimum(gaps[0], -_SKIN)
     hit = np.argwhere(depth.min(axis=(1, 2)) < -1e-9)
     if not len(hit):
@@ -62,27 +62,19 @@ def first_contact(world: World, arm: Arm, path: list[Stance], around: Solids) ->
 
 
 def moving_boxes(world: World, arm: Arm, stances: list[Stance]) -> Boxes:
-    """The boxes (stances * n) of the arm and of what it holds in the world, stance after stance."""
-    freight = _freight(world, arm)
+    """The boxes (stances, n) of the arm and of what it holds, in the world."""
     frames = [base_frame(arm.rig, s.position, s.yaw, s.pose) for s in stances]
     origins, turns = np.stack([f.origin for f in frames]), np.stack([f.turn for f in frames])
-    if all(s.pose is stances[0].pose for s in stances):
-        return _local(arm, stances[0].pose, freight).moved(origins, turns)
-    return join([
-        _local(arm, s.pose, freight).moved(origins[i : i + 1], turns[i : i + 1]) for i, s in enumerate(stances)
-    ])  # fmt: skip
-
-
-def _local(arm: Arm, pose: ArmPose, freight: Boxes) -> Boxes:
-    """The boxes of the arm in the frame of its base."""
-    return join([arm.rig.boxes(pose), freight.moved(pose.wrist[None], pose.turn[None])])
+    poses = [stances[0].pose] if all(s.pose is stances[0].pose for s in stances) else [s.pose for s in stances]
+    wrists, twists = np.stack([p.wrist for p in poses]), np.stack([p.turn for p in poses])
+    return join([arm.rig.boxes(poses), _freight(world, arm).moved(wrists, twists)], axis=1).moved(origins, turns)
 
 
 def _freight(world: World, arm: Arm) -> Boxes:
-    """The boxes of what moves with the hand, in the wrist's frame."""
-    parts = []
-    for object_id, grip in arm.grips():
-        item = world.objects[object_id]
-        held = Frame(grip.offset, grip.turn)
-        parts.append(Boxes(held.point(item.box_center)[None], grip.turn.T[None], item.box_size[None] / 2))
-    return join(parts)
+    """The boxes (n,) of what moves with the hand, in the wrist's frame."""
+    held = [(Frame(grip.offset, grip.turn), world.objects[object_id]) for object_id, grip in arm.grips()]
+    return Boxes(
+        np.array([frame.point(item.box_center) for frame, item in held]).reshape(-1, 3),
+        np.array([frame.turn.T for frame, _ in held]).reshape(-1, 3, 3),
+        np.array([item.box_size / 2 for _, item in held]).reshape(-1, 3),
+    )

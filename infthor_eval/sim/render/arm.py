@@ -26,7 +26,7 @@ def arm_rows(arm: Arm, agent: Agent, instance: int) -> Array:
         agent: whose arm it is.
         instance: index of the arm in the picture's table of instances.
     """
-    boxes, base = arm.rig.boxes(arm.pose), arm.base(agent)
+    boxes, base = arm.rig.boxes([arm.pose]).flat(), arm.base(agent)
     parts = []
     for center, axes, half in zip(boxes.center[:-1], boxes.axes[:-1], boxes.half[:-1], strict=True):
         longest = int(np.argmax(half))
