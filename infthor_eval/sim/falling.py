@@ -60,10 +60,11 @@ def _floor(world: World, point: Array) -> _Ground:
 def _grounds(world: World, item: SimObject, point: Array) -> Iterator[_Ground]:
     """What is below `point` and below the object."""
     bottom = float(item.bounds()[0][1])
+    basins = [o for o in world.objects.values() if o.type.basin and o.type.open_top and _under(surfaces(o)[0], point)]
     aside = {item.object_id, *(o.object_id for o in world.descendants(item)), *world.carried()}
     for other in world.objects.values():
         gone = other.object_id in aside or other.object_type == "Floor" or world.hidden(other)
-        if gone or not (other.type.receptacle or other.type.pickupable):
+        if gone or not (other.type.receptacle or other.type.pickupable) or _cut_out(other, basins):
             continue
         for ground in _on(world, item, other, point, bottom):
             if 0.0 < ground.height <= bottom + _SUNK:
@@ -73,20 +74,22 @@ def _grounds(world: World, item: SimObject, point: Array) -> Iterator[_Ground]:
 def _on(world: World, item: SimObject, other: SimObject, point: Array, bottom: float) -> Iterator[_Ground]:
     """Where on or in another thing an object may come to lie."""
     closed = other.type.encloses and other.type.openable and other.state.openness == 0
-    if other.type.receptacle and not closed:
-        for surface in surfaces(other):
-            if _under(surface, point) and _fits(item, other, surface) and _open_above(other, surface, bottom):
-                yield _Ground(float(surface.center[1]), other)
-    # Its top: of what is closed or full of shelves, and of loose things, which a larger one lies across.
+    open_surfaces = surfaces(other) if other.type.receptacle and not closed else []
+    reached = [s for s in open_surfaces if _under(s, point) and _fits(item, other, s) and _open_above(other, s, bottom)]
+    yield from (_Ground(float(surface.center[1]), other) for surface in reached)
     topped = other.type.encloses and not other.type.slides
-    if (topped or (other.type.pickupable and not _has_plain_top(other))) and _over(other, point):
-        parent = None if other.parent is None else world.objects[other.parent]
-        yield _Ground(float(other.bounds()[1][1]), parent if other.type.pickupable else None)
+    if not reached and (topped or other.type.pickupable) and _over(other, point):
+        # It lies on top: of what is closed or full of shelves, or across a loose thing and so where that lies.
+        parent = world.objects[other.parent] if other.type.pickupable and other.parent is not None else None
+        yield _Ground(float(other.bounds()[1][1]), parent)
 
 
-def _has_plain_top(other: SimObject) -> bool:
-    """Whether its top is the surface that things stand on anyway."""
-    return other.type.receptacle and not other.type.open_top and not other.type.encloses
+def _cut_out(other: SimObject, basins: list[SimObject]) -> bool:
+    """Whether a piece of furniture has one of some basins let into its surface."""
+    if other.type.pickupable or other.type.open_top:
+        return False
+    low, high = other.bounds()
+    return any(np.all(basin.center > low - _SUNK) and np.all(basin.center < high + _SUNK) for basin in basins)
 
 
 def _under(surface: Surface, point: Array) -> bool:

@@ -98,10 +98,13 @@ class World:
         return found
 
     def touch(self, *changed: SimObject) -> None:
-        """Record that these objects (and the view) changed."""
+        """Record that these objects (and the view) changed.
+
+        No two states of an object have the same version, be it another object that took its id.
+        """
         self.version += 1
         for item in changed:
-            item.version += 1
+            item.version = self.version
 
     def add(self, item: SimObject) -> None:
         """Add an object; its id must be new."""

@@ -31,17 +31,17 @@ def touched(world: World, arm: Arm) -> Touched:
     """What the hand's sphere meets; not what is shut in, nor what the arm holds."""
     center = arm.sphere(world.agent)
     loose = [
-        o for o in world.objects.values()
-        if (o.type.pickupable or o.type.moveable) and o.object_id not in arm.held and _within(o, center, arm.radius)
-        and not world.hidden(o)
-    ]  # fmt: skip
-    return Touched([o for o in loose if o.type.pickupable], loose)
+        o for o in world.objects.values() if (o.type.pickupable or o.type.moveable) and o.object_id not in arm.held
+    ]
+    near = [o for o in loose if _near(o, center, arm.radius) and not world.hidden(o)]
+    return Touched([o for o in near if o.type.pickupable], near)
 
 
-def _within(item: SimObject, center: Array, radius: float) -> bool:
+def _near(item: SimObject, center: Array, radius: float) -> bool:
     low, high = item.bounds()
-    if np.any(center < low - radius) or np.any(center > high + radius):
-        return False
+    for axis in range(3):  # most things are far away: this is the quickest way to tell
+        if not low[axis] - radius <= center[axis] <= high[axis] + radius:
+            return False
     box = Boxes(item.center[None], item.matrix.T[None], item.box_size[None] / 2)
     return bool(sphere_gaps(box, center)[0] <= radius)
 

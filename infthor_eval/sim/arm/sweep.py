@@ -14,6 +14,8 @@ from infthor_eval.sim.world import World
 __all__ = ["Stance", "assume", "first_contact", "moving_boxes", "stance"]
 
 _SKIN = 0.001  # metres that boxes may overlap: things that touch do
+_STUCK = 0.02  # metres deep from which a part of the arm does not touch a thing but is in it
+_SAME = 1e-9  # metres of rounding
 
 
 @dataclass(frozen=True)
@@ -40,8 +42,9 @@ def assume(world: World, arm: Arm, to: Stance) -> None:
 def first_contact(world: World, arm: Arm, path: list[Stance], around: Solids) -> tuple[int, str] | None:
     """The first of some stances (n) in which the arm, or what it holds, is in something: its index, and what that is.
 
-    The path begins where the agent is now. What is touched there is in the way only where the arm gets deeper into it:
-    it could not be got away otherwise.
+    The path begins where the agent is now. A thing that is touched there is in the way only where the same part of the
+    arm gets deeper into it than it is: it could not be got away otherwise. What is stuck in a thing, as after a
+    teleport, may leave it through other parts of it: there the end of the path counts alone.
 
     Returns:
         None where the whole path is free.
@@ -52,13 +55,15 @@ def first_contact(world: World, arm: Arm, path: list[Stance], around: Solids) ->
     if not len(met.owner):
         return None
     gaps = separations(moving.flat(), met.boxes).reshape(len(path) + 1, -1, len(met.owner))
+    things = np.unique(met.owner)
+    gaps = np.stack([gaps[:, :, met.owner == thing].min(axis=2) for thing in things], axis=2)
     depth = gaps[1:] - np.minimum(gaps[0], -_SKIN)
-    hit = np.argwhere(depth.min(axis=(1, 2)) < -1e-9)
+    depth[:-1, gaps[0] < -_STUCK] = 0.0
+    hit = np.flatnonzero(depth.min(axis=(1, 2)) < -_SAME)
     if not len(hit):
         return None
-    step = int(hit[0, 0])
-    box = int(depth[step].min(axis=0).argmin())
-    return step, met.names[met.owner[box]]
+    step = int(hit[0])
+    return step, met.names[things[depth[step].min(axis=0).argmin()]]
 
 
 def moving_boxes(world: World, arm: Arm, stances: list[Stance]) -> Boxes:

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from infthor_eval.sim.arm.equipment import equip
 from infthor_eval.sim.arm.sweep import moving_boxes, stance
 
 from ..harness import Bench
@@ -25,6 +26,12 @@ def xyz(vector: Any) -> dict[str, float]:
     return dict(zip("xyz", map(float, vector), strict=True))
 
 
+def loose(bench: Bench, object_type: str) -> str:
+    """A thing of a type that is not shut in."""
+    world = bench.sim.world
+    return next(o.object_id for o in world.objects.values() if o.object_type == object_type and not world.hidden(o))
+
+
 def hand_to(bench: Bench, object_id: str) -> None:
     """Stand somewhere before a thing and bring the hand's sphere to it from above."""
     item = bench.sim.world.objects[object_id]
@@ -35,21 +42,18 @@ def hand_to(bench: Bench, object_id: str) -> None:
     cells = sorted(bench.sim.world.nav, key=lambda c: abs(math.dist(c, middle[[0, 2]]) - 0.6))
     for x, z in cells[:15]:
         yaw = math.degrees(math.atan2(middle[0] - x, middle[2] - z))
-        bench.step("Initialize", agentMode="arm", gridSize=0.25, fieldOfView=60, visibilityDistance=1.5,
-                   fastActionEmit=False)  # fmt: skip
+        equip(bench.sim.world, bench.sim.settings.agent_mode)
         bench.ok("TeleportFull", position={"x": x, "y": height, "z": z}, rotation={"y": yaw}, horizon=20, standing=True)
         share = min(max((target[1] + 0.25 - 0.451) / 1.35, 0.0), 1.0)
         if not bench.step("MoveArmBase", y=share)["lastActionSuccess"]:
             continue
         ahead = np.array([math.sin(math.radians(yaw)), 0.0, math.cos(math.radians(yaw))])
         back = target - ahead * 0.07  # the sphere's centre is that far ahead of the wrist
-        above = bench.step("MoveArm", position=xyz(back + (0, 0.15, 0)), coordinateSpace="world")
-        if (
-            above["lastActionSuccess"]
-            and bench.step("MoveArm", position=xyz(back), coordinateSpace="world")["lastActionSuccess"]
-        ):
-            if object_id in bench.metadata["arm"]["pickupableObjects"]:
-                return
+        lift = np.array([0.0, 0.15, 0.0])
+        way = [bench.step("MoveArm", position=xyz(at), coordinateSpace="world") for at in (back + lift, back)]
+        near = bench.metadata["arm"]["pickupableObjects"]
+        if all(moved["lastActionSuccess"] for moved in way) and object_id in near:
+            return
     raise AssertionError(f"the hand comes to {object_id} from nowhere: {bench.metadata['errorMessage']}")
 
 
