@@ -49,8 +49,8 @@ def _overlap(low: Array, high: Array, box: tuple[Array, Array]) -> bool:
 def _solid(world: World, item: SimObject) -> Iterator[SimObject]:
     """What is in the way of an object; not its own contents, nor the inside of what is open."""
     own = {o.object_id for o in world.descendants(item)} | {item.object_id}
-    if world.held is not None and item.object_id != world.held:
-        own |= {world.held, *(o.object_id for o in world.descendants(world.objects[world.held]))}
+    for held in world.carried():
+        own |= {held, *(o.object_id for o in world.descendants(world.objects[held]))}
     for other in world.objects.values():
         if not (other.object_id in own or _open_inside(other) or world.hidden(other) or other.object_type == "Floor"):
             yield other

@@ -13,6 +13,7 @@ __all__ = [
     "aabb_overlap",
     "convex_hull",
     "corners",
+    "cross",
     "euler_matrix",
     "level_gaps",
     "matrix_euler",
@@ -65,6 +66,12 @@ def corners(center: Array, size: Array, rotation: Array | None = None) -> Array:
     """The 8 corners (8, 3) of a box, bottom four first, in AI2-THOR's order; `rotation` is a matrix."""
     offsets = _SIGNS * (np.asarray(size) * 0.5)
     return center + (offsets if rotation is None else offsets @ rotation.T)
+
+
+def cross(first: Array, second: Array) -> Array:
+    """Cross products (n, 3) of vectors (n, 3); for few of them much faster than numpy's own."""
+    (ax, ay, az), (bx, by, bz) = first.T, second.T
+    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=1)
 
 
 def convex_hull(points: Array) -> list[Array]:

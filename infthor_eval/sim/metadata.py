@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from infthor_eval.sim.arm.metadata import arm_metadata
 from infthor_eval.sim.geometry import corners, matrix_euler, rounded, to_xyz
 from infthor_eval.sim.objects import SimObject
 from infthor_eval.sim.obstacles import door_leaf
@@ -108,7 +109,7 @@ def agent_metadata(sim: Simulation, outcome: Outcome) -> dict[str, Any]:
         },
         "heldObjectPose": pose,
         "hand": pose,
-        "arm": None,
+        "arm": None if world.arm is None else arm_metadata(world, world.arm),
         "fov": sim.settings.field_of_view,
         "cameraPosition": _xyz(agent.camera_position()),
         "cameraOrthSize": 0.0,

@@ -58,7 +58,7 @@ class Peer:
                 raise ActionError(
                     "renderFlowImage is not offered by the embedded simulator", ErrorCode.INVALID_ARGUMENT
                 )
-            found, arguments = bind(message)
+            found, arguments = bind(message, self._sim.settings.agent_mode)
             value = found.run(self._sim, **arguments)
             if not found.query:
                 settle(self._sim.world)

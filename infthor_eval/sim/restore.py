@@ -41,9 +41,7 @@ def set_poses(world: World, poses: Iterable[NamedPose], keep_moveable: bool = Fa
     Names of other versions of AI2-THOR differ after the type: a name that the scene does not have is taken by type.
     """
     chooser = _Templates(world)
-    if world.held is not None:
-        world.objects[world.held].state.picked_up = False
-        world.held = None
+    world.release()
     for item in [o for o in world.objects.values() if o.type.pickupable]:
         world.remove(item)
     for pose in poses:
@@ -83,8 +81,9 @@ def _has_surface(furniture: ObjectType) -> bool:
 
 def settle_parents(world: World) -> None:
     """Find for every loose object without a parent the receptacle that it stands in or on."""
+    carried = world.carried()
     for item in world.objects.values():
-        if item.type.pickupable and item.parent is None and item.object_id != world.held:
+        if item.type.pickupable and item.parent is None and item.object_id not in carried:
             owner = owner_of(world, item)
             if owner is not None:
                 world.attach(item, owner)
@@ -136,10 +135,11 @@ def spawn_randomly(
     in_open_only: bool,
 ) -> None:
     """Put every loose object that is not `kept` into a random receptacle that takes its type and has room."""
+    carried = world.carried()
     loose = [o for o in world.objects.values() if o.type.pickupable and o.object_id not in kept]
     for index in random.permutation(len(loose)):
         item = loose[index]
-        if item.object_id == world.held:
+        if item.object_id in carried:
             continue
         homes = [
             o for o in world.objects.values()

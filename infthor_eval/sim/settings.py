@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 __all__ = ["AGENT_MODES", "SMOOTH_LEVELS", "SMOOTH_QUALITIES", "SimulatorSettings"]
 
-AGENT_MODES = ("default",)  # the arm agent registers its mode here when it comes
+AGENT_MODES = ("default", "arm", "stretch")
 SMOOTH_QUALITIES = {"High": 5, "Very High": 6, "Ultra": 7, "High WebGL": 8}
 """The `quality` values whose pictures are anti-aliased, with the numbers that the Controller passes to the player."""
 SMOOTH_LEVELS = frozenset(SMOOTH_QUALITIES.values())
@@ -14,10 +14,11 @@ SMOOTH_LEVELS = frozenset(SMOOTH_QUALITIES.values())
 class SimulatorSettings:
     """Parameters of the agent and of the pictures; names and defaults are those of AI2-THOR 5.
 
-    Lengths in metres, angles in degrees.
+    Lengths in metres, angles in degrees, masses in kilograms.
     """
 
     agent_mode: str = "default"
+    mass_threshold: float | None = None
     grid_size: float = 0.25
     snap_to_grid: bool = True
     rotate_step: float = 90.0

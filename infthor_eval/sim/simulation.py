@@ -6,8 +6,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from infthor_eval.sim.agent import Agent
+from infthor_eval.sim.arm.equipment import equip
+from infthor_eval.sim.arm.surroundings import Solids, solids
 from infthor_eval.sim.geometry import Array, euler_matrix
 from infthor_eval.sim.objects import SimObject
+from infthor_eval.sim.render.arm import ARM, arm_rows
 from infthor_eval.sim.render.camera import FAR, NEAR, Camera
 from infthor_eval.sim.render.glimpse import Glimpse
 from infthor_eval.sim.render.hand import held_rows
@@ -17,7 +21,7 @@ from infthor_eval.sim.render.scene import SceneModel
 from infthor_eval.sim.scenes.catalogue import Catalogue
 from infthor_eval.sim.settings import SimulatorSettings
 from infthor_eval.sim.visibility import enclosures, least_pixels, visible_ids
-from infthor_eval.sim.world import Agent, World
+from infthor_eval.sim.world import World
 
 __all__ = ["Simulation", "ThirdPartyCamera"]
 
@@ -71,6 +75,7 @@ class Simulation:
         self.told = None
         self.random = np.random.default_rng(world.seed)
         self._saved: dict[int, tuple[World, np.random.Generator]] = {}
+        equip(world, self.settings.agent_mode)
         self._show(world)
 
     def save(self, slot: int) -> None:
@@ -95,6 +100,7 @@ class Simulation:
         self._model = SceneModel(world)
         self._key: tuple[object, ...] | None = None
         self._full: Picture | None = None
+        self._full_version = -1
         self._visible: frozenset[str] | None = None
 
     def told_objects(self) -> list[SimObject]:
@@ -107,16 +113,30 @@ class Simulation:
         return self._view
 
     def full_view(self) -> Picture:
-        """The agent's view with the held object in front."""
+        """The agent's view with the held object, or its arm, in front."""
         self._refresh()
-        _, held, names = self._model.primitives()
-        if self.world.held is None or not len(held):
-            return self._view
-        if self._full is None:
-            camera = self._view.camera
-            shown = held_rows(held, self.world.objects[self.world.held], camera)
-            self._full = cast_picture(shown, names, camera, self.rasterizer, self._view)
+        version = -1 if self.world.arm is None else self.world.arm.version
+        if self._full is None or self._full_version != version:
+            shown, names = self._in_front()
+            if not len(shown):
+                return self._view
+            self._full = cast_picture(shown, names, self._view.camera, self.rasterizer, self._view)
+            self._full_version = version
         return self._full
+
+    def _in_front(self) -> tuple[Array, tuple[str, ...]]:
+        """What the agent's frame shows beside its view, and the names of all instances."""
+        _, held, names = self._model.primitives()
+        if self.world.arm is not None:
+            return arm_rows(self.world.arm, self.world.agent, len(names)), (*names, ARM)
+        if self.world.held is None:
+            return held, names
+        return held_rows(held, self.world.objects[self.world.held], self._view.camera), names
+
+    def solids(self) -> Solids:
+        """What stops an arm."""
+        prims, _, names = self._model.primitives()
+        return solids(self.world, prims, names, self.settings.mass_threshold)
 
     def agent_picture(self) -> Picture:
         """What the agent's frame shows: its view, or the map from above when the map view is on."""
@@ -197,6 +217,8 @@ class Simulation:
         """What a third-party camera sees."""
         prims, held, names = self._model.primitives()
         lens = self._lens(camera)
+        if self.world.arm is not None:
+            held, names = self._in_front()
         return cast_picture(np.concatenate([prims, held]), names, lens, self.rasterizer)
 
     def _agent_camera(self, agent: Agent) -> Camera:

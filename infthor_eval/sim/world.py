@@ -5,63 +5,18 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from infthor_eval.sim.agent import Agent, Grip
 from infthor_eval.sim.appearance import Appearance
+from infthor_eval.sim.arm.arm import Arm
 from infthor_eval.sim.errors import ActionError
 from infthor_eval.sim.geometry import Array, aabb_gap, euler_matrix, matrix_euler
 from infthor_eval.sim.navigation import NavGrid
 from infthor_eval.sim.objects import SimObject
 
-__all__ = [
-    "AGENT_HEIGHT",
-    "CAMERA_HEIGHT",
-    "FLOOR_STYLES",
-    "MAX_DOWN",
-    "MAX_UP",
-    "Agent",
-    "Grip",
-    "RoomShell",
-    "Wall",
-    "World",
-]
+__all__ = ["FLOOR_STYLES", "RoomShell", "Wall", "World"]
 
-AGENT_HEIGHT = 0.9009992  # agent.y of AI2-THOR's default agent on a floor at 0
-CAMERA_HEIGHT = 0.675  # camera above agent.y, fitted to the boxes recorded in ALFRED
-MAX_DOWN, MAX_UP = 60.0, 30.0  # degrees that the camera tilts below and above the horizon
 FLOOR_STYLES = ("wood", "tiles", "carpet")
-_CROUCH = 0.35
 _HAND = np.array([0.0, -0.16, 0.38])  # where AI2-THOR holds an object, in the camera's frame, metres
-
-
-@dataclass
-class Agent:
-    """The default agent: where it stands, which way it and its camera look (degrees, horizon down positive)."""
-
-    position: Array
-    yaw: float = 0.0
-    horizon: float = 0.0
-    standing: bool = True
-
-    def camera_position(self) -> Array:
-        """Position of the camera in the world, metres (3,)."""
-        lift = CAMERA_HEIGHT if self.standing else CAMERA_HEIGHT - _CROUCH
-        return self.position + np.array([0.0, lift, 0.0])
-
-    def camera_matrix(self) -> Array:
-        """Rotation matrix (3, 3) of the camera."""
-        return euler_matrix((self.horizon, self.yaw, 0.0))
-
-
-@dataclass(frozen=True)
-class Grip:
-    """How the agent holds an object that it moved or turned in its hand, in the camera's frame.
-
-    Attributes:
-        offset: the object's origin, metres (3,).
-        turn: the object's rotation (3, 3).
-    """
-
-    offset: Array
-    turn: Array
 
 
 @dataclass(frozen=True)
@@ -104,6 +59,7 @@ class World:
         open_at_start: doors that are open in the recording; its cells already go around them.
         coarse: the shapes of its furniture are only known as boxes, as in recordings.
         grip: how the held object is held; None for as one holds what was just picked up.
+        arm: the agent's arm; None for an agent that holds things in front of its camera.
         disabled: objects that are taken out for a time, by id.
         appearance: what changes the colours of the scene.
         standing_height: height in metres of the agent's position on the floor.
@@ -122,6 +78,7 @@ class World:
     open_at_start: frozenset[str] = frozenset()
     templates: dict[str, list[SimObject]] = field(default_factory=dict)
     grip: Grip | None = None
+    arm: Arm | None = None
     disabled: dict[str, SimObject] = field(default_factory=dict)
     appearance: Appearance = field(default_factory=Appearance)
     standing_height: float = field(init=False)
@@ -141,10 +98,13 @@ class World:
         return found
 
     def touch(self, *changed: SimObject) -> None:
-        """Record that these objects (and the view) changed."""
+        """Record that these objects (and the view) changed.
+
+        No two states of an object have the same version, be it another object that took its id.
+        """
         self.version += 1
         for item in changed:
-            item.version += 1
+            item.version = self.version
 
     def add(self, item: SimObject) -> None:
         """Add an object; its id must be new."""
@@ -159,6 +119,10 @@ class World:
             self.touch(content)
         if self.held == item.object_id:
             self.held = None
+        if self.arm is not None:
+            self.arm.let_go(item.object_id)
+            for content_id in item.contents:
+                self.arm.freight.pop(content_id, None)
         del self.objects[item.object_id]
         self.touch()
 
@@ -171,6 +135,8 @@ class World:
 
     def detach(self, item: SimObject) -> None:
         """Take `item` out of whatever contains it."""
+        if self.arm is not None:
+            self.arm.freight.pop(item.object_id, None)
         if item.parent is not None:
             receptacle = self.objects[item.parent]
             receptacle.contents.remove(item.object_id)
@@ -210,6 +176,21 @@ class World:
             self.grip = None
         if self.held is not None:
             self.set_pose(self.objects[self.held], *self._held_pose(self.objects[self.held]))
+        if self.arm is not None:
+            self._carry_with(self.arm)
+
+    def _carry_with(self, arm: Arm) -> None:
+        """Put what an arm holds, with its contents, where the wrist is."""
+        wrist = arm.wrist(self.agent)
+        for object_id, grip in arm.grips():
+            item = self.objects[object_id]
+            item.position, item.rotation = wrist.point(grip.offset), matrix_euler(wrist.turn @ grip.turn)
+            self.touch(item)
+
+    def carried(self) -> list[str]:
+        """Ids of what the agent holds itself, in its hand or with its arm; not of what is in it."""
+        by_arm = [] if self.arm is None else list(self.arm.held)
+        return by_arm if self.held is None else [self.held, *by_arm]
 
     def _held_pose(self, item: SimObject) -> tuple[Array, Array]:
         if self.grip is None:
@@ -219,10 +200,20 @@ class World:
         return self.agent.camera_position() + camera @ self.grip.offset, matrix_euler(camera @ self.grip.turn)
 
     def release(self) -> None:
-        """Take the held object out of the hand; it stays where it is."""
-        if self.held is not None:
-            self.objects[self.held].state.picked_up = False
+        """Let go of all that the agent holds; it stays where it is."""
+        for object_id in self.carried():
+            self.let_go(self.objects[object_id])
+
+    def let_go(self, item: SimObject) -> None:
+        """Let go of one thing, if it is held, with all that is in it; it stays where it is."""
+        if item.object_id == self.held:
             self.held = self.grip = None
+        if self.arm is not None:
+            for part in (item, *self.descendants(item)):
+                part.state.picked_up = part.state.picked_up and part.object_id not in self.arm.held
+                self.arm.let_go(part.object_id)
+        item.state.picked_up = False
+        self.touch(item)
 
     def regrip(self, position: Array, matrix: Array) -> None:
         """Move and turn the held object in the hand, to a position (3,) and rotation (3, 3) in the world."""

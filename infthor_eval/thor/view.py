@@ -9,7 +9,19 @@ from numpy.typing import NDArray
 
 from infthor_eval.errors import SimulatorError
 
-__all__ = ["AgentPose", "Box", "Instance", "ThorObject", "Vector", "View", "instances_of", "view_of"]
+__all__ = [
+    "AgentPose",
+    "ArmJoint",
+    "ArmState",
+    "AxisAngle",
+    "Box",
+    "Instance",
+    "ThorObject",
+    "Vector",
+    "View",
+    "instances_of",
+    "view_of",
+]
 
 
 class Vector(msgspec.Struct, frozen=True):
@@ -74,6 +86,62 @@ class AgentPose(msgspec.Struct, frozen=True):
     standing: bool | None = True
 
 
+class AxisAngle(msgspec.Struct, frozen=True):
+    """A rotation by `w` degrees about the axis (x, y, z), a unit vector."""
+
+    x: float = 1.0
+    y: float = 0.0
+    z: float = 0.0
+    w: float = 0.0
+
+
+class ArmJoint(msgspec.Struct, rename="camel", frozen=True):
+    """One joint of an arm.
+
+    `root_relative_position` and `root_relative_rotation` are in the frame of the arm's base, `local_rotation` in that
+    of the joint before; what the first joint alone tells is None at the others.
+    """
+
+    name: str
+    position: Vector
+    root_relative_position: Vector
+    rotation: AxisAngle
+    root_relative_rotation: AxisAngle
+    local_rotation: AxisAngle
+    arm_base_height: float | None = None
+    elbow_orientation: float | None = None
+
+
+class ArmState(msgspec.Struct, frozen=True):
+    """`metadata["arm"]`: how the arm is bent, what it holds, and what the sphere of its hand meets.
+
+    Attributes:
+        joints: from the base to the wrist.
+        held: ids of what it holds.
+        pickupable: ids of what `PickupObject` would pick up now.
+        touched: ids of all loose things and furniture in the sphere that it does not hold.
+        sphere_center: metres, in the world.
+        sphere_radius: metres.
+    """
+
+    joints: list[ArmJoint]
+    held: list[str] = msgspec.field(name="heldObjects")
+    pickupable: list[str] = msgspec.field(name="pickupableObjects")
+    touched: list[str] = msgspec.field(name="touchedNotHeldObjects")
+    sphere_center: Vector = msgspec.field(name="handSphereCenter")
+    sphere_radius: float = msgspec.field(name="handSphereRadius")
+
+    @property
+    def wrist(self) -> Vector:
+        """Where the wrist is, metres in the world."""
+        return self.joints[-1].position
+
+    @property
+    def base_height(self) -> float:
+        """Height of the arm's base in the world, metres."""
+        return self.joints[0].position.y
+
+
 @dataclass(frozen=True)
 class Instance:
     """The pixels that show one object: their number and [xmin, ymin, xmax, ymax], both ends inclusive."""
@@ -91,13 +159,14 @@ class View:
         depth: metres, float32, [height, width]; None where depth is off.
         objects: the objects by id.
         agent: the agent's pose.
-        inventory: ids of the held objects.
+        inventory: ids of the objects that the agent holds, in its hand or with its arm.
         success: whether the action was carried out.
         error: the simulator's message where it was not.
         error_code: the simulator's code for it.
         result: `actionReturn`.
         scene: name of the scene.
         instances: what the frame shows, by object id; None where instance segmentation is off.
+        arm: the agent's arm; None for an agent without.
     """
 
     frame: NDArray[np.uint8] | None
@@ -111,6 +180,7 @@ class View:
     result: Any
     scene: str
     instances: dict[str, Instance] | None
+    arm: ArmState | None = None
 
 
 def view_of(event: Any) -> View:
@@ -123,7 +193,9 @@ def view_of(event: Any) -> View:
     try:
         objects = msgspec.convert(metadata["objects"], list[ThorObject])
         agent = _pose(metadata["agent"])
-        inventory = tuple(item["objectId"] for item in metadata["inventoryObjects"] or ())
+        arm = msgspec.convert(metadata.get("arm"), ArmState | None)
+        # Arm agents leave the inventory empty and tell of what they hold among the arm's state.
+        in_hand = [item["objectId"] for item in metadata["inventoryObjects"] or ()]
     except (msgspec.ValidationError, KeyError, TypeError) as error:
         raise SimulatorError(f"metadata of {metadata['lastAction']}: {error}; use AI2-THOR 5.x") from error
     return View(
@@ -131,13 +203,14 @@ def view_of(event: Any) -> View:
         depth=None if event.depth_frame is None else np.ascontiguousarray(event.depth_frame),
         objects={item.object_id: item for item in objects},
         agent=agent,
-        inventory=inventory,
+        inventory=tuple(in_hand if arm is None else arm.held),
         success=bool(metadata["lastActionSuccess"]),
         error=metadata["errorMessage"] or "",
         error_code=str(metadata["errorCode"] or ""),
         result=metadata["actionReturn"],
         scene=metadata["sceneName"],
         instances=_instances(event),
+        arm=arm,
     )
 
 

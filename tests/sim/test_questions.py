@@ -6,9 +6,9 @@ from itertools import product
 import numpy as np
 import pytest
 
+from infthor_eval.sim.agent import Agent
 from infthor_eval.sim.geometry import to_array
 from infthor_eval.sim.render.picture import choose_rasterizer
-from infthor_eval.sim.world import Agent
 
 from .harness import Bench
 

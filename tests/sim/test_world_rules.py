@@ -204,7 +204,7 @@ def test_an_open_fridge_stands_in_the_way():
 
 
 def test_agent_modes_and_bad_settings_are_refused(bench):
-    assert "agentMode" in bench.refused("Initialize", agentMode="arm")
+    assert "agentMode" in bench.refused("Initialize", agentMode="drone")
     assert "gridSize" in bench.refused("Initialize", gridSize=0)
     assert bench.metadata["errorCode"] == "InvalidArgument"
 

@@ -1,6 +1,8 @@
 """What the agent and the user can do, one module per theme; importing this package registers them all."""
 
 from infthor_eval.sim.actions import (  # noqa: F401 - imported to be registered
+    arm,
+    arm_walking,
     cameras,
     hand,
     interaction,

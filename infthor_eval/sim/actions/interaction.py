@@ -198,6 +198,6 @@ def cut(
     target = interactable(sim, objectId, forceAction, x, y)
     if not target.type.sliceable:
         raise ActionError(f"{target.object_id} Does not have the CanBeSliced property!")
-    if target.object_id == sim.world.held:
+    if target.object_id in sim.world.carried():
         raise ActionError("target object is in the agent's hand; put it down to slice it")
     slice_object(sim.world, target)

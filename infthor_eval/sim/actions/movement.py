@@ -7,11 +7,11 @@ from typing import NamedTuple
 import numpy as np
 
 from infthor_eval.sim.actions.registry import Vector3, action
+from infthor_eval.sim.agent import MAX_DOWN, MAX_UP
 from infthor_eval.sim.errors import ActionError, ErrorCode
 from infthor_eval.sim.geometry import Array
 from infthor_eval.sim.obstacles import blocking_object, held_object_blocks, nearest_name
 from infthor_eval.sim.simulation import Simulation
-from infthor_eval.sim.world import MAX_DOWN, MAX_UP
 
 __all__: list[str] = []
 

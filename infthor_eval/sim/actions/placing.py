@@ -39,7 +39,7 @@ def teleport_object(
     With `forceAction` it goes where there is no room too, with `forceKinematic` it stays in the air.
     """
     world, item = sim.world, sim.world.get(objectId)
-    if item.object_id == world.held and not allowTeleportOutOfHand:
+    if item.object_id in world.carried() and not allowTeleportOutOfHand:
         raise ActionError("Cannot teleport object in hand.")
     tried = positions or [_given(position, x, y, z)]
     pose = _first_free(world, item, tried, to_array(rotation), forceAction)
@@ -82,8 +82,7 @@ def get_spawn_coordinates(sim: Simulation, objectId: str, anywhere: bool = True)
 def disable_object(sim: Simulation, objectId: str) -> None:
     """Take an object out of the scene until it is enabled again; its contents stay."""
     item = sim.world.get(objectId)
-    if objectId == sim.world.held:
-        sim.world.release()
+    sim.world.let_go(item)
     sim.world.remove(item)
     item.contents = []
     sim.world.disabled[objectId] = item
@@ -131,8 +130,7 @@ def _copy(item: SimObject) -> SimObject:
 
 
 def _put(world: World, item: SimObject, pose: SimObject) -> None:
-    if item.object_id == world.held:
-        world.release()
+    world.let_go(item)
     world.set_pose(item, pose.position, pose.rotation)
     if item.type.pickupable:
         settle_in(world, item)

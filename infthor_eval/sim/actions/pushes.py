@@ -60,7 +60,7 @@ def directional_push(
 
 
 def _push(sim: Simulation, target: SimObject, force: float, angle: float) -> None:
-    if target.object_id == sim.world.held:
+    if target.object_id in sim.world.carried():
         raise ActionError("Please use Throw for an item in the Agent's Hand")
     if not (target.type.pickupable or target.type.moveable):
         raise ActionError("Target object must be either Pickupable or Moveable to have force applied to it!")

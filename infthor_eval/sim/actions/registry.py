@@ -12,6 +12,7 @@ from typing import Any, Concatenate
 from infthor_eval.sim.actions.signatures import expectation, type_name
 from infthor_eval.sim.actions.vectors import Vector3
 from infthor_eval.sim.errors import ActionError, ErrorCode
+from infthor_eval.sim.settings import AGENT_MODES
 from infthor_eval.sim.simulation import Simulation
 
 __all__ = ["Action", "Vector3", "action", "bind", "names"]
@@ -47,36 +48,49 @@ class Action:
     forms: tuple[Form, ...] = ()
 
 
-_ACTIONS: dict[str, Action] = {}
+_ACTIONS: dict[str, dict[str, Action]] = {mode: {} for mode in AGENT_MODES}
 
 
 def action(
-    *names: str, query: bool = False, lenient: bool = False, forms: tuple[Form, ...] = ()
+    *names: str,
+    query: bool = False,
+    lenient: bool = False,
+    forms: tuple[Form, ...] = (),
+    modes: tuple[str, ...] = AGENT_MODES,
 ) -> Callable[[Body], Body]:
-    """Register a function as the action(s) `names`; see `Action`."""
+    """Register a function as the action(s) `names` of some agent modes; see `Action`.
+
+    As in Unity, whose arm agents descend from the default one: what they do otherwise takes the place of what all do,
+    in whatever order the two are registered.
+    """
 
     def register(run: Body) -> Body:
         parameters = dict(list(inspect.signature(run).parameters.items())[1:])
         for name in names:
-            _ACTIONS[name] = Action(name, run, parameters, query, lenient, forms)
+            made = Action(name, run, parameters, query, lenient, forms)
+            for mode in modes:
+                if modes == AGENT_MODES:
+                    _ACTIONS[mode].setdefault(name, made)
+                else:
+                    _ACTIONS[mode][name] = made
         return run
 
     return register
 
 
-def names() -> list[str]:
-    """All actions, sorted."""
-    return sorted(_ACTIONS)
+def names(mode: str = "default") -> list[str]:
+    """All actions of an agent mode, sorted."""
+    return sorted(_ACTIONS[mode])
 
 
-def bind(message: Mapping[str, Any]) -> tuple[Action, dict[str, Any]]:
-    """The action of a message and its checked arguments.
+def bind(message: Mapping[str, Any], mode: str = "default") -> tuple[Action, dict[str, Any]]:
+    """The action of a message to an agent of some mode, and its checked arguments.
 
     Raises:
         ActionError: no such action; an argument is unknown, missing or of the wrong type.
     """
     name = message.get("action")
-    found = _ACTIONS.get(name) if isinstance(name, str) else None
+    found = _ACTIONS[mode].get(name) if isinstance(name, str) else None
     if found is None:
         raise ActionError(f"Invalid action: {name}", ErrorCode.INVALID_ACTION)
     given = {key: value for key, value in message.items() if key not in _PASSED_BY or key in found.parameters}

@@ -4,6 +4,7 @@ from typing import Any
 
 from infthor_eval.errors import DataError
 from infthor_eval.sim.actions.registry import action
+from infthor_eval.sim.arm.equipment import equip
 from infthor_eval.sim.errors import ActionError, ErrorCode
 from infthor_eval.sim.render.camera import FAR, NEAR
 from infthor_eval.sim.settings import AGENT_MODES, SimulatorSettings
@@ -43,6 +44,7 @@ def initialize(
     renderClassImage: bool = False,
     fastActionEmit: bool = True,
     agentCount: int = 1,
+    massThreshold: float | None = None,
 ) -> dict[str, float]:
     """Set up the agent; arguments that only Unity knows are passed over, as Unity does."""
     if sim.failed_reset:
@@ -56,8 +58,11 @@ def initialize(
     _check(rotateStepDegrees > 0, f"rotateStepDegrees must be positive, not {rotateStepDegrees}")
     _check(0 < fieldOfView < 180, f"fieldOfView must be in (0, 180) noninclusive, not {fieldOfView}")
     _check(visibilityDistance >= 0, f"visibilityDistance must be at least 0, not {visibilityDistance}")
+    if massThreshold is not None and massThreshold <= 0:
+        raise ActionError(f"massThreshold must have nonzero value - invalid value: {massThreshold}")
     sim.configure(
         agent_mode=agentMode.lower(),
+        mass_threshold=massThreshold,
         grid_size=float(gridSize),
         snap_to_grid=snapToGrid,
         rotate_step=float(rotateStepDegrees),
@@ -69,6 +74,7 @@ def initialize(
         classes=renderSemanticSegmentation or renderClassImage,
         fast_emit=fastActionEmit,
     )
+    equip(sim.world, sim.settings.agent_mode)
     return {"cameraNearPlane": NEAR, "cameraFarPlane": FAR}
 
 

@@ -5,11 +5,11 @@ from itertools import islice, product
 from typing import Any
 
 from infthor_eval.sim.actions.registry import Vector3, action
+from infthor_eval.sim.agent import MAX_DOWN, MAX_UP, Agent
 from infthor_eval.sim.errors import ActionError
 from infthor_eval.sim.geometry import level_gaps, to_array
 from infthor_eval.sim.objects import SimObject
 from infthor_eval.sim.simulation import Simulation
-from infthor_eval.sim.world import MAX_DOWN, MAX_UP, Agent
 
 __all__ = ["reachable_positions"]
 

@@ -77,7 +77,7 @@ def smash(
     _require(target, target.type.breakable, "CanBreak")
     if target.state.broken:
         raise ActionError(f"{target.object_id} is already broken")
-    if target.object_id == sim.world.held and target.type.cracks:
+    if target.object_id in sim.world.carried() and target.type.cracks:
         raise ActionError("target object is in the agent's hand; put it down to crack it")
     break_object(sim.world, target)
 

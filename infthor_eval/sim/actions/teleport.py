@@ -3,11 +3,12 @@
 import numpy as np
 
 from infthor_eval.sim.actions.registry import Vector3, action
+from infthor_eval.sim.agent import MAX_DOWN, MAX_UP
 from infthor_eval.sim.errors import ActionError
 from infthor_eval.sim.geometry import Array
 from infthor_eval.sim.obstacles import blocking_object, nearest_name
 from infthor_eval.sim.simulation import Simulation
-from infthor_eval.sim.world import MAX_DOWN, MAX_UP, World
+from infthor_eval.sim.world import World
 
 __all__: list[str] = []
 

@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 
 from infthor_eval.errors import DataError
+from infthor_eval.sim.agent import AGENT_HEIGHT, Agent
 from infthor_eval.sim.navigation import NavGrid
 from infthor_eval.sim.scenes.dataset import FloorPlanData
 from infthor_eval.sim.scenes.floorplan import build_floor_plan
 from infthor_eval.sim.scenes.procedural import SCENE_TYPES, build_scene
 from infthor_eval.sim.scenes.supplement import Supplement, read_supplement
-from infthor_eval.sim.world import AGENT_HEIGHT, Agent, RoomShell, World
+from infthor_eval.sim.world import RoomShell, World
 
 __all__ = ["Catalogue"]
 

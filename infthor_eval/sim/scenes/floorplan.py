@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from infthor_eval.errors import DataError
+from infthor_eval.sim.agent import AGENT_HEIGHT, Agent
 from infthor_eval.sim.geometry import Array
 from infthor_eval.sim.navigation import NavGrid
 from infthor_eval.sim.objects import SimObject
@@ -14,7 +15,7 @@ from infthor_eval.sim.scenes.adoption import adopt
 from infthor_eval.sim.scenes.arrangement import arrange
 from infthor_eval.sim.scenes.recorded import recorded_object
 from infthor_eval.sim.scenes.supplement import Supplement
-from infthor_eval.sim.world import AGENT_HEIGHT, FLOOR_STYLES, Agent, RoomShell, World
+from infthor_eval.sim.world import FLOOR_STYLES, RoomShell, World
 
 __all__ = ["build_floor_plan"]
 

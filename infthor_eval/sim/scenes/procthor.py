@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from infthor_eval.errors import DataError
+from infthor_eval.sim.agent import AGENT_HEIGHT, Agent
 from infthor_eval.sim.default_objects import style_of
 from infthor_eval.sim.footprints import Rect, polygon_rects
 from infthor_eval.sim.geometry import Array, level_gaps, to_array
@@ -18,7 +19,7 @@ from infthor_eval.sim.object_types import type_named
 from infthor_eval.sim.objects import SimObject, SimObjectState
 from infthor_eval.sim.restore import settle_parents
 from infthor_eval.sim.scenes.arrangement import arrange
-from infthor_eval.sim.world import AGENT_HEIGHT, FLOOR_STYLES, Agent, RoomShell, Wall, World
+from infthor_eval.sim.world import FLOOR_STYLES, RoomShell, Wall, World
 
 __all__ = ["build_house", "read_asset_sizes"]
 

@@ -4,13 +4,14 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from infthor_eval.sim.agent import AGENT_HEIGHT, Agent
 from infthor_eval.sim.default_objects import default_object
 from infthor_eval.sim.geometry import Array, aabb_overlap, level_gaps
 from infthor_eval.sim.navigation import CELL, NavGrid
 from infthor_eval.sim.object_types import allowed_in, type_named
 from infthor_eval.sim.objects import SimObject
 from infthor_eval.sim.receptacles import find_place
-from infthor_eval.sim.world import AGENT_HEIGHT, Agent, RoomShell, World
+from infthor_eval.sim.world import RoomShell, World
 
 __all__ = ["RoomPlan", "finish"]
 

@@ -1,0 +1,22 @@
+"""Which body and arm the agent has in each mode."""
+
+from infthor_eval.sim.agent import CAMERA_HEIGHT
+from infthor_eval.sim.arm.arm import Arm
+from infthor_eval.sim.arm.kinova import Kinova
+from infthor_eval.sim.arm.rig import Rig
+from infthor_eval.sim.arm.stretch import Stretch
+from infthor_eval.sim.world import World
+
+__all__ = ["equip"]
+
+_RIGS: dict[str, type[Kinova] | type[Stretch]] = {"arm": Kinova, "stretch": Stretch}
+_EYES = {"stretch": (0.00192, 0.5447, 0.06788)}  # read in Unity's sources, metres; the others have the usual one
+
+
+def equip(world: World, agent_mode: str) -> None:
+    """Give the agent of a world the camera and the arm, at rest, of an agent mode; what it held it lets go of."""
+    world.release()
+    rig: Rig | None = _RIGS[agent_mode]() if agent_mode in _RIGS else None
+    world.arm = None if rig is None else Arm.at_rest(rig)
+    world.agent.eye = _EYES.get(agent_mode, (0.0, CAMERA_HEIGHT, 0.0))
+    world.touch()

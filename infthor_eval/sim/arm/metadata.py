@@ -1,0 +1,59 @@
+"""`metadata.arm`: joints, sphere, what is held and what is within the sphere."""
+
+from typing import Any
+
+import numpy as np
+
+from infthor_eval.sim.arm.arm import Arm
+from infthor_eval.sim.arm.holding import touched
+from infthor_eval.sim.arm.turns import axis_angle
+from infthor_eval.sim.geometry import Array, rounded, to_xyz
+from infthor_eval.sim.world import World
+
+__all__ = ["arm_metadata"]
+
+_DIGITS = 6
+
+
+def arm_metadata(world: World, arm: Arm) -> dict[str, Any]:
+    """The arm as AI2-THOR tells of it; positions in metres, rotations as axis and angle (`w`, degrees)."""
+    near = touched(world, arm)
+    return {
+        "joints": _joints(world, arm),
+        "heldObjects": list(arm.held),
+        "pickupableObjects": [o.object_id for o in near.pickupable],
+        "touchedNotHeldObjects": [o.object_id for o in near.loose],
+        "handSphereCenter": _xyz(arm.sphere(world.agent)),
+        "handSphereRadius": arm.radius,
+    }
+
+
+def _joints(world: World, arm: Arm) -> list[dict[str, Any]]:
+    base, joints = arm.base(world.agent), arm.rig.joints([arm.pose])
+    told: list[dict[str, Any]] = []
+    parent = np.eye(3)
+    for name, position, turn in zip(arm.rig.joint_names, joints.positions[0], joints.turns[0], strict=True):
+        told.append({
+            "name": name,
+            "position": _xyz(base.point(position)),
+            "rootRelativePosition": _xyz(position),
+            "rotation": _axis_angle(base.turn @ turn),
+            "rootRelativeRotation": _axis_angle(turn),
+            "localRotation": _axis_angle(parent.T @ turn),
+            "armBaseHeight": None,
+            "elbowOrientation": None,
+        })  # fmt: skip
+        parent = turn
+    if arm.rig.has_elbow:
+        told[0] |= {"armBaseHeight": round(arm.pose.base, _DIGITS), "elbowOrientation": round(arm.pose.elbow, _DIGITS)}
+    return told
+
+
+def _axis_angle(turn: Array) -> dict[str, float]:
+    """Axis and angle of a rotation (3, 3); no rotation is one of 0 degrees about x."""
+    axis, degrees = axis_angle(turn)
+    return {**_xyz(axis), "w": round(degrees, _DIGITS)}
+
+
+def _xyz(vector: Array) -> dict[str, float]:
+    return to_xyz(rounded(vector, _DIGITS))
