@@ -1,12 +1,20 @@
 """Tokens of actions, one after the other, each the likeliest."""
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import torch
 
 from infthor_eval.errors import ModelError
 
-__all__ = ["greedy"]
+__all__ = ["embedded", "greedy"]
+
+
+def embedded(model: Any, ids: Sequence[int]) -> torch.Tensor:
+    """Embeddings of ids, (1, ids, hidden), as a transformers model feeds them to its first layer."""
+    embedding = model.get_input_embeddings()
+    found: torch.Tensor = embedding(torch.tensor([ids], device=embedding.weight.device))
+    return found
 
 
 def greedy(

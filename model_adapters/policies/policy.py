@@ -49,7 +49,7 @@ def arm_deltas(name: str, actions: Actions) -> tuple[ArmDelta, ...]:
             f"{name} gave actions of shape {list(actions.shape)}, not one or more of {ACTION_SIZE} numbers"
         )
     if not np.isfinite(actions).all():
-        raise ModelError(f"{name} gave an action that is no number: {actions.tolist()}; try dtype=float32")
+        raise ModelError(f"{name} gave an action that is no number: {actions.tolist()}")
     return tuple(
         ArmDelta((x, y, z), (roll, pitch, yaw), min(max(gripper, 0.0), 1.0))
         for x, y, z, roll, pitch, yaw, gripper in actions.tolist()

@@ -36,8 +36,10 @@ _TRANSLATION, _ROTATION = ("theta_bins", "phi_bins", "r_bins"), ("roll_bins", "p
 
 
 def _borders(n_bins: int, low: float, high: float, mean: float, deviation: float) -> list[float]:
-    likelihood = np.linspace(*norm.cdf((low, high), mean, deviation), n_bins + 1)
-    return np.clip(norm.ppf(likelihood, mean, deviation), low, high).tolist()
+    gaussian = norm(mean, deviation)
+    likelihood = np.linspace(float(gaussian.cdf(low)), float(gaussian.cdf(high)), n_bins + 1)
+    borders: list[float] = np.clip(gaussian.ppf(likelihood), low, high).tolist()
+    return borders
 
 
 def _text() -> dict[str, Any]:

@@ -9,7 +9,7 @@ from torch import nn
 from torch.nn.functional import gelu
 from transformers import DynamicCache, LlamaConfig, LlamaForCausalLM
 
-from model_adapters.policies.decoding import greedy
+from model_adapters.policies.decoding import embedded, greedy
 from model_adapters.policies.openvla.actions import ActionBins
 from model_adapters.policies.openvla.vision import Tower, TowerShape, unused_keys
 from model_adapters.policies.preprocessing import normalised, resized
@@ -110,23 +110,18 @@ class OpenVLANetwork:
     def predict(self, image: Image.Image, instruction: str, *, constrained: bool) -> Actions:
         """A chunk of one action; see `Network.predict`."""
         model = self.weights.language_model
-        weight = model.get_input_embeddings().weight
         cache = DynamicCache(config=model.config)
 
-        def logits(embedded: torch.Tensor) -> torch.Tensor:
-            output = model(inputs_embeds=embedded, past_key_values=cache, use_cache=True, logits_to_keep=1)
+        def logits(fed: torch.Tensor) -> torch.Tensor:
+            output = model(inputs_embeds=fed, past_key_values=cache, use_cache=True, logits_to_keep=1)
             return output.logits[0, -1].float()
 
         def step(token: int) -> torch.Tensor:
-            return logits(self._embedded([token]))
+            return logits(embedded(model, [token]))
 
-        pixels = resized(image, self.image_size).to(weight.device)[None]
+        pixels = resized(image, self.image_size).to(model.device)[None]
         patches = self.weights.projector(self.weights.vision_backbone(pixels))
-        text = self._embedded(self.prompt_ids(instruction))
+        text = embedded(model, self.prompt_ids(instruction))
         first = logits(torch.cat([text[:, :1], patches, text[:, 1:]], dim=1))
         ids = greedy(first, step, [self.bins.legal] * ACTION_SIZE, constrained=constrained)
         return self.bins.decode(ids)
-
-    def _embedded(self, ids: list[int]) -> torch.Tensor:
-        embedding = self.weights.language_model.get_input_embeddings()
-        return embedding(torch.tensor([ids], device=embedding.weight.device))

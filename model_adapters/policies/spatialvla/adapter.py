@@ -122,13 +122,13 @@ def _tokenizer(checkpoint: PolicyCheckpoint, config: SpatialVLAConfig) -> Tokeni
 def _view(
     config: SpatialVLAConfig, processor: ProcessorConfig, key: str, options: SpatialVLAOptions, pretrained: str
 ) -> View:
-    vision, degrees = config.vision(), parse_field_of_view(options.intrinsics)
-    cameras, size = processor.intrinsic_config, vision.image_size
+    degrees, cameras = parse_field_of_view(options.intrinsics), processor.intrinsic_config
+    size, patch, zoe_size = config.sides(pretrained)
     return View(
         image_size=size,
-        patch=vision.patch_size,
+        patch=patch,
         resolution=config.ego3d_patch_reso,
-        zoe_size=config.zoe().backbone_config.image_size,
+        zoe_size=zoe_size,
         intrinsics=published_intrinsics(cameras, key, size, pretrained) if degrees is None else None,
         field_of_view=degrees,
     )

@@ -52,6 +52,19 @@ class SpatialVLAConfig(msgspec.Struct, frozen=True, kw_only=True):
                 "end of the vocabulary can be run here"
             )
 
+    def sides(self, pretrained: str) -> tuple[int, int, int]:
+        """Sides, in pixels, of the image, of its patches, and of the image that depth is estimated on.
+
+        Raises:
+            ModelError: one of them is no square.
+        """
+        vision, backbone = self.vision(), self.zoe().backbone_config
+        found = vision.image_size, vision.patch_size, getattr(backbone, "image_size", None)
+        image, patch, zoe = found
+        if not (isinstance(image, int) and isinstance(patch, int) and isinstance(zoe, int)):
+            raise ModelError(f"{pretrained}: images, patches and depth images of sides {found} cannot be run here")
+        return image, patch, zoe
+
     def text(self) -> Gemma2Config:
         """Gemma 2's config."""
         return Gemma2Config(**self.text_config)

@@ -31,7 +31,7 @@ class Ego3DEmbedding(nn.Module):
 
     def forward(self, points: torch.Tensor) -> torch.Tensor:
         """Features, (batch, patches, width), of points in metres, (batch, patches, 3 * points), in float32."""
-        dtype = self.position_embedding_head[0].weight.dtype
+        dtype = next(self.parameters()).dtype
         centre = points.new_tensor(_CENTRE).repeat(points.shape[-1] // 3)
         near = ((points - centre) / _REACH).to(dtype).unsqueeze(-1)
         angles = near * 2.0 ** torch.arange(self._n_freqs, device=points.device, dtype=dtype)

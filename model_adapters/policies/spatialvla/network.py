@@ -1,6 +1,7 @@
 """SpatialVLA's network: patches that know where they lie, in front of a Gemma 2 that writes action tokens."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import torch
 from PIL import Image
@@ -9,7 +10,7 @@ from torch import nn
 from transformers import DynamicCache, Gemma2ForCausalLM, SiglipVisionModel, ZoeDepthForDepthEstimation
 
 from infthor_eval.errors import ModelError
-from model_adapters.policies.decoding import greedy
+from model_adapters.policies.decoding import embedded, greedy
 from model_adapters.policies.preprocessing import normalised, resized
 from model_adapters.policies.spatialvla.actions import SpatialBins
 from model_adapters.policies.spatialvla.camera import thor_intrinsics
@@ -48,7 +49,8 @@ class SpatialVLAWeights(nn.Module):
     def __init__(self, config: SpatialVLAConfig, attn_implementation: str) -> None:
         super().__init__()
         text, vision, zoe = config.text(), config.vision(), config.zoe()
-        for part in (text, vision, zoe, zoe.backbone_config):
+        parts: tuple[Any, ...] = (text, vision, zoe, zoe.backbone_config)
+        for part in parts:
             part._attn_implementation = attn_implementation
         self.vision_tower = SiglipVisionModel(vision)
         self.vision_zoe_model = ZoeDepthForDepthEstimation(zoe)
@@ -159,15 +161,14 @@ class SpatialVLANetwork:
     def predict(self, image: Image.Image, instruction: str, *, constrained: bool) -> Actions:
         """A chunk of actions; see `Network.predict`."""
         model = self.weights.language_model
-        embedding = model.get_input_embeddings()
         cache = DynamicCache(config=model.config)
 
-        def logits(embedded: torch.Tensor) -> torch.Tensor:
-            past, new = cache.get_seq_length(), embedded.shape[1]
+        def logits(fed: torch.Tensor) -> torch.Tensor:
+            past, new = cache.get_seq_length(), fed.shape[1]
             # Everything sees everything: the prefix is read in both directions, and what follows comes one by one.
-            mask = embedded.new_zeros(1, 1, new, past + new)
+            mask = fed.new_zeros(1, 1, new, past + new)
             output = model(
-                inputs_embeds=embedded,
+                inputs_embeds=fed,
                 attention_mask={"full_attention": mask, "sliding_attention": mask},
                 position_ids=torch.arange(past + 1, past + new + 1, device=mask.device)[None],  # counted from 1
                 past_key_values=cache,
@@ -177,9 +178,10 @@ class SpatialVLANetwork:
             return output.logits[0, -1].float()
 
         def step(token: int) -> torch.Tensor:
-            return logits(embedding(torch.tensor([[token]], device=embedding.weight.device)))
+            return logits(embedded(model, [token]))
 
-        ids = torch.tensor([self.prompt_ids(instruction)], device=embedding.weight.device)
-        prefix = embedding(ids).masked_scatter((ids == self.image_id)[..., None], self.features(image))
+        ids = self.prompt_ids(instruction)
+        places = torch.tensor(ids, device=model.device) == self.image_id
+        prefix = embedded(model, ids).masked_scatter(places[None, :, None], self.features(image))
         written = greedy(logits(prefix), step, self.bins.legal * self.chunk, constrained=constrained)
         return self.bins.decode(written)
