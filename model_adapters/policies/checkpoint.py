@@ -22,7 +22,7 @@ T = TypeVar("T")
 
 
 class _Kind(msgspec.Struct):
-    model_type: str = "without a model_type"
+    model_type: str = "nameless"
     torch_dtype: str | None = None
     dtype: str | None = None
 
@@ -50,7 +50,9 @@ class PolicyCheckpoint:
         """
         found = self._kind().model_type
         if found != model_type:
-            raise ModelError(f"{self.pretrained} is a checkpoint {found}, not {model_type}; `infthor-eval ls models`")
+            raise ModelError(
+                f"{self.pretrained} is a {found} checkpoint, not {model_type}; see `infthor-eval ls models`"
+            )
 
     def read(self, name: str, form: type[T]) -> T:
         """One of its JSON files, in the form of a type.

@@ -124,7 +124,10 @@ def load_weights(
             if not tensor.is_floating_point():
                 raise ModelError(f"{key} of {pretrained} is {tensor.dtype}; quantised weights are not supported")
             _assign(module, name, tensor.to(device, dtype))
-    module.to(device)
+    # Not the whole module: a parameter without a key of its own has no memory yet.
+    for part in module.modules():
+        for name, buffer in part.named_buffers(recurse=False):
+            setattr(part, name, buffer.to(device))
 
 
 def _places(files: Sequence[Any], pretrained: str) -> dict[str, Any]:

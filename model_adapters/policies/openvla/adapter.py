@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+from tokenizers import Tokenizer
+
 from infthor_eval.errors import ModelError
 from model_adapters.hf.checkpoint import loading
 from model_adapters.policies.checkpoint import PolicyCheckpoint, find
@@ -58,18 +60,24 @@ def load_openvla(name: str, checkpoint: PolicyCheckpoint, options: PolicyOptions
     key, statistics = statistics_of(_statistics(checkpoint, config), options.unnorm_key, checkpoint.pretrained)
     device, dtype = checkpoint.placed(options)
     towers, size = config.towers(checkpoint.pretrained), config.image_size(checkpoint.pretrained)
-    tokenizer = checkpoint.tokenizer()
+    tokenizer = _tokenizer(checkpoint)
     with loading(checkpoint.pretrained):
         with empty():
             weights = OpenVLAWeights(towers, size, config.language(options.attn_implementation))
         layout = layout_of(weights, towers)
         load_weights(weights, checkpoint.folder, layout, pretrained=checkpoint.pretrained, device=device, dtype=dtype)
     vocabulary = weights.language_model.config.vocab_size - config.pad_to_multiple_of
-    if tokenizer.get_vocab_size() > vocabulary + config.pad_to_multiple_of:
-        raise ModelError(f"{checkpoint.pretrained}: the tokenizer has more tokens than the model; they do not belong")
     network = OpenVLANetwork(weights.eval(), tokenizer, ActionBins(vocabulary, config.n_action_bins), size)
     identity = checkpoint.identity(device, dtype, options) | {"unnorm_key": key}
     return VlaPolicy(name, network, statistics, options, identity)
+
+
+def _tokenizer(checkpoint: PolicyCheckpoint) -> Tokenizer:
+    tokenizer = checkpoint.tokenizer()
+    # The patches go in behind the first token, whatever that is.
+    if tokenizer.encode("In").ids[0] != tokenizer.token_to_id("<s>"):
+        raise ModelError(f"{checkpoint.pretrained}: the tokenizer does not begin a text with <s>; restore its file")
+    return tokenizer
 
 
 def _statistics(checkpoint: PolicyCheckpoint, config: OpenVLAConfig) -> dict[str, Any]:

@@ -91,6 +91,17 @@ def test_the_checkpoint_s_own_type_is_taken(family: str, altered: Altered) -> No
     assert _load(family, folder).identity()["dtype"] == "bfloat16"
 
 
+def test_tied_embeddings_are_written_by_what_they_are_read_by(altered: Altered) -> None:
+    def tie(folder: Path) -> None:
+        json_edit("config.json", lambda config: config["text_config"].update(tie_word_embeddings=True))(folder)
+        weights_edit(lambda found: {key: value for key, value in found.items() if "lm_head" not in key})(folder)
+
+    policy = _load("spatialvla", altered("spatialvla", tie))
+    model = policy._network.weights.language_model
+    assert model.lm_head.weight is model.model.embed_tokens.weight
+    check_policy(policy)
+
+
 def test_the_published_checkpoints_are_the_defaults() -> None:
     assert "pretrained=openvla/openvla-7b" in options("openvla")
     assert "pretrained=IPEC-COMMUNITY/spatialvla-4b-224-pt" in options("spatialvla")
@@ -139,7 +150,7 @@ def test_a_depth_model_under_its_new_names_is_no_checkpoint_of_ours(altered: Alt
 
 @pytest.mark.parametrize(("family", "other"), [FAMILIES, FAMILIES[::-1]])
 def test_a_checkpoint_of_another_family_is_named(family: str, other: str, policy_checkpoints: dict[str, Path]) -> None:
-    with pytest.raises(ModelError, match=f"is a checkpoint {other}, not {family}"):
+    with pytest.raises(ModelError, match=f"is a {other} checkpoint, not {family}"):
         _load(family, policy_checkpoints[other])
 
 
@@ -153,7 +164,7 @@ def test_a_checkpoint_of_another_family_is_named(family: str, other: str, policy
         (lambda folder: (folder / "tokenizer.json").write_text("{}"), "cannot be loaded"),
         (lambda folder: (folder / "config.json").write_text("{"), "config.json: not in its documented form"),
         (lambda folder: (folder / "config.json").unlink(), "config.json"),
-        (json_edit("config.json", lambda config: config.update(model_type="llava")), "a checkpoint llava"),
+        (json_edit("config.json", lambda config: config.update(model_type="llava")), "a llava checkpoint"),
         (json_edit("config.json", lambda config: config.update(text_config=3)), "not in its documented form"),
         (json_edit("config.json", lambda config: config.update(torch_dtype="int8")), "names no type of weights"),
     ],
@@ -213,6 +224,12 @@ def test_a_variant_that_is_not_run_here_is_refused(
 ) -> None:
     with pytest.raises((ModelError, DataError), match=said):
         _load(family, altered(family, json_edit(file, lambda content: content.update(change))))
+
+
+def test_a_tokenizer_that_begins_no_text_is_refused(altered: Altered) -> None:
+    folder = altered("openvla", json_edit("tokenizer.json", lambda content: content.update(post_processor=None)))
+    with pytest.raises(ModelError, match="the tokenizer does not begin a text with <s>"):
+        _load("openvla", folder)
 
 
 @pytest.mark.parametrize("family", FAMILIES)

@@ -46,7 +46,7 @@ SHAPES: dict[str, Shape] = {
     f"{BEIT}.lambda_1": (1024,),
     f"{BEIT}.layernorm_after.bias": (1024,),
     "vision_zoe_model.neck.fusion_stage.layers.3.residual_layer2.convolution1.weight": (256, 256, 3, 3),
-    "vision_zoe_model.metric_head.seed_bin_regressors.kitti.conv2.weight": (64, 128, 1, 1),
+    "vision_zoe_model.metric_head.seed_bin_regressors.kitti.conv2.weight": (64, 64, 1, 1),
 }
 
 
