@@ -254,12 +254,15 @@ class Model(Subject, Protocol):
 
 @dataclass(frozen=True)
 class ArmDelta:
-    """One step of a robot arm's end effector, in the frame of the robot's base (x forward, y left, z up).
+    """One step of a robot arm's end effector, in the frame of the robot's base.
+
+    The base's x points forward, y left, z up (right-handed); docs/policies.md says how models' numbers come to be
+    these.
 
     Attributes:
-        translation: along x, y, z, in metres.
-        rotation: roll, pitch, yaw, in radians.
-        gripper: 0 (closed) to 1 (open).
+        translation: by how much it moves along x, y, z, in metres.
+        rotation: by how much it turns about x, y, z (roll, pitch, yaw), in radians.
+        gripper: where the gripper is to be, not by how much it moves: 0 (closed) to 1 (open).
     """
 
     translation: tuple[float, float, float]

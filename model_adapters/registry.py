@@ -27,10 +27,15 @@ _BUILT_IN = {
     "hf-vlm": "model_adapters.hf.families.hf_vlm:HfVlm",
     "llava-onevision": "model_adapters.hf.families.llava_onevision:LlavaOnevision",
     "llava-onevision-tiny": "model_adapters.tiny.llava_onevision:LlavaOnevisionTiny",
+    "openvla": "model_adapters.policies.openvla.adapter:OpenVLA",
+    "openvla-tiny": "model_adapters.tiny.openvla:OpenVLATiny",
     "pixtral": "model_adapters.hf.families.pixtral:Pixtral",
     "pixtral-tiny": "model_adapters.tiny.pixtral:PixtralTiny",
     "qwen2.5-vl": "model_adapters.hf.families.qwen2_5_vl:Qwen25VL",
     "qwen2.5-vl-tiny": "model_adapters.tiny.qwen2_5_vl:Qwen25VLTiny",
+    "spatialvla": "model_adapters.policies.spatialvla.adapter:SpatialVLA",
+    "spatialvla-tiny": "model_adapters.tiny.spatialvla:SpatialVLATiny",
+    "vla-http": "model_adapters.policies.http.adapter:VlaHttp",
 }
 
 

@@ -25,6 +25,7 @@ _COMMANDS = {
     "fetch": "Download the published data.",
     "validate": "Keep the questions of a set that one of several models answers.",
     "compare": "Compare two runs on the same data.",
+    "check-parity": "Compare a policy's actions with another implementation's.",
     "report": "Draw a figure of the paper of your own runs.",
     "watch": "Show what an agent did in a run of plans, as MP4 or GIF.",
     "ls": "List the models, the tasks or the scenes.",

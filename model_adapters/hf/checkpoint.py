@@ -24,7 +24,7 @@ from model_adapters.hf.decoding import read_generation
 from model_adapters.hf.family import Family, MakeFamily
 from model_adapters.hf.hub import fetch
 from model_adapters.hf.loaded import Loaded
-from model_adapters.hf.options import CheckpointOptions, HfOptions
+from model_adapters.hf.options import CheckpointOptions, Placement
 from model_adapters.hf.rope import apply_rope
 from model_adapters.hf.templates import chat_template, plain_template
 
@@ -69,7 +69,7 @@ def locate(options: CheckpointOptions) -> LocatedCheckpoint:
     """
     folder, commit = fetch(options.pretrained, options.revision)
     require_plain_files(folder, "restore the checkpoint")
-    with loading(options):
+    with loading(options.pretrained):
         config = transformers.AutoConfig.from_pretrained(folder, trust_remote_code=options.trust_remote_code)
     return LocatedCheckpoint(folder, commit, config, options)
 
@@ -87,7 +87,7 @@ def load_checkpoint(located: LocatedCheckpoint, family: MakeFamily) -> Loaded:
     """
     options, folder = located.options, located.folder
     remote = {"trust_remote_code": options.trust_remote_code}
-    with loading(options):
+    with loading(options.pretrained):
         image_processor = transformers.AutoImageProcessor.from_pretrained(
             folder, backend="pil", **remote, **options.image_settings()
         )
@@ -186,7 +186,7 @@ def versions() -> dict[str, str]:
     }
 
 
-def resolve_device(options: HfOptions) -> torch.device:
+def resolve_device(options: Placement) -> torch.device:
     """The device asked for; auto is the GPU where there is one.
 
     Raises:
@@ -208,7 +208,7 @@ def resolve_device(options: HfOptions) -> torch.device:
     return device
 
 
-def resolve_dtype(options: HfOptions) -> torch.dtype | str:
+def resolve_dtype(options: Placement) -> torch.dtype | str:
     """The type asked for, or "auto".
 
     Raises:
@@ -221,15 +221,18 @@ def resolve_dtype(options: HfOptions) -> torch.dtype | str:
 
 
 @contextlib.contextmanager
-def loading(options: CheckpointOptions) -> Iterator[None]:
+def loading(pretrained: str) -> Iterator[None]:
     """Turn the errors of transformers' loading into one line.
+
+    Args:
+        pretrained: what was asked for, for the message.
 
     Raises:
         ModelError: something could not be loaded.
     """
     # There is no end to what transformers, tokenizers and safetensors raise on files that somebody damaged.
     mend = "restore its files, or give another checkpoint"
-    with naming(f"the checkpoint {options.pretrained} cannot be loaded", mend, of=Exception, as_a=ModelError):
+    with naming(f"the checkpoint {pretrained} cannot be loaded", mend, of=Exception, as_a=ModelError):
         yield
 
 

@@ -4,7 +4,7 @@ import importlib.util
 from dataclasses import dataclass
 from typing import Any
 
-__all__ = ["CheckpointOptions", "HfOptions", "parse_rope"]
+__all__ = ["CheckpointOptions", "HfOptions", "Placement", "parse_rope"]
 
 
 _ATTENTION = ("eager", "sdpa", "flex_attention", "flash_attention_2", "flash_attention_3")
@@ -30,13 +30,35 @@ def parse_rope(text: str) -> tuple[str, float]:
 
 
 @dataclass(frozen=True, kw_only=True)
-class HfOptions:
-    """How a model is run.
+class Placement:
+    """Where and how the weights of anything are run.
 
     Attributes:
         dtype: torch's name of the weights' type, or auto: as in the checkpoint.
         device: cpu, cuda, cuda:1, ..., or auto: a GPU where there is one.
         attn_implementation: sdpa, eager, flash_attention_2, ...
+    """
+
+    dtype: str = "auto"
+    device: str = "auto"
+    attn_implementation: str = "sdpa"
+
+    def __post_init__(self) -> None:
+        """Refuse attention that transformers would fetch from the hub and run, or does not know."""
+        name = self.attn_implementation
+        if "/" in name and not getattr(self, "trust_remote_code", False):
+            raise ValueError(f"attn_implementation={name} is code on the hub, which runs with trust_remote_code=true")
+        if "/" not in name and name not in _ATTENTION:
+            raise ValueError(f"attn_implementation={name} is not known; there are {', '.join(_ATTENTION)}")
+        if name.startswith("flash_") and importlib.util.find_spec("flash_attn") is None:
+            raise ValueError(f"attn_implementation={name} needs the package flash-attn; use sdpa")
+
+
+@dataclass(frozen=True, kw_only=True)
+class HfOptions(Placement):
+    """How a model is run.
+
+    Attributes:
         prompt: chat writes conversations by the checkpoint's own chat template; plain writes the turns one after the
             other, texts and frames in their places, without roles.
         share_prefix: encode what two replies have in common once; false encodes everything for every reply.
@@ -49,9 +71,6 @@ class HfOptions:
         rope: context extension TYPE:FACTOR (yarn:4, linear:2, dynamic:4, longrope:8) instead of the checkpoint's RoPE.
     """
 
-    dtype: str = "auto"
-    device: str = "auto"
-    attn_implementation: str = "sdpa"
     prompt: str = "chat"
     share_prefix: bool = True
     chunk_tokens: int = 1024
@@ -75,19 +94,9 @@ class HfOptions:
                 raise ValueError(f"{name} is above {_LARGEST}")
         if self.prompt not in _PROMPTS:
             raise ValueError(f"prompt={self.prompt} is not {' or '.join(_PROMPTS)}")
-        self._check_attention()
+        super().__post_init__()
         if self.rope is not None:
             parse_rope(self.rope)
-
-    def _check_attention(self) -> None:
-        """Refuse what transformers would fetch from the hub and run, or does not know."""
-        name = self.attn_implementation
-        if "/" in name and not getattr(self, "trust_remote_code", False):
-            raise ValueError(f"attn_implementation={name} is code on the hub, which runs with trust_remote_code=true")
-        if "/" not in name and name not in _ATTENTION:
-            raise ValueError(f"attn_implementation={name} is not known; there are {', '.join(_ATTENTION)}")
-        if name.startswith("flash_") and importlib.util.find_spec("flash_attn") is None:
-            raise ValueError(f"attn_implementation={name} needs the package flash-attn; use sdpa")
 
 
 @dataclass(frozen=True, kw_only=True)

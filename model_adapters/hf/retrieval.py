@@ -21,7 +21,7 @@ from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.user_cache import user_cache
 from model_adapters.hf.checkpoint import loading, origin, resolve_device, versions
 from model_adapters.hf.hub import fetch
-from model_adapters.hf.options import CheckpointOptions, HfOptions
+from model_adapters.hf.options import Placement
 from model_adapters.hf.vectors import VectorFile
 
 __all__ = ["Retriever", "open_retriever"]
@@ -49,13 +49,13 @@ class Retriever:
         try:
             # Old CLIP checkpoints on the hub have no safetensors.
             folder, commit = fetch(name, revision, option="--retriever ", also=["pytorch_model.bin"])
-            with loading(CheckpointOptions(pretrained=name)):
+            with loading(name):
                 model = _load_model(folder)
                 self._tokenizer = transformers.AutoTokenizer.from_pretrained(folder)
                 self._image_processor = transformers.AutoImageProcessor.from_pretrained(folder, backend="pil")
         except ModelError as error:
             raise UsageError(str(error)) from error
-        self._model: Any = model.to(resolve_device(HfOptions())).eval()
+        self._model: Any = model.to(resolve_device(Placement())).eval()
         self._origin = origin(folder, commit, name)
         file = user_cache("clip_vectors") / f"{digest(json.dumps(self.identity(), sort_keys=True))}.f32"
         self._vectors = VectorFile(file, model.config.projection_dim)

@@ -151,7 +151,7 @@ def _known(config: Any) -> MakeFamily | None:
 
 def _processor(located: LocatedCheckpoint) -> Any:
     remote = {"trust_remote_code": located.options.trust_remote_code}
-    with loading(located.options):
+    with loading(located.options.pretrained):
         processor = transformers.AutoProcessor.from_pretrained(located.folder, **remote)
         processor.image_processor = transformers.AutoImageProcessor.from_pretrained(
             located.folder, backend="pil", **remote

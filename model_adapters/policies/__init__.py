@@ -1,0 +1,5 @@
+"""Vision-language-action policies: published checkpoints as native ports, and a client for any other behind a server.
+
+No remote code, no timm, no torchvision: what a checkpoint's file holds is mapped, key by key, to modules written here
+or in transformers.
+"""

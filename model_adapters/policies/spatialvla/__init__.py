@@ -1,0 +1,1 @@
+"""SpatialVLA: PaliGemma 2 whose patches know where in space they lie, actions as tokens of spherical bins."""

@@ -1,0 +1,69 @@
+"""The camera that SpatialVLA is to believe its frames come from."""
+
+import math
+from collections.abc import Mapping
+
+import torch
+
+from infthor_eval.errors import ModelError
+from model_adapters.policies.spatialvla.actions import Camera
+
+__all__ = ["DEFAULT", "parse_field_of_view", "published_intrinsics", "thor_intrinsics"]
+
+DEFAULT = "default"
+
+
+def parse_field_of_view(text: str) -> float | None:
+    """The vertical field of view of `thor:DEGREES`; None for `default`.
+
+    Raises:
+        ValueError: it has another form, or no camera has such a field.
+    """
+    if text == DEFAULT:
+        return None
+    kind, _, number = text.partition(":")
+    try:
+        degrees = float(number)
+    except ValueError:
+        degrees = 0.0
+    if kind != "thor" or not 0 < degrees < 180:
+        raise ValueError(f"intrinsics={text} is not {DEFAULT} or thor:DEGREES, DEGREES the vertical field of view")
+    return degrees
+
+
+def published_intrinsics(
+    cameras: Mapping[str, Camera], unnorm_key: str, image_size: int, pretrained: str
+) -> torch.Tensor:
+    """Intrinsics, (3, 3), in pixels of the squashed image: the dataset's camera, or the checkpoint's default.
+
+    Args:
+        cameras: the checkpoint's, by dataset.
+        unnorm_key: the dataset.
+        image_size: width and height that frames are squashed to.
+        pretrained: the checkpoint, for the message.
+
+    Raises:
+        ModelError: it has neither, or a camera that is none.
+    """
+    camera = cameras.get(unnorm_key) or cameras.get(DEFAULT)
+    rows = [] if camera is None else camera.intrinsic
+    if camera is None or [len(row) for row in rows] != [3, 3, 3] or min(camera.width, camera.height) < 1:
+        raise ModelError(
+            f"{pretrained} has no intrinsics for {unnorm_key} and no default; give intrinsics=thor:DEGREES"
+        )
+    scale = torch.tensor([image_size / camera.width, image_size / camera.height, 1.0])
+    return torch.tensor(rows) * scale[:, None]
+
+
+def thor_intrinsics(degrees: float, size: tuple[int, int], image_size: int) -> torch.Tensor:
+    """Intrinsics, (3, 3), in pixels of the squashed image, of a simulator's camera.
+
+    Args:
+        degrees: its vertical field of view.
+        size: width and height of its frames in pixels.
+        image_size: width and height that they are squashed to.
+    """
+    width, height = size
+    focal = (height / 2) / math.tan(math.radians(degrees) / 2)
+    middle = image_size / 2
+    return torch.tensor([[focal * image_size / width, 0, middle], [0, focal * image_size / height, middle], [0, 0, 1]])

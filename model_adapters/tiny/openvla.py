@@ -1,0 +1,84 @@
+"""An OpenVLA of two layers with random weights and the vocabulary of the real one."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import msgspec
+from tokenizers import Tokenizer
+
+from model_adapters.policies.openvla.adapter import MODEL_TYPE, load_openvla
+from model_adapters.policies.openvla.config import OpenVLAConfig
+from model_adapters.policies.openvla.network import OpenVLAWeights, layout_of
+from model_adapters.policies.openvla.vision import TOWERS, TowerShape
+from model_adapters.policies.options import PolicyOptions
+from model_adapters.policies.policy import VlaPolicy
+from model_adapters.policies.weights import Layout, empty
+from model_adapters.tiny.policy_twin import BRIDGE, PolicyTwin
+from model_adapters.tiny.tokenizer import train_tokenizer
+
+__all__ = ["OpenVLATiny"]
+
+_TOWERS = (TowerShape("dinov2", 32, 3, 2, 64), TowerShape("siglip", 48, 3, 2, 80))
+_IMAGE_SIZE = 56
+
+
+def _config() -> dict[str, Any]:
+    return {
+        "model_type": MODEL_TYPE,
+        "architectures": ["OpenVLAForActionPrediction"],
+        "torch_dtype": "float32",
+        "timm_model_ids": list(TOWERS),
+        "timm_override_act_layers": [None, None],
+        "image_sizes": [_IMAGE_SIZE, _IMAGE_SIZE],
+        "image_resize_strategy": "resize-naive",
+        "use_fused_vision_backbone": True,
+        "n_action_bins": 256,
+        "pad_to_multiple_of": 64,
+        "norm_stats": {"bridge_orig": BRIDGE},
+        "vision_towers": [msgspec.to_builtins(tower) for tower in _TOWERS],
+        "text_config": {
+            "model_type": "llama",
+            "vocab_size": 32_064,  # so that action ids and Llama's token of a space are the published ones
+            "hidden_size": 64,
+            "intermediate_size": 128,
+            "num_hidden_layers": 2,
+            "num_attention_heads": 4,
+            "num_key_value_heads": 4,
+            "pad_token_id": 32_000,
+        },
+    }
+
+
+def _files() -> Mapping[str, Mapping[str, Any]]:
+    return {"config.json": _config()}
+
+
+def _tokenizer() -> Tokenizer:
+    special = ("<unk>", "<s>", "</s>")
+    return train_tokenizer(special, begin="<s>", end="</s>", pad="</s>", named={}).backend_tokenizer
+
+
+def _layout() -> Layout:
+    config = msgspec.convert(_config(), OpenVLAConfig)
+    with empty():
+        weights = OpenVLAWeights(_TOWERS, _IMAGE_SIZE, config.language("sdpa"))
+    return layout_of(weights, _TOWERS)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Options(PolicyOptions):
+    dtype: str = "float32"
+    device: str = "cpu"
+
+
+class OpenVLATiny:
+    """The adapter `openvla-tiny`."""
+
+    Options: ClassVar[type] = _Options
+    twin: ClassVar[PolicyTwin] = PolicyTwin(files=_files, tokenizer=_tokenizer, layout=_layout, load=load_openvla)
+
+    @classmethod
+    def build(cls, name: str, options: _Options, seed: int) -> VlaPolicy:
+        """Make a policy with random weights of this seed."""
+        return cls.twin.build(name, options, seed)

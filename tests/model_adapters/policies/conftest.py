@@ -1,0 +1,90 @@
+"""Tiny policies, their checkpoints, and frames to act on."""
+
+import json
+import shutil
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+from PIL import Image
+from safetensors.torch import load_file, save_file
+
+from infthor_eval.formats.frames import FrameRef
+from model_adapters import load
+from model_adapters.policies.policy import VlaPolicy
+from model_adapters.tiny.openvla import OpenVLATiny
+from model_adapters.tiny.spatialvla import SpatialVLATiny
+
+TWINS = {"openvla": OpenVLATiny.twin, "spatialvla": SpatialVLATiny.twin}
+FAMILIES = tuple(TWINS)
+
+Edit = Callable[[Path], object]
+
+
+@pytest.fixture(autouse=True)
+def no_proxy(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No proxy on the way to the servers that tests start."""
+    monkeypatch.setenv("no_proxy", "127.0.0.1")
+
+
+@pytest.fixture(scope="session")
+def policy_checkpoints(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """Folders of tiny checkpoints by family."""
+    root = tmp_path_factory.mktemp("policies")
+    for family, twin in TWINS.items():
+        twin.save(root / family, seed=0)
+    return {family: root / family for family in TWINS}
+
+
+@pytest.fixture(scope="session")
+def policies(policy_checkpoints: dict[str, Path]) -> Iterator[dict[str, VlaPolicy]]:
+    """The tiny checkpoints as the adapters of the published ones load them, by family."""
+    loaded = {
+        family: load(family, {"pretrained": str(at), "device": "cpu"}, 0) for family, at in policy_checkpoints.items()
+    }
+    yield loaded  # type: ignore[misc]
+    for policy in loaded.values():
+        policy.close()
+
+
+@pytest.fixture
+def altered(policy_checkpoints: dict[str, Path], tmp_path: Path) -> Callable[[str, Edit], Path]:
+    """Makes a copy of a family's checkpoint and alters it; its folder."""
+
+    def alter(family: str, edit: Edit) -> Path:
+        folder = tmp_path / "altered"
+        shutil.copytree(policy_checkpoints[family], folder)
+        edit(folder)
+        return folder
+
+    return alter
+
+
+@pytest.fixture(scope="session")
+def plain_frames(tmp_path_factory: pytest.TempPathFactory) -> tuple[FrameRef, FrameRef]:
+    """A black frame and a white one."""
+    folder = tmp_path_factory.mktemp("plain")
+    for colour in ("black", "white"):
+        Image.new("RGB", (300, 300), colour).save(folder / f"{colour}.png")
+    return FrameRef(folder / "black.png"), FrameRef(folder / "white.png")
+
+
+def json_edit(name: str, change: Callable[[dict[str, Any]], object]) -> Edit:
+    """An edit of one JSON file of a checkpoint."""
+
+    def edit(folder: Path) -> None:
+        content = json.loads((folder / name).read_text())
+        change(content)
+        (folder / name).write_text(json.dumps(content))
+
+    return edit
+
+
+def weights_edit(change: Callable[[dict[str, Any]], Mapping[str, Any]]) -> Edit:
+    """An edit of a checkpoint's tensors."""
+
+    def edit(folder: Path) -> None:
+        save_file(dict(change(load_file(folder / "model.safetensors"))), folder / "model.safetensors")
+
+    return edit

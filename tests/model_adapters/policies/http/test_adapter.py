@@ -1,0 +1,227 @@
+"""The client against servers that answer, and that fail."""
+
+import socket
+import threading
+import time
+from collections.abc import Callable
+from http.server import BaseHTTPRequestHandler
+from typing import Any
+
+import numpy as np
+import pytest
+
+from infthor_eval.errors import DataError, ModelError, UsageError
+from infthor_eval.formats.frames import FrameRef
+from model_adapters import check_policy, load
+from model_adapters.policies.http import client
+from model_adapters.policies.policy import VlaPolicy
+
+from ..servers import Answer, asked_image, policy_answers, send, serving
+
+Frames = tuple[FrameRef, FrameRef]
+ACTION = [0.1, 0.2, 0.3, -0.1, -0.2, -0.3, 1.0]
+
+
+@pytest.fixture(autouse=True)
+def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No waiting between attempts."""
+    monkeypatch.setattr(client, "_FIRST_WAIT_S", 0.001)
+
+
+def _act(url: str, frame: FrameRef, **given: str) -> Any:
+    policy: Any = load("vla-http", {"url": url, "timeout_s": "5", **given}, 0)
+    return policy.act(frame, "pick up the mug")
+
+
+def _refused(answer: Answer, frame: FrameRef, **given: str) -> str:
+    with serving(answer) as url, pytest.raises(ModelError) as caught:
+        _act(url, frame, **given)
+    assert f"{url}/act" in str(caught.value)
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+@pytest.mark.parametrize("image", ["json_numpy", "list"])
+@pytest.mark.parametrize("ending", ["", "/", "/act"])
+def test_a_frame_and_an_instruction_are_sent_and_an_action_comes_back(
+    image: str, ending: str, plain_frames: Frames
+) -> None:
+    asked: list[dict[str, Any]] = []
+
+    def answer(request: dict[str, Any], _handler: Any) -> Any:
+        asked.append(request)
+        return ACTION
+
+    with serving(answer) as url:
+        (step,) = _act(url + ending, plain_frames[1], image=image, unnorm_key="bridge_orig")
+    assert (step.translation, step.rotation, step.gripper) == ((0.1, 0.2, 0.3), (-0.1, -0.2, -0.3), 1.0)
+    (request,) = asked
+    assert request.keys() == {"image", "instruction", "unnorm_key"}
+    assert (request["instruction"], request["unnorm_key"]) == ("pick up the mug", "bridge_orig")
+    seen = asked_image(request)
+    assert (seen.shape, seen.dtype, np.unique(seen).tolist()) == ((300, 300, 3), np.uint8, [255])
+
+
+def test_without_a_key_none_is_sent(plain_frames: Frames) -> None:
+    asked = []
+    with serving(lambda request, _: asked.append(request) or ACTION) as url:
+        _act(url, plain_frames[0])
+    assert "unnorm_key" not in asked[0]
+
+
+def test_chunks_are_taken_and_cut(plain_frames: Frames) -> None:
+    with serving(lambda *_: [ACTION] * 4) as url:
+        assert len(_act(url, plain_frames[0])) == 4
+        assert len(_act(url, plain_frames[0], execute="2")) == 2
+
+
+def test_a_policy_behind_a_server_acts_as_it_does_here(policies: dict[str, VlaPolicy], plain_frames: Frames) -> None:
+    with serving(policy_answers(policies["openvla"])) as url:
+        policy: Any = load("vla-http", {"url": url}, 0)
+        check_policy(policy)
+        assert policy.act(plain_frames[1], "close the fridge") == policies["openvla"].act(
+            plain_frames[1], "close the fridge"
+        )
+
+
+@pytest.mark.parametrize(
+    ("reply", "said"),
+    [
+        (ACTION[:6], r"gave actions of shape [1, 6], not one or more of 7 numbers"),
+        ([], "gave actions of shape [1, 0]"),
+        ([[]], "gave actions of shape [1, 0]"),
+        ([[ACTION]], "gave actions of shape [1, 1, 7]"),
+        ([*ACTION[:6], float("nan")], "no number"),
+        ([float("inf"), *ACTION[1:]], "no number"),
+        ("error", "answers no action of numbers: the text 'error'"),
+        ({"detail": "no such key"}, "answers no action of numbers"),
+        ([10**400, *ACTION[1:]], "answers no action of numbers"),
+    ],
+)
+def test_a_reply_that_is_no_action_is_refused(reply: Any, said: str, plain_frames: Frames) -> None:
+    assert said in _refused(lambda *_: reply, plain_frames[0])
+
+
+def test_an_error_of_the_server_is_told_and_not_tried_again(plain_frames: Frames) -> None:
+    n_asked = 0
+
+    def answer(_request: Any, handler: BaseHTTPRequestHandler) -> None:
+        nonlocal n_asked
+        n_asked += 1
+        send(handler, 500, b"CUDA out\nof memory")
+
+    assert "answers 500 Internal Server Error: 'CUDA out of memory'" in _refused(answer, plain_frames[0])
+    assert n_asked == 1
+
+
+def test_what_is_no_json_is_refused(plain_frames: Frames) -> None:
+    said = _refused(lambda _, handler: send(handler, 200, b"<html>hello</html>"), plain_frames[0])
+    assert "answers what is no JSON: '<html>hello</html>'" in said
+
+
+def test_a_redirect_is_not_followed(plain_frames: Frames) -> None:
+    def answer(_request: Any, handler: BaseHTTPRequestHandler) -> None:
+        handler.send_response(302)
+        handler.send_header("Location", "http://127.0.0.1:1/elsewhere")
+        handler.send_header("Content-Length", "0")
+        handler.end_headers()
+
+    assert "answers 302" in _refused(answer, plain_frames[0])
+
+
+@pytest.mark.parametrize("slow", ["before it answers", "while it answers"])
+def test_a_server_that_takes_too_long_is_not_waited_for(slow: str, plain_frames: Frames) -> None:
+    done = threading.Event()
+
+    def answer(_request: Any, handler: BaseHTTPRequestHandler) -> None:
+        if slow == "while it answers":
+            send(handler, 200, b"[0.1,", length=10_000)
+        while not done.wait(0.05):
+            if slow == "while it answers":
+                handler.wfile.write(b"0.1,")
+
+    began = time.monotonic()
+    try:
+        said = _refused(answer, plain_frames[0], timeout_s="0.3")
+    finally:
+        done.set()
+    assert "does not answer within 0.3 s; raise timeout_s" in said
+    assert time.monotonic() - began < 3
+
+
+@pytest.mark.parametrize(
+    "fail",
+    [
+        lambda handler: handler.connection.shutdown(socket.SHUT_RDWR),
+        lambda handler: send(handler, 200, b"[0.1, ", length=100),
+    ],
+    ids=["closed", "cut off"],
+)
+def test_a_lost_connection_is_tried_again(fail: Callable[[Any], None], plain_frames: Frames) -> None:
+    n_asked = 0
+
+    def answer(_request: Any, handler: BaseHTTPRequestHandler) -> Any:
+        nonlocal n_asked
+        n_asked += 1
+        if n_asked < 3:
+            handler.close_connection = True
+            fail(handler)
+            return None
+        return ACTION
+
+    with serving(answer) as url:
+        assert _act(url, plain_frames[0], retries="2")
+        assert n_asked == 3
+        n_asked = 0
+        with pytest.raises(ModelError, match=r"/act cannot be reached in 2 attempts .*; is the server up\?"):
+            _act(url, plain_frames[0], retries="1")
+
+
+def test_a_server_that_is_not_there_is_one_line(plain_frames: Frames) -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        url = f"http://127.0.0.1:{taken.getsockname()[1]}"
+        with pytest.raises(ModelError, match=f"{url}/act cannot be reached in 4 attempts"):
+            _act(url, plain_frames[0])
+
+
+def test_a_reply_without_end_is_not_read(monkeypatch: pytest.MonkeyPatch, plain_frames: Frames) -> None:
+    monkeypatch.setattr(client, "_LARGEST", 1000)
+    said = _refused(lambda _, handler: send(handler, 200, b"[" + b"0.1," * 5000), plain_frames[0])
+    assert "answers more than 1000 bytes" in said
+
+
+def test_a_frame_that_is_not_there_is_a_fault_of_the_data(plain_frames: Frames) -> None:
+    with pytest.raises(DataError):
+        _act("http://127.0.0.1:1", FrameRef(plain_frames[0].path.with_name("none.png")))
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"url": "localhost:8000"}, "url is no address of a server"),
+        ({"url": "file:///etc/passwd"}, "url is no address of a server"),
+        ({"url": "http://me:secret@host"}, "url holds a password"),
+        ({"url": "http://host/?token=secret"}, "url holds a password, a query"),
+        ({"image": "png"}, "image=png is not json_numpy or list"),
+        ({"timeout_s": "0"}, "timeout_s must be above 0"),
+        ({"retries": "11"}, "retries 0 to 10"),
+        ({"execute": "0"}, "execute=0"),
+    ],
+)
+def test_misuse_is_refused_and_no_secret_told(given: dict[str, str], said: str) -> None:
+    with pytest.raises(UsageError, match=said) as caught:
+        load("vla-http", given, 0)
+    assert "secret" not in str(caught.value)
+
+
+def test_the_identity_is_how_it_is_asked() -> None:
+    policy = load("vla-http", {"url": "https://host:1/base", "unnorm_key": "b"}, 0)
+    assert policy.identity() == {
+        "adapter": "vla-http",
+        "url": "https://host:1/base/act",
+        "unnorm_key": "b",
+        "image": "json_numpy",
+        "execute": None,
+    }
+    assert not policy.capabilities.deterministic

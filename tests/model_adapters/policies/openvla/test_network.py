@@ -1,0 +1,86 @@
+"""OpenVLA's network: what it is asked, what it sees, and that its cache changes nothing."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+import torch
+from PIL import Image
+
+from infthor_eval.formats.frames import FrameRef
+from model_adapters.policies.decoding import embedded
+from model_adapters.policies.openvla.network import OpenVLANetwork, prompt
+from model_adapters.policies.openvla.vision import Tower, TowerShape
+from model_adapters.policies.policy import VlaPolicy
+from model_adapters.policies.preprocessing import normalised, resized
+
+
+@pytest.fixture
+def network(policies: dict[str, VlaPolicy]) -> OpenVLANetwork:
+    found = policies["openvla"]._network
+    assert isinstance(found, OpenVLANetwork)
+    return found
+
+
+def test_the_prompt_is_the_one_of_training_in_lower_case() -> None:
+    assert prompt("Pick up the Mug") == "In: What action should the robot take to pick up the mug?\nOut:"
+
+
+def test_the_space_before_actions_ends_the_prompt_once(network: OpenVLANetwork) -> None:
+    ids = network.prompt_ids("pick up the mug")
+    assert ids[-1] == 29_871
+    assert ids.count(29_871) == 1
+    assert ids[0] == network.tokenizer.token_to_id("<s>")
+    assert network.tokenizer.decode(ids[1:-1]) == prompt("pick up the mug")
+
+
+def test_frames_are_squashed_by_pil_and_normalised_by_channel() -> None:
+    image = Image.new("RGB", (300, 200), (255, 0, 51))
+    pixels = resized(image, 224)
+    assert pixels.shape == (3, 224, 224)
+    assert pixels[:, 100, 100].tolist() == pytest.approx([1.0, 0.0, 0.2])
+    seen = normalised(pixels, (0.5, 0.25, 0.0), (0.5, 0.25, 0.1))
+    assert seen[:, 0, 0].tolist() == pytest.approx([1.0, -1.0, 2.0])
+
+
+@pytest.mark.parametrize("kind", ["dinov2", "siglip"])
+def test_a_tower_gives_features_of_patches_alone_in_reading_order(kind: Any) -> None:
+    torch.manual_seed(0)
+    tower = Tower(TowerShape(kind, 16, 3, 2, 24), 56)
+    for parameter in tower.parameters():
+        torch.nn.init.normal_(parameter, std=0.3)
+    pixels = torch.zeros(1, 3, 56, 56)
+    changed = pixels.clone()
+    changed[..., :14, 42:] = 1.0  # the fourth patch of the first row
+    assert len(tower.blocks) == 2  # the last of three is not run
+    tower.blocks = torch.nn.ModuleList()  # so that patches see nothing of each other
+    difference = (tower(changed) - tower(pixels)).abs().sum(dim=-1)[0]
+    assert difference.shape == (16,)
+    assert difference.nonzero().flatten().tolist() == [3]
+
+
+@torch.inference_mode()
+def test_actions_with_a_cache_are_those_of_reading_all_anew(
+    network: OpenVLANetwork, plain_frames: tuple[FrameRef, FrameRef]
+) -> None:
+    """The patches go in behind the begin token; every token is chosen from the whole sequence so far."""
+    weights, model = network.weights, network.weights.language_model
+    image = plain_frames[1].load()
+    patches = weights.projector(weights.vision_backbone(resized(image, 56)[None]))
+    assert patches.shape == (1, 16, 64)
+    ids = network.prompt_ids("pick up the mug")
+    written: list[int] = []
+    for _ in range(7):
+        text = embedded(model, [*ids, *written])
+        scores = model(inputs_embeds=torch.cat([text[:, :1], patches, text[:, 1:]], dim=1)).logits[0, -1]
+        written.append(31_744 + int(scores[31_744:32_000].argmax()))
+    assert len(set(written)) > 1
+    expected = network.bins.decode(written)
+    assert (network.predict(image, "pick up the mug", constrained=True) == expected).all()
+
+
+def test_without_the_constraint_a_policy_still_acts(policy_checkpoints: dict[str, Path], plain_frames: Any) -> None:
+    from model_adapters import check_policy, load
+
+    policy = load("openvla", {"pretrained": str(policy_checkpoints["openvla"]), "constrained": "false"}, 0)
+    check_policy(policy)  # type: ignore[arg-type]

@@ -1,0 +1,84 @@
+"""Servers of the `/act` convention for tests: scripted ones, and one that a policy of ours answers for."""
+
+import base64
+import json
+import tempfile
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from PIL import Image
+
+from infthor_eval.formats.frames import FrameRef
+from model_adapters import Policy
+
+__all__ = ["Answer", "asked_image", "policy_answers", "send", "serving"]
+
+# Gets the request and its handler; gives what is sent as JSON, or None where it has answered by itself.
+Answer = Callable[[dict[str, Any], BaseHTTPRequestHandler], Any]
+
+
+@contextmanager
+def serving(answer: Answer) -> Iterator[str]:
+    """The address of a server that answers POSTs to `/act`, for as long as it is needed."""
+
+    class Handler(BaseHTTPRequestHandler):
+        def do_POST(self) -> None:
+            body = self.rfile.read(int(self.headers["Content-Length"]))
+            if self.path != "/act":
+                self.send_error(404)
+                return
+            content = answer(json.loads(body), self)
+            if content is not None:
+                send(self, 200, json.dumps(content).encode())
+
+        def log_message(self, *args: Any) -> None:
+            pass
+
+    server = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+    server.daemon_threads = True
+    thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01}, daemon=True)
+    thread.start()
+    try:
+        yield f"http://127.0.0.1:{server.server_port}"
+    finally:
+        server.shutdown()
+        server.server_close()
+        thread.join()
+
+
+def send(handler: BaseHTTPRequestHandler, status: int, body: bytes, length: int | None = None) -> None:
+    """Answer a request; `length` is what is announced instead of the body's."""
+    handler.send_response(status)
+    handler.send_header("Content-Length", str(len(body) if length is None else length))
+    handler.end_headers()
+    handler.wfile.write(body)
+
+
+def asked_image(request: dict[str, Any]) -> np.ndarray:
+    """The frame in a request, as the package json_numpy or a plain list has it."""
+    image = request["image"]
+    if isinstance(image, list):
+        return np.array(image, dtype=np.uint8)
+    return np.frombuffer(base64.b64decode(image["__numpy__"]), np.dtype(image["dtype"])).reshape(image["shape"])
+
+
+def policy_answers(policy: Policy, change: float = 0.0) -> Answer:
+    """Answers for a policy of ours, its first number changed by so much."""
+
+    def answer(request: dict[str, Any], _handler: BaseHTTPRequestHandler) -> Any:
+        policy.reset()
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "frame.png"
+            Image.fromarray(asked_image(request)).save(path)
+            steps = policy.act(FrameRef(path), request["instruction"])
+        actions = [
+            [step.translation[0] + change, *step.translation[1:], *step.rotation, step.gripper] for step in steps
+        ]
+        return actions[0] if len(actions) == 1 else actions
+
+    return answer

@@ -1,0 +1,95 @@
+"""SpatialVLA's network: what it is asked, where its embeddings are, and that its cache changes nothing."""
+
+from pathlib import Path
+
+import pytest
+import torch
+from safetensors.torch import load_file
+
+from infthor_eval.errors import ModelError
+from infthor_eval.formats.frames import FrameRef
+from model_adapters import check_policy, load
+from model_adapters.policies.decoding import embedded
+from model_adapters.policies.policy import VlaPolicy
+from model_adapters.policies.spatialvla.network import SpatialVLANetwork, prompt
+
+N_ACTIONS, N_PATCHES, HIDDEN = 8194, 16, 64
+
+
+@pytest.fixture
+def network(policies: dict[str, VlaPolicy]) -> SpatialVLANetwork:
+    found = policies["spatialvla"]._network
+    assert isinstance(found, SpatialVLANetwork)
+    return found
+
+
+def test_the_prompt_stands_behind_the_image_tokens_and_ends_a_line(network: SpatialVLANetwork) -> None:
+    ids = network.prompt_ids("pick up the Mug")
+    assert ids[:N_PATCHES] == [network.image_id] * N_PATCHES
+    assert ids[N_PATCHES] == network.tokenizer.token_to_id("<bos>")
+    said = network.tokenizer.decode(ids[N_PATCHES + 1 :])
+    assert said == "What action should the robot take to pick up the Mug?\n" == f"{prompt('pick up the Mug')}\n"
+
+
+def test_a_tokenizer_without_image_tokens_is_refused(network: SpatialVLANetwork) -> None:
+    other = SpatialVLANetwork(network.weights, network.tokenizer, network.bins, 4, network.image_id + 1, network.view)
+    with pytest.raises(ModelError, match="the tokenizer has no <image> of id"):
+        other.prompt_ids("x")
+
+
+def test_action_tokens_have_the_embeddings_kept_apart_and_all_are_scaled(
+    network: SpatialVLANetwork, policy_checkpoints: dict[str, Path]
+) -> None:
+    kept = load_file(policy_checkpoints["spatialvla"] / "model.safetensors")
+    model = network.weights.language_model
+    begin = network.bins.begin
+    found = embedded(model, [5, begin, begin + N_ACTIONS - 1])[0]
+    of_text = kept["language_model.model.embed_tokens.weight"][5]
+    spatial = kept["spatial_embed_tokens.weight"]
+    expected = torch.stack([of_text, spatial[0], spatial[-1]]) * HIDDEN**0.5
+    torch.testing.assert_close(found, expected)
+    # What writes tokens is not tied in the published checkpoint, and stays as it was.
+    torch.testing.assert_close(model.lm_head.weight.data, kept["language_model.lm_head.weight"])
+
+
+@torch.inference_mode()
+def test_actions_with_a_cache_are_those_of_reading_all_anew(
+    network: SpatialVLANetwork, plain_frames: tuple[FrameRef, FrameRef]
+) -> None:
+    """Positions count from 1, the prefix is read in both directions, and what follows by what came before."""
+    model, image = network.weights.language_model, plain_frames[1].load()
+    ids = network.prompt_ids("pick up the mug")
+    written: list[int] = []
+    for place in range(12):
+        fed = embedded(model, [*ids, *written])
+        fed[:, :N_PATCHES] = network.features(image)
+        length = fed.shape[1]
+        mask = torch.full((length, length), torch.finfo(torch.float32).min).triu(1)
+        mask[: len(ids), : len(ids)] = 0
+        output = model(
+            inputs_embeds=fed,
+            attention_mask={"full_attention": mask[None, None], "sliding_attention": mask[None, None]},
+            position_ids=torch.arange(1, length + 1)[None],
+        )
+        legal = network.bins.legal[place % 3]
+        written.append(legal.start + int(output.logits[0, -1, legal.start : legal.stop].argmax()))
+    assert (network.predict(image, "pick up the mug", constrained=True) == network.bins.decode(written)).all()
+
+
+def test_the_camera_changes_what_is_seen(
+    policy_checkpoints: dict[str, Path], plain_frames: tuple[FrameRef, FrameRef]
+) -> None:
+    seen = []
+    for intrinsics in ("default", "thor:60", "thor:90"):
+        given = {"pretrained": str(policy_checkpoints["spatialvla"]), "device": "cpu", "intrinsics": intrinsics}
+        policy = load("spatialvla", given, 0)
+        assert policy.identity()["intrinsics"] == intrinsics
+        with torch.inference_mode():
+            seen.append(policy._network.features(plain_frames[0].load()))  # type: ignore[union-attr]
+    assert not torch.equal(seen[0], seen[1])
+    assert not torch.equal(seen[1], seen[2])
+
+
+def test_without_the_constraint_a_policy_still_acts(policy_checkpoints: dict[str, Path]) -> None:
+    policy = load("spatialvla", {"pretrained": str(policy_checkpoints["spatialvla"]), "constrained": "false"}, 0)
+    check_policy(policy)  # type: ignore[arg-type]

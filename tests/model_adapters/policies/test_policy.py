@@ -1,0 +1,126 @@
+"""A network as a policy: what is scaled, averaged, cut, and refused."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from infthor_eval.errors import DataError, ModelError
+from infthor_eval.formats.frames import FrameRef
+from model_adapters import ArmDelta, Policy, check_policy
+from model_adapters.policies.options import PolicyOptions
+from model_adapters.policies.policy import VlaPolicy, arm_deltas
+from model_adapters.policies.statistics import ActionStatistics
+
+STATISTICS = ActionStatistics(q01=[-2.0] * 7, q99=[2.0] * 7, mask=[True] * 6 + [False])
+
+
+class Scripted:
+    """Writes what it was given."""
+
+    def __init__(self, chunk: Any) -> None:
+        self._chunk = chunk
+        self.asked: list[tuple[str, bool]] = []
+
+    def predict(self, image: Any, instruction: str, *, constrained: bool) -> Any:
+        self.asked.append((instruction, constrained))
+        if isinstance(self._chunk, Exception):
+            raise self._chunk
+        return np.array(self._chunk, dtype=np.float64)
+
+
+def _policy(chunk: Any, **options: Any) -> VlaPolicy:
+    return VlaPolicy("scripted", Scripted(chunk), STATISTICS, PolicyOptions(**options), {"checkpoint": "none"})
+
+
+STEP = [0.5, -0.5, 0.0, 0.1, 0.2, 0.3, 1.0]
+
+
+def test_actions_are_scaled_and_come_as_steps(plain_frames: tuple[FrameRef, FrameRef]) -> None:
+    policy = _policy([STEP])
+    assert isinstance(policy, Policy)
+    (step,) = policy.act(plain_frames[0], "pick up the mug")
+    assert step.translation == pytest.approx((1.0, -1.0, 0.0))
+    assert step.rotation == pytest.approx((0.2, 0.4, 0.6))
+    assert step.gripper == 1.0
+    check_policy(policy)
+
+
+@pytest.mark.parametrize(("execute", "n_steps"), [(None, 4), (2, 2), (9, 4)])
+def test_so_many_steps_of_a_chunk_are_given_out(
+    plain_frames: tuple[FrameRef, FrameRef], execute: int | None, n_steps: int
+) -> None:
+    assert len(_policy([STEP] * 4, execute=execute).act(plain_frames[0], "x")) == n_steps
+
+
+def test_an_ensemble_gives_out_one_step_and_forgets_at_reset(plain_frames: tuple[FrameRef, FrameRef]) -> None:
+    chunk = [STEP, [0.0] * 7]
+    policy = _policy(chunk, ensemble="exp")
+    first = policy.act(plain_frames[0], "x")
+    second = policy.act(plain_frames[0], "x")
+    assert len(first) == len(second) == 1
+    # STEP of the second chunk with weight exp(0.8), nothing of the first with weight 1
+    assert second[0].translation[0] == pytest.approx(1.0 * np.exp(0.8) / (1 + np.exp(0.8)))
+    policy.reset()
+    assert policy.act(plain_frames[0], "x") == first
+
+
+def test_the_gripper_is_held_between_closed_and_open() -> None:
+    steps = arm_deltas("x", np.array([[0.0] * 6 + [1.7], [0.0] * 6 + [-0.3]]))
+    assert [step.gripper for step in steps] == [1.0, 0.0]
+    assert all(isinstance(step, ArmDelta) for step in steps)
+
+
+@pytest.mark.parametrize(
+    ("chunk", "said"),
+    [
+        ([[*STEP[:3], float("nan"), *STEP[4:]]], "scripted gave an action that is no number"),
+        ([[float("inf"), *STEP[1:]]], "no number"),
+        (RuntimeError("CUDA out of memory. Tried to allocate"), "scripted fails on the request .*out of memory"),
+        (MemoryError("none left"), "scripted fails on the request"),
+    ],
+)
+def test_what_is_no_action_is_refused(chunk: Any, said: str, plain_frames: tuple[FrameRef, FrameRef]) -> None:
+    with pytest.raises(ModelError, match=said):
+        _policy(chunk).act(plain_frames[0], "x")
+
+
+@pytest.mark.parametrize("actions", [np.zeros((1, 6)), np.zeros((0, 7)), np.zeros(7)])
+def test_actions_of_another_length_are_refused(actions: Any) -> None:
+    with pytest.raises(ModelError, match=r"gave actions of shape .*, not one or more of 7 numbers"):
+        arm_deltas("x", actions)
+
+
+def test_a_bad_chunk_does_not_stay_in_the_average(plain_frames: tuple[FrameRef, FrameRef]) -> None:
+    network = Scripted([[float("nan")] * 7] * 2)
+    policy = VlaPolicy("scripted", network, STATISTICS, PolicyOptions(ensemble="exp"), {})
+    with pytest.raises(ModelError):
+        policy.act(plain_frames[0], "x")
+    network._chunk = [STEP, STEP]
+    assert policy.act(plain_frames[0], "x")[0].gripper == 1.0
+
+
+def test_a_frame_that_is_not_there_is_a_fault_of_the_data(plain_frames: tuple[FrameRef, FrameRef]) -> None:
+    with pytest.raises(DataError):
+        _policy([STEP]).act(FrameRef(plain_frames[0].path.with_name("none.png")), "x")
+
+
+def test_the_identity_tells_how_chunks_are_used() -> None:
+    identity = _policy([STEP], ensemble="exp", constrained=False).identity()
+    assert identity["ensemble"] == "exp"
+    assert identity["constrained"] is False
+    assert identity["checkpoint"] == "none"
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"ensemble": "mean"}, "ensemble=mean is not none or exp"),
+        ({"execute": 0}, "execute=0"),
+        ({"ensemble": "exp", "execute": 4}, "does not go with ensemble=exp"),
+        ({"attn_implementation": "someone/kernel"}, "is code on the hub"),
+    ],
+)
+def test_options_that_do_not_fit_are_refused(options: dict[str, Any], said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        PolicyOptions(**options)
