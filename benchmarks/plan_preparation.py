@@ -29,7 +29,6 @@ from unittest import mock
 
 from infthor_eval.agents import expert, rewards
 from infthor_eval.agents.environment import PlanEnvironment
-from infthor_eval.agents.frames import FrameFolder, NoFrames
 from infthor_eval.agents.plans import Plan, PlanKind
 from infthor_eval.formats.trajectory import Trajectory, iter_trajectories
 from infthor_eval.generation.generate_set import generate_set
@@ -37,6 +36,7 @@ from infthor_eval.generation.settings import TrajectorySettings
 from infthor_eval.household.navigation import Grid
 from infthor_eval.thor import simulator as simulators
 from infthor_eval.thor.controller import SafeController
+from infthor_eval.thor.frames import FrameFolder, NoFrames
 from infthor_eval.thor.launch import embedded
 from infthor_eval.thor.simulator import Simulator
 

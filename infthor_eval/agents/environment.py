@@ -8,7 +8,6 @@ from enum import StrEnum
 from typing import Any, NamedTuple
 
 from infthor_eval.agents.expert import Expert, ExpertAction
-from infthor_eval.agents.frames import FrameKeeper, NoFrames
 from infthor_eval.agents.memory import Past
 from infthor_eval.agents.plans import Plan, PlanKind, plans_of, tasks_of
 from infthor_eval.agents.rewards import PlanReward, RewardRules, StepReward, max_reward, n_on_the_way, reward_rules
@@ -18,6 +17,7 @@ from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.household.navigation import Grid
 from infthor_eval.household.scout import HORIZON_STEP, reachable, stand_of
 from infthor_eval.thor.actions import ActionText, UngroundedError, ground, parse_action
+from infthor_eval.thor.frames import FrameKeeper, NoFrames
 from infthor_eval.thor.recorded import degrees_of
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import AgentPose, View

@@ -1,32 +1,29 @@
 """Leading an actor through a trajectory, plan by plan (Algorithm 2)."""
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TypeVar
 
 import msgspec
 
 from infthor_eval.agents.actors import Act, Situation
 from infthor_eval.agents.cast import Cast
 from infthor_eval.agents.environment import PlanEnvironment, StepOutcome
-from infthor_eval.agents.frames import FrameFolder, NoFrames
 from infthor_eval.agents.plans import Plan
 from infthor_eval.agents.records import PlanRecord, StepRecord
 from infthor_eval.agents.task import PlansTask
 from infthor_eval.agents.trajectories import Course
-from infthor_eval.errors import SceneError, SimulatorError
 from infthor_eval.formats.scratch import ScratchFolder
 from infthor_eval.runs import Tokens
+from infthor_eval.thor.frames import FrameFolder, NoFrames
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.simulators import Simulators
+from infthor_eval.thor.survival import survived
 
 __all__ = ["Episode", "Played", "described", "episode"]
 
-_T = TypeVar("_T")
-_TRIALS = 3  # of one plan, where the simulator fails
 _DIGITS = 6  # of rewards: what is beyond is rounding
 
 
@@ -99,8 +96,8 @@ class Episode:
             SceneError: the simulator has no such scene.
             SimulatorError: the simulator failed every time.
         """
-        played, faults = self._survived(lambda: self._played(plan))
-        return replace(played, faults=tuple(faults))
+        played, faults = survived(self._simulator, lambda: self._played(plan), self._begin_anew)
+        return replace(played, faults=faults)
 
     def pass_over(self, plan: Plan) -> None:
         """See whether a plan could have been come to at all: what nobody can do counts for nobody.
@@ -109,26 +106,10 @@ class Episode:
             ExpertRefusedError: as `play`.
             SimulatorError: as `play`.
         """
-        self._survived(lambda: self._entered().expert_actions(plan.index))
+        survived(self._simulator, lambda: self._entered().expert_actions(plan.index), self._begin_anew)
 
-    def _survived(self, do: Callable[[], _T]) -> tuple[_T, list[str]]:
-        """What comes of something, and the faults of the simulator on the way."""
-        faults: list[str] = []
-        while True:
-            restarts = self._simulator.restarts
-            try:
-                made = do()
-            except SceneError:
-                raise
-            except SimulatorError as error:
-                self._environment = None
-                faults.append(str(error))
-                if len(faults) == _TRIALS:
-                    raise
-            else:
-                if self._simulator.restarts > restarts:
-                    faults.append(f"simulator started again: {self._simulator.restarts - restarts}")
-                return made, faults
+    def _begin_anew(self) -> None:
+        self._environment = None
 
     def _played(self, plan: Plan) -> Played:
         began = time.perf_counter()

@@ -4,7 +4,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from infthor_eval.agents.frames import FrameKeeper
 from infthor_eval.agents.history import Chapter
 from infthor_eval.agents.memory import Past
 from infthor_eval.agents.plans import Plan, TrajectoryTask, UnfitPlanError
@@ -14,6 +13,7 @@ from infthor_eval.household.goals import goal_holds
 from infthor_eval.household.state_summary import state_summaries
 from infthor_eval.household.treatments import Treatments
 from infthor_eval.thor.actions import text_of
+from infthor_eval.thor.frames import FrameKeeper
 from infthor_eval.thor.grounding import Grounding
 from infthor_eval.thor.recorded import MissingObjectError, translate
 from infthor_eval.thor.recorder import Recorder

@@ -14,10 +14,10 @@ from typing import Any
 import msgspec
 
 from infthor_eval.agents.plans import PlanKind, UnfitPlanError
-from infthor_eval.agents.targets import PlanTarget, in_hand, is_in, subject_of
+from infthor_eval.agents.targets import PlanTarget, in_hand, subject_of
 from infthor_eval.errors import unknown_name
 from infthor_eval.formats.yaml_files import read_yaml
-from infthor_eval.household.containment import contents_of
+from infthor_eval.household.containment import contents_of, is_in
 from infthor_eval.household.goals import APPLIANCE, goal_holds
 from infthor_eval.household.navigation import Grid, Stand
 from infthor_eval.household.scout import stand_of

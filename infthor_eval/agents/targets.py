@@ -7,7 +7,7 @@ from infthor_eval.household.navigation import Stand
 from infthor_eval.thor.grounding import Grounding
 from infthor_eval.thor.view import View
 
-__all__ = ["PlanTarget", "in_hand", "is_in", "subject_of", "target_of"]
+__all__ = ["PlanTarget", "in_hand", "subject_of", "target_of"]
 
 _TREATMENTS = {PlanKind.CLEAN, PlanKind.HEAT, PlanKind.COOL}
 
@@ -67,20 +67,6 @@ def subject_of(target: PlanTarget, start: View) -> str | None:
 def in_hand(wanted: str, view: View) -> bool:
     """Whether an object is held, or another slice of the same thing: words do not tell slices apart."""
     return any(held == wanted or _are_slices_of_one(held, wanted) for held in view.inventory)
-
-
-def is_in(wanted: str, receptacle_id: str, view: View) -> bool:
-    """Whether an object lies in or on a receptacle itself.
-
-    In a bowl that stands in it is not in it; of furniture within furniture, each that the simulator names will do.
-    """
-    item, holder = view.objects.get(wanted), view.objects.get(receptacle_id)
-    if item is None or holder is None:
-        return False
-    parents = set(item.parent_receptacles or ())
-    carried = any(key in view.objects and view.objects[key].pickupable for key in parents - {receptacle_id})
-    named = receptacle_id in parents or wanted in (holder.receptacle_object_ids or ())
-    return named and (holder.pickupable or not carried)
 
 
 def _are_slices_of_one(one: str, other: str) -> bool:

@@ -5,9 +5,9 @@ from collections.abc import Mapping
 
 from infthor_eval.formats.step_log import ObjectState
 from infthor_eval.household.wording import canonical
-from infthor_eval.thor.view import ThorObject
+from infthor_eval.thor.view import ThorObject, View
 
-__all__ = ["contents_of", "direct_parent", "logged_parent"]
+__all__ = ["contents_of", "direct_parent", "is_in", "logged_parent"]
 
 
 def contents_of(holder: str, objects: Mapping[str, ThorObject]) -> frozenset[str]:
@@ -20,6 +20,20 @@ def contents_of(holder: str, objects: Mapping[str, ThorObject]) -> frozenset[str
         new = (inside & objects.keys()) - found - {holder}
         found |= new
     return frozenset(found)
+
+
+def is_in(wanted: str, receptacle_id: str, view: View) -> bool:
+    """Whether an object lies in or on a receptacle itself.
+
+    In a bowl that stands in it is not in it; of furniture within furniture, each that the simulator names will do.
+    """
+    item, holder = view.objects.get(wanted), view.objects.get(receptacle_id)
+    if item is None or holder is None:
+        return False
+    parents = set(item.parent_receptacles or ())
+    carried = any(key in view.objects and view.objects[key].pickupable for key in parents - {receptacle_id})
+    named = receptacle_id in parents or wanted in (holder.receptacle_object_ids or ())
+    return named and (holder.pickupable or not carried)
 
 
 def direct_parent(item: ThorObject, objects: Mapping[str, ThorObject]) -> str | None:

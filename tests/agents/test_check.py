@@ -8,8 +8,8 @@ import pytest
 
 from infthor_eval.agents.check import check_env
 from infthor_eval.agents.environment import Ended, PlanEnvironment
-from infthor_eval.agents.frames import FrameFolder
 from infthor_eval.formats.trajectory import iter_trajectories
+from infthor_eval.thor.frames import FrameFolder
 from infthor_eval.thor.view import View
 from model_adapters import ContractError
 

@@ -9,10 +9,10 @@ import pytest
 
 from infthor_eval.agents.environment import Ended, PlanEnvironment
 from infthor_eval.agents.expert import ExpertRefusedError
-from infthor_eval.agents.frames import FrameFolder
 from infthor_eval.errors import DataError
 from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.formats.trajectory import Trajectory, iter_trajectories
+from infthor_eval.thor.frames import FrameFolder
 from infthor_eval.thor.launch import embedded
 from infthor_eval.thor.simulator import Simulator
 
