@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-import msgspec
 from tokenizers import Tokenizer
 
 from infthor_eval.errors import ModelError
@@ -103,7 +102,6 @@ def load_spatialvla(name: str, checkpoint: PolicyCheckpoint, options: SpatialVLA
     identity = checkpoint.identity(device, dtype, options) | {
         "unnorm_key": key,
         "intrinsics": options.intrinsics,
-        "bins": msgspec.to_builtins(processor.bin_policy),
     }
     return VlaPolicy(name, network, statistics, options, identity)
 
