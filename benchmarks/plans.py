@@ -15,18 +15,19 @@ import sys
 import tempfile
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import closing
 from pathlib import Path
 from typing import NamedTuple
 
 from infthor_eval.agents.environment import PlanEnvironment
 from infthor_eval.agents.expert import ExpertRefusedError
 from infthor_eval.agents.records import PlanRecord
-from infthor_eval.agents.simulators import Simulators
 from infthor_eval.agents.suite import PlansSuite
 from infthor_eval.agents.summary import Rate, TaskSummary
 from infthor_eval.errors import DataError
 from infthor_eval.formats.trajectory import Source, iter_sources
 from infthor_eval.runs import UnitRecord, read_run
+from infthor_eval.thor.simulators import Simulators
 
 _BASELINES = ("planner", "random", "scripted", "history")
 _TASK = "infthor_plans"
@@ -82,13 +83,14 @@ def demonstrations(options: argparse.Namespace) -> Iterator[Source]:
     """The first demonstrations that the simulator carries out whole."""
     wanted = options.alfred
     sources = list(iter_sources(options.data / "alfred" / "valid_seen.jsonl.gz")) if wanted else []
-    simulators = Simulators("embedded", options.data, [source.read() for source in sources], image=False)
-    for source in sources:
-        if not wanted:
-            return
-        if is_whole(source, simulators):
-            wanted -= 1
-            yield source
+    trajectories = [source.read() for source in sources]
+    with closing(Simulators("embedded", options.data, trajectories, image=False)) as simulators:
+        for source in sources:
+            if not wanted:
+                return
+            if is_whole(source, simulators):
+                wanted -= 1
+                yield source
 
 
 def is_whole(source: Source, simulators: Simulators) -> bool:

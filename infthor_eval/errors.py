@@ -12,6 +12,7 @@ __all__ = [
     "DataError",
     "InfthorError",
     "ModelError",
+    "SceneError",
     "SimulatorError",
     "UsageError",
     "in_one_line",
@@ -44,6 +45,10 @@ class SimulatorError(InfthorError):
     """The simulator cannot be started, died, hung, or answered with something that is not its protocol."""
 
     exit_code = 1
+
+
+class SceneError(SimulatorError):
+    """The simulator has no such scene, or refuses it; another try would end the same way."""
 
 
 def unknown_name(what: str, name: str, known: Iterable[str]) -> UsageError:

@@ -138,6 +138,7 @@ class PlanEnvironment:
         Raises:
             IndexError: there is no such plan.
             ExpertRefusedError: this simulator refuses an action of the expert before the plan's end.
+            UnfitPlanError: the scene has not what the plan is about.
             SimulatorError: the simulator fails.
         """
         if not 0 <= plan < len(self.plans):

@@ -1,6 +1,5 @@
 """Leading an actor through a trajectory, plan by plan (Algorithm 2)."""
 
-import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -16,12 +15,13 @@ from infthor_eval.agents.environment import PlanEnvironment, StepOutcome
 from infthor_eval.agents.frames import FrameFolder, NoFrames
 from infthor_eval.agents.plans import Plan
 from infthor_eval.agents.records import PlanRecord, StepRecord
-from infthor_eval.agents.simulators import Simulators
 from infthor_eval.agents.task import PlansTask
 from infthor_eval.agents.trajectories import Course
-from infthor_eval.errors import SimulatorError
+from infthor_eval.errors import SceneError, SimulatorError
+from infthor_eval.formats.scratch import ScratchFolder
 from infthor_eval.runs import Tokens
 from infthor_eval.thor.simulator import Simulator
+from infthor_eval.thor.simulators import Simulators
 
 __all__ = ["Episode", "Played", "described", "episode"]
 
@@ -65,8 +65,8 @@ def described(course: Course, plan: Plan) -> PlanRecord:
 @contextmanager
 def episode(task: PlansTask, course: Course, cast: Cast, simulators: Simulators, seed: int) -> Iterator["Episode"]:
     """A trajectory with an actor in it, in a simulator that is there for as long as the context lasts."""
-    with simulators.one() as simulator, tempfile.TemporaryDirectory(prefix="infthor-frames-") as folder:
-        yield Episode(task, course, cast, simulator, Path(folder), seed)
+    with simulators.one() as simulator, ScratchFolder() as folder:
+        yield Episode(task, course, cast, simulator, folder, seed)
 
 
 class Episode:
@@ -92,9 +92,11 @@ class Episode:
         """One plan. Where the simulator fails for good it is begun anew, in a fresh one.
 
         Raises:
-            ExpertRefusedError: this simulator refuses an action of the expert before the plan's end.
+            UnfitPlanError: this simulator refuses an action of the expert before the plan's end, or has not what the
+                plan is about.
             DataError: a frame cannot be written or read.
             ModelError: the model fails.
+            SceneError: the simulator has no such scene.
             SimulatorError: the simulator failed every time.
         """
         played, faults = self._survived(lambda: self._played(plan))
@@ -116,6 +118,8 @@ class Episode:
             restarts = self._simulator.restarts
             try:
                 made = do()
+            except SceneError:
+                raise
             except SimulatorError as error:
                 self._environment = None
                 faults.append(str(error))

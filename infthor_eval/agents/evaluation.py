@@ -9,13 +9,11 @@ import msgspec
 
 from infthor_eval.agents.cast import Cast, cast_of
 from infthor_eval.agents.episodes import Episode, described, episode
-from infthor_eval.agents.expert import ExpertRefusedError
-from infthor_eval.agents.plans import Plan
+from infthor_eval.agents.plans import Plan, UnfitPlanError
 from infthor_eval.agents.records import NOT_COME_TO, PlanRecord
-from infthor_eval.agents.simulators import Simulators
 from infthor_eval.agents.task import PlansTask
 from infthor_eval.agents.trajectories import Course
-from infthor_eval.errors import InfthorError, UsageError
+from infthor_eval.errors import InfthorError, SceneError, UsageError
 from infthor_eval.formats.digests import fingerprint
 from infthor_eval.formats.floor_plans import floor_plans_digest
 from infthor_eval.runs import (
@@ -29,6 +27,7 @@ from infthor_eval.runs import (
     UnitRecord,
     Workload,
 )
+from infthor_eval.thor.simulators import Simulators
 from model_adapters import Subject
 
 __all__ = ["PlanUnit", "PlansEvaluation"]
@@ -74,6 +73,7 @@ class PlansEvaluation:
         every = {course.traj_id: course for task in self._tasks.values() for course in task.courses.found}
         self._trajectories = [course.trajectory for course in every.values()]
         self._cast: Cast | None = None
+        self._simulators: Simulators | None = None
 
     def outline(self) -> list[tuple[str, list[str]]]:
         """The trajectories that are gone through, by name, each with the texts of its plans."""
@@ -120,7 +120,7 @@ class PlansEvaluation:
             yield from (record for record in known.values() if record is not None)
             return
         task = self._tasks[first.key.task]
-        assert self._cast is not None  # the workload comes first
+        assert self._cast is not None and self._simulators is not None  # the workload comes first
         with episode(task, first.course, self._cast, self._simulators, self._seed) as stage:
             over = False
             for unit in units:
@@ -142,6 +142,11 @@ class PlansEvaluation:
             settings=task.file.settings["generation_kwargs"],
             reply=", ".join(step.action or (step.reply or "") for step in payload.steps),
         )
+
+    def close(self) -> None:
+        """See `infthor_eval.runs.Evaluation.close`."""
+        if self._simulators is not None:
+            self._simulators.close()
 
     def _described_simulators(self, seen: bool) -> Simulators:
         """What episodes run in; it draws nothing that nobody looks at."""
@@ -173,7 +178,7 @@ def _recorded(unit: PlanUnit, inputs: str, stage: Episode, over: bool) -> UnitRe
             stage.pass_over(unit.plan)
             return unit.record(inputs, msgspec.structs.replace(unit.payload, ended=NOT_COME_TO))
         played = stage.play(unit.plan)
-    except ExpertRefusedError as error:
+    except (UnfitPlanError, SceneError) as error:
         return unit.excluded(str(error), inputs)
     except InfthorError as error:
         begun = stage.begun if stage.begun is not None and stage.begun.index == unit.plan.index else unit.payload

@@ -1,14 +1,13 @@
 """The expert's actions of one trajectory, carried out as far as they are needed: the true history."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from infthor_eval.agents.frames import FrameKeeper
 from infthor_eval.agents.history import Chapter
 from infthor_eval.agents.memory import Past
-from infthor_eval.agents.plans import Plan, TrajectoryTask
-from infthor_eval.errors import DataError
+from infthor_eval.agents.plans import Plan, TrajectoryTask, UnfitPlanError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.household.goals import goal_holds
@@ -25,7 +24,7 @@ from infthor_eval.thor.view import AgentPose, View
 __all__ = ["Expert", "ExpertRefusedError", "PlanStart"]
 
 
-class ExpertRefusedError(DataError):
+class ExpertRefusedError(UnfitPlanError):
     """This simulator refuses an action of the expert: there is no true history from its plan on."""
 
 
@@ -57,6 +56,15 @@ class PlanStart:
     """
 
     mark: SimulatorMark
+    frame: FrameRef | None
+    treatments: Treatments
+
+
+class _Step(NamedTuple):
+    """An action, and what came of it."""
+
+    action: ExpertAction
+    view: View
     frame: FrameRef | None
     treatments: Treatments
 
@@ -138,33 +146,35 @@ class Expert:
         return told.get(n_actions - 1, "")
 
     def _carry_out(self, plan: Plan) -> None:
-        simulator, start = self._simulator, self._starts[-1]
-        view = simulator.rewind(start.mark, exactly=True)
-        treatments, frame = start.treatments, start.frame
+        """The actions of the next plan; nothing is kept of them unless all can be."""
+        start = self._starts[-1]
+        steps = list(self._steps(plan, start))
+        mark, last = self._simulator.mark(), steps[-1]
+        if self._log is not None:
+            for number, step in zip(range(*plan.low), steps, strict=True):
+                self._log.record(step.view, step=number, action=step.action.text)
+        if start.frame is not None:
+            opening = self._chapter(plan.index)
+            told = tuple((step.action.text, step.frame) for step in steps if step.frame is not None)
+            self._chapters.append(Chapter(opening.plan, opening.goal, opening.before, told))
+        self._actions.append([step.action for step in steps])
+        following = self._plans[plan.index + 1 : plan.index + 2]
+        goes_on = any(item.task == plan.task for item in following)
+        self._starts.append(PlanStart(mark, last.frame, last.treatments if goes_on else Treatments()))
+
+    def _steps(self, plan: Plan, start: PlanStart) -> Iterator["_Step"]:
+        view, treatments = self._simulator.rewind(start.mark, exactly=True), start.treatments
         task = self._tasks[plan.task].task
         task_open = not goal_holds(task, view, treatments)
-        actions: list[ExpertAction] = []
-        steps: list[tuple[str, FrameRef]] = []
         for number in range(*plan.low):
             call = self._call(plan, number, view)
-            view = simulator.step(**call)
+            view = self._simulator.step(**call)
             if not view.success:
                 raise self._refusal(plan, number, view.error or "refused without a message")
             treatments = treatments.after(call["action"], call.get("objectId"), view)
-            frame = self._frames.keep(view)
-            if self._log is not None:
-                self._log.record(view, step=number, action=self._text(number))
             completes = task_open and goal_holds(task, view, treatments)
-            actions.append(ExpertAction(call, self._text(number), view.agent, completes))
-            if frame is not None:
-                steps.append((actions[-1].text, frame))
-        if start.frame is not None:
-            opening = self._chapter(plan.index)
-            self._chapters.append(Chapter(opening.plan, opening.goal, opening.before, tuple(steps)))
-        self._actions.append(actions)
-        following = self._plans[plan.index + 1 : plan.index + 2]
-        goes_on = any(item.task == plan.task for item in following)
-        self._starts.append(PlanStart(simulator.mark(), frame, treatments if goes_on else Treatments()))
+            action = ExpertAction(call, self._text(number), view.agent, completes)
+            yield _Step(action, view, self._frames.keep(view), treatments)
 
     def _call(self, plan: Plan, number: int, view: View) -> dict[str, Any]:
         try:

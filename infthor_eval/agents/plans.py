@@ -9,7 +9,11 @@ from infthor_eval.formats.trajectory import HighAction, SubTask, TaskInfo, Traje
 from infthor_eval.household.sequence_text import goal_text, plan_text
 from infthor_eval.household.tasks import Task, task_of
 
-__all__ = ["Plan", "PlanKind", "TrajectoryTask", "plans_of", "tasks_of"]
+__all__ = ["Plan", "PlanKind", "TrajectoryTask", "UnfitPlanError", "plans_of", "tasks_of"]
+
+
+class UnfitPlanError(DataError):
+    """Nobody can carry a plan out here, so it counts for nobody."""
 
 
 class PlanKind(StrEnum):

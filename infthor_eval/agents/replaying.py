@@ -5,7 +5,7 @@ to each plan and the recorded calls are stepped, which leads where it led then i
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,13 +17,13 @@ from infthor_eval.agents.moments import Moment, PlanTitle, Point, Pose, Rewards,
 from infthor_eval.agents.plans import PlanKind
 from infthor_eval.agents.records import PlanRecord, StepRecord
 from infthor_eval.agents.rewards import RewardRules
-from infthor_eval.agents.simulators import Simulators
 from infthor_eval.agents.trajectories import Course, Courses, find_courses
 from infthor_eval.errors import DataError, UsageError, naming, unknown_name
 from infthor_eval.household.scout import reachable
 from infthor_eval.runs import UnitRecord
 from infthor_eval.thor.actions import object_type_of, text_of
 from infthor_eval.thor.simulator import Simulator
+from infthor_eval.thor.simulators import Simulators
 from infthor_eval.thor.view import AgentPose, ThorObject
 
 __all__ = ["Record", "Recorded", "Replay", "recorded_plans", "replay"]
@@ -127,7 +127,7 @@ def replay(recorded: Recorded, data: str | None, scenes: Path | None) -> Iterato
     name = recorded.run.about.simulator
     # All of them, as in the run: the embedded simulator learns of floor plans from each.
     simulators = Simulators(name, scenes, [item.trajectory for item in courses.found], instances=False)
-    with simulators.one() as simulator:
+    with closing(simulators), simulators.one() as simulator:
         yield Replay(recorded, course, simulator)
 
 

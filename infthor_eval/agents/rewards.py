@@ -13,9 +13,9 @@ from typing import Any
 
 import msgspec
 
-from infthor_eval.agents.plans import PlanKind
+from infthor_eval.agents.plans import PlanKind, UnfitPlanError
 from infthor_eval.agents.targets import PlanTarget, in_hand, is_in, subject_of
-from infthor_eval.errors import DataError, unknown_name
+from infthor_eval.errors import unknown_name
 from infthor_eval.formats.yaml_files import read_yaml
 from infthor_eval.household.containment import contents_of
 from infthor_eval.household.goals import APPLIANCE, goal_holds
@@ -120,7 +120,7 @@ class PlanReward:
             grid: the cells that can be reached; GotoLocation needs it.
 
         Raises:
-            DataError: the plan lacks what its kind needs, or the scene does.
+            UnfitPlanError: the plan lacks what its kind needs, or the scene does.
             ValueError: GotoLocation without a grid.
         """
         _check(target, start)
@@ -349,14 +349,14 @@ def _check(target: PlanTarget, start: View) -> None:
     kind = target.kind
     if kind == PlanKind.GOTO:
         if target.goal_stand is None:
-            raise DataError(f"this {kind} plan has no pose to reach; leave it out")
+            raise UnfitPlanError(f"this {kind} plan has no pose to reach; leave it out")
         return
     subject = subject_of(target, start)
     if subject not in start.objects:
         named = "has no object" if subject is None else f"is about {subject}, which the scene has not"
-        raise DataError(f"this {kind} plan {named}; leave it out")
+        raise UnfitPlanError(f"this {kind} plan {named}; leave it out")
     if kind == PlanKind.PUT and target.receptacle_id not in start.objects:
-        raise DataError(
+        raise UnfitPlanError(
             f"the {kind} plan's receptacle is {target.receptacle_id}, which the scene has not; leave it out"
         )
 

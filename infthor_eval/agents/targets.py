@@ -1,17 +1,14 @@
 """What a plan is about, in the simulator at hand."""
 
-import re
 from dataclasses import dataclass
 
-from infthor_eval.agents.plans import Plan, PlanKind
-from infthor_eval.errors import DataError
-from infthor_eval.household.navigation import GRID, Grid, Stand
+from infthor_eval.agents.plans import Plan, PlanKind, UnfitPlanError
+from infthor_eval.household.navigation import Stand
 from infthor_eval.thor.grounding import Grounding
 from infthor_eval.thor.view import View
 
 __all__ = ["PlanTarget", "in_hand", "is_in", "subject_of", "target_of"]
 
-_LOCATION = re.compile(r"loc\|(-?\d+)\|(-?\d+)\|([0-3])\|(-?\d+)")
 _TREATMENTS = {PlanKind.CLEAN, PlanKind.HEAT, PlanKind.COOL}
 
 
@@ -34,23 +31,17 @@ class PlanTarget:
     goal_horizon: float = 0.0
 
 
-def target_of(plan: Plan, grounding: Grounding, view: View, grid: Grid | None = None) -> PlanTarget:
-    """What a recorded plan asks for here.
+def target_of(plan: Plan, grounding: Grounding, view: View) -> PlanTarget:
+    """What a recorded plan asks for here; where GotoLocation leads the environment alone can tell.
 
     Args:
         plan: the plan.
         grounding: the episode's ids.
         view: the world at the plan's start.
-        grid: the cells that can be reached; for GotoLocation.
 
     Raises:
-        DataError: GotoLocation without a location, or the scene has no object for an id.
+        UnfitPlanError: the scene has no object for an id.
     """
-    if plan.kind == PlanKind.GOTO:
-        if grid is None:
-            raise ValueError("the target of GotoLocation needs the grid")
-        stand, horizon = _pose(plan, grid)
-        return PlanTarget(plan.kind, goal_stand=stand, goal_horizon=horizon)
     return PlanTarget(plan.kind, _here(plan.object_id, grounding, view), _here(plan.receptacle_id, grounding, view))
 
 
@@ -97,20 +88,10 @@ def _are_slices_of_one(one: str, other: str) -> bool:
     return parts[0][0] == parts[1][0] and all("Sliced" in part for _, _, part in parts)
 
 
-def _pose(plan: Plan, grid: Grid) -> tuple[Stand, float]:
-    found = _LOCATION.fullmatch(plan.location or "")
-    if found is None:
-        raise DataError(
-            f"plan {plan.index} ({plan.text}): its location is {plan.location!r:.60}, not loc|x|z|turn|horizon"
-        )
-    x, z, turn, horizon = map(int, found.groups())
-    return Stand(grid.cell(x * GRID, z * GRID), turn * 90), float(horizon)
-
-
 def _here(recorded: str | None, grounding: Grounding, view: View) -> str | None:
     if recorded is None:
         return None
     found = grounding.ground(recorded, view)
     if found is None:
-        raise DataError(f"the scene has no object for {recorded!r:.80}; leave the trajectory out")
+        raise UnfitPlanError(f"the scene has no object for {recorded!r:.80}")
     return found

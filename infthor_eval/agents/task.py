@@ -1,9 +1,8 @@
 """A task of plans: what its file says, and whom it leads through which trajectories."""
 
-import difflib
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, get_type_hints
+from typing import Any
 
 from infthor_eval.agents.environment import MAX_STEPS
 from infthor_eval.agents.memory import Memory, memory_named
@@ -12,9 +11,9 @@ from infthor_eval.agents.options import PlansOptions
 from infthor_eval.agents.plans import Plan
 from infthor_eval.agents.rewards import RewardRules, reward_rules
 from infthor_eval.agents.trajectories import Course, Courses, find_courses
-from infthor_eval.errors import DataError
 from infthor_eval.runs import TaskFile, TaskRequest
 from infthor_eval.runs.generation_kwargs import decoding_of
+from infthor_eval.runs.task_settings import task_settings
 from model_adapters import Decoding
 
 __all__ = ["PlansTask", "TaskSettings"]
@@ -60,7 +59,8 @@ class PlansTask:
         self.file = file
         self.name = file.name
         self._options: PlansOptions = request.options
-        self.settings = _settings(file, self._options)
+        told = {name: getattr(self._options, name) for name in ("rewards", "history", "after_failure")}
+        self.settings = task_settings(file, TaskSettings, told, _CHOICES)
         self.rules: RewardRules = reward_rules(self.settings.rewards)
         self.decoding: Decoding = self._decoding(request.seed)
         self.memory: Memory = memory_named(self.settings.history, self._options.retriever)
@@ -105,29 +105,3 @@ class PlansTask:
         if self._options.greedy and isinstance(given, Mapping):
             given = {**given, "do_sample": False, "temperature": 0.0}
         return decoding_of(given, seed, self.name)
-
-
-def _settings(file: TaskFile, options: PlansOptions) -> TaskSettings:
-    given = file.settings["dataset_kwargs"]
-    if not isinstance(given, Mapping):
-        raise DataError(f"{file.path}: dataset_kwargs must be a mapping of settings")
-    for key, value in given.items():
-        _check(file, str(key), value)
-    told = {name: getattr(options, name) for name in ("rewards", "history", "after_failure")}
-    return TaskSettings(**{**given, **{name: value for name, value in told.items() if value is not None}})
-
-
-def _check(file: TaskFile, key: str, value: object) -> None:
-    """Refuse a setting that would not act, or not as it was meant."""
-    hints = get_type_hints(TaskSettings)
-    if key not in hints:
-        near = difflib.get_close_matches(key, hints, n=1)
-        hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(hints)}"
-        raise DataError(f"{file.path}: dataset_kwargs: {key} is not known; {hint}")
-    if hints[key] is int:
-        if not isinstance(value, int) or isinstance(value, bool) or value < 1:
-            raise DataError(f"{file.path}: dataset_kwargs: {key} is {value!r:.60}; it is a whole number above 0")
-    elif not isinstance(value, str):
-        raise DataError(f"{file.path}: dataset_kwargs: {key} is {value!r:.60}; it is a text")
-    elif value not in _CHOICES.get(key, (value,)):
-        raise DataError(f"{file.path}: dataset_kwargs: {key} is {value!r:.60}; there are {', '.join(_CHOICES[key])}")

@@ -16,7 +16,7 @@ def evaluate(requests: Sequence[tuple[RunRequest, Suite]]) -> int:
     """Run the requests one after another, and print one set of tables per suite.
 
     Returns:
-        Exit code: 1 where a unit failed, else 0.
+        Exit code: 1 where a unit failed, or nothing of a run counts, else 0.
     """
     with NOTES.status("looking at the tasks and their data"):  # retrieval embeds every frame: minutes
         runs = [prepare(request, suite) for request, suite in requests]
@@ -32,11 +32,19 @@ def evaluate(requests: Sequence[tuple[RunRequest, Suite]]) -> int:
     for outcome in outcomes:
         console.print(f"{outcome.summary.header.name}: {outcome.folder}")
     n_failed = sum(map(_say_what_failed, outcomes))  # every run says what failed
-    return int(n_failed > 0)
+    n_void = sum(map(_say_if_void, outcomes))
+    return int(n_failed + n_void > 0)
 
 
 def _suite_name(outcome: RunOutcome) -> str:
     return outcome.run.suite.name
+
+
+def _say_if_void(outcome: RunOutcome) -> bool:
+    void = bool(outcome.records) and all(record.excluded is not None for record in outcome.records)
+    if void:
+        say(f"{outcome.summary.header.name}: nothing that could be evaluated counts: all of it was left out", "red")
+    return void
 
 
 def _say_what_failed(outcome: RunOutcome) -> int:

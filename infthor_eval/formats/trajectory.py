@@ -41,7 +41,8 @@ __all__ = [
 ]
 
 _SUFFIXES = (".json", ".jsonl", ".jsonl.gz")
-_NOT_TRAJECTORIES = {"metadata.json", "expert_log.json"}  # what a replayed set holds beside its trajectories
+# What a replayed set holds beside its trajectories.
+_NOT_TRAJECTORIES = {"metadata.json", "expert_log.json", "state_summary.json"}
 _MEND = "restore the file or leave it out"
 _ALWAYS: dict[str, Callable[[], Any]] = {"long_horizon_task": dict, "sub_tasks": list, "sub_trajs": list}
 

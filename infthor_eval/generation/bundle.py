@@ -4,7 +4,6 @@ The manifest says which trajectories to generate and how questions are drawn; th
 digest of every file, by which a test tells that the same set comes out again.
 """
 
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
@@ -17,6 +16,7 @@ from infthor_eval.errors import DataError
 from infthor_eval.formats.digests import digest_of_file
 from infthor_eval.formats.qa_csv import write_questions
 from infthor_eval.formats.reading import read_json
+from infthor_eval.formats.scratch import ScratchFolder
 from infthor_eval.generation.generate_set import generate_set
 from infthor_eval.generation.questions.make import MadeQuestions, make_questions
 from infthor_eval.generation.replay_set import replay_set, select
@@ -89,9 +89,9 @@ def make_bundle(
     if out.exists() and any(out.iterdir()):
         raise DataError(f"{out}: is not empty; give a new folder")
     jobs = [TrajectorySettings(**msgspec.structs.asdict(item)) for item in manifest.trajectories]
-    with tempfile.TemporaryDirectory(prefix="infthor-") as folder:
-        _refuse(generate_set(jobs, simulator, Path(folder), progress).failures)
-        replayed = replay_set(select([Path(folder)]), simulator, out, progress)
+    with ScratchFolder() as folder:
+        _refuse(generate_set(jobs, simulator, folder, progress).failures)
+        replayed = replay_set(select([folder]), simulator, out, progress)
     _refuse([f"{item.place}: {item.message}" for item in replayed.failures])
     made = make_questions(
         out, seed=manifest.question_seed, per_trajectory=manifest.per_trajectory, further=manifest.further

@@ -1,6 +1,5 @@
 """Our models under lm-eval's own command: `lm-eval run --model infthor --model_args adapter=qwen2.5-vl-tiny,...`."""
 
-import tempfile
 from collections.abc import Sequence
 from itertools import groupby
 from pathlib import Path
@@ -11,6 +10,7 @@ from lm_eval.api.model import LM
 from infthor_eval.agents import records as plan_records
 from infthor_eval.agents.evaluation import PlansEvaluation
 from infthor_eval.errors import ModelError, UsageError
+from infthor_eval.formats.scratch import ScratchFolder
 from infthor_eval.harness.plans_task import episode_response, evaluation_around
 from infthor_eval.harness.registration import NAME, say_model_takes_references
 from infthor_eval.nieh import records as nieh_records
@@ -80,8 +80,8 @@ class InfthorLM(LM):
         self._model = model
         self._seed = seed
         self._name, self._code = label(adapter, given), adapter_identity(adapter)
-        self._scratch = None if journal else tempfile.TemporaryDirectory(prefix="infthor-")
-        self._folder = Path(journal or str(self._scratch and self._scratch.name))
+        self._scratch = ScratchFolder()
+        self._folder = Path(journal) if journal else self._scratch.path
         self._sessions: dict[str, JournalSession] = {}
         self._plans: dict[str, PlansEvaluation] = {}
         self._groups: dict[str, dict[str, Group]] = {}

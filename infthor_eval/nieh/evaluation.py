@@ -92,6 +92,9 @@ class NiehEvaluation:
             reply=record.payload.reply or "",
         )
 
+    def close(self) -> None:
+        """Nothing is held."""
+
     @cached_property
     def _numbers(self) -> dict[UnitKey, int]:
         """Places of the samples in their tasks."""

@@ -147,6 +147,7 @@ def execute(run: PreparedRun, observer: Observer | None = None) -> RunOutcome:
             records = _asked(workload, journal)
             journal.require_there()
     finally:
+        run.evaluation.close()
         subject.close()
     summary = RunSummary(header, run.suite.summarise(header, records))
     _write_results(folder, summary)

@@ -177,6 +177,10 @@ class Evaluation(Protocol):
         """A record for other readers; called after the work was found."""
         ...
 
+    def close(self) -> None:
+        """Let go of what the work needed (simulators); called once all of it is done, or given up."""
+        ...
+
 
 class Suite(Protocol):
     """A kind of evaluation.

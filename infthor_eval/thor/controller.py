@@ -1,12 +1,12 @@
 """The Controller of ai2thor 5.0.0 on the safe transport, cleaning up behind itself."""
 
-import tempfile
 from pathlib import Path
 from typing import Any
 
 import ai2thor.controller
 
-from infthor_eval.errors import SimulatorError
+from infthor_eval.errors import SceneError, SimulatorError
+from infthor_eval.formats.scratch import ScratchFolder
 from infthor_eval.thor.launch import Launch
 from infthor_eval.thor.transport import PeerFault, SafeFifoServer
 
@@ -30,10 +30,11 @@ class SafeController(ai2thor.controller.Controller):
             options: of ai2thor's Controller (`width`, `renderInstanceSegmentation`, ...).
 
         Raises:
-            SimulatorError: it does not start, or refuses the scene.
+            SceneError: it refuses the scene.
+            SimulatorError: it does not start.
         """
         self.server: SafeFifoServer | None = None
-        self._folder = None if launch.executable is None else tempfile.TemporaryDirectory(prefix="infthor-")
+        self._folder = None if launch.executable is None else ScratchFolder()
         try:
             super().__init__(
                 scene=scene,
@@ -59,7 +60,7 @@ class SafeController(ai2thor.controller.Controller):
                 raise SimulatorError(
                     "AI2-THOR's Unity build is neither here nor to be downloaded; go online once, or name an executable"
                 ) from error
-            raise SimulatorError(f"scene {_scene_name(scene)}: {message}") from error
+            raise SceneError(f"scene {_scene_name(scene)}: {message}") from error
         except BaseException:
             self.stop()
             raise
@@ -67,7 +68,7 @@ class SafeController(ai2thor.controller.Controller):
     @property
     def base_dir(self) -> str:
         """Where ai2thor keeps its log and releases."""
-        return super().base_dir if self._folder is None else self._folder.name
+        return super().base_dir if self._folder is None else str(self._folder.path)
 
     def reset(self, scene: str | dict[str, Any] | None = None, **init_params: Any) -> Any:
         """Load a scene; as the published method, but a failed simulator raises SimulatorError."""

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from types import TracebackType
 from typing import Any, Self
 
-from infthor_eval.errors import SimulatorError
+from infthor_eval.errors import SceneError, SimulatorError
 from infthor_eval.thor.controller import SafeController
 from infthor_eval.thor.launch import Launch
 from infthor_eval.thor.teleport import teleport_call
@@ -131,7 +131,8 @@ class Simulator:
                 present one.
 
         Raises:
-            SimulatorError: the simulator cannot be started, or refuses the scene.
+            SceneError: the simulator refuses the scene.
+            SimulatorError: it cannot be started.
         """
         self._scene, self._episode, self._failures = scene or self._scene, [], 0
         self._copies = {}
@@ -257,7 +258,7 @@ class Simulator:
             return view_of(self._controller.reset(self._scene))
         except (ValueError, RuntimeError) as error:
             message = " ".join(str(error).split())[:300]
-            raise SimulatorError(f"scene {self._scene}: {message}") from error
+            raise SceneError(f"scene {self._scene}: {message}") from error
 
     def _call(self, call: dict[str, Any]) -> View:
         assert self._controller is not None

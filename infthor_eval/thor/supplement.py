@@ -5,7 +5,6 @@ gaps. Where the expert walked there is floor, and what it opened, switched and p
 """
 
 import math
-import tempfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -13,6 +12,7 @@ from pathlib import Path
 
 import msgspec
 
+from infthor_eval.formats.scratch import ScratchFolder
 from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.thor.recorded import degrees_of
 
@@ -56,8 +56,8 @@ def write_supplement(trajectories: Iterable[Trajectory], path: Path) -> None:
 @contextmanager
 def supplement_file(trajectories: Iterable[Trajectory]) -> Iterator[Path]:
     """What the trajectories tell of each floor plan, in a temporary file."""
-    with tempfile.TemporaryDirectory(prefix="infthor-") as folder:
-        path = Path(folder) / "supplement.json"
+    with ScratchFolder() as folder:
+        path = folder / "supplement.json"
         write_supplement(trajectories, path)
         yield path
 

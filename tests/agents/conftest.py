@@ -51,6 +51,9 @@ def shared_simulator(simulators: SharedSimulators, monkeypatch: pytest.MonkeyPat
         def one(self) -> Any:
             return simulators.one(**self._options)
 
+        def close(self) -> None:
+            """They go on for other tests."""
+
     monkeypatch.setattr("infthor_eval.agents.evaluation.Simulators", Shared)
 
 

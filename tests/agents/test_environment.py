@@ -127,6 +127,42 @@ def test_the_history_is_the_sequence_that_models_are_trained_on(simulator, tmp_p
     assert whole[len(text) :].startswith("<|act|>")
 
 
+class _FullFor(FrameFolder):
+    """A disk that is full when one of the frames is written."""
+
+    def __init__(self, folder, number):
+        super().__init__(folder)
+        self._left = number
+
+    def keep(self, view):
+        self._left -= 1
+        if self._left == 0:
+            raise DataError("the disk is full")
+        return super().keep(view)
+
+
+@pytest.fixture(scope="module")
+def segmenting_simulator():
+    with Simulator(embedded(), max_copies=64) as simulator:
+        yield simulator
+
+
+def test_a_disk_that_was_full_in_between_changes_nothing_that_is_remembered(segmenting_simulator, tmp_path):
+    pasts = []
+    for name, number in (("sound", 0), ("full", 6)):
+        (tmp_path / name).mkdir()
+        frames = _FullFor(tmp_path / name, number)
+        environment = PlanEnvironment(trajectory(), segmenting_simulator, frames=frames, in_words=True)
+        if number:
+            with pytest.raises(DataError, match="full"):
+                environment.reset(1)
+        environment.reset(1)
+        pasts.append(environment.past(1))
+    sound, full = pasts
+    assert sound.state == full.state
+    assert [len(chapter.steps) for chapter in sound.all] == [len(chapter.steps) for chapter in full.all]
+
+
 def test_an_expert_that_is_refused_here_is_named_and_the_plans_before_go_on(simulator):
     found = trajectory()
     broken = 5

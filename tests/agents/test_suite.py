@@ -167,6 +167,47 @@ def test_plans_that_the_expert_cannot_do_here_count_for_nobody(prepared, tmp_pat
         assert f"2 left out: {reason}" in table.notes
 
 
+def test_a_plan_about_what_is_not_there_counts_for_nobody(prepared, tmp_path):
+    document = cut(FORK)
+    document["plan"]["high_pddl"][3]["planner_action"]["receptacleObjectId"] = "Elephant|+00.00|+00.00|+00.00"
+    outcome = execute(prepared(data=write(tmp_path / "elephant", document)))
+    task = summary(outcome)
+    assert task.excluded == {"the scene has no object for 'Elephant|+00.00|+00.00|+00.00'": 1}
+    assert (task.n_plans, task.n_failed, task.endings) == (3, 0, {"done": 3})
+
+
+def test_trajectories_in_a_scene_that_is_not_here_count_for_nobody(prepared, data):
+    document = cut(MUG, 2, called="elsewhere")
+    document["scene"]["floor_plan"] = "FloorPlan7"
+    (data / "elsewhere.json").write_text(json.dumps(document))
+    outcome = execute(prepared("scripted"))
+    task = summary(outcome)
+    ((reason, number),) = task.excluded.items()
+    assert reason.startswith("scene FloorPlan7: ")
+    assert (number, task.n_plans, task.n_failed) == (2, 4, 0)
+    assert all(not record.faults for record in outcome.records)
+
+
+def test_where_all_is_left_out_the_exit_code_says_so(run, tmp_path):
+    document = cut(MUG, 2)
+    document["scene"]["floor_plan"] = "FloorPlan7"
+    data = write(tmp_path / "elsewhere", document)
+    arguments = (
+        "--model",
+        "scripted",
+        "--tasks",
+        "infthor_plans",
+        "--data",
+        str(data),
+        "--output",
+        str(tmp_path / "o"),
+    )
+    code, out, err = run("run", *arguments)
+    assert code == 1
+    assert "scene FloorPlan7" in out and "--scenes DIR" in " ".join(out.split())
+    assert "nothing that could be evaluated counts" in err
+
+
 BROKEN = {
     "no JSON": ("{", "not a trajectory"),
     "of another form": ('{"scene": 5}', "not a trajectory"),
@@ -190,9 +231,10 @@ def test_a_broken_trajectory_is_skipped_named_and_counted(prepared, data, name):
         (data / "broken.json").write_text(json.dumps(document))
     run = prepared("scripted")
     (skipped,) = run.evaluation.workload(run.suite.baselines["scripted"](0)).skipped
-    assert skipped.key.id == str(data / "broken.json")
+    assert skipped.key.id == "broken.json"
     assert said in skipped.reason
     assert "\n" not in skipped.reason
+    assert str(data) not in skipped.reason  # the run is the same one wherever its data lie
 
 
 def test_files_that_cannot_be_read_are_skipped_too(prepared, data):

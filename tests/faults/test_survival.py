@@ -298,11 +298,12 @@ def test_a_format_string_in_a_plan_is_a_name(action):
 def test_sigterm_leaves_no_temporary_folder(tmp_path):
     # A command that waits with a temporary folder open, as a replay does.
     code = (
-        "import sys, tempfile, time\n"
+        "import sys, time\n"
         "from infthor_eval.cli import main\n"
         "import infthor_eval.cli.ls as ls\n"
+        "from infthor_eval.formats.scratch import ScratchFolder\n"
         "def wait(*_):\n"
-        "    with tempfile.TemporaryDirectory(prefix='infthor-'):\n"
+        "    with ScratchFolder():\n"
         "        print('waiting', flush=True)\n"
         "        time.sleep(60)\n"
         "ls._tasks = wait\n"

@@ -61,6 +61,7 @@ def test_a_group_that_fails_takes_no_other_with_it_and_its_units_are_named(tmp_p
     assert outcome.summary.summary.numbers == (2, 2)
     assert [record.payload.answer for record in outcome.records] == [4, 5, None, None]
     assert read_run(outcome.folder, ToySuite.records) == (outcome.summary.header, outcome.records)
+    assert outcome.run.evaluation.closed
 
 
 def broken_by(error, answered=0):

@@ -36,6 +36,9 @@ class Sums:
         a, b = record.payload.numbers
         return runs.SampleView(a * 10 + b, {"numbers": [a, b]}, str(a + b), f"{a}+{b}", {}, str(record.payload.answer))
 
+    def close(self):
+        self.closed = True
+
 
 class ToySuite:
     name, needs, options, records = "toy", "conversation", object, runs.RecordTypes(Sum)

@@ -12,12 +12,11 @@ from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.formats.frames import FrameRef
 from model_adapters import Turn, check_adapter, load, registry
 from model_adapters.hf.families.hf_vlm import ProcessorFamily
-from model_adapters.hf.prompt import token_ids
 from model_adapters.hf.templates import plain_template
 from model_adapters.hf.uncached import UncachedModel
 from model_adapters.tiny.tokenizer import train_tokenizer
 
-from ..asking import up_to
+from ..asking import require_same
 from ..checkpoints import FAMILIES, OTHERS
 
 NEW = 6
@@ -64,13 +63,6 @@ def _load(name: str, folder: Path, **options: str) -> Any:
     return load(name if name in FAMILIES else "hf-vlm", given | options, seed=0)
 
 
-def _talk(model: Any, turns: tuple[Turn, ...]) -> Any:
-    talk = model.conversation()
-    for turn in turns:
-        talk.append(*turn.parts, role=turn.role)
-    return talk
-
-
 def _without_template(checkpoint: Path, folder: Path) -> Path:
     shutil.copytree(checkpoint, folder)
     (folder / "chat_template.jinja").unlink()
@@ -101,12 +93,7 @@ def test_ids_and_replies_are_those_of_transformers_on_the_bare_sequence(
     for name in names:
         for model in models[name]:
             for turns, (ids, reply) in zip(said, plainly[folders[name]], strict=True):
-                talk = _talk(model, turns)
-                assert talk.n_tokens == len(ids)
-                assert not hasattr(model, "pieces") or list(token_ids(model.pieces(turns))) == ids
-                got = list(talk.reply(up_to(NEW)).token_ids)
-                assert got == reply[: len(got)]
-                assert reply[len(got) :] == [] or reply[len(got)] in model._loaded.generation.end_ids
+                require_same(model, turns, ids, reply, NEW)
 
 
 @pytest.mark.parametrize("name", ["qwen2.5-vl", "llava"])

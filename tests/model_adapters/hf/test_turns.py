@@ -9,9 +9,8 @@ import pytest
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
 from model_adapters import Turn, load
-from model_adapters.hf.prompt import token_ids
 
-from ..asking import up_to
+from ..asking import require_same, talk_of, up_to
 from ..checkpoints import FAMILIES
 
 NEW = 6
@@ -49,13 +48,6 @@ def _load(name: str, checkpoints: Mapping[str, Path], **options: str) -> Any:
     return load(ADAPTERS[name], {**given, **options}, seed=0)
 
 
-def _talk(model: Any, turns: tuple[Turn, ...]) -> Any:
-    talk = model.conversation()
-    for turn in turns:
-        talk.append(*turn.parts, role=turn.role)
-    return talk
-
-
 @pytest.mark.parametrize("name", ADAPTERS)
 @pytest.mark.parametrize("share_prefix", ["true", "false"])
 def test_ids_and_replies_are_those_of_transformers(
@@ -67,12 +59,7 @@ def test_ids_and_replies_are_those_of_transformers(
 ) -> None:
     model = _load(name, checkpoints, share_prefix=share_prefix, chunk_tokens="50")
     for turns, (ids, reply) in zip(conversations, plainly[checkpoints[name]], strict=True):
-        talk = _talk(model, turns)
-        assert talk.n_tokens == len(ids)
-        assert not hasattr(model, "pieces") or list(token_ids(model.pieces(turns))) == ids
-        got = list(talk.reply(up_to(NEW)).token_ids)
-        assert got == reply[: len(got)]
-        assert reply[len(got) :] == [] or reply[len(got)] in model._loaded.generation.end_ids
+        require_same(model, turns, ids, reply, NEW)
     model.close()
 
 
@@ -100,7 +87,7 @@ def test_every_round_encodes_what_is_new_in_it_only(family: str, frames: list[Fr
 def test_batches_go_on_from_several_turns(conversations: list[tuple[Turn, ...]]) -> None:
     found = []
     for size in ("1", "3"):
-        talk = _talk(load("qwen2.5-vl-tiny", {"batch_size": size}, seed=0), conversations[1][:-1])
+        talk = talk_of(load("qwen2.5-vl-tiny", {"batch_size": size}, seed=0), conversations[1][:-1])
         replies = talk.replies([["What?"], [*conversations[1][-1].parts], ["\nWhy not?"]], up_to(NEW))
         found.append([(reply.text, reply.token_ids, reply.n_context_tokens) for reply in replies])
     assert found[0] == found[1]

@@ -19,7 +19,7 @@ _COPIES = 512  # of the simulator's state: one for each plan of a long trajector
 
 
 class Simulators:
-    """Starts simulators as they are needed; they are stopped when nobody holds this any more."""
+    """Starts simulators as they are needed; they are stopped with `close`, or when nobody holds this any more."""
 
     def __init__(self, name: str, scenes: Path | None, trajectories: Sequence[Trajectory], **options: Any) -> None:
         """Say which.
@@ -32,7 +32,7 @@ class Simulators:
         """
         self._name, self._scenes, self._options = name, scenes, options
         self._open = ExitStack()
-        weakref.finalize(self, self._open.close)  # with the run, or with the process: whichever is first
+        weakref.finalize(self, self._open.close)  # where nobody closes this
         self._idle: SimpleQueue[Simulator] = SimpleQueue()
         supplement = self._open.enter_context(supplement_file(trajectories)) if scenes is not None else None
         self._launch = self._described(supplement)
@@ -49,6 +49,10 @@ class Simulators:
             yield simulator
         finally:
             self._idle.put(simulator)
+
+    def close(self) -> None:
+        """Stop them all; safe to call again."""
+        self._open.close()
 
     def _described(self, supplement: Path | None) -> Launch:
         if self._name == "embedded":
