@@ -91,11 +91,11 @@ def load_spatialvla(name: str, checkpoint: PolicyCheckpoint, options: SpatialVLA
     device, dtype = checkpoint.placed(options)
     with loading(pretrained):
         config.check(pretrained)
+        view = _view(config, processor, key, options, pretrained)
         with empty():
             weights = SpatialVLAWeights(config, options.attn_implementation)
         load_weights(weights, checkpoint.folder, weights.layout(), pretrained=pretrained, device=device, dtype=dtype)
         weights.finish()
-    view = _view(config, processor, key, options, pretrained)
     network = SpatialVLANetwork(
         weights.eval(), tokenizer, bins, processor.action_chunk_size, config.image_token_index, view
     )
