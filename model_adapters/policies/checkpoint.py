@@ -88,7 +88,7 @@ class PolicyCheckpoint:
         kind = self._kind()
         dtype = resolve_dtype(options)
         if isinstance(dtype, str):
-            named = getattr(torch, kind.dtype or kind.torch_dtype or "float32", None)
+            named = getattr(torch, kind.dtype or kind.torch_dtype or "", None)
             if not (isinstance(named, torch.dtype) and named.is_floating_point):
                 raise UsageError(f"{self.pretrained} names no type of weights; give dtype=")
             dtype = named

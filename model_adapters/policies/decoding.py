@@ -35,11 +35,11 @@ def greedy(
     ids: list[int] = []
     logits = first
     for place, allowed in enumerate(legal):
-        if place:
-            logits = step(ids[-1])
         held = logits[allowed.start : allowed.stop] if constrained else logits
         if not torch.isfinite(held.max()):  # the largest is NaN where one is
             raise ModelError(f"action token {place + 1} has no finite score (NaN); try dtype=float32")
-        found = int(held.argmax()) + (allowed.start if constrained else 0)
-        ids.append(min(max(found, allowed.start), allowed.stop - 1))
+        token = int(held.argmax()) + (allowed.start if constrained else 0)
+        ids.append(min(max(token, allowed.start), allowed.stop - 1))
+        if place + 1 < len(legal):
+            logits = step(token)
     return ids

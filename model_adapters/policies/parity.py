@@ -1,6 +1,5 @@
 """Whether a policy acts as another implementation of it does, behind a server."""
 
-import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -11,6 +10,7 @@ from PIL import Image
 
 from infthor_eval.errors import DataError, UsageError
 from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.scratch import ScratchFolder
 from infthor_eval.tables import Column, Row, Table
 from model_adapters.policies.http.adapter import HttpPolicy, VlaHttpOptions
 from model_adapters.protocols import ArmDelta, Policy
@@ -127,11 +127,11 @@ def drawn_frames() -> Iterator[list[FrameRef]]:
     """A black frame, a white one and some of noise, for as long as they are needed; the same every time."""
     draws = np.random.default_rng(0)
     noise = [draws.integers(0, 256, (240, 320, 3), dtype=np.uint8) for _ in range(_NOISE)]
-    with tempfile.TemporaryDirectory() as folder:
+    with ScratchFolder() as folder:
         plain = [Image.new("RGB", (300, 300), colour) for colour in ("black", "white")]
         for number, picture in enumerate([*plain, *map(Image.fromarray, noise)]):
-            picture.save(Path(folder) / f"{number}.png")
-        yield frames_in(Path(folder))
+            picture.save(folder / f"{number}.png")
+        yield frames_in(folder)
 
 
 def _row(ours: Policy, theirs: Policy, frames: Sequence[FrameRef], instruction: str) -> _Row:

@@ -2,7 +2,6 @@
 
 import json
 import math
-import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +11,7 @@ import torch
 from safetensors.torch import save_file
 from tokenizers import Tokenizer
 
+from infthor_eval.formats.scratch import ScratchFolder
 from model_adapters.policies.checkpoint import PolicyCheckpoint
 from model_adapters.policies.options import PolicyOptions
 from model_adapters.policies.policy import VlaPolicy
@@ -62,10 +62,9 @@ class PolicyTwin:
 
     def build(self, name: str, options: PolicyOptions, seed: int) -> VlaPolicy:
         """The policy with random weights of this seed, by way of a checkpoint that is gone afterwards."""
-        with tempfile.TemporaryDirectory() as folder:
-            self.save(Path(folder), seed)
-            origin = {"checkpoint": name, "seed": seed}
-            return self.load(name, PolicyCheckpoint(Path(folder), name, origin), options)
+        with ScratchFolder() as folder:
+            self.save(folder, seed)
+            return self.load(name, PolicyCheckpoint(folder, name, {"checkpoint": name, "seed": seed}), options)
 
 
 def _random(shapes: Mapping[str, Shape], seed: int) -> dict[str, torch.Tensor]:

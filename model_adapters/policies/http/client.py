@@ -24,8 +24,12 @@ def act_url(url: str) -> str:
     Raises:
         ValueError: it is none of http or https, or holds what must not stand in records: a password or a query.
     """
-    parts = urlsplit(url)
-    if parts.scheme not in ("http", "https") or not parts.hostname:
+    try:
+        parts = urlsplit(url)
+        known = parts.scheme in ("http", "https") and bool(parts.hostname) and (parts.port is None or parts.port > 0)
+    except ValueError:  # its text would tell what may be a password
+        known = False
+    if not known:
         raise ValueError("url is no address of a server; write http://HOST:PORT")
     if parts.username is not None or parts.password is not None or parts.query or parts.fragment:
         raise ValueError("url holds a password, a query or a fragment, which would stand in every record; leave it out")

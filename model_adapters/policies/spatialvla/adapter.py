@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-import msgspec
 from tokenizers import Tokenizer
 
 from infthor_eval.errors import ModelError
@@ -92,18 +91,17 @@ def load_spatialvla(name: str, checkpoint: PolicyCheckpoint, options: SpatialVLA
     device, dtype = checkpoint.placed(options)
     with loading(pretrained):
         config.check(pretrained)
+        view = _view(config, processor, key, options, pretrained)
         with empty():
             weights = SpatialVLAWeights(config, options.attn_implementation)
         load_weights(weights, checkpoint.folder, weights.layout(), pretrained=pretrained, device=device, dtype=dtype)
         weights.finish()
-    view = _view(config, processor, key, options, pretrained)
     network = SpatialVLANetwork(
         weights.eval(), tokenizer, bins, processor.action_chunk_size, config.image_token_index, view
     )
     identity = checkpoint.identity(device, dtype, options) | {
         "unnorm_key": key,
         "intrinsics": options.intrinsics,
-        "bins": msgspec.to_builtins(processor.bin_policy),
     }
     return VlaPolicy(name, network, statistics, options, identity)
 

@@ -61,7 +61,7 @@ def points_of(depth: torch.Tensor, intrinsics: torch.Tensor, patch: int, resolut
     """Points in front of the camera, (batch, patches, 3 * resolution ** 2), in metres and float32.
 
     Args:
-        depth: (batch, 1, size, size).
+        depth: (batch, 1, size, size), in the type of the weights.
         intrinsics: (3, 3), in pixels of that size.
         patch: side of a patch in pixels.
         resolution: points along each side of a patch.
@@ -69,6 +69,8 @@ def points_of(depth: torch.Tensor, intrinsics: torch.Tensor, patch: int, resolut
     size, cell = depth.shape[-1], patch // resolution
     n_patches, n_cells = size // patch, size // patch * resolution
     middle = torch.arange(0, size, cell, device=depth.device).float() + patch / resolution / 2
+    # The original makes these in the type of its weights: in bfloat16, 220.5 is 220.
+    middle = middle.to(depth.dtype).float()
     v, u = torch.meshgrid(middle, middle, indexing="ij")
     rays = torch.linalg.inv(intrinsics.float()) @ torch.stack([u, v, torch.ones_like(u)]).reshape(3, -1)
     averaged = interpolate(depth, (n_cells, n_cells), mode="area").flatten(2)

@@ -167,6 +167,7 @@ def test_a_checkpoint_of_another_family_is_named(family: str, other: str, policy
         (json_edit("config.json", lambda config: config.update(model_type="llava")), "a llava checkpoint"),
         (json_edit("config.json", lambda config: config.update(text_config=3)), "not in its documented form"),
         (json_edit("config.json", lambda config: config.update(torch_dtype="int8")), "names no type of weights"),
+        (json_edit("config.json", lambda config: config.pop("torch_dtype")), "names no type of weights; give dtype="),
     ],
 )
 def test_a_damaged_checkpoint_is_one_line(family: str, edit: Edit, said: str, altered: Altered) -> None:

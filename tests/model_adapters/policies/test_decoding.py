@@ -27,7 +27,14 @@ def test_only_legal_tokens_are_chosen_at_each_place() -> None:
 
 
 def test_without_the_constraint_others_are_clipped_as_the_originals_do() -> None:
-    assert greedy(_scores(best=9), lambda token: _scores(best=0), LEGAL, constrained=False) == [5, 6]
+    fed = []
+
+    def step(token: int) -> torch.Tensor:
+        fed.append(token)
+        return _scores(best=0)
+
+    assert greedy(_scores(best=9), step, LEGAL, constrained=False) == [5, 6]
+    assert fed == [9]  # what was written is what the model reads; only what it means is clipped
     assert greedy(_scores(best=4), lambda token: _scores(best=7), LEGAL, constrained=False) == [4, 7]
 
 

@@ -25,6 +25,16 @@ def test_points_of_a_wall_lie_on_the_rays_through_the_middles_of_cells() -> None
     assert points[0, 1].tolist() == pytest.approx(second)
 
 
+def test_pixels_are_as_coarse_as_the_weights() -> None:
+    unit = torch.eye(3)
+    coarse = points_of(torch.ones(1, 1, 224, 224, dtype=torch.bfloat16), unit, patch=14, resolution=2)
+    fine = points_of(torch.ones(1, 1, 224, 224), unit, patch=14, resolution=2)
+    assert coarse.dtype == fine.dtype == torch.float32
+    assert fine[0, -1, -3:].tolist() == [220.5, 220.5, 1.0]
+    assert coarse[0, -1, -3:].tolist() == [220.0, 220.0, 1.0]
+    assert coarse[0, 0, :3].tolist() == [3.5, 3.5, 1.0]
+
+
 def test_depth_is_averaged_over_a_cell() -> None:
     depth = torch.zeros(1, 1, 28, 28)
     depth[..., :7, :7] = torch.arange(49.0).reshape(7, 7)
