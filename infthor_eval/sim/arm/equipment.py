@@ -1,6 +1,6 @@
 """Which body and arm the agent has in each mode."""
 
-from infthor_eval.sim.agent import CAMERA_HEIGHT
+from infthor_eval.sim.agent import CAMERA_HEIGHT, CROUCH
 from infthor_eval.sim.arm.arm import Arm
 from infthor_eval.sim.arm.kinova import Kinova
 from infthor_eval.sim.arm.rig import Rig
@@ -19,4 +19,5 @@ def equip(world: World, agent_mode: str) -> None:
     rig: Rig | None = _RIGS[agent_mode]() if agent_mode in _RIGS else None
     world.arm = None if rig is None else Arm.at_rest(rig)
     world.agent.eye = _EYES.get(agent_mode, (0.0, CAMERA_HEIGHT, 0.0))
+    world.agent.crouch = 0.0 if agent_mode in _EYES else CROUCH
     world.touch()

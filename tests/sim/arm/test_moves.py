@@ -166,7 +166,7 @@ def test_what_is_touched_already_does_not_lock_the_arm():
     world.arm.change(world.arm.rig.lifted(world.arm.pose, -0.1))
     world.agent.position[2] += 0.3  # the hand and a link are in the counter now
     assert separations(own_boxes(bench), bench.sim.solids().boxes).min() < -0.02
-    bench.ok("MoveBack", moveMagnitude=0.3)
+    bench.ok("MoveBack", moveMagnitude=0.45)
     bench.ok("MoveArmBase", y=1.2, normalizedY=False)
 
 
