@@ -11,7 +11,7 @@ from infthor_eval.sim.arm.surroundings import Solids
 from infthor_eval.sim.geometry import Array
 from infthor_eval.sim.world import World
 
-__all__ = ["Stance", "assume", "first_contact", "moving_boxes", "stance"]
+__all__ = ["Stance", "assume", "first_contact", "free", "moving_boxes", "stance"]
 
 _SKIN = 0.001  # metres that boxes may overlap: things that touch do
 _STUCK = 0.02  # metres deep from which a part of the arm does not touch a thing but is in it
@@ -64,6 +64,12 @@ def first_contact(world: World, arm: Arm, path: list[Stance], around: Solids) ->
         return None
     step = int(hit[0])
     return step, met.names[things[depth[step].min(axis=0).argmin()]]
+
+
+def free(world: World, arm: Arm, there: Stance, around: Solids) -> bool:
+    """Whether the arm, and what it holds, is in nothing in a stance, wherever it is now."""
+    gaps = separations(moving_boxes(world, arm, [there]).flat(), around.boxes)
+    return bool((gaps >= -_SKIN).all())
 
 
 def moving_boxes(world: World, arm: Arm, stances: list[Stance]) -> Boxes:
