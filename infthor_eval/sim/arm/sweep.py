@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from infthor_eval.sim.arm.arm import Arm, Frame, base_frame
+from infthor_eval.sim.arm.arm import Arm, Frame, base_frames
 from infthor_eval.sim.arm.boxes import Boxes, join, separations
 from infthor_eval.sim.arm.rig import ArmPose
 from infthor_eval.sim.arm.surroundings import Solids
@@ -74,8 +74,8 @@ def free(world: World, arm: Arm, there: Stance, around: Solids) -> bool:
 
 def moving_boxes(world: World, arm: Arm, stances: list[Stance]) -> Boxes:
     """The boxes (stances, n) of the arm and of what it holds, in the world."""
-    frames = [base_frame(arm.rig, s.position, s.yaw, s.pose) for s in stances]
-    origins, turns = np.stack([f.origin for f in frames]), np.stack([f.turn for f in frames])
+    positions, yaws = np.stack([s.position for s in stances]), np.array([s.yaw for s in stances])
+    origins, turns = base_frames(arm.rig, positions, yaws, [s.pose for s in stances])
     poses = [stances[0].pose] if all(s.pose is stances[0].pose for s in stances) else [s.pose for s in stances]
     wrists, twists = np.stack([p.wrist for p in poses]), np.stack([p.turn for p in poses])
     return join([arm.rig.boxes(poses), _freight(world, arm).moved(wrists, twists)], axis=1).moved(origins, turns)
