@@ -210,3 +210,19 @@ def test_what_falls_far_breaks_unless_its_type_was_made_unbreakable(spared):
     assert bench.object(plate)["isBroken"] != spared
     bench.ok("AdvancePhysicsStep", simSeconds=1.0)
     assert "timeStep between" in bench.refused("AdvancePhysicsStep", timeStep=0.1)
+
+
+def test_a_new_start_of_the_agent_lets_go_of_what_an_arm_holds_and_of_nothing_in_a_hand():
+    bench = arm_bench()
+    plate = loose(bench, "Plate")
+    hand_to(bench, plate)
+    on = bench.object(plate)["parentReceptacles"]
+    bench.ok("PickupObject")
+    bench.ok("MoveArmRelative", offset={"y": 0.1})
+    bench.ok("Initialize", agentMode="default", visibilityDistance=1.5)
+    assert bench.object(plate)["parentReceptacles"] == on and not bench.object(plate)["isPickedUp"]
+    bench.ok("PickupObject", objectId=plate, forceAction=True)
+    held = bench.ok("Initialize", agentMode="default", visibilityDistance=1.5)["inventoryObjects"]
+    assert [o["objectId"] for o in held] == [plate]
+    bench.ok("Initialize", agentMode="arm")
+    assert bench.metadata["inventoryObjects"] == [] and not bench.object(plate)["isPickedUp"]
