@@ -6,12 +6,12 @@ import numpy as np
 
 from infthor_eval.sim.geometry import Array, euler_matrix, yaw_matrix
 
-__all__ = ["AGENT_HEIGHT", "CAMERA_HEIGHT", "MAX_DOWN", "MAX_UP", "Agent", "Grip"]
+__all__ = ["AGENT_HEIGHT", "CAMERA_HEIGHT", "CROUCH", "MAX_DOWN", "MAX_UP", "Agent", "Grip"]
 
 AGENT_HEIGHT = 0.9009992  # agent.y of AI2-THOR's default agent on a floor at 0
 CAMERA_HEIGHT = 0.675  # camera above agent.y, fitted to the boxes recorded in ALFRED
 MAX_DOWN, MAX_UP = 60.0, 30.0  # degrees that the camera tilts below and above the horizon
-_CROUCH = 0.35
+CROUCH = 0.35  # metres that crouching lowers the camera
 
 
 @dataclass
@@ -20,6 +20,7 @@ class Agent:
 
     Attributes:
         eye: the camera from the agent's position (right, up, ahead), metres; the stretch robot's is not in the middle.
+        crouch: metres that crouching lowers it; a robot cannot.
     """
 
     position: Array
@@ -27,10 +28,11 @@ class Agent:
     horizon: float = 0.0
     standing: bool = True
     eye: tuple[float, float, float] = (0.0, CAMERA_HEIGHT, 0.0)
+    crouch: float = CROUCH
 
     def camera_position(self) -> Array:
         """Position of the camera in the world, metres (3,)."""
-        lift = self.eye[1] if self.standing else self.eye[1] - _CROUCH
+        lift = self.eye[1] if self.standing else self.eye[1] - self.crouch
         aside = yaw_matrix(self.yaw) @ np.array([self.eye[0], 0.0, self.eye[2]])
         return self.position + aside + np.array([0.0, lift, 0.0])
 

@@ -40,7 +40,8 @@ def let_fall(world: World, item: SimObject, point: Array) -> None:
     world.detach(item)
     if ground.owner is not None:
         world.attach(item, ground.owner)
-    if item.type.breakable and not item.state.broken and fall > _BREAKING:
+    breakable = item.type.breakable and item.object_type not in world.unbreakable
+    if breakable and not item.state.broken and fall > _BREAKING:
         break_object(world, item)
 
 

@@ -61,6 +61,7 @@ class World:
         grip: how the held object is held; None for as one holds what was just picked up.
         arm: the agent's arm; None for an agent that holds things in front of its camera.
         disabled: objects that are taken out for a time, by id.
+        unbreakable: types of objects that no fall breaks.
         appearance: what changes the colours of the scene.
         standing_height: height in metres of the agent's position on the floor.
     """
@@ -80,6 +81,7 @@ class World:
     grip: Grip | None = None
     arm: Arm | None = None
     disabled: dict[str, SimObject] = field(default_factory=dict)
+    unbreakable: set[str] = field(default_factory=set)
     appearance: Appearance = field(default_factory=Appearance)
     standing_height: float = field(init=False)
 

@@ -2,6 +2,8 @@
 
 from infthor_eval.sim.actions import (  # noqa: F401 - imported to be registered
     arm,
+    arm_physics,
+    arm_teleport,
     arm_walking,
     cameras,
     hand,

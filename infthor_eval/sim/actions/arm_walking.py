@@ -46,11 +46,17 @@ def move_agent(
 
 
 def _body_contact(world: World, places: list[Array]) -> tuple[int, str] | None:
-    """The first of some places at which the agent cannot be, and what is there."""
+    """The first of some places at which the agent cannot be, and what is there.
+
+    From where it cannot be either, as after a forced teleport, it may walk to where it can.
+    """
+    stood = world.nav.stands(world.agent.position[0], world.agent.position[2])
     for step, place in enumerate(places):
         obstacle = blocking_object(world, place)
-        if obstacle is not None or not world.nav.stands(place[0], place[2]):
+        stands = obstacle is None and world.nav.stands(place[0], place[2])
+        if not stands and (stood or step == len(places) - 1):
             return step, obstacle or nearest_name(world, place)
+        stood = stood or stands
     return None
 
 

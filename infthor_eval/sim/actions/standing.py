@@ -1,11 +1,12 @@
 """Where the agent can stand, and from where it can interact with an object."""
 
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 from itertools import islice, product
 from typing import Any
 
 from infthor_eval.sim.actions.registry import Vector3, action
-from infthor_eval.sim.agent import MAX_DOWN, MAX_UP, Agent
+from infthor_eval.sim.agent import MAX_DOWN, MAX_UP
 from infthor_eval.sim.errors import ActionError
 from infthor_eval.sim.geometry import level_gaps, to_array
 from infthor_eval.sim.objects import SimObject
@@ -67,7 +68,10 @@ def _seeing(
     """Those of some poses (position, horizon, rotation, standing) from which the agent sees an object."""
     glimpse = sim.glimpse(item)
     for position, tilt, turn, standing in poses:
-        if sim.sees_from(Agent(to_array(position), turn % 360.0, tilt, standing), glimpse):
+        if sim.sees_from(
+            replace(sim.world.agent, position=to_array(position), yaw=turn % 360.0, horizon=tilt, standing=standing),
+            glimpse,
+        ):
             yield {**position, "rotation": turn, "standing": standing, "horizon": tilt}
 
 

@@ -1,6 +1,6 @@
 """The state of an arm: how it is bent, how large the sphere of its hand is, and what it holds."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -8,9 +8,9 @@ import numpy as np
 
 from infthor_eval.sim.agent import Agent, Grip
 from infthor_eval.sim.arm.rig import ArmPose, Rig
-from infthor_eval.sim.geometry import Array, yaw_matrix
+from infthor_eval.sim.geometry import Array
 
-__all__ = ["Arm", "Frame", "base_frame"]
+__all__ = ["Arm", "Frame", "base_frames"]
 
 _RADIUS = 0.06  # metres, of the hand's sphere when the agent is made
 
@@ -31,9 +31,26 @@ class Frame(NamedTuple):
         return inside
 
 
-def base_frame(rig: Rig, position: Array, yaw: float, pose: ArmPose) -> Frame:
-    """The frame of the arm's base in the world, for an agent at a position (3,) that looks along `yaw` (degrees)."""
-    return Frame(position + yaw_matrix(yaw) @ rig.origin(pose), yaw_matrix(yaw + rig.heading))
+def base_frames(rig: Rig, positions: Array, yaws: Array, poses: Sequence[ArmPose]) -> tuple[Array, Array]:
+    """Origins (n, 3) and rotations (n, 3, 3) of the arm's base in the world.
+
+    Args:
+        rig: the arm's.
+        positions: where the agent is, metres (n, 3).
+        yaws: which way it looks, degrees (n,).
+        poses: how the arm is bent.
+    """
+    offsets = np.stack([rig.origin(pose) for pose in poses])[:, :, None]
+    return positions + (_upright(yaws) @ offsets)[:, :, 0], _upright(yaws + rig.heading)
+
+
+def _upright(yaws: Array) -> Array:
+    """Rotations (n, 3, 3) about the vertical."""
+    sines, cosines = np.sin(np.radians(yaws)), np.cos(np.radians(yaws))
+    turns = np.zeros((len(yaws), 3, 3))
+    turns[:, 0, 0] = turns[:, 2, 2] = cosines
+    turns[:, 0, 2], turns[:, 2, 0], turns[:, 1, 1] = sines, -sines, 1.0
+    return turns
 
 
 @dataclass
@@ -61,7 +78,8 @@ class Arm:
 
     def base(self, agent: Agent) -> Frame:
         """The frame of the base in the world."""
-        return base_frame(self.rig, agent.position, agent.yaw, self.pose)
+        origins, turns = base_frames(self.rig, agent.position[None], np.array([agent.yaw]), [self.pose])
+        return Frame(origins[0], turns[0])
 
     def wrist(self, agent: Agent) -> Frame:
         """The frame of the wrist in the world."""

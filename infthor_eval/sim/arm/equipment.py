@@ -1,10 +1,12 @@
 """Which body and arm the agent has in each mode."""
 
-from infthor_eval.sim.agent import CAMERA_HEIGHT
+from infthor_eval.sim.agent import CAMERA_HEIGHT, CROUCH
 from infthor_eval.sim.arm.arm import Arm
+from infthor_eval.sim.arm.holding import drop_all
 from infthor_eval.sim.arm.kinova import Kinova
 from infthor_eval.sim.arm.rig import Rig
 from infthor_eval.sim.arm.stretch import Stretch
+from infthor_eval.sim.falling import let_fall
 from infthor_eval.sim.world import World
 
 __all__ = ["equip"]
@@ -14,9 +16,15 @@ _EYES = {"stretch": (0.00192, 0.5447, 0.06788)}  # read in Unity's sources, metr
 
 
 def equip(world: World, agent_mode: str) -> None:
-    """Give the agent of a world the camera and the arm, at rest, of an agent mode; what it held it lets go of."""
-    world.release()
+    """Give the agent of a world the camera and the arm, at rest, of an agent mode; what another arm held falls."""
+    if world.arm is not None:
+        drop_all(world, world.arm)
     rig: Rig | None = _RIGS[agent_mode]() if agent_mode in _RIGS else None
+    if rig is not None and world.held is not None:
+        held = world.objects[world.held]
+        world.let_go(held)
+        let_fall(world, held, held.center)
     world.arm = None if rig is None else Arm.at_rest(rig)
     world.agent.eye = _EYES.get(agent_mode, (0.0, CAMERA_HEIGHT, 0.0))
+    world.agent.crouch = 0.0 if agent_mode in _EYES else CROUCH
     world.touch()

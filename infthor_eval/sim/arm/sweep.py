@@ -4,14 +4,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from infthor_eval.sim.arm.arm import Arm, Frame, base_frame
+from infthor_eval.sim.arm.arm import Arm, Frame, base_frames
 from infthor_eval.sim.arm.boxes import Boxes, join, separations
 from infthor_eval.sim.arm.rig import ArmPose
 from infthor_eval.sim.arm.surroundings import Solids
 from infthor_eval.sim.geometry import Array
 from infthor_eval.sim.world import World
 
-__all__ = ["Stance", "assume", "first_contact", "moving_boxes", "stance"]
+__all__ = ["Stance", "assume", "first_contact", "free", "moving_boxes", "stance"]
 
 _SKIN = 0.001  # metres that boxes may overlap: things that touch do
 _STUCK = 0.02  # metres deep from which a part of the arm does not touch a thing but is in it
@@ -66,10 +66,16 @@ def first_contact(world: World, arm: Arm, path: list[Stance], around: Solids) ->
     return step, met.names[things[depth[step].min(axis=0).argmin()]]
 
 
+def free(world: World, arm: Arm, there: Stance, around: Solids) -> bool:
+    """Whether the arm, and what it holds, is in nothing in a stance, wherever it is now."""
+    gaps = separations(moving_boxes(world, arm, [there]).flat(), around.boxes)
+    return bool((gaps >= -_SKIN).all())
+
+
 def moving_boxes(world: World, arm: Arm, stances: list[Stance]) -> Boxes:
     """The boxes (stances, n) of the arm and of what it holds, in the world."""
-    frames = [base_frame(arm.rig, s.position, s.yaw, s.pose) for s in stances]
-    origins, turns = np.stack([f.origin for f in frames]), np.stack([f.turn for f in frames])
+    positions, yaws = np.stack([s.position for s in stances]), np.array([s.yaw for s in stances])
+    origins, turns = base_frames(arm.rig, positions, yaws, [s.pose for s in stances])
     poses = [stances[0].pose] if all(s.pose is stances[0].pose for s in stances) else [s.pose for s in stances]
     wrists, twists = np.stack([p.wrist for p in poses]), np.stack([p.turn for p in poses])
     return join([arm.rig.boxes(poses), _freight(world, arm).moved(wrists, twists)], axis=1).moved(origins, turns)

@@ -196,3 +196,33 @@ def test_a_heavy_thing_stops_the_arm_where_a_threshold_says_so(threshold, passes
     hand_to(bench, loose(bench, "Plate"))
     bench.ok("MoveArmRelative", offset={"y": 0.1})
     assert bench.step("MoveArmRelative", offset={"y": -0.125})["lastActionSuccess"] == passes
+
+
+@pytest.mark.parametrize("spared", [False, True])
+def test_what_falls_far_breaks_unless_its_type_was_made_unbreakable(spared):
+    bench = arm_bench()
+    plate = loose(bench, "Plate")
+    bench.ok("PausePhysicsAutoSim")
+    if spared:
+        bench.ok("MakeObjectsOfTypeUnbreakable", objectType="Plate")
+    x, z = max(bench.sim.world.nav, key=lambda c: bench.sim.world.nav.freedom(*c, 0.0))
+    drop_over(bench, plate, np.array([x, 1.4, z]))
+    assert bench.object(plate)["isBroken"] != spared
+    bench.ok("AdvancePhysicsStep", simSeconds=1.0)
+    assert "timeStep between" in bench.refused("AdvancePhysicsStep", timeStep=0.1)
+
+
+def test_a_new_start_of_the_agent_lets_go_of_what_an_arm_holds_and_of_nothing_in_a_hand():
+    bench = arm_bench()
+    plate = loose(bench, "Plate")
+    hand_to(bench, plate)
+    on = bench.object(plate)["parentReceptacles"]
+    bench.ok("PickupObject")
+    bench.ok("MoveArmRelative", offset={"y": 0.1})
+    bench.ok("Initialize", agentMode="default", visibilityDistance=1.5)
+    assert bench.object(plate)["parentReceptacles"] == on and not bench.object(plate)["isPickedUp"]
+    bench.ok("PickupObject", objectId=plate, forceAction=True)
+    held = bench.ok("Initialize", agentMode="default", visibilityDistance=1.5)["inventoryObjects"]
+    assert [o["objectId"] for o in held] == [plate]
+    bench.ok("Initialize", agentMode="arm")
+    assert bench.metadata["inventoryObjects"] == [] and not bench.object(plate)["isPickedUp"]

@@ -166,7 +166,7 @@ def test_what_is_touched_already_does_not_lock_the_arm():
     world.arm.change(world.arm.rig.lifted(world.arm.pose, -0.1))
     world.agent.position[2] += 0.3  # the hand and a link are in the counter now
     assert separations(own_boxes(bench), bench.sim.solids().boxes).min() < -0.02
-    bench.ok("MoveBack", moveMagnitude=0.3)
+    bench.ok("MoveBack", moveMagnitude=0.45)
     bench.ok("MoveArmBase", y=1.2, normalizedY=False)
 
 
@@ -250,3 +250,21 @@ def test_the_arm_is_in_the_picture_and_hides_nothing(camera):
     bench.ok("Initialize", agentMode="arm", fieldOfView=90, visibilityDistance=1.5, fastActionEmit=False)
     assert bench.frames[field] != without
     assert {o["objectId"] for o in bench.metadata["objects"] if o["visible"]} == seen
+
+
+def test_the_arm_is_put_into_a_pose_at_once(bench):
+    bench.ok("TeleportArm", position={"x": 0.1, "y": 0.1, "z": 0.5}, rotation={"x": 0, "y": 2, "z": 0, "w": 90},
+             armHeight=0.5, elbowOrientation=-10)  # fmt: skip
+    joints = arm(bench)["joints"]
+    assert relative(bench) == pytest.approx([0.1, 0.1, 0.5], abs=1e-5)
+    assert (joints[0]["armBaseHeight"], joints[0]["elbowOrientation"]) == (0.5, 350)
+    assert joints[3]["rootRelativeRotation"] == pytest.approx({"x": 0, "y": 1, "z": 0, "w": 90}, abs=1e-4)
+    there = wrist(bench)
+    bench.ok("TeleportArm")
+    assert relative(bench) == [0, 0, 0.4] and arm(bench)["joints"][0]["armBaseHeight"] == -0.003
+    bench.ok("TeleportArm", position=xyz(there), worldRelative=True, armHeight=0.5)
+    assert wrist(bench) == pytest.approx(there, abs=1e-5)
+    told = "collision detected at desired transform, cannot teleport"
+    assert bench.refused("TeleportArm", position={"x": 0, "y": -0.6, "z": 0.4}, armHeight=-0.45) == told
+    bench.ok("TeleportArm", position={"x": 0, "y": -0.6, "z": 0.4}, armHeight=-0.45, forceAction=True)
+    assert "axis" in bench.refused("TeleportArm", rotation={"w": 10})

@@ -1,0 +1,39 @@
+"""Nonsense arguments to the arm agents' actions get an error in AI2-THOR's style."""
+
+import pytest
+
+from infthor_eval.sim.actions import bind, names
+from infthor_eval.sim.errors import ActionError
+
+from ..test_misuse import NONSENSE
+from .harness import arm_bench
+
+OWN = [*sorted(set(names("arm")) - set(names())), "PickupObject", "MoveAhead", "RotateLeft"]
+USUAL = {"position": {"x": 0, "y": 0, "z": 0.5}, "offset": {"x": 0.05}, "y": 0.5, "distance": 0.05, "degrees": 10,
+         "radius": 0.1, "point": {"x": 0}, "ahead": 0.1}  # fmt: skip
+
+
+@pytest.mark.parametrize("mode", ["arm", "stretch"])
+@pytest.mark.parametrize("name", OWN)
+def test_every_argument_of_every_action(mode, name):
+    if name not in names(mode):
+        pytest.skip("the stretch robot has no elbow")
+    bench = arm_bench("bathroom-1", size=20, agentMode=mode)
+    try:
+        parameters = list(bind({"action": name, "nonsense": 1}, mode)[0].parameters)
+    except ActionError as error:
+        listed = error.message.split("Expected arguments: ")[1].split("\n")[0]
+        parameters = [part.split(" = ")[0].split()[-1] for part in listed.split(", ") if part]
+    for parameter in parameters:
+        given = {key: USUAL[key] for key in parameters if key in USUAL}
+        for value in NONSENSE:
+            bench.peer.act({"action": name, **given, parameter: value})
+        metadata = bench.step(name, **(given | {parameter: "a"}))
+        assert metadata["lastActionSuccess"] or metadata["errorMessage"]
+        assert not any(word in metadata["errorMessage"] for word in ("NoneType", "<class", "typing", "Traceback"))
+
+
+def test_the_modes_differ_where_unity_s_do():
+    assert set(names()) <= set(names("arm"))
+    assert set(names("stretch")) < set(names("arm"))
+    assert "RotateElbowRelative" not in names("stretch") and "MoveArm" not in names()
