@@ -23,9 +23,10 @@ from infthor_eval.agents.environment import PlanEnvironment
 from infthor_eval.agents.expert import ExpertRefusedError
 from infthor_eval.agents.records import PlanRecord
 from infthor_eval.agents.suite import PlansSuite
-from infthor_eval.agents.summary import Rate, TaskSummary
+from infthor_eval.agents.summary import TaskSummary
 from infthor_eval.errors import DataError
 from infthor_eval.formats.trajectory import Source, iter_sources
+from infthor_eval.rates import Rate
 from infthor_eval.runs import UnitRecord, read_run
 from infthor_eval.thor.simulators import Simulators
 

@@ -17,6 +17,10 @@ __all__ = ["baseline_names", "options_of", "split_by_suite", "suite_named", "sui
 # "module:Class" of the suite, and of its options.
 _SUITES = {
     "nieh": ("infthor_eval.nieh.suite:NiehSuite", "infthor_eval.nieh.options:NiehOptions"),
+    "manipulation": (
+        "infthor_eval.manipulation.suite:ManipulationSuite",
+        "infthor_eval.manipulation.options:ManipulationOptions",
+    ),
     "plans": ("infthor_eval.agents.suite:PlansSuite", "infthor_eval.agents.options:PlansOptions"),
 }
 

@@ -8,10 +8,10 @@ import msgspec
 
 from infthor_eval.agents.plans import PlanKind
 from infthor_eval.agents.records import PlanRecord
+from infthor_eval.rates import Rate, cluster_rate, clustered_rate
 from infthor_eval.runs import UnitRecord
-from infthor_eval.statistics import clustered_mean, mean_over_clusters
 
-__all__ = ["FINAL_COLUMNS", "PlansSummary", "Rate", "TaskSummary", "summarise"]
+__all__ = ["FINAL_COLUMNS", "PlansSummary", "TaskSummary", "summarise"]
 
 Record = UnitRecord[PlanRecord]
 _COLUMNS: dict[str, frozenset[str]] = {
@@ -21,22 +21,6 @@ _COLUMNS: dict[str, frozenset[str]] = {
     "total": frozenset(PlanKind),
 }
 FINAL_COLUMNS = tuple(_COLUMNS)  # of the paper's table of final tasks
-
-
-class Rate(msgspec.Struct, frozen=True):
-    """A mean over plans or trajectories, with its 95 % interval, clustered by trajectory.
-
-    Attributes:
-        mean: the mean.
-        low: lower end; None with fewer than two trajectories.
-        high: upper end.
-        n: how many it is over.
-    """
-
-    mean: float
-    low: float | None
-    high: float | None
-    n: int
 
 
 class TaskSummary(msgspec.Struct, frozen=True):
@@ -123,7 +107,7 @@ def _counted(items: Iterable[str]) -> dict[str, int]:
 
 def _success(records: Sequence[Record], kinds: frozenset[str]) -> Rate | None:
     chosen = [record for record in records if record.payload.kind in kinds]
-    return _rate([float(record.payload.done) for record in chosen], [record.cluster for record in chosen])
+    return clustered_rate([float(record.payload.done) for record in chosen], [record.cluster for record in chosen])
 
 
 def _goals(records: Sequence[Record]) -> Rate | None:
@@ -132,7 +116,7 @@ def _goals(records: Sequence[Record]) -> Rate | None:
     for record in records:
         key = record.cluster, record.payload.task
         reached[key] = reached.get(key, False) or record.payload.goal_reached
-    return _rate([float(value) for value in reached.values()], [trajectory for trajectory, _ in reached])
+    return clustered_rate([float(value) for value in reached.values()], [trajectory for trajectory, _ in reached])
 
 
 def _of_trajectories(records: Sequence[Record], measure: Callable[[float, float], float]) -> Rate | None:
@@ -140,14 +124,4 @@ def _of_trajectories(records: Sequence[Record], measure: Callable[[float, float]
     for record in records:
         got, most = sums.get(record.cluster, (0.0, 0.0))
         sums[record.cluster] = got + record.payload.reward, most + (record.payload.max_reward or 0.0)
-    if not sums:
-        return None
-    estimate = mean_over_clusters([measure(*sums[name]) for name in sorted(sums)])
-    return Rate(estimate.mean, estimate.low, estimate.high, estimate.n)
-
-
-def _rate(values: Sequence[float], clusters: Sequence[str]) -> Rate | None:
-    if not values:
-        return None
-    estimate = clustered_mean(values, clusters)
-    return Rate(estimate.mean, estimate.low, estimate.high, estimate.n)
+    return cluster_rate([measure(*sums[name]) for name in sorted(sums)])

@@ -2,8 +2,9 @@
 
 from collections.abc import Iterator, Sequence
 
-from infthor_eval.agents.summary import FINAL_COLUMNS, PlansSummary, Rate, TaskSummary
+from infthor_eval.agents.summary import FINAL_COLUMNS, PlansSummary, TaskSummary
 from infthor_eval.formats.published import published_tables
+from infthor_eval.rates import number, percent
 from infthor_eval.runs import RunSummary
 from infthor_eval.tables import Column, Row, Table
 
@@ -33,7 +34,7 @@ def _tasks(runs: Sequence[RunSummary]) -> Iterator[tuple[str, str, TaskSummary]]
 def _success_table(runs: Sequence[RunSummary]) -> Table:
     """Plans carried out, by the columns of the published table of final tasks."""
     rows = [
-        Row((name, task_name, *(_percent(task.success.get(column)) for column in FINAL_COLUMNS), *_sizes(task)))
+        Row((name, task_name, *(percent(task.success.get(column)) for column in FINAL_COLUMNS), *_sizes(task)))
         for name, task_name, task in _tasks(runs)
     ]
     notes = _notes(runs)
@@ -49,8 +50,8 @@ def _success_table(runs: Sequence[RunSummary]) -> Table:
 def _reward_table(runs: Sequence[RunSummary]) -> Table:
     rows = []
     for name, task_name, task in _tasks(runs):
-        of_trajectory = _number(task.reward), _number(task.max_reward), _percent(task.reward_share)
-        rows.append(Row((name, task_name, *of_trajectory, _percent(task.goals))))
+        of_trajectory = number(task.reward), number(task.max_reward), percent(task.reward_share)
+        rows.append(Row((name, task_name, *of_trajectory, percent(task.goals))))
     columns = (*_NAMES, *map(Column, ("reward", "at most", "% of it", "goals reached, %")))
     return Table("Reward of a trajectory, 95 % interval in brackets", columns, tuple(rows))
 
@@ -80,18 +81,3 @@ def _notes(runs: Sequence[RunSummary]) -> list[str]:
 def _is_final(run: RunSummary) -> bool:
     tasks = run.header.identity["tasks"].values()
     return any(task["config"]["dataset_kwargs"].get("plans") == "final" for task in tasks)
-
-
-def _percent(rate: Rate | None) -> str:
-    return "-" if rate is None else _written(rate, 100.0)
-
-
-def _number(rate: Rate | None) -> str:
-    return "-" if rate is None else _written(rate, 1.0)
-
-
-def _written(rate: Rate, factor: float) -> str:
-    mean = f"{factor * rate.mean:.1f}"
-    if rate.low is None or rate.high is None:
-        return mean
-    return f"{mean} [{factor * rate.low:.1f}, {factor * rate.high:.1f}]"

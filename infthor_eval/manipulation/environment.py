@@ -23,8 +23,9 @@ from model_adapters import ArmDelta
 __all__ = ["ArmEnvironment", "ArmOutcome", "Grasp", "arm_of"]
 
 _WAITS = 20  # for what was let go to lie still
-_HELD_GAP = 0.02  # metres between the palm and what it is given to hold
-_WIDEST = 0.5  # metres, of the hand's sphere
+_HALVINGS = 8  # of the range of heights, to half a centimetre
+_HELD_GAP = 0.02  # metres between the palm and what is held before it
+_PLACES = 5  # from there to the middle of the sphere, at which there may be room
 
 
 @dataclass(frozen=True)
@@ -34,11 +35,13 @@ class Grasp:
     Attributes:
         radius: of its sphere, metres.
         takes_all: whether it takes everything in the sphere, or the target alone.
+        at_palm: whether what is to be put is held before the palm, or in the middle of the sphere where there is room.
         threshold: of a policy's gripper; below it the hand closes, else it opens.
     """
 
     radius: float = 0.5
     takes_all: bool = False
+    at_palm: bool = False
     threshold: float = 0.5
 
 
@@ -76,32 +79,40 @@ class ArmEnvironment:
     moment: Moment
     inside: bool
 
-    def __init__(self, trajectory: Trajectory, simulator: Simulator, frames: FrameKeeper) -> None:
+    def __init__(self, trajectory: Trajectory, simulator: Simulator) -> None:
         """Restore the scene.
 
         Args:
             trajectory: out of which the episodes are cut.
             simulator: of an agent with an arm.
-            frames: keeps what is seen.
 
         Raises:
             SceneError: the simulator has no such scene.
             SimulatorError: the simulator fails.
         """
-        self._simulator, self._frames = simulator, frames
+        self._simulator = simulator
         restore(simulator, trajectory.scene)
         self._start = simulator.mark()
         self._over = True
 
-    def reset(self, errand: Errand, moment: Moment, conversion: Conversion, grasp: Grasp) -> ArmOutcome:
+    def reset(
+        self, errand: Errand, moment: Moment, conversion: Conversion, grasp: Grasp, frames: FrameKeeper
+    ) -> ArmOutcome:
         """Bring the world to the true state before an errand, with the arm at rest; of a put, with the object in hand.
+
+        Args:
+            errand: what is to be done.
+            moment: the true state.
+            conversion: of a policy's steps.
+            grasp: how the hand closes.
+            frames: keeps what is seen.
 
         Raises:
             UnfitEpisodeError: the errand's objects cannot be brought to where they were, or not into the hand.
             SimulatorError: the simulator fails.
         """
         self.errand, self.moment = errand, moment
-        self._conversion, self._grasp = conversion, grasp
+        self._conversion, self._grasp, self._frames = conversion, grasp, frames
         view = self._simulator.rewind(self._start, exactly=True)
         lost = transfer(self._simulator, moment.view)
         named = {moment.object_id, moment.receptacle_id} & set(lost)
@@ -187,16 +198,21 @@ class ArmEnvironment:
             self._simulator.step("Pass")
 
     def _take_in_hand(self, target: str, before: View) -> None:
-        """Raise the arm to where the expert's hand was, and have it hold the object before its palm."""
+        """Raise the arm to where the expert's hand was, and have the magnet hold the object.
+
+        It is held before the palm, or in the middle of the sphere: as near to that as there is room on the way to it.
+        """
         height = before.objects[target].position.y
         low, high = 0.0, 1.0
-        for _ in range(8):  # the range of heights is the simulator's, so the share is sought
+        for _ in range(_HALVINGS):  # the range of heights is the simulator's, so the share is sought
             share = (low + high) / 2
             view = self._simulator.step("MoveArmBase", y=share)
             low, high = (share, high) if arm_of(view).wrist.y < height else (low, share)
-        self._must({"action": "SetHandSphereRadius", "radius": _WIDEST})
-        view = self._simulator.view
-        self._must(_before_the_palm(view.objects[target], arm_of(view)))
+        view = self._must({"action": "SetHandSphereRadius", "radius": self._grasp.radius})
+        parts = [0] if self._grasp.at_palm else range(_PLACES, -1, -1)
+        brought = [_brought(view.objects[target], arm_of(view), part / _PLACES) for part in parts]
+        if not any(self._simulator.step(**call).success for call in brought):
+            self._must(brought[-1] | {"forceAction": True})
         self._must({"action": "PickupObject", "objectIdCandidates": [target]})
 
     def _must(self, call: Call) -> View:
@@ -221,20 +237,19 @@ def arm_of(view: View) -> ArmState:
     return view.arm
 
 
-def _before_the_palm(item: ThorObject, arm: ArmState) -> Call:
-    """The call that brings an object before the palm, as it is turned; the hand looks along its sphere."""
+def _brought(item: ThorObject, arm: ArmState, share: float) -> Call:
+    """The call that brings an object, as it is turned, before the palm (0), or to the middle of the sphere (1)."""
     wrist, center = point_of(arm.wrist), point_of(arm.sphere_center)
     length = math.dist(wrist, center) or 1.0
     ahead = away(wrist, center)
     depth = sum(abs(part) / length * extent for part, extent in zip(ahead, size_of(item), strict=True)) / 2
-    palm = length - arm.sphere_radius
-    goal = along(wrist, center, (palm + _HELD_GAP + depth) / length)
+    nearest = length - arm.sphere_radius + _HELD_GAP + depth
+    goal = along(wrist, center, (nearest + share * max(0.0, length - nearest)) / length)
     lever = away(middle_of(item), point_of(item.position))
     return {
         "action": "TeleportObject",
         "objectId": item.object_id,
         "position": xyz((goal[0] + lever[0], goal[1] + lever[1], goal[2] + lever[2])),
         "rotation": xyz(point_of(item.rotation)),
-        "forceAction": True,
         "forceKinematic": True,
     }

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 from infthor_eval.manipulation.conversion import Call
 from infthor_eval.manipulation.environment import ArmEnvironment, arm_of
@@ -16,13 +17,17 @@ _FLOOR = 0.9  # metres from the agent's position down to the floor
 _SHIFTS = (0.0, 0.25, -0.25, 0.5, -0.5)  # metres by which the base is brought above a target, one after the other
 _REACH = 0.6  # metres from the shoulder, a little less than the arm's own
 _EXACT = 0.04  # metres from above a place
-_PLACES = 4  # of a receptacle that are tried with each clearance
+_DRAWN_IN = 0.35  # metres by which the arm is drawn in before it enters something
+_GAP = 0.04  # metres between an opening and what is held before it
+_BREADTH = 0.05  # metres
+_PLACES = 3  # of a receptacle that are tried with each clearance
 # Metres between a place and what is let go above it, one after the other.
 _FROM_ABOVE = (0.15, 0.4, 0.05)
 _IN_FRONT = (0.02, 0.06, 0.12)
 _ENTERED = {"Fridge", "Microwave", "Cabinet", "Safe", "CoffeeMachine", "Shelf", "ShelvingUnit"}  # from the front
 
 Steps = Iterator[Sequence[Call]]
+Entry = tuple[Point, float]  # the direction out of an opening, and where that is along it
 
 
 def plan(environment: ArmEnvironment) -> Steps:
@@ -80,62 +85,156 @@ def _short_of(view: View, goal: Point) -> Point:
 
 
 def _put(environment: ArmEnvironment) -> Steps:
-    """Bring what is held over each of some places, or into it, and let go where that succeeds."""
+    """Bring what is held over each of some places, or into it, and let go as soon as it is over any."""
     receptacle = environment.view.objects[str(environment.moment.receptacle_id)]
+    every = _all_places(environment, receptacle)
+    entry = _entry(receptacle, every)
+    held = environment.view.objects[environment.moment.object_id]
+    safe = [place for place in every if not _sticks_out(place, held, receptacle)] or every
+    for call in _ways(environment, receptacle, every, entry):
+        yield [call]
+        if _is_over(environment, receptacle, safe):
+            yield [{"action": "ReleaseObject"}]
+
+
+def _ways(
+    environment: ArmEnvironment, receptacle: ThorObject, every: Sequence[Point], entry: Entry | None
+) -> Iterator[Call]:
+    """Ways over one place after the other, from above or through an opening, each with the way back."""
     rest = point_of(arm_of(environment.view).wrist)
-    for clearance in _IN_FRONT if receptacle.object_type in _ENTERED else _FROM_ABOVE:
-        for place in _places(environment, receptacle, clearance):
-            goal = _wrist_above(environment, place, clearance)
-            yield [_lift(environment.view, goal[1])]
-            yield [_move(_abreast(environment.view, rest, goal))]
-            yield [_move(_wrist_above(environment, place, clearance))]
-            if _is_above(environment, place):
-                yield [{"action": "ReleaseObject"}]
-            yield [_move(_back(environment.view, rest))]
+    if entry is not None:
+        rest = _drawn_in(environment.view)  # what is held may be before a side of what it is to be put into
+        yield _move(rest)
+    for clearance in _FROM_ABOVE if entry is None else _IN_FRONT:
+        for place in _best_places(environment, receptacle, every, clearance):
+            goal = _Goal(environment, receptacle, clearance)
+            yield from _from_above(goal, place) if entry is None else _through(goal, place, entry)
+            yield _move((rest[0], point_of(arm_of(environment.view).wrist)[1], rest[2]))
 
 
-def _wrist_above(environment: ArmEnvironment, place: Point, clearance: float) -> Point:
-    """Where the wrist is to be for what it holds to be so far above a place."""
+@dataclass(frozen=True)
+class _Goal:
+    """Moves what is held over points."""
+
+    environment: ArmEnvironment
+    receptacle: ThorObject
+    clearance: float
+
+    def wrist(self, point: Point) -> Point:
+        return _wrist_above(self.environment, point, self.clearance, self.receptacle)
+
+    def over(self, point: Point) -> Call:
+        return _move(self.wrist(point))
+
+    def rise(self, point: Point) -> Call:
+        """Straight up or down to the height over a point, where the base alone does not bring the wrist there."""
+        x, _, z = point_of(arm_of(self.environment.view).wrist)
+        return _move((x, self.wrist(point)[1], z))
+
+    def lift(self, point: Point) -> Call:
+        """Bring the wrist to the height that it has over a point, as far as the base alone brings it there."""
+        arm = arm_of(self.environment.view)
+        change = self.wrist(point)[1] - point_of(arm.wrist)[1]
+        return _lift(self.environment.view, arm.base_height + change)
+
+
+def _from_above(goal: _Goal, place: Point) -> Iterator[Call]:
+    yield goal.lift(place)
+    yield goal.over(place)
+
+
+def _through(goal: _Goal, place: Point, entry: Entry) -> Iterator[Call]:
+    """Straight to before the opening and in; where a door is in the way, over it."""
+    before = _before(goal.environment, place, entry)
+    yield goal.lift(place)
+    yield goal.over(before)
+    if not _is_at(goal, before):
+        top = middle_of(goal.receptacle)[1] + size_of(goal.receptacle)[1] / 2
+        above = before[0], top + _GAP, before[2]
+        yield _move(_drawn_in(goal.environment.view))
+        yield goal.lift(above)
+        yield goal.rise(above)
+        yield goal.over(above)
+        yield goal.lift(before)
+        yield goal.over(before)
+    yield goal.over(place)
+    yield goal.over(before)
+
+
+def _is_at(goal: _Goal, point: Point) -> bool:
+    return math.dist(goal.wrist(point), point_of(arm_of(goal.environment.view).wrist)) < _EXACT
+
+
+def _before(environment: ArmEnvironment, place: Point, entry: Entry) -> Point:
+    """A place moved out of the opening, so far that what is held is before it."""
+    out, opening = entry
+    width = size_of(environment.view.objects[environment.moment.object_id])
+    way = opening - (place[0] * out[0] + place[2] * out[2]) + max(width[0], width[2]) / 2 + _GAP
+    return place[0] + way * out[0], place[1], place[2] + way * out[2]
+
+
+def _entry(receptacle: ThorObject, places: Sequence[Point]) -> Entry | None:
+    """The direction out of what is entered from the front, and where its opening is along that.
+
+    Its open door widens its box on that side.
+    """
+    if receptacle.object_type not in _ENTERED or not places:
+        return None
+    box, room = middle_of(receptacle), [(min(axis) + max(axis)) / 2 for axis in zip(*places, strict=True)]
+    x, z = box[0] - room[0], box[2] - room[2]
+    out = (math.copysign(1.0, x), 0.0, 0.0) if abs(x) > abs(z) else (0.0, 0.0, math.copysign(1.0, z))
+    return out, max(place[0] * out[0] + place[2] * out[2] for place in places) + _BREADTH
+
+
+def _wrist_above(environment: ArmEnvironment, place: Point, clearance: float, receptacle: ThorObject) -> Point:
+    """Where the wrist is to be for what it holds to be so far above a place; above basins and bins above their rim."""
     held = environment.view.objects[environment.moment.object_id]
     lever = away(middle_of(held), point_of(arm_of(environment.view).wrist))
-    height = place[1] + clearance + size_of(held)[1] / 2
-    return place[0] + lever[0], height + lever[1], place[2] + lever[2]
+    rim = middle_of(receptacle)[1] + size_of(receptacle)[1] / 2
+    ground = place[1] if receptacle.object_type in _ENTERED else max(place[1], rim)
+    return place[0] + lever[0], ground + clearance + size_of(held)[1] / 2 + lever[1], place[2] + lever[2]
 
 
-def _abreast(view: View, rest: Point, goal: Point) -> Point:
-    """As far ahead as the arm is at rest, and as far aside as a goal: doors stand open at the sides."""
-    turn = math.radians(view.agent.rotation)
-    ahead = math.sin(turn), math.cos(turn)
-    way = away(rest, goal)
-    depth = way[0] * ahead[0] + way[2] * ahead[1]
-    return goal[0] - depth * ahead[0], point_of(arm_of(view).wrist)[1], goal[2] - depth * ahead[1]
+def _drawn_in(view: View) -> Point:
+    """The wrist drawn in towards the agent."""
+    turn, wrist = math.radians(view.agent.rotation), point_of(arm_of(view).wrist)
+    return wrist[0] - _DRAWN_IN * math.sin(turn), wrist[1], wrist[2] - _DRAWN_IN * math.cos(turn)
 
 
-def _back(view: View, rest: Point) -> Point:
-    """Straight back to where the wrist is at rest, at the present height."""
-    wrist = point_of(arm_of(view).wrist)
-    retreat = _abreast(view, rest, wrist)
-    return retreat[0], wrist[1], retreat[2]
+def _all_places(environment: ArmEnvironment, receptacle: ThorObject) -> list[Point]:
+    found = environment.query("GetSpawnCoordinatesAboveReceptacle", objectId=receptacle.object_id, anywhere=True)
+    return [(place["x"], place["y"], place["z"]) for place in found or []]
 
 
-def _places(environment: ArmEnvironment, receptacle: ThorObject, clearance: float) -> list[Point]:
+def _best_places(
+    environment: ArmEnvironment, receptacle: ThorObject, places: Sequence[Point], clearance: float
+) -> list[Point]:
     """Places on a receptacle: those that the arm reaches, that are free, and where the thing fits, by distance."""
-    key = receptacle.object_id
-    found = environment.query("GetSpawnCoordinatesAboveReceptacle", objectId=key, anywhere=True) or []
-    view = environment.view
+    view, key = environment.view, receptacle.object_id
     held, shoulder = view.objects[environment.moment.object_id], point_of(arm_of(view).joints[1].position)
     others = [
         item for name, item in view.objects.items()
         if item.pickupable and name != held.object_id and key in (item.parent_receptacles or ())
     ]  # fmt: skip
+    aside = _aside(_entry(receptacle, places), places)
 
-    def order(place: Point) -> tuple[bool, bool, bool, float]:
-        goal = _wrist_above(environment, place, clearance)
+    def order(place: Point) -> tuple[bool, bool, bool, int, float]:
+        goal = _wrist_above(environment, place, clearance, receptacle)
         level = math.hypot(goal[0] - shoulder[0], goal[2] - shoulder[2])
         too_far = level > _REACH or not _LOWEST - 0.4 < goal[1] - _floor(view) < _LOWEST + _RANGE + 0.4
-        return too_far, _is_taken(place, held, others), _sticks_out(place, held, receptacle), level
+        taken, out = _is_taken(place, held, others), _sticks_out(place, held, receptacle)
+        return too_far, taken, out, aside[place], level
 
-    return sorted(((place["x"], place["y"], place["z"]) for place in found), key=order)[:_PLACES]
+    return sorted(places, key=order)[:_PLACES]
+
+
+def _aside(entry: Entry | None, places: Sequence[Point]) -> dict[Point, int]:
+    """How far places are from the middle of an opening, in steps: its sides are in the way."""
+    if entry is None:
+        return dict.fromkeys(places, 0)
+    across = {place: place[2] if entry[0][0] else place[0] for place in places}
+    middle = (min(across.values()) + max(across.values())) / 2
+    return {place: round(abs(value - middle) / _BREADTH) for place, value in across.items()}
 
 
 def _is_taken(place: Point, held: ThorObject, others: Sequence[ThorObject]) -> bool:
@@ -154,11 +253,17 @@ def _sticks_out(place: Point, held: ThorObject, receptacle: ThorObject) -> bool:
     return any(abs(apart[axis]) + width[axis] / 2 > room[axis] / 2 for axis in (0, 2))
 
 
-def _is_above(environment: ArmEnvironment, place: Point) -> bool:
-    """Whether what is held has come to be above a place."""
+def _is_over(environment: ArmEnvironment, receptacle: ThorObject, places: Sequence[Point]) -> bool:
+    """Whether what is held has come to be over a place; in what is entered from the front, under its top."""
     held = environment.view.objects[environment.moment.object_id]
-    apart = away(place, middle_of(held))
-    return all(abs(apart[axis]) <= _EXACT for axis in (0, 2)) and apart[1] > 0
+    middle, size = middle_of(held), size_of(held)
+    top = middle_of(receptacle)[1] + size_of(receptacle)[1] / 2
+    if receptacle.object_type in _ENTERED and middle[1] > top:
+        return False
+    bottom = middle[1] - size[1] / 2
+    return any(
+        math.hypot(place[0] - middle[0], place[2] - middle[2]) <= _EXACT and bottom > place[1] for place in places
+    )
 
 
 # -- both

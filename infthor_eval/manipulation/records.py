@@ -1,15 +1,17 @@
 """What the suite of manipulation writes into a run's journal: episodes, each with all that the arm did."""
 
 from enum import StrEnum
+from typing import Any
 
 import msgspec
 
 from infthor_eval.runs.records import RecordTypes
 
-__all__ = ["RECORDS", "ArmEnded", "ArmRecord", "ArmStep", "Call"]
+__all__ = ["RECORDS", "ArmEnded", "ArmRecord", "ArmStep"]
 
-Call = dict[str, bool | float | str | list[str] | dict[str, float] | None]
+Call = dict[str, Any]
 Place = tuple[float, float, float]
+_COLLIDED = "Collided"  # as AI2-THOR's message begins
 
 
 class ArmEnded(StrEnum):
@@ -29,14 +31,14 @@ class ArmStep(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
         calls: what the simulator was asked, as JSON values.
         hand: centre of the hand's sphere after it, metres in the world.
         distance: metres from there to the nearest point of the target's box: the object, or where it is to be put.
-        collisions: what the arm met, in the simulator's words.
+        refusals: what the simulator refused, in its words: the arm met something, or closed around nothing.
     """
 
     delta: tuple[float, ...] | None = None
     calls: tuple[Call, ...] = ()
     hand: Place = (0.0, 0.0, 0.0)
     distance: float = 0.0
-    collisions: tuple[str, ...] = ()
+    refusals: tuple[str, ...] = ()
 
 
 class ArmRecord(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, tag_field="type", tag="arm"):
@@ -78,7 +80,7 @@ class ArmRecord(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, t
     @property
     def n_collisions(self) -> int:
         """How many movements met something."""
-        return sum(len(step.collisions) for step in self.steps)
+        return sum(text.startswith(_COLLIDED) for step in self.steps for text in step.refusals)
 
 
 RECORDS = RecordTypes(unit=ArmRecord)

@@ -10,6 +10,7 @@ from infthor_eval.formats.trajectory import Source, Trajectory
 from infthor_eval.formats.trajectory_sets import TrajectorySet, find_trajectories
 from infthor_eval.household.wording import canonical, noun
 from infthor_eval.manipulation.conversion import Conversion
+from infthor_eval.manipulation.environment import Grasp
 from infthor_eval.manipulation.history import Errand, ErrandKind, errands_of
 from infthor_eval.manipulation.options import RADII, ManipulationOptions
 from infthor_eval.runs import TaskFile, TaskRequest
@@ -19,7 +20,7 @@ __all__ = ["ArmCourse", "ManipulationTask", "TaskSettings"]
 
 SHORT = {ErrandKind.PICKUP: "Pick-up", ErrandKind.PUT: "Put"}  # as the paper calls them
 _WORDS = {ErrandKind.PICKUP: "pick up the {object}", ErrandKind.PUT: "put the {object} in the {receptacle}"}
-_CHOICES = {"kind": tuple(ErrandKind), "grasps": ("target", "all")}
+_CHOICES = {"kind": tuple(ErrandKind), "grasps": ("target", "all"), "hold": ("middle", "palm")}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,6 +36,7 @@ class TaskSettings:
         image_size: width and height of the frames, pixels.
         field_of_view: of the camera, degrees.
         grasps: whether the hand takes the "target" alone out of its sphere, or "all" that is in it.
+        hold: where what is to be put is held: in the "middle" of the sphere where there is room, or before the "palm".
         gripper_threshold: of a policy's gripper; below it the hand closes, else it opens.
         translation_scale: see `Conversion`.
         max_step: see `Conversion`.
@@ -51,6 +53,7 @@ class TaskSettings:
     image_size: int = 300
     field_of_view: float = 60.0
     grasps: str = "target"
+    hold: str = "middle"
     gripper_threshold: float = 0.5
     translation_scale: float = 1.0
     max_step: float = 0.1
@@ -103,6 +106,13 @@ class ManipulationTask:
             self.settings.rotation,
             self.settings.return_to_start,
         )
+        self.grasp = Grasp(
+            radius=self.settings.radius,
+            takes_all=self.settings.grasps == "all",
+            at_palm=self.settings.hold == "palm",
+            threshold=self.settings.gripper_threshold,
+        )
+        self.camera = self.settings.image_size, self.settings.field_of_view
         data = str(request.data) if request.data is not None else None
         self.courses: TrajectorySet[ArmCourse] = find_trajectories(data, self.settings.bundled, _course)
         every = [(course, errand) for course in self.courses.found for errand in course.errands]
@@ -123,6 +133,7 @@ class ManipulationTask:
         used = {course.traj_id: course.digest for course, _ in self.episodes}
         return {
             "config": dict(self.file.settings),
+            "kind": str(self.kind),
             "radius": self.settings.radius,
             "instruction": self.settings.instruction,
             "trajectories": used,

@@ -1,0 +1,43 @@
+"""Manipulation as a suite: an arm picks up and puts what the experts of long trajectories did."""
+
+from collections.abc import Mapping, Sequence
+from typing import ClassVar
+
+from infthor_eval.manipulation.actors import BASELINES
+from infthor_eval.manipulation.evaluation import ManipulationEvaluation
+from infthor_eval.manipulation.options import ManipulationOptions
+from infthor_eval.manipulation.records import RECORDS, ArmRecord
+from infthor_eval.manipulation.summary import ManipulationSummary, summarise
+from infthor_eval.manipulation.tables import tables
+from infthor_eval.runs import RecordTypes, RunHeader, RunSummary, TaskRequest, UnitRecord
+from infthor_eval.runs.suite import Need
+from infthor_eval.tables import Table
+
+__all__ = ["ManipulationSuite"]
+
+
+class ManipulationSuite:
+    """The suite."""
+
+    name: ClassVar[str] = "manipulation"
+    needs: ClassVar[Need] = "policy"
+    options: ClassVar[type] = ManipulationOptions
+    baselines = BASELINES
+    records: ClassVar[RecordTypes] = RECORDS
+
+    def prepare(self, request: TaskRequest) -> ManipulationEvaluation:
+        """See `Suite.prepare`."""
+        return ManipulationEvaluation(request)
+
+    def summarise(self, header: RunHeader, records: Sequence[UnitRecord[ArmRecord]]) -> ManipulationSummary:
+        """See `Suite.summarise`."""
+        return summarise(header.identity, records)
+
+    def scores(self, record: UnitRecord[ArmRecord]) -> Mapping[str, float]:
+        """See `Suite.scores`: whether the episode was a success, and what it earned."""
+        payload = record.payload
+        return {"success": float(payload.done), "reward": payload.reward} if payload.ended else {}
+
+    def tables(self, runs: Sequence[RunSummary]) -> list[Table]:
+        """See `Suite.tables`."""
+        return tables(runs)

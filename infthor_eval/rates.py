@@ -1,0 +1,56 @@
+"""Means with their intervals, as summaries keep them and tables show them."""
+
+from collections.abc import Hashable, Sequence
+
+import msgspec
+
+from infthor_eval.statistics import Estimate, clustered_mean, mean_over_clusters
+
+__all__ = ["Rate", "cluster_rate", "clustered_rate", "number", "percent"]
+
+
+class Rate(msgspec.Struct, frozen=True):
+    """A mean with its 95 % interval, clustered by trajectory.
+
+    Attributes:
+        mean: the mean.
+        low: lower end; None with fewer than two trajectories.
+        high: upper end.
+        n: how many it is over.
+    """
+
+    mean: float
+    low: float | None
+    high: float | None
+    n: int
+
+
+def clustered_rate(values: Sequence[float], clusters: Sequence[Hashable]) -> Rate | None:
+    """The mean of values of units, see `clustered_mean`; None of nothing."""
+    return _rate(clustered_mean(values, clusters)) if values else None
+
+
+def cluster_rate(values: Sequence[float]) -> Rate | None:
+    """The mean of numbers of which each cluster has one, see `mean_over_clusters`; None of nothing."""
+    return _rate(mean_over_clusters(values)) if values else None
+
+
+def percent(rate: Rate | None) -> str:
+    """A share in a table's cell, in percent."""
+    return "-" if rate is None else _written(rate, 100.0, 1)
+
+
+def number(rate: Rate | None, digits: int = 1) -> str:
+    """A number in a table's cell."""
+    return "-" if rate is None else _written(rate, 1.0, digits)
+
+
+def _rate(estimate: Estimate) -> Rate:
+    return Rate(estimate.mean, estimate.low, estimate.high, estimate.n)
+
+
+def _written(rate: Rate, factor: float, digits: int) -> str:
+    mean = f"{factor * rate.mean:.{digits}f}"
+    if rate.low is None or rate.high is None:
+        return mean
+    return f"{mean} [{factor * rate.low:.{digits}f}, {factor * rate.high:.{digits}f}]"
