@@ -37,20 +37,20 @@ def cluster_rate(values: Sequence[float]) -> Rate | None:
 
 def percent(rate: Rate | None) -> str:
     """A share in a table's cell, in percent."""
-    return "-" if rate is None else _written(rate, 100.0, 1)
+    return "-" if rate is None else _written(rate, 100.0)
 
 
-def number(rate: Rate | None, digits: int = 1) -> str:
+def number(rate: Rate | None) -> str:
     """A number in a table's cell."""
-    return "-" if rate is None else _written(rate, 1.0, digits)
+    return "-" if rate is None else _written(rate, 1.0)
 
 
 def _rate(estimate: Estimate) -> Rate:
     return Rate(estimate.mean, estimate.low, estimate.high, estimate.n)
 
 
-def _written(rate: Rate, factor: float, digits: int) -> str:
-    mean = f"{factor * rate.mean:.{digits}f}"
+def _written(rate: Rate, factor: float) -> str:
+    mean = f"{factor * rate.mean:.1f}"
     if rate.low is None or rate.high is None:
         return mean
-    return f"{mean} [{factor * rate.low:.{digits}f}, {factor * rate.high:.{digits}f}]"
+    return f"{mean} [{factor * rate.low:.1f}, {factor * rate.high:.1f}]"

@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from statistics import fmean
 from typing import Any
 
 import msgspec
@@ -41,9 +42,9 @@ class TaskSummary(msgspec.Struct, frozen=True):
     skipped: dict[str, int]
     success: Rate | None
     inside: Rate | None
-    closest: Rate | None
-    steps: Rate | None
-    collisions: Rate | None
+    closest: float | None
+    steps: float | None
+    collisions: float | None
     endings: dict[str, int]
 
 
@@ -88,11 +89,16 @@ def _task(about: Mapping[str, Any], records: Sequence[Record]) -> TaskSummary:
         skipped=_counted(reason for _, reason in about["broken"]),
         success=rate((float(record.payload.done) for record in counted), counted),
         inside=rate((float(record.payload.starts_inside) for record in acted), acted),
-        closest=rate((record.payload.closest for record in acted), acted),
-        steps=rate((float(len(record.payload.steps)) for record in acted), acted),
-        collisions=rate((float(record.payload.n_collisions) for record in acted), acted),
+        closest=_mean(record.payload.closest for record in acted),
+        steps=_mean(len(record.payload.steps) for record in acted),
+        collisions=_mean(record.payload.n_collisions for record in acted),
         endings=_counted(record.payload.ended or "failed" for record in counted),
     )
+
+
+def _mean(values: Iterable[float]) -> float | None:
+    found = list(values)
+    return fmean(found) if found else None
 
 
 def _counted(items: Iterable[str]) -> dict[str, int]:

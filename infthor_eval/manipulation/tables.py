@@ -6,7 +6,7 @@ from itertools import zip_longest
 from infthor_eval.formats.published import published_tables
 from infthor_eval.manipulation.history import ErrandKind
 from infthor_eval.manipulation.summary import ManipulationSummary, TaskSummary
-from infthor_eval.rates import Rate, number, percent
+from infthor_eval.rates import Rate, percent
 from infthor_eval.runs import RunSummary
 from infthor_eval.tables import Column, Row, Table
 
@@ -65,7 +65,7 @@ def _episodes_table(runs: Sequence[RunSummary]) -> Table:
     rows = [
         Row((
             name, task_name, f"{task.radius:g}", percent(task.inside if task.kind == ErrandKind.PICKUP else None),
-            number(task.closest, 2), number(task.steps), number(task.collisions),
+            _number(task.closest, 2), _number(task.steps), _number(task.collisions),
         ))
         for name, summary in _named(runs)
         for task_name, task in summary.tasks.items()
@@ -81,6 +81,10 @@ def _endings_table(runs: Sequence[RunSummary]) -> Table:
     rows = [Row((*names, *(str(task.endings.get(ending, 0)) for ending in endings))) for *names, task in found]
     columns = (Column("model", False), Column("task", False), *map(Column, endings))
     return Table("How episodes ended", columns, tuple(rows))
+
+
+def _number(value: float | None, digits: int = 1) -> str:
+    return "-" if value is None else f"{value:.{digits}f}"
 
 
 def _notes(runs: Sequence[RunSummary]) -> list[str]:
