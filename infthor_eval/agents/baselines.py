@@ -9,7 +9,7 @@ from infthor_eval.agents.environment import StepOutcome
 from infthor_eval.agents.habits import Habits
 from infthor_eval.agents.script import scripted
 from infthor_eval.formats.trajectory import Trajectory
-from infthor_eval.thor.actions import applicable
+from infthor_eval.thor.actions import applicable_calls
 from model_adapters import Capabilities
 
 __all__ = ["BASELINES"]
@@ -62,7 +62,7 @@ class _RandomActor(_Reader):
         self._draw = random.Random(situation.seed)
 
     def act(self) -> Act:
-        return Act(str(self._draw.choice(applicable(self._view))))
+        return Act(self._draw.choice(applicable_calls(self._view, self._situation.environment.look_degrees)))
 
 
 class _ScriptedActor(_Reader):
@@ -89,7 +89,7 @@ class Planner(_Unseeing):
 
 
 class Random(_Unseeing):
-    """Any action that is possible in the present view, each as likely."""
+    """Any action that is possible in the present view, with any of the objects there: each call as likely."""
 
     name = "random"
 

@@ -16,7 +16,7 @@ from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.household.navigation import Grid
 from infthor_eval.household.scout import HORIZON_STEP, reachable, stand_of
-from infthor_eval.thor.actions import ActionText, UngroundedError, ground, parse_action
+from infthor_eval.thor.actions import ActionText, UngroundedError, ground, parse_action, text_of_call
 from infthor_eval.thor.frames import FrameKeeper, NoFrames
 from infthor_eval.thor.recorded import degrees_of
 from infthor_eval.thor.simulator import Simulator
@@ -91,6 +91,7 @@ class PlanEnvironment:
     Attributes:
         plans: what can be reset to.
         tasks: the tasks that they belong to.
+        look_degrees: by how much a look up or down turns the camera.
     """
 
     def __init__(
@@ -123,7 +124,7 @@ class PlanEnvironment:
         self._rules = rules or reward_rules("default")
         self._max_steps = max_steps
         self._frames = frames or NoFrames()
-        self._look_degrees = _look_degrees(trajectory)
+        self.look_degrees = _look_degrees(trajectory)
         self._expert = Expert(trajectory, self.plans, self.tasks, simulator, self._frames, in_words)
         self._plan: Plan | None = None
         self._n_steps = 0
@@ -208,9 +209,9 @@ class PlanEnvironment:
 
     def _grounded(self, action: str | Mapping[str, Any], view: View) -> tuple[str, Mapping[str, Any]]:
         if not isinstance(action, str):
-            return str(action["action"]), action
+            return str(text_of_call(action, view)), action
         text: ActionText = parse_action(action)
-        return str(text), ground(text, view, self._look_degrees, self._meant)
+        return str(text), ground(text, view, self.look_degrees, self._meant)
 
     def _carried_out(self, text: str, call: Mapping[str, Any], before: View) -> StepOutcome:
         after = self._simulator.step(**call)

@@ -5,7 +5,7 @@ object types; a call names objects by id. A text is grounded to the nearest visi
 the action applies to.
 """
 
-from collections.abc import Callable, Container
+from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
@@ -17,10 +17,12 @@ __all__ = [
     "Misuse",
     "UngroundedError",
     "applicable",
+    "applicable_calls",
     "ground",
     "object_type_of",
     "parse_action",
     "text_of",
+    "text_of_call",
 ]
 
 _APPLIES: dict[str, Callable[[ThorObject], bool]] = {
@@ -129,17 +131,34 @@ def ground(
 
 def applicable(view: View) -> list[ActionText]:
     """Every action text that can be grounded in a view, in a fixed order."""
-    found = [ActionText(name) for name in sorted(_PLAIN)]
-    visible = sorted({item.object_type for item in view.objects.values() if item.visible})
-    held = [object_type_of(key) for key in view.inventory]
+    return list(dict.fromkeys(text_of_call(call, view) for call in applicable_calls(view)))
+
+
+def applicable_calls(view: View, degrees: float = _LOOK_DEGREES) -> list[dict[str, Any]]:
+    """Every call that is possible in a view, in a fixed order: an action with each visible object that it applies to.
+
+    Args:
+        view: what the agent sees now.
+        degrees: by which LookUp and LookDown turn the camera.
+    """
+    found = [ground(ActionText(name), view, degrees) for name in sorted(_PLAIN)]
+    visible = sorted((item.object_type, item.object_id) for item in view.objects.values() if item.visible)
     for action, applies in _APPLIES.items():
-        able = {item.object_type for item in view.objects.values() if item.visible and applies(item)}
-        names = [name for name in visible if name in able]
-        pairs = (
-            [(item, name) for item in held for name in names] if action == "PutObject" else [(name,) for name in names]
-        )
-        found += [ActionText(action, types) for types in pairs]
+        if action == "PutObject" and not view.inventory:
+            continue
+        ids = [key for _, key in visible if applies(view.objects[key])]
+        found += [{"action": action, "objectId": key} for key in ids]
     return found
+
+
+def text_of_call(call: Mapping[str, Any], view: View) -> ActionText:
+    """The text of a call in a view: what is put is what is held there."""
+    if call["action"] == "Pass":
+        return ActionText("NoOp")
+    key = call.get("objectId")
+    if call["action"] == "PutObject" and view.inventory:
+        return text_of("PutObject", view.inventory[0], key)
+    return text_of(call["action"], key)
 
 
 def object_type_of(object_id: str) -> str:

@@ -3,10 +3,13 @@ import pytest
 from infthor_eval.thor.actions import (
     ActionText,
     UngroundedError,
+    applicable,
+    applicable_calls,
     ground,
     object_type_of,
     parse_action,
     text_of,
+    text_of_call,
 )
 
 from .views import thing, view
@@ -69,3 +72,20 @@ def test_moves_need_no_object():
 def test_types_of_ids(object_id, object_type):
     assert object_type_of(object_id) == object_type
     assert text_of("PickupObject", object_id).types == (object_type,)
+
+
+def test_what_is_possible_counts_every_object_in_view():
+    drawers = [thing(f"Drawer|+0{number}.00|+00.50|+00.00", openable=True, receptacle=True) for number in range(3)]
+    mug = thing("Mug|+00.20|+00.90|+00.00", pickupable=True)
+    hidden = thing("Cup|+00.30|+00.90|+00.00", pickupable=True, visible=False)
+    calls = applicable_calls(view(*drawers, mug, hidden), degrees=15.0)
+    assert [call["action"] for call in calls].count("OpenObject") == 3
+    assert {"action": "LookUp", "degrees": 15.0} in calls
+    assert {call["objectId"] for call in calls if call["action"] == "PickupObject"} == {mug.object_id}
+    assert not [call for call in calls if call["action"] == "PutObject"]
+    texts = [str(text) for text in applicable(view(*drawers, mug, hidden))]
+    assert texts.count("OpenObject Drawer") == 1
+    held = view(*drawers, mug, inventory=[mug.object_id])
+    assert [str(text_of_call(call, held)) for call in applicable_calls(held) if call["action"] == "PutObject"] == [
+        "PutObject Mug Drawer"
+    ] * 3
