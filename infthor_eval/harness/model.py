@@ -11,8 +11,11 @@ from infthor_eval.agents import records as plan_records
 from infthor_eval.agents.evaluation import PlansEvaluation
 from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.formats.scratch import ScratchFolder
+from infthor_eval.harness.manipulation_task import arm_evaluation, arm_response
 from infthor_eval.harness.plans_task import episode_response, evaluation_around
 from infthor_eval.harness.registration import NAME, say_model_takes_references
+from infthor_eval.manipulation import records as arm_records
+from infthor_eval.manipulation.evaluation import ManipulationEvaluation
 from infthor_eval.nieh import records as nieh_records
 from infthor_eval.nieh.answering import ModelAnswerer, NiehUnit, answered
 from infthor_eval.nieh.baselines import BASELINES
@@ -24,11 +27,11 @@ from infthor_eval.runs.identity import identity_of
 from infthor_eval.runs.journal import Journal
 from infthor_eval.runs.records import UnitKey
 from infthor_eval.runs.session import JournalSession
-from model_adapters import Model, adapter_identity, label, load, takes
+from model_adapters import Model, Policy, adapter_identity, label, load, takes
 
 __all__ = ["InfthorLM"]
 
-_RECORDS = {"nieh": nieh_records.RECORDS, "plans": plan_records.RECORDS}
+_RECORDS = {"nieh": nieh_records.RECORDS, "plans": plan_records.RECORDS, "manipulation": arm_records.RECORDS}
 _DEFAULT_DEVICE = "cuda:0"  # what lm-eval says where nobody said anything
 
 
@@ -73,11 +76,8 @@ class InfthorLM(LM):
         given = {key: str(value) for key, value in options.items()}
         theirs = {"device": None if device == _DEFAULT_DEVICE else device, "batch_size": _number(batch_size)}
         given |= {key: value for key, value in theirs.items() if value is not None and takes(adapter, key)}
-        model = load(adapter, given, seed)
-        if not isinstance(model, Model):
-            raise UsageError(f"{adapter} cannot be talked to; it is a policy")
         say_model_takes_references()
-        self._model = model
+        self._model = load(adapter, given, seed)
         self._seed = seed
         self._name, self._code = label(adapter, given), adapter_identity(adapter)
         self._scratch = ScratchFolder()
@@ -85,6 +85,7 @@ class InfthorLM(LM):
         self._sessions: dict[str, JournalSession] = {}
         self._plans: dict[str, PlansEvaluation] = {}
         self._groups: dict[str, dict[str, Group]] = {}
+        self._arms: dict[str, ManipulationEvaluation] = {}
 
     @property
     def tokenizer_name(self) -> str:
@@ -98,15 +99,22 @@ class InfthorLM(LM):
     def generate_until(self, requests: Sequence[Instance]) -> list[str]:
         """One response per request; empty where the model could not answer (the journal has the reason).
 
-        A request of a task of plans is an episode, and is answered with what came of it.
+        A request of a task of plans or of manipulation is an episode, and is answered with what came of it.
+
+        Raises:
+            UsageError: a policy is asked anything but episodes of manipulation, or a model those.
         """
-        if any(isinstance(request.doc, dict) and "plans" in request.doc for request in requests):
+        if _are(requests, "arm_episode"):
+            return self._arm_episodes(requests)
+        if not isinstance(self._model, Model):
+            raise UsageError(f"{self._name} cannot be talked to; it is a policy, for tasks of manipulation")
+        if _are(requests, "plans"):
             return [self._episode(request) for request in requests]
         replies: dict[UnitKey, str] = {}
         units = [_unit(request) for request in requests]
         order = sorted(range(len(units)), key=lambda number: (units[number].key.task, units[number].cluster))
         for _, numbers in groupby(order, key=lambda number: (units[number].key.task, units[number].cluster)):
-            replies |= self._replies([(units[number], requests[number]) for number in numbers])
+            replies |= self._replies(self._model, [(units[number], requests[number]) for number in numbers])
         return [replies[unit.key] for unit in units]
 
     def loglikelihood(self, requests: Sequence[Instance]) -> list[tuple[float, bool]]:
@@ -117,13 +125,13 @@ class InfthorLM(LM):
         """Not offered, see `loglikelihood`."""
         raise ModelError("infthor-eval models answer in words; use a task with output_type generate_until")
 
-    def _replies(self, group: Sequence[tuple[NiehUnit, Instance]]) -> dict[UnitKey, str]:
+    def _replies(self, model: Model, group: Sequence[tuple[NiehUnit, Instance]]) -> dict[UnitKey, str]:
         """Replies to the requests of one task on one trajectory."""
         unit, request = group[0]
         decoding = decoding_of(request.args[1], self._seed, unit.key.task)
         prepared = PreparedTask(samples_around(request.doc), decoding)
         session = self._session("nieh")
-        records = answered([unit for unit, _ in group], prepared, ModelAnswerer(self._model, session), session)
+        records = answered([unit for unit, _ in group], prepared, ModelAnswerer(model, session), session)
         return {record.key: session.recorded(record)[0].payload.reply or "" for record in records}
 
     def _episode(self, request: Instance) -> str:
@@ -137,6 +145,24 @@ class InfthorLM(LM):
         records = self._plans[task].run(self._groups[task][doc["traj_id"]], session)
         return episode_response(session.recorded(record)[0] for record in records)
 
+    def _arm_episodes(self, requests: Sequence[Instance]) -> list[str]:
+        """What came of episodes of an arm; those of one trajectory are played together."""
+        if not isinstance(self._model, Policy):
+            raise UsageError(
+                f"{self._name} drives no arm; tasks of manipulation need a policy (openvla, spatialvla, ...)"
+            )
+        session, responses = self._session("manipulation"), {}
+        for task, same in _by_task(requests).items():
+            if task not in self._arms:
+                self._arms[task] = arm_evaluation(same[0].doc, task, self._seed)
+                self._arms[task].workload(self._model)
+            asked = {request.doc["arm_episode"] for request in same}
+            units = [unit for unit in self._arms[task].units if unit.key.id in asked]
+            for _, group in groupby(units, key=lambda unit: unit.cluster):
+                for record in self._arms[task].run(Group(list(group)), session):
+                    responses[task, record.id] = arm_response(session.recorded(record)[0])
+        return [responses[str(request.task_name), request.doc["arm_episode"]] for request in requests]
+
     def _session(self, suite: str) -> JournalSession:
         """Where the records of a suite go: those of NIEH into the folder itself, others into one of theirs."""
         if suite not in self._sessions:
@@ -146,6 +172,18 @@ class InfthorLM(LM):
             journal = Journal(folder, header, _RECORDS[suite])
             self._sessions[suite] = JournalSession(self._model, journal)
         return self._sessions[suite]
+
+
+def _are(requests: Sequence[Instance], kind: str) -> bool:
+    """Whether requests are episodes of a kind, by what their docs hold."""
+    return any(isinstance(request.doc, dict) and kind in request.doc for request in requests)
+
+
+def _by_task(requests: Sequence[Instance]) -> dict[str, list[Instance]]:
+    found: dict[str, list[Instance]] = {}
+    for request in requests:
+        found.setdefault(str(request.task_name), []).append(request)
+    return found
 
 
 def _unit(request: Instance) -> NiehUnit:

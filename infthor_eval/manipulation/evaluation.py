@@ -73,9 +73,9 @@ class ManipulationEvaluation:
         self._open = ExitStack()
 
     @property
-    def tasks(self) -> dict[str, ManipulationTask]:
-        """The tasks by name."""
-        return self._tasks
+    def units(self) -> list[ArmUnit]:
+        """The episodes of all tasks, task by task, in the order of trajectories and time."""
+        return [ArmUnit.of(task, course, errand) for task in self._tasks.values() for course, errand in task.episodes]
 
     def workload(self, subject: Subject) -> Workload:
         """See `infthor_eval.runs.Evaluation.workload`."""
@@ -89,7 +89,7 @@ class ManipulationEvaluation:
             "frames": self._options.frames,
         }
         return Workload(
-            groups=[Group(units) for units in self._units().values()],
+            groups=[Group(units) for units in self._by_trajectory().values()],
             skipped=[
                 Skipped(UnitKey(task.name, place), reason)
                 for task in self._tasks.values()
@@ -114,7 +114,7 @@ class ManipulationEvaluation:
     def view(self, record: UnitRecord[ArmRecord]) -> SampleView:
         """See `infthor_eval.runs.Evaluation.view`."""
         payload, task = record.payload, self._tasks[record.task]
-        keys = [ArmUnit.of(task, course, errand).key for course, errand in task.episodes]
+        keys = [unit.key for unit in self.units if unit.key.task == record.task]
         return SampleView(
             number=keys.index(record.key),
             doc={"traj_id": record.cluster, "action": payload.index, "kind": payload.kind},
@@ -128,12 +128,11 @@ class ManipulationEvaluation:
         """See `infthor_eval.runs.Evaluation.close`."""
         self._open.close()
 
-    def _units(self) -> dict[str, list[ArmUnit]]:
+    def _by_trajectory(self) -> dict[str, list[ArmUnit]]:
         """The episodes of all tasks by trajectory, in time order: they share its history."""
         found: dict[str, list[ArmUnit]] = {}
-        for task in self._tasks.values():
-            for course, errand in task.episodes:
-                found.setdefault(course.traj_id, []).append(ArmUnit.of(task, course, errand))
+        for unit in self.units:
+            found.setdefault(unit.cluster, []).append(unit)
         return {name: sorted(units, key=lambda unit: (unit.errand.index, unit.key)) for name, units in found.items()}
 
     def _played(
