@@ -1,0 +1,116 @@
+"""What arms reach in the pick-ups and puts of long trajectories: the upper bound, chance, standing still, by radius.
+
+    python benchmarks/manipulation.py --trajectories DIR [--data FOLDER] [--episodes 300] [--radii 0.06,0.5] [--out DIR]
+
+Takes trajectories evenly out of all in DIR until they have so many pick-ups and so many puts, and runs planner-arm,
+still and random-arm on them through the command line, once for each radius of the hand's sphere. What planner-arm does
+not reach is told by what stopped it. Stopped and started again with the same --out it goes on.
+"""
+
+import argparse
+import re
+import subprocess
+import sys
+import tempfile
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from infthor_eval.formats.trajectory import Source, iter_sources
+from infthor_eval.manipulation.history import ErrandKind, errands_of
+from infthor_eval.manipulation.records import ArmRecord
+from infthor_eval.manipulation.suite import ManipulationSuite
+from infthor_eval.rates import percent
+from infthor_eval.runs import UnitRecord, read_run
+
+_BASELINES = ("planner-arm", "still", "random-arm")
+_TASKS = {ErrandKind.PICKUP: "manipulathor_pickup", ErrandKind.PUT: "manipulathor_put"}
+_NAME = re.compile(r"'(\w+?)_\w+'")  # of what an arm met: its type
+
+
+def main() -> None:
+    """Choose, run, and print."""
+    options = _arguments()
+    with tempfile.TemporaryDirectory() as scratch:
+        out = options.out or Path(scratch)
+        out.mkdir(parents=True, exist_ok=True)
+        data = out / "trajectories.jsonl"
+        if not data.exists():
+            data.write_bytes(b"".join(source.raw.replace(b"\n", b" ").strip() + b"\n" for source in chosen(options)))
+        for radius in options.radii.split(","):
+            for name in _BASELINES:
+                show(name, radius, run(name, radius, data, out, options))
+
+
+def _arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--trajectories", type=Path, required=True, help="folder with generated ones")
+    parser.add_argument("--data", type=Path, help="folder with recorded floor plans")
+    parser.add_argument("--episodes", type=int, default=300, help="of each kind, at least")
+    parser.add_argument("--radii", default="0.5", help="of the hand's sphere, metres, with commas")
+    parser.add_argument("--out", type=Path, help="kept there; else in a folder that is removed")
+    return parser.parse_args()
+
+
+def chosen(options: argparse.Namespace) -> Iterator[Source]:
+    """Trajectories, evenly out of all, until they have enough episodes of both kinds."""
+    every = list(iter_sources(options.trajectories))
+    counts: Counter[ErrandKind] = Counter()
+    step = max(1, round(len(every) * 0.618))  # goes through them without favouring a scene
+    for number in range(len(every)):
+        source = every[number * step % len(every)]
+        counts.update(errand.kind for errand in errands_of(source.read()))
+        yield source
+        if min(counts[kind] for kind in ErrandKind) >= options.episodes:
+            return
+
+
+def run(name: str, radius: str, data: Path, out: Path, options: argparse.Namespace) -> Path:
+    """Run a baseline; the folder of its run."""
+    results = out / f"radius-{radius}"
+    scenes = ["--scenes", str(options.data)] if options.data else []
+    arguments = ["--tasks", "manipulathor", "--data", data, "--radius", radius, "--output", results, *scenes]
+    command = [Path(sys.executable).with_name("infthor-eval"), "run", "--model", name, *arguments]
+    ended = subprocess.run(list(map(str, command)), check=False, stdout=subprocess.DEVNULL)
+    folders = list((results / name).glob("manipulathor-*"))
+    if len(folders) != 1:
+        raise SystemExit(f"{name} ended with {ended.returncode}, and {results / name} has {len(folders)} runs")
+    return folders[0]
+
+
+def show(name: str, radius: str, folder: Path) -> None:
+    """One line a kind, and what stopped the upper bound."""
+    header, records = read_run(folder, ManipulationSuite.records)
+    summary = ManipulationSuite().summarise(header, records)
+    for kind, task in _TASKS.items():
+        about = summary.tasks[task]
+        same = [record for record in records if record.task == task and record.excluded is None]
+        seconds = sum(record.seconds for record in same)
+        steps = sum(len(record.payload.steps) for record in same)
+        print(
+            f"{name:12} radius {radius:5} {kind:7} {len(same):4} episodes, success {percent(about.success):24}"
+            f" in the sphere at the start {percent(about.inside):24} {steps} steps, {seconds / max(1, len(same)):.2f} s"
+            f" an episode, {sum(about.excluded.values())} excluded, {about.n_failed} failed",
+            flush=True,
+        )
+        if name == "planner-arm":
+            for what, number in stopped(same):
+                print(f"    {number} not reached: {what}", flush=True)
+
+
+def stopped(records: Sequence[UnitRecord[ArmRecord]]) -> list[tuple[str, int]]:
+    """What episodes without success ended with: what the arm met most, or that it met nothing."""
+    found: Counter[str] = Counter()
+    for record in records:
+        payload = record.payload
+        if payload.done:
+            continue
+        met = Counter(name for step in payload.steps for text in step.refusals for name in _NAME.findall(text))
+        most = ", ".join(name for name, _ in met.most_common(2)) or "nothing in the way"
+        target = (payload.receptacle_id or payload.object_id).split("|")[0]
+        found[f"{payload.kind} {target}: {payload.ended}; met {most}"] += 1
+    return found.most_common()
+
+
+if __name__ == "__main__":
+    main()
