@@ -1,0 +1,103 @@
+"""What a step of an arm costs through the real Controller, and of a tiny policy; several simulators against one.
+
+    python benchmarks/arm_speed.py [--steps 200] [--simulators 4]
+
+An arm is moved to and fro in a kitchen, with frames and without; each tiny policy looks at such a frame. Then as many
+simulators as asked are moved at the same time, each in a thread, against one.
+"""
+
+import argparse
+import tempfile
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+from infthor_eval.manipulation.conversion import Conversion
+from infthor_eval.thor.frames import FrameFolder
+from infthor_eval.thor.launch import embedded
+from infthor_eval.thor.simulator import Simulator
+from model_adapters import ArmDelta, Policy, load
+
+_SCENE = "kitchen-1"
+_POLICIES = ("openvla-tiny", "spatialvla-tiny")
+_ACTS = 10
+
+
+def main() -> None:
+    """Print a line for each."""
+    options = _arguments()
+    single = 0.0
+    for image in (True, False):
+        with _simulator(image) as simulator:
+            rate = steps_per_second(simulator, options.steps)
+            single = single if not image else rate
+            print(f"arm, {'frames' if image else 'no frames'}: {rate:.0f} steps/s", flush=True)
+    together = several(options.simulators, options.steps)
+    print(f"arm, frames, {options.simulators} simulators: {together:.0f} steps/s, {together / single:.2f} of one's")
+    with tempfile.TemporaryDirectory() as folder, _simulator(True) as simulator:
+        frame = FrameFolder(Path(folder)).keep(simulator.view)
+        assert frame is not None
+        for name in _POLICIES:
+            policy = load(name, {}, 0)
+            assert isinstance(policy, Policy)
+            policy.reset()
+            policy.act(frame, "pick up the mug")
+            seconds = timed(lambda policy=policy: policy.act(frame, "pick up the mug"), _ACTS)
+            print(f"{name}: {1 / seconds:.1f} chunks/s, {1000 * seconds:.0f} ms each", flush=True)
+            policy.close()
+
+
+def _arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--steps", type=int, default=200, help="of each simulator")
+    parser.add_argument("--simulators", type=int, default=4, help="at once")
+    return parser.parse_args()
+
+
+def _simulator(image: bool) -> Simulator:
+    simulator = Simulator(embedded(), image=image, instances=False, agentMode="arm")
+    simulator.reset(_SCENE)
+    simulator.step("MoveArmBase", y=0.8)
+    return simulator
+
+
+def steps_per_second(simulator: Simulator, n_steps: int) -> float:
+    """Steps of 5 cm to and fro, each a translation and a turn of the wrist as a policy's."""
+    conversion = Conversion()
+
+    def step(number: int) -> None:
+        sign = (-1.0) ** number
+        for call in conversion.calls(ArmDelta((sign * 0.03, 0.0, sign * 0.04), (0.0, 0.0, sign * 0.1), 0.0)):
+            simulator.step(**call)
+
+    step(0)
+    began = time.perf_counter()
+    for number in range(1, n_steps + 1):
+        step(number)
+    return n_steps / (time.perf_counter() - began)
+
+
+def several(n_simulators: int, n_steps: int) -> float:
+    """Steps a second of several simulators together."""
+    simulators = [_simulator(True) for _ in range(n_simulators)]
+    try:
+        began = time.perf_counter()
+        with ThreadPoolExecutor(n_simulators) as pool:
+            list(pool.map(lambda simulator: steps_per_second(simulator, n_steps), simulators))
+        return n_simulators * n_steps / (time.perf_counter() - began)
+    finally:
+        for simulator in simulators:
+            simulator.close()
+
+
+def timed(do: Callable[[], object], n_times: int) -> float:
+    """Seconds of one call, on average."""
+    began = time.perf_counter()
+    for _ in range(n_times):
+        do()
+    return (time.perf_counter() - began) / n_times
+
+
+if __name__ == "__main__":
+    main()
