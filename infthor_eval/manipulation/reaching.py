@@ -88,28 +88,31 @@ def _put(environment: ArmEnvironment) -> Steps:
     """Bring what is held over each of some places, or into it, and let go as soon as it is over any."""
     receptacle = environment.view.objects[str(environment.moment.receptacle_id)]
     every = _all_places(environment, receptacle)
-    entry = _entry(receptacle, every)
+    entry = _entry(environment.view, receptacle, every)
     held = environment.view.objects[environment.moment.object_id]
     safe = [place for place in every if not _sticks_out(place, held, receptacle)] or every
-    for call in _ways(environment, receptacle, every, entry):
+    for call, place in _ways(environment, receptacle, every, entry):
         yield [call]
-        if _is_over(environment, receptacle, safe):
+        if _is_over(environment, receptacle, [*safe, place]):
             yield [{"action": "ReleaseObject"}]
 
 
 def _ways(
     environment: ArmEnvironment, receptacle: ThorObject, every: Sequence[Point], entry: Entry | None
-) -> Iterator[Call]:
-    """Ways over one place after the other, from above or through an opening, each with the way back."""
+) -> Iterator[tuple[Call, Point]]:
+    """Ways over one place after the other, from above or through an opening, each with the way back; and the place."""
     rest = point_of(arm_of(environment.view).wrist)
     if entry is not None:
         rest = _drawn_in(environment.view)  # what is held may be before a side of what it is to be put into
-        yield _move(rest)
+        yield _move(rest), rest
     for clearance in _FROM_ABOVE if entry is None else _IN_FRONT:
         for place in _best_places(environment, receptacle, every, clearance):
             goal = _Goal(environment, receptacle, clearance)
-            yield from _from_above(goal, place) if entry is None else _through(goal, place, entry)
-            yield _move((rest[0], point_of(arm_of(environment.view).wrist)[1], rest[2]))
+            if goal.is_beyond_reach(place):
+                yield _turn_towards(environment.view, place), place
+            way = _from_above(goal, place) if entry is None else _through(goal, place, entry)
+            yield from ((call, place) for call in way)
+            yield _move((rest[0], point_of(arm_of(environment.view).wrist)[1], rest[2])), place
 
 
 @dataclass(frozen=True)
@@ -122,6 +125,11 @@ class _Goal:
 
     def wrist(self, point: Point) -> Point:
         return _wrist_above(self.environment, point, self.clearance, self.receptacle)
+
+    def is_beyond_reach(self, point: Point) -> bool:
+        """Whether the wrist does not come over a point with the hand as it is turned."""
+        shoulder, wrist = point_of(arm_of(self.environment.view).joints[1].position), self.wrist(point)
+        return math.hypot(wrist[0] - shoulder[0], wrist[2] - shoulder[2]) > _REACH
 
     def over(self, point: Point) -> Call:
         return _move(self.wrist(point))
@@ -165,6 +173,14 @@ def _is_at(goal: _Goal, point: Point) -> bool:
     return math.dist(goal.wrist(point), point_of(arm_of(goal.environment.view).wrist)) < _EXACT
 
 
+def _turn_towards(view: View, place: Point) -> Call:
+    """Turn the hand about the vertical, so that arm and hand are in line with the way from the shoulder to a place."""
+    arm = arm_of(view)
+    now, wanted = away(point_of(arm.wrist), point_of(arm.sphere_center)), away(point_of(arm.joints[1].position), place)
+    yaw = math.degrees(math.atan2(wanted[0], wanted[2]) - math.atan2(now[0], now[2]))
+    return {"action": "RotateWristRelative", "pitch": 0.0, "yaw": yaw, "roll": 0.0, "returnToStart": False}
+
+
 def _before(environment: ArmEnvironment, place: Point, entry: Entry) -> Point:
     """A place moved out of the opening, so far that what is held is before it."""
     out, opening = entry
@@ -173,15 +189,16 @@ def _before(environment: ArmEnvironment, place: Point, entry: Entry) -> Point:
     return place[0] + way * out[0], place[1], place[2] + way * out[2]
 
 
-def _entry(receptacle: ThorObject, places: Sequence[Point]) -> Entry | None:
+def _entry(view: View, receptacle: ThorObject, places: Sequence[Point]) -> Entry | None:
     """The direction out of what is entered from the front, and where its opening is along that.
 
-    Its open door widens its box on that side.
+    An open door widens its box on that side; what has no door is open towards the agent.
     """
     if receptacle.object_type not in _ENTERED or not places:
         return None
-    box, room = middle_of(receptacle), [(min(axis) + max(axis)) / 2 for axis in zip(*places, strict=True)]
-    x, z = box[0] - room[0], box[2] - room[2]
+    room = [(min(axis) + max(axis)) / 2 for axis in zip(*places, strict=True)]
+    towards = middle_of(receptacle) if receptacle.openable else point_of(view.agent.position)
+    x, z = towards[0] - room[0], towards[2] - room[2]
     out = (math.copysign(1.0, x), 0.0, 0.0) if abs(x) > abs(z) else (0.0, 0.0, math.copysign(1.0, z))
     return out, max(place[0] * out[0] + place[2] * out[2] for place in places) + _BREADTH
 
@@ -216,12 +233,13 @@ def _best_places(
         item for name, item in view.objects.items()
         if item.pickupable and name != held.object_id and key in (item.parent_receptacles or ())
     ]  # fmt: skip
-    aside = _aside(_entry(receptacle, places), places)
+    lever = math.dist(middle_of(held), point_of(arm_of(view).wrist))
+    aside = _aside(_entry(view, receptacle, places), places)
 
     def order(place: Point) -> tuple[bool, bool, bool, int, float]:
         goal = _wrist_above(environment, place, clearance, receptacle)
-        level = math.hypot(goal[0] - shoulder[0], goal[2] - shoulder[2])
-        too_far = level > _REACH or not _LOWEST - 0.4 < goal[1] - _floor(view) < _LOWEST + _RANGE + 0.4
+        level = math.hypot(place[0] - shoulder[0], place[2] - shoulder[2])
+        too_far = level > _REACH + lever or not _LOWEST - 0.4 < goal[1] - _floor(view) < _LOWEST + _RANGE + 0.4
         taken, out = _is_taken(place, held, others), _sticks_out(place, held, receptacle)
         return too_far, taken, out, aside[place], level
 
