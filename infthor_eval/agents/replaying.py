@@ -18,9 +18,10 @@ from infthor_eval.agents.plans import PlanKind
 from infthor_eval.agents.records import PlanRecord, StepRecord
 from infthor_eval.agents.rewards import RewardRules
 from infthor_eval.agents.trajectories import Course, Courses, find_courses
-from infthor_eval.errors import DataError, UsageError, naming, unknown_name
+from infthor_eval.errors import DataError, UsageError, naming
 from infthor_eval.household.scout import reachable
 from infthor_eval.runs import UnitRecord
+from infthor_eval.runs.sharing import one_of
 from infthor_eval.thor.actions import object_type_of, text_of
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.simulators import Simulators
@@ -89,23 +90,15 @@ def recorded_plans(run: PlansRun, task: str | None, trajectory: str | None) -> R
         UsageError: there is no such task or trajectory, or none is given and there are several.
         DataError: the identity is not that of a run of plans.
     """
-    task = _one_of("task", "--task", task, list(run.about.tasks))
+    task = one_of("task", "--task", task, list(run.about.tasks))
     plans: dict[str, list[Record]] = {}
     for record in run.records:
         if record.task == task:
             plans.setdefault(record.cluster, []).append(record)
     if not plans:
         raise DataError(f"{run.label}: the run has no record of a plan yet; let it go on first")
-    name = _one_of("trajectory", "--trajectory", trajectory, sorted(plans))
+    name = one_of("trajectory", "--trajectory", trajectory, sorted(plans))
     return Recorded(run, task, name, tuple(sorted(plans[name], key=lambda record: record.payload.index)))
-
-
-def _one_of(what: str, option: str, name: str | None, known: Sequence[str]) -> str:
-    if name is None and len(known) > 1:
-        raise UsageError(f"the run has more than one {what}; give one of them with {option}: {', '.join(known)}")
-    if name is not None and name not in known:
-        raise unknown_name(f"{what} of this run", name, known)
-    return name or known[0]
 
 
 @contextmanager

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from infthor_eval.agents.curves import Axis, RewardCurves, RunCurves
+from infthor_eval.curves import RewardCurves, RunCurves
 from infthor_eval.errors import DataError
 from infthor_eval.formats.yaml_files import read_yaml
 from infthor_eval.runs import RunHeader
@@ -13,8 +13,7 @@ from infthor_eval.tables import Column, Row, Table
 __all__ = ["Panel", "curves_table", "embedded_label", "one_panel", "read_panels", "run_labels", "trajectories_told"]
 
 _MOST_PANELS = 12  # a picture of more cannot be read
-_COLUMNS = ("reward", "95 % interval", "of the bound, %", "at step", "at context tokens")
-_COUNTS = ("plans", "failed", "not come to")
+_COLUMNS = ("reward", "95 % interval", "of the bound, %")
 
 
 @dataclass(frozen=True)
@@ -84,12 +83,15 @@ def embedded_label(curves: RewardCurves) -> str | None:
 
 def curves_table(curves: RewardCurves) -> Table:
     """Where the curves end: a row per run."""
-    bound = next(run for run in curves.runs if run.is_bound).curves[Axis.STEPS].end.mean
-    columns = (Column("run", False), *map(Column, (*_COLUMNS, *_COUNTS)))
+    bound = next(run for run in curves.runs if run.is_bound).curves[curves.main].end.mean
+    facets = curves.facets.values()
+    earned = [facet.earned for facet in facets if facet.earned is not None]
+    end_at = [facet.end_at for facet in facets if facet.end_at is not None]
+    columns = (Column("run", False), *map(Column, (*_COLUMNS, *earned, *end_at, *curves.runs[0].counts)))
     label = embedded_label(curves)
     notes = ((label,) if label else ()) + curves.notes
     title = f"{curves.task}: reward at the end, mean over {trajectories_told(curves.n_trajectories)}"
-    return Table(title, columns, tuple(_row(run, bound) for run in curves.runs), notes)
+    return Table(title, columns, tuple(_row(run, bound, curves) for run in curves.runs), notes)
 
 
 def trajectories_told(count: int) -> str:
@@ -97,11 +99,11 @@ def trajectories_told(count: int) -> str:
     return "1 trajectory" if count == 1 else f"{count} trajectories"
 
 
-def _row(run: RunCurves, bound: float) -> Row:
-    curve, tokens = run.curves[Axis.STEPS], run.curves.get(Axis.TOKENS)
-    end = curve.end
+def _row(run: RunCurves, bound: float, curves: RewardCurves) -> Row:
+    end = run.curves[curves.main].end
     interval = "-" if end.low is None or end.high is None else f"[{end.low:.2f}, {end.high:.2f}]"
     share = f"{100 * end.mean / bound:.1f}" if bound > 0 else "-"
-    places = f"{curve.places[-1]:.0f}", "-" if tokens is None else f"{tokens.places[-1]:.0f}"
-    counts = run.n_plans, run.n_failed, run.n_not_come_to
-    return Row((run.label, f"{end.mean:.2f}", interval, share, *places, *map(str, counts)))
+    found = [(facet, run.curves.get(name)) for name, facet in curves.facets.items()]
+    earned = ("-" if curve is None else f"{curve.end.mean:.2f}" for facet, curve in found if facet.earned)
+    places = ("-" if curve is None else f"{curve.places[-1]:.0f}" for facet, curve in found if facet.end_at)
+    return Row((run.label, f"{end.mean:.2f}", interval, share, *earned, *places, *map(str, run.counts.values())))
