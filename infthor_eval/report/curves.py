@@ -10,7 +10,17 @@ from infthor_eval.formats.yaml_files import read_yaml
 from infthor_eval.runs import RunHeader
 from infthor_eval.tables import Column, Row, Table
 
-__all__ = ["Panel", "curves_table", "embedded_label", "one_panel", "read_panels", "run_labels", "trajectories_told"]
+__all__ = [
+    "Panel",
+    "curves_table",
+    "embedded_label",
+    "embedded_note",
+    "model_names",
+    "one_panel",
+    "read_panels",
+    "run_labels",
+    "trajectories_told",
+]
 
 _MOST_PANELS = 12  # a picture of more cannot be read
 _COLUMNS = ("reward", "95 % interval", "of the bound, %")
@@ -29,12 +39,16 @@ class Panel:
     labels: tuple[str, ...]
 
 
-def run_labels(folders: Sequence[Path], headers: Sequence[RunHeader]) -> list[str]:
+def run_labels(folders: Sequence[Path], named: Sequence[str]) -> list[str]:
     """What runs are called beside each other: by their names, and where these are alike by their folders too."""
-    named = [_name(header) for header in headers]
     places = [f"{name} ({folder.name})" for name, folder in zip(named, folders, strict=True)]
     told = [place if named.count(name) > 1 else name for name, place in zip(named, places, strict=True)]
     return [str(folder) if told.count(name) > 1 else name for name, folder in zip(told, folders, strict=True)]
+
+
+def model_names(headers: Sequence[RunHeader]) -> list[str]:
+    """What the models of runs are called, alike in runs that differ in a setting alone."""
+    return [_name(header) for header in headers]
 
 
 def _name(header: RunHeader) -> str:
@@ -74,11 +88,21 @@ def _panel(path: Path, title: str, named: object, curves: RewardCurves) -> Panel
 
 def embedded_label(curves: RewardCurves) -> str | None:
     """What must stand on a picture with numbers of the embedded simulator; None where none are."""
-    embedded = [run.label for run in curves.runs if run.is_embedded]
-    if not embedded:
+    return embedded_note([run.label for run in curves.runs if run.is_embedded], len(curves.runs), "curves")
+
+
+def embedded_note(labels: Sequence[str], n_labels: int, what: str) -> str | None:
+    """What must stand beside numbers of the embedded simulator; None where none are.
+
+    Args:
+        labels: of what was made in it.
+        n_labels: of all that is drawn.
+        what: the paper's own, which these are not comparable with.
+    """
+    if not labels:
         return None
-    which = "" if len(embedded) == len(curves.runs) else f" ({', '.join(embedded)})"
-    return f"embedded simulator{which}: not comparable with the paper's curves"
+    which = "" if len(labels) == n_labels else f" ({', '.join(labels)})"
+    return f"embedded simulator{which}: not comparable with the paper's {what}"
 
 
 def curves_table(curves: RewardCurves) -> Table:
