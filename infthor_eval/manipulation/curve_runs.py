@@ -9,7 +9,7 @@ from typing import Any
 import msgspec
 
 from infthor_eval.errors import DataError, UsageError, naming, unknown_name
-from infthor_eval.manipulation.history import ErrandKind
+from infthor_eval.manipulation.kinds import ErrandKind
 from infthor_eval.manipulation.records import RECORDS, ArmRecord
 from infthor_eval.runs import RunHeader, UnitRecord, read_run
 from infthor_eval.runs.sharing import differing, shared_units, sharing_notes

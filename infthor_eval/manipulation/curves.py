@@ -10,9 +10,8 @@ import numpy as np
 
 from infthor_eval.curves import AT_MOST, Curve, Facet, RewardCurves, RunCurves, StepFunction, grid_of, mean_curve
 from infthor_eval.manipulation.curve_runs import ArmRun, SharedEpisodes, shared_episodes
-from infthor_eval.manipulation.history import ErrandKind
+from infthor_eval.manipulation.kinds import SHORT, ErrandKind
 from infthor_eval.manipulation.records import ArmRecord
-from infthor_eval.manipulation.task import SHORT
 from infthor_eval.runs import UnitRecord
 
 __all__ = ["ALL", "arm_curves"]

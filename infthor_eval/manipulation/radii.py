@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from infthor_eval.errors import UsageError
 from infthor_eval.manipulation.curve_runs import ArmRun, SharedEpisodes, shared_episodes
-from infthor_eval.manipulation.history import ErrandKind
+from infthor_eval.manipulation.kinds import ErrandKind
 from infthor_eval.manipulation.records import ArmRecord
 from infthor_eval.rates import Rate, clustered_rate
 from infthor_eval.runs import UnitRecord

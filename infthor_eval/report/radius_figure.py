@@ -6,9 +6,8 @@ from pathlib import Path
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from infthor_eval.manipulation.history import ErrandKind
+from infthor_eval.manipulation.kinds import SHORT, ErrandKind
 from infthor_eval.manipulation.radii import RadiusLine, SuccessByRadius
-from infthor_eval.manipulation.task import SHORT
 from infthor_eval.rates import Rate, percent
 from infthor_eval.report.curves import embedded_note, trajectories_told
 from infthor_eval.report.drawing import BOUND, LEGEND, Look, add_legend, add_words, looks_of, save_figure
