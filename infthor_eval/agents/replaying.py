@@ -17,8 +17,9 @@ from infthor_eval.agents.moments import Moment, PlanTitle, Point, Pose, Rewards,
 from infthor_eval.agents.plans import PlanKind
 from infthor_eval.agents.records import PlanRecord, StepRecord
 from infthor_eval.agents.rewards import RewardRules
-from infthor_eval.agents.trajectories import Course, Courses, find_courses
+from infthor_eval.agents.trajectories import Course, read_course
 from infthor_eval.errors import DataError, UsageError, naming
+from infthor_eval.formats.trajectory_sets import find_again
 from infthor_eval.household.scout import reachable
 from infthor_eval.runs import UnitRecord
 from infthor_eval.runs.sharing import one_of
@@ -115,35 +116,14 @@ def replay(recorded: Recorded, data: str | None, scenes: Path | None) -> Iterato
         DataError: the trajectory is not among them, or is another than the run's.
         SimulatorError: the simulator has no such scene or fails.
     """
-    courses = _courses(recorded, data)
-    course = _course(recorded, courses)
+    digest = recorded.run.about.tasks[recorded.task].trajectories.get(recorded.trajectory)
+    bundled = _settings(recorded).get("bundled")
+    courses, course = find_again(recorded.task, recorded.trajectory, digest, data, bundled, read_course)
     name = recorded.run.about.simulator
     # All of them, as in the run: the embedded simulator learns of floor plans from each.
     simulators = Simulators(name, scenes, [item.trajectory for item in courses.found], instances=False)
     with closing(simulators), simulators.one() as simulator:
         yield Replay(recorded, course, simulator)
-
-
-def _courses(recorded: Recorded, data: str | None) -> Courses:
-    bundled = _settings(recorded).get("bundled")
-    if data is None and bundled is None:
-        raise UsageError(
-            f"the trajectories of {recorded.task} do not come with the package; give them as --data FILE or FOLDER, "
-            "as for the run"
-        )
-    return find_courses(data, None if data is not None else str(bundled))
-
-
-def _course(recorded: Recorded, courses: Courses) -> Course:
-    """The course that the run went through."""
-    name = recorded.trajectory
-    course = next((item for item in courses.found if item.traj_id == name), None)
-    if course is None:
-        there = ", ".join(item.traj_id for item in courses.found)
-        raise DataError(f"{name}: not among the trajectories of --data ({there:.200}); give those of the run")
-    if course.digest != recorded.run.about.tasks[recorded.task].trajectories.get(name):
-        raise DataError(f"{name}: is not what it was when the run was made; give the run's own trajectories as --data")
-    return course
 
 
 def _settings(recorded: Recorded) -> Mapping[str, object]:
