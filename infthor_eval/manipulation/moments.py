@@ -99,6 +99,7 @@ class ArmMoment:
         sight: the world after the step; None where nobody acted in the episode.
         number: of the step, from 1 on; 0 at the start.
         asked: what a policy asked for, and what the simulator was, a line each.
+        actions: names of the calls, in order.
         refusals: what the simulator said of calls that it refused in this step.
         distance: metres from the middle of the hand's sphere to the target's box, as recorded; None where nobody acted.
         closest: the same at its smallest up to now.
@@ -114,6 +115,7 @@ class ArmMoment:
     sight: ArmSight | None
     number: int = 0
     asked: tuple[str, ...] = ()
+    actions: tuple[str, ...] = ()
     refusals: tuple[str, ...] = ()
     distance: float | None = None
     closest: float | None = None

@@ -291,6 +291,7 @@ def _after(before: ArmMoment, step: ArmStep, number: int, sight: ArmSight) -> Ar
         sight=sight,
         number=number,
         asked=tuple(asked_in_words(step)),
+        actions=tuple(str(call.get("action", "")) for call in step.calls),
         refusals=step.refusals,
         distance=step.distance,
         closest=closest,

@@ -19,7 +19,7 @@ def asked_in_words(step: ArmStep) -> Iterator[str]:
         moved = ", ".join(f"{name} {100 * value:+.1f}" for name, value in (("x", x), ("y", y), ("z", z)))
         turned = (("roll", roll), ("pitch", pitch), ("yaw", yaw))
         angles = ", ".join(f"{name} {math.degrees(value):+.0f}" for name, value in turned)
-        yield f"policy: {moved} cm; {angles} deg; gripper {gripper:.2f}"
+        yield f"delta: {moved} cm; {angles} deg; gripper {gripper:.2f}"
     if step.calls:
         yield "; ".join(map(call_in_words, step.calls))
     else:

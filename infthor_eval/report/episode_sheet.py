@@ -67,7 +67,7 @@ def _draw_cell(picture: Image.Image, moment: ArmMoment, left: int, top: int) -> 
     colour = WARN if moment.note else INK
     pen = ImageDraw.Draw(picture)
     _write(pen, (left, top + _CELL + 3), [when + where], 14, "-Bold", colour, width=_CELL)
-    told = moment.note or "; ".join(moment.refusals) or (moment.asked[-1] if moment.asked else "")
+    told = moment.note or "; ".join(moment.refusals) or ", ".join(moment.actions)
     colour = WARN if moment.note else BAD if moment.refusals else FAINT
     _write(pen, (left, top + _CELL + 20), [told], 12, "", colour, width=_CELL)
 

@@ -35,6 +35,8 @@ class _Pane:
 
     def __init__(self, reach: Reach, wide: int, high: int, *, is_above: bool) -> None:
         self._reach, self._size, self._is_above = reach, (wide, high), is_above
+        # What lies beside what is looked at would hide it.
+        self._solids = [solid for solid in reach.solids if _meets(solid, reach, is_above=is_above)]
         corners = [self._flat(reach.low), self._flat(reach.high)]
         (left, right), (bottom, top) = (sorted(values) for values in zip(*corners, strict=True))
         # One scale in both views, so that lengths can be compared.
@@ -46,7 +48,7 @@ class _Pane:
         """The view, with its title."""
         large = Image.new("RGB", (self._size[0] * _FINER, self._size[1] * _FINER), _PAPER)
         pen = ImageDraw.Draw(large, "RGBA")
-        for solid in _in_order(self._reach.solids):
+        for solid in _in_order(self._solids):
             fill, edge, width = (_NAMED, _NAMED_EDGE, 3) if solid.is_named else (_FURNITURE, _EDGE, 1)
             pen.polygon(self._outline(solid), fill=fill, outline=edge, width=width * _FINER)
         self._draw_arm(pen)
@@ -73,7 +75,7 @@ class _Pane:
     def _write_names(self, pen: ImageDraw.ImageDraw) -> None:
         """In the middle of what can be seen of each thing; of furniture, where there is room."""
         taken: list[tuple[float, float]] = []
-        for solid in sorted(self._reach.solids, key=lambda solid: not solid.is_named):
+        for solid in sorted(self._solids, key=lambda solid: not solid.is_named):
             face = font(13, "-Bold") if solid.is_named else font(12)
             place = self._name_place(solid, face)
             if place is None or any(abs(place[0] - x) < 90 and abs(place[1] - y) < 16 for x, y in taken):
@@ -111,6 +113,14 @@ class _Pane:
         across = wide / 2 + (x - self._middle[0]) * self._per_metre
         down = _HEAD + (high - _HEAD) / 2 - (y - self._middle[1]) * self._per_metre
         return across * _FINER, down * _FINER
+
+
+def _meets(solid: Solid, reach: Reach, *, is_above: bool) -> bool:
+    """Whether a thing is as deep in the picture as what it must hold."""
+    if is_above:
+        return solid.low <= reach.high[2] and reach.low[2] <= solid.high
+    across = [right for right, _ in solid.corners]
+    return min(across) <= reach.high[0] and reach.low[0] <= max(across)
 
 
 def _draw_dot(pen: ImageDraw.ImageDraw, place: tuple[float, float], half: float, colour: str) -> None:
