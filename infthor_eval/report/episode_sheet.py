@@ -11,7 +11,7 @@ from infthor_eval.report.page import BAD, FAINT, GOOD, INK, WARN
 __all__ = ["COLUMNS", "MOST_ROWS", "draw_sheet", "shown_steps"]
 
 COLUMNS, MOST_ROWS = 5, 8  # more cannot be taken in at a glance
-_CELL, _CAPTION, _GAP = 260, 40, 12  # pixels; a caption has two lines
+_CELL, _CAPTION, _GAP = 260, 56, 12  # pixels; a caption has three lines
 _SIDE, _EDGE, _TOP = 230, 16, 44
 _WIDTH = 2 * _EDGE + _SIDE + COLUMNS * (_CELL + _GAP) - _GAP
 
@@ -69,7 +69,7 @@ def _draw_cell(picture: Image.Image, moment: ArmMoment, left: int, top: int) -> 
     _write(pen, (left, top + _CELL + 3), [when + where], 14, "-Bold", colour, width=_CELL)
     told = moment.note or "; ".join(moment.refusals) or ", ".join(moment.actions)
     colour = WARN if moment.note else BAD if moment.refusals else FAINT
-    _write(pen, (left, top + _CELL + 20), [told], 12, "", colour, width=_CELL)
+    _write(pen, (left, top + _CELL + 20), [told], 12, "", colour, most=2, width=_CELL)
 
 
 def _write(

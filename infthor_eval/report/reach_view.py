@@ -73,7 +73,7 @@ class _Pane:
         _draw_dot(pen, (x, y), 6 * _FINER, _HAND)
 
     def _write_names(self, pen: ImageDraw.ImageDraw) -> None:
-        """In the middle of what can be seen of each thing; of furniture, where there is room."""
+        """In the middle of what can be seen of each thing; beside what is small, if the instruction is about it."""
         taken: list[tuple[float, float]] = []
         for solid in sorted(self._solids, key=lambda solid: not solid.is_named):
             face = font(13, "-Bold") if solid.is_named else font(12)
@@ -91,7 +91,7 @@ class _Pane:
         if right <= left or bottom <= top or (not solid.is_named and right - left < 2 * half):
             return None
         x = min(max((left + right) / 2, half), self._size[0] - half)
-        if not solid.is_named or bottom - top >= 16:
+        if not solid.is_named or (right - left >= 2 * half and bottom - top >= 16):
             return x, (top + bottom) / 2
         return x, top - 10 if top > _HEAD + 20 else bottom + 10
 
