@@ -1,6 +1,6 @@
 """Runs of plans that are drawn together: the task, the trajectories and the plans that all of them have."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -10,6 +10,7 @@ import msgspec
 from infthor_eval.agents.records import PlanRecord
 from infthor_eval.errors import DataError, UsageError, naming, unknown_name
 from infthor_eval.runs import RunHeader, UnitRecord
+from infthor_eval.runs.sharing import differing, shared_units, sharing_notes
 
 __all__ = ["About", "PlansRun", "SharedPlans", "shared_plans"]
 
@@ -104,22 +105,18 @@ def shared_plans(runs: Sequence[PlansRun], task: str | None) -> SharedPlans:
     name = _shared_task(runs, task)
     settings = [run.about.tasks[name] for run in runs]
     _require_same_rewards(runs, settings)
-    plans = [_by_trajectory(run, name) for run in runs]
-    every = sorted(
-        {*(key for about in settings for key in about.trajectories), *(key for item in plans for key in item)}
-    )
-    excluded = {key: _excluded(item[key] for item in plans if key in item) for key in every}
-    shared = [key for key in every if _is_shared(key, settings, plans) and plans[0][key].keys() - excluded[key]]
-    if not shared:
+    found = shared_units([_by_trajectory(run, name) for run in runs], [about.trajectories for about in settings])
+    if not found.trajectories:
         raise DataError(
             f"the runs share no trajectory of {name} that all of them have in full; draw runs on the same data"
         )
-    records = tuple(
-        tuple(tuple(item[key][index] for index in sorted(item[key].keys() - excluded[key])) for key in shared)
-        for item in plans
-    )
-    notes = _notes(runs, settings, len(shared), len(every), sum(len(excluded[key]) for key in shared))
-    return SharedPlans(name, tuple(shared), records, tuple(notes))
+    labels = [run.label for run in runs]
+    notes = [
+        *sharing_notes(found, "plans left out, whose own expert a simulator refused"),
+        *differing("course after a failed plan", labels, [about.after_failure for about in settings]),
+        *differing("simulator", labels, [run.about.simulator for run in runs]),
+    ]
+    return SharedPlans(name, found.trajectories, found.records, tuple(notes))
 
 
 def _shared_task(runs: Sequence[PlansRun], task: str | None) -> str:
@@ -150,36 +147,3 @@ def _by_trajectory(run: PlansRun, task: str) -> dict[str, dict[int, Record]]:
         if record.task == task:
             found.setdefault(record.cluster, {})[record.payload.index] = record
     return found
-
-
-def _excluded(trajectory: Iterable[Mapping[int, Record]]) -> set[int]:
-    """Plans of a trajectory that some run excludes."""
-    return {index for plans in trajectory for index, record in plans.items() if record.excluded is not None}
-
-
-def _is_shared(key: str, settings: Sequence[_TaskAbout], plans: Sequence[Mapping[str, Mapping[int, Record]]]) -> bool:
-    """Whether all runs have the same trajectory of that name, with the same plans: none stopped amid it."""
-    if any(key not in item for item in plans) or len({about.trajectories.get(key) for about in settings}) > 1:
-        return False
-    return all(item[key].keys() == plans[0][key].keys() for item in plans)
-
-
-def _notes(
-    runs: Sequence[PlansRun], settings: Sequence[_TaskAbout], n_shared: int, n_every: int, n_excluded: int
-) -> list[str]:
-    found = []
-    if n_shared < n_every:
-        found.append(f"{n_shared} of {n_every} trajectories are drawn: those that all of these runs have in full")
-    if n_shared == 1:
-        found.append("of one trajectory there is no interval")
-    if n_excluded:
-        found.append(f"plans left out, whose own expert a simulator refused: {n_excluded}")
-    found += _differing("course after a failed plan", runs, [about.after_failure for about in settings])
-    return found + _differing("simulator", runs, [run.about.simulator for run in runs])
-
-
-def _differing(what: str, runs: Sequence[PlansRun], values: Sequence[str]) -> list[str]:
-    if len(set(values)) < 2:
-        return []
-    told = ", ".join(f"{value} ({run.label})" for run, value in zip(runs, values, strict=True))
-    return [f"the runs differ in the {what}: {told}"]

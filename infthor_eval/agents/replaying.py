@@ -17,10 +17,12 @@ from infthor_eval.agents.moments import Moment, PlanTitle, Point, Pose, Rewards,
 from infthor_eval.agents.plans import PlanKind
 from infthor_eval.agents.records import PlanRecord, StepRecord
 from infthor_eval.agents.rewards import RewardRules
-from infthor_eval.agents.trajectories import Course, Courses, find_courses
-from infthor_eval.errors import DataError, UsageError, naming, unknown_name
+from infthor_eval.agents.trajectories import Course, read_course
+from infthor_eval.errors import DataError, UsageError, naming
+from infthor_eval.formats.trajectory_sets import find_again
 from infthor_eval.household.scout import reachable
 from infthor_eval.runs import UnitRecord
+from infthor_eval.runs.sharing import one_of
 from infthor_eval.thor.actions import object_type_of, text_of
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.simulators import Simulators
@@ -89,23 +91,15 @@ def recorded_plans(run: PlansRun, task: str | None, trajectory: str | None) -> R
         UsageError: there is no such task or trajectory, or none is given and there are several.
         DataError: the identity is not that of a run of plans.
     """
-    task = _one_of("task", "--task", task, list(run.about.tasks))
+    task = one_of("task", "--task", task, list(run.about.tasks))
     plans: dict[str, list[Record]] = {}
     for record in run.records:
         if record.task == task:
             plans.setdefault(record.cluster, []).append(record)
     if not plans:
         raise DataError(f"{run.label}: the run has no record of a plan yet; let it go on first")
-    name = _one_of("trajectory", "--trajectory", trajectory, sorted(plans))
+    name = one_of("trajectory", "--trajectory", trajectory, sorted(plans))
     return Recorded(run, task, name, tuple(sorted(plans[name], key=lambda record: record.payload.index)))
-
-
-def _one_of(what: str, option: str, name: str | None, known: Sequence[str]) -> str:
-    if name is None and len(known) > 1:
-        raise UsageError(f"the run has more than one {what}; give one of them with {option}: {', '.join(known)}")
-    if name is not None and name not in known:
-        raise unknown_name(f"{what} of this run", name, known)
-    return name or known[0]
 
 
 @contextmanager
@@ -122,35 +116,14 @@ def replay(recorded: Recorded, data: str | None, scenes: Path | None) -> Iterato
         DataError: the trajectory is not among them, or is another than the run's.
         SimulatorError: the simulator has no such scene or fails.
     """
-    courses = _courses(recorded, data)
-    course = _course(recorded, courses)
+    digest = recorded.run.about.tasks[recorded.task].trajectories.get(recorded.trajectory)
+    bundled = _settings(recorded).get("bundled")
+    courses, course = find_again(recorded.task, recorded.trajectory, digest, data, bundled, read_course)
     name = recorded.run.about.simulator
     # All of them, as in the run: the embedded simulator learns of floor plans from each.
     simulators = Simulators(name, scenes, [item.trajectory for item in courses.found], instances=False)
     with closing(simulators), simulators.one() as simulator:
         yield Replay(recorded, course, simulator)
-
-
-def _courses(recorded: Recorded, data: str | None) -> Courses:
-    bundled = _settings(recorded).get("bundled")
-    if data is None and bundled is None:
-        raise UsageError(
-            f"the trajectories of {recorded.task} do not come with the package; give them as --data FILE or FOLDER, "
-            "as for the run"
-        )
-    return find_courses(data, None if data is not None else str(bundled))
-
-
-def _course(recorded: Recorded, courses: Courses) -> Course:
-    """The course that the run went through."""
-    name = recorded.trajectory
-    course = next((item for item in courses.found if item.traj_id == name), None)
-    if course is None:
-        there = ", ".join(item.traj_id for item in courses.found)
-        raise DataError(f"{name}: not among the trajectories of --data ({there:.200}); give those of the run")
-    if course.digest != recorded.run.about.tasks[recorded.task].trajectories.get(name):
-        raise DataError(f"{name}: is not what it was when the run was made; give the run's own trajectories as --data")
-    return course
 
 
 def _settings(recorded: Recorded) -> Mapping[str, object]:

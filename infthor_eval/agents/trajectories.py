@@ -9,7 +9,7 @@ from infthor_eval.formats.digests import digest
 from infthor_eval.formats.trajectory import Source, Trajectory
 from infthor_eval.formats.trajectory_sets import TrajectorySet, find_trajectories
 
-__all__ = ["Course", "Courses", "find_courses"]
+__all__ = ["Course", "Courses", "find_courses", "read_course"]
 
 
 @dataclass(frozen=True)
@@ -39,10 +39,15 @@ Courses = TrajectorySet[Course]
 
 def find_courses(data: str | None, bundled: str | None) -> Courses:
     """Read the trajectories; see `find_trajectories`."""
-    return find_trajectories(data, bundled, _course)
+    return find_trajectories(data, bundled, read_course)
 
 
-def _course(source: Source) -> Course:
+def read_course(source: Source) -> Course:
+    """What evaluation needs of a trajectory.
+
+    Raises:
+        DataError: it cannot be used.
+    """
     trajectory = source.read()
     plans = plans_of(trajectory)
     if not plans:

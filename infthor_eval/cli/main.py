@@ -27,7 +27,7 @@ _COMMANDS = {
     "compare": "Compare two runs on the same data.",
     "check-parity": "Compare a policy's actions with another implementation's.",
     "report": "Draw a figure of the paper of your own runs.",
-    "watch": "Show what an agent did in a run of plans, as MP4 or GIF.",
+    "watch": "Show what was done in a run of plans or of arms, as MP4 or GIF.",
     "ls": "List the models, the tasks or the scenes.",
     "scenes": "Look at a scene, or carry it to machines without Unity.",
     "generate": "Make long-horizon trajectories in a scene.",

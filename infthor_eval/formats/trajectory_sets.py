@@ -9,7 +9,7 @@ from infthor_eval.errors import DataError, UsageError
 from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.formats.trajectory import Source, iter_sources, trajectory_files
 
-__all__ = ["TrajectorySet", "find_trajectories"]
+__all__ = ["TrajectorySet", "find_again", "find_trajectories"]
 
 
 class _Named(Protocol):
@@ -17,7 +17,13 @@ class _Named(Protocol):
     def traj_id(self) -> str: ...
 
 
+class _Told(_Named, Protocol):
+    @property
+    def digest(self) -> str: ...
+
+
 T = TypeVar("T", bound=_Named)
+D = TypeVar("D", bound=_Told)
 _Broken = list[tuple[str, str]]
 
 
@@ -67,6 +73,38 @@ def find_trajectories(data: str | None, bundled: str | None, read: Callable[[Sou
         raise DataError(f"{root}: nothing to evaluate ({why})")
     within = [(_within(root, place), _within(root, reason)) for place, reason in broken]
     return TrajectorySet([found[name] for name in sorted(found)], within)
+
+
+def find_again(
+    task: str, name: str, digest: str | None, data: str | None, bundled: object, read: Callable[[Source], D]
+) -> tuple[TrajectorySet[D], D]:
+    """The trajectories that a run was made on, and one of them.
+
+    Args:
+        task: the run's task.
+        name: of the one.
+        digest: of its file, as the run recorded it.
+        data: where they lie, see `find_trajectories`; None for those that come with the package.
+        bundled: what the task's file says of that.
+        read: see `find_trajectories`.
+
+    Raises:
+        UsageError: they do not come with the package, and `data` is not given or not there.
+        DataError: the trajectory is not among them, or is another than the run's.
+    """
+    if data is None and bundled is None:
+        raise UsageError(
+            f"the trajectories of {task} do not come with the package; give them as --data FILE or FOLDER, "
+            "as for the run"
+        )
+    every = find_trajectories(data, None if data is not None else str(bundled), read)
+    found = next((item for item in every.found if item.traj_id == name), None)
+    if found is None:
+        there = ", ".join(item.traj_id for item in every.found)
+        raise DataError(f"{name}: not among the trajectories of --data ({there:.200}); give those of the run")
+    if found.digest != digest:
+        raise DataError(f"{name}: is not what it was when the run was made; give the run's own trajectories as --data")
+    return every, found
 
 
 def _within(root: Path, text: str) -> str:

@@ -1,10 +1,10 @@
 """The true states from which arms act: before each pick-up and put of an expert's trajectory."""
 
 from dataclasses import dataclass
-from enum import StrEnum
 
 from infthor_eval.errors import DataError
 from infthor_eval.formats.trajectory import LowAction, Trajectory
+from infthor_eval.manipulation.kinds import ErrandKind
 from infthor_eval.thor.actions import object_type_of
 from infthor_eval.thor.grounding import Grounding
 from infthor_eval.thor.recorded import MissingObjectError, translate
@@ -17,13 +17,6 @@ __all__ = ["Errand", "ErrandKind", "History", "Moment", "UnfitEpisodeError", "er
 
 class UnfitEpisodeError(DataError):
     """Nobody can act in an episode here, so it counts for nobody."""
-
-
-class ErrandKind(StrEnum):
-    """What an episode is about."""
-
-    PICKUP = "pickup"
-    PUT = "put"
 
 
 _KINDS = {"PickupObject": ErrandKind.PICKUP, "PutObject": ErrandKind.PUT}

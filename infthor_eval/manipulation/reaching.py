@@ -89,8 +89,8 @@ def _put(environment: ArmEnvironment) -> Steps:
     receptacle = environment.view.objects[str(environment.moment.receptacle_id)]
     every = _all_places(environment, receptacle)
     entry = _entry(environment.view, receptacle, every)
-    held = environment.view.objects[environment.moment.object_id]
-    safe = [place for place in every if not _sticks_out(place, held, receptacle)] or every
+    held, others = environment.view.objects[environment.moment.object_id], _others(environment, receptacle)
+    safe = [p for p in every if not _sticks_out(p, held, receptacle) and not _is_taken(p, held, others)]
     for call, place in _ways(environment, receptacle, every, entry):
         yield [call]
         if _is_over(environment, receptacle, [*safe, place]):
@@ -227,12 +227,9 @@ def _best_places(
     environment: ArmEnvironment, receptacle: ThorObject, places: Sequence[Point], clearance: float
 ) -> list[Point]:
     """Places on a receptacle: those that the arm reaches, that are free, and where the thing fits, by distance."""
-    view, key = environment.view, receptacle.object_id
+    view = environment.view
     held, shoulder = view.objects[environment.moment.object_id], point_of(arm_of(view).joints[1].position)
-    others = [
-        item for name, item in view.objects.items()
-        if item.pickupable and name != held.object_id and key in (item.parent_receptacles or ())
-    ]  # fmt: skip
+    others = _others(environment, receptacle)
     lever = math.dist(middle_of(held), point_of(arm_of(view).wrist))
     aside = _aside(_entry(view, receptacle, places), places)
 
@@ -244,6 +241,15 @@ def _best_places(
         return too_far, taken, out, aside[place], level
 
     return sorted(places, key=order)[:_PLACES]
+
+
+def _others(environment: ArmEnvironment, receptacle: ThorObject) -> list[ThorObject]:
+    """What stands in or on a receptacle, but for what is held."""
+    held, key = environment.moment.object_id, receptacle.object_id
+    return [
+        item for name, item in environment.view.objects.items()
+        if item.pickupable and name != held and key in (item.parent_receptacles or ())
+    ]  # fmt: skip
 
 
 def _aside(entry: Entry | None, places: Sequence[Point]) -> dict[Point, int]:

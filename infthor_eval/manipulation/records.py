@@ -40,6 +40,11 @@ class ArmStep(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     distance: float = 0.0
     refusals: tuple[str, ...] = ()
 
+    @property
+    def n_collisions(self) -> int:
+        """How many movements met something."""
+        return sum(text.startswith(_COLLIDED) for text in self.refusals)
+
 
 class ArmRecord(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, tag_field="type", tag="arm"):
     """One episode, and what an arm did in it.
@@ -80,7 +85,7 @@ class ArmRecord(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, t
     @property
     def n_collisions(self) -> int:
         """How many movements met something."""
-        return sum(text.startswith(_COLLIDED) for step in self.steps for text in step.refusals)
+        return sum(step.n_collisions for step in self.steps)
 
 
 RECORDS = RecordTypes(unit=ArmRecord)

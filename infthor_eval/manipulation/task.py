@@ -11,14 +11,14 @@ from infthor_eval.formats.trajectory_sets import TrajectorySet, find_trajectorie
 from infthor_eval.household.wording import canonical, noun
 from infthor_eval.manipulation.conversion import Conversion
 from infthor_eval.manipulation.environment import Grasp
-from infthor_eval.manipulation.history import Errand, ErrandKind, errands_of
+from infthor_eval.manipulation.history import Errand, errands_of
+from infthor_eval.manipulation.kinds import SHORT, ErrandKind
 from infthor_eval.manipulation.options import RADII, ManipulationOptions
 from infthor_eval.runs import TaskFile, TaskRequest
 from infthor_eval.runs.task_settings import task_settings
 
 __all__ = ["ArmCourse", "ManipulationTask", "TaskSettings"]
 
-SHORT = {ErrandKind.PICKUP: "Pick-up", ErrandKind.PUT: "Put"}  # as the paper calls them
 _WORDS = {ErrandKind.PICKUP: "pick up the {object}", ErrandKind.PUT: "put the {object} in the {receptacle}"}
 _CHOICES = {"kind": tuple(ErrandKind), "grasps": ("target", "all"), "hold": ("middle", "palm")}
 

@@ -4,17 +4,26 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from infthor_eval.agents.curves import Axis, RewardCurves, RunCurves
+from infthor_eval.curves import RewardCurves, RunCurves
 from infthor_eval.errors import DataError
 from infthor_eval.formats.yaml_files import read_yaml
 from infthor_eval.runs import RunHeader
 from infthor_eval.tables import Column, Row, Table
 
-__all__ = ["Panel", "curves_table", "embedded_label", "one_panel", "read_panels", "run_labels", "trajectories_told"]
+__all__ = [
+    "Panel",
+    "curves_table",
+    "embedded_label",
+    "embedded_note",
+    "model_names",
+    "one_panel",
+    "read_panels",
+    "run_labels",
+    "trajectories_told",
+]
 
 _MOST_PANELS = 12  # a picture of more cannot be read
-_COLUMNS = ("reward", "95 % interval", "of the bound, %", "at step", "at context tokens")
-_COUNTS = ("plans", "failed", "not come to")
+_COLUMNS = ("reward", "95 % interval", "of the bound, %")
 
 
 @dataclass(frozen=True)
@@ -30,12 +39,16 @@ class Panel:
     labels: tuple[str, ...]
 
 
-def run_labels(folders: Sequence[Path], headers: Sequence[RunHeader]) -> list[str]:
+def run_labels(folders: Sequence[Path], named: Sequence[str]) -> list[str]:
     """What runs are called beside each other: by their names, and where these are alike by their folders too."""
-    named = [_name(header) for header in headers]
     places = [f"{name} ({folder.name})" for name, folder in zip(named, folders, strict=True)]
     told = [place if named.count(name) > 1 else name for name, place in zip(named, places, strict=True)]
     return [str(folder) if told.count(name) > 1 else name for name, folder in zip(told, folders, strict=True)]
+
+
+def model_names(headers: Sequence[RunHeader]) -> list[str]:
+    """What the models of runs are called, alike in runs that differ in a setting alone."""
+    return [_name(header) for header in headers]
 
 
 def _name(header: RunHeader) -> str:
@@ -75,21 +88,34 @@ def _panel(path: Path, title: str, named: object, curves: RewardCurves) -> Panel
 
 def embedded_label(curves: RewardCurves) -> str | None:
     """What must stand on a picture with numbers of the embedded simulator; None where none are."""
-    embedded = [run.label for run in curves.runs if run.is_embedded]
-    if not embedded:
+    return embedded_note([run.label for run in curves.runs if run.is_embedded], len(curves.runs), "curves")
+
+
+def embedded_note(labels: Sequence[str], n_labels: int, what: str) -> str | None:
+    """What must stand beside numbers of the embedded simulator; None where none are.
+
+    Args:
+        labels: of what was made in it.
+        n_labels: of all that is drawn.
+        what: the paper's own, which these are not comparable with.
+    """
+    if not labels:
         return None
-    which = "" if len(embedded) == len(curves.runs) else f" ({', '.join(embedded)})"
-    return f"embedded simulator{which}: not comparable with the paper's curves"
+    which = "" if len(labels) == n_labels else f" ({', '.join(labels)})"
+    return f"embedded simulator{which}: not comparable with the paper's {what}"
 
 
 def curves_table(curves: RewardCurves) -> Table:
     """Where the curves end: a row per run."""
-    bound = next(run for run in curves.runs if run.is_bound).curves[Axis.STEPS].end.mean
-    columns = (Column("run", False), *map(Column, (*_COLUMNS, *_COUNTS)))
+    bound = next(run for run in curves.runs if run.is_bound).curves[curves.main].end.mean
+    facets = curves.facets.values()
+    earned = [facet.earned for facet in facets if facet.earned is not None]
+    end_at = [facet.end_at for facet in facets if facet.end_at is not None]
+    columns = (Column("run", False), *map(Column, (*_COLUMNS, *earned, *end_at, *curves.runs[0].counts)))
     label = embedded_label(curves)
     notes = ((label,) if label else ()) + curves.notes
     title = f"{curves.task}: reward at the end, mean over {trajectories_told(curves.n_trajectories)}"
-    return Table(title, columns, tuple(_row(run, bound) for run in curves.runs), notes)
+    return Table(title, columns, tuple(_row(run, bound, curves) for run in curves.runs), notes)
 
 
 def trajectories_told(count: int) -> str:
@@ -97,11 +123,11 @@ def trajectories_told(count: int) -> str:
     return "1 trajectory" if count == 1 else f"{count} trajectories"
 
 
-def _row(run: RunCurves, bound: float) -> Row:
-    curve, tokens = run.curves[Axis.STEPS], run.curves.get(Axis.TOKENS)
-    end = curve.end
+def _row(run: RunCurves, bound: float, curves: RewardCurves) -> Row:
+    end = run.curves[curves.main].end
     interval = "-" if end.low is None or end.high is None else f"[{end.low:.2f}, {end.high:.2f}]"
     share = f"{100 * end.mean / bound:.1f}" if bound > 0 else "-"
-    places = f"{curve.places[-1]:.0f}", "-" if tokens is None else f"{tokens.places[-1]:.0f}"
-    counts = run.n_plans, run.n_failed, run.n_not_come_to
-    return Row((run.label, f"{end.mean:.2f}", interval, share, *places, *map(str, counts)))
+    found = [(facet, run.curves.get(name)) for name, facet in curves.facets.items()]
+    earned = ("-" if curve is None else f"{curve.end.mean:.2f}" for facet, curve in found if facet.earned)
+    places = ("-" if curve is None else f"{curve.places[-1]:.0f}" for facet, curve in found if facet.end_at)
+    return Row((run.label, f"{end.mean:.2f}", interval, share, *earned, *places, *map(str, run.counts.values())))

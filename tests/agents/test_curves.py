@@ -2,8 +2,9 @@
 
 import pytest
 
-from infthor_eval.agents.curves import AT_MOST, Axis, StepFunction, reward_curves
+from infthor_eval.agents.curves import Axis, reward_curves
 from infthor_eval.agents.records import NOT_COME_TO
+from infthor_eval.curves import AT_MOST, StepFunction
 from infthor_eval.errors import DataError, UsageError
 
 from .made_runs import TASK, made_run, plan, planner_run
@@ -49,7 +50,7 @@ def test_an_excluded_plan_is_left_out_of_all_runs_and_counted():
     for label in "mn":
         assert curve_of(curves, label).places == (0, 10, 30)
         assert means(curve_of(curves, label)) == [0, 0.5, 2.5]
-    assert [run.n_plans for run in curves.runs] == [2, 2, 2]
+    assert [run.counts["plans"] for run in curves.runs] == [2, 2, 2]
     assert any(note.endswith("refused: 1") for note in curves.notes)
 
 
@@ -63,7 +64,7 @@ def test_failed_plans_and_those_not_come_to_earn_nothing_and_are_counted():
     assert means(curve_of(curves, "m")) == [0, 1, 1, 1]
     assert curve_of(curves, "m").places == (0, 10, 20, 40)
     run = curves.runs[0]
-    assert (run.n_plans, run.n_failed, run.n_not_come_to) == (3, 1, 1)
+    assert run.counts == {"plans": 3, "failed": 1, "not come to": 1}
     assert curves.n_trajectories == 1
     assert curve_of(curves, "m").end.low is None
     assert "of one trajectory there is no interval" in curves.notes

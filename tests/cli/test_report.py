@@ -53,7 +53,7 @@ def test_what_is_no_run_of_plans_is_refused(folders, make_nieh_set, tmp_path, ru
 
 
 def test_misuse_is_one_line(folders, tmp_path, run):
-    refused(run("report", *folders, "--figure", "6"), "--figure 6: is none that can be drawn; there are 7 (reward")
+    refused(run("report", *folders, "--figure", "5"), "--figure 5: is none that can be drawn; there are 6 (reward")
     refused(run("report", *folders), "--figure")
     refused(run("report", "--figure", "7"), "RUN...")
     refused(run("report", folders[0], folders[0], "--figure", "7"), "given twice")

@@ -97,7 +97,7 @@ def test_what_cannot_be_watched_is_one_line(scripted_run, make_nieh_set, tmp_pat
     refused(run("watch", tmp_path), f"{tmp_path}: no journal in it; give the folder of a run")
     run("--model", "oracle", "--tasks", "nieh_gt", "--data", make_nieh_set(size=56), "--output", tmp_path / "nieh")
     (asked,) = (tmp_path / "nieh" / "oracle").iterdir()
-    refused(run("watch", asked), f"{asked}: is a run of nieh, and only runs of plans can be watched")
+    refused(run("watch", asked), f"{asked}: is a run of nieh, and only runs of plans and manipulation can be watched")
 
 
 @pytest.mark.parametrize("name", [NAME, "kitchen-1-seed7"])

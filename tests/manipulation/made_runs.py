@@ -1,0 +1,93 @@
+"""Journals of arms made by hand: no simulator, no policy."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from infthor_eval.manipulation.curve_runs import ArmRun
+from infthor_eval.manipulation.kinds import ErrandKind
+from infthor_eval.manipulation.records import RECORDS, ArmRecord
+from infthor_eval.runs import RunHeader, UnitRecord
+from infthor_eval.runs.journal import Journal
+
+TASKS = {"pickup": "arm_pickup", "put": "arm_put"}
+REWARD = 2.0
+
+
+def episode(
+    trajectory: str,
+    index: int,
+    kind: str = ErrandKind.PICKUP,
+    *,
+    done: bool = True,
+    inside: bool = False,
+    most: float = REWARD,
+    failure: str | None = None,
+    excluded: str | None = None,
+    task: str | None = None,
+) -> UnitRecord[ArmRecord]:
+    acted = failure is None and excluded is None
+    payload = ArmRecord(
+        index=index,
+        kind=str(kind),
+        instruction="pick up the mug",
+        object_id="Mug|1",
+        starts_inside=inside and acted,
+        start_distance=0.5,
+        closest=0.5,
+        reward=most if done and acted else 0.0,
+        max_reward=most,
+        ended=("done" if done else "gave up") if acted else "",
+    )
+    return UnitRecord(
+        task=task or TASKS[kind],
+        id=f"{trajectory}/{index:04d}",
+        cluster=trajectory,
+        fingerprint=f"{trajectory}/{index}",
+        payload=payload,
+        failure=failure,
+        excluded=excluded,
+    )
+
+
+def made_run(
+    label: str,
+    records: Sequence[UnitRecord[ArmRecord]],
+    *,
+    radius: float = 0.5,
+    simulator: str = "embedded",
+    model: Mapping[str, Any] | None = None,
+    settings: Mapping[str, Any] | None = None,
+) -> ArmRun:
+    tasks = {
+        record.task: {
+            "kind": record.payload.kind,
+            "radius": radius,
+            "instruction": None,
+            "trajectories": {item.cluster: f"digest of {item.cluster}" for item in records},
+            "config": {"dataset_kwargs": {"kind": record.payload.kind, **(settings or {})}},
+            "broken": [],
+        }
+        for record in records
+    }
+    identity = {
+        "suite": "manipulation",
+        "model": dict(model or {"name": label}),
+        "simulator": simulator,
+        "frames": "shown",
+        "tasks": tasks,
+    }
+    return ArmRun(label, RunHeader(suite="manipulation", name=label, identity=identity), records)
+
+
+def planner_run(records: Sequence[UnitRecord[ArmRecord]], label: str = "planner-arm", **about: Any) -> ArmRun:
+    return made_run(label, records, model={"name": "planner-arm", "baseline": "planner-arm"}, **about)
+
+
+def write_run(run: ArmRun, output: Path, name: str = "arm-0123") -> Path:
+    """Write its journal as the driver does; returns the run's folder."""
+    folder = output / run.label / name
+    with Journal(folder, run.header, RECORDS) as journal:
+        for record in run.records:
+            journal.append(record)
+    return folder

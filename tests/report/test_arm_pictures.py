@@ -1,0 +1,141 @@
+"""Pictures of arms: figures, moments and sheets, from numbers made by hand."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from infthor_eval.manipulation.curves import arm_curves
+from infthor_eval.manipulation.moments import ArmMoment, ArmSight, EpisodeTitle, Reach, Solid
+from infthor_eval.manipulation.radii import success_by_radius
+from infthor_eval.report.arm_recording import arm_pictures, draw_arm_moment, draw_arm_title
+from infthor_eval.report.curves import curves_table, one_panel
+from infthor_eval.report.episode_sheet import COLUMNS, draw_sheet, shown_steps
+from infthor_eval.report.figures import draw_curves
+from infthor_eval.report.page import END_HELD, SIZE, TITLE_HELD
+from infthor_eval.report.radius_figure import draw_radii, radii_table
+from infthor_eval.report.reach_view import draw_reach
+
+from ..manipulation.made_runs import episode, made_run, planner_run
+
+GREEN, RED = (26, 127, 55), (193, 39, 45)
+NAMED, HAND = (213, 94, 0), (0, 114, 178)
+MUG = Solid("Mug", ((0.1, 0.6), (0.1, 0.7), (0.2, 0.7), (0.2, 0.6)), 0.8, 0.9, is_named=True)
+TABLE = Solid("SideTable", ((-0.3, 0.5), (-0.3, 1.2), (0.4, 1.2), (0.4, 0.5)), 0.0, 0.8)
+FAR = Solid("Sofa", ((3.0, 0.5), (3.0, 1.2), (4.0, 1.2), (4.0, 0.5)), 0.0, 0.8, is_named=False)
+WAY = ((0.0, 0.3, 0.8), (0.1, 0.5, 0.9))
+JOINTS = ((0.0, 0.0, 0.8), (0.0, 0.2, 0.9))
+REACH = Reach(JOINTS, WAY[-1], 0.2, WAY, (TABLE, MUG, FAR), (-0.4, -0.1, 0.5), (0.5, 0.9, 1.2))
+SIGHT = ArmSight(np.full((300, 300, 3), 90, np.uint8), REACH)
+TITLE = EpisodeTitle(2, 7, 57, "Pick-up", "pick up the mug", 1, 0.2)
+START = ArmMoment(TITLE, SIGHT, distance=0.5, closest=0.5, most=2.0)
+END = replace(
+    START, number=1, asked=("delta: x +1.0", "MoveArmRelative"), actions=("MoveArmRelative",), ending="done", done=True
+)
+
+
+def runs():
+    records = [episode(name, number, kind) for name in "ab" for number, kind in enumerate(("pickup", "put"))]
+    lost = [episode(name, number, kind, done=False) for name in "ab" for number, kind in enumerate(("pickup", "put"))]
+    return [made_run("m", lost, radius=0.1), made_run("m", records), planner_run(records)]
+
+
+def texts(svg):
+    return re.findall(r"<text[^>]*>([^<]*)</text>", svg.read_text(encoding="utf-8"))
+
+
+def colours(picture):
+    return {colour for _, colour in picture.getcolors(1 << 24)}
+
+
+def test_figure_6_has_a_panel_for_both_kinds_and_for_each(tmp_path):
+    curves = arm_curves([replace(run, label=f"run {number}") for number, run in enumerate(runs())])
+    _, svg = draw_curves(curves, one_panel(curves), tmp_path, "figure6")
+    said = texts(svg)
+    for words in (
+        "Pick-up and put",
+        "Pick-up",
+        "Put",
+        "run 0",
+        "Cumulative reward on arm_pickup and arm_put: mean over 2 trajectories, 95 % intervals shaded",
+        "embedded simulator: not comparable with the paper's curves",
+        "the radius of the hand's sphere is not one: 0.1, 0.5 m",
+    ):
+        assert words in said
+    assert said.count("the expert's step (low-level action)") == 3
+    table = curves_table(curves)
+    names = ["run", "reward", "95 % interval", "of the bound, %", "of pick-ups", "of puts", "at step"]
+    assert [column.name for column in table.columns] == [*names, "episodes", "failed"]
+    assert table.rows[1].cells == ("run 1", "4.00", "[4.00, 4.00]", "100.0", "2.00", "2.00", "1", "4", "0")
+
+
+def test_success_by_radius_is_drawn_with_its_floor(tmp_path):
+    found = success_by_radius(runs())
+    one, other = (draw_radii(found, tmp_path, name)[1] for name in ("one", "other"))
+    assert one.read_bytes() == other.read_bytes()
+    for words in ("Pick-up", "Put", "m", "planner-arm", "in the sphere at the start", "success (%)"):
+        assert words in texts(one)
+    with Image.open(tmp_path / "one.png") as picture:
+        assert min(picture.size) > 300
+    table = radii_table(found)
+    assert [column.name for column in table.columns][2:] == ["0.1 m", "0.5 m", "episodes", "failed"]
+    assert [row.cells[:2] for row in table.rows] == [
+        ("m", "Pick-up"),
+        ("planner-arm", "Pick-up"),
+        ("m", "Put"),
+        ("planner-arm", "Put"),
+        ("(in the sphere at the start)", "Pick-up"),
+    ]
+    assert table.rows[1].cells[2] == "-"
+    assert table.notes[0] == "embedded simulator: not comparable with the paper's results"
+
+
+def test_an_episode_has_its_title_its_start_and_its_end_held():
+    found = list(arm_pictures([START, END], "a run"))
+    assert len(found) == TITLE_HELD + 1 + END_HELD
+    assert {(picture.size, picture.mode) for picture in found} == {(SIZE, "RGB")}
+    idle = replace(START, sight=None, ending="left out: no room")
+    assert len(list(arm_pictures([idle], "a run"))) == TITLE_HELD
+    assert RED in colours(draw_arm_title(idle, ""))
+    with pytest.raises(ValueError, match="nothing to be seen"):
+        draw_arm_moment(idle, "")
+
+
+def test_the_ending_is_green_or_red_and_what_is_told_is_written():
+    lost = replace(END, ending="step limit", done=False)
+    assert GREEN in colours(draw_arm_moment(END, ""))
+    assert RED in colours(draw_arm_moment(lost, ""))
+    assert not {GREEN, RED} & colours(draw_arm_moment(START, ""))
+    plain = draw_arm_moment(END, "").tobytes()
+    for change in ({"refusals": ("Collided",)}, {"note": "differs"}, {"asked": ("other",)}, {"n_collisions": 3}):
+        assert draw_arm_moment(replace(END, **change), "").tobytes() != plain
+
+
+def test_the_reach_shows_hand_and_target_and_not_what_lies_beside():
+    picture = draw_reach(REACH, 400)
+    assert picture.size == (400, 400)
+    assert {NAMED, HAND} <= colours(picture)
+    without = draw_reach(replace(REACH, solids=(TABLE, MUG)), 400)
+    rows = slice(200, 370)  # the view from the side, which the sofa would stand in
+    assert np.array_equal(np.asarray(picture)[rows], np.asarray(without)[rows])
+
+
+@pytest.mark.parametrize("n_steps", [0, 1, 3, 4, 60])
+def test_a_row_has_its_start_and_its_end(n_steps):
+    shown = shown_steps(n_steps)
+    assert (shown[0], shown[-1]) == (0, n_steps)
+    assert len(shown) == min(COLUMNS, n_steps + 1)
+
+
+def test_a_sheet_has_a_row_for_each_episode():
+    lost = replace(END, ending="step limit", done=False, refusals=("Collided with a wall",))
+    idle = replace(START, sight=None, ending="failed: broken")
+    one = draw_sheet([[START, END]], "a run")
+    three = draw_sheet([[START, END], [START, lost], [idle]], "a run")
+    assert three.size[0] == one.size[0]
+    assert three.size[1] > 2 * one.size[1]
+    assert GREEN in colours(one)
+    assert RED not in colours(one)
+    assert {GREEN, RED} <= colours(three)
