@@ -63,7 +63,7 @@ def test_a_larger_sphere_takes_no_success_from_the_planner(room):
     }  # fmt: skip
     rates = [sum(found[radius]) for radius in radii]
     assert rates == sorted(rates)
-    assert 0 < rates[0] and rates[-1] == 7
+    assert rates[0] > 0 and rates[-1] == 7
 
 
 def test_equal_seeds_move_alike_and_other_seeds_and_episodes_do_not(room):
