@@ -53,27 +53,28 @@ def found(output):
     return read_run(folder, RECORDS)[1], json.loads((folder / "results.json").read_text())["summary"]
 
 
-def test_a_run_that_is_killed_ends_as_one_that_is_not(tmp_path):
-    data = write(tmp_path / "data", cut(CANDLE, 8), cut(MUG))
+@pytest.mark.usefixtures("shared_simulators")
+def test_a_run_that_is_killed_ends_as_one_that_is_not(prepared, tmp_path):
+    data = write(tmp_path / "two", cut(CANDLE, 6), cut(MUG))
     whole, killed = tmp_path / "whole", tmp_path / "killed"
-    finish(start(data, whole))
+    execute(prepared("random-arm", data=data, output=whole))
     process = start(data, killed)
     deadline = time.monotonic() + 120
-    while not any(read_lines(killed)):
+    while not any(lines(killed)):
         assert process.poll() is None and time.monotonic() < deadline
         time.sleep(0.002)
     os.kill(process.pid, signal.SIGKILL)
     process.communicate()
-    done = len(list(read_lines(killed)))
+    done = len(list(lines(killed)))
     finish(start(data, killed))
     records, summary = found(killed)
     assert 1 <= done < len(records)
     assert same(records) == same(found(whole)[0])
     assert summary == found(whole)[1]
-    assert len(list(read_lines(killed))) == len(records)  # what was done is not done again
+    assert len(list(lines(killed))) == len(records)  # what was done is not done again
 
 
-def read_lines(output):
+def lines(output):
     """Episodes that are in the journal, whole."""
     for path in output.rglob("worker-*.jsonl"):
         for line in path.read_bytes().splitlines(keepends=True):
@@ -172,7 +173,7 @@ class Counting(Silent):
         self.most = max(self.most, len(children() - self.before))
 
 
-def test_two_trajectories_at_once_find_what_one_after_the_other_finds(prepared, tmp_path, monkeypatch):
+def test_two_trajectories_at_once_find_what_one_after_the_other_finds(prepared, tmp_path, monkeypatch, pool):
     data = write(tmp_path / "two", cut(CANDLE), cut(MUG))
     counting = Counting()
     together = execute(prepared("random-arm", data=data, output=tmp_path / "together"), counting)
@@ -181,6 +182,7 @@ def test_two_trajectories_at_once_find_what_one_after_the_other_finds(prepared, 
     one_by_one = Capabilities(counts_tokens=False, token_ids=False)
     assert BASELINES["random-arm"](0).capabilities.max_in_flight == 2
     monkeypatch.setattr(BASELINES["random-arm"], "capabilities", one_by_one)
+    monkeypatch.setattr("infthor_eval.manipulation.evaluation.Simulators", pool.kind())
     alone = execute(prepared("random-arm", data=data, output=tmp_path / "alone"))
     assert same(together.records) == same(alone.records)
     assert together.summary == alone.summary

@@ -126,7 +126,8 @@ def test_numbers_of_the_embedded_simulator_say_so_and_others_do_not():
 def test_there_is_a_row_per_run_and_radius():
     runs = [run(radius=radius, frames=frames) for radius in (0.06, 0.5) for frames in ("shown", "blank")]
     assert [(row["model"], row["radius, m"]) for row in own(table("Low-level", *runs))] == [
-        ("a policy", "0.06"), ("a policy, blank frames", "0.06"), ("a policy", "0.5"), ("a policy, blank frames", "0.5"),
+        ("a policy", "0.06"), ("a policy, blank frames", "0.06"),
+        ("a policy", "0.5"), ("a policy, blank frames", "0.5"),
     ]  # fmt: skip
 
 
