@@ -1,6 +1,7 @@
 """Episodes in the simulator: how they begin, what counts as success, and what baselines make of them."""
 
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -264,6 +265,21 @@ def test_distances_are_from_the_spheres_centre_to_the_targets_box(room):
             )  # fmt: skip
             assert outcome.distance == pytest.approx(math.dist(point_of(center), tuple(nearest)))
             assert outcome.distance == gap(point_of(center), outcome.view.objects[target])
+
+
+def test_an_egg_that_cracks_before_it_is_taken_ends_nothing(arena):
+    """Its id is gone then; the distance is to where it was, and nobody can pick it up any more."""
+    kitchen = arena("kitchen-2-seed4", 99)
+    moment = kitchen.history.moments[13]
+    (egg, *_) = (key for key, item in moment.view.objects.items() if item.object_type == "Egg")
+    environment = ArmEnvironment(kitchen.trajectory, kitchen.simulator)
+    begun = environment.reset(
+        kitchen.errands[13], replace(moment, object_id=egg), Conversion(), Grasp(), NoFrames()
+    )  # fmt: skip
+    outcome = environment.step([{"action": "BreakObject", "objectId": egg, "forceAction": True}])
+    assert egg not in outcome.view.objects
+    assert (outcome.ended, outcome.distance) == (None, begun.distance)
+    assert environment.step(gripper(0.0)).ended is None
 
 
 def test_closest_is_the_smallest_of_the_start_and_all_steps(room):
