@@ -306,3 +306,18 @@ def test_an_option_that_does_not_fit_ends_the_command_in_one_line(run, data, tmp
     code, out, err = run(*words, f"--{option}", value)
     assert (code, out) == (2, "")
     assert said in " ".join(err.split()) and "Traceback" not in err
+
+
+def test_two_tasks_about_the_same_episodes_run_together(prepared, task_files):
+    """They share the expert's history; each has its own frames' size and radius."""
+    for name, settings in (("near", "radius: 0.06, image_size: 64"), ("far", "radius: 0.5")):
+        (task_files / "manipulation" / f"{name}.yaml").write_text(
+            f"include: _manipulation.yaml\ntask: {name}\ndataset_kwargs: {{kind: pickup, {settings}}}\n"
+        )
+    outcome = execute(prepared("planner-arm", tasks=("near", "far")))
+    found = by_key(outcome)
+    assert sorted(found) == [("far", MUG, 9), ("near", MUG, 9)]
+    assert found["far", MUG, 9].payload.done
+    assert found["near", MUG, 9].payload.start_distance > found["far", MUG, 9].payload.start_distance  # a small sphere
+    rows = [row for row in outcome.run.suite.tables([outcome.summary])[0].rows if not row.is_published]
+    assert [row.cells[1] for row in rows] == ["0.06", "0.5"]
