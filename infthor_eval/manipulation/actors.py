@@ -1,5 +1,6 @@
 """What drives an arm: it begins an episode, and gives steps until the episode is over."""
 
+import math
 import random
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -18,6 +19,7 @@ __all__ = ["BASELINES", "ArmActor", "ArmBaseline", "ArmSituation", "PolicyActor"
 
 Step = ArmDelta | Sequence[Call]
 _IN_FLIGHT = 2  # episodes at a time; each has two simulators of its own
+_N_NUMBERS = 7  # of a policy's step
 _LARGEST_TURN = 0.17  # radians of a random turn about each axis: 10 degrees
 
 
@@ -82,7 +84,28 @@ class PolicyActor:
         chunk = self._policy.act(blank_like(frame) if self._blank else frame, self._instruction)
         if not chunk:
             raise ModelError(f"{self._policy.name} gives no movement; a policy gives at least one")
+        for step in chunk:
+            _check(step)
         return chunk
+
+
+def _check(step: object) -> None:
+    """Refuse what a policy should not give.
+
+    Raises:
+        ModelError: it is not three lengths, three angles and a gripper, all finite numbers.
+    """
+    if not isinstance(step, ArmDelta):
+        raise ModelError(f"the policy gives {step!r:.60} for a step; it takes an ArmDelta")
+    numbers = (*step.translation, *step.rotation, step.gripper)
+    if (len(step.translation), len(step.rotation)) != (3, 3):
+        raise ModelError(f"the policy gives {len(numbers)} numbers for a step; it takes {_N_NUMBERS}")
+    try:
+        finite = all(math.isfinite(number) for number in numbers)
+    except TypeError:
+        finite = False
+    if not finite:
+        raise ModelError("the policy gives numbers that are not finite; its weights or its input are broken")
 
 
 class _Baseline:

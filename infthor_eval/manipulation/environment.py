@@ -118,6 +118,7 @@ class ArmEnvironment:
         named = {moment.object_id, moment.receptacle_id} & set(lost)
         if named:
             raise UnfitEpisodeError(f"{min(map(str, named))} cannot be brought to where it was")
+        self._goal = moment.view.objects[moment.receptacle_id or moment.object_id]
         pose = moment.view.agent
         stand = Vector(pose.position.x, view.agent.position.y, pose.position.z)
         self._must(teleport_call(AgentPose(stand, pose.rotation, pose.horizon, view.agent.standing)))
@@ -222,8 +223,9 @@ class ArmEnvironment:
         return view
 
     def _distance(self, view: View) -> float:
-        target = self.moment.receptacle_id or self.moment.object_id
-        return gap(point_of(arm_of(view).sphere_center), view.objects[target])
+        # What broke and is no more (an egg) is where it was last.
+        self._goal = view.objects.get(self.moment.receptacle_id or self.moment.object_id, self._goal)
+        return gap(point_of(arm_of(view).sphere_center), self._goal)
 
 
 def arm_of(view: View) -> ArmState:

@@ -1,6 +1,5 @@
 """Leading an arm through one episode."""
 
-import math
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -8,7 +7,6 @@ from dataclasses import dataclass
 
 import msgspec
 
-from infthor_eval.errors import ModelError
 from infthor_eval.formats.scratch import ScratchFolder
 from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.manipulation.actors import ArmActor, ArmSituation, Step
@@ -25,7 +23,6 @@ from model_adapters import ArmDelta
 __all__ = ["ArmStage", "Played", "described"]
 
 _DIGITS = 6  # of metres and rewards: what is beyond is rounding
-_N_NUMBERS = 7  # of a policy's step
 
 
 @dataclass(frozen=True)
@@ -105,7 +102,7 @@ class ArmStage:
         waiting: list[Step] = []
         ended: ArmEnded | None = None
         while ended is None:
-            waiting = waiting or [_checked(step) for step in self._actor.act(outcome.frame)]
+            waiting = waiting or list(self._actor.act(outcome.frame))
             if not waiting:
                 ended = ArmEnded.GAVE_UP
                 break
@@ -130,22 +127,6 @@ class ArmStage:
             return
         with ScratchFolder() as folder:
             yield FrameFolder(folder)
-
-
-def _checked(step: Step) -> Step:
-    """A step as a policy gave it.
-
-    Raises:
-        ModelError: it is not three lengths, three angles and a gripper, all finite.
-    """
-    if isinstance(step, ArmDelta):
-        numbers = (*step.translation, *step.rotation, step.gripper)
-        lengths = len(step.translation), len(step.rotation)
-        if lengths != (3, 3):
-            raise ModelError(f"the policy gives {len(numbers)} numbers for a step; it takes {_N_NUMBERS}")
-        if not all(math.isfinite(number) for number in numbers):
-            raise ModelError("the policy gives numbers that are not finite; its weights or its input are broken")
-    return step
 
 
 def _step(step: Step, outcome: ArmOutcome) -> ArmStep:

@@ -7,6 +7,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 from infthor_eval.errors import InfthorError, SceneError
 from infthor_eval.formats.digests import fingerprint
 from infthor_eval.formats.floor_plans import floor_plans_digest
@@ -28,6 +30,7 @@ from infthor_eval.runs import (
     Workload,
 )
 from infthor_eval.thor.simulators import Simulators
+from infthor_eval.thor.survival import survived
 from model_adapters import Policy, Subject
 
 __all__ = ["ArmUnit", "ManipulationEvaluation"]
@@ -141,7 +144,7 @@ class ManipulationEvaluation:
         trajectory = units[0].course.trajectory
         try:
             with self._experts.one() as expert:
-                history = history_of(trajectory, expert)
+                history, faults = survived(expert, lambda: history_of(trajectory, expert), lambda: None)
         except SceneError as error:
             yield from (unit.excluded(str(error), prints[unit.key]) for unit in units)
             return
@@ -149,7 +152,9 @@ class ManipulationEvaluation:
         with self._arms[camera].one() as simulator:
             stage = ArmStage(trajectory, history, simulator, self._actor(), sees=sees, seed=self._seed)
             for unit in units:
-                yield _recorded(unit, prints[unit.key], stage, self._tasks[unit.key.task])
+                record = _recorded(unit, prints[unit.key], stage, self._tasks[unit.key.task])
+                yield msgspec.structs.replace(record, faults=(*faults, *record.faults))
+                faults = ()  # the expert's are told once
 
     def _actor(self) -> ArmActor:
         if isinstance(self._subject, ArmBaseline):

@@ -1,5 +1,6 @@
 """Results of arms as tables: Table 6 beside the published rows, and what there is to say of the episodes."""
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from itertools import zip_longest
 
@@ -12,6 +13,7 @@ from infthor_eval.tables import Column, Row, Table
 
 __all__ = ["tables"]
 
+_TOLD = 5  # reasons for leaving something out
 _EMBEDDED = "Made in the embedded simulator: not comparable with the published rows, which are of AI2-THOR's own."
 
 
@@ -89,6 +91,12 @@ def _number(value: float | None, digits: int = 1) -> str:
 
 def _notes(runs: Sequence[RunSummary]) -> list[str]:
     notes = [_EMBEDDED] if any(summary.simulator == "embedded" for _, summary in _named(runs)) else []
-    tasks = [task for _, summary in _named(runs) for task in summary.tasks.values()]
-    reasons = {reason: n for task in tasks for reason, n in (task.excluded | task.skipped).items()}
-    return notes + [f"{n} left out: {reason}" for reason, n in sorted(reasons.items())[:5]]
+    reasons: Counter[str] = Counter()
+    for _, summary in _named(runs):
+        tasks = summary.tasks.values()
+        excluded = sum((Counter(task.excluded) for task in tasks), Counter[str]())
+        # The tasks of a run read the same files, and runs side by side leave out the same.
+        reasons |= excluded | Counter({reason: n for task in tasks for reason, n in task.skipped.items()})
+    told = sorted(reasons.items())
+    more = [f"{len(told) - _TOLD} more reasons to leave out"] if len(told) > _TOLD else []
+    return notes + [f"{n} left out: {reason}" for reason, n in told[:_TOLD]] + more

@@ -20,6 +20,7 @@ from infthor_eval.runs.task_settings import task_settings
 __all__ = ["ArmCourse", "ManipulationTask", "TaskSettings"]
 
 _WORDS = {ErrandKind.PICKUP: "pick up the {object}", ErrandKind.PUT: "put the {object} in the {receptacle}"}
+_HALF_TURN = 180.0  # degrees
 _CHOICES = {"kind": tuple(ErrandKind), "grasps": ("target", "all"), "hold": ("middle", "palm")}
 
 
@@ -122,7 +123,7 @@ class ManipulationTask:
 
     def instruction(self, errand: Errand) -> str:
         """What a policy is told."""
-        template = self.settings.instruction or _WORDS[self.kind]
+        template = self._template
         if template == "short":
             return SHORT[self.kind]
         names = {"object": errand.object_type, "receptacle": errand.receptacle_type}
@@ -140,17 +141,25 @@ class ManipulationTask:
             "broken": [list(item) for item in self.courses.broken],
         }
 
+    @property
+    def _template(self) -> str:
+        return _WORDS[self.kind] if self.settings.instruction is None else self.settings.instruction
+
     def _check(self) -> None:
-        """Refuse a radius that AI2-THOR does not take, and words that do not tell what is meant.
+        """Refuse numbers that no hand and no camera has, and words that do not tell the object.
 
         Raises:
-            UsageError: of either.
+            UsageError: of any of them.
         """
+        if self.settings.field_of_view >= _HALF_TURN:
+            raise UsageError(f"{self.name}: field_of_view {self.settings.field_of_view} is not below 180 degrees")
+        if self.settings.gripper_threshold > 1:
+            raise UsageError(f"{self.name}: gripper_threshold {self.settings.gripper_threshold} is above 1, fully open")
         if not RADII[0] <= self.settings.radius <= RADII[1]:
             raise UsageError(
                 f"{self.name}: radius {self.settings.radius} is not within {RADII[0]} to {RADII[1]} metres"
             )
-        template = self.settings.instruction or _WORDS[self.kind]
+        template = self._template
         known = {"object", "receptacle"} if self.kind == ErrandKind.PUT else {"object"}
         try:
             fields = {name for _, name, form, turn in string.Formatter().parse(template) if name is not None}

@@ -238,7 +238,7 @@ def owner_of(world: World, item: SimObject) -> SimObject | None:
 
 def _holding_cost(receptacle: SimObject, point: Array, item: SimObject) -> float | None:
     """How far-fetched it is that a thing whose underside is at `point` stands in `receptacle`; None: it does not."""
-    low, high = receptacle.bounds()
+    low, high = (corner + drawer_offset(receptacle) for corner in receptacle.bounds())
     if not (low[0] - 0.01 <= point[0] <= high[0] + 0.01 and low[2] - 0.01 <= point[2] <= high[2] + 0.01):
         return None
     if receptacle.object_type == "Floor":

@@ -1,0 +1,84 @@
+"""Runs and episodes of arms on trajectories that are cut down, in simulators that all tests share."""
+
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from infthor_eval.cli.requests import Asked, requests_for
+from infthor_eval.runs import PreparedRun, prepare
+from infthor_eval.thor.launch import embedded
+from infthor_eval.thor.simulator import Simulator
+
+from ..agents.cut import MUG, cut, write
+from .arena import Arena
+from .pool import Pool
+
+ASKED = ("tasks", "data", "output", "seed", "limit", "fresh", "recover")
+
+
+@pytest.fixture(scope="session")
+def pool() -> Iterator[Pool]:
+    pool = Pool()
+    with pool.open:
+        yield pool
+
+
+@pytest.fixture
+def shared_simulators(pool: Pool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Has runs of manipulation use the shared processes instead of starting their own."""
+    monkeypatch.setattr("infthor_eval.manipulation.evaluation.Simulators", pool.kind())
+
+
+@pytest.fixture(scope="session")
+def arena(pool: Pool, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., Arena]]:
+    """Makes the arena of a bundled trajectory, cut to so many plans; each has an arm's simulator of its own."""
+    made: dict[tuple[str, int], Arena] = {}
+    with ExitStack() as opened:
+
+        def make(name: str, n_plans: int) -> Arena:
+            if (name, n_plans) not in made:
+                data = write(tmp_path_factory.mktemp("arena") / "data", cut(name, n_plans))
+                options = {"image": False, "instances": False}
+                arm = Simulator(embedded(), max_copies=64, agentMode="arm", **options)  # type: ignore[arg-type]
+                opened.enter_context(arm)
+                with pool.one(**options) as expert:
+                    made[name, n_plans] = Arena(data, expert, arm)
+            return made[name, n_plans]
+
+        yield make
+
+
+@pytest.fixture
+def data(tmp_path: Path) -> Path:
+    """A folder with a pick-up and a put of a mug."""
+    return write(tmp_path / "data", cut(MUG))
+
+
+@pytest.fixture
+def prepared(data: Path, tmp_path: Path) -> Callable[..., PreparedRun]:
+    """A run on that, ready to be executed; keyword arguments are the model's, those of `Asked`, and the suite's."""
+
+    def make(model: str = "planner-arm", model_options: dict[str, str] | None = None, **changes: Any) -> PreparedRun:
+        settings = {name: changes.pop(name) for name in ASKED if name in changes}
+        settings = {"tasks": ("manipulathor",), "data": data, "output": tmp_path / "out", **settings}
+        ((request, suite),) = requests_for(Asked(**settings, suite_options=changes), model, model_options or {})
+        return prepare(request, suite)
+
+    return make
+
+
+@pytest.fixture
+def task_file(task_files: Path) -> Callable[..., None]:
+    """Has the tasks of pick-ups and puts say something more in their `dataset_kwargs`."""
+
+    def write_tasks(settings: str, kinds: tuple[str, ...] = ("pickup", "put")) -> None:
+        for kind in kinds:
+            (task_files / "manipulation" / f"manipulathor_{kind}.yaml").write_text(
+                f"include: _manipulation.yaml\ntask: manipulathor_{kind}\n"
+                f"dataset_kwargs: {{kind: {kind}, {settings}}}\n"
+            )
+
+    return write_tasks

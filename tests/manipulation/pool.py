@@ -1,0 +1,49 @@
+"""Simulator processes that runs of different tests use one after the other."""
+
+from collections import defaultdict
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from queue import Empty, SimpleQueue
+from typing import Any
+
+from infthor_eval.thor.launch import embedded
+from infthor_eval.thor.simulator import Simulator
+
+Options = tuple[tuple[str, Any], ...]
+
+
+class Pool:
+    """Simulators by their options; each is one episode's at a time, as in `Simulators`."""
+
+    def __init__(self) -> None:
+        self.open = ExitStack()
+        self._idle: dict[Options, SimpleQueue[Simulator]] = defaultdict(SimpleQueue)
+
+    @contextmanager
+    def one(self, **options: Any) -> Iterator[Simulator]:
+        idle = self._idle[tuple(sorted(options.items()))]
+        try:
+            simulator = idle.get_nowait()
+        except Empty:
+            simulator = self.open.enter_context(Simulator(embedded(), max_copies=64, **options))
+        try:
+            yield simulator
+        finally:
+            idle.put(simulator)
+
+    def kind(self) -> type:
+        """What takes the place of `Simulators`."""
+        pool = self
+
+        class Shared:
+            def __init__(self, name: str, scenes: Path | None, trajectories: object, **options: Any) -> None:
+                self._options = options
+
+            def one(self) -> Any:
+                return pool.one(**self._options)
+
+            def close(self) -> None:
+                """They go on for other tests."""
+
+        return Shared

@@ -1,0 +1,40 @@
+"""A policy that does what it is told, for what no real one does on demand."""
+
+from collections.abc import Callable
+from typing import Any
+
+from infthor_eval.formats.frames import FrameRef
+from model_adapters import Capabilities
+
+
+class ScriptedPolicy:
+    """Gives what a function makes of what it sees and is told; keeps what that was.
+
+    Attributes:
+        seen: bytes of the frames.
+        told: instructions.
+        resets: how often an episode began, by the number of acts before it.
+    """
+
+    name = "scripted-policy"
+    capabilities = Capabilities(counts_tokens=False, token_ids=False)
+
+    def __init__(self, gives: Callable[[int], Any]) -> None:
+        self._gives = gives
+        self.seen: list[bytes] = []
+        self.told: list[str] = []
+        self.resets: list[int] = []
+
+    def identity(self) -> dict[str, Any]:
+        return {"name": self.name}
+
+    def reset(self) -> None:
+        self.resets.append(len(self.told))
+
+    def act(self, frame: FrameRef, instruction: str) -> Any:
+        self.seen.append(frame.path.read_bytes())
+        self.told.append(instruction)
+        return self._gives(len(self.told) - 1 - self.resets[-1])
+
+    def close(self) -> None:
+        """Nothing is held."""
