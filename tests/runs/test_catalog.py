@@ -13,7 +13,7 @@ def test_the_packaged_tasks_are_those_that_lm_eval_sees():
     assert [task.name for task in catalog.expand(["nieh"])] == ["nieh_gt", "nieh_full"]
     twice = catalog.expand(["nieh_mini_full", "nieh_mini"])
     assert [task.name for task in twice] == ["nieh_mini_full", "nieh_mini_gt"]
-    assert {task.suite for task in catalog.tasks.values()} == {"nieh", "plans"}
+    assert {task.suite for task in catalog.tasks.values()} == {"nieh", "plans", "manipulation"}
     assert catalog.tasks["nieh_gt"].settings["generation_kwargs"]["max_gen_toks"] == 50
 
 
