@@ -212,3 +212,20 @@ def test_a_push_leaves_things_in_what_is_closed(bench):
     outer = inside.parent
     bench.ok("PushObject", objectId=inside.object_id, moveMagnitude=500, forceAction=True)
     assert bench.object(inside.object_id)["parentReceptacles"] == [outer]
+
+
+def test_a_thing_teleported_into_the_tray_of_an_open_drawer_is_in_it_and_goes_with_it(bench):
+    world = bench.sim.world
+    drawer = next(o for o in world.objects.values() if o.object_type == "Drawer" and o.contents)
+    (item, *_) = (o for o in world.objects.values() if o.object_id in drawer.contents)
+    bench.ok("OpenObject", objectId=drawer.object_id, openness=1.0, forceAction=True)
+    out = bench.object(item.object_id)
+    aside = {**out["position"], "y": out["position"]["y"] + 1.0}
+    for position in (aside, out["position"]):
+        bench.ok(
+            "TeleportObject", objectId=item.object_id, position=position, rotation=out["rotation"],
+            forceAction=True, forceKinematic=True,
+        )  # fmt: skip
+    assert bench.object(item.object_id)["parentReceptacles"] == out["parentReceptacles"] == [drawer.object_id]
+    bench.ok("CloseObject", objectId=drawer.object_id, forceAction=True)
+    assert bench.object(item.object_id)["position"] != out["position"]
