@@ -1,8 +1,14 @@
 """Tables as values: what suites say, before it is known whether a terminal or a page shows it."""
 
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-__all__ = ["Column", "Row", "Table"]
+__all__ = ["Column", "Row", "Table", "told_left_out"]
+
+_TOLD = 5  # reasons that a table tells of
+
+Reasons = Mapping[str, int]
 
 
 @dataclass(frozen=True)
@@ -48,3 +54,19 @@ class Table:
     columns: tuple[Column, ...]
     rows: tuple[Row, ...]
     notes: tuple[str, ...] = ()
+
+
+def told_left_out(runs: Sequence[Sequence[tuple[Reasons, Reasons]]]) -> list[str]:
+    """Notes on what does not count, by reason.
+
+    Args:
+        runs: of each run, of each of its tasks: what was excluded, and what was skipped, by reason. The tasks of a run
+            read the same files, and runs side by side leave out the same.
+    """
+    reasons: Counter[str] = Counter()
+    for tasks in runs:
+        excluded = sum((Counter(one) for one, _ in tasks), Counter[str]())
+        reasons |= excluded | Counter({reason: n for _, skipped in tasks for reason, n in skipped.items()})
+    told = sorted(reasons.items())
+    more = [f"{len(told) - _TOLD} more reasons to leave out"] if len(told) > _TOLD else []
+    return [f"{n} left out: {reason}" for reason, n in told[:_TOLD]] + more

@@ -6,7 +6,7 @@ from infthor_eval.agents.summary import FINAL_COLUMNS, PlansSummary, TaskSummary
 from infthor_eval.formats.published import published_tables
 from infthor_eval.rates import number, percent
 from infthor_eval.runs import RunSummary
-from infthor_eval.tables import Column, Row, Table
+from infthor_eval.tables import Column, Row, Table, told_left_out
 
 __all__ = ["tables"]
 
@@ -74,8 +74,7 @@ def _sizes(task: TaskSummary) -> tuple[str, ...]:
 
 def _notes(runs: Sequence[RunSummary]) -> list[str]:
     notes = [_EMBEDDED] if any(run.summary.simulator == "embedded" for run in runs) else []
-    reasons = {reason: n for _, _, task in _tasks(runs) for reason, n in (task.excluded | task.skipped).items()}
-    return notes + [f"{n} left out: {reason}" for reason, n in sorted(reasons.items())[:5]]
+    return notes + told_left_out([[(t.excluded, t.skipped) for t in run.summary.tasks.values()] for run in runs])
 
 
 def _is_final(run: RunSummary) -> bool:

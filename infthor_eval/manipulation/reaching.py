@@ -90,7 +90,8 @@ def _put(environment: ArmEnvironment) -> Steps:
     every = _all_places(environment, receptacle)
     entry = _entry(environment.view, receptacle, every)
     held, others = environment.view.objects[environment.moment.object_id], _others(environment, receptacle)
-    safe = [p for p in every if not _sticks_out(p, held, receptacle) and not _is_taken(p, held, others)]
+    free = [p for p in every if not _sticks_out(p, held, receptacle) and not _is_taken(p, held, others)]
+    safe = [p for p in free if not _is_covered(p, environment.view, receptacle)]
     for call, place in _ways(environment, receptacle, every, entry):
         yield [call]
         if _is_over(environment, receptacle, [*safe, place]):
@@ -233,12 +234,12 @@ def _best_places(
     lever = math.dist(middle_of(held), point_of(arm_of(view).wrist))
     aside = _aside(_entry(view, receptacle, places), places)
 
-    def order(place: Point) -> tuple[bool, bool, bool, int, float]:
+    def order(place: Point) -> tuple[bool, bool, bool, bool, int, float]:
         goal = _wrist_above(environment, place, clearance, receptacle)
         level = math.hypot(place[0] - shoulder[0], place[2] - shoulder[2])
         too_far = level > _REACH + lever or not _LOWEST - 0.4 < goal[1] - _floor(view) < _LOWEST + _RANGE + 0.4
         taken, out = _is_taken(place, held, others), _sticks_out(place, held, receptacle)
-        return too_far, taken, out, aside[place], level
+        return too_far, _is_covered(place, view, receptacle), taken, out, aside[place], level
 
     return sorted(places, key=order)[:_PLACES]
 
@@ -267,6 +268,17 @@ def _is_taken(place: Point, held: ThorObject, others: Sequence[ThorObject]) -> b
     for other in others:
         apart, reach = away(middle_of(other), place), size_of(other)
         if all(abs(apart[axis]) < (reach[axis] + width[axis]) / 2 for axis in (0, 2)):
+            return True
+    return False
+
+
+def _is_covered(place: Point, view: View, receptacle: ThorObject) -> bool:
+    """Whether other furniture reaches over a place, as a counter does over a drawer."""
+    for other in view.objects.values():
+        if other.pickupable or other.object_id == receptacle.object_id:
+            continue
+        apart, reach = away(middle_of(other), place), size_of(other)
+        if abs(apart[0]) < reach[0] / 2 and abs(apart[2]) < reach[2] / 2 and apart[1] < 0:
             return True
     return False
 

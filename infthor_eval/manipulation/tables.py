@@ -1,6 +1,5 @@
 """Results of arms as tables: Table 6 beside the published rows, and what there is to say of the episodes."""
 
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from itertools import zip_longest
 
@@ -9,11 +8,10 @@ from infthor_eval.manipulation.history import ErrandKind
 from infthor_eval.manipulation.summary import ManipulationSummary, TaskSummary
 from infthor_eval.rates import Rate, percent
 from infthor_eval.runs import RunSummary
-from infthor_eval.tables import Column, Row, Table
+from infthor_eval.tables import Column, Row, Table, told_left_out
 
 __all__ = ["tables"]
 
-_TOLD = 5  # reasons for leaving something out
 _EMBEDDED = "Made in the embedded simulator: not comparable with the published rows, which are of AI2-THOR's own."
 
 
@@ -91,12 +89,4 @@ def _number(value: float | None, digits: int = 1) -> str:
 
 def _notes(runs: Sequence[RunSummary]) -> list[str]:
     notes = [_EMBEDDED] if any(summary.simulator == "embedded" for _, summary in _named(runs)) else []
-    reasons: Counter[str] = Counter()
-    for _, summary in _named(runs):
-        tasks = summary.tasks.values()
-        excluded = sum((Counter(task.excluded) for task in tasks), Counter[str]())
-        # The tasks of a run read the same files, and runs side by side leave out the same.
-        reasons |= excluded | Counter({reason: n for task in tasks for reason, n in task.skipped.items()})
-    told = sorted(reasons.items())
-    more = [f"{len(told) - _TOLD} more reasons to leave out"] if len(told) > _TOLD else []
-    return notes + [f"{n} left out: {reason}" for reason, n in told[:_TOLD]] + more
+    return notes + told_left_out([[(t.excluded, t.skipped) for t in s.tasks.values()] for _, s in _named(runs)])
