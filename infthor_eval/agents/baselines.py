@@ -2,13 +2,13 @@
 
 import random
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
 
 from infthor_eval.agents.actors import Act, Baseline, Situation
 from infthor_eval.agents.environment import StepOutcome
 from infthor_eval.agents.habits import Habits
 from infthor_eval.agents.script import scripted
 from infthor_eval.formats.trajectory import Trajectory
+from infthor_eval.runs.yardstick import Yardstick
 from infthor_eval.thor.actions import applicable_calls
 from model_adapters import Capabilities
 
@@ -17,24 +17,13 @@ __all__ = ["BASELINES"]
 _IN_FLIGHT = 4  # episodes at a time; each has a simulator of its own
 
 
-class _Unseeing:
-    """What baselines have in common: they are their own actors' makers and have no options."""
+class _Unseeing(Yardstick):
+    """What the baselines of plans have in common."""
 
-    name = ""
     capabilities = Capabilities(counts_tokens=False, token_ids=False, max_in_flight=_IN_FLIGHT)
-
-    def __init__(self, seed: int) -> None:
-        self._seed = seed
-
-    def identity(self) -> dict[str, Any]:
-        """The name alone: what is drawn depends on the run's own seed."""
-        return {"baseline": self.name}
 
     def fit(self, trajectories: Sequence[Trajectory]) -> None:
         """Nothing to learn."""
-
-    def close(self) -> None:
-        """Nothing is held."""
 
 
 class _Reader:

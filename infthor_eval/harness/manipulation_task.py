@@ -5,11 +5,11 @@ lm-eval has no simulator and no policies, so our model class alone can answer, w
 
 import json
 from collections.abc import Sequence
-from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 from infthor_eval.errors import UsageError
+from infthor_eval.harness.episode_docs import about_run
 from infthor_eval.harness.registration import model_takes_references, register
 from infthor_eval.manipulation.evaluation import ManipulationEvaluation
 from infthor_eval.manipulation.options import ManipulationOptions
@@ -22,8 +22,6 @@ __all__ = ["arm_evaluation", "arm_response", "dataset", "doc_to_target", "doc_to
 register()  # see `nieh_task`
 
 Doc = dict[str, Any]
-_SETTINGS = tuple(item.name for item in fields(TaskSettings))
-_OPTIONS = tuple(item.name for item in fields(ManipulationOptions))
 
 
 def dataset(**config: Any) -> dict[str, Any]:
@@ -43,11 +41,7 @@ def dataset(**config: Any) -> dict[str, Any]:
             "arms are driven in a simulator, which infthor-eval's policies alone do; use --model infthor"
             " --model_args adapter=openvla"
         )
-    about = {
-        "settings": json.dumps({name: config[name] for name in _SETTINGS if config.get(name) is not None}),
-        "options": json.dumps({name: config[name] for name in _OPTIONS if name in config and name not in _SETTINGS}),
-        "data": str(config.get("data") or ""),
-    }
+    about = about_run(config, TaskSettings, ManipulationOptions)
     units = arm_evaluation(about, "dataset", 0).units
     return {
         "test": Dataset.from_list([

@@ -6,7 +6,6 @@ response tells what came of every plan (`episode_response`).
 
 import json
 from collections.abc import Iterable, Sequence
-from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +14,7 @@ from infthor_eval.agents.options import PlansOptions
 from infthor_eval.agents.records import PlanRecord
 from infthor_eval.agents.task import TaskSettings
 from infthor_eval.errors import UsageError
+from infthor_eval.harness.episode_docs import about_run
 from infthor_eval.harness.registration import model_takes_references, register
 from infthor_eval.runs import TaskFile, TaskRequest, UnitRecord
 
@@ -23,8 +23,6 @@ __all__ = ["dataset", "doc_to_target", "doc_to_text", "episode_response", "evalu
 register()  # see `nieh_task`
 
 Doc = dict[str, Any]
-_SETTINGS = tuple(item.name for item in fields(TaskSettings))
-_OPTIONS = tuple(item.name for item in fields(PlansOptions))
 
 
 def dataset(**config: Any) -> dict[str, Any]:
@@ -43,11 +41,7 @@ def dataset(**config: Any) -> dict[str, Any]:
         raise UsageError(
             "plans are carried out in a simulator, which infthor-eval's models alone do; use --model infthor"
         )
-    about = {
-        "settings": json.dumps({name: config[name] for name in _SETTINGS if config.get(name) is not None}),
-        "options": json.dumps({name: config[name] for name in _OPTIONS if name in config and name not in _SETTINGS}),
-        "data": str(config.get("data") or ""),
-    }
+    about = about_run(config, TaskSettings, PlansOptions)
     plans = evaluation_around({**about, "traj_id": ""}, "dataset", {"max_gen_toks": 1}, 0)
     return {"test": Dataset.from_list([{**about, "traj_id": name, "plans": texts} for name, texts in plans.outline()])}
 

@@ -4,7 +4,7 @@ import math
 import random
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol, runtime_checkable
+from typing import Protocol, runtime_checkable
 
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.blank import blank_like
@@ -13,6 +13,7 @@ from infthor_eval.manipulation.conversion import Call
 from infthor_eval.manipulation.environment import ArmEnvironment
 from infthor_eval.manipulation.history import ErrandKind
 from infthor_eval.manipulation.reaching import plan
+from infthor_eval.runs.yardstick import Yardstick
 from model_adapters import ArmDelta, Capabilities, Policy, Subject
 
 __all__ = ["BASELINES", "ArmActor", "ArmBaseline", "ArmSituation", "PolicyActor"]
@@ -108,21 +109,10 @@ def _check(step: object) -> None:
         raise ModelError("the policy gives numbers that are not finite; its weights or its input are broken")
 
 
-class _Baseline:
-    """What baselines have in common."""
+class _Baseline(Yardstick):
+    """What the baselines of arms have in common."""
 
-    name = ""
     capabilities = Capabilities(counts_tokens=False, token_ids=False, max_in_flight=_IN_FLIGHT)
-
-    def __init__(self, seed: int) -> None:
-        self._seed = seed
-
-    def identity(self) -> dict[str, Any]:
-        """The name alone: what is drawn depends on the run's own seed."""
-        return {"baseline": self.name}
-
-    def close(self) -> None:
-        """Nothing is held."""
 
 
 class _StillActor:

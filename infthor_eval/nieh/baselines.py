@@ -11,7 +11,8 @@ from infthor_eval.formats.question import Question
 from infthor_eval.nieh.contexts import Sample
 from infthor_eval.nieh.docs import doc_target
 from infthor_eval.nieh.guessing import Chain, Guesser, chains_of_words, chains_of_words_and_count
-from model_adapters import Capabilities, Subject
+from infthor_eval.runs.yardstick import Yardstick
+from model_adapters import Subject
 
 __all__ = ["BASELINES", "Baseline", "Predict", "question_type"]
 
@@ -36,28 +37,7 @@ class Baseline(Subject, Protocol):
         ...
 
 
-class _KeyReader:
-    """What baselines have in common.
-
-    Args:
-        seed: of the run.
-    """
-
-    name = ""
-    capabilities = Capabilities(counts_tokens=False, token_ids=False)
-
-    def __init__(self, seed: int) -> None:
-        self._seed = seed
-
-    def identity(self) -> dict[str, Any]:
-        """The name alone: a baseline has no options."""
-        return {"baseline": self.name}
-
-    def close(self) -> None:
-        """Nothing is held."""
-
-
-class Oracle(_KeyReader):
+class Oracle(Yardstick):
     """Reads the answer key: what a perfect model would score."""
 
     name = "oracle"
@@ -67,7 +47,7 @@ class Oracle(_KeyReader):
         return lambda sample: doc_target(sample.question)
 
 
-class Blind(_KeyReader):
+class Blind(Yardstick):
     """The best guess from the question's words, learned on the other trajectories: what can be had without looking."""
 
     name = "blind"
@@ -85,7 +65,7 @@ class BlindCount(Blind):
     _chains = staticmethod(chains_of_words_and_count)
 
 
-class Random(_KeyReader):
+class Random(Yardstick):
     """An answer drawn from those of the question's type, each as likely as it is frequent."""
 
     name = "random"
