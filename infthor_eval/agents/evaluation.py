@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
 
@@ -135,7 +136,7 @@ class PlansEvaluation:
         """See `infthor_eval.runs.Evaluation.view`."""
         payload, task = record.payload, self._tasks[record.task]
         return SampleView(
-            number=self._numbers(record.task)[record.key],
+            number=self._numbers[record.key],
             doc={"traj_id": record.cluster, "plan": payload.index, "kind": payload.kind, "goal": payload.goal},
             target=payload.plan,
             prompt=f"{payload.goal}\n{payload.plan}",
@@ -153,11 +154,14 @@ class PlansEvaluation:
         in_words = seen and any(task.memory.needs_state for task in self._tasks.values())
         return Simulators(self._options.simulator, self._scenes, self._trajectories, image=seen, instances=in_words)
 
-    def _numbers(self, task: str) -> dict[UnitKey, int]:
-        """Places of the plans in their task."""
-        found = self._tasks[task]
-        keys = [PlanUnit.of(task, course, plan).key for course in found.limited for plan in found.plans(course)]
-        return {key: number for number, key in enumerate(keys)}
+    @cached_property
+    def _numbers(self) -> dict[UnitKey, int]:
+        """Places of the plans in their tasks."""
+        found: dict[UnitKey, int] = {}
+        for name, task in self._tasks.items():
+            plans = [(course, plan) for course in task.limited for plan in task.plans(course)]
+            found |= {PlanUnit.of(name, *plan).key: number for number, plan in enumerate(plans)}
+        return found
 
     def _fingerprint(self, unit: PlanUnit) -> str:
         return fingerprint(

@@ -3,7 +3,9 @@
 from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
+from functools import cached_property
 from importlib.metadata import version
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -117,9 +119,8 @@ class ManipulationEvaluation:
     def view(self, record: UnitRecord[ArmRecord]) -> SampleView:
         """See `infthor_eval.runs.Evaluation.view`."""
         payload, task = record.payload, self._tasks[record.task]
-        keys = [unit.key for unit in self.units if unit.key.task == record.task]
         return SampleView(
-            number=keys.index(record.key),
+            number=self._numbers[record.key],
             doc={"traj_id": record.cluster, "action": payload.index, "kind": payload.kind},
             target=payload.instruction,
             prompt=payload.instruction,
@@ -130,6 +131,12 @@ class ManipulationEvaluation:
     def close(self) -> None:
         """See `infthor_eval.runs.Evaluation.close`."""
         self._open.close()
+
+    @cached_property
+    def _numbers(self) -> dict[UnitKey, int]:
+        """Places of the episodes in their tasks."""
+        by_task = groupby(self.units, key=lambda unit: unit.key.task)
+        return {unit.key: number for _, same in by_task for number, unit in enumerate(same)}
 
     def _by_trajectory(self) -> dict[str, list[ArmUnit]]:
         """The episodes of all tasks by trajectory, in time order: they share its history."""
@@ -174,14 +181,8 @@ class ManipulationEvaluation:
             return made
 
         arms = {
-            task.camera: simulators(
-                image=seen,
-                agentMode="arm",
-                width=task.settings.image_size,
-                height=task.settings.image_size,
-                fieldOfView=task.settings.field_of_view,
-            )
-            for task in self._tasks.values()
+            (size, angle): simulators(image=seen, agentMode="arm", width=size, height=size, fieldOfView=angle)
+            for size, angle in {task.camera for task in self._tasks.values()}
         }
         return simulators(image=False), arms
 
