@@ -16,7 +16,7 @@ def evaluate(requests: Sequence[tuple[RunRequest, Suite]]) -> int:
     """Run the requests one after another, and print one set of tables per suite.
 
     Returns:
-        Exit code: 1 where a unit failed, or nothing of a run counts, else 0.
+        Exit code: 130 where somebody stopped it, 1 where a unit failed, or nothing of a run counts, else 0.
     """
     with NOTES.status("looking at the tasks and their data"):  # retrieval embeds every frame: minutes
         runs = [prepare(request, suite) for request, suite in requests]
@@ -24,6 +24,8 @@ def evaluate(requests: Sequence[tuple[RunRequest, Suite]]) -> int:
     for run in runs:
         outcomes.append(execute_with_progress(run))
         export(outcomes[-1])
+        if outcomes[-1].n_missing:
+            break
     console = table_console()
     for _, of_suite in groupby(sorted(outcomes, key=_suite_name), key=_suite_name):
         same = list(of_suite)
@@ -33,7 +35,7 @@ def evaluate(requests: Sequence[tuple[RunRequest, Suite]]) -> int:
         console.print(f"{outcome.summary.header.name}: {outcome.folder}")
     n_failed = sum(map(_say_what_failed, outcomes))  # every run says what failed
     n_void = sum(map(_say_if_void, outcomes))
-    return int(n_failed + n_void > 0)
+    return 130 if outcomes[-1].n_missing else int(n_failed + n_void > 0)
 
 
 def _suite_name(outcome: RunOutcome) -> str:

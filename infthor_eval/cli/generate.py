@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING
 import click
 
 from infthor_eval.cli.options import LARGEST, floor_plans_option
+from infthor_eval.cli.staffing_options import staffing_options
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from infthor_eval.generation.generate_set import GenerationSummary
+    from infthor_eval.workers import Staffing
 
 __all__ = ["command"]
 
@@ -30,6 +32,7 @@ _PATH = click.Path(path_type=Path)
 @click.option("--test-set", is_flag=True, help="As the published test sets: with a final task, without bathrooms.")
 @click.option("--out", required=True, type=_PATH, help="Directory for the trajectory files.")
 @floor_plans_option
+@staffing_options
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as one JSON object.")
 @click.pass_context
 def command(
@@ -44,6 +47,7 @@ def command(
     test_set: bool,
     out: Path,
     data: Path | None,
+    staffing: Staffing,
     as_json: bool,
 ) -> None:
     """Generate trajectories: tasks are sampled, planned, and carried out in the embedded simulator.
@@ -51,11 +55,10 @@ def command(
     Trajectories that the directory has already are not made again. Exit status 1 where one could not be made.
     """
     from infthor_eval.formats.files import prepared_folder
-    from infthor_eval.generation.generate_set import generate_set
+    from infthor_eval.generation.generate_set import generate_with_workers
     from infthor_eval.generation.jobs import trajectory_jobs, without_bathrooms
     from infthor_eval.terminal import console, error_console, progress_bar
     from infthor_eval.thor.launch import embedded
-    from infthor_eval.thor.simulator import Simulator
 
     notes = error_console()
     chosen, skipped = without_bathrooms(scenes) if test_set else (scenes, [])
@@ -71,9 +74,9 @@ def command(
         max_fail=max_fail,
     )
     prepared_folder(out)
-    with Simulator(embedded(data)) as simulator, progress_bar(notes) as progress:
+    with progress_bar(notes) as progress:
         bar = progress.add_task("generate", total=len(jobs))
-        result = generate_set(jobs, simulator, out, lambda: progress.advance(bar))
+        result = generate_with_workers(jobs, embedded(data), out, staffing, lambda: progress.advance(bar), notes.print)
     if as_json:
         import msgspec
 

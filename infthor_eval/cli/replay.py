@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING
 import click
 
 from infthor_eval.cli.options import floor_plans_option
+from infthor_eval.cli.staffing_options import staffing_options
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from infthor_eval.generation.replay_summary import ReplaySummary
+    from infthor_eval.workers import Staffing
 
 __all__ = ["command"]
 
@@ -28,6 +30,7 @@ _SHOWN = 20  # failures and divergences printed one by one; all are in the JSON 
 @click.option("--per-floor-plan", type=click.IntRange(1), help="At most this many of one floor plan.")
 @click.option("--frames", type=click.IntRange(1), default=1, show_default=True, help="Frames per move or turn.")
 @click.option("--unity", is_flag=True, help="Use AI2-THOR's own Unity build, not the embedded simulator.")
+@staffing_options
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as one JSON object.")
 @click.pass_context
 def command(
@@ -39,6 +42,7 @@ def command(
     per_floor_plan: int | None,
     frames: int,
     unity: bool,
+    staffing: Staffing,
     as_json: bool,
 ) -> None:
     """Replay trajectories (.json, .jsonl, .jsonl.gz, directories) into an NIEH set.
@@ -48,11 +52,10 @@ def command(
     replay goes on. Exit status 1 where a trajectory could not be replayed at all.
     """
     from infthor_eval.formats.files import prepared_folder
-    from infthor_eval.generation.replay_set import replay_set, select
+    from infthor_eval.generation.replay_set import replay_with_workers, select
     from infthor_eval.generation.replay_summary import summarise
     from infthor_eval.terminal import console, error_console, progress_bar
     from infthor_eval.thor import launch
-    from infthor_eval.thor.simulator import Simulator
     from infthor_eval.thor.supplement import supplement_file
 
     notes = error_console()
@@ -60,9 +63,11 @@ def command(
     selection = select(trajectories, limit, per_floor_plan)
     with supplement_file(trajectory for _, trajectory in selection.items) as supplement:
         start = launch.unity() if unity else launch.embedded(data, supplement)
-        with Simulator(start) as simulator, progress_bar(notes) as progress:
+        with progress_bar(notes) as progress:
             bar = progress.add_task("replay", total=len(selection.items))
-            replayed = replay_set(selection, simulator, out, lambda: progress.advance(bar), frames)
+            replayed = replay_with_workers(
+                selection, start, out, staffing, frames, lambda: progress.advance(bar), notes.print
+            )
     if as_json:
         import msgspec
 

@@ -10,6 +10,7 @@ from infthor_eval.cli.suite_options import chosen_options
 from infthor_eval.errors import UsageError
 from infthor_eval.runs import Catalog, RunRequest, Suite, TaskRequest
 from infthor_eval.suites import split_by_suite, suite_named
+from infthor_eval.workers import Staffing
 
 __all__ = ["Asked", "requests_for"]
 
@@ -26,6 +27,7 @@ class Asked:
         output: results folder.
         fresh: start anew.
         recover: go on without bad lines.
+        staffing: how many workers, and where.
         suite_options: option names to values, of all suites; None where not given.
     """
 
@@ -36,6 +38,7 @@ class Asked:
     seed: int = 0
     fresh: bool = False
     recover: bool = False
+    staffing: Staffing = field(default_factory=Staffing)
     suite_options: Mapping[str, Any] = field(default_factory=dict)
 
 
@@ -70,6 +73,7 @@ def requests_for(
                 name=name,
                 fresh=asked.fresh,
                 recover=asked.recover,
+                staffing=asked.staffing,
             )
             requests.append((request, suite_named(suite_name)))
     return requests

@@ -6,7 +6,9 @@ from typing import Any
 import click
 
 from infthor_eval.cli.options import LARGEST, SEED, model_options_in, names_in
+from infthor_eval.cli.staffing_options import staffing_options
 from infthor_eval.cli.suite_options import suite_options
+from infthor_eval.workers import Staffing
 
 __all__ = ["command"]
 
@@ -33,6 +35,7 @@ __all__ = ["command"]
 @click.option("--seed", type=SEED, default=0, show_default=True, help="For whatever is random.")
 @click.option("--fresh", is_flag=True, help="Start anew; the journal of an earlier run is set aside.")
 @click.option("--recover", is_flag=True, help="Go on without the bad lines of a damaged journal.")
+@staffing_options
 @suite_options
 def command(
     models: str,
@@ -46,6 +49,7 @@ def command(
     seed: int,
     fresh: bool,
     recover: bool,
+    staffing: Staffing,
     **given: Any,
 ) -> int:
     """Evaluate MODEL on TASKS and print the results beside the published ones.
@@ -68,6 +72,7 @@ def command(
         output=output,
         fresh=fresh,
         recover=recover,
+        staffing=staffing,
         suite_options=given,
     )
     named = names_in(models, "--model")

@@ -6,6 +6,8 @@ from typing import Literal
 import click
 
 from infthor_eval.cli.options import SEED, model_options_in, names_in
+from infthor_eval.cli.staffing_options import staffing_options
+from infthor_eval.workers import Staffing
 
 __all__ = ["command"]
 
@@ -18,6 +20,7 @@ __all__ = ["command"]
 @click.option("--decisions", type=click.Path(path_type=Path), help="The inspection list with keep or drop filled in.")
 @click.option("--scorer", type=click.Choice(["strict", "reference"]), default="strict", show_default=True)
 @click.option("--seed", type=SEED, default=0, show_default=True, help="For whatever is random.")
+@staffing_options
 def command(
     set_folder: Path,
     models: str,
@@ -26,6 +29,7 @@ def command(
     decisions: Path | None,
     scorer: Literal["strict", "reference"],
     seed: int,
+    staffing: Staffing,
 ) -> int:
     """Ask every question of SET of each model, on its clue frames alone, and keep what one of them answers.
 
@@ -40,7 +44,7 @@ def command(
         if model in options:
             raise click.UsageError(f"--model-args for {model} is given twice; give it once")
         options[model] = given
-    asked = Asked(tasks=("nieh_gt",), data=set_folder, output=out / "runs", seed=seed)
+    asked = Asked(tasks=("nieh_gt",), data=set_folder, output=out / "runs", seed=seed, staffing=staffing)
     requests = [
         request
         for model in names_in(models, "--models")

@@ -28,14 +28,18 @@ def validate(
         scorer: under which an answer is correct.
 
     Returns:
-        Exit code: 1 where a model failed on a question, else 0.
+        Exit code: 130 where somebody stopped it, 1 where a model failed on a question, else 0.
     """
     decisions = read_decisions(decisions_file) if decisions_file else {}
     data = find_set(str(requests[0][0].tasks.data))
     check_decisions(decisions, data.questions)
     check_place(out, data)
     runs = [prepare(request, suite) for request, suite in requests]
-    outcomes = [execute_with_progress(run) for run in runs]
+    outcomes = []
+    for run in runs:
+        outcomes.append(execute_with_progress(run))
+        if outcomes[-1].n_missing:
+            return 130
     asked = {record.id for record in outcomes[0].records}
     questions = [question for question in data.questions if question.id in asked]
     replies = {outcome.run.request.model: _replies(outcome) for outcome in outcomes}

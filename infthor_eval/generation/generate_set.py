@@ -1,6 +1,6 @@
 """Generating many trajectories into a directory, so that stopping and starting continues."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -13,9 +13,11 @@ from infthor_eval.generation.factory import GeneratedTrajectory, TaskStatistics,
 from infthor_eval.generation.garbage import libraries_set_aside
 from infthor_eval.generation.settings import TrajectorySettings
 from infthor_eval.household.pddl import DOMAIN
+from infthor_eval.thor.launch import Launch
 from infthor_eval.thor.simulator import Simulator
+from infthor_eval.workers import Staffing, shared_out
 
-__all__ = ["GeneratedSet", "GenerationSummary", "TaskCounts", "generate_set"]
+__all__ = ["GeneratedSet", "GenerationSummary", "TaskCounts", "generate_set", "generate_with_workers"]
 
 
 class TaskCounts(msgspec.Struct):
@@ -76,6 +78,23 @@ class GeneratedSet:
         )
 
 
+@dataclass(frozen=True)
+class _Outcome:
+    """What became of one job.
+
+    Attributes:
+        path: of the trajectory; None where it could not be made.
+        steps: its low-level actions.
+        statistics: tasks tried and accepted; None where an earlier run made it.
+        failure: why it could not be made.
+    """
+
+    path: Path | None = None
+    steps: int = 0
+    statistics: TaskStatistics | None = None
+    failure: str | None = None
+
+
 def generate_set(
     jobs: Sequence[TrajectorySettings], simulator: Simulator, out: Path, progress: Callable[[], None] = lambda: None
 ) -> GeneratedSet:
@@ -91,23 +110,91 @@ def generate_set(
         DataError: a trajectory cannot be written; those before it stay.
     """
     out.mkdir(parents=True, exist_ok=True)
-    result = GeneratedSet()
-    for job in jobs:
-        path = out / f"{job.traj_id}.json"
-        try:
-            made = None if path.exists() else _made(job, simulator)
-            result.steps += _earlier(path, job) if made is None else len(made.trajectory.plan.low_actions)
-        except InfthorError as error:
-            result.failures.append(str(error))
-        else:
-            result.paths.append(path)
-            if made is None:
-                result.resumed += 1
-            else:  # not a failure of this one: where it has no room, the others would be made in vain
-                result.statistics.add(made.statistics)
-                _write(made, path)
+    return _collected(enumerate(_outcome(job, simulator, out) for job in jobs), progress)
+
+
+def generate_with_workers(
+    jobs: Sequence[TrajectorySettings],
+    launch: Launch,
+    out: Path,
+    staffing: Staffing,
+    progress: Callable[[], None] = lambda: None,
+    say: Callable[[str], None] = lambda _: None,
+) -> GeneratedSet:
+    """As `generate_set`, by workers with a simulator each: the same files.
+
+    Args:
+        jobs: what to make.
+        launch: how a simulator is started.
+        out: directory of the files, the same for all workers; made where it does not exist.
+        staffing: how many workers, and where.
+        progress: is called after each trajectory.
+        say: is told what becomes of workers.
+
+    Raises:
+        DataError: a trajectory cannot be written; those before it stay.
+    """
+    out.mkdir(parents=True, exist_ok=True)
+    return _collected(shared_out(_OpenMaker(launch, out), jobs, staffing, say), progress)
+
+
+@dataclass(frozen=True)
+class _OpenMaker:
+    """Makes a worker that generates."""
+
+    launch: Launch
+    out: Path
+
+    def __call__(self, number: int) -> "_Maker":
+        return _Maker(self.launch, self.out)
+
+
+class _Maker:
+    """Generates in a simulator of its own; see `infthor_eval.workers.Worker`."""
+
+    greeting = None
+
+    def __init__(self, launch: Launch, out: Path) -> None:
+        self._simulator = Simulator(launch)
+        self._out = out
+
+    def do(self, job: TrajectorySettings) -> Iterator[_Outcome]:
+        yield _outcome(job, self._simulator, self._out)
+
+    def close(self) -> None:
+        self._simulator.close()
+
+
+def _collected(outcomes: Iterable[tuple[int, _Outcome | InfthorError]], progress: Callable[[], None]) -> GeneratedSet:
+    """What came of it, in the order of the jobs."""
+    found: dict[int, _Outcome] = {}
+    for number, outcome in outcomes:
+        found[number] = _Outcome(failure=str(outcome)) if isinstance(outcome, InfthorError) else outcome
         progress()
+    result = GeneratedSet()
+    for _, outcome in sorted(found.items()):
+        if outcome.path is None:
+            result.failures.append(str(outcome.failure))
+            continue
+        result.paths.append(outcome.path)
+        result.steps += outcome.steps
+        if outcome.statistics is None:
+            result.resumed += 1
+        else:
+            result.statistics.add(outcome.statistics)
     return result
+
+
+def _outcome(job: TrajectorySettings, simulator: Simulator, out: Path) -> _Outcome:
+    path = out / f"{job.traj_id}.json"
+    try:
+        if path.exists():
+            return _Outcome(path, _earlier(path, job))
+        made = _made(job, simulator)
+    except InfthorError as error:
+        return _Outcome(failure=str(error))
+    _write(made, path)  # not a failure of this one: where it has no room, the others would be made in vain
+    return _Outcome(path, len(made.trajectory.plan.low_actions), made.statistics)
 
 
 def _made(job: TrajectorySettings, simulator: Simulator) -> GeneratedTrajectory:

@@ -22,10 +22,12 @@ from infthor_eval.formats.set_info import claim_for_simulator
 from infthor_eval.formats.trajectory import Source, Trajectory, folder_name, iter_sources, trajectory_files
 from infthor_eval.generation.garbage import libraries_set_aside
 from infthor_eval.generation.replay import ReplayReport, replay
+from infthor_eval.thor.launch import Launch
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.supplement import agent_path
+from infthor_eval.workers import Staffing, shared_out
 
-__all__ = ["Failure", "ReplayedSet", "Selection", "replay_set", "select"]
+__all__ = ["Failure", "ReplayedSet", "Selection", "replay_set", "replay_with_workers", "select"]
 
 _REPORT = "replay.json"
 _TRAJECTORY = "traj_data.json"
@@ -94,6 +96,24 @@ def select(paths: Iterable[Path], limit: int | None = None, per_floor_plan: int 
     return selection
 
 
+Item = tuple[Source, Trajectory]
+
+
+@dataclass(frozen=True)
+class _Outcome:
+    """What became of one trajectory.
+
+    Attributes:
+        report: of its replay; None where it could not be replayed at all.
+        new: whether it was made now.
+        failure: why there is no report.
+    """
+
+    report: ReplayReport | None = None
+    new: bool = False
+    failure: Failure | None = None
+
+
 def replay_set(
     selection: Selection,
     simulator: Simulator,
@@ -113,23 +133,105 @@ def replay_set(
     Returns:
         The result. The failure of one trajectory is in it and does not stop the others.
     """
-    started = time.monotonic()
+    metadata = _prepared(out, simulator.label)
+    outcomes = enumerate(_outcome(item, simulator, metadata, frames) for item in selection.items)
+    return _collected(outcomes, selection, progress)
+
+
+def replay_with_workers(
+    selection: Selection,
+    launch: Launch,
+    out: Path,
+    staffing: Staffing,
+    frames: int = 1,
+    progress: Callable[[], None] = lambda: None,
+    say: Callable[[str], None] = lambda _: None,
+) -> ReplayedSet:
+    """As `replay_set`, by workers with a simulator each: the same files.
+
+    Args:
+        selection: what to replay.
+        launch: how a simulator is started.
+        out: the set, the same for all workers; made where it does not exist.
+        staffing: how many workers, and where.
+        frames: per action that moves the agent or its camera.
+        progress: is called after each trajectory.
+        say: is told what becomes of workers.
+    """
+    metadata = _prepared(out, launch.label)
+    outcomes = shared_out(_OpenReplayer(launch, metadata, frames), selection.items, staffing, say)
+    return _collected(outcomes, selection, progress)
+
+
+@dataclass(frozen=True)
+class _OpenReplayer:
+    """Makes a worker that replays."""
+
+    launch: Launch
+    metadata: Path
+    frames: int
+
+    def __call__(self, number: int) -> "_Replayer":
+        return _Replayer(self)
+
+
+class _Replayer:
+    """Replays in a simulator of its own; see `infthor_eval.workers.Worker`."""
+
+    greeting = None
+
+    def __init__(self, settings: _OpenReplayer) -> None:
+        self._settings = settings
+        self._simulator = Simulator(settings.launch)
+
+    def do(self, job: Item) -> Iterator[_Outcome]:
+        yield _outcome(job, self._simulator, self._settings.metadata, self._settings.frames)
+
+    def close(self) -> None:
+        self._simulator.close()
+
+
+def _prepared(out: Path, label: str) -> Path:
+    """The folder that takes the trajectories of a set."""
     metadata = out / "metadata"
     metadata.mkdir(parents=True, exist_ok=True)
-    claim_for_simulator(out, simulator.label)
-    result = ReplayedSet(failures=list(selection.failures))
-    for source, trajectory in selection.items:
-        try:
-            with libraries_set_aside(), _malformed(source):
-                report, new = _one(source, trajectory, simulator, metadata, frames)
-        except InfthorError as error:
-            result.failures.append(Failure(source.place, f"{trajectory.traj_id}: {error}"))
-        else:
-            result.reports.append(report)
-            result.resumed += not new
+    claim_for_simulator(out, label)
+    return metadata
+
+
+def _collected(
+    outcomes: Iterable[tuple[int, _Outcome | InfthorError]], selection: Selection, progress: Callable[[], None]
+) -> ReplayedSet:
+    """What came of it, in the order of the selection."""
+    started = time.monotonic()
+    found: dict[int, _Outcome] = {}
+    for number, outcome in outcomes:
+        if isinstance(outcome, InfthorError):
+            outcome = _failed(selection.items[number], outcome)  # noqa: PLW2901
+        found[number] = outcome
         progress()
-    result.seconds = time.monotonic() - started
+    result = ReplayedSet(failures=list(selection.failures), seconds=time.monotonic() - started)
+    for _, outcome in sorted(found.items()):
+        if outcome.report is not None:
+            result.reports.append(outcome.report)
+            result.resumed += not outcome.new
+        elif outcome.failure is not None:
+            result.failures.append(outcome.failure)
     return result
+
+
+def _outcome(item: Item, simulator: Simulator, metadata: Path, frames: int) -> _Outcome:
+    source, trajectory = item
+    try:
+        with libraries_set_aside(), _malformed(source):
+            return _Outcome(*_one(source, trajectory, simulator, metadata, frames))
+    except InfthorError as error:
+        return _failed(item, error)
+
+
+def _failed(item: Item, error: InfthorError) -> _Outcome:
+    source, trajectory = item
+    return _Outcome(failure=Failure(source.place, f"{trajectory.traj_id}: {error}"))
 
 
 def _all_sources(paths: Iterable[Path], failures: list[Failure]) -> Iterator[Source]:

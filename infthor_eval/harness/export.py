@@ -91,9 +91,7 @@ def _tasks(outcome: RunOutcome) -> list[_Scored]:
 def _rows(outcome: RunOutcome, task: _Scored) -> list[dict[str, Any]]:
     """A sample per line, in the task's order."""
     rows = [
-        _row(outcome.run.evaluation.view(record))
-        | {"metrics": task.metrics}
-        | {name: scores.get(name, 0.0) for name in task.metrics}
+        _row(outcome.view(record)) | {"metrics": task.metrics} | {name: scores.get(name, 0.0) for name in task.metrics}
         for record, scores in zip(task.records, task.scores, strict=True)
     ]
     return sorted(rows, key=lambda row: row["doc_id"])

@@ -1,9 +1,10 @@
 """One run of any suite: its identity, its journal, and the order of its work."""
 
 from infthor_eval.runs.catalog import Catalog, TaskFile
-from infthor_eval.runs.driver import Observer, PreparedRun, RunOutcome, RunRequest, Silent, execute, prepare
+from infthor_eval.runs.driver import Observer, RunOutcome, Silent, execute
 from infthor_eval.runs.journal import read_header, read_run
 from infthor_eval.runs.records import RecordTypes, RunHeader, Tokens, Unit, UnitKey, UnitRecord
+from infthor_eval.runs.request import PreparedRun, RunRequest, prepare
 from infthor_eval.runs.suite import (
     Cost,
     Evaluation,

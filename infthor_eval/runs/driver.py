@@ -1,58 +1,25 @@
-"""One run of any suite: what is evaluated, its journal, and the order of its work."""
+"""One run of any suite: its journal, and the order of its work."""
 
-import traceback
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol
 
 import msgspec
 
-from infthor_eval.errors import InfthorError, UsageError, in_one_line, naming, unknown_name
-from infthor_eval.formats.digests import fingerprint
-from infthor_eval.formats.files import require_writable, written_atomically
+from infthor_eval.errors import naming
+from infthor_eval.formats.files import written_atomically
 from infthor_eval.runs import journal as journals
-from infthor_eval.runs.executor import evaluated
-from infthor_eval.runs.identity import identity_of
+from infthor_eval.runs.crew import Crew
 from infthor_eval.runs.journal import Journal
 from infthor_eval.runs.records import RunHeader, UnitRecord
-from infthor_eval.runs.session import JournalSession
-from infthor_eval.runs.suite import Evaluation, Group, RunSummary, Suite, TaskRequest, Workload
-from model_adapters import Model, Policy, Subject, adapter_identity, check_options, label, load, names
+from infthor_eval.runs.request import PreparedRun
+from infthor_eval.runs.staff import Alone, View
+from infthor_eval.runs.suite import RunSummary, Workload
 
-__all__ = ["Observer", "PreparedRun", "RunOutcome", "RunRequest", "Silent", "execute", "prepare"]
+__all__ = ["Observer", "RunOutcome", "Silent", "execute"]
 
 _RESULTS = "results.json"
-
-
-@dataclass(frozen=True)
-class RunRequest:
-    """What a user asked for.
-
-    Attributes:
-        model: name of a model, a policy, or one of the suite's baselines.
-        tasks: what the suite is asked.
-        asked: the names of tasks and groups as typed, which name the run's folder.
-        output: folder that takes the run's own folder.
-        model_options: the model's options as typed.
-        name: what the run is called; None takes the checkpoint's name, or the model's.
-        fresh: set an earlier journal aside and start anew.
-        recover: go on without the bad lines of an earlier journal.
-    """
-
-    model: str
-    tasks: TaskRequest
-    asked: tuple[str, ...]
-    output: Path
-    model_options: Mapping[str, str] = field(default_factory=dict)
-    name: str | None = None
-    fresh: bool = False
-    recover: bool = False
-
-    @property
-    def label(self) -> str:
-        """What the run is called."""
-        return self.name or label(self.model, self.model_options)
 
 
 class Observer(Protocol):
@@ -66,6 +33,10 @@ class Observer(Protocol):
         """A unit is done; or was found in the journal of an earlier, stopped run."""
         ...
 
+    def note(self, text: str) -> None:
+        """What became of a worker, in words."""
+        ...
+
 
 class Silent:
     """An observer that says nothing."""
@@ -76,51 +47,34 @@ class Silent:
     def done(self, record: UnitRecord[Any], resumed: bool) -> None:
         """Nothing."""
 
-
-@dataclass(frozen=True)
-class PreparedRun:
-    """A request whose names, files and data have been found to be in order."""
-
-    request: RunRequest
-    suite: Suite
-    evaluation: Evaluation
+    def note(self, text: str) -> None:
+        """Nothing."""
 
 
 @dataclass(frozen=True)
 class RunOutcome:
-    """A finished run.
+    """A run that has ended.
 
     Attributes:
         folder: the run's own.
         run: what it was made from.
         summary: who it was, and what it found.
-        records: of every unit.
+        records: of every unit that was come to.
+        n_missing: how many units were not come to, as the run was stopped.
+        view: how other readers see its records.
     """
 
     folder: Path
     run: PreparedRun
     summary: RunSummary
     records: list[UnitRecord[Any]]
+    n_missing: int
+    view: View
 
 
-def prepare(request: RunRequest, suite: Suite) -> PreparedRun:
-    """Check a request before anything expensive is loaded.
-
-    Raises:
-        UsageError: an unknown model or option, or what the suite refuses.
-        DataError: the suite's data are not what their format says, or the results folder cannot be written to.
-    """
-    if request.model not in {*suite.baselines, *names()}:
-        raise unknown_name("model", request.model, [*suite.baselines, *names()])
-    if request.model not in suite.baselines:
-        check_options(request.model, request.model_options)  # refused before the data are read
-    elif request.model_options:
-        raise UsageError(f"{request.model} has no option {next(iter(request.model_options))}, nor any other")
-    require_writable(request.output / request.label, "--output")
-    return PreparedRun(request, suite, suite.prepare(request.tasks))
-
-
-def execute(run: PreparedRun, observer: Observer | None = None) -> RunOutcome:
+def execute(
+    run: PreparedRun, observer: Observer | None = None, should_stop: Callable[[], bool] = lambda: False
+) -> RunOutcome:
     """Load the model, do what the journal does not hold yet, and write the results.
 
     The folder `<output>/<name>/<tasks>-<identity>/` holds the journal and `results.json`.
@@ -128,6 +82,7 @@ def execute(run: PreparedRun, observer: Observer | None = None) -> RunOutcome:
     Args:
         run: what `prepare` found.
         observer: is told how it goes.
+        should_stop: once it says so, the units in hand are finished, and the results of what is there are written.
 
     Raises:
         UsageError: another process at the same run, a subject that the suite cannot evaluate, or nothing to do.
@@ -135,47 +90,35 @@ def execute(run: PreparedRun, observer: Observer | None = None) -> RunOutcome:
         DataError: the journal has a bad line, or the results cannot be written.
     """
     observer = observer or Silent()
-    subject = _subject(run)
+    staff = Alone(run) if run.request.staffing.alone else Crew(run, observer.note)
     try:
-        workload = run.evaluation.workload(subject)
-        header = _header(run, subject, workload)
-        folder = _folder(run.request, header)
+        header, workload = staff.begin()
+        folder = run.request.folder(header)
         n_recovered = _open_anew(run, folder, header)
         with Journal(folder, header, run.suite.records) as journal:
             observer.begin(workload, n_recovered)
-            _evaluate(run.evaluation, workload, JournalSession(subject, journal), observer)
-            records = _asked(workload, journal)
-            journal.require_there()
+            try:
+                for record, resumed in staff.evaluate(folder, journal, should_stop):
+                    observer.done(record, resumed)
+            except Exception:
+                raise
+            except BaseException:  # stopped at once: what is there by then has its results all the same
+                _found(run, folder, header, workload, journal)
+                raise
+            outcome = _found(run, folder, header, workload, journal)
+        return replace(outcome, view=staff.view(outcome.records))
     finally:
-        run.evaluation.close()
-        subject.close()
+        staff.close()
+
+
+def _found(run: PreparedRun, folder: Path, header: RunHeader, workload: Workload, journal: Journal) -> RunOutcome:
+    """What the journal holds of a run by now, with its results written."""
+    records = _asked(workload, journal)
+    journal.require_there()
     summary = RunSummary(header, run.suite.summarise(header, records))
-    _write_results(folder, summary)
-    return RunOutcome(folder, run, summary, records)
-
-
-def _subject(run: PreparedRun) -> Subject:
-    request, suite = run.request, run.suite
-    if request.model in suite.baselines:
-        return suite.baselines[request.model](request.tasks.seed)
-    subject = load(request.model, request.model_options, request.tasks.seed)
-    wanted: type = {"conversation": Model, "policy": Policy}[suite.needs]
-    if not isinstance(subject, wanted):
-        subject.close()
-        raise UsageError(f"{request.model} cannot be evaluated on {suite.name}, which needs a {suite.needs}")
-    return subject
-
-
-def _header(run: PreparedRun, subject: Subject, workload: Workload) -> RunHeader:
-    request = run.request
-    code = {} if request.model in run.suite.baselines else adapter_identity(request.model)
-    tasks = request.tasks
-    identity = identity_of(run.suite.name, subject, code, workload.identity, tasks.limit, tasks.seed)
-    return RunHeader(suite=run.suite.name, name=request.label, identity=identity)
-
-
-def _folder(request: RunRequest, header: RunHeader) -> Path:
-    return request.output / header.name / f"{'+'.join(request.asked)[:80]}-{fingerprint(header.identity)}"
+    n_missing = workload.n_units - len(records)
+    _write_results(folder, summary, n_missing)
+    return RunOutcome(folder, run, summary, records, n_missing, run.evaluation.view)
 
 
 def _open_anew(run: PreparedRun, folder: Path, header: RunHeader) -> int:
@@ -191,40 +134,15 @@ def _asked(workload: Workload, journal: Journal) -> list[UnitRecord[Any]]:
     return [record for record in journal.records if record.key in asked]
 
 
-def _evaluate(evaluation: Evaluation, workload: Workload, session: JournalSession, observer: Observer) -> None:
-    in_flight = session.subject.capabilities.max_in_flight
-    for record in evaluated(workload.groups, lambda group: _records(evaluation, group, session), in_flight):
-        observer.done(*session.recorded(record))
-
-
-def _records(evaluation: Evaluation, group: Group, session: JournalSession) -> Iterator[UnitRecord[Any]]:
-    """The records of a group; units that it came to no record of have failed, and no other group with them."""
-    waiting = {unit.key: unit for unit in group.units}
-    reason = "the suite gives no record of it; mend the suite"
-    try:
-        for record in evaluation.run(group, session):
-            msgspec.json.encode(record)  # what cannot be written is to fail here, not where the journal writes it
-            waiting.pop(record.key, None)
-            yield record
-    except InfthorError as error:
-        reason = str(error)
-    except MemoryError:  # of the machine, and not of the group alone
-        raise
-    except Exception as error:  # noqa: BLE001 - a suite is anybody's code, and its fault is recorded whatever it is
-        reason = _fault(error)
-    yield from (unit.failed(reason) for unit in waiting.values())
-
-
-def _fault(error: Exception) -> str:
-    """What a programming error is, where, and what it says."""
-    place = traceback.extract_tb(error.__traceback__)[-1]
-    where = f"{Path(place.filename).name}:{place.lineno} ({place.name})"
-    return f"{type(error).__name__} in {where}: {in_one_line(error)}; mend the suite and run the same command again"
-
-
-def _write_results(folder: Path, found: RunSummary) -> None:
+def _write_results(folder: Path, found: RunSummary, n_missing: int) -> None:
     header = found.header
-    document = {"suite": header.suite, "name": header.name, "identity": header.identity, "summary": found.summary}
+    document = {
+        "suite": header.suite,
+        "name": header.name,
+        "identity": header.identity,
+        "n_missing": n_missing,
+        "summary": found.summary,
+    }
     path = folder / _RESULTS
     with (
         naming(f"{path}: cannot be written", "make room, the journal holds it all"),

@@ -5,9 +5,21 @@ from collections.abc import Mapping
 from typing import Any
 
 import infthor_eval
-from model_adapters import Subject
+from infthor_eval.runs.records import RunHeader
+from infthor_eval.runs.request import PreparedRun
+from infthor_eval.runs.suite import Workload
+from model_adapters import Subject, adapter_identity
 
-__all__ = ["identity_of"]
+__all__ = ["header_of", "identity_of"]
+
+
+def header_of(run: PreparedRun, subject: Subject, workload: Workload) -> RunHeader:
+    """Who a run is, once its subject is loaded and its work is found."""
+    request, suite = run.request, run.suite
+    code = {} if request.model in suite.baselines else adapter_identity(request.model)
+    tasks = request.tasks
+    identity = identity_of(suite.name, subject, code, workload.identity, tasks.limit, tasks.seed)
+    return RunHeader(suite=suite.name, name=request.label, identity=identity)
 
 
 def identity_of(

@@ -9,6 +9,7 @@ again.
 import fcntl
 import itertools
 import os
+from collections.abc import Iterable
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from io import FileIO
@@ -31,6 +32,7 @@ FOLDER = "journal"  # of a run's folder
 _SHARD = "worker-{:d}.jsonl"
 _BAD_LINES = "bad_lines.txt"
 _OLD = "journal.jsonl"  # the one file of format 1, in the run's folder
+Decoder = msgspec.json.Decoder[Any]
 _BAD = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
 _MEND = "run the same command with --recover to go on without such lines, or with --fresh to start anew"
 
@@ -97,7 +99,8 @@ class Journal:
         self._writing = Lock()
         try:
             _lock(self._file, path)
-            self._log = _read_shards(run, types)
+            self._decoder = types.decoder()
+            self._log = _read_shards(run, self._decoder)
             self._begin(path, header)
         except (DataError, UsageError):
             self._file.close()
@@ -122,6 +125,35 @@ class Journal:
         if record is None or record.failure is not None or record.fingerprint != fingerprint:
             return None
         return record
+
+    def known_of(self, keys: Iterable[UnitKey]) -> tuple[UnitRecord[Any], ...]:
+        """The latest records of these units, whatever became of them; those that have one."""
+        return tuple(self._log.units[key] for key in keys if key in self._log.units)
+
+    def result_of(self, key: UnitKey) -> UnitRecord[Any] | None:
+        """The latest record of a unit, if it has a result, from whatever inputs."""
+        record = self._log.units.get(key)
+        return None if record is None or record.failure is not None else record
+
+    def take(self, record: UnitRecord[Any]) -> None:
+        """Know a record that stands in another shard."""
+        self._log.add(record)
+
+    def take_from(self, worker: int, record: UnitRecord[Any]) -> None:
+        """Know what a worker has put on disk; where its shard is not to be seen from here, it is put into this one.
+
+        Raises:
+            DataError: it cannot be written.
+        """
+        if not (self._path.parent / _SHARD.format(worker)).exists():
+            self._write(record)
+        self.take(record)
+
+    def reread(self, worker: int) -> None:
+        """Know all that stands in the shard of a worker that was lost, what it could not tell any more included."""
+        path = self._path.parent / _SHARD.format(worker)
+        if path.exists():
+            _read_shard(path, self._decoder, self._log)
 
     def holds(self, record: UnitRecord[Any]) -> bool:
         """Whether this very record is in it already."""
@@ -212,7 +244,7 @@ def read_run(run: Path, types: RecordTypes) -> tuple[RunHeader, list[UnitRecord[
         DataError: there is no journal, or one with a bad line, or of another format.
     """
     header = read_header(run)
-    return header, _read_shards(run, types).records
+    return header, _read_shards(run, types.decoder()).records
 
 
 def _no_journal(run: Path) -> str:
@@ -228,26 +260,30 @@ def _shards(run: Path) -> list[Path]:
     return shards
 
 
-def _read_shards(run: Path, types: RecordTypes) -> RunLog:
+def _read_shards(run: Path, decoder: Decoder) -> RunLog:
     log = RunLog()
-    decoder = types.decoder()
     for path in _shards(run):
-        lines = _lines(path)
-        if not lines:
-            continue  # begun by a worker that was killed before it said who it is
-        header = _header(path, lines)
-        if log.header is not None and canonical_json(header.identity) != canonical_json(log.header.identity):
-            raise DataError(f"{path}: belongs to another run than the shards beside it; take it out of the folder")
-        log.header = header
-        for number, line in enumerate(lines[1:], 2):
-            try:
-                record = decoder.decode(line)
-            except _BAD as error:
-                raise DataError(f"{path}, line {number}: not a line of a journal ({error}); {_MEND}") from error
-            if isinstance(record, RunHeader):
-                raise DataError(f"{path}, line {number}: the first line of a journal amid its records; {_MEND}")
-            log.add(record)
+        _read_shard(path, decoder, log)
     return log
+
+
+def _read_shard(path: Path, decoder: Decoder, log: RunLog) -> None:
+    """Take up all that a shard holds."""
+    lines = _lines(path)
+    if not lines:
+        return  # begun by a worker that was killed before it said who it is
+    header = _header(path, lines)
+    if log.header is not None and canonical_json(header.identity) != canonical_json(log.header.identity):
+        raise DataError(f"{path}: belongs to another run than the shards beside it; take it out of the folder")
+    log.header = header
+    for number, line in enumerate(lines[1:], 2):
+        try:
+            record = decoder.decode(line)
+        except _BAD as error:
+            raise DataError(f"{path}, line {number}: not a line of a journal ({error}); {_MEND}") from error
+        if isinstance(record, RunHeader):
+            raise DataError(f"{path}, line {number}: the first line of a journal amid its records; {_MEND}")
+        log.add(record)
 
 
 def _lines(path: Path) -> list[bytes]:
@@ -311,7 +347,7 @@ def _recover_shard(path: Path, header: RunHeader, types: RecordTypes) -> int:
         return len(bad)
 
 
-def _is_good(line: bytes, decoder: msgspec.json.Decoder[Any], *, is_first: bool) -> bool:
+def _is_good(line: bytes, decoder: Decoder, *, is_first: bool) -> bool:
     try:
         return isinstance(decoder.decode(line), RunHeader) == is_first
     except _BAD:

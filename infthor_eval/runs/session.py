@@ -2,6 +2,8 @@
 
 from typing import Any
 
+import msgspec
+
 from infthor_eval.runs.journal import Journal
 from infthor_eval.runs.records import Unit, UnitRecord
 from model_adapters import Subject
@@ -30,5 +32,14 @@ class JournalSession:
 
     def recorded(self, record: UnitRecord[Any]) -> tuple[UnitRecord[Any], bool]:
         """A record that a suite gave, on disk; and whether it was there already."""
-        resumed = self.journal.holds(record)
-        return (record if resumed else self.journal.append(record)), resumed
+        if self.journal.holds(record):
+            return record, True
+        return self.journal.append(self._naming_changes(record)), False
+
+    def _naming_changes(self, record: UnitRecord[Any]) -> UnitRecord[Any]:
+        """A record that says so where there was a result already, from other inputs."""
+        earlier = self.journal.result_of(record.key)
+        if earlier is None or not record.fingerprint or earlier.fingerprint == record.fingerprint:
+            return record
+        changed = f"its inputs changed since attempt {earlier.attempt}: a frame, a text or a trajectory is another now"
+        return msgspec.structs.replace(record, faults=(*record.faults, changed))

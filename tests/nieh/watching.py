@@ -9,6 +9,7 @@ class Watcher:
     def __init__(self) -> None:
         self.work: Workload | None = None
         self.n_recovered = 0
+        self.notes: list[str] = []
         self.done_units: list[tuple[UnitRecord, bool]] = []
 
     def begin(self, work: Workload, n_recovered: int) -> None:
@@ -18,6 +19,10 @@ class Watcher:
     def done(self, record: UnitRecord, resumed: bool) -> None:
         """See `Observer`."""
         self.done_units.append((record, resumed))
+
+    def note(self, text: str) -> None:
+        """See `Observer`."""
+        self.notes.append(text)
 
     @property
     def made(self) -> list[UnitRecord]:

@@ -32,6 +32,9 @@ class Watching:
     def done(self, record, resumed):
         self.seen.append((record.id, record.failure, resumed))
 
+    def note(self, text):
+        raise AssertionError(text)
+
 
 def run(asked: RunRequest, suite=None):
     watching = Watching()
@@ -208,9 +211,9 @@ def test_a_subject_that_cannot_do_what_the_suite_needs_is_refused(tmp_path, monk
         def reset(self):
             raise AssertionError
 
-    monkeypatch.setattr("infthor_eval.runs.driver.names", lambda: ("arm",))
-    monkeypatch.setattr("infthor_eval.runs.driver.check_options", lambda *_: None)
-    monkeypatch.setattr("infthor_eval.runs.driver.load", lambda *_: Policy())
+    monkeypatch.setattr("infthor_eval.runs.request.names", lambda: ("arm",))
+    monkeypatch.setattr("infthor_eval.runs.request.check_options", lambda *_: None)
+    monkeypatch.setattr("infthor_eval.runs.subjects.load", lambda *_: Policy())
     with pytest.raises(UsageError, match="arm cannot be evaluated on toy, which needs a conversation"):
         run(request(tmp_path, model="arm"))
 

@@ -1,0 +1,190 @@
+"""A run by several workers: each loads the subject, does groups, and writes a shard of the journal.
+
+The driver loads nothing. A worker tells it who the run is and what there is to do; it hands out groups, each with the
+records that earlier runs, or a worker that was lost, left of it.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from infthor_eval.errors import UsageError
+from infthor_eval.formats.digests import canonical_json
+from infthor_eval.runs.groups import group_records
+from infthor_eval.runs.identity import header_of
+from infthor_eval.runs.journal import Journal
+from infthor_eval.runs.records import RunHeader, Unit, UnitKey, UnitRecord
+from infthor_eval.runs.request import PreparedRun
+from infthor_eval.runs.session import JournalSession
+from infthor_eval.runs.staff import Recorded, View
+from infthor_eval.runs.subjects import subject_of
+from infthor_eval.runs.suite import Group, SampleView, Workload
+from infthor_eval.workers import Event, GivenUp, Lost, Made, Pool, Withdrawn
+
+__all__ = ["Crew"]
+
+
+@dataclass(frozen=True)
+class _Greeting:
+    """What a worker finds: who the run is, and what there is to do, without what only the suite needs of it."""
+
+    header: RunHeader
+    workload: Workload
+
+
+@dataclass(frozen=True)
+class _GroupOrder:
+    """One group to be done.
+
+    Attributes:
+        number: of the group, in the order of the workload.
+        folder: the run's.
+        known: the latest records of its units.
+    """
+
+    number: int
+    folder: Path
+    known: tuple[UnitRecord[Any], ...]
+
+
+@dataclass(frozen=True)
+class _ViewOrder:
+    """Records to be seen by other readers."""
+
+    records: tuple[UnitRecord[Any], ...]
+
+
+@dataclass(frozen=True)
+class _OpenEvaluator:
+    """Makes the worker where it is to work."""
+
+    run: PreparedRun
+
+    def __call__(self, number: int) -> "_Evaluator":
+        return _Evaluator(self.run, number)
+
+
+class _Evaluator:
+    """A worker of a run; see `infthor_eval.workers.Worker`."""
+
+    def __init__(self, run: PreparedRun, number: int) -> None:
+        self._run = run
+        self._number = number
+        self._subject = subject_of(run)
+        self._workload = run.evaluation.workload(self._subject)
+        self._header = header_of(run, self._subject, self._workload)
+        self._session: JournalSession | None = None
+
+    @property
+    def greeting(self) -> _Greeting:
+        groups = [Group([_plain(unit) for unit in group.units]) for group in self._workload.groups]
+        return _Greeting(self._header, replace(self._workload, groups=groups))
+
+    def do(self, job: _GroupOrder | _ViewOrder) -> Iterator[Recorded | SampleView]:
+        if isinstance(job, _ViewOrder):
+            yield from map(self._run.evaluation.view, job.records)
+            return
+        session = self._session_in(job.folder)
+        for record in job.known:
+            session.journal.take(record)
+        group = self._workload.groups[job.number]
+        for record in group_records(self._run.evaluation, group, session):
+            yield session.recorded(record)
+
+    def close(self) -> None:
+        self._run.evaluation.close()
+        self._subject.close()
+
+    def _session_in(self, folder: Path) -> JournalSession:
+        if self._session is None:
+            journal = Journal(folder, self._header, self._run.suite.records, worker=self._number)
+            self._session = JournalSession(self._subject, journal)
+        return self._session
+
+
+def _plain(unit: Unit[Any]) -> Unit[Any]:
+    return Unit(unit.key, unit.cluster, unit.payload)
+
+
+class Crew:
+    """Several workers; see `infthor_eval.runs.staff.Staff`."""
+
+    def __init__(self, run: PreparedRun, say: Callable[[str], None]) -> None:
+        """Find where the workers are to be; none is started yet.
+
+        Args:
+            run: what they evaluate; it is sent to each of them.
+            say: is told what becomes of workers, a line each.
+
+        Raises:
+            UsageError: there is no such cluster.
+        """
+        staffing = run.request.staffing
+        self._first: _Greeting | None = None
+        self._say = say
+        self._pool = Pool(staffing.connect(_OpenEvaluator(run)), staffing.workers, self._accept)
+
+    def begin(self) -> tuple[RunHeader, Workload]:
+        """See `Staff`."""
+        self._first = self._pool.open()
+        return self._first.header, self._first.workload
+
+    def evaluate(self, folder: Path, journal: Journal, should_stop: Callable[[], bool]) -> Iterator[Recorded]:
+        """See `Staff`."""
+        assert self._first is not None  # begun
+        groups = self._first.workload.groups
+        done: set[UnitKey] = set()
+
+        def order(number: int) -> _GroupOrder:
+            return _GroupOrder(number, folder, journal.known_of([unit.key for unit in groups[number].units]))
+
+        for event in self._pool.run(len(groups), order, should_stop):
+            self._tell(event)
+            if isinstance(event, Made):
+                record, resumed = event.result
+                if not resumed:
+                    journal.take_from(event.worker, record)
+                if record.key not in done:
+                    done.add(record.key)
+                    yield record, resumed
+            elif isinstance(event, Lost):
+                journal.reread(event.worker)  # it may have written what it could not send any more
+            elif isinstance(event, GivenUp):
+                journal.reread(event.worker)
+                yield from self._given_up(groups[event.job], event.reason, journal, done)
+
+    def view(self, records: Sequence[UnitRecord[Any]]) -> View:
+        """See `Staff`."""
+        order = _ViewOrder(tuple(records))
+        views = [event.result for event in self._pool.run(1, lambda _: order) if isinstance(event, Made)]
+        found = dict(zip((record.key for record in records), views, strict=True))
+        return lambda record: found[record.key]
+
+    def close(self) -> None:
+        """See `Staff`."""
+        self._pool.close()
+
+    def _accept(self, greeting: _Greeting) -> None:
+        """Refuse a worker that would evaluate something else: another version, a model that has moved on."""
+        if self._first is None:
+            self._first = greeting
+            return
+        ours, theirs = self._first.header.identity, greeting.header.identity
+        if canonical_json(ours) != canonical_json(theirs):
+            differing = sorted(name for name in {*ours, *theirs} if ours.get(name) != theirs.get(name))
+            raise UsageError(f"the workers differ in {', '.join(differing)}; give all nodes the same versions and data")
+
+    def _tell(self, event: Event) -> None:
+        if isinstance(event, Lost):
+            self._say(f"{event.reason}; what it had not finished goes to another")
+        elif isinstance(event, Withdrawn):
+            self._say(f"worker {event.worker} cannot be started, the others go on: {event.reason}")
+
+    def _given_up(self, group: Group, reason: str, journal: Journal, done: set[UnitKey]) -> Iterator[Recorded]:
+        for unit in group.units:
+            if unit.key not in done and journal.result_of(unit.key) is None:
+                failed = unit.failed(
+                    f"worker after worker was lost at it ({reason}); give it more memory, or leave it out"
+                )
+                yield journal.append(failed), False

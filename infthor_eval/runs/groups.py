@@ -1,0 +1,35 @@
+"""The records of a group, whatever its suite does: what fails is recorded, and no other group with it."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import msgspec
+
+from infthor_eval.errors import InfthorError
+from infthor_eval.runs.records import UnitRecord
+from infthor_eval.runs.suite import Evaluation, Group, Session
+from infthor_eval.workers import fault
+
+__all__ = ["group_records"]
+
+
+def group_records(evaluation: Evaluation, group: Group, session: Session) -> Iterator[UnitRecord[Any]]:
+    """The records of a group; units that it came to no record of have failed, and no other group with them.
+
+    Raises:
+        MemoryError: the machine has no more; the run ends.
+    """
+    waiting = {unit.key: unit for unit in group.units}
+    reason = "the suite gives no record of it; mend the suite"
+    try:
+        for record in evaluation.run(group, session):
+            msgspec.json.encode(record)  # what cannot be written is to fail here, not where the journal writes it
+            waiting.pop(record.key, None)
+            yield record
+    except InfthorError as error:
+        reason = str(error)
+    except MemoryError:  # of the machine, and not of the group alone
+        raise
+    except Exception as error:  # noqa: BLE001 - a suite is anybody's code, and its fault is recorded whatever it is
+        reason = f"{fault(error)}; mend the suite and run the same command again"
+    yield from (unit.failed(reason) for unit in waiting.values())

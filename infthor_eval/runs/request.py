@@ -1,0 +1,77 @@
+"""What a run is asked: checked before anything expensive is loaded."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from infthor_eval.errors import UsageError, unknown_name
+from infthor_eval.formats.digests import fingerprint
+from infthor_eval.formats.files import require_writable
+from infthor_eval.runs.records import RunHeader
+from infthor_eval.runs.suite import Evaluation, Suite, TaskRequest
+from infthor_eval.workers import Staffing
+from model_adapters import check_options, label, names
+
+__all__ = ["PreparedRun", "RunRequest", "prepare"]
+
+
+@dataclass(frozen=True)
+class RunRequest:
+    """What a user asked for.
+
+    Attributes:
+        model: name of a model, a policy, or one of the suite's baselines.
+        tasks: what the suite is asked.
+        asked: the names of tasks and groups as typed, which name the run's folder.
+        output: folder that takes the run's own folder.
+        model_options: the model's options as typed.
+        name: what the run is called; None takes the checkpoint's name, or the model's.
+        fresh: set an earlier journal aside and start anew.
+        recover: go on without the bad lines of an earlier journal.
+        staffing: how many workers, and where; it changes no number.
+    """
+
+    model: str
+    tasks: TaskRequest
+    asked: tuple[str, ...]
+    output: Path
+    model_options: Mapping[str, str] = field(default_factory=dict)
+    name: str | None = None
+    fresh: bool = False
+    recover: bool = False
+    staffing: Staffing = field(default_factory=Staffing)
+
+    @property
+    def label(self) -> str:
+        """What the run is called."""
+        return self.name or label(self.model, self.model_options)
+
+    def folder(self, header: RunHeader) -> Path:
+        """The run's own folder, `<output>/<name>/<tasks>-<identity>`."""
+        return self.output / header.name / f"{'+'.join(self.asked)[:80]}-{fingerprint(header.identity)}"
+
+
+@dataclass(frozen=True)
+class PreparedRun:
+    """A request whose names, files and data have been found to be in order; it is sent to workers as it is."""
+
+    request: RunRequest
+    suite: Suite
+    evaluation: Evaluation
+
+
+def prepare(request: RunRequest, suite: Suite) -> PreparedRun:
+    """Check a request before anything expensive is loaded.
+
+    Raises:
+        UsageError: an unknown model or option, or what the suite refuses.
+        DataError: the suite's data are not what their format says, or the results folder cannot be written to.
+    """
+    if request.model not in {*suite.baselines, *names()}:
+        raise unknown_name("model", request.model, [*suite.baselines, *names()])
+    if request.model not in suite.baselines:
+        check_options(request.model, request.model_options)  # refused before the data are read
+    elif request.model_options:
+        raise UsageError(f"{request.model} has no option {next(iter(request.model_options))}, nor any other")
+    require_writable(request.output / request.label, "--output")
+    return PreparedRun(request, suite, suite.prepare(request.tasks))

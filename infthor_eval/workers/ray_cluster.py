@@ -1,0 +1,121 @@
+"""Workers as actors of a Ray cluster: on whatever nodes it has now, or gets later."""
+
+import contextlib
+from collections.abc import Iterator
+from typing import Any
+
+from infthor_eval.errors import InfthorError, UsageError, in_one_line
+from infthor_eval.workers.link import Connect, OpenWorker, WorkerLostError
+from infthor_eval.workers.serving import Serving, portable
+
+__all__ = ["RayLink", "ray_actors"]
+
+_PARTING_S = 5.0  # for an actor to close what it holds
+
+
+def ray_actors(open_worker: OpenWorker, address: str, gpus_per_worker: float | None) -> Connect:
+    """Links to actors of a cluster.
+
+    The package is installed on every node, and the folders of data and results are the same on all of them.
+
+    Args:
+        open_worker: makes a worker.
+        address: of the cluster, as `ray.init` takes it.
+        gpus_per_worker: that are set aside for each; None takes one where the cluster has any.
+
+    Raises:
+        UsageError: Ray is not installed, or there is no cluster at the address.
+    """
+    try:
+        import ray
+    except ImportError as error:
+        raise UsageError("--ray-address needs Ray; pip install 'infthor-eval[ray]'") from error
+    try:
+        if not ray.is_initialized():
+            ray.init(address=address, log_to_driver=False, logging_level="error")
+    except (ConnectionError, RuntimeError, ValueError) as error:
+        raise UsageError(f"--ray-address {address}: no Ray cluster there ({in_one_line(error)}); start one") from error
+    if gpus_per_worker is None:
+        gpus_per_worker = 1.0 if ray.cluster_resources().get("GPU", 0) else 0.0
+    # Two calls at once: a job, and the word to stop it.
+    actor = ray.remote(max_concurrency=2, num_cpus=1, num_gpus=gpus_per_worker)(_Actor)
+    return lambda number: RayLink(actor, open_worker, number)
+
+
+class _Actor:
+    """Runs on a node."""
+
+    def __init__(self, open_worker: OpenWorker, number: int) -> None:
+        self._open_worker = open_worker
+        self._number = number
+        self._serving: Serving | None = None
+
+    def open(self) -> Any:
+        try:
+            self._serving = Serving(self._open_worker, self._number)
+        except Exception as error:  # noqa: BLE001 - told to the driver, whatever it is
+            return portable(error)
+        return self._serving.greeting
+
+    def do(self, job: Any) -> Iterator[Any]:
+        assert self._serving is not None
+        try:
+            yield from self._serving.do(job)
+        except Exception as error:  # noqa: BLE001 - told to the driver, whatever it is
+            yield portable(error)
+
+    def stop(self) -> None:
+        if self._serving is not None:
+            self._serving.stop()
+
+    def close(self) -> None:
+        if self._serving is not None:
+            self._serving.close()
+
+
+class RayLink:
+    """A worker that is a Ray actor; see `Link`."""
+
+    def __init__(self, actor: Any, open_worker: OpenWorker, number: int) -> None:
+        self._actor_class = actor
+        self._open_worker = open_worker
+        self._number = number
+        self._actor: Any = None
+
+    def open(self) -> Any:
+        """See `Link`; waits until a node has room for it."""
+        self.close()
+        self._actor = self._actor_class.remote(self._open_worker, self._number)
+        return self._value(self._actor.open.remote())
+
+    def do(self, job: Any) -> Iterator[Any]:
+        """See `Link`."""
+        for reference in self._actor.do.options(num_returns="streaming").remote(job):
+            yield self._value(reference)
+
+    def stop(self) -> None:
+        """See `Link`."""
+        if self._actor is not None:
+            self._actor.stop.remote()
+
+    def close(self) -> None:
+        """See `Link`."""
+        import ray
+
+        if self._actor is not None:
+            with contextlib.suppress(ray.exceptions.RayError):  # gone already, or at work: it is ended either way
+                ray.get(self._actor.close.remote(), timeout=_PARTING_S)
+            ray.kill(self._actor)
+
+    def _value(self, reference: Any) -> Any:
+        import ray
+
+        try:
+            value = ray.get(reference)
+        except (ray.exceptions.RayActorError, ray.exceptions.ObjectLostError) as error:
+            raise WorkerLostError(f"worker {self._number} is lost ({in_one_line(error)})") from error
+        except ray.exceptions.RayError as error:
+            raise InfthorError(f"worker {self._number} failed ({in_one_line(error)}); see Ray's logs") from error
+        if isinstance(value, Exception):
+            raise value
+        return value

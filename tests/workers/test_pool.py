@@ -1,0 +1,194 @@
+"""Jobs shared out to processes and to Ray actors: each done, whoever dies, refuses or raises."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from infthor_eval.errors import DataError, InfthorError, ModelError, UsageError
+from infthor_eval.workers import GivenUp, Lost, Made, Pool, Staffing, Withdrawn, WorkerLostError, shared_out
+
+from .toys import Job, OpenCounter, broken
+
+
+@pytest.fixture(scope="module")
+def cluster():
+    ray = pytest.importorskip("ray", reason="Ray is an extra: pip install 'infthor-eval[ray]'")
+    from ray.cluster_utils import Cluster
+
+    node = {"num_cpus": 1, "object_store_memory": 100 * 2**20}
+    made = Cluster(initialize_head=True, head_node_args=node)
+    made.add_node(**node)
+    ray.init(address=made.address, log_to_driver=False, logging_level="error")
+    yield made
+    ray.shutdown()
+    made.shutdown()
+
+
+@pytest.fixture(params=["processes", "ray"])
+def pool(request):
+    """Makes pools, of processes and of actors on two nodes."""
+    made = []
+
+    def make(opening=None, count=2, **more):
+        address = request.getfixturevalue("cluster").address if request.param == "ray" else None
+        connect = Staffing(count, address).connect(opening or OpenCounter())
+        made.append(Pool(connect, count, **more))
+        return made[-1]
+
+    yield make
+    for item in made:
+        item.close()
+
+
+def counts(events, job):
+    return [event.result[1] for event in events if isinstance(event, Made) and event.job == job]
+
+
+def of(events, kind):
+    return [event for event in events if isinstance(event, kind)]
+
+
+@pytest.mark.timeout(120)
+def test_every_job_is_done_once_and_in_its_order_by_all_workers(pool):
+    shared = pool()
+    shared.open()
+    events = list(shared.run(6, lambda job: Job(job + 1, slow=0.1)))
+    assert [counts(events, job) for job in range(6)] == [list(range(job + 1)) for job in range(6)]
+    assert len({event.result[0] for event in events}) == 2
+    assert {event.worker for event in events} == {1, 2}
+
+
+@pytest.mark.timeout(120)
+def test_a_job_whose_worker_dies_goes_to_another_and_loses_only_what_had_not_come(pool, tmp_path):
+    shared = pool()
+    shared.open()
+    jobs = [Job(3), Job(4, dies=2, once=tmp_path / "died"), Job(2)]
+    events = list(shared.run(3, jobs.__getitem__))
+    (lost,) = of(events, Lost)
+    assert (lost.job, "worker" in lost.reason) == (1, True)
+    assert counts(events, 1) in ([0, 1, 0, 1, 2, 3], [0, 0, 1, 2, 3], [0, 1, 2, 3])  # what was sent may die with it
+    assert (counts(events, 0), counts(events, 2)) == ([0, 1, 2], [0, 1])
+
+
+@pytest.mark.timeout(120)
+def test_a_job_that_kills_one_worker_after_the_other_is_given_up_and_the_others_are_done(pool):
+    shared = pool()
+    shared.open()
+    jobs = [Job(3, dies=0), Job(2), Job(2)]
+    events = list(shared.run(3, jobs.__getitem__))
+    assert [event.job for event in of(events, GivenUp)] == [0]
+    assert len(of(events, Lost)) == 2
+    assert (counts(events, 1), counts(events, 2)) == ([0, 1], [0, 1])
+
+
+@pytest.mark.timeout(120)
+@pytest.mark.parametrize(
+    ("error", "kind", "said"),
+    [
+        (broken(), DataError, "the abacus is broken; buy another"),
+        (OSError(28, "No space left on device", "shard"), OSError, "No space left on device"),
+        (MemoryError("all of it"), MemoryError, "all of it"),
+        (ZeroDivisionError("of its own"), InfthorError, r"ZeroDivisionError in toys.py:\d+ \(do\): of its own; mend"),
+    ],
+)
+def test_what_a_worker_raises_is_raised(pool, error, kind, said):
+    shared = pool(count=1)
+    shared.open()
+    with pytest.raises(kind, match=said):
+        list(shared.run(1, lambda _: Job(1, raises=error)))
+
+
+@pytest.mark.timeout(120)
+@pytest.mark.parametrize("opening", [OpenCounter(refusing=(2,)), OpenCounter(dying=(2,))])
+def test_a_worker_that_cannot_be_made_is_told_and_the_others_do_the_work(pool, opening):
+    shared = pool(opening)
+    shared.open()
+    events = []
+    for event in shared.run(200, lambda _: Job(1, slow=0.05)):
+        events.append(event)
+        if of(events, Withdrawn) and of(events, Made):
+            break
+    (withdrawn,) = of(events, Withdrawn)
+    assert withdrawn.worker == 2
+    assert {event.worker for event in of(events, Made)} == {1}
+
+
+@pytest.mark.timeout(120)
+def test_where_no_worker_can_be_made_the_reason_is_raised(pool):
+    with pytest.raises(ModelError, match="no room for worker"):
+        pool(OpenCounter(refusing=(1, 2))).open()
+
+
+@pytest.mark.timeout(120)
+def test_a_worker_that_is_not_accepted_ends_the_pool(pool):
+    def refuse(greeting):
+        raise UsageError(f"worker {greeting['number']} is of another version")
+
+    with pytest.raises(UsageError, match="another version"):
+        pool(accept=refuse).open()
+
+
+@pytest.mark.timeout(120)
+def test_once_it_is_to_stop_the_results_in_hand_are_the_last_and_further_jobs_can_be_done(pool):
+    shared = pool(count=1)
+    shared.open()
+    events = []
+    for event in shared.run(5, lambda _: Job(50, slow=0.05), lambda: bool(events)):
+        events.append(event)
+    assert {event.job for event in events} == {0}
+    assert len(events) < 20
+    assert counts(list(shared.run(1, lambda _: Job(3))), 0) == [0, 1, 2]
+
+
+def test_processes_share_the_processors_of_the_machine(monkeypatch):
+    monkeypatch.delenv("OMP_NUM_THREADS")
+    monkeypatch.setattr(os, "cpu_count", lambda: 1)
+    shared = Pool(Staffing(2).connect(OpenCounter()), 2)
+    assert shared.open()["threads"] == str(max(1, len(os.sched_getaffinity(0)) // 2))
+    shared.close()
+
+
+@pytest.mark.timeout(60)
+def test_a_driver_that_is_killed_takes_its_workers_with_it(tmp_path):
+    script = (
+        "import sys; sys.path.insert(0, sys.argv[1])\n"
+        "from infthor_eval.workers import Pool, Staffing\n"
+        "from tests.workers.toys import Job, OpenCounter\n"
+        "if __name__ == '__main__':\n"
+        "    pool = Pool(Staffing(1).connect(OpenCounter()), 1)\n"
+        "    print(pool.open()['pid'], flush=True)\n"
+        "    list(pool.run(1, lambda _: Job(1000, slow=0.5)))\n"
+    )
+    (tmp_path / "drive.py").write_text(script)
+    root = Path(__file__).parents[2]
+    driver = subprocess.Popen([sys.executable, tmp_path / "drive.py", root], stdout=subprocess.PIPE, text=True)
+    worker = int(driver.stdout.readline())
+    os.kill(driver.pid, signal.SIGKILL)
+    driver.communicate()
+    deadline = time.monotonic() + 20
+    while is_running(worker):
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
+def is_running(pid):
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().split(") ")[-1][0] != "Z"
+    except FileNotFoundError:
+        return False
+
+
+def test_jobs_of_one_result_come_with_their_numbers_and_what_is_given_up_is_an_error():
+    told = []
+    jobs = [Job(1), Job(1, dies=0), Job(1)]
+    found = dict(shared_out(OpenCounter(), jobs, Staffing(2), told.append))
+    assert (found[0][1], found[2][1]) == (0, 0)
+    assert isinstance(found[1], WorkerLostError)
+    assert len(told) == 2
+    alone = dict(shared_out(OpenCounter(), jobs[:1], Staffing(1), told.append))
+    assert alone == {0: (os.getpid(), 0)}
