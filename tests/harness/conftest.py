@@ -9,8 +9,18 @@ from pathlib import Path
 
 import pytest
 
-LM_EVAL = "from lm_eval.__main__ import cli_evaluate; cli_evaluate()"
-OURS = "from infthor_eval.cli import main; main()"
+# lm-eval reads all of its own thousands of task files at each start, 20 seconds: it looks for ours alone here, and for
+# all of them where a test is about that.
+_OWN_TASKS_ALONE = """
+import lm_eval.tasks
+class OwnTasksAlone(lm_eval.tasks.TaskManager):
+    def __init__(self, *given, **named):
+        super().__init__(*given, **{**named, "include_defaults": False})
+lm_eval.tasks.TaskManager = OwnTasksAlone
+"""
+LM_EVAL = f"{_OWN_TASKS_ALONE}\nfrom lm_eval.__main__ import cli_evaluate; cli_evaluate()"
+OURS_WITH_ALL_TASKS = "from infthor_eval.cli import main; main()"
+OURS = f"{_OWN_TASKS_ALONE}\n{OURS_WITH_ALL_TASKS}"
 
 
 @pytest.fixture

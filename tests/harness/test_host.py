@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from infthor_eval.formats.packaged import packaged_folder
-from tests.harness.conftest import LM_EVAL, OURS, samples
+from tests.harness.conftest import LM_EVAL, OURS_WITH_ALL_TASKS, samples
 
 PEERS = Path(sys.prefix) / "test-peers"
 SHIM = Path(__file__).parents[1] / "peers"
@@ -74,7 +74,7 @@ def test_our_command_starts_lm_evals_with_any_adapter_and_tasks_by_name(make_nie
     arguments = ["--model", "infthor", "--model_args", "adapter=constant,word=mug", "--include_path", TASKS]
     arguments += ["--tasks", "nieh_gt", "--metadata", json.dumps({"data": str(data)})]
     out = tmp_path / "theirs"
-    start(OURS, "lm-eval", "run", *arguments, "--log_samples", "--output_path", out, path=[package])
+    start(OURS_WITH_ALL_TASKS, "lm-eval", "run", *arguments, "--log_samples", "--output_path", out, path=[package])
     (rows,) = samples(out).values()
     assert [row["resps"][0][0] for row in rows] == ["mug"] * 5
 

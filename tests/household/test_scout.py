@@ -17,7 +17,7 @@ def test_an_object_is_shown_and_the_agent_is_back(simulator):
     view = simulator.reset("kitchen-3")
     grid = reachable(simulator)
     here = simulator.view.agent
-    items = [key for key, item in sorted(view.objects.items()) if item.pickupable]
+    items = [key for key, item in sorted(view.objects.items()) if item.pickupable][::3]
     found = [find_viewpoint(simulator, grid, [key], min_pixels=60) for key in items]
     assert any(found)
     assert simulator.view.agent == here
