@@ -7,6 +7,8 @@ from pathlib import Path
 import click
 
 from infthor_eval.cli.options import LARGEST, FiniteRange
+from infthor_eval.cli.staffing_options import staffing_options
+from infthor_eval.workers import Staffing
 
 __all__ = ["command"]
 
@@ -27,6 +29,7 @@ _PATH = click.Path(path_type=Path)
 )
 @click.option("--further", is_flag=True, help="Ask forms beside those of Table 3 too, under types of their own.")
 @click.option("--overwrite", is_flag=True, help="Replace a file that holds other questions.")
+@staffing_options
 @click.pass_context
 def command(
     context: click.Context,
@@ -37,6 +40,7 @@ def command(
     min_share: float,
     further: bool,
     overwrite: bool,
+    staffing: Staffing,
 ) -> None:
     """Make questions on a replayed set, in the words of the paper's Table 3.
 
@@ -49,7 +53,16 @@ def command(
     from infthor_eval.terminal import error_console, tell
 
     prepared_file(out)
-    made = make_questions(folder, seed=seed, per_trajectory=per_trajectory, share=min_share, further=further)
+    notes = error_console()
+    made = make_questions(
+        folder,
+        seed=seed,
+        per_trajectory=per_trajectory,
+        share=min_share,
+        further=further,
+        staffing=staffing,
+        say=notes.print,
+    )
     content = encode_questions(made.questions)
     if not overwrite:
         refuse_loss(out, content)
@@ -57,7 +70,6 @@ def command(
         partial.write_bytes(content)
     told = f"{len(made.questions)} questions on {made.trajectories} trajectories: {out}\n{made.words()}"
     tell(told)
-    notes = error_console()
     for question in made.doubted:
         notes.print(f"skipped, the checker disagrees: {question.traj_id}: {question.text}")
     for line in made.skipped:

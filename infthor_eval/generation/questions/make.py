@@ -5,11 +5,12 @@ The rules are those of Table 3; our further forms are asked where they are wante
 
 import random
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
-from infthor_eval.errors import DataError, naming
+from infthor_eval.errors import DataError, InfthorError, naming
 from infthor_eval.formats.question import ABSENCE, Question, clue_column
 from infthor_eval.formats.set_info import simulator_of
 from infthor_eval.formats.step_log import read_steps
@@ -25,10 +26,12 @@ from infthor_eval.generation.questions import (
 from infthor_eval.generation.questions.candidates import Candidate
 from infthor_eval.generation.questions.checker import Checker
 from infthor_eval.generation.questions.history import DEFAULT_SHARE, History
+from infthor_eval.workers import Staffing, shared_out
 
 __all__ = ["MadeQuestions", "candidates_of", "further_candidates_of", "make_questions"]
 
 
+_ALONE = Staffing()
 # What a log that is JSON of the right form can still be wrong in.
 _WRONG = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError)
 
@@ -66,7 +69,14 @@ class MadeQuestions:
 
 
 def make_questions(
-    folder: Path, *, seed: int = 0, per_trajectory: int = 25, share: float = DEFAULT_SHARE, further: bool = False
+    folder: Path,
+    *,
+    seed: int = 0,
+    per_trajectory: int = 25,
+    share: float = DEFAULT_SHARE,
+    further: bool = False,
+    staffing: Staffing = _ALONE,
+    say: Callable[[str], None] = lambda _: None,
 ) -> MadeQuestions:
     """Make questions on a replayed set.
 
@@ -76,6 +86,8 @@ def make_questions(
         per_trajectory: how many questions at most on one trajectory.
         share: of the frame's pixels that an object must fill to count as shown.
         further: whether to ask our further forms too.
+        staffing: how many workers, and where; the questions are the same.
+        say: is told what becomes of workers.
 
     Returns:
         The questions; trajectories whose log cannot be read are named in it.
@@ -85,26 +97,94 @@ def make_questions(
     """
     simulator_of(folder)
     made = MadeQuestions()
-    histories = []
+    types: dict[Path, frozenset[str]] = {}
     for path in _folders(folder):
         try:
-            with naming(f"{path}: its log does not hang together", "replay the trajectory again", of=_WRONG):
-                histories.append(History(path.name, read_steps(path), share))
+            types[path] = _history(path, share).all_object_types
         except DataError as error:
             made.skipped.append(str(error))
-    made.trajectories = len(histories)
-    vocabulary = frozenset[str]().union(*(history.all_object_types for history in histories))
+    made.trajectories = len(types)
+    vocabulary = frozenset[str]().union(*types.values())
+    asking = [_Asking(path, vocabulary, seed, share, further) for path in types]
+    found = _shared_out(asking, staffing, say, made)
     chooser = _Chooser()
-    for history in histories:
-        rng = random.Random(f"{seed}/{history.traj_id}")
-        candidates = candidates_of(history, vocabulary, rng)
-        if further:
-            candidates += further_candidates_of(history, rng)
+    checking = []
+    for path in [path for path in types if path in found]:  # one after the other: what was chosen before counts
+        candidates, rng = found[path]
         chosen = chooser.choose(candidates, per_trajectory, rng)
-        checker = Checker(history.steps, share)
-        for question in (item.question(history.traj_id) for item in chosen):
-            (made.questions if checker.verdict(question).sound else made.doubted).append(question)
+        checking.append(_Checking(path, tuple(item.question(path.name) for item in chosen), share))
+    sound = _shared_out(checking, staffing, say, made)
+    for item in checking:
+        for question, verdict in zip(item.questions, sound.get(item.path, ()), strict=False):
+            (made.questions if verdict else made.doubted).append(question)
     return made
+
+
+@dataclass(frozen=True)
+class _Asking:
+    """Find all questions on a trajectory."""
+
+    path: Path
+    vocabulary: frozenset[str]
+    seed: int
+    share: float
+    further: bool
+
+    def do(self) -> tuple[list[Candidate], random.Random]:
+        """The candidates, and what makes the further choices on this trajectory."""
+        history = _history(self.path, self.share)
+        rng = random.Random(f"{self.seed}/{history.traj_id}")
+        candidates = candidates_of(history, self.vocabulary, rng)
+        if self.further:
+            candidates += further_candidates_of(history, rng)
+        return candidates, rng
+
+
+@dataclass(frozen=True)
+class _Checking:
+    """Check the questions that were chosen on a trajectory."""
+
+    path: Path
+    questions: tuple[Question, ...]
+    share: float
+
+    def do(self) -> list[bool]:
+        """Whether the checker agrees with each."""
+        checker = Checker(_history(self.path, self.share).steps, self.share)
+        return [checker.verdict(question).sound for question in self.questions]
+
+
+class _Asker:
+    """Does either; see `infthor_eval.workers.Worker`."""
+
+    greeting = None
+
+    def __init__(self, number: int) -> None:
+        """Nothing is needed."""
+
+    def do(self, job: _Asking | _Checking) -> Iterator[Any]:
+        yield job.do()
+
+    def close(self) -> None:
+        """Nothing is held."""
+
+
+def _shared_out(
+    jobs: Sequence[_Asking] | Sequence[_Checking], staffing: Staffing, say: Callable[[str], None], made: MadeQuestions
+) -> dict[Path, Any]:
+    """What came of the jobs, by trajectory; where worker after worker was lost at one, it is skipped."""
+    found: dict[Path, Any] = {}
+    for number, result in shared_out(_Asker, jobs, staffing, say):
+        if isinstance(result, InfthorError):
+            made.skipped.append(f"{jobs[number].path}: {result}")
+        else:
+            found[jobs[number].path] = result
+    return found
+
+
+def _history(path: Path, share: float) -> History:
+    with naming(f"{path}: its log does not hang together", "replay the trajectory again", of=_WRONG):
+        return History(path.name, read_steps(path), share)
 
 
 def _folders(folder: Path) -> list[Path]:

@@ -1,0 +1,35 @@
+"""Generating, replaying and asking by several workers: the very files of one."""
+
+import pytest
+
+from infthor_eval.formats.digests import digest_of_file
+
+SCENES = ("--scene", "kitchen-1", "--scene", "bedroom-2", "--min-steps", 20, "--min-subgoals", 1)
+
+
+def files(folder):
+    return {
+        str(path.relative_to(folder)): digest_of_file(path)
+        for path in sorted(folder.rglob("*"))
+        if path.is_file() and path.name != "replay.json"  # which holds times
+    }
+
+
+@pytest.mark.timeout(300)
+def test_the_files_are_the_same_whoever_makes_them(run, tmp_path):
+    for workers in (1, 2):
+        out = tmp_path / str(workers)
+        code, said, err = run("generate", *SCENES, "--out", out / "made", "--workers", workers)
+        assert code == 0, err
+        assert said.startswith("2 trajectories (0 made earlier)")
+        assert run("replay", out / "made", "--out", out / "set", "--workers", workers)[0] == 0
+        assert run("questions", out / "set", "--out", out / "set" / "qa_set_q.csv", "--workers", workers)[0] == 0
+    assert files(tmp_path / "1") == files(tmp_path / "2")
+    assert len(files(tmp_path / "2")) > 40
+    code, said, _ = run("generate", *SCENES, "--out", tmp_path / "2" / "made", "--workers", 2)
+    assert (code, said.splitlines()[0].split(",")[0]) == (0, "2 trajectories (2 made earlier)")
+
+
+def test_gpus_are_shared_out_by_a_cluster_alone(run, tmp_path):
+    code, _, err = run("--model", "blind", "--tasks", "nieh_mini_gt", "--gpus-per-worker", 1, "--output", tmp_path)
+    assert (code, "--gpus-per-worker is for --ray-address" in err) == (2, True)
