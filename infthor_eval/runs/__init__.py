@@ -16,8 +16,10 @@ from infthor_eval.runs.suite import (
     TaskRequest,
     Workload,
 )
+from infthor_eval.runs.usage import NOTHING, Usage
 
 __all__ = [
+    "NOTHING",
     "Catalog",
     "Cost",
     "Evaluation",
@@ -40,6 +42,7 @@ __all__ = [
     "Unit",
     "UnitKey",
     "UnitRecord",
+    "Usage",
     "Workload",
     "execute",
     "prepare",

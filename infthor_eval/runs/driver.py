@@ -18,6 +18,7 @@ from infthor_eval.runs.journal import Journal
 from infthor_eval.runs.records import RunHeader, UnitRecord
 from infthor_eval.runs.session import JournalSession
 from infthor_eval.runs.suite import Evaluation, Group, RunSummary, Suite, TaskRequest, Workload
+from infthor_eval.runs.usage import Usage
 from model_adapters import Model, Policy, Subject, adapter_identity, check_options, label, load, names
 
 __all__ = ["Observer", "PreparedRun", "RunOutcome", "RunRequest", "Silent", "execute", "prepare"]
@@ -95,12 +96,14 @@ class RunOutcome:
         run: what it was made from.
         summary: who it was, and what it found.
         records: of every unit.
+        usage: what all its requests took, those for memos with them.
     """
 
     folder: Path
     run: PreparedRun
     summary: RunSummary
     records: list[UnitRecord[Any]]
+    usage: Usage
 
 
 def prepare(request: RunRequest, suite: Suite) -> PreparedRun:
@@ -145,13 +148,14 @@ def execute(run: PreparedRun, observer: Observer | None = None) -> RunOutcome:
             observer.begin(workload, n_recovered)
             _evaluate(run.evaluation, workload, JournalSession(subject, journal), observer)
             records = _asked(workload, journal)
+            usage = Usage.total([record.usage for record in records] + [memo.usage for memo in journal.memos])
             journal.require_there()
     finally:
         run.evaluation.close()
         subject.close()
     summary = RunSummary(header, run.suite.summarise(header, records))
-    _write_results(folder, summary)
-    return RunOutcome(folder, run, summary, records)
+    _write_results(folder, summary, usage)
+    return RunOutcome(folder, run, summary, records, usage)
 
 
 def _subject(run: PreparedRun) -> Subject:
@@ -222,9 +226,16 @@ def _fault(error: Exception) -> str:
     return f"{type(error).__name__} in {where}: {in_one_line(error)}; mend the suite and run the same command again"
 
 
-def _write_results(folder: Path, found: RunSummary) -> None:
+def _write_results(folder: Path, found: RunSummary, usage: Usage) -> None:
     header = found.header
-    document = {"suite": header.suite, "name": header.name, "identity": header.identity, "summary": found.summary}
+    document = {
+        "suite": header.suite,
+        "name": header.name,
+        "identity": header.identity,
+        "summary": found.summary,
+        # Not what was cached: that differs between a run and the same run resumed.
+        "usage": {name: getattr(usage, name) for name in ("requests", "context", "reply", "cost")},
+    }
     path = folder / _RESULTS
     with (
         naming(f"{path}: cannot be written", "make room, the journal holds it all"),
