@@ -3,6 +3,7 @@
 import asyncio
 import logging
 from collections.abc import AsyncIterator, Mapping
+from concurrent.futures import CancelledError
 from threading import Thread
 from typing import Any
 from urllib.parse import urlsplit
@@ -38,6 +39,7 @@ class Wire:
 
     def __init__(self, options: OpenAIOptions, secret: Secret) -> None:
         self._timeout_s = options.timeout_s
+        self._closed = False
         for name in _TALKATIVE:
             logging.getLogger(name).setLevel(logging.WARNING)
         self._loop = asyncio.new_event_loop()
@@ -59,9 +61,13 @@ class Wire:
             TimeoutError: no whole reply in time.
             UnreadableError: the reply is not read.
         """
+        if self._closed:
+            raise UnreadableError("is not asked any more: the model is closed")
         sent = asyncio.run_coroutine_threadsafe(self._post(request), self._loop)
         try:
             return sent.result()
+        except CancelledError as error:
+            raise UnreadableError("is not waited for any more: the model is closed") from error
         except openai.APIConnectionError as error:
             if isinstance(error.__cause__, UnreadableError):
                 raise error.__cause__ from error
@@ -75,11 +81,19 @@ class Wire:
             return bytes(reply.content)
 
     def close(self) -> None:
-        """Close all connections."""
-        asyncio.run_coroutine_threadsafe(self._client.close(), self._loop).result()
+        """Give up what is in flight and close all connections."""
+        self._closed = True
+        asyncio.run_coroutine_threadsafe(self._end(), self._loop).result()
         self._loop.call_soon_threadsafe(self._loop.stop)
         self._thread.join()
         self._loop.close()
+
+    async def _end(self) -> None:
+        in_flight = asyncio.all_tasks() - {asyncio.current_task()}
+        for task in in_flight:
+            task.cancel()
+        await asyncio.gather(*in_flight, return_exceptions=True)
+        await self._client.close()
 
 
 def _client(options: OpenAIOptions, secret: Secret) -> openai.AsyncOpenAI:

@@ -16,7 +16,7 @@ from model_adapters import Decoding, check_adapter, load
 from model_adapters.openai import model as served
 
 from ..asking import up_to
-from .talking import completion, images_in, kept, opened, says, talkative
+from .talking import chatting, completion, images_in, kept, opened, says, talkative
 
 KEY = "sk-0123456789abcdef0123456789"
 
@@ -154,6 +154,42 @@ def waits(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[float]]:
     found: list[float] = []
     monkeypatch.setattr(served.Pace, "wait", lambda pace, amount=1.0: found.append(amount))
     return found
+
+
+def test_what_is_in_flight_ends_when_the_model_is_closed() -> None:
+    asked, done = threading.Event(), threading.Event()
+
+    def answer(_request: Any, _handler: Any) -> None:
+        asked.set()
+        done.wait(20)
+
+    try:
+        with ThreadPoolExecutor(1) as pool:
+            with opened(answer) as model:
+                waiting = pool.submit(_ask, model, "What?")
+                assert asked.wait(10)
+            with pytest.raises(ModelError, match="is not waited for any more: the model is closed"):
+                waiting.result(10)
+            with pytest.raises(ModelError, match="is not asked any more: the model is closed"):
+                _ask(model, "What?")
+            done.set()
+    finally:
+        done.set()
+
+
+def test_a_server_on_this_machine_is_asked_without_the_environments_proxy(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("HTTP_PROXY", "http_proxy", "ALL_PROXY", "all_proxy"):
+        monkeypatch.setenv(name, "http://127.0.0.1:1")
+    for name in ("NO_PROXY", "no_proxy"):
+        monkeypatch.delenv(name, raising=False)
+    with opened(says("a mug")) as model:
+        assert _ask(model, "What?").text == "a mug"
+
+
+def test_what_is_no_encryption_is_found_out() -> None:
+    refused = pytest.raises(ModelError, match=r"^https://127.0.0.1:\d+/v1 cannot be reached \(.*SSL")
+    with chatting() as url, opened(base_url=url.replace("http:", "https:")) as model, refused:
+        _ask(model, "What?")
 
 
 def test_tokens_a_minute_are_kept_by_the_size_of_the_last_request(waits: list[float]) -> None:

@@ -2,6 +2,10 @@
 
 import json
 import logging
+import signal
+import subprocess
+import sys
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -174,6 +178,36 @@ def test_the_key_is_in_no_file_and_in_nothing_that_is_said(
         assert KEY[3:] not in said
 
 
+@pytest.mark.parametrize("in_flight", [1, 4])
+def test_an_interrupted_run_ends_at_once_in_one_line(make_nieh_set: Any, tmp_path: Path, in_flight: int) -> None:
+    asked, done = threading.Event(), threading.Event()
+
+    def answer(_request: Any, _handler: Any) -> None:
+        asked.set()
+        done.wait(60)
+
+    data = make_nieh_set(size=56)
+    with chatting(answer) as url:
+        given = f"base_url={url},model=m,max_in_flight={in_flight}"
+        arguments = ["--model", "openai", "--model-args", given, "--tasks", "nieh_full", "--data", data]
+        command = [sys.executable, "-c", "from infthor_eval.cli import main; main()", *map(str, arguments)]
+        stopped = subprocess.Popen(
+            [*command, "--output", tmp_path / "out"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
+        try:
+            assert asked.wait(60)
+            stopped.send_signal(signal.SIGINT)
+            out, err = stopped.communicate(timeout=30)
+        finally:
+            stopped.kill()
+            done.set()
+    assert (stopped.returncode, out) == (130, "")
+    assert err.splitlines()[-1] == "infthor-eval: stopped; the same command goes on where it was"
+    assert "Traceback" not in err
+    assert "never awaited" not in err
+    assert "pending" not in err
+
+
 def test_notes_are_paid_for_too(make_nieh_set: Any, tmp_path: Path, run: Any) -> None:
     data = make_nieh_set(size=56)
     with chatting(lambda *_: completion("a note", (100, 10))) as url:
@@ -194,8 +228,6 @@ def test_in_process_models_and_baselines_tell_what_they_read(make_nieh_set: Any,
 
 
 def test_several_trajectories_are_asked_about_at_once(make_nieh_set: Any, tmp_path: Path, run: Any) -> None:
-    import threading
-
     both = threading.Barrier(2, timeout=10)
     seen: set[int] = set()
 
