@@ -186,7 +186,12 @@ def _recorded(unit: PlanUnit, inputs: str, stage: Episode, over: bool) -> UnitRe
         return unit.excluded(str(error), inputs)
     except InfthorError as error:
         begun = stage.begun if stage.begun is not None and stage.begun.index == unit.plan.index else unit.payload
-        return replace(unit, payload=begun).failed(str(error), inputs)
+        return replace(unit, payload=begun).failed(str(error), inputs, usage=stage.usage)
     return unit.record(
-        inputs, played.record, faults=played.faults, seconds=round(played.seconds, 4), tokens=played.tokens
+        inputs,
+        played.record,
+        faults=played.faults,
+        seconds=round(played.seconds, 4),
+        tokens=played.tokens,
+        usage=played.usage,
     )

@@ -5,7 +5,7 @@ from typing import Any
 
 import click
 
-from infthor_eval.cli.options import LARGEST, SEED, model_options_in, names_in
+from infthor_eval.cli.options import LARGEST, SEED, FiniteRange, model_options_in, names_in
 from infthor_eval.cli.staffing_options import staffing_options
 from infthor_eval.cli.suite_options import suite_options
 from infthor_eval.workers import Staffing
@@ -22,6 +22,18 @@ __all__ = ["command"]
     "--rope",
     metavar="TYPE:FACTOR",
     help="Extend the model's context: yarn:4, linear:2, dynamic:4, longrope:8.",
+)
+@click.option(
+    "--max-tokens-total",
+    type=click.IntRange(1, LARGEST),
+    metavar="N",
+    help="Ask a served model nothing more once a run has taken so many tokens.",
+)
+@click.option(
+    "--max-cost",
+    type=FiniteRange(min=0, min_open=True),
+    metavar="USD",
+    help="Nor once it has cost so much, by the prices in --model-args.",
 )
 @click.option("--name", help="What the run is called in tables and folders; else by its checkpoint, or its model.")
 @click.option("--limit", type=click.IntRange(1, LARGEST), help="Ask only the first N questions of each task.")
@@ -43,6 +55,8 @@ def command(
     data: Path | None,
     model_args: str,
     rope: str | None,
+    max_tokens_total: int | None,
+    max_cost: float | None,
     name: str | None,
     limit: int | None,
     output: Path,
@@ -60,10 +74,12 @@ def command(
     from infthor_eval.cli.requests import Asked, requests_for
 
     options = model_options_in(model_args)
-    if rope is not None:
-        if "rope" in options:
-            raise click.UsageError("--rope and rope= in --model-args are the same option; give one of them")
-        options["rope"] = rope
+    for option, value in {"rope": rope, "max_tokens_total": max_tokens_total, "max_cost": max_cost}.items():
+        if value is not None:
+            if option in options:
+                typed = f"--{option.replace('_', '-')}"
+                raise click.UsageError(f"{typed} and {option}= in --model-args are the same option; give one of them")
+            options[option] = str(value)
     asked = Asked(
         tasks=names_in(tasks, "--tasks"),
         data=data,

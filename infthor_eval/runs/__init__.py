@@ -17,8 +17,10 @@ from infthor_eval.runs.suite import (
     TaskRequest,
     Workload,
 )
+from infthor_eval.runs.usage import NOTHING, Usage
 
 __all__ = [
+    "NOTHING",
     "Catalog",
     "Cost",
     "Evaluation",
@@ -41,6 +43,7 @@ __all__ = [
     "Unit",
     "UnitKey",
     "UnitRecord",
+    "Usage",
     "Workload",
     "execute",
     "prepare",

@@ -123,6 +123,7 @@ class Crew:
         staffing = run.request.staffing
         self._first: _Greeting | None = None
         self._say = say
+        self._n_workers = staffing.workers
         self._pool = Pool(staffing.connect(_OpenEvaluator(run)), staffing.workers, self._accept)
 
     def begin(self) -> tuple[RunHeader, Workload]:
@@ -153,6 +154,8 @@ class Crew:
             elif isinstance(event, GivenUp):
                 journal.reread(event.worker)
                 yield from self._given_up(groups[event.job], event.reason, journal, done)
+        for worker in range(1, self._n_workers + 1):
+            journal.reread(worker)  # memos, which are not told
 
     def view(self, records: Sequence[UnitRecord[Any]]) -> View:
         """See `Staff`."""

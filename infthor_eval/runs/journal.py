@@ -25,6 +25,7 @@ from infthor_eval.formats.digests import canonical_json
 from infthor_eval.formats.files import written_atomically
 from infthor_eval.formats.reading import read_bytes, require_file
 from infthor_eval.runs.records import FORMAT, MemoRecord, RecordTypes, RunHeader, UnitKey, UnitRecord
+from infthor_eval.runs.usage import NOTHING, Usage
 
 __all__ = ["FOLDER", "Journal", "RunLog", "read_header", "read_run", "recover", "set_aside"]
 
@@ -178,9 +179,14 @@ class Journal:
         record = self._log.memos.get(fingerprint)
         return None if record is None else record.payload
 
-    def keep(self, fingerprint: str, payload: Any) -> None:
+    @property
+    def memos(self) -> list[MemoRecord[Any]]:
+        """All that was kept, of all shards, in the order of its inputs."""
+        return [self._log.memos[key] for key in sorted(self._log.memos)]
+
+    def keep(self, fingerprint: str, payload: Any, usage: Usage = NOTHING) -> None:
         """Keep a payload; it is on disk when this returns."""
-        record: MemoRecord[Any] = MemoRecord(fingerprint=fingerprint, payload=payload)
+        record: MemoRecord[Any] = MemoRecord(fingerprint=fingerprint, payload=payload, usage=usage)
         self._write(record)
         self._log.add(record)
 

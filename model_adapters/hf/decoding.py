@@ -20,7 +20,7 @@ from infthor_eval.errors import ModelError
 from model_adapters.hf.choices import Choices
 from model_adapters.protocols import Decoding
 
-__all__ = ["Generation", "Writing", "cut_at_stop", "read_generation", "write"]
+__all__ = ["Generation", "Writing", "read_generation", "write"]
 
 # Settings that change what is decoded and that this decoder does not have, with the values that switch them off.
 _UNSUPPORTED: dict[str, tuple[Any, ...]] = {
@@ -168,9 +168,3 @@ def _penalised(logits: torch.Tensor, seen: set[int], penalty: float) -> torch.Te
         return logits
     ids = torch.tensor([list(seen)], device=logits.device)
     return RepetitionPenaltyLogitsProcessor(penalty)(cast(Any, ids), cast(Any, logits[None]))[0]
-
-
-def cut_at_stop(text: str, stop: Sequence[str]) -> str | None:
-    """The text before the first stop string in it, or None where there is none."""
-    found = [text.index(string) for string in stop if string in text]
-    return text[: min(found)] if found else None
