@@ -99,7 +99,10 @@ class PlansEvaluation:
         }
         return Workload(
             groups=[
-                Group([PlanUnit.of(task.name, course, plan) for plan in task.plans(course)])
+                Group(
+                    [PlanUnit.of(task.name, course, plan) for plan in task.plans(course)],
+                    frames=len(course.trajectory.plan.low_actions),
+                )
                 for task in self._tasks.values()
                 for course in task.limited
             ],

@@ -94,7 +94,10 @@ class ManipulationEvaluation:
             "frames": self._options.frames,
         }
         return Workload(
-            groups=[Group(units) for units in self._by_trajectory().values()],
+            groups=[
+                Group(units, frames=len(units[0].course.trajectory.plan.low_actions))
+                for units in self._by_trajectory().values()
+            ],
             skipped=[
                 Skipped(UnitKey(task.name, place), reason)
                 for task in self._tasks.values()

@@ -78,7 +78,7 @@ class _Evaluator:
 
     @property
     def greeting(self) -> _Greeting:
-        groups = [Group([_plain(unit) for unit in group.units]) for group in self._workload.groups]
+        groups = [replace(group, units=list(map(_plain, group.units)), context=None) for group in self._workload.groups]
         return _Greeting(self._header, replace(self._workload, groups=groups))
 
     def do(self, job: _GroupOrder | _ViewOrder) -> Iterator[Recorded | SampleView]:

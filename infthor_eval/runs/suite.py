@@ -60,10 +60,12 @@ class Group:
     Attributes:
         units: at least one.
         context: what the suite itself wants to know when it does them.
+        frames: that the units look at, each counted once; what they share grows with it.
     """
 
     units: Sequence[Unit[Any]]
     context: Any = None
+    frames: int = 1
 
 
 @dataclass(frozen=True)
