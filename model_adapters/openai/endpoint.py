@@ -43,12 +43,14 @@ class _PassingError(Exception):
     Attributes:
         mend: what to do where it is not.
         wait_s: how long the server asks to wait; None where it does not say.
+        busy: whether the server is well, and only has too much to do.
     """
 
-    def __init__(self, said: str, mend: str, wait_s: float | None = None) -> None:
+    def __init__(self, said: str, mend: str, wait_s: float | None = None, *, busy: bool = False) -> None:
         super().__init__(said)
         self.mend = mend
         self.wait_s = wait_s
+        self.busy = busy
 
 
 class Endpoint:
@@ -88,7 +90,8 @@ class Endpoint:
             except _PassingError as fault:
                 faults.append(f"{self.where} {fault}")
                 if len(faults) == most:
-                    self._given_up.set()
+                    if not fault.busy:
+                        self._given_up.set()
                     raise ModelError(f"{self.where} {fault}, in {most} attempts; {fault.mend}") from fault
                 time.sleep(_wait_s(len(faults), fault))
             else:
@@ -129,7 +132,7 @@ class Endpoint:
                 f"{self.where} {said}, and asks to wait {wait_s:.0f} s; run the same command again then, "
                 "which goes on where it was"
             )
-        return _PassingError(said, mend, wait_s)
+        return _PassingError(said, mend, wait_s, busy=status == 429)
 
     def _quoted(self, body: bytes) -> str:
         text = self._secret.hidden_in(body.decode("utf-8", "replace"))

@@ -54,7 +54,6 @@ class ServedModel:
             sampling=True,
             choices=options.guided is not None,
             max_in_flight=options.max_in_flight,
-            max_tokens=options.max_context,
         )
 
     def identity(self) -> dict[str, Any]:

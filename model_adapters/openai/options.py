@@ -15,7 +15,7 @@ _ONE_OF = {
     "max_tokens_field": ("max_tokens", "max_completion_tokens"),
     "guided": (None, "vllm"),
 }
-_RANGES = {"max_in_flight": (1, 256), "retries": (0, 20), "timeout_s": (0.01, 86_400), "max_context": (1, 10**12)}
+_RANGES = {"max_in_flight": (1, 256), "retries": (0, 20), "timeout_s": (0.01, 86_400)}
 _ABOVE_ZERO = ("requests_per_minute", "tokens_per_minute", "max_tokens_total", "max_cost")
 _PRICES = ("price_per_m_input", "price_per_m_cached", "price_per_m_output")
 _ACTING = (  # on a reply; how fast and how dear a server may be asked is not
@@ -46,7 +46,6 @@ class OpenAIOptions:
         send_temperature: whether temperature and top_p are sent; some models take none and decode in their own way.
         send_stop: whether stop strings are sent, at most 4; replies are cut here in any case.
         guided: how replies are held to choices: `vllm` sends its `structured_outputs`; None holds none.
-        max_context: limit of context and reply together in tokens, where it is known.
         max_in_flight: requests at the same time.
         timeout_s: for a whole reply, from the connection to its last byte.
         retries: how often a request is sent again after a passing failure.
@@ -70,7 +69,6 @@ class OpenAIOptions:
     send_temperature: bool = True
     send_stop: bool = True
     guided: str | None = None
-    max_context: int | None = None
     max_in_flight: int = 4
     timeout_s: float = 300.0
     retries: int = 4

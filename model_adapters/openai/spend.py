@@ -65,7 +65,8 @@ class Spend:
 
     A request is refused once a cap is reached, before it is sent. What requests in flight will take is estimated by
     the dearest so far, and a request that could only be paid without them waits for their end: so a cap is passed by
-    one request at most, not by one per thread, as long as none is dearer than all before.
+    one request at most, not by one per thread, as long as none is dearer than all before. A reply that does not tell
+    what it took counts as the dearest so far; where none has told yet, no cap can be kept.
 
     Args:
         name: of the model, for messages.
@@ -106,11 +107,15 @@ class Spend:
     def _settle(self, charge: Charge) -> None:
         with self._changed:
             self._in_flight -= 1
-            self._tokens += charge.tokens or 0
-            self._cost += charge.cost
-            self._most_tokens = max(self._most_tokens, charge.tokens or 0)
-            self._most_cost = max(self._most_cost, charge.cost)
-            self._untold = self._untold or (charge.sent and charge.tokens is None)
+            if charge.tokens is not None:
+                self._most_tokens = max(self._most_tokens, charge.tokens)
+                self._most_cost = max(self._most_cost, charge.cost)
+                self._tokens += charge.tokens
+                self._cost += charge.cost
+            elif charge.sent:
+                self._untold = self._untold or not self._most_tokens
+                self._tokens += self._most_tokens
+                self._cost += self._most_cost
             self._changed.notify_all()
 
     def _short_with_those_in_flight(self) -> bool:

@@ -16,11 +16,13 @@ from hypothesis import strategies as st
 
 from infthor_eval.errors import ModelError
 from model_adapters import Decoding, Reply
-from model_adapters.openai import endpoint, wire
 from model_adapters.openai.completions import read_completion
 
 from ..policies.servers import Answer, send
 from .talking import completion, opened, says, talkative
+
+endpoint = pytest.importorskip("model_adapters.openai.endpoint", reason="the client library is not installed")
+wire = pytest.importorskip("model_adapters.openai.wire")
 
 KEY = "sk-0123456789abcdef0123456789"
 Handler = BaseHTTPRequestHandler
@@ -243,6 +245,21 @@ def test_a_server_that_is_down_is_not_waited_for_by_every_unit() -> None:
         down = True
         with pytest.raises(ModelError, match="in 4 attempts"):
             _ask(model)
+
+
+def test_a_server_that_is_only_busy_is_asked_as_patiently_by_every_unit() -> None:
+    n_asked = 0
+
+    def answer(_request: Any, handler: Handler) -> None:
+        nonlocal n_asked
+        n_asked += 1
+        send(handler, 429, b"slow down")
+
+    with opened(answer, retries=2) as model:
+        for n_expected in (3, 6):
+            with pytest.raises(ModelError, match="answers 429 Too Many Requests: 'slow down', in 3 attempts; lower"):
+                _ask(model)
+            assert n_asked == n_expected
 
 
 def test_a_server_that_is_not_there_is_one_line() -> None:

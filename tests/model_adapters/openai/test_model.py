@@ -13,10 +13,11 @@ import pytest
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
 from model_adapters import Decoding, check_adapter, load
-from model_adapters.openai import model as served
 
 from ..asking import up_to
 from .talking import chatting, completion, images_in, kept, opened, says, talkative
+
+served = pytest.importorskip("model_adapters.openai.model", reason="the client library is not installed")
 
 KEY = "sk-0123456789abcdef0123456789"
 
@@ -215,7 +216,6 @@ def test_the_identity_is_whom_is_asked_and_how() -> None:
             "send_stop": True,
             "guided": None,
         }
-        assert model.capabilities.max_tokens is None
         assert not model.capabilities.deterministic
 
 

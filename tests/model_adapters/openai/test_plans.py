@@ -43,7 +43,7 @@ def played(task_files: Path, tmp_path: Path, run: Any) -> Any:
 
 
 def test_episodes_at_once_find_what_one_after_the_other_finds(played: Any, tmp_path: Path) -> None:
-    data = write(tmp_path / "data", cut(FORK, 2), cut(MUG, 2), cut(CANDLE, 2))
+    data = write(tmp_path / "data", cut(FORK, 1), cut(MUG, 1), cut(CANDLE, 1))
     with chatting(_moves) as url:
         runs = [played(url, data, f"with-{number}", max_in_flight=number) for number in (3, 1)]
     together, alone = ([msgspec.structs.replace(record, seconds=0.0) for record in records] for _, records, _ in runs)

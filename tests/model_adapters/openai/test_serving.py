@@ -25,7 +25,7 @@ from tests.agents.cut import CANDLE, FORK, cut, write
 from ..asking import up_to
 from ..checkpoints import save
 
-for package in ("fastapi", "uvicorn", "multipart"):
+for package in ("openai", "fastapi", "uvicorn", "multipart"):
     pytest.importorskip(package, reason="what `transformers serve` needs is not installed (pip install -e '.[dev]')")
 
 SERVE = "from transformers.cli.transformers import main; main()"

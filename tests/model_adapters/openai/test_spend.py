@@ -63,6 +63,14 @@ def test_a_server_that_does_not_tell_is_asked_once_under_a_cap_and_for_ever_with
         _took(capped, None)
 
 
+def test_a_reply_that_does_not_tell_counts_as_the_dearest_before_it() -> None:
+    spend = Spend("m", Caps(tokens=100))
+    for tokens in (10, 40, None, None):
+        _took(spend, tokens)
+    with pytest.raises(ModelError, match="not asked: 130 tokens reach max_tokens_total=100"):
+        _took(spend, 1)
+
+
 def test_threads_pass_a_cap_by_one_request_at_most() -> None:
     spend, taken, lock = Spend("m", Caps(tokens=100)), [], Lock()
 
