@@ -24,6 +24,8 @@ from infthor_eval.workers import Event, GivenUp, Lost, Made, Pool, Withdrawn
 
 __all__ = ["Crew"]
 
+_PARTING_S = 20.0
+
 
 @dataclass(frozen=True)
 class _Greeting:
@@ -98,7 +100,9 @@ class _Evaluator:
 
     def _session_in(self, folder: Path) -> JournalSession:
         if self._session is None:
-            journal = Journal(folder, self._header, self._run.suite.records, worker=self._number)
+            # A worker of a driver that was killed may still be ending.
+            types = self._run.suite.records
+            journal = Journal(folder, self._header, types, worker=self._number, patience_s=_PARTING_S)
             self._session = JournalSession(self._subject, journal)
         return self._session
 
