@@ -18,6 +18,7 @@ from infthor_eval.runs import execute, prepare, read_run
 from infthor_eval.runs.journal import Journal
 from infthor_eval.workers import Staffing
 
+from ..clusters import two_nodes
 from .toy import Adder, Sum, Sums, ToySuite
 from .toy_command import request
 
@@ -142,6 +143,33 @@ def test_a_run_that_is_stopped_has_the_results_of_what_is_there_and_goes_on(tmp_
     outcome, watching = run(request(tmp_path, staffing=staffing), suite)
     assert (outcome.n_missing, len(outcome.records)) == (0, 24)
     assert sum(resumed for _, resumed in watching.seen) == len(stopped.records)
+
+
+class _Losing(Watching):
+    """Takes a node away once some units are done."""
+
+    def __init__(self, cluster, node):
+        super().__init__()
+        self._cluster, self._node = cluster, node
+
+    def done(self, record, resumed):
+        super().done(record, resumed)
+        if len(self.seen) == 5:
+            self._cluster.remove_node(self._node)
+
+
+@pytest.mark.timeout(200)
+def test_a_cluster_that_loses_a_node_finds_what_one_process_finds(tmp_path):
+    suite = DeadlySuite(tmp_path, {"4+1": 1})
+    with two_nodes() as (cluster, node):
+        watching = _Losing(cluster, node)
+        asked = request(tmp_path / "2", staffing=Staffing(2, cluster.address))
+        shared = execute(prepare(asked, suite), watching)
+    alone, _ = run(request(tmp_path / "1"), suite)
+    assert plain(shared.records) == plain(alone.records)
+    assert (shared.folder / "results.json").read_bytes() == (alone.folder / "results.json").read_bytes()
+    assert len(watching.seen) == 24
+    assert len(watching.notes) >= 2  # of the node's worker, and of the one that a unit killed
 
 
 class OtherElsewhere(Adder):
