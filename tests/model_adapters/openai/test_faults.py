@@ -287,7 +287,8 @@ def test_a_wait_that_the_server_asks_for_is_kept(monkeypatch: pytest.MonkeyPatch
 
     with opened(answer, retries=4) as model:
         _ask(model)
-    assert waited == pytest.approx([7, 1.5, 30], abs=1.1)
+    assert waited[:2] == pytest.approx([7, 1.5], abs=0.1)
+    assert 15 < waited[2] <= 30  # until a time of day, which comes nearer while the machine is busy
 
 
 def test_without_one_each_wait_is_longer(monkeypatch: pytest.MonkeyPatch) -> None:
