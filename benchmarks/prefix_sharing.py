@@ -9,10 +9,10 @@ One run measures, on the same Qwen2.5-VL with random weights, the same frames an
 
     python benchmarks/prefix_sharing.py --frames 120 --questions 24
 
-On a machine with a GPU it also tells tokens per second, peak memory and the largest context that fits, for random
-weights of the real shape:
+On a machine with a GPU it also tells tokens per second, as published_evaluation.py takes them, peak memory and the
+largest context that fits, for random weights of the real shape:
 
-    python benchmarks/prefix_sharing.py --device cuda --model-size 7b --largest
+    python benchmarks/prefix_sharing.py --device cuda --model-size 7b --largest --attention flash_attention_2
 """
 
 import argparse
@@ -79,6 +79,8 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--device", default="cpu")
     parser.add_argument("--model-size", choices=("tiny", "7b"), default="tiny")
+    parser.add_argument("--attention", default="sdpa", help="attn_implementation")
+    parser.add_argument("--chunk-tokens", type=int, default=1024)
     parser.add_argument("--largest", action="store_true", help="find the largest context that fits")
     options = parser.parse_args()
     if options.largest and not options.device.startswith("cuda"):
@@ -92,7 +94,14 @@ def build(options: argparse.Namespace) -> TransformersModel:
     if options.model_size == "7b":
         twin, dtype = replace(twin, config=_real_shape), "bfloat16"
     adapter = type("Adapter", (TinyAdapter,), {"twin": twin})
-    settings = TinyOptions(device=options.device, dtype=dtype, batch_size=options.batch_size, max_tokens=0)
+    settings = TinyOptions(
+        device=options.device,
+        dtype=dtype,
+        attn_implementation=options.attention,
+        chunk_tokens=options.chunk_tokens,
+        batch_size=options.batch_size,
+        max_tokens=0,
+    )
     return adapter.build(f"qwen2.5-vl-{options.model_size}", settings, options.seed)
 
 
@@ -115,17 +124,32 @@ def forget(model: TransformersModel) -> None:
 
 
 def machine_report(model: TransformersModel, frames: Sequence[FrameRef], options: argparse.Namespace) -> None:
-    """Print the speed of one prefill, the peak memory of a GPU, and the largest context that fits."""
-    forget(model)
+    """Print the speed of encoding and decoding, the peak memory of a GPU, and the largest context that fits."""
     on_gpu = options.device.startswith("cuda")
     if on_gpu:
         torch.cuda.reset_peak_memory_stats()
-    seconds, replies = _timed(lambda: [_prefill(model, frames)])
-    print(f"prefill          {replies[0][0]} tokens, {replies[0][0] / seconds:.0f} tokens/s")
+    points = []
+    for some in (frames[: max(1, len(frames) // 8)], frames):
+        forget(model)
+        seconds, replies = _timed(lambda some=some: [_prefill(model, some)])
+        points.append(f"{replies[0][0]}:{replies[0][0] / seconds:.0f}")
+    print(f"prefill          {','.join(points)} (tokens:tokens/s)")
+    print(f"decode           {_decoding_speed(model, frames[:1]):.1f} tokens/s")
     if on_gpu:
         print(f"peak memory      {torch.cuda.max_memory_allocated() / 2**30:.1f} GiB")
     if options.largest:
         print(f"largest context  {_largest(model, frames)} tokens (found by doubling)")
+
+
+def _decoding_speed(model: TransformersModel, frames: Sequence[FrameRef], few: int = 2, more: int = 34) -> float:
+    """Tokens per second of a reply on a short context, by the difference of two replies."""
+    times, lengths = [], []
+    for new in (few, more):
+        conversation(model, frames, [""], new)
+        seconds, replies = _timed(lambda new=new: conversation(model, frames, [""], new))
+        times.append(seconds)
+        lengths.append(len(replies[0]))
+    return (lengths[1] - lengths[0]) / (times[1] - times[0])
 
 
 def _prefill(model: TransformersModel, frames: Sequence[FrameRef]) -> tuple[int, ...]:
@@ -222,12 +246,14 @@ def transformers_alone(
 
 def _decode(model: Any, cache: DynamicCache, ids: list[int], position: int, new_tokens: int) -> tuple[int, ...]:
     bare, ends = model._loaded.model, model._loaded.generation.end_ids
+    device = bare.device
     n_prefix = cache.get_seq_length()
     reply: list[int] = []
     feed = ids
     while True:
-        positions = torch.arange(position, position + len(feed)).expand(3, 1, -1)
-        output = bare(input_ids=torch.tensor([feed]), position_ids=positions, past_key_values=cache, logits_to_keep=1)
+        positions = torch.arange(position, position + len(feed), device=device).expand(3, 1, -1)
+        ids_fed = torch.tensor([feed], device=device)
+        output = bare(input_ids=ids_fed, position_ids=positions, past_key_values=cache, logits_to_keep=1)
         position += len(feed)
         token = int(output.logits[0, -1].argmax())
         if token in ends:

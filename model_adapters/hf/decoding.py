@@ -20,7 +20,7 @@ from infthor_eval.errors import ModelError
 from model_adapters.hf.choices import Choices
 from model_adapters.protocols import Decoding
 
-__all__ = ["Generation", "Writing", "read_generation", "write"]
+__all__ = ["Generation", "Writing", "extend", "read_generation", "write"]
 
 # Settings that change what is decoded and that this decoder does not have, with the values that switch them off.
 _UNSUPPORTED: dict[str, tuple[Any, ...]] = {
@@ -100,7 +100,9 @@ class Writing:
         self._choices = choices
         self._finished = finished
         # How often a token was seen does not matter.
-        self._seen = set(context) if generation.repetition_penalty != 1.0 else set()
+        self._seen = (
+            torch.tensor([list(set(context))], dtype=torch.long) if generation.repetition_penalty != 1.0 else None
+        )
         self._draws = torch.Generator().manual_seed(decoding.seed)
 
     @property
@@ -108,19 +110,39 @@ class Writing:
         """The choice that the reply is; None where it is free."""
         return None if self._choices is None else self._choices.text(self.ids)
 
-    def extend(self, logits: torch.Tensor) -> None:
-        """Choose the next token by its logits, (vocabulary,), or end the reply."""
-        scores = _penalised(logits.float(), self._seen, self._generation.repetition_penalty)
-        held = self._held(scores)
-        if not held.max() > -torch.inf:  # the largest is NaN where one is
+    def scores(self, logits: torch.Tensor) -> torch.Tensor:
+        """What the next token is chosen by, (vocabulary,), on the logits' device, which nothing is read from."""
+        return self._held(self._penalised(logits.float()))
+
+    def take(self, scores: torch.Tensor, likeliest: int, score: float) -> None:
+        """Choose the next token, or end the reply.
+
+        Args:
+            scores: of all tokens, (vocabulary,), on the CPU where a token is drawn.
+            likeliest: the token with the largest.
+            score: which that is.
+
+        Raises:
+            ModelError: no token has a score.
+        """
+        if not score > -math.inf:  # the largest is NaN where one is
             raise ModelError(f"no token has a score after {len(self.ids)} tokens of the reply (NaN); try dtype=float32")
-        token = self._chosen(held)
+        token = likeliest if self.decoding.greedy else self._drawn(scores)
         if token in self._generation.end_ids:
             self.done = True
             return
         self.ids.append(token)
-        self._seen.add(token)
+        if self._seen is not None:
+            self._seen = torch.cat((self._seen, self._seen.new_full((1, 1), token)), dim=-1)
         self.done = len(self.ids) == self.decoding.max_new_tokens or self._complete()
+
+    def _penalised(self, logits: torch.Tensor) -> torch.Tensor:
+        """Logits with those of seen tokens lowered as transformers' repetition penalty does."""
+        if self._seen is None:
+            return logits
+        self._seen = self._seen.to(logits.device)  # copied once, and lengthened there
+        penalty = RepetitionPenaltyLogitsProcessor(self._generation.repetition_penalty)
+        return penalty(cast(Any, self._seen), cast(Any, logits[None]))[0]
 
     def _held(self, scores: torch.Tensor) -> torch.Tensor:
         """Scores of what may come next; of a reply that is held to choices, nothing else has any."""
@@ -132,10 +154,8 @@ class Writing:
         held[at] = scores[at]
         return held
 
-    def _chosen(self, scores: torch.Tensor) -> int:
-        if self.decoding.greedy:
-            return int(scores.argmax())
-        rows = scores[None].cpu()  # on the CPU a seed draws the same everywhere
+    def _drawn(self, scores: torch.Tensor) -> int:
+        rows = scores[None]
         for warp in (TemperatureLogitsWarper(float(self.decoding.temperature)), TopPLogitsWarper(self.decoding.top_p)):
             rows = warp(cast(Any, None), cast(Any, rows))
         return int(torch.multinomial(rows[0].softmax(dim=-1), 1, generator=self._draws))
@@ -153,18 +173,26 @@ def write(logits: torch.Tensor, step: Callable[[Sequence[int]], torch.Tensor], r
         replies: what is written.
     """
     while True:
-        for row, reply in enumerate(replies):
-            if not reply.done:
-                reply.extend(logits[row])
+        extend([(reply, logits[row]) for row, reply in enumerate(replies) if not reply.done])
         if all(reply.done for reply in replies):
             return
         # Those that are done are fed something, which nobody reads.
         logits = step([0 if reply.done else reply.ids[-1] for reply in replies])
 
 
-def _penalised(logits: torch.Tensor, seen: set[int], penalty: float) -> torch.Tensor:
-    """Logits, (vocabulary,), with those of seen tokens lowered as transformers' repetition penalty does."""
-    if penalty == 1.0:
-        return logits
-    ids = torch.tensor([list(seen)], device=logits.device)
-    return RepetitionPenaltyLogitsProcessor(penalty)(cast(Any, ids), cast(Any, logits[None]))[0]
+def extend(replies: Sequence[tuple[Writing, torch.Tensor]]) -> None:
+    """Choose the next token of replies by their logits, (vocabulary,), or end them.
+
+    Of all of them together the device is read once: that is what a step waits for.
+
+    Raises:
+        ModelError: in one of them no token has a score.
+    """
+    scores = torch.stack([reply.scores(logits) for reply, logits in replies])
+    if not all(reply.decoding.greedy for reply, _ in replies):
+        scores = scores.cpu()  # where a seed draws the same everywhere
+    best = scores.max(dim=-1)
+    # As one tensor: a float32 holds the number of any token.
+    pairs = torch.stack((best.values, best.indices.float())).T.tolist()
+    for (reply, _), row, (score, token) in zip(replies, scores, pairs, strict=True):
+        reply.take(row, int(token), score)

@@ -19,8 +19,8 @@ class Embedded:
     """A stretch of a prompt, ready to be fed.
 
     Attributes:
-        embeds: (tokens, hidden).
-        positions: (1, tokens) or (3, 1, tokens).
+        embeds: (tokens, hidden), on the embedding layer's device.
+        positions: (1, tokens) or (3, 1, tokens), there too.
         starts: the position of each piece's first token.
         end: the position of what follows.
     """
@@ -64,18 +64,25 @@ class Embedder:
             else:
                 slots.extend(len(flat) + at for at, token in enumerate(piece.ids) if token == self._family.slot_id)
                 flat.extend(piece.ids)
-        ids = torch.tensor(flat, device=self._embeddings.weight.device)
-        embeds = self._embeddings(ids)
-        if frames:
-            features = torch.cat(self._features.get(frames))
-            if len(features) != len(slots):
-                raise ModelError(
-                    f"the processor makes {len(slots)} image tokens of {len(frames)} frames and the model "
-                    f"{len(features)} features; they do not belong to one checkpoint"
-                )
-            embeds[slots] = features.to(embeds.dtype)
+        # Features first: their frames are read and scaled here while the device still computes what came before.
+        features = self._features_of(frames, len(slots)) if frames else None
+        device = self._embeddings.weight.device
+        # Positions are made here, where they can be looked at without waiting for the device.
+        ids = torch.tensor(flat)
         positions = self._family.positions(ids, [frame.size for frame in frames], start)
+        embeds = self._embeddings(ids.to(device))
+        if features is not None:
+            embeds[slots] = features.to(embeds)
         # A piece's first token has the same position on every axis; the next piece starts behind the largest one.
         axes = positions.reshape(-1, len(flat))
         first = axes[0].tolist()
-        return Embedded(embeds, positions, tuple(first[at] for at in firsts), int(axes.max()) + 1)
+        return Embedded(embeds, positions.to(device), tuple(first[at] for at in firsts), int(axes.max()) + 1)
+
+    def _features_of(self, frames: Sequence[Frame], n_slots: int) -> torch.Tensor:
+        features = torch.cat(self._features.get(frames))
+        if len(features) != n_slots:
+            raise ModelError(
+                f"the processor makes {n_slots} image tokens of {len(frames)} frames and the model "
+                f"{len(features)} features; they do not belong to one checkpoint"
+            )
+        return features

@@ -38,12 +38,12 @@ class Family(Protocol):
         """Position ids of a stretch of a sequence that has whole frames only.
 
         Args:
-            ids: (tokens,), frames expanded.
+            ids: (tokens,), frames expanded, on the CPU.
             sizes: of the frames in it.
             start: the position that the first token takes.
 
         Returns:
-            (1, tokens), or (3, 1, tokens) where positions have three axes.
+            (1, tokens), or (3, 1, tokens) where positions have three axes, on the CPU.
         """
         ...
 

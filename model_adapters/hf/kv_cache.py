@@ -5,6 +5,7 @@ crop. Here keys and values lie in buffers with room at the end: an update writes
 no memory at all.
 """
 
+from dataclasses import dataclass
 from typing import Any
 
 import torch
@@ -13,6 +14,22 @@ from transformers.cache_utils import Cache, DynamicLayer
 __all__ = ["BufferedCache"]
 
 _STEP = 1024  # buffers end at multiples of this, so that questions of slightly different length find room
+
+
+@dataclass
+class _Wanted:
+    """What the layers of a cache have to know of it.
+
+    They do not hold the cache itself: in a circle of references, buffers that nobody uses any more would stay in memory
+    beside their successors until Python's collector comes by.
+
+    Attributes:
+        storage: where buffers lie; beside the layers' weights where None.
+        room: tokens that a layer which has to grow should hold.
+    """
+
+    storage: torch.device | None
+    room: int = 0
 
 
 class BufferedCache(Cache):
@@ -26,8 +43,7 @@ class BufferedCache(Cache):
                 keys and values are copied to the weights' device while the layer computes, and to nowhere else: a
                 context that does not fit on the device runs, at the speed of the connection.
         """
-        self._room = 0
-        self._storage = storage
+        self._wanted = _Wanted(storage)
         super().__init__(layers=[])
 
     def update(
@@ -40,22 +56,12 @@ class BufferedCache(Cache):
     ) -> tuple[torch.Tensor, torch.Tensor]:
         """Write one layer's new states behind its old ones and return all."""
         while len(self.layers) <= layer_idx:
-            self.layers.append(BufferedLayer(self))
+            self.layers.append(BufferedLayer(self._wanted))
         return super().update(key_states, value_states, layer_idx, *args, **kwargs)
-
-    @property
-    def storage(self) -> torch.device | None:
-        """Where the buffers lie."""
-        return self._storage
-
-    @property
-    def room(self) -> int:
-        """Tokens that a layer which has to grow should hold."""
-        return self._room
 
     def reserve(self, n_tokens: int) -> None:
         """Say how long the sequence will become, so that buffers are allocated once and at the right size."""
-        self._room = -(-n_tokens // _STEP) * _STEP
+        self._wanted.room = -(-n_tokens // _STEP) * _STEP
 
     def truncate(self, n_tokens: int) -> None:
         """Keep the first `n_tokens` tokens; memory stays allocated."""
@@ -65,7 +71,7 @@ class BufferedCache(Cache):
 
     def spread(self, n_rows: int, room: int) -> "BufferedCache":
         """A new cache that holds this one's single sequence in each of its rows, with room for `room` tokens."""
-        spread = BufferedCache(self._storage)
+        spread = BufferedCache(self._wanted.storage)
         spread.reserve(room)
         for index, layer in enumerate(self.layers):
             if isinstance(layer, BufferedLayer) and layer.keys is not None and layer.values is not None:
@@ -79,9 +85,9 @@ class BufferedLayer(DynamicLayer):
     Buffers have the shape (batch, heads, room, head size).
     """
 
-    def __init__(self, cache: BufferedCache) -> None:
+    def __init__(self, wanted: _Wanted) -> None:
         super().__init__()
-        self._cache = cache
+        self._wanted = wanted
         self._buffers: tuple[torch.Tensor, torch.Tensor] | None = None
 
     def update(
@@ -97,7 +103,7 @@ class BufferedLayer(DynamicLayer):
         old = self.get_seq_length()
         new = old + key_states.shape[-2]
         if self._buffers is None or self._buffers[0].shape[-2] < new:
-            room = max(new, self._cache.room)
+            room = max(new, self._wanted.room)
             self._buffers = (
                 self._grown(key_states, old, room, self.keys),
                 self._grown(value_states, old, room, self.values),
@@ -109,7 +115,7 @@ class BufferedLayer(DynamicLayer):
         return self.keys.to(key_states.device), self.values.to(value_states.device)
 
     def _grown(self, like: torch.Tensor, old: int, room: int, used: torch.Tensor | None) -> torch.Tensor:
-        device = self._cache.storage or like.device
+        device = self._wanted.storage or like.device
         buffer = like.new_empty((*like.shape[:-2], room, like.shape[-1]), device=device)
         if used is not None and old:
             buffer[..., :old, :] = used

@@ -1,5 +1,6 @@
 """What does not fit, in one line."""
 
+import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -42,12 +43,15 @@ def naming_model_errors(name: str) -> Iterator[None]:
 def naming_memory_errors(name: str, n_context: int) -> Iterator[None]:
     """Turn errors of memory into one line with the size of the context.
 
+    Whoever keeps the error keeps no tensors with it: what is asked next finds the memory free.
+
     Raises:
         ModelError: memory ran out.
     """
     try:
         yield
     except (RuntimeError, MemoryError) as error:
+        traceback.clear_frames(error.__traceback__)  # their variables hold the request's cache and activations
         # torch has an exception of its own for GPUs only; on CPU the allocator's name in the message tells.
         cpu = isinstance(error, MemoryError) or "DefaultCPUAllocator" in str(error)
         if not (cpu or isinstance(error, torch.OutOfMemoryError)):

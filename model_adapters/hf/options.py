@@ -8,6 +8,11 @@ __all__ = ["CheckpointOptions", "HfOptions", "Placement", "parse_rope"]
 
 
 _ATTENTION = ("eager", "sdpa", "flex_attention", "flash_attention_2", "flash_attention_3")
+# What is imported for attention that torch does not have, and what it is called when it is installed.
+_PACKAGES = {
+    "flash_attention_2": ("flash_attn", "flash-attn"),
+    "flash_attention_3": ("flash_attn_interface", "flash-attn-3"),
+}
 _LARGEST = 2**53  # of the numbers that options take; what is larger is a slip
 _PROMPTS = ("chat", "plain")
 _ROPES = ("dynamic", "linear", "longrope", "yarn")
@@ -50,8 +55,9 @@ class Placement:
             raise ValueError(f"attn_implementation={name} is code on the hub, which runs with trust_remote_code=true")
         if "/" not in name and name not in _ATTENTION:
             raise ValueError(f"attn_implementation={name} is not known; there are {', '.join(_ATTENTION)}")
-        if name.startswith("flash_") and importlib.util.find_spec("flash_attn") is None:
-            raise ValueError(f"attn_implementation={name} needs the package flash-attn; use sdpa")
+        module, package = _PACKAGES.get(name, ("", ""))
+        if module and importlib.util.find_spec(module) is None:
+            raise ValueError(f"attn_implementation={name} needs the package {package}; use sdpa")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,7 +70,7 @@ class HfOptions(Placement):
         share_prefix: encode what two replies have in common once; false encodes everything for every reply.
         chunk_tokens: most tokens encoded in one forward pass.
         batch_size: most continuations of one prefix that are answered together; each has its own copy of the prefix's
-            keys and values.
+            keys and values, and continuations of different length have attention copy these for each token.
         kv_offload: keep keys and values in CPU memory; slower, for contexts that do not fit on the GPU.
         feature_cache_mb: memory for vision features of frames seen before, in MiB.
         max_tokens: context limit instead of the checkpoint's; 0 for none.

@@ -14,7 +14,7 @@ from transformers import LogitsProcessor, LogitsProcessorList, StoppingCriteria,
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
 from model_adapters.backend import BackendConversation
-from model_adapters.hf.decoding import Writing
+from model_adapters.hf.decoding import Writing, extend
 from model_adapters.hf.description import capabilities, identity
 from model_adapters.hf.limits import check_limit, naming_memory_errors, naming_model_errors
 from model_adapters.hf.loaded import Loaded
@@ -71,7 +71,7 @@ class _Dictate(LogitsProcessor):
         self._reply = reply
 
     def __call__(self, input_ids: torch.LongTensor, scores: torch.FloatTensor) -> torch.FloatTensor:
-        self._reply.extend(scores[0])
+        extend([(self._reply, scores[0])])
         if not self._reply.done:
             scores[0, self._reply.ids[-1]] = torch.inf
         return scores

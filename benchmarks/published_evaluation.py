@@ -1,0 +1,369 @@
+"""What a full published evaluation would take on 1, 8 and 64 GPUs: requests, hours, cost, and what sharing saves.
+
+225 trajectories with their questions, drawn from the seed, are asked about in every mode by four models, as the harness
+does it: a group is a trajectory, its contexts are in the order in which they begin alike, and a request encodes what
+the one before it did not. Groups go to workers longest first; a worker has as many GPUs as its longest context needs.
+
+    python benchmarks/published_evaluation.py
+    python benchmarks/published_evaluation.py --prefill qwen2.5-vl=8000:9000,128000:5000 --decode qwen2.5-vl=35
+
+The last line puts in what was measured on a GPU (benchmarks/gpu.md): tokens/s of encoding at two lengths, tokens/s of
+decoding at a short one. What is not measured is reckoned from the machine's numbers. docs/cost.md has the formulae.
+"""
+
+import argparse
+import random
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import takewhile
+
+import numpy as np
+from evaluation_costs import (
+    MODELS,
+    Machine,
+    Rates,
+    Request,
+    Shape,
+    gpus_for,
+    largest_context,
+    makespan,
+    measured_prefill,
+    reckoned,
+    seconds,
+)
+
+from infthor_eval.nieh.contexts.haystack import _window
+
+GPUS = (1, 8, 64)
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """A trajectory, by what costs.
+
+    Attributes:
+        n_frames: frames; of as many steps.
+        questions: places of the clues, for each.
+    """
+
+    n_frames: int
+    questions: tuple[tuple[int, ...], ...]
+
+
+@dataclass(frozen=True)
+class Mode:
+    """A way to evaluate.
+
+    Attributes:
+        name: of the task.
+        contexts: the contexts of a trajectory, as places of frames, and how many there are not; None for plans.
+        step_seconds: in the simulator, for each reply.
+    """
+
+    name: str
+    contexts: Callable[[Trajectory, Shape], tuple[list[tuple[int, ...]], int]] | None
+    step_seconds: float = 0.0
+
+
+@dataclass(frozen=True)
+class Run:
+    """One model in one mode.
+
+    Attributes:
+        mode: its name.
+        model: its name.
+        n_requests: that are answered.
+        n_skipped: that there is no such context for, that are too long, or that no node has the memory for.
+        tokens: of all contexts together.
+        encoded: of them, not found in the cache.
+        largest: tokens of the longest context.
+        n_gpus: of one worker; 0 where there is nothing to do.
+        jobs: seconds of each group, and of each without any sharing.
+    """
+
+    mode: str
+    model: Shape
+    n_requests: int
+    n_skipped: tuple[int, int, int]
+    tokens: int
+    encoded: int
+    largest: int
+    n_gpus: int
+    jobs: tuple[tuple[float, ...], tuple[float, ...]]
+
+    def hours(self, n_gpus: int, load: float, reuse: bool = True) -> float | None:
+        """On so many GPUs; None where they are too few for one worker."""
+        if not self.n_gpus:
+            return 0.0
+        if n_gpus < self.n_gpus:
+            return None
+        return (load + makespan(self.jobs[0 if reuse else 1], n_gpus // self.n_gpus)) / 3600
+
+
+def main() -> None:
+    """Print the set, a line for each run, and sums."""
+    options = _arguments()
+    machine = machine_of(options)
+    trajectories = draw(options)
+    n_frames = sum(trajectory.n_frames for trajectory in trajectories)
+    n_questions = sum(len(trajectory.questions) for trajectory in trajectories)
+    print(f"{len(trajectories)} trajectories, {n_frames} frames, {n_questions} questions, seed {options.seed}")
+    print(f"attention {machine.attention}, {machine.parallel} over a worker's GPUs, {options.price:.2f} USD a GPU-hour")
+    runs = [
+        run(mode, shape, trajectories, rates_of(shape, machine, options), machine, options)
+        for mode in modes(options)
+        for shape in MODELS
+    ]
+    print(table(runs, machine.load_seconds, options.price))
+    print("\nlargest context by memory, in 1,000 tokens, on 1, 2, 4, 8 GPUs")
+    for shape in MODELS:
+        fitting = [f"{largest_context(shape, machine, n) / 1000:8,.0f}" for n in (1, 2, 4, 8)]
+        print(f"{shape.name:17s}{''.join(fitting)}{shape.kv_bytes / 1e9 * 1e6:10.0f} GB of keys and values a million")
+
+
+def _arguments(given: Sequence[str] | None = None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        description=__doc__.splitlines()[0], formatter_class=argparse.ArgumentDefaultsHelpFormatter
+    )
+    work = parser.add_argument_group("the work")
+    work.add_argument("--trajectories", type=int, default=225, help="published")
+    work.add_argument("--frames", type=float, default=600, help="mean of a trajectory; assumed")
+    work.add_argument("--frames-spread", type=float, default=350, help="their standard deviation; assumed")
+    work.add_argument("--frames-least", type=int, default=300, help="published: steps of a generated trajectory")
+    work.add_argument("--frames-most", type=int, default=2287, help="published: the longest trajectory")
+    work.add_argument(
+        "--questions", type=float, default=24, help="mean of a trajectory; as our questions choose, 475/20"
+    )
+    work.add_argument("--one-clue", type=float, default=0.635, help="share of questions; from the published totals")
+    work.add_argument("--two-clues", type=float, default=0.165, help="likewise")
+    work.add_argument("--puts", type=float, default=0.5, help="share of two clues that follow each other; assumed")
+    work.add_argument("--most-clues", type=int, default=6, help="of a question with three and more; assumed")
+    work.add_argument("--text-tokens", type=int, default=60, help="of a question with its instruction; assumed")
+    work.add_argument("--reply-tokens", type=int, default=6, help="mean of a reply, at most 50; assumed")
+    work.add_argument("--step-tokens", type=int, default=20, help="words of a plan's step beside its frame; assumed")
+    work.add_argument("--step-seconds", type=float, default=0.024, help="simulator; measured, benchmarks/README.md")
+    work.add_argument("--haystack", default="8,32,128,512,1000", help="sizes in kilo-tokens, as in tasks/nieh/contexts")
+    work.add_argument("--max-context", type=int, default=1_010_000, help="contexts beyond are refused; RoPE extended")
+    work.add_argument("--seed", type=int, default=0, help="of what is drawn")
+    _machine_arguments(parser.add_argument_group("the machine, one GPU of it"))
+    return parser.parse_args(given)
+
+
+def _machine_arguments(group: argparse._ArgumentGroup) -> None:
+    group.add_argument("--tflops", type=float, default=400, help="in products; assumed, 40%% of an H100's 989")
+    group.add_argument("--attention-tflops", type=float, default=200, help="in attention; assumed")
+    group.add_argument("--bandwidth", type=float, default=2.0, help="TB/s reached; assumed, 60%% of an H100's 3.35")
+    group.add_argument("--step-overhead", type=float, default=0.02, help="seconds a token; assumed, eager transformers")
+    group.add_argument("--frame-seconds", type=float, help="CPU's work on a frame; else each model's own, measured")
+    group.add_argument("--memory-gb", type=float, default=80, help="of a GPU: an H100's")
+    group.add_argument("--usable", type=float, default=0.9, help="share of it; assumed")
+    group.add_argument("--gpus-per-node", type=int, default=8, help="most of one worker")
+    group.add_argument("--attention", choices=("sdpa", "flash_attention_2"), default="sdpa", help="for memory")
+    group.add_argument("--chunk-tokens", type=int, default=1024, help="the option of that name")
+    group.add_argument("--parallel", choices=("layers", "tensor"), default="layers", help="layers is device_map")
+    group.add_argument("--tensor-efficiency", type=float, default=0.8, help="of tensor parallelism; assumed")
+    group.add_argument("--load-seconds", type=float, default=120, help="until a worker has its model; assumed")
+    group.add_argument("--price", type=float, default=3.0, help="USD a GPU-hour; assumed")
+    group.add_argument("--prefill", action="append", default=[], metavar="MODEL=N:RATE,N:RATE", help="measured")
+    group.add_argument("--decode", action="append", default=[], metavar="MODEL=RATE", help="measured, tokens/s")
+
+
+def machine_of(options: argparse.Namespace) -> Machine:
+    """The machine that the options describe."""
+    return Machine(
+        tflops=options.tflops,
+        attention_tflops=options.attention_tflops,
+        bandwidth=options.bandwidth * 1e12,
+        step_overhead=options.step_overhead,
+        memory=options.memory_gb * 1e9,
+        usable=options.usable,
+        gpus_per_node=options.gpus_per_node,
+        attention=options.attention,
+        chunk_tokens=options.chunk_tokens,
+        parallel=options.parallel,
+        tensor_efficiency=options.tensor_efficiency,
+        load_seconds=options.load_seconds,
+    )
+
+
+def rates_of(shape: Shape, machine: Machine, options: argparse.Namespace) -> Rates:
+    """A model's rates: measured where they were, else reckoned."""
+    if options.frame_seconds is not None:
+        shape = replace(shape, frame_seconds=options.frame_seconds)
+    rates = reckoned(shape, machine)
+    for name, _, text in (given.partition("=") for given in options.prefill):
+        if name == shape.name:
+            short, long = (point.split(":") for point in text.split(","))
+            rates = measured_prefill(rates, (int(short[0]), float(short[1])), (int(long[0]), float(long[1])))
+    for name, _, text in (given.partition("=") for given in options.decode):
+        if name == shape.name:
+            rates = replace(rates, step=1 / float(text))
+    return rates
+
+
+def draw(options: argparse.Namespace) -> list[Trajectory]:
+    """Trajectories of differing length (log-normal, cut at both ends), with their questions' clues."""
+    dice = np.random.default_rng(options.seed)
+    spread = np.log1p((options.frames_spread / options.frames) ** 2)
+    lengths = dice.lognormal(np.log(options.frames) - spread / 2, np.sqrt(spread), options.trajectories)
+    found = []
+    for n_frames in lengths.clip(options.frames_least, options.frames_most).astype(int).tolist():
+        n_questions = max(1, int(dice.poisson(options.questions)))
+        found.append(Trajectory(n_frames, tuple(_clues(n_frames, dice, options) for _ in range(n_questions))))
+    return found
+
+
+def _clues(n_frames: int, dice: np.random.Generator, options: argparse.Namespace) -> tuple[int, ...]:
+    kind = dice.random()
+    if kind < options.one_clue:
+        return (int(dice.integers(n_frames)),)
+    if kind < options.one_clue + options.two_clues:
+        if dice.random() < options.puts:
+            first = int(dice.integers(n_frames - 1))
+            return (first, first + 1)
+        n_clues = 2
+    else:
+        n_clues = int(dice.integers(3, options.most_clues + 1))
+    return tuple(sorted(dice.choice(n_frames, n_clues, replace=False).tolist()))
+
+
+def modes(options: argparse.Namespace) -> list[Mode]:
+    """All that is evaluated."""
+    sizes = [int(size) for size in options.haystack.split(",")]
+    return [
+        Mode("nieh_gt", lambda trajectory, _: (list(trajectory.questions), 0)),
+        Mode("nieh_full", lambda trajectory, _: ([tuple(range(trajectory.n_frames))] * len(trajectory.questions), 0)),
+        *[Mode(f"nieh_haystack {size}k", _haystack_of(size, options.seed)) for size in sizes],
+        Mode("infthor_plans", None, options.step_seconds),
+    ]
+
+
+def _haystack_of(size: int, seed: int) -> Callable[[Trajectory, Shape], tuple[list[tuple[int, ...]], int]]:
+    def contexts(trajectory: Trajectory, shape: Shape) -> tuple[list[tuple[int, ...]], int]:
+        dice = random.Random(seed)
+        n = size * 1000 // shape.frame_tokens
+        windows = [
+            _window(clues, trajectory.n_frames, n, depth, dice) for clues in trajectory.questions for depth in range(5)
+        ]
+        found = [window for window in windows if not isinstance(window, str)]
+        return found, len(windows) - len(found)
+
+    return contexts
+
+
+def requests(
+    trajectory: Trajectory, mode: Mode, shape: Shape, options: argparse.Namespace
+) -> tuple[list[Request], int]:
+    """The requests of a group, and how many there are not because there is no such context."""
+    if mode.contexts is None:
+        return list(_plan_requests(trajectory, shape, options)), 0
+    contexts, n_missing = mode.contexts(trajectory, shape)
+    found, before = [], ()
+    for frames in sorted(contexts):
+        n_shared = len(frames) if frames == before else _n_alike(frames, before)
+        tokens = len(frames) * shape.frame_tokens + options.text_tokens
+        found.append(Request(tokens, n_shared * shape.frame_tokens, options.reply_tokens))
+        before = frames
+    return found, n_missing
+
+
+def _n_alike(one: Sequence[int], other: Sequence[int]) -> int:
+    return sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], zip(one, other, strict=False)))
+
+
+def _plan_requests(trajectory: Trajectory, shape: Shape, options: argparse.Namespace) -> Iterator[Request]:
+    """An agent's: for each step the whole history, which grows by a frame and an action."""
+    step = shape.frame_tokens + options.step_tokens
+    for number in range(1, trajectory.n_frames + 1):
+        yield Request(number * step, (number - 1) * step, options.reply_tokens)
+
+
+def run(
+    mode: Mode,
+    shape: Shape,
+    trajectories: Sequence[Trajectory],
+    rates: Rates,
+    machine: Machine,
+    options: argparse.Namespace,
+) -> Run:
+    """What one model in one mode takes."""
+    n_absent = n_long = n_large = 0
+    groups: list[list[Request]] = []
+    for trajectory in trajectories:
+        found, n_missing = requests(trajectory, mode, shape, options)
+        short = [request for request in found if request.context <= options.max_context]
+        fitting = [request for request in short if gpus_for(shape, machine, request.context) is not None]
+        n_absent, n_long = n_absent + n_missing, n_long + len(found) - len(short)
+        n_large += len(short) - len(fitting)
+        if fitting:
+            groups.append(fitting)
+    asked = [request for group in groups for request in group]
+    largest = max((request.context for request in asked), default=0)
+    n_gpus = (gpus_for(shape, machine, largest) or 0) if asked else 0
+    jobs = [
+        tuple(
+            sum(seconds(request, rates, reuse) / machine.speed(n_gpus) + mode.step_seconds for request in group)
+            for group in groups
+        )
+        for reuse in (True, False)
+    ]
+    return Run(
+        mode.name,
+        shape,
+        len(asked),
+        (n_absent, n_long, n_large),
+        sum(request.context for request in asked),
+        sum(request.context - request.cached for request in asked),
+        largest,
+        n_gpus,
+        (jobs[0], jobs[1]),
+    )
+
+
+_HEAD = (
+    f"{'mode':20s}{'model':17s}{'requests':>9s}{'no window':>10s}{'too long':>9s}{'no memory':>10s}{'Mtokens':>9s}"
+    f"{'encoded':>9s}{'longest':>9s}{'RoPE':>6s}{'GPUs':>5s}{'h on 1':>9s}{'on 8':>9s}{'on 64':>8s}{'USD 8':>9s}"
+    f"{'USD 64':>9s}{'h on 8, not shared':>20s}{'saved':>8s}"
+)
+
+
+def table(runs: Sequence[Run], load: float, price: float) -> str:
+    """A line for each run, and one for the sum over each model's and over all."""
+    lines = [_HEAD]
+    for one in runs:
+        extension = one.largest / one.model.limit
+        lines.append(
+            f"{one.mode:20s}{one.model.name:17s}{one.n_requests:9d}"
+            f"{one.n_skipped[0]:10d}{one.n_skipped[1]:9d}{one.n_skipped[2]:10d}"
+            f"{one.tokens / 1e6:9.0f}{one.encoded / 1e6:9.0f}{one.largest:9d}"
+            f"{f'x{extension:.1f}' if extension > 1 else '-':>6s}{one.n_gpus or '-':>5}" + _times([one], load, price)
+        )
+    for name in dict.fromkeys(one.model.name for one in runs):
+        lines.append(
+            f"{'all':20s}{name:17s}{'':76s}" + _times([one for one in runs if one.model.name == name], load, price)
+        )
+    lines.append(f"{'all':20s}{'all':17s}{'':76s}" + _times(runs, load, price))
+    return "\n".join(lines)
+
+
+def _times(runs: Sequence[Run], load: float, price: float) -> str:
+    """Hours, cost and saving of runs one after the other; a dash where one of them cannot be run on so few GPUs."""
+    hours = {n: _sum([one.hours(n, load) for one in runs]) for n in GPUS}
+    without = _sum([one.hours(8, load, reuse=False) for one in runs])
+    shown = f"{_number(hours[1], 9)}{_number(hours[8], 9)}{_number(hours[64], 8)}"
+    shown += "".join(_number(None if (time := hours[n]) is None else price * n * time, 9, 0) for n in (8, 64))
+    saved = None if without is None or not hours[8] else without / hours[8]
+    return shown + _number(without, 20) + _number(saved, 8)
+
+
+def _sum(hours: Sequence[float | None]) -> float | None:
+    known = [time for time in hours if time is not None]
+    return sum(known) if len(known) == len(hours) else None
+
+
+def _number(value: float | None, width: int, digits: int = 1) -> str:
+    return "-".rjust(width) if value is None else f"{value:{width},.{digits}f}"
+
+
+if __name__ == "__main__":
+    main()
