@@ -22,7 +22,7 @@ from model_adapters.protocols import (
     Turn,
 )
 from model_adapters.refusals import check_decoding, check_turns, requesting
-from model_adapters.registry import adapter_identity, check_options, label, load, names, options, takes
+from model_adapters.registry import adapter_identity, check_options, label, load, names, on_engine, options, takes
 from model_adapters.transcript import Transcript
 
 __all__ = [
@@ -53,6 +53,7 @@ __all__ = [
     "label",
     "load",
     "names",
+    "on_engine",
     "options",
     "requesting",
     "takes",

@@ -12,27 +12,44 @@ from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Any, cast
 
-from infthor_eval.errors import ModelError, unknown_name
+from infthor_eval.errors import ModelError, UsageError, unknown_name
 from model_adapters.adapter_identity import identity_of
 from model_adapters.options import describe, parse
 from model_adapters.protocols import Adapter, Model, Policy
 
-__all__ = ["ENTRY_POINTS", "adapter_identity", "check_options", "label", "load", "names", "options", "takes"]
+__all__ = [
+    "ENTRY_POINTS",
+    "adapter_identity",
+    "check_options",
+    "label",
+    "load",
+    "names",
+    "on_engine",
+    "options",
+    "takes",
+]
 
 ENTRY_POINTS = "infthor_eval.models"
+
+_TRANSFORMERS = "transformers"  # runs what no other engine is named for
 
 _BUILT_IN = {
     "deepseek-vl": "model_adapters.hf.families.deepseek_vl:DeepseekVL",
     "deepseek-vl-tiny": "model_adapters.tiny.deepseek_vl:DeepseekVLTiny",
     "hf-vlm": "model_adapters.hf.families.hf_vlm:HfVlm",
+    "hf-vlm@vllm": "model_adapters.vllm.adapter:HfVlmOnVllm",
     "llava-onevision": "model_adapters.hf.families.llava_onevision:LlavaOnevision",
+    "llava-onevision@vllm": "model_adapters.vllm.adapter:LlavaOnevisionOnVllm",
     "llava-onevision-tiny": "model_adapters.tiny.llava_onevision:LlavaOnevisionTiny",
     "openai": "model_adapters.openai.adapter:OpenAI",
     "openvla": "model_adapters.policies.openvla.adapter:OpenVLA",
+    "openvla@vllm": "model_adapters.vllm.openvla:OpenVLAOnVllm",
     "openvla-tiny": "model_adapters.tiny.openvla:OpenVLATiny",
     "pixtral": "model_adapters.hf.families.pixtral:Pixtral",
+    "pixtral@vllm": "model_adapters.vllm.adapter:PixtralOnVllm",
     "pixtral-tiny": "model_adapters.tiny.pixtral:PixtralTiny",
     "qwen2.5-vl": "model_adapters.hf.families.qwen2_5_vl:Qwen25VL",
+    "qwen2.5-vl@vllm": "model_adapters.vllm.adapter:Qwen25VLOnVllm",
     "qwen2.5-vl-tiny": "model_adapters.tiny.qwen2_5_vl:Qwen25VLTiny",
     "spatialvla": "model_adapters.policies.spatialvla.adapter:SpatialVLA",
     "spatialvla-tiny": "model_adapters.tiny.spatialvla:SpatialVLATiny",
@@ -43,6 +60,27 @@ _BUILT_IN = {
 def names() -> tuple[str, ...]:
     """All model names, sorted: the built-in ones and those of installed packages."""
     return tuple(sorted(_targets()))
+
+
+def on_engine(name: str, engine: str) -> str:
+    """The name of a model where an engine of one's choice is to run it.
+
+    Args:
+        name: of the model, with its engine or without.
+        engine: `transformers`, or what stands behind the `@` of the names that it runs.
+
+    Raises:
+        UsageError: the engine does not run it; the message lists what it runs.
+    """
+    model, _, named = name.partition("@")
+    if named and named != engine:
+        raise UsageError(f"{name} names its engine, and it is not {engine}; leave one of them out")
+    if engine == _TRANSFORMERS:
+        return name
+    known = [known.removesuffix(f"@{engine}") for known in names() if known.endswith(f"@{engine}")]
+    if model not in known:
+        raise UsageError(f"{model} does not run on {engine}; there do: {', '.join(known)}")
+    return f"{model}@{engine}"
 
 
 def options(name: str) -> str:

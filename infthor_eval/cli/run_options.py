@@ -19,6 +19,11 @@ __all__ = ["run_options"]
 
 _OPTIONS = (
     click.option("--model", "models", required=True, help="Model name, or several with commas (see `ls models`)."),
+    click.option(
+        "--engine",
+        type=click.Choice(["transformers", "vllm"]),
+        help="What runs the model: transformers, unless its name says otherwise, or vLLM.",
+    ),
     click.option("--tasks", required=True, help="Task or group names with commas (see `ls tasks`)."),
     click.option("--data", type=click.Path(path_type=Path), help="Folder of the data set to ask about."),
     click.option("--model-args", default="", metavar="K=V,...", help="Options of the model (see `ls models`)."),
@@ -75,6 +80,7 @@ def run_options(*own: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]
 
 def _requests(
     models: str,
+    engine: str | None,
     tasks: str,
     model_args: str,
     name: str | None,
@@ -91,6 +97,7 @@ def _requests(
     **suites: Any,
 ) -> "list[tuple[RunRequest, Suite]]":
     from infthor_eval.cli.requests import Asked, requests_for
+    from model_adapters import on_engine
 
     options = model_options_in(model_args)
     for option, value in {"rope": rope, "max_tokens_total": max_tokens_total, "max_cost": max_cost}.items():
@@ -116,4 +123,6 @@ def _requests(
     named = names_in(models, "--model")
     if name is not None and len(named) > 1:
         raise click.UsageError(f"--name {name}: names one run, and {len(named)} models are asked")
+    if engine is not None:
+        named = tuple(on_engine(model, engine) for model in named)
     return [request for model in named for request in requests_for(asked, model, options, name)]

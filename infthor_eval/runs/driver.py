@@ -5,22 +5,17 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol
 
-import msgspec
-
-from infthor_eval.errors import naming
-from infthor_eval.formats.files import written_atomically
 from infthor_eval.runs import journal as journals
 from infthor_eval.runs.crew import Crew
 from infthor_eval.runs.journal import Journal
 from infthor_eval.runs.records import RunHeader, UnitRecord
 from infthor_eval.runs.request import PreparedRun
+from infthor_eval.runs.results import write_results, write_took
 from infthor_eval.runs.staff import Alone, View
 from infthor_eval.runs.suite import RunSummary, Workload
 from infthor_eval.runs.usage import Usage
 
 __all__ = ["Observer", "RunOutcome", "Silent", "execute"]
-
-_RESULTS = "results.json"
 
 
 class Observer(Protocol):
@@ -80,7 +75,8 @@ def execute(
 ) -> RunOutcome:
     """Load the model, do what the journal does not hold yet, and write the results.
 
-    The folder `<output>/<name>/<tasks>-<identity>/` holds the journal and `results.json`.
+    The folder `<output>/<name>/<tasks>-<identity>/` holds the journal, `results.json`
+    (what it found, equal for equal runs) and `took.json` (what it took).
 
     Args:
         run: what `prepare` found.
@@ -121,7 +117,8 @@ def _found(run: PreparedRun, folder: Path, header: RunHeader, workload: Workload
     summary = RunSummary(header, run.suite.summarise(header, records))
     n_missing = workload.n_units - len(records)
     usage = Usage.total([record.usage for record in records] + [memo.usage for memo in journal.memos])
-    _write_results(folder, summary, n_missing, usage)
+    write_results(folder, summary, n_missing, usage)
+    write_took(folder, records, usage)
     return RunOutcome(folder, run, summary, records, n_missing, usage, run.evaluation.view)
 
 
@@ -136,23 +133,3 @@ def _asked(workload: Workload, journal: Journal) -> list[UnitRecord[Any]]:
     """The records of what this run asks; the journal may know more."""
     asked = {unit.key for group in workload.groups for unit in group.units}
     return [record for record in journal.records if record.key in asked]
-
-
-def _write_results(folder: Path, found: RunSummary, n_missing: int, usage: Usage) -> None:
-    header = found.header
-    document = {
-        "suite": header.suite,
-        "name": header.name,
-        "identity": header.identity,
-        "n_missing": n_missing,
-        "summary": found.summary,
-        # Not what was cached: that differs between a run and the same run resumed, or shared out.
-        "usage": {name: getattr(usage, name) for name in ("requests", "context", "reply", "cost")},
-    }
-    path = folder / _RESULTS
-    with (
-        naming(f"{path}: cannot be written", "make room, the journal holds it all"),
-        written_atomically(path) as partial,
-    ):
-        encoded = msgspec.json.encode(document, order="sorted")
-        partial.write_bytes(msgspec.json.format(encoded, indent=2) + b"\n")

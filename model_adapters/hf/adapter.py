@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import ClassVar
+from typing import ClassVar, TypeVar
 
 from PIL import Image
 
@@ -10,11 +10,13 @@ from infthor_eval.errors import ModelError, naming
 from model_adapters.hf.checkpoint import LocatedCheckpoint, load_checkpoint, locate
 from model_adapters.hf.family import MakeFamily
 from model_adapters.hf.model import TransformersModel
-from model_adapters.hf.options import CheckpointOptions
+from model_adapters.hf.options import CheckpointOptions, CheckpointReading
 
 __all__ = ["CheckpointAdapter", "fitting", "load_model"]
 
 _SAMPLE = (300, 300)  # a frame's width and height in the published data
+
+R = TypeVar("R", bound=CheckpointReading)
 
 
 class CheckpointAdapter:
@@ -37,16 +39,25 @@ class CheckpointAdapter:
         Raises:
             ModelError: it cannot be loaded, or is not of one piece.
         """
+        return load_model(name, cls.locate(options), cls.family)
+
+    @classmethod
+    def locate(cls, options: R) -> LocatedCheckpoint[R]:
+        """Find a checkpoint of this family, for whichever engine.
+
+        Raises:
+            ModelError: there is none, or it is another family's.
+        """
         located = locate(options)
         found = located.config.model_type
         if found not in cls.model_types:
             raise ModelError(
                 f"{options.pretrained} is a {found} checkpoint, not {' or '.join(cls.model_types)}; try hf-vlm"
             )
-        return load_model(name, located, cls.family)
+        return located
 
 
-def load_model(name: str, located: LocatedCheckpoint, family: MakeFamily) -> TransformersModel:
+def load_model(name: str, located: LocatedCheckpoint[CheckpointOptions], family: MakeFamily) -> TransformersModel:
     """Load a checkpoint of a known family and try it on one frame.
 
     Args:

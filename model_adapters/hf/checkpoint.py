@@ -7,10 +7,10 @@ PIL ones: torchvision's resize gives other pixels, and the numbers must not depe
 
 import contextlib
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, Generic, TypeVar, cast
 
 import PIL
 import tokenizers
@@ -24,7 +24,7 @@ from model_adapters.hf.decoding import read_generation
 from model_adapters.hf.family import Family, MakeFamily
 from model_adapters.hf.hub import fetch
 from model_adapters.hf.loaded import Loaded
-from model_adapters.hf.options import CheckpointOptions, Placement
+from model_adapters.hf.options import CheckpointOptions, CheckpointReading, Placement
 from model_adapters.hf.rope import apply_rope
 from model_adapters.hf.templates import chat_template, plain_template
 
@@ -35,17 +35,23 @@ __all__ = [
     "loading",
     "locate",
     "origin",
+    "outline",
+    "read_checkpoint",
     "resolve_device",
     "resolve_dtype",
     "versions",
 ]
 
 _DTYPES = (torch.bfloat16, torch.float16, torch.float32, torch.float64)
+_GENERATION = "generation_config.json"
 _FINGERPRINTED = {".bin", ".jinja", ".json", ".model", ".safetensors", ".txt"}
+
+R = TypeVar("R", bound=CheckpointReading)
+R_co = TypeVar("R_co", bound=CheckpointReading, covariant=True)
 
 
 @dataclass(frozen=True)
-class LocatedCheckpoint:
+class LocatedCheckpoint(Generic[R_co]):
     """A checkpoint that was found, not yet loaded.
 
     Attributes:
@@ -58,10 +64,10 @@ class LocatedCheckpoint:
     folder: Path
     commit: str | None
     config: Any
-    options: CheckpointOptions
+    options: R_co
 
 
-def locate(options: CheckpointOptions) -> LocatedCheckpoint:
+def locate(options: R) -> LocatedCheckpoint[R]:
     """Find a checkpoint and read its config.
 
     Raises:
@@ -74,8 +80,8 @@ def locate(options: CheckpointOptions) -> LocatedCheckpoint:
     return LocatedCheckpoint(folder, commit, config, options)
 
 
-def load_checkpoint(located: LocatedCheckpoint, family: MakeFamily) -> Loaded:
-    """Load everything a conversation needs.
+def load_checkpoint(located: LocatedCheckpoint[CheckpointOptions], family: MakeFamily) -> Loaded:
+    """Load everything a conversation needs, its weights too.
 
     Args:
         located: the checkpoint.
@@ -84,6 +90,23 @@ def load_checkpoint(located: LocatedCheckpoint, family: MakeFamily) -> Loaded:
     Raises:
         ModelError: the checkpoint is incomplete or damaged.
         UsageError: there is no such dtype or device.
+    """
+    return read_checkpoint(located, family, _load_model)
+
+
+def read_checkpoint(
+    located: LocatedCheckpoint[R], family: MakeFamily, make_model: Callable[[LocatedCheckpoint[R]], Any]
+) -> Loaded:
+    """Load everything a conversation needs.
+
+    Args:
+        located: the checkpoint; an extension of the context is written into its config.
+        family: makes the family of a model, an image processor and a tokenizer.
+        make_model: makes the model of the config; `outline` does without weights.
+
+    Raises:
+        ModelError: the checkpoint is incomplete or damaged.
+        UsageError: what making the model raises.
     """
     options, folder = located.options, located.folder
     remote = {"trust_remote_code": options.trust_remote_code}
@@ -94,7 +117,7 @@ def load_checkpoint(located: LocatedCheckpoint, family: MakeFamily) -> Loaded:
         tokenizer = transformers.AutoTokenizer.from_pretrained(folder, **remote)
         template = chat_template(folder, tokenizer) if options.prompt == "chat" else None
         max_tokens = apply_rope(located.config, options.rope)
-        model = _load_model(located)
+        model = make_model(located)
         made = family(model, image_processor, tokenizer)
         return assemble(
             model,
@@ -105,6 +128,20 @@ def load_checkpoint(located: LocatedCheckpoint, family: MakeFamily) -> Loaded:
             max_tokens=max_tokens,
             origin=origin(located.folder, located.commit, options.pretrained),
         )
+
+
+def outline(located: LocatedCheckpoint[Any]) -> Any:
+    """The model of a checkpoint whose weights another engine holds: shapes alone, which take no memory.
+
+    What frames become in tokens can be told by it as by the model itself.
+    """
+    with torch.device("meta"):
+        model = cast(Any, transformers.AutoModelForImageTextToText).from_config(
+            located.config, trust_remote_code=located.options.trust_remote_code
+        )
+    if (located.folder / _GENERATION).is_file():
+        model.generation_config = transformers.GenerationConfig.from_pretrained(located.folder)
+    return model
 
 
 def assemble(
@@ -236,7 +273,7 @@ def loading(pretrained: str) -> Iterator[None]:
         yield
 
 
-def _load_model(located: LocatedCheckpoint) -> Any:
+def _load_model(located: LocatedCheckpoint[CheckpointOptions]) -> Any:
     options = located.options
     device = resolve_device(options)
     model, report = cast(Any, transformers.AutoModelForImageTextToText).from_pretrained(

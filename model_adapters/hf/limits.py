@@ -15,8 +15,15 @@ __all__ = ["check_limit", "naming_memory_errors", "naming_model_errors"]
 _FAILURES = (RuntimeError, ValueError, IndexError, ArithmeticError, MemoryError)
 
 
-def check_limit(name: str, n_context: int, max_new_tokens: int, limit: int | None) -> None:
+def check_limit(name: str, n_context: int, max_new_tokens: int, limit: int | None, option: str = "max_tokens") -> None:
     """Refuse what does not fit.
+
+    Args:
+        name: of the model.
+        n_context: tokens of the context.
+        max_new_tokens: most of the reply.
+        limit: of both together; None for none.
+        option: the model's, that sets the limit.
 
     Raises:
         ModelError: context and reply are beyond the limit.
@@ -24,7 +31,7 @@ def check_limit(name: str, n_context: int, max_new_tokens: int, limit: int | Non
     if limit is not None and n_context + max_new_tokens > limit:
         raise ModelError(
             f"a context of {n_context} tokens and {max_new_tokens} new ones is beyond the {limit} tokens "
-            f"of {name}; use fewer frames, or set max_tokens if the model can take more"
+            f"of {name}; use fewer frames, or set {option} if the model can take more"
         )
 
 

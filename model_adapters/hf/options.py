@@ -4,7 +4,7 @@ import importlib.util
 from dataclasses import dataclass
 from typing import Any
 
-__all__ = ["CheckpointOptions", "HfOptions", "Placement", "parse_rope"]
+__all__ = ["CheckpointOptions", "CheckpointReading", "HfOptions", "Placement", "Reading", "parse_rope"]
 
 
 _ATTENTION = ("eager", "sdpa", "flex_attention", "flash_attention_2", "flash_attention_3")
@@ -61,12 +61,49 @@ class Placement:
 
 
 @dataclass(frozen=True, kw_only=True)
-class HfOptions(Placement):
-    """How a model is run.
+class Reading:
+    """What a model is made to read, whichever engine runs it.
 
     Attributes:
         prompt: chat writes conversations by the checkpoint's own chat template; plain writes the turns one after the
             other, texts and frames in their places, without roles.
+        rope: context extension TYPE:FACTOR (yarn:4, linear:2, dynamic:4, longrope:8) instead of the checkpoint's RoPE.
+    """
+
+    prompt: str = "chat"
+    rope: str | None = None
+
+    def image_settings(self) -> dict[str, Any]:
+        """Settings of the image processor that differ from the checkpoint's; families with options for it override."""
+        return {}
+
+    def __post_init__(self) -> None:
+        if self.prompt not in _PROMPTS:
+            raise ValueError(f"prompt={self.prompt} is not {' or '.join(_PROMPTS)}")
+        if self.rope is not None:
+            parse_rope(self.rope)
+
+
+@dataclass(frozen=True, kw_only=True)
+class CheckpointReading(Reading):
+    """Where a checkpoint comes from, whichever engine runs it.
+
+    Attributes:
+        pretrained: hub id or folder.
+        revision: branch, tag or commit on the hub; the default branch where None.
+        trust_remote_code: run code that comes with the checkpoint.
+    """
+
+    pretrained: str
+    revision: str | None = None
+    trust_remote_code: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class HfOptions(Reading, Placement):
+    """How a model is run by transformers.
+
+    Attributes:
         share_prefix: encode what two replies have in common once; false encodes everything for every reply.
         chunk_tokens: most tokens encoded in one forward pass.
         batch_size: most continuations of one prefix that are answered together; each has its own copy of the prefix's
@@ -74,21 +111,14 @@ class HfOptions(Placement):
         kv_offload: keep keys and values in CPU memory; slower, for contexts that do not fit on the GPU.
         feature_cache_mb: memory for vision features of frames seen before, in MiB.
         max_tokens: context limit instead of the checkpoint's; 0 for none.
-        rope: context extension TYPE:FACTOR (yarn:4, linear:2, dynamic:4, longrope:8) instead of the checkpoint's RoPE.
     """
 
-    prompt: str = "chat"
     share_prefix: bool = True
     chunk_tokens: int = 1024
     batch_size: int = 1
     kv_offload: bool = False
     feature_cache_mb: int = 128
     max_tokens: int | None = None
-    rope: str | None = None
-
-    def image_settings(self) -> dict[str, Any]:
-        """Settings of the image processor that differ from the checkpoint's; families with options for it override."""
-        return {}
 
     def __post_init__(self) -> None:
         if self.chunk_tokens < 1 or self.batch_size < 1 or self.feature_cache_mb < 0 or (self.max_tokens or 0) < 0:
@@ -98,30 +128,21 @@ class HfOptions(Placement):
         for name in ("chunk_tokens", "batch_size", "feature_cache_mb", "max_tokens"):
             if (getattr(self, name) or 0) > _LARGEST:
                 raise ValueError(f"{name} is above {_LARGEST}")
-        if self.prompt not in _PROMPTS:
-            raise ValueError(f"prompt={self.prompt} is not {' or '.join(_PROMPTS)}")
         super().__post_init__()
-        if self.rope is not None:
-            parse_rope(self.rope)
+        Placement.__post_init__(self)
 
 
 @dataclass(frozen=True, kw_only=True)
-class CheckpointOptions(HfOptions):
-    """Where a checkpoint comes from.
+class CheckpointOptions(HfOptions, CheckpointReading):
+    """How a checkpoint is run by transformers.
 
     Attributes:
-        pretrained: hub id or folder.
-        revision: branch, tag or commit on the hub; the default branch where None.
         device_map: transformers' device map (auto, balanced, ...) instead of one device.
         quantization: bnb4 or bnb8 for bitsandbytes with 4 or 8 bits per weight; none for the checkpoint's own.
-        trust_remote_code: run code that comes with the checkpoint.
     """
 
-    pretrained: str
-    revision: str | None = None
     device_map: str | None = None
     quantization: str | None = None
-    trust_remote_code: bool = False
 
     def __post_init__(self) -> None:
         super().__post_init__()

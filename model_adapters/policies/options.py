@@ -4,14 +4,14 @@ from dataclasses import dataclass
 
 from model_adapters.hf.options import Placement
 
-__all__ = ["CheckpointPolicyOptions", "PolicyOptions"]
+__all__ = ["ActionOptions", "CheckpointPolicyOptions", "PolicyOptions"]
 
 _ENSEMBLES = ("none", "exp")
 
 
 @dataclass(frozen=True, kw_only=True)
-class PolicyOptions(Placement):
-    """How a policy is run; it always takes the likeliest tokens.
+class ActionOptions:
+    """How a policy acts, whichever engine runs it; it always takes the likeliest tokens.
 
     Attributes:
         unnorm_key: the dataset whose robot's metres and radians the actions are scaled to; the checkpoint's own where
@@ -27,13 +27,22 @@ class PolicyOptions(Placement):
     execute: int | None = None
 
     def __post_init__(self) -> None:
-        super().__post_init__()
+        """Refuse what does not go together."""
         if self.ensemble not in _ENSEMBLES:
             raise ValueError(f"ensemble={self.ensemble} is not {' or '.join(_ENSEMBLES)}")
         if self.execute is not None and self.execute < 1:
             raise ValueError(f"execute={self.execute} gives out no step; it is 1 or more")
         if self.ensemble == "exp" and self.execute not in (None, 1):
             raise ValueError(f"execute={self.execute} does not go with ensemble=exp, which gives out one step a call")
+
+
+@dataclass(frozen=True, kw_only=True)
+class PolicyOptions(ActionOptions, Placement):
+    """How a policy is run here."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        Placement.__post_init__(self)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,7 +13,7 @@ import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import torch
@@ -33,16 +33,18 @@ from model_adapters.hf.families.qwen2_5_vl import Qwen25VLFamily
 from model_adapters.hf.family import MakeFamily, Size
 from model_adapters.hf.loaded import Loaded
 from model_adapters.hf.model import TransformersModel
-from model_adapters.hf.options import CheckpointOptions
+from model_adapters.hf.options import CheckpointOptions, CheckpointReading
 from model_adapters.hf.prompt import token_ids
 from model_adapters.hf.uncached import UncachedModel, expanded, image_token, processed
 from model_adapters.protocols import Model, Part, Turn
 
-__all__ = ["HfVlm", "ProcessorFamily"]
+__all__ = ["HfVlm", "ProcessorFamily", "known_family", "load_processor"]
 
 _TOLERANCE = {torch.float32: 1e-3, torch.float64: 1e-3}  # of the largest logit; half precision is compared more loosely
 _HALF_TOLERANCE = 0.1
 _BLANK = (300, 300)  # width and height of an image that shows what the processor expands one to
+
+R = TypeVar("R", bound=CheckpointReading)
 
 
 class ProcessorFamily(PlainFamily):
@@ -115,17 +117,11 @@ class HfVlm:
             UsageError: no checkpoint was named.
             ModelError: it cannot be loaded, sees no images, is not of one piece, or cannot share prefixes.
         """
-        if not options.pretrained:
-            raise UsageError(f"{name} needs pretrained=..., a hub id or a folder")
-        located = locate(options)
-        model_type = located.config.model_type
-        remote = options.trust_remote_code and "AutoModelForImageTextToText" in getattr(located.config, "auto_map", {})
-        if model_type not in MODEL_FOR_IMAGE_TEXT_TO_TEXT_MAPPING_NAMES and not remote:
-            raise ModelError(f"{options.pretrained} is a {model_type} checkpoint, which sees no images")
-        known = _known(located.config)
+        located = cls.locate(name, options)
+        known = known_family(located.config)
         if known is not None:
             return load_model(name, located, known)
-        processor = _processor(located)
+        processor = load_processor(located)
         model: TransformersModel | UncachedModel
         loaded = load_checkpoint(located, functools.partial(ProcessorFamily, processor=processor))
         if options.share_prefix:
@@ -135,8 +131,25 @@ class HfVlm:
         _try(model, loaded, processor, options.pretrained)
         return model
 
+    @classmethod
+    def locate(cls, name: str, options: R) -> LocatedCheckpoint[R]:
+        """Find a checkpoint that sees images, for whichever engine.
 
-def _known(config: Any) -> MakeFamily | None:
+        Raises:
+            UsageError: no checkpoint was named.
+            ModelError: there is none, or it sees no images.
+        """
+        if not options.pretrained:
+            raise UsageError(f"{name} needs pretrained=..., a hub id or a folder")
+        located = locate(options)
+        model_type = located.config.model_type
+        remote = options.trust_remote_code and "AutoModelForImageTextToText" in getattr(located.config, "auto_map", {})
+        if model_type not in MODEL_FOR_IMAGE_TEXT_TO_TEXT_MAPPING_NAMES and not remote:
+            raise ModelError(f"{options.pretrained} is a {model_type} checkpoint, which sees no images")
+        return located
+
+
+def known_family(config: Any) -> MakeFamily | None:
     """The family made for this architecture, if there is one."""
     families: dict[str, MakeFamily] = {
         "qwen2_5_vl": Qwen25VLFamily,
@@ -149,7 +162,12 @@ def _known(config: Any) -> MakeFamily | None:
     return families.get(config.model_type)
 
 
-def _processor(located: LocatedCheckpoint) -> Any:
+def load_processor(located: LocatedCheckpoint[Any]) -> Any:
+    """The checkpoint's processor of images and text, for families without code of their own.
+
+    Raises:
+        ModelError: it has none, or it cannot be loaded.
+    """
     remote = {"trust_remote_code": located.options.trust_remote_code}
     with loading(located.options.pretrained):
         processor = transformers.AutoProcessor.from_pretrained(located.folder, **remote)

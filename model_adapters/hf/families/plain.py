@@ -48,8 +48,10 @@ class PlainFamily:
     def _inputs(self, images: Sequence[Image.Image]) -> Mapping[str, torch.Tensor]:
         """The image processor's output on the model's device, pixels in the model's type."""
         inputs = self._image_processor(images=list(images), return_tensors="pt")
-        weight = self._model.get_input_embeddings().weight
+        device = self._model.get_input_embeddings().weight.device
+        # Of an outline's pixels the shapes are enough; what is counted by has to have values.
+        counts = torch.device("cpu") if device.type == "meta" else device
         return {
-            name: value.to(weight.device, self._model.dtype if value.is_floating_point() else None)
+            name: value.to(device, self._model.dtype) if value.is_floating_point() else value.to(counts)
             for name, value in inputs.items()
         }

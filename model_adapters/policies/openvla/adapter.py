@@ -13,10 +13,10 @@ from model_adapters.policies.openvla.config import OpenVLAConfig
 from model_adapters.policies.openvla.network import OpenVLANetwork, OpenVLAWeights, layout_of
 from model_adapters.policies.options import CheckpointPolicyOptions, PolicyOptions
 from model_adapters.policies.policy import VlaPolicy
-from model_adapters.policies.statistics import statistics_of
+from model_adapters.policies.statistics import ActionStatistics, statistics_of
 from model_adapters.policies.weights import empty, load_weights
 
-__all__ = ["MODEL_TYPE", "OpenVLA", "load_openvla"]
+__all__ = ["MODEL_TYPE", "OpenVLA", "OpenVLADescription", "describe_openvla", "load_openvla"]
 
 MODEL_TYPE = "openvla"
 _FINE_TUNED = "dataset_statistics.json"
@@ -44,6 +44,46 @@ class OpenVLA:
         return load_openvla(name, find(options.pretrained, options.revision), options)
 
 
+@dataclass(frozen=True)
+class OpenVLADescription:
+    """All of a checkpoint but its weights.
+
+    Attributes:
+        config: its config.
+        key: the dataset whose statistics are used.
+        statistics: of that dataset's actions.
+        tokenizer: of the language model; it begins every text with `<s>`.
+        bins: what action ids mean.
+    """
+
+    config: OpenVLAConfig
+    key: str
+    statistics: ActionStatistics
+    tokenizer: Tokenizer
+    bins: ActionBins
+
+
+def describe_openvla(checkpoint: PolicyCheckpoint, unnorm_key: str | None) -> OpenVLADescription:
+    """Read what stands beside the weights of an OpenVLA.
+
+    Args:
+        checkpoint: where it lies.
+        unnorm_key: the dataset whose statistics are used; None where there is only one.
+
+    Raises:
+        ModelError: it is another family's checkpoint, or damaged.
+        UsageError: an unknown unnorm_key.
+        DataError: a file is missing or damaged.
+    """
+    checkpoint.require_kind(MODEL_TYPE)
+    config = checkpoint.read("config.json", OpenVLAConfig)
+    key, statistics = statistics_of(_statistics(checkpoint, config), unnorm_key, checkpoint.pretrained)
+    with loading(checkpoint.pretrained):
+        vocabulary = config.language("eager").vocab_size - config.pad_to_multiple_of
+    bins = ActionBins(vocabulary, config.n_action_bins)
+    return OpenVLADescription(config, key, statistics, _tokenizer(checkpoint), bins)
+
+
 def load_openvla(name: str, checkpoint: PolicyCheckpoint, options: PolicyOptions) -> VlaPolicy:
     """Load an OpenVLA from a folder.
 
@@ -55,21 +95,18 @@ def load_openvla(name: str, checkpoint: PolicyCheckpoint, options: PolicyOptions
     Raises:
         ModelError: see `OpenVLA.build`.
     """
-    checkpoint.require_kind(MODEL_TYPE)
-    config = checkpoint.read("config.json", OpenVLAConfig)
-    key, statistics = statistics_of(_statistics(checkpoint, config), options.unnorm_key, checkpoint.pretrained)
+    described = describe_openvla(checkpoint, options.unnorm_key)
+    config = described.config
     device, dtype = checkpoint.placed(options)
     towers, size = config.towers(checkpoint.pretrained), config.image_size(checkpoint.pretrained)
-    tokenizer = _tokenizer(checkpoint)
     with loading(checkpoint.pretrained):
         with empty():
             weights = OpenVLAWeights(towers, size, config.language(options.attn_implementation))
         layout = layout_of(weights, towers)
         load_weights(weights, checkpoint.folder, layout, pretrained=checkpoint.pretrained, device=device, dtype=dtype)
-    vocabulary = weights.language_model.config.vocab_size - config.pad_to_multiple_of
-    network = OpenVLANetwork(weights.eval(), tokenizer, ActionBins(vocabulary, config.n_action_bins), size)
-    identity = checkpoint.identity(device, dtype, options) | {"unnorm_key": key}
-    return VlaPolicy(name, network, statistics, options, identity)
+    network = OpenVLANetwork(weights.eval(), described.tokenizer, described.bins, size)
+    identity = checkpoint.identity(device, dtype, options) | {"unnorm_key": described.key}
+    return VlaPolicy(name, network, described.statistics, options, identity)
 
 
 def _tokenizer(checkpoint: PolicyCheckpoint) -> Tokenizer:

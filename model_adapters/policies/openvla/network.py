@@ -16,7 +16,7 @@ from model_adapters.policies.preprocessing import normalised, resized
 from model_adapters.policies.statistics import ACTION_SIZE, Actions
 from model_adapters.policies.weights import Layout
 
-__all__ = ["OpenVLANetwork", "OpenVLAWeights", "layout_of", "prompt"]
+__all__ = ["OpenVLANetwork", "OpenVLAWeights", "layout_of", "prompt", "prompt_ids"]
 
 _DINOV2 = ((0.484375, 0.455078125, 0.40625), (0.228515625, 0.2236328125, 0.224609375))
 _SIGLIP = ((0.5, 0.5, 0.5), (0.5, 0.5, 0.5))
@@ -26,6 +26,17 @@ _SPACE = 29871  # Llama's token of a lone space, which stood before every action
 def prompt(instruction: str) -> str:
     """What OpenVLA is asked; instructions were in lower case in training."""
     return f"In: What action should the robot take to {instruction.lower()}?\nOut:"
+
+
+def prompt_ids(tokenizer: Tokenizer, instruction: str) -> list[int]:
+    """The ids of the prompt, with the space that actions follow.
+
+    Args:
+        tokenizer: of the language model; it writes the begin token by itself.
+        instruction: what is to be done.
+    """
+    ids: list[int] = tokenizer.encode(prompt(instruction)).ids
+    return ids if ids[-1] == _SPACE else [*ids, _SPACE]
 
 
 class _Vision(nn.Module):
@@ -101,11 +112,6 @@ class OpenVLANetwork:
     bins: ActionBins
     image_size: int
 
-    def prompt_ids(self, instruction: str) -> list[int]:
-        """The ids of the prompt, with the space that actions follow."""
-        ids: list[int] = self.tokenizer.encode(prompt(instruction)).ids
-        return ids if ids[-1] == _SPACE else [*ids, _SPACE]
-
     @torch.inference_mode()
     def predict(self, image: Image.Image, instruction: str, *, constrained: bool) -> Actions:
         """A chunk of one action; see `Network.predict`."""
@@ -121,7 +127,7 @@ class OpenVLANetwork:
 
         pixels = resized(image, self.image_size).to(model.device)[None]
         patches = self.weights.projector(self.weights.vision_backbone(pixels))
-        text = embedded(model, self.prompt_ids(instruction))
+        text = embedded(model, prompt_ids(self.tokenizer, instruction))
         first = logits(torch.cat([text[:, :1], patches, text[:, 1:]], dim=1))
         ids = greedy(first, step, [self.bins.legal] * ACTION_SIZE, constrained=constrained)
         return self.bins.decode(ids)

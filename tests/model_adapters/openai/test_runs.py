@@ -51,7 +51,9 @@ def test_questions_are_answered_and_their_tokens_and_cost_are_in_the_results(ask
     assert [record.payload.reply for record in records] == ["yes"] * 5
     assert [record.usage.cost for record in records] == pytest.approx([each] * 5)
     assert results["usage"] == {"requests": 5, "context": 5000, "reply": 50, "cost": pytest.approx(5 * each)}
-    assert f"m: 5 requests, 5,000 tokens read (1,000 of them cached), 50 written, {5 * each:.4f} US dollars" in out
+    assert (
+        f"m: 5 requests, 5,000 tokens read (1,000 of them cached, 20.0 %), 50 written, {5 * each:.4f} US dollars" in out
+    )
 
 
 def test_a_run_that_reaches_its_cap_goes_on_with_a_higher_one(ask: Any, tmp_path: Path) -> None:

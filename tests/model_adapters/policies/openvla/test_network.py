@@ -9,7 +9,7 @@ from PIL import Image
 
 from infthor_eval.formats.frames import FrameRef
 from model_adapters.policies.decoding import embedded
-from model_adapters.policies.openvla.network import OpenVLANetwork, prompt
+from model_adapters.policies.openvla.network import OpenVLANetwork, prompt, prompt_ids
 from model_adapters.policies.openvla.vision import Tower, TowerShape
 from model_adapters.policies.policy import VlaPolicy
 from model_adapters.policies.preprocessing import normalised, resized
@@ -27,7 +27,7 @@ def test_the_prompt_is_the_one_of_training_in_lower_case() -> None:
 
 
 def test_the_space_before_actions_ends_the_prompt_once(network: OpenVLANetwork) -> None:
-    ids = network.prompt_ids("pick up the mug")
+    ids = prompt_ids(network.tokenizer, "pick up the mug")
     assert ids[-1] == 29_871
     assert ids.count(29_871) == 1
     assert ids[0] == network.tokenizer.token_to_id("<s>")
@@ -68,7 +68,7 @@ def test_actions_with_a_cache_are_those_of_reading_all_anew(
     image = plain_frames[1].load()
     patches = weights.projector(weights.vision_backbone(resized(image, 56)[None]))
     assert patches.shape == (1, 16, 64)
-    ids = network.prompt_ids("pick up the mug")
+    ids = prompt_ids(network.tokenizer, "pick up the mug")
     written: list[int] = []
     for _ in range(7):
         text = embedded(model, [*ids, *written])

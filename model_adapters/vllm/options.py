@@ -1,0 +1,118 @@
+"""Options of models that vLLM runs; docs/vllm.md says what becomes of each."""
+
+from dataclasses import dataclass, fields
+
+from model_adapters.hf.options import CheckpointReading
+from model_adapters.policies.options import ActionOptions
+
+__all__ = ["EngineOptions", "VllmOptions", "VllmPolicyOptions", "usual_checkpoint"]
+
+_DTYPES = ("auto", "bfloat16", "float16", "float32")
+_RANGES = {
+    "max_model_len": (1, 2**31 - 1),
+    "tensor_parallel_size": (1, 1024),
+    "pipeline_parallel_size": (1, 1024),
+    "data_parallel_size": (1, 1024),
+    "mm_processor_cache_gb": (0, 2**20),
+    "seed": (0, 2**32 - 1),
+    "frame_size": (1, 100_000),
+    "max_frames": (1, 2**31 - 1),
+}
+_LAUNCHED = "external_launcher"
+
+
+def usual_checkpoint(options: type) -> str:
+    """The checkpoint that an adapter loads where none is named.
+
+    Args:
+        options: the adapter's.
+    """
+    return next(str(field.default) for field in fields(options) if field.name == "pretrained")
+
+
+@dataclass(frozen=True, kw_only=True)
+class EngineOptions:
+    """How vLLM is started, whatever it runs.
+
+    Attributes:
+        dtype: of the weights: bfloat16, float16, float32, or auto: as in the checkpoint, but for float32, of which vLLM
+            makes float16.
+        max_model_len: most tokens of context and reply together; the checkpoint's limit where None.
+        tensor_parallel_size: GPUs that share each layer.
+        pipeline_parallel_size: GPUs, or groups of them, that share the layers out.
+        data_parallel_size: copies of the model; above 1 only with distributed_executor_backend=external_launcher.
+        distributed_executor_backend: mp, ray, uni or external_launcher; vLLM's own choice where None.
+        gpu_memory_utilization: share of a GPU's memory that vLLM takes, above 0 and at most 1.
+        enforce_eager: run without CUDA graphs: slower, less memory.
+        quantization: vLLM's name of a method (fp8, awq, bitsandbytes, ...); the checkpoint's own where None.
+        prefix_caching: keep the keys and values of what was read, for requests that begin alike.
+        mm_processor_cache_gb: memory for processed frames, in GiB; vLLM's default where None.
+        seed: of the engine; each request has its own besides.
+    """
+
+    dtype: str = "auto"
+    max_model_len: int | None = None
+    tensor_parallel_size: int = 1
+    pipeline_parallel_size: int = 1
+    data_parallel_size: int = 1
+    distributed_executor_backend: str | None = None
+    gpu_memory_utilization: float = 0.9
+    enforce_eager: bool = False
+    quantization: str | None = None
+    prefix_caching: bool = True
+    mm_processor_cache_gb: float | None = None
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        """Refuse what vLLM would refuse after minutes of loading.
+
+        Raises:
+            ValueError: names the option.
+        """
+        if self.dtype not in _DTYPES:
+            raise ValueError(f"dtype={self.dtype} is not {', '.join(_DTYPES)}")
+        if not 0 < self.gpu_memory_utilization <= 1:
+            raise ValueError(f"gpu_memory_utilization={self.gpu_memory_utilization} is not above 0 and at most 1")
+        for name, (least, most) in _RANGES.items():
+            value = getattr(self, name, None)
+            if value is not None and not least <= value <= most:
+                raise ValueError(f"{name}={value} is not from {least:,} to {most:,}")
+        if self.data_parallel_size > 1 and self.distributed_executor_backend != _LAUNCHED:
+            raise ValueError(
+                f"data_parallel_size={self.data_parallel_size} is refused by vLLM in one process, but with "
+                f"distributed_executor_backend={_LAUNCHED}; use --workers {self.data_parallel_size}, a model each"
+            )
+
+
+@dataclass(frozen=True, kw_only=True)
+class VllmOptions(EngineOptions, CheckpointReading):
+    """How a model is run that can be talked to.
+
+    Attributes:
+        frame_size: width and height in pixels of the largest frame, by which vLLM reserves memory.
+        max_frames: most frames of a request; as many as fit into max_model_len where None.
+    """
+
+    frame_size: int = 300
+    max_frames: int | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        CheckpointReading.__post_init__(self)
+
+
+@dataclass(frozen=True, kw_only=True)
+class VllmPolicyOptions(EngineOptions, ActionOptions):
+    """How a policy is run.
+
+    Attributes:
+        pretrained: hub id or folder.
+        revision: branch, tag or commit on the hub; the default branch where None.
+    """
+
+    pretrained: str
+    revision: str | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        ActionOptions.__post_init__(self)

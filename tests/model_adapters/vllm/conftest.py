@@ -1,0 +1,49 @@
+"""The double in vLLM's place, and tiny checkpoints for it."""
+
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from model_adapters import load
+
+from .double import Double
+
+
+@pytest.fixture
+def vllm(monkeypatch: pytest.MonkeyPatch) -> Double:
+    """The double, found by whoever imports vLLM."""
+    double = Double()
+    for name, module in double.modules().items():
+        monkeypatch.setitem(sys.modules, name, module)
+    return double
+
+
+@pytest.fixture
+def start(vllm: Double, checkpoints: dict[str, Path]) -> Callable[..., Any]:
+    """Starts a model of a tiny checkpoint on the double."""
+
+    def start(family: str = "qwen2.5-vl", name: str | None = None, **options: object) -> Any:
+        given = {"pretrained": checkpoints[family], "dtype": "float32", **options}
+        return load(f"{name or family}@vllm", {key: str(value) for key, value in given.items()}, 0)
+
+    return start
+
+
+@pytest.fixture(scope="session")
+def in_process(checkpoints: dict[str, Path]) -> Iterator[Callable[..., Any]]:
+    """The same checkpoints as transformers runs them."""
+    loaded: dict[tuple[str, str], Any] = {}
+
+    def get(family: str, name: str | None = None, **options: object) -> Any:
+        key = (family, str(sorted(options.items())))
+        if key not in loaded:
+            given = {"pretrained": checkpoints[family], "dtype": "float32", "device": "cpu", **options}
+            loaded[key] = load(name or family, {option: str(value) for option, value in given.items()}, 0)
+        return loaded[key]
+
+    yield get
+    for model in loaded.values():
+        model.close()

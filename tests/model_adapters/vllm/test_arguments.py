@@ -1,0 +1,194 @@
+"""What becomes of each option, by hand, and that vLLM takes it."""
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from transformers import LlamaConfig, Qwen2_5_VLConfig
+
+from infthor_eval.errors import ModelError, UsageError
+from model_adapters import check_options, options
+from model_adapters.hf.rope import apply_rope
+from model_adapters.vllm.adapter import Qwen25VLOnVllm
+from model_adapters.vllm.arguments import engine_arguments, frame_limit, model_arguments, rope_overrides, token_limit
+from model_adapters.vllm.options import EngineOptions, VllmOptions
+
+from .double import SIGNATURES
+
+TAKEN = {*SIGNATURES["LLM"], *SIGNATURES["EngineArgs"]}
+FOLDER = Path("checkpoint")
+
+
+def _qwen(rope: str) -> Any:
+    config = Qwen2_5_VLConfig(
+        text_config={
+            "max_position_embeddings": 128_000,
+            "rope_parameters": {"rope_type": "default", "rope_theta": 1e6, "mrope_section": [16, 24, 24]},
+        }
+    )
+    apply_rope(config, rope)
+    return config
+
+
+def test_without_options_vllm_gets_what_it_needs_and_the_rest_is_its_own_choice() -> None:
+    assert engine_arguments(FOLDER, EngineOptions()) == {
+        "model": "checkpoint",
+        "dtype": "auto",
+        "seed": 0,
+        "tensor_parallel_size": 1,
+        "pipeline_parallel_size": 1,
+        "data_parallel_size": 1,
+        "gpu_memory_utilization": 0.9,
+        "enforce_eager": False,
+        "enable_prefix_caching": True,
+    }
+
+
+def test_every_option_arrives_under_vllms_name() -> None:
+    typed = VllmOptions(
+        pretrained="x",
+        dtype="bfloat16",
+        trust_remote_code=True,
+        max_model_len=9_999,
+        tensor_parallel_size=2,
+        pipeline_parallel_size=3,
+        data_parallel_size=4,
+        distributed_executor_backend="external_launcher",
+        gpu_memory_utilization=0.5,
+        enforce_eager=True,
+        quantization="fp8",
+        prefix_caching=False,
+        mm_processor_cache_gb=0.0,
+        seed=7,
+        frame_size=640,
+        rope="yarn:4",
+    )
+    assert model_arguments(FOLDER, _qwen("yarn:4"), typed, max_tokens=9_999, max_frames=12) == {
+        "model": "checkpoint",
+        "dtype": "bfloat16",
+        "seed": 7,
+        "tensor_parallel_size": 2,
+        "pipeline_parallel_size": 3,
+        "data_parallel_size": 4,
+        "distributed_executor_backend": "external_launcher",
+        "gpu_memory_utilization": 0.5,
+        "enforce_eager": True,
+        "quantization": "fp8",
+        "enable_prefix_caching": False,
+        "mm_processor_cache_gb": 0.0,
+        "max_model_len": 9_999,
+        "trust_remote_code": True,
+        "limit_mm_per_prompt": {"image": {"count": 12, "width": 640, "height": 640}, "video": 0},
+        "hf_overrides": {
+            "text_config": {
+                "rope_parameters": {
+                    "rope_type": "yarn",
+                    "rope_theta": 1e6,
+                    "factor": 4.0,
+                    "original_max_position_embeddings": 128_000,
+                    "mrope_section": [16, 24, 24],
+                },
+                "max_position_embeddings": 512_000,
+            }
+        },
+    }
+
+
+def test_limits_of_a_frames_area_are_the_processors() -> None:
+    typed = Qwen25VLOnVllm.Options(min_pixels=100, max_pixels=200)
+    arguments = model_arguments(FOLDER, _qwen("yarn:2"), typed, max_tokens=10, max_frames=1)
+    assert arguments["mm_processor_kwargs"] == {"min_pixels": 100, "max_pixels": 200}
+    assert "hf_overrides" not in arguments
+
+
+@given(
+    st.fixed_dictionaries(
+        {},
+        optional={
+            "max_model_len": st.none() | st.integers(1, 2**20),
+            "tensor_parallel_size": st.integers(1, 16),
+            "distributed_executor_backend": st.sampled_from([None, "mp", "ray"]),
+            "gpu_memory_utilization": st.floats(0.01, 1),
+            "quantization": st.sampled_from([None, "fp8", "awq"]),
+            "mm_processor_cache_gb": st.none() | st.floats(0, 64),
+            "prefix_caching": st.booleans(),
+            "image": st.none() | st.integers(1, 5_000),
+        },
+    )
+)
+def test_whatever_is_chosen_vllm_takes_all_of_it_and_no_none(chosen: dict[str, Any]) -> None:
+    typed = VllmOptions(pretrained="x", max_frames=chosen.pop("image", None), **chosen)
+    config = SimpleNamespace()
+    arguments = model_arguments(FOLDER, config, typed, max_tokens=100, max_frames=frame_limit(100, 7, typed))
+    assert set(arguments) <= TAKEN
+    assert None not in arguments.values()
+    assert arguments["limit_mm_per_prompt"]["image"]["count"] == (typed.max_frames or 14)
+
+
+def test_a_frame_is_taken_even_where_none_would_fit() -> None:
+    assert frame_limit(100, 121, VllmOptions(pretrained="x")) == 1
+
+
+@pytest.mark.parametrize(("typed", "own", "limit"), [(None, 128_000, 128_000), (4_096, 128_000, 4_096), (9, None, 9)])
+def test_the_limit_is_what_was_asked_for_or_the_checkpoints(typed: int | None, own: int | None, limit: int) -> None:
+    assert token_limit("x", own, VllmOptions(pretrained="x", max_model_len=typed)) == limit
+
+
+def test_a_checkpoint_without_a_limit_needs_one() -> None:
+    with pytest.raises(ModelError, match="the config of x names no longest context; give max_model_len="):
+        token_limit("x", None, VllmOptions(pretrained="x"))
+
+
+@pytest.mark.parametrize(("rope_type", "longer"), [("yarn", True), ("longrope", True), ("linear", False)])
+def test_a_model_of_one_part_has_its_extension_at_the_top(rope_type: str, longer: bool) -> None:
+    config = LlamaConfig(max_position_embeddings=100, hidden_size=64, num_attention_heads=4)
+    apply_rope(config, f"{rope_type}:2")
+    overrides = rope_overrides(config, f"{rope_type}:2")
+    assert overrides["rope_parameters"]["rope_type"] == rope_type
+    assert overrides["rope_parameters"]["factor"] == 2
+    assert overrides.get("max_position_embeddings") == (200 if longer else None)
+
+
+@pytest.mark.parametrize("rope", ["linear:2", "dynamic:2", "longrope:2"])
+def test_an_extension_that_would_lose_the_three_axes_is_refused(rope: str) -> None:
+    with pytest.raises(ModelError, match=r"qwen2_5_vl, whose positions have three axes, .* yarn alone; use yarn:2"):
+        rope_overrides(_qwen(rope), rope)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"dtype": "int8"}, "dtype=int8 is not auto, bfloat16"),
+        ({"gpu_memory_utilization": "0"}, "gpu_memory_utilization=0.0 is not above 0"),
+        ({"gpu_memory_utilization": "nan"}, "gpu_memory_utilization=nan"),
+        ({"max_model_len": "0"}, "max_model_len=0 is not from 1"),
+        ({"tensor_parallel_size": "0"}, "tensor_parallel_size=0 is not from 1"),
+        ({"max_frames": "0"}, "max_frames=0 is not from 1"),
+        ({"mm_processor_cache_gb": "-1"}, "mm_processor_cache_gb=-1.0 is not from 0"),
+        ({"data_parallel_size": "2"}, "refused by vLLM in one process, .* use --workers 2"),
+        ({"rope": "yarn"}, "rope=yarn is not TYPE:FACTOR"),
+        ({"prompt": "loud"}, "prompt=loud is not chat or plain"),
+        ({"max_pixels": "0"}, "max_pixels=0 is not between"),
+        ({"device": "cpu"}, "has no option device"),
+    ],
+)
+def test_options_that_cannot_be_are_refused_at_once(given: dict[str, str], said: str) -> None:
+    with pytest.raises(UsageError, match=said):
+        check_options("qwen2.5-vl@vllm", given)
+
+
+@pytest.mark.parametrize("given", [{"ensemble": "loud"}, {"dtype": "int8"}, {"execute": "0"}])
+def test_a_policys_options_are_refused_likewise(given: dict[str, str]) -> None:
+    with pytest.raises(UsageError, match=next(iter(given))):
+        check_options("openvla@vllm", given)
+
+
+@pytest.mark.parametrize("name", ["qwen2.5-vl", "llava-onevision", "pixtral", "openvla"])
+def test_both_engines_load_the_same_checkpoint_where_none_is_named(name: str) -> None:
+    named = [
+        next(each for each in options(known).split(", ") if "pretrained=" in each) for known in (name, f"{name}@vllm")
+    ]
+    assert named[0] == named[1] != "pretrained="

@@ -1,0 +1,320 @@
+"""A model on the double: the same words, the same counts as in transformers, and what its cache finds."""
+
+import json
+import shutil
+import sys
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from infthor_eval.errors import ModelError, UsageError
+from infthor_eval.formats.frames import FrameRef
+from model_adapters import Decoding, Part, Reply, check_adapter, load
+
+from ..asking import up_to, user
+from .double import Double
+
+Start = Callable[..., Any]
+FAMILIES = ("qwen2.5-vl", "llava-onevision", "pixtral", "llava", "idefics3")
+
+
+def _name(family: str) -> str:
+    """Who loads it; the others are nobody's own."""
+    return family if family in FAMILIES[:3] else "hf-vlm"
+
+
+def _facts(reply: Reply) -> tuple[Any, ...]:
+    return reply.text, reply.token_ids, reply.n_reply_tokens, reply.n_context_tokens
+
+
+@pytest.mark.parametrize("family", ["qwen2.5-vl", "pixtral", "llava"])
+def test_it_keeps_the_contract(family: str, start: Start) -> None:
+    model = start(family, _name(family))
+    check_adapter(model, (84, 84))
+    model.close()
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_replies_and_counts_are_those_of_transformers(
+    family: str, start: Start, in_process: Start, frames: list[FrameRef]
+) -> None:
+    ours, theirs = start(family, _name(family)), in_process(family, _name(family))
+    assert ours.tokens_per_frame(frames[0]) == theirs.tokens_per_frame(frames[0])
+    told: list[tuple[Part, ...]] = [
+        ("What do you see?",),
+        (frames[0], "\nWhat is it?"),
+        ("First ", frames[1], " then ", frames[2], "?"),
+    ]
+    for parts in told:
+        talks = [model.conversation() for model in (ours, theirs)]
+        for talk in talks:
+            talk.append(*parts)
+        assert talks[0].n_tokens == talks[1].n_tokens
+        replies = [talk.reply(up_to(8)) for talk in talks]
+        assert _facts(replies[0]) == _facts(replies[1])
+        assert replies[0].n_context_tokens == talks[0].n_tokens
+
+
+@pytest.mark.parametrize("options", [{"prompt": "plain"}, {"rope": "yarn:4"}, {"max_pixels": 3_200}])
+def test_options_that_change_what_is_read_change_it_alike(
+    options: dict[str, Any], start: Start, in_process: Start, frames: list[FrameRef]
+) -> None:
+    ours, theirs = start(**options), in_process("qwen2.5-vl", **options)
+    turns = user(frames[0], "Where is the mug? " * 8, frames[1])
+    if "max_pixels" in options:  # the double's processor is the checkpoint's own: counts alone tell
+        assert ours.count(turns) == theirs.count(turns) < in_process("qwen2.5-vl").count(turns)
+        return
+    assert _facts(ours.answer(turns, up_to(8))) == _facts(theirs.answer(turns, up_to(8)))
+    assert ours.capabilities.max_tokens == theirs.capabilities.max_tokens
+    assert ours.capabilities.max_tokens_before_extension == theirs.capabilities.max_tokens_before_extension
+
+
+def test_a_checkpoint_with_a_penalty_is_written_with_it(
+    start: Start, in_process: Start, vllm: Double, checkpoints: dict[str, Path], tmp_path: Path
+) -> None:
+    folder = tmp_path / "penalised"
+    shutil.copytree(checkpoints["qwen2.5-vl"], folder)
+    settings = json.loads((folder / "generation_config.json").read_text())
+    (folder / "generation_config.json").write_text(json.dumps(settings | {"repetition_penalty": 20.0}))
+    turns, decoding = user("Where is the mug?"), up_to(40)
+    ours, theirs = (
+        make(pretrained=folder).answer(turns, decoding) for make in (start, partial(in_process, "qwen2.5-vl"))
+    )
+    assert _facts(ours) == _facts(theirs) != _facts(in_process("qwen2.5-vl").answer(turns, decoding))
+    assert vllm.calls[-1].params.repetition_penalty == 20.0
+
+
+def test_a_stop_string_ends_and_cuts_the_reply_where_transformers_does(
+    start: Start, in_process: Start, frames: list[FrameRef]
+) -> None:
+    ours, theirs, turns = start(), in_process("qwen2.5-vl"), user(frames[0], "Where?")
+    whole = theirs.answer(turns, up_to(12)).text
+    for stop in (whole[3:5], whole[-1], "never"):
+        replies = [model.answer(turns, up_to(12, stop=("not this", stop))) for model in (ours, theirs)]
+        assert _facts(replies[0]) == _facts(replies[1])
+
+
+SPECIAL = "<|im_start|>"
+
+
+@pytest.mark.parametrize(
+    ("said", "stop", "text"),
+    [
+        (f"mug on{SPECIAL}table", (SPECIAL,), "mug on"),
+        (f"mug on{SPECIAL}table", ("never", "ta"), "mug on"),
+        (f"mug{SPECIAL} on<|im_end|>table", (), "mug on"),
+        (f"mug{SPECIAL} on<|endoftext|>table", ("table",), "mug on"),
+        ("<|im_end|>", (), ""),
+    ],
+)
+def test_special_tokens_stop_a_reply_and_are_no_text(
+    said: str, stop: tuple[str, ...], text: str, start: Start, vllm: Double
+) -> None:
+    model = start()
+    tokenizer = model._loaded.tokenizer
+    vllm.would_say = tokenizer(said, add_special_tokens=False)["input_ids"]
+    reply = model.answer(user("x"), up_to(50, stop=stop))
+    assert reply.text == text
+    assert len(reply.token_ids) == reply.n_reply_tokens
+    ends = {tokenizer.convert_tokens_to_ids(end) for end in ("<|im_end|>", "<|endoftext|>")}
+    assert not ends & set(reply.token_ids)
+    assert ends <= set(vllm.calls[-1].params.stop_token_ids)
+    assert (tokenizer.convert_tokens_to_ids(SPECIAL) in vllm.calls[-1].params.stop_token_ids) == (SPECIAL in stop)
+
+
+def test_draws_are_the_requests_own(start: Start, vllm: Double) -> None:
+    model = start()
+    replies = [model.answer(user("Say it."), up_to(8, temperature=2.0, top_p=0.9, seed=seed)) for seed in (3, 4, 3)]
+    assert replies[0].text == replies[2].text != replies[1].text
+    params = vllm.calls[-1].params
+    assert (params.temperature, params.top_p, params.seed) == (2.0, 0.9, 3)
+    model.answer(user("Say it."), up_to(8))
+    assert (vllm.calls[-1].params.temperature, vllm.calls[-1].params.seed) == (0, None)
+
+
+def test_a_reply_is_held_to_choices_and_no_stop_string_cuts_it(
+    start: Start, in_process: Start, vllm: Double, frames: list[FrameRef]
+) -> None:
+    decoding = up_to(30, choices=("on the table", "in the sink"), stop=("the",))
+    turns = user(frames[0], "Where is the mug?")
+    ours, theirs = start().answer(turns, decoding), in_process("qwen2.5-vl").answer(turns, decoding)
+    assert _facts(ours) == _facts(theirs)
+    params = vllm.calls[-1].params
+    assert params.structured_outputs is not None
+    assert (params.structured_outputs.choice, params.stop) == (["on the table", "in the sink"], [])
+
+
+def test_a_choice_that_does_not_fit_is_refused_before_vllm_is_asked(start: Start, vllm: Double) -> None:
+    with pytest.raises(ModelError, match=r"takes .* tokens and a reply may have 2"):
+        start().answer(user("x"), up_to(2, choices=("on the kitchen table",)))
+    assert vllm.calls == []
+
+
+def test_a_reply_that_is_no_choice_fails(start: Start, vllm: Double) -> None:
+    model = start()
+    vllm.would_say = model._loaded.tokenizer("mug", add_special_tokens=False)["input_ids"]
+    with pytest.raises(ModelError, match=r"vLLM 0\.33\.0 answers 'mug', which is none of the 2 choices"):
+        model.answer(user("x"), up_to(20, choices=("yes", "no")))
+
+
+# What its cache finds.
+
+
+def _talk(model: Any, *parts: Part) -> Any:
+    talk = model.conversation()
+    talk.append(*parts)
+    return talk
+
+
+def test_of_continuations_the_first_goes_alone_and_the_others_find_its_prefix(
+    start: Start, in_process: Start, vllm: Double, frames: list[FrameRef]
+) -> None:
+    asked = [[f"\nQuestion {number}: what is it?"] for number in range(5)]
+    replies = _talk(start(), *frames).replies(asked, up_to(4))
+    assert [len(call.prompts) for call in vllm.calls] == [1, 4]
+    theirs = _talk(in_process("qwen2.5-vl"), *frames).replies(asked, up_to(4))
+    assert [_facts(reply) for reply in replies] == [_facts(reply) for reply in theirs]
+    shared = _talk(start(), *frames).n_tokens // 16 * 16 - 16
+    assert replies[0].n_cached_tokens == 0
+    assert all(reply.n_cached_tokens >= shared > 0 for reply in replies[1:])
+
+
+def test_what_was_just_read_is_warm_already(start: Start, vllm: Double, frames: list[FrameRef]) -> None:
+    talk = _talk(start(), *frames)
+    talk.replies([["\nOne?"], ["\nTwo?"]], up_to(2))
+    more = talk.replies([["\nThree?"], ["\nFour?"]], up_to(2))
+    assert [len(call.prompts) for call in vllm.calls] == [1, 1, 2]
+    assert all(reply.n_cached_tokens > 0 for reply in more)
+
+
+def test_without_a_cache_all_go_together(start: Start, vllm: Double, frames: list[FrameRef]) -> None:
+    replies = _talk(start(prefix_caching=False), *frames).replies([["\nOne?"], ["\nTwo?"]], up_to(2))
+    assert [len(call.prompts) for call in vllm.calls] == [2]
+    assert [reply.n_cached_tokens for reply in replies] == [0, 0]
+    assert vllm.started[0]["enable_prefix_caching"] is False
+
+
+def test_other_frames_are_no_warm_prefix(start: Start, frames: list[FrameRef]) -> None:
+    model = start()
+    first = model.answer(user(*frames[:3], "What?"), up_to(2))
+    other = model.answer(user(*frames[3:], "What?"), up_to(2))
+    again = model.answer(user(*frames[:3], "Where?"), up_to(2))
+    assert (first.n_cached_tokens, other.n_cached_tokens) == (0, 16)  # a block of the template's own words
+    assert again.n_cached_tokens == 48
+
+
+def test_frames_are_sent_once_each_by_name_and_loaded_once(
+    start: Start, vllm: Double, frames: list[FrameRef], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    loaded: list[Path] = []
+    plain = FrameRef.load
+    monkeypatch.setattr(FrameRef, "load", lambda self: loaded.append(self.path) or plain(self))
+    talk = _talk(start(), frames[0], frames[1], frames[0])
+    talk.replies([["\nOne?"], ["\nTwo?"]], up_to(2))
+    prompt = vllm.calls[0].prompts[0]
+    assert prompt["multi_modal_uuids"] == {"image": [frames[at].digest for at in (0, 1, 0)]}
+    assert len(prompt["multi_modal_data"]["image"]) == 3
+    assert loaded == [frames[0].path, frames[1].path]
+
+
+# What does not fit, and what fails.
+
+
+def test_what_does_not_fit_is_refused_before_vllm_is_asked(start: Start, vllm: Double, frames: list[FrameRef]) -> None:
+    model = start(max_model_len=60)
+    assert model.capabilities.max_tokens == 60 == vllm.started[0]["max_model_len"]
+    with pytest.raises(
+        ModelError, match=r"a context of \d+ tokens and 50 new ones is beyond the 60 .* set max_model_len"
+    ):
+        model.answer(user(frames[0], "What?"), up_to(50))
+    assert vllm.calls == []
+
+
+def test_more_frames_than_reserved_are_refused(start: Start, vllm: Double, frames: list[FrameRef]) -> None:
+    model = start(max_frames=2)
+    assert vllm.started[0]["limit_mm_per_prompt"]["image"]["count"] == 2
+    with pytest.raises(ModelError, match=r"3 frames are more than max_frames=2 of qwen2.5-vl@vllm; raise it"):
+        model.answer(user(*frames[:3]), up_to(2))
+    model.answer(user(*frames[:2]), up_to(2))
+
+
+def test_frames_reserved_are_as_many_as_fit(start: Start, vllm: Double) -> None:
+    start(max_model_len=1_300)
+    assert vllm.started[0]["limit_mm_per_prompt"] == {"image": {"count": 10, "width": 300, "height": 300}, "video": 0}
+
+
+def test_a_vllm_that_counts_otherwise_is_not_believed(start: Start, vllm: Double) -> None:
+    model = start()
+    vllm.expands = True
+    with pytest.raises(ModelError, match=r"vLLM 0\.33\.0 reads \d+ tokens where .* makes \d+: it sees other frames"):
+        model.answer(user("x"), up_to(2))
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        RuntimeError("CUDA out of memory.\nTried to allocate 20 GiB."),
+        type("EngineDeadError", (Exception,), {})("EngineCore encountered an issue."),
+        ValueError("At most 1 image(s) may be provided in one prompt."),
+    ],
+)
+def test_what_vllm_says_to_a_request_is_one_line(error: Exception, start: Start, vllm: Double) -> None:
+    model = start()
+    vllm.fails = error
+    with pytest.raises(ModelError, match=r"qwen2.5-vl@vllm: vLLM 0\.33\.0 fails on the request \(.*\); ask") as raised:
+        model.answer(user("x"), up_to(2))
+    assert "\n" not in str(raised.value)
+    assert " ".join(str(error).split()) in str(raised.value)
+
+
+def test_a_vllm_that_does_not_start_says_so_in_one_line(start: Start, vllm: Double) -> None:
+    vllm.fails = RuntimeError("Engine core initialization failed.\nSee root cause above.")
+    with pytest.raises(ModelError, match=r"does not start \(Engine core initialization failed. See .*max_model_len"):
+        start()
+
+
+def test_without_vllm_the_line_says_what_to_install(
+    checkpoints: dict[str, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "vllm", None)
+    for name in ("qwen2.5-vl@vllm", "hf-vlm@vllm", "openvla@vllm"):
+        with pytest.raises(ModelError, match=rf"{name} needs the package vllm .*pip install 'infthor-eval\[vllm\]'"):
+            load(name, {"pretrained": str(checkpoints["qwen2.5-vl"])}, 0)
+
+
+def test_a_checkpoint_of_another_family_is_refused_as_in_transformers(start: Start, vllm: Double) -> None:
+    with pytest.raises(ModelError, match="is a llava checkpoint, not qwen2_5_vl; try hf-vlm"):
+        start("llava", "qwen2.5-vl")
+    with pytest.raises(UsageError, match=r"hf-vlm@vllm needs pretrained="):
+        load("hf-vlm@vllm", {}, 0)
+    assert vllm.started == []
+
+
+def test_identities_tell_engines_and_what_changes_a_number_apart(start: Start, in_process: Start) -> None:
+    plain, theirs = start().identity(), in_process("qwen2.5-vl").identity()
+    assert (plain["engine"], plain["versions"]["vllm"]) == ("vllm", "0.33.0")
+    assert plain["fingerprint"] == theirs["fingerprint"]
+    assert plain["n_parameters"] == theirs["n_parameters"]
+    changed = [{"enforce_eager": True}, {"max_model_len": 999}, {"quantization": "fp8"}, {"rope": "yarn:2"}]
+    others = [start(**options).identity() for options in changed]
+    assert all(one != other for at, one in enumerate([plain, *others]) for other in others[at:])
+    assert start(gpu_memory_utilization=0.5, mm_processor_cache_gb=1).identity() == plain
+
+
+def test_the_double_takes_no_argument_that_vllm_does_not_take(vllm: Double) -> None:
+    top = sys.modules["vllm"]
+    for call in (
+        lambda: top.LLM(model="x", image_limit=3),
+        lambda: top.SamplingParams(max_new_tokens=3),
+        lambda: sys.modules["vllm.sampling_params"].StructuredOutputsParams(choices=["a"]),
+    ):
+        with pytest.raises(TypeError, match="unexpected keyword argument"):
+            call()
+
+
+def test_decoding_that_vllm_refuses_is_told(start: Start) -> None:
+    with pytest.raises(ModelError, match=r"temperature must be in \[0, 2\]"):
+        start().answer(user("x"), Decoding(max_new_tokens=2, temperature=3.0))

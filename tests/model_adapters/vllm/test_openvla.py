@@ -1,0 +1,87 @@
+"""OpenVLA on the double: the actions of the native port."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from infthor_eval.errors import ModelError, UsageError
+from infthor_eval.formats.frames import FrameRef
+from model_adapters import check_policy, load
+from model_adapters.tiny.openvla import OpenVLATiny
+
+from .double import Double
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    made = tmp_path_factory.mktemp("openvla")
+    OpenVLATiny.twin.save(made, seed=0)
+    return made
+
+
+@pytest.fixture
+def policy(vllm: Double, folder: Path) -> Callable[..., Any]:
+    """Starts the tiny policy on the double."""
+
+    def start(**options: object) -> Any:
+        given = {"pretrained": folder, "dtype": "float32", **options}
+        return load("openvla@vllm", {name: str(value) for name, value in given.items()}, 0)
+
+    return start
+
+
+@pytest.mark.parametrize("constrained", [True, False])
+def test_actions_are_those_of_the_native_port(
+    constrained: bool, policy: Callable[..., Any], folder: Path, frames: list[FrameRef]
+) -> None:
+    ours = policy(constrained=constrained)
+    theirs: Any = load("openvla", {"pretrained": str(folder), "device": "cpu", "constrained": str(constrained)}, 0)
+    asked = [(frame, text) for frame in frames[:3] for text in ("pick up the Mug", "close the fridge")]
+    actions = [[each.act(frame, text) for frame, text in asked] for each in (ours, theirs)]
+    assert actions[0] == actions[1]
+    assert len(set(actions[0])) > 1 or not constrained  # without, it writes words, which are clipped
+
+
+def test_it_keeps_the_contract_of_policies(policy: Callable[..., Any]) -> None:
+    acting = policy()
+    check_policy(acting)
+    acting.close()
+
+
+def test_what_vllm_is_asked(policy: Callable[..., Any], vllm: Double, frames: list[FrameRef], folder: Path) -> None:
+    policy(max_model_len=512, tensor_parallel_size=2).act(frames[0], "Pick up the mug")
+    assert vllm.started[0]["limit_mm_per_prompt"] == {"image": 1}
+    assert (vllm.started[0]["max_model_len"], vllm.started[0]["tensor_parallel_size"]) == (512, 2)
+    (call,) = vllm.calls
+    assert call.prompts[0]["prompt_token_ids"][-1] == 29_871
+    assert (call.params.max_tokens, call.params.temperature, call.params.ignore_eos) == (7, 0, True)
+    assert call.params.allowed_token_ids == list(range(31_744, 32_000))
+    policy(constrained=False).act(frames[0], "Pick up the mug")
+    assert vllm.calls[-1].params.allowed_token_ids is None
+
+
+def test_too_few_tokens_are_told(
+    policy: Callable[..., Any], vllm: Double, frames: list[FrameRef], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    acting = policy()
+    monkeypatch.setattr("tests.model_adapters.vllm.double._OpenVLA.write", lambda *_: ([31_800] * 3, ""))
+    with pytest.raises(ModelError, match=r"openvla@vllm: vLLM wrote 3 action tokens, not 7"):
+        acting.act(frames[0], "pick up the mug")
+
+
+def test_its_identity_has_engine_and_dataset(policy: Callable[..., Any]) -> None:
+    found = policy().identity()
+    assert (found["engine"], found["unnorm_key"], found["adapter"]) == ("vllm", "bridge_orig", "openvla@vllm")
+    assert found != policy(enforce_eager=True).identity()
+
+
+def test_what_is_wrong_with_checkpoint_or_key_is_told_as_in_the_native_port(
+    policy: Callable[..., Any], vllm: Double, checkpoints: dict[str, Path]
+) -> None:
+    with pytest.raises(UsageError, match="unnorm_key=x is no dataset"):
+        policy(unnorm_key="x")
+    with pytest.raises(ModelError, match="is a qwen2_5_vl checkpoint, not openvla"):
+        policy(pretrained=checkpoints["qwen2.5-vl"])
+    assert vllm.started == []

@@ -1,0 +1,103 @@
+"""Whole runs on the double, as their user types them."""
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from infthor_eval.errors import UsageError
+from infthor_eval.nieh.records import RECORDS
+from infthor_eval.runs import read_run
+from model_adapters import on_engine
+
+from .double import Double
+
+
+@pytest.fixture
+def ask(make_nieh_set: Any, checkpoints: dict[str, Path], tmp_path: Path, run: Any) -> Any:
+    """Runs `nieh_full` on five questions about two trajectories."""
+    data = make_nieh_set(size=56)
+
+    def ask(name: str, *options: object, **model_args: object) -> tuple[int, str, str]:
+        given = {"pretrained": checkpoints["qwen2.5-vl"], "dtype": "float32", **model_args}
+        typed = ",".join(f"{option}={value}" for option, value in given.items())
+        arguments = ["--model", "qwen2.5-vl", "--model-args", typed, "--tasks", "nieh_full", "--data", data]
+        return run(*arguments, "--name", name, "--output", tmp_path / "out", *options)
+
+    return ask
+
+
+def _found(folder: Path) -> tuple[list[Any], dict[str, Any], dict[str, Any]]:
+    """The records of the one run in a folder, its results, and what it took."""
+    (results,) = folder.rglob("results.json")
+    took = json.loads((results.parent / "took.json").read_text())
+    return read_run(results.parent, RECORDS)[1], json.loads(results.read_text()), took
+
+
+def test_both_engines_give_the_same_replies_and_tokens_and_the_hit_rate_is_told(
+    ask: Any, vllm: Double, tmp_path: Path
+) -> None:
+    code, out, err = ask("on vllm", "--engine", "vllm")
+    assert code == 0, err
+    assert ask("here", "--engine", "transformers", device="cpu")[0] == 0
+    (ours, results, took), (theirs, others, _) = (_found(tmp_path / "out" / name) for name in ("on vllm", "here"))
+    facts = [
+        [(one.key, one.payload.reply, one.payload.scores, one.tokens.context, one.tokens.reply) for one in records]
+        for records in (ours, theirs)
+    ]
+    assert facts[0] == facts[1]
+    assert results["usage"] == others["usage"]
+    assert results["identity"]["model"]["name"] == "qwen2.5-vl@vllm"
+    # Three questions on one trajectory, two on the other: all but the first of each find its frames.
+    warm = [record.tokens.cached > record.tokens.context / 2 for record in ours]
+    assert warm == [False, True, True, False, True]
+    cached = sum(record.tokens.cached for record in ours)
+    assert took == {
+        "requests": 5,
+        "read": results["usage"]["context"],
+        "cached": cached,
+        "hit_rate": pytest.approx(cached / took["read"], abs=1e-6),
+        "written": results["usage"]["reply"],
+        "seconds": pytest.approx(sum(record.seconds for record in ours)),
+        "cost": None,
+    }
+    assert "cached" not in results["usage"]
+    assert f"({cached:,} of them cached, {100 * cached / took['read']:.1f} %)" in out
+
+
+def test_the_order_of_the_requests_makes_the_hits(
+    ask: Any, vllm: Double, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert ask("one first", "--engine", "vllm")[0] == 0
+    monkeypatch.setattr("model_adapters.vllm.model.VllmModel._shares_what_is_not_read", lambda *_: False)
+    assert ask("all at once", "--engine", "vllm", "--fresh")[0] == 0
+    kept, lost = (_found(tmp_path / "out" / name)[2]["hit_rate"] for name in ("one first", "all at once"))
+    assert kept > 0.4
+    assert lost < 0.1
+    assert [len(call.prompts) for call in vllm.calls] == [1, 2, 1, 1, 3, 2]
+
+
+def test_engines_that_do_not_run_a_model_are_refused_in_one_line(run: Any, tmp_path: Path) -> None:
+    known = "there do: hf-vlm, llava-onevision, openvla, pixtral, qwen2.5-vl"
+    for command in ("run", "plan"):
+        code, _, err = run(command, "--model", "deepseek-vl", "--engine", "vllm", "--tasks", "nieh_mini")
+        assert code == 2
+        assert f"deepseek-vl does not run on vllm; {known}" in err
+        assert "Traceback" not in err
+
+
+def test_the_name_of_a_model_may_say_its_engine() -> None:
+    assert on_engine("qwen2.5-vl", "vllm") == on_engine("qwen2.5-vl@vllm", "vllm") == "qwen2.5-vl@vllm"
+    assert on_engine("deepseek-vl", "transformers") == "deepseek-vl"
+    with pytest.raises(UsageError, match="pixtral@vllm names its engine, and it is not transformers; leave one"):
+        on_engine("pixtral@vllm", "transformers")
+
+
+def test_a_run_without_vllm_ends_with_one_line(ask: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "vllm", None)
+    code, _, err = ask("none", "--engine", "vllm")
+    assert code == 2
+    assert "pip install 'infthor-eval[vllm]'" in err
+    assert "Traceback" not in err
