@@ -104,6 +104,7 @@ class Reply:
         token_ids: the generated ids without the end-of-turn token; where a stop string ended the reply, up to the
             token that completed it; None where the model does not tell.
         faults: what went wrong and was survived on the way (a request sent again, say), a line each.
+        cost: what it cost, in US dollars; None where nothing is paid, or no price is known.
     """
 
     text: str
@@ -112,6 +113,7 @@ class Reply:
     n_cached_tokens: int | None = None
     token_ids: tuple[int, ...] | None = None
     faults: tuple[str, ...] = ()
+    cost: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

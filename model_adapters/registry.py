@@ -27,6 +27,7 @@ _BUILT_IN = {
     "hf-vlm": "model_adapters.hf.families.hf_vlm:HfVlm",
     "llava-onevision": "model_adapters.hf.families.llava_onevision:LlavaOnevision",
     "llava-onevision-tiny": "model_adapters.tiny.llava_onevision:LlavaOnevisionTiny",
+    "openai": "model_adapters.openai.adapter:OpenAI",
     "openvla": "model_adapters.policies.openvla.adapter:OpenVLA",
     "openvla-tiny": "model_adapters.tiny.openvla:OpenVLATiny",
     "pixtral": "model_adapters.hf.families.pixtral:Pixtral",
@@ -108,9 +109,10 @@ def label(name: str, options: Mapping[str, str]) -> str:
 
     Args:
         name: of the model.
-        options: as typed; where they name a checkpoint, so does the label: `Qwen2.5-VL-3B-Instruct@main`.
+        options: as typed; where they name a checkpoint, so does the label: `Qwen2.5-VL-3B-Instruct@main`. A server's
+            model is named as the server does.
     """
-    checkpoint = options.get("pretrained")
+    checkpoint = options.get("pretrained") or options.get("model")
     if not checkpoint:
         return _as_component(name)
     revision = options.get("revision")

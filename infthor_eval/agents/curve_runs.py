@@ -8,14 +8,14 @@ from typing import Any
 import msgspec
 
 from infthor_eval.agents.records import PlanRecord
-from infthor_eval.errors import DataError, UsageError, naming, unknown_name
+from infthor_eval.errors import DataError, UsageError, unknown_name
 from infthor_eval.runs import RunHeader, UnitRecord
+from infthor_eval.runs.about import About, about, shared_tasks
 from infthor_eval.runs.sharing import differing, shared_units, sharing_notes
 
-__all__ = ["About", "PlansRun", "SharedPlans", "shared_plans"]
+__all__ = ["PlansRun", "SharedPlans", "shared_plans"]
 
 _PLANNER = "planner"  # `baselines.Planner.name`, which would bring the simulator with it
-_EMBEDDED = "embedded"  # as the option --simulator names it
 
 Record = UnitRecord[PlanRecord]
 
@@ -27,30 +27,6 @@ class _TaskAbout(msgspec.Struct, frozen=True):
     rewards: Any
     after_failure: str
     config: dict[str, Any] = {}  # the task file's settings
-
-
-class About(msgspec.Struct, frozen=True):
-    """What a run's identity says, as far as curves need it.
-
-    Attributes:
-        model: the subject.
-        simulator: what it acted in.
-        tasks: by name.
-    """
-
-    model: dict[str, Any]
-    simulator: str
-    tasks: dict[str, _TaskAbout]
-
-    @property
-    def is_planner(self) -> bool:
-        """Whether the subject is the expert itself."""
-        return self.model.get("baseline") == _PLANNER
-
-    @property
-    def is_embedded(self) -> bool:
-        """Whether its numbers are of the embedded simulator."""
-        return self.simulator == _EMBEDDED
 
 
 @dataclass(frozen=True)
@@ -68,14 +44,19 @@ class PlansRun:
     records: Sequence[Record]
 
     @cached_property
-    def about(self) -> About:
+    def about(self) -> About[_TaskAbout]:
         """What its identity says.
 
         Raises:
             DataError: it is not that of a run of plans.
         """
-        with naming(f"{self.label}: not the identity of a run of plans", "start it anew", of=msgspec.ValidationError):
-            return msgspec.convert(self.header.identity, About)
+        found: About[_TaskAbout] = about(self.label, self.header, About[_TaskAbout], "plans")
+        return found
+
+    @property
+    def is_planner(self) -> bool:
+        """Whether the subject is the expert itself."""
+        return self.about.is_baseline(_PLANNER)
 
 
 @dataclass(frozen=True)
@@ -120,11 +101,7 @@ def shared_plans(runs: Sequence[PlansRun], task: str | None) -> SharedPlans:
 
 
 def _shared_task(runs: Sequence[PlansRun], task: str | None) -> str:
-    shared = [name for name in runs[0].about.tasks if all(name in run.about.tasks for run in runs)]
-    if not shared:
-        first = runs[0]
-        other = next(run for run in runs if not run.about.tasks.keys() & first.about.tasks.keys())
-        raise UsageError(f"{first.label} and {other.label} share no task; draw runs of the same task")
+    shared = shared_tasks(runs)
     if task is None and len(shared) > 1:
         raise UsageError(f"the runs share several tasks; give one of them with --task: {', '.join(shared)}")
     if task is not None and task not in shared:
@@ -133,8 +110,8 @@ def _shared_task(runs: Sequence[PlansRun], task: str | None) -> str:
 
 
 def _require_same_rewards(runs: Sequence[PlansRun], settings: Sequence[_TaskAbout]) -> None:
-    for run, about in zip(runs, settings, strict=True):
-        if about.rewards != settings[0].rewards:
+    for run, found in zip(runs, settings, strict=True):
+        if found.rewards != settings[0].rewards:
             raise UsageError(
                 f"{runs[0].label} and {run.label} have different rules of rewards; draw runs with the same --rewards"
             )

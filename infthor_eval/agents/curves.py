@@ -101,7 +101,7 @@ def _run_curves(run: PlansRun, records: Sequence[Sequence[Record]], curves: Mapp
     plans = [record for trajectory in records for record in trajectory]
     return RunCurves(
         label=run.label,
-        is_bound=run.about.is_planner,
+        is_bound=run.is_planner,
         is_embedded=run.about.is_embedded,
         curves=curves,
         counts=_counts(

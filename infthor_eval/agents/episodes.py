@@ -16,11 +16,12 @@ from infthor_eval.agents.records import PlanRecord, StepRecord
 from infthor_eval.agents.task import PlansTask
 from infthor_eval.agents.trajectories import Course
 from infthor_eval.formats.scratch import ScratchFolder
-from infthor_eval.runs import Tokens
+from infthor_eval.runs import NOTHING, Tokens, Usage
 from infthor_eval.thor.frames import FrameFolder, NoFrames
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.simulators import Simulators
 from infthor_eval.thor.survival import survived
+from model_adapters import Reply
 
 __all__ = ["Episode", "Played", "described", "episode"]
 
@@ -34,14 +35,16 @@ class Played:
     Attributes:
         record: for the journal.
         tokens: that its requests took: the length of the last one, of which so many were cached, and all replies.
-        faults: of the simulator, survived on the way.
         seconds: time that it took.
+        faults: of the simulator and of the model, survived on the way.
+        usage: what all its requests took, with those of tries that the simulator did not survive.
     """
 
     record: PlanRecord
     tokens: Tokens
     seconds: float
     faults: tuple[str, ...] = ()
+    usage: Usage = NOTHING
 
 
 def described(course: Course, plan: Plan) -> PlanRecord:
@@ -71,9 +74,11 @@ class Episode:
 
     Attributes:
         begun: what is known of the plan last begun, with the most that it can earn.
+        usage: what all requests for the plan that is played took so far.
     """
 
     begun: PlanRecord | None = None
+    usage: Usage = NOTHING
 
     def __init__(
         self, task: PlansTask, course: Course, cast: Cast, simulator: Simulator, folder: Path, seed: int
@@ -96,8 +101,9 @@ class Episode:
             SceneError: the simulator has no such scene.
             SimulatorError: the simulator failed every time.
         """
+        self.usage = NOTHING
         played, faults = survived(self._simulator, lambda: self._played(plan), self._begin_anew)
-        return replace(played, faults=faults)
+        return replace(played, faults=(*faults, *played.faults), usage=self.usage)
 
     def pass_over(self, plan: Plan) -> None:
         """See whether a plan could have been come to at all: what nobody can do counts for nobody.
@@ -106,6 +112,7 @@ class Episode:
             ExpertRefusedError: as `play`.
             SimulatorError: as `play`.
         """
+        self.usage = NOTHING
         survived(self._simulator, lambda: self._entered().expert_actions(plan.index), self._begin_anew)
 
     def _begin_anew(self) -> None:
@@ -123,8 +130,12 @@ class Episode:
             if acts:
                 self._actor.saw(acts[-1][1])
             act = self._actor.act()
+            if act.reply is not None:
+                self.usage = Usage.total([self.usage, Usage.of([act.reply])])
             acts.append((act, environment.step(act.action)))
-        return Played(_record(self.begun, acts), _tokens([act for act, _ in acts]), time.perf_counter() - began)
+        replies = [act.reply for act, _ in acts if act.reply is not None]
+        faults = tuple(fault for reply in replies for fault in reply.faults)
+        return Played(_record(self.begun, acts), _tokens(replies), time.perf_counter() - began, faults)
 
     def _entered(self) -> PlanEnvironment:
         if self._environment is None:
@@ -162,8 +173,7 @@ def _step(act: Act, outcome: StepOutcome) -> StepRecord:
     )
 
 
-def _tokens(acts: Sequence[Act]) -> Tokens:
-    replies = [act.reply for act in acts if act.reply is not None]
+def _tokens(replies: Sequence[Reply]) -> Tokens:
     if not replies:
         return Tokens()
     written = [reply.n_reply_tokens for reply in replies]

@@ -15,7 +15,6 @@ from infthor_eval.agents.records import NOT_COME_TO, PlanRecord
 from infthor_eval.agents.task import PlansTask
 from infthor_eval.agents.trajectories import Course
 from infthor_eval.errors import InfthorError, SceneError, UsageError
-from infthor_eval.formats.digests import fingerprint
 from infthor_eval.formats.floor_plans import floor_plans_digest
 from infthor_eval.runs import (
     Group,
@@ -28,6 +27,7 @@ from infthor_eval.runs import (
     UnitRecord,
     Workload,
 )
+from infthor_eval.runs.identity import episode_fingerprint
 from infthor_eval.thor.simulators import Simulators
 from model_adapters import Subject
 
@@ -99,7 +99,10 @@ class PlansEvaluation:
         }
         return Workload(
             groups=[
-                Group([PlanUnit.of(task.name, course, plan) for plan in task.plans(course)])
+                Group(
+                    [PlanUnit.of(task.name, course, plan) for plan in task.plans(course)],
+                    frames=len(course.trajectory.plan.low_actions),
+                )
                 for task in self._tasks.values()
                 for course in task.limited
             ],
@@ -164,14 +167,12 @@ class PlansEvaluation:
         return found
 
     def _fingerprint(self, unit: PlanUnit) -> str:
-        return fingerprint(
-            {
-                "task": self._tasks[unit.key.task].identity() | {"trajectories": None, "broken": None},
-                "trajectory": unit.course.digest,
-                "plan": unit.plan.index,
-                "seed": self._seed,
-                **{name: value for name, value in self._identity.items() if name != "tasks"},
-            }
+        return episode_fingerprint(
+            self._identity,
+            unit.key.task,
+            trajectory=unit.course.digest,
+            plan=unit.plan.index,
+            seed=self._seed,
         )
 
 
@@ -186,7 +187,12 @@ def _recorded(unit: PlanUnit, inputs: str, stage: Episode, over: bool) -> UnitRe
         return unit.excluded(str(error), inputs)
     except InfthorError as error:
         begun = stage.begun if stage.begun is not None and stage.begun.index == unit.plan.index else unit.payload
-        return replace(unit, payload=begun).failed(str(error), inputs)
+        return replace(unit, payload=begun).failed(str(error), inputs, usage=stage.usage)
     return unit.record(
-        inputs, played.record, faults=played.faults, seconds=round(played.seconds, 4), tokens=played.tokens
+        inputs,
+        played.record,
+        faults=played.faults,
+        seconds=round(played.seconds, 4),
+        tokens=played.tokens,
+        usage=played.usage,
     )

@@ -32,6 +32,8 @@ def evaluate(requests: Sequence[tuple[RunRequest, Suite]]) -> int:
         for table in same[0].run.suite.tables([outcome.summary for outcome in same]):
             print_table(table, console)
     for outcome in outcomes:
+        if outcome.usage.requests:
+            console.print(f"{outcome.summary.header.name}: {outcome.usage.description}")
         console.print(f"{outcome.summary.header.name}: {outcome.folder}")
     n_failed = sum(map(_say_what_failed, outcomes))  # every run says what failed
     n_void = sum(map(_say_if_void, outcomes))

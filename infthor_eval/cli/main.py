@@ -22,6 +22,7 @@ __all__ = ["main"]
 # Name, and the one line that the overview shows; the module infthor_eval.cli.<name, with _ for -> has the command.
 _COMMANDS = {
     "run": "Evaluate a model on tasks (the default command).",
+    "plan": "Estimate what a run will take, before it begins.",
     "fetch": "Download the published data.",
     "validate": "Keep the questions of a set that one of several models answers.",
     "compare": "Compare two runs on the same data.",

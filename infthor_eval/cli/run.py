@@ -1,81 +1,21 @@
 """`infthor-eval run`: evaluate a model on tasks."""
 
-from pathlib import Path
 from typing import Any
 
 import click
 
-from infthor_eval.cli.options import LARGEST, SEED, model_options_in, names_in
-from infthor_eval.cli.staffing_options import staffing_options
-from infthor_eval.cli.suite_options import suite_options
-from infthor_eval.workers import Staffing
+from infthor_eval.cli.run_options import run_options
 
 __all__ = ["command"]
 
 
 @click.command("run")
-@click.option("--model", "models", required=True, help="Model name, or several with commas (see `ls models`).")
-@click.option("--tasks", required=True, help="Task or group names with commas (see `ls tasks`).")
-@click.option("--data", type=click.Path(path_type=Path), help="Folder of the data set to ask about.")
-@click.option("--model-args", default="", metavar="K=V,...", help="Options of the model (see `ls models`).")
-@click.option(
-    "--rope",
-    metavar="TYPE:FACTOR",
-    help="Extend the model's context: yarn:4, linear:2, dynamic:4, longrope:8.",
-)
-@click.option("--name", help="What the run is called in tables and folders; else by its checkpoint, or its model.")
-@click.option("--limit", type=click.IntRange(1, LARGEST), help="Ask only the first N questions of each task.")
-@click.option(
-    "--output",
-    type=click.Path(path_type=Path),
-    default=Path("results"),
-    show_default=True,
-    help="Results folder.",
-)
-@click.option("--seed", type=SEED, default=0, show_default=True, help="For whatever is random.")
-@click.option("--fresh", is_flag=True, help="Start anew; the journal of an earlier run is set aside.")
-@click.option("--recover", is_flag=True, help="Go on without the bad lines of a damaged journal.")
-@staffing_options
-@suite_options
-def command(
-    models: str,
-    tasks: str,
-    data: Path | None,
-    model_args: str,
-    rope: str | None,
-    name: str | None,
-    limit: int | None,
-    output: Path,
-    seed: int,
-    fresh: bool,
-    recover: bool,
-    staffing: Staffing,
-    **given: Any,
-) -> int:
+@run_options()
+def command(requests: Any) -> int:
     """Evaluate MODEL on TASKS and print the results beside the published ones.
 
     Stop it whenever you like: the same command goes on where it was.
     """
     from infthor_eval.cli.evaluate import evaluate
-    from infthor_eval.cli.requests import Asked, requests_for
 
-    options = model_options_in(model_args)
-    if rope is not None:
-        if "rope" in options:
-            raise click.UsageError("--rope and rope= in --model-args are the same option; give one of them")
-        options["rope"] = rope
-    asked = Asked(
-        tasks=names_in(tasks, "--tasks"),
-        data=data,
-        limit=limit,
-        seed=seed,
-        output=output,
-        fresh=fresh,
-        recover=recover,
-        staffing=staffing,
-        suite_options=given,
-    )
-    named = names_in(models, "--model")
-    if name is not None and len(named) > 1:
-        raise click.UsageError(f"--name {name}: names one run, and {len(named)} models are asked")
-    return evaluate([request for model in named for request in requests_for(asked, model, options, name)])
+    return evaluate(requests)

@@ -8,16 +8,16 @@ from typing import Any
 
 import msgspec
 
-from infthor_eval.errors import DataError, UsageError, naming, unknown_name
+from infthor_eval.errors import DataError, UsageError, unknown_name
 from infthor_eval.manipulation.kinds import ErrandKind
 from infthor_eval.manipulation.records import RECORDS, ArmRecord
 from infthor_eval.runs import RunHeader, UnitRecord, read_run
+from infthor_eval.runs.about import About, about, shared_tasks
 from infthor_eval.runs.sharing import differing, shared_units, sharing_notes
 
-__all__ = ["About", "ArmRun", "SharedEpisodes", "TaskAbout", "arm_runs", "shared_episodes", "with_radii"]
+__all__ = ["ArmRun", "SharedEpisodes", "TaskAbout", "arm_runs", "shared_episodes", "with_radii"]
 
 _PLANNER = "planner-arm"  # `actors.PlannerArm.name`, which would bring the simulator with it
-_EMBEDDED = "embedded"  # as the option --simulator names it
 _REWARD, _RADIUS = "reward", "radius"  # settings that are looked at by themselves
 
 Record = UnitRecord[ArmRecord]
@@ -39,30 +39,6 @@ class TaskAbout(msgspec.Struct, frozen=True):
         return dict(found) if isinstance(found, dict) else {}
 
 
-class About(msgspec.Struct, frozen=True):
-    """What a run's identity says, as far as pictures need it.
-
-    Attributes:
-        model: the subject.
-        simulator: what it acted in.
-        tasks: by name.
-    """
-
-    model: dict[str, Any]
-    simulator: str
-    tasks: dict[str, TaskAbout]
-
-    @property
-    def is_planner(self) -> bool:
-        """Whether the subject knows where everything is."""
-        return self.model.get("baseline") == _PLANNER
-
-    @property
-    def is_embedded(self) -> bool:
-        """Whether its numbers are of the embedded simulator."""
-        return self.simulator == _EMBEDDED
-
-
 @dataclass(frozen=True)
 class ArmRun:
     """A run's journal, read.
@@ -78,15 +54,19 @@ class ArmRun:
     records: Sequence[Record]
 
     @cached_property
-    def about(self) -> About:
+    def about(self) -> About[TaskAbout]:
         """What its identity says.
 
         Raises:
             DataError: it is not that of a run of manipulation.
         """
-        problem = f"{self.label}: not the identity of a run of manipulation"
-        with naming(problem, "start it anew", of=msgspec.ValidationError):
-            return msgspec.convert(self.header.identity, About)
+        found: About[TaskAbout] = about(self.label, self.header, About[TaskAbout], "manipulation")
+        return found
+
+    @property
+    def is_planner(self) -> bool:
+        """Whether the subject knows where everything is."""
+        return self.about.is_baseline(_PLANNER)
 
 
 def arm_runs(folders: Sequence[Path], labels: Sequence[str]) -> list[ArmRun]:
@@ -154,10 +134,7 @@ def shared_episodes(runs: Sequence[ArmRun], tasks: str | None, *, one_radius: bo
 
 
 def _shared_tasks(runs: Sequence[ArmRun], tasks: str | None) -> dict[ErrandKind, str]:
-    shared = [name for name in runs[0].about.tasks if all(name in run.about.tasks for run in runs)]
-    if not shared:
-        other = next((run for run in runs if not run.about.tasks.keys() & runs[0].about.tasks.keys()), runs[-1])
-        raise UsageError(f"{runs[0].label} and {other.label} share no task; draw runs of the same tasks")
+    shared = shared_tasks(runs)
     wanted = shared if tasks is None else [name.strip() for name in tasks.split(",")]
     found: dict[ErrandKind, str] = {}
     for name in wanted:

@@ -42,7 +42,7 @@ def arm_curves(runs: Sequence[ArmRun], tasks: str | None = None) -> RewardCurves
     facets = _facets(list(shared.tasks))
     earned = [_functions(records, facets, _earned) for records in shared.records]
     grids = {name: grid_of([found[name] for found in earned]) for name in facets}
-    planners = [run for run in runs if run.about.is_planner]
+    planners = [run for run in runs if run.is_planner]
     bound = planners[0] if len(planners) == 1 else None
     drawn = [
         _run_curves(run, records, _curves(found, grids), is_bound=run is bound)

@@ -12,7 +12,6 @@ from typing import Any
 import msgspec
 
 from infthor_eval.errors import InfthorError, SceneError
-from infthor_eval.formats.digests import fingerprint
 from infthor_eval.formats.floor_plans import floor_plans_digest
 from infthor_eval.manipulation.actors import ArmActor, ArmBaseline, PolicyActor
 from infthor_eval.manipulation.episodes import ArmStage, described
@@ -31,6 +30,7 @@ from infthor_eval.runs import (
     UnitRecord,
     Workload,
 )
+from infthor_eval.runs.identity import episode_fingerprint
 from infthor_eval.thor.simulators import Simulators
 from infthor_eval.thor.survival import survived
 from model_adapters import Policy, Subject
@@ -94,7 +94,10 @@ class ManipulationEvaluation:
             "frames": self._options.frames,
         }
         return Workload(
-            groups=[Group(units) for units in self._by_trajectory().values()],
+            groups=[
+                Group(units, frames=len(units[0].course.trajectory.plan.low_actions))
+                for units in self._by_trajectory().values()
+            ],
             skipped=[
                 Skipped(UnitKey(task.name, place), reason)
                 for task in self._tasks.values()
@@ -187,14 +190,12 @@ class ManipulationEvaluation:
         return simulators(image=False), arms
 
     def _fingerprint(self, unit: ArmUnit) -> str:
-        return fingerprint(
-            {
-                "task": self._tasks[unit.key.task].identity() | {"trajectories": None, "broken": None},
-                "trajectory": unit.course.digest,
-                "action": unit.errand.index,
-                "seed": self._seed,
-                **{name: value for name, value in self._identity.items() if name != "tasks"},
-            }
+        return episode_fingerprint(
+            self._identity,
+            unit.key.task,
+            trajectory=unit.course.digest,
+            action=unit.errand.index,
+            seed=self._seed,
         )
 
 

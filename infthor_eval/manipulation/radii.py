@@ -100,7 +100,7 @@ def _line(label: str, kind: ErrandKind, radii: dict[float, tuple[ArmRun, list[Re
     return RadiusLine(
         label=label,
         kind=kind,
-        is_bound=all(run.about.is_planner for run in runs),
+        is_bound=all(run.is_planner for run in runs),
         is_embedded=any(run.about.is_embedded for run in runs),
         points=_points({radius: [(_success(r), r) for r in records] for radius, (_, records) in radii.items()}),
         n_failed=sum(record.failure is not None for _, records in radii.values() for record in records),

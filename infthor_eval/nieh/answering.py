@@ -19,7 +19,7 @@ from infthor_eval.nieh.notebook import Notebook
 from infthor_eval.nieh.notes import Notes
 from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.nieh.task import PreparedTask
-from infthor_eval.runs import Session, Tokens, Unit, UnitKey, UnitRecord
+from infthor_eval.runs import NOTHING, Session, Tokens, Unit, UnitKey, UnitRecord, Usage
 from model_adapters import Model, Reply, requesting
 
 __all__ = ["Answerer", "BaselineAnswerer", "ModelAnswerer", "NiehUnit", "answered"]
@@ -87,7 +87,7 @@ class _Asked:
             }
         )
 
-    def record(self, reply: Reply, seconds: float, faults: tuple[str, ...]) -> UnitRecord[NiehAnswer]:
+    def record(self, reply: Reply, seconds: float, faults: tuple[str, ...], usage: Usage) -> UnitRecord[NiehAnswer]:
         """The record of its reply; a failed one, with the reply, where the task's own metrics fail on it."""
         scores, failure = {}, None
         try:
@@ -101,6 +101,7 @@ class _Asked:
             faults=(*faults, *reply.faults),
             seconds=round(seconds, 4),
             tokens=Tokens(reply.n_context_tokens, reply.n_cached_tokens, reply.n_reply_tokens),
+            usage=usage,
         )
 
 
@@ -128,6 +129,10 @@ class Answerer(Protocol):
             DataError: a frame cannot be read; nothing is answered then.
             ModelError: the model cannot take one of the requests; nothing is answered then.
         """
+        ...
+
+    def usage(self, reply: Reply) -> Usage:
+        """What a reply took."""
         ...
 
 
@@ -160,6 +165,10 @@ class ModelAnswerer:
             self._conversation.rewind(self._after_context)
             return self._conversation.replies([[item.text] for item in asked], asked[0].prepared.decoding)
 
+    def usage(self, reply: Reply) -> Usage:
+        """See `Answerer`."""
+        return Usage.of([reply])
+
 
 class BaselineAnswerer:
     """Looks at no context and notes nothing."""
@@ -176,6 +185,10 @@ class BaselineAnswerer:
     def answer(self, asked: Sequence[_Asked]) -> list[Reply]:
         """See `Answerer`."""
         return [Reply(self._predict(item.unit.sample)) for item in asked]
+
+    def usage(self, reply: Reply) -> Usage:
+        """See `Answerer`: nothing was asked of anybody."""
+        return NOTHING
 
 
 def answered(
@@ -246,4 +259,4 @@ def _made(
         return
     seconds = (time.perf_counter() - began) / len(asked)
     for item, reply in zip(asked, replies, strict=True):
-        yield item.record(reply, seconds, faults)
+        yield item.record(reply, seconds, faults, answerer.usage(reply))

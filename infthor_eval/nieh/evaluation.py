@@ -162,7 +162,9 @@ def _groups(task: str, prepared: PreparedTask) -> Iterator[Group]:
     """The samples of one trajectory are a group: they share what is encoded of it."""
     ordered = sorted(prepared.found.samples, key=lambda sample: sample.question.traj_id)
     for _, samples in groupby(ordered, key=lambda sample: sample.question.traj_id):
-        yield Group([NiehUnit.of(task, sample) for sample in samples])
+        same = list(samples)
+        frames = len({frame for sample in same for frame in sample.frames})
+        yield Group([NiehUnit.of(task, sample) for sample in same], frames=frames)
 
 
 def _skipped(task: str, found: TaskSamples) -> Iterator[Skipped]:

@@ -5,7 +5,7 @@ import time
 from infthor_eval.formats.digests import fingerprint
 from infthor_eval.nieh.notes import Notes, Window
 from infthor_eval.nieh.records import NiehNote
-from infthor_eval.runs import Session
+from infthor_eval.runs import Session, Usage
 from model_adapters import Decoding, Model
 
 __all__ = ["Notebook"]
@@ -34,16 +34,16 @@ class Notebook:
         inputs = fingerprint({"frames": digests, "text": window.request[-1], "decoding": decoding.document()})
         note = self._session.memo(inputs)
         if note is None:
-            note = self._taken(notes, window, decoding)
-            self._session.keep(inputs, note)
+            note, usage = self._taken(notes, window, decoding)
+            self._session.keep(inputs, note, usage)
         return str(note.note)
 
-    def _taken(self, notes: Notes, window: Window, decoding: Decoding) -> NiehNote:
+    def _taken(self, notes: Notes, window: Window, decoding: Decoding) -> tuple[NiehNote, Usage]:
         began = time.perf_counter()
         self._conversation.rewind(self._start)
         self._conversation.append(*window.request)
         reply = self._conversation.reply(decoding)
-        return NiehNote(
+        note = NiehNote(
             note=reply.text,
             traj_id=notes.traj_id,
             steps=window.steps,
@@ -51,3 +51,4 @@ class Notebook:
             n_reply_tokens=reply.n_reply_tokens,
             seconds=round(time.perf_counter() - began, 4),
         )
+        return note, Usage.of([reply])

@@ -2,6 +2,7 @@
 
 from infthor_eval.runs.catalog import Catalog, TaskFile
 from infthor_eval.runs.driver import Observer, RunOutcome, Silent, execute
+from infthor_eval.runs.estimate import Estimate, TaskEstimate, estimate_run
 from infthor_eval.runs.journal import read_header, read_run
 from infthor_eval.runs.records import RecordTypes, RunHeader, Tokens, Unit, UnitKey, UnitRecord
 from infthor_eval.runs.request import PreparedRun, RunRequest, prepare
@@ -17,10 +18,13 @@ from infthor_eval.runs.suite import (
     TaskRequest,
     Workload,
 )
+from infthor_eval.runs.usage import NOTHING, Usage
 
 __all__ = [
+    "NOTHING",
     "Catalog",
     "Cost",
+    "Estimate",
     "Evaluation",
     "Group",
     "Observer",
@@ -35,13 +39,16 @@ __all__ = [
     "Silent",
     "Skipped",
     "Suite",
+    "TaskEstimate",
     "TaskFile",
     "TaskRequest",
     "Tokens",
     "Unit",
     "UnitKey",
     "UnitRecord",
+    "Usage",
     "Workload",
+    "estimate_run",
     "execute",
     "prepare",
     "read_header",

@@ -4,8 +4,8 @@ The driver loads nothing. A worker tells it who the run is and what there is to 
 records that earlier runs, or a worker that was lost, left of it.
 """
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Generator, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +24,10 @@ from infthor_eval.workers import Event, GivenUp, Lost, Made, Pool, Withdrawn
 
 __all__ = ["Crew"]
 
+_PARTING_S = 20.0
+_PATIENCE = 3  # losses in a row at a group before its units are tried one by one
+_PATIENCE_ALONE = 2  # and at one of these before it has failed
+
 
 @dataclass(frozen=True)
 class _Greeting:
@@ -34,16 +38,34 @@ class _Greeting:
 
 
 @dataclass(frozen=True)
-class _GroupOrder:
-    """One group to be done.
+class _Portion:
+    """A group, or one unit of it.
 
     Attributes:
-        number: of the group, in the order of the workload.
+        group: its number, in the order of the workload.
+        unit: its number in the group; None for all of them.
+    """
+
+    group: int
+    unit: int | None = None
+
+    def of(self, workload: Workload) -> Group:
+        """What is to be done."""
+        group = workload.groups[self.group]
+        return group if self.unit is None else replace(group, units=[group.units[self.unit]])
+
+
+@dataclass(frozen=True)
+class _GroupOrder:
+    """One group to be done, or a unit of it alone.
+
+    Attributes:
+        portion: which.
         folder: the run's.
         known: the latest records of its units.
     """
 
-    number: int
+    portion: "_Portion"
     folder: Path
     known: tuple[UnitRecord[Any], ...]
 
@@ -78,7 +100,7 @@ class _Evaluator:
 
     @property
     def greeting(self) -> _Greeting:
-        groups = [Group([_plain(unit) for unit in group.units]) for group in self._workload.groups]
+        groups = [replace(group, units=list(map(_plain, group.units)), context=None) for group in self._workload.groups]
         return _Greeting(self._header, replace(self._workload, groups=groups))
 
     def do(self, job: _GroupOrder | _ViewOrder) -> Iterator[Recorded | SampleView]:
@@ -88,8 +110,7 @@ class _Evaluator:
         session = self._session_in(job.folder)
         for record in job.known:
             session.journal.take(record)
-        group = self._workload.groups[job.number]
-        for record in group_records(self._run.evaluation, group, session):
+        for record in group_records(self._run.evaluation, job.portion.of(self._workload), session):
             yield session.recorded(record)
 
     def close(self) -> None:
@@ -98,9 +119,28 @@ class _Evaluator:
 
     def _session_in(self, folder: Path) -> JournalSession:
         if self._session is None:
-            journal = Journal(folder, self._header, self._run.suite.records, worker=self._number)
+            # A worker of a driver that was killed may still be ending.
+            types = self._run.suite.records
+            journal = Journal(folder, self._header, types, worker=self._number, patience_s=_PARTING_S)
             self._session = JournalSession(self._subject, journal)
         return self._session
+
+
+@dataclass(frozen=True)
+class _Sharing:
+    """What is the same for all portions of a run.
+
+    Attributes:
+        folder: the run's.
+        journal: the driver's shard.
+        should_stop: see `Staff.evaluate`.
+        done: the units whose records were given.
+    """
+
+    folder: Path
+    journal: Journal
+    should_stop: Callable[[], bool]
+    done: set[UnitKey] = field(default_factory=set)
 
 
 def _plain(unit: Unit[Any]) -> Unit[Any]:
@@ -123,6 +163,7 @@ class Crew:
         staffing = run.request.staffing
         self._first: _Greeting | None = None
         self._say = say
+        self._n_workers = staffing.workers
         self._pool = Pool(staffing.connect(_OpenEvaluator(run)), staffing.workers, self._accept)
 
     def begin(self) -> tuple[RunHeader, Workload]:
@@ -133,26 +174,49 @@ class Crew:
     def evaluate(self, folder: Path, journal: Journal, should_stop: Callable[[], bool]) -> Iterator[Recorded]:
         """See `Staff`."""
         assert self._first is not None  # begun
-        groups = self._first.workload.groups
-        done: set[UnitKey] = set()
+        work = self._first.workload
+        sharing = _Sharing(folder, journal, should_stop)
+        given_up = yield from self._shared([_Portion(n) for n in range(len(work.groups))], sharing, _PATIENCE)
+        # Some unit in them is to blame; the others are not to fail with it.
+        alone = [
+            _Portion(portion.group, number)
+            for portion in given_up
+            for number, unit in enumerate(portion.of(work).units)
+            if unit.key not in sharing.done
+        ]
+        for portion, reason in (yield from self._shared(alone, sharing, _PATIENCE_ALONE)).items():
+            (unit,) = portion.of(work).units
+            told = f"worker after worker was lost at it ({reason}); give it more memory, or leave it out"
+            yield journal.append(unit.failed(told)), False
+        for worker in range(1, self._n_workers + 1):
+            journal.reread(worker)  # memos, which are not told
+
+    def _shared(
+        self, portions: Sequence[_Portion], sharing: "_Sharing", patience: int
+    ) -> Generator[Recorded, None, dict[_Portion, str]]:
+        """Have portions done; gives the records, and in the end the portions that were given up, with the reason."""
+        assert self._first is not None
+        work, journal = self._first.workload, sharing.journal
+        given_up: dict[_Portion, str] = {}
 
         def order(number: int) -> _GroupOrder:
-            return _GroupOrder(number, folder, journal.known_of([unit.key for unit in groups[number].units]))
+            keys = [unit.key for unit in portions[number].of(work).units]
+            return _GroupOrder(portions[number], sharing.folder, journal.known_of(keys))
 
-        for event in self._pool.run(len(groups), order, should_stop):
+        for event in self._pool.run(len(portions), order, sharing.should_stop, patience):
             self._tell(event)
             if isinstance(event, Made):
                 record, resumed = event.result
                 if not resumed:
                     journal.take_from(event.worker, record)
-                if record.key not in done:
-                    done.add(record.key)
+                if record.key not in sharing.done:
+                    sharing.done.add(record.key)
                     yield record, resumed
-            elif isinstance(event, Lost):
+            elif isinstance(event, Lost | GivenUp):
                 journal.reread(event.worker)  # it may have written what it could not send any more
-            elif isinstance(event, GivenUp):
-                journal.reread(event.worker)
-                yield from self._given_up(groups[event.job], event.reason, journal, done)
+            if isinstance(event, GivenUp):
+                given_up[portions[event.job]] = event.reason
+        return given_up
 
     def view(self, records: Sequence[UnitRecord[Any]]) -> View:
         """See `Staff`."""
@@ -180,11 +244,3 @@ class Crew:
             self._say(f"{event.reason}; what it had not finished goes to another")
         elif isinstance(event, Withdrawn):
             self._say(f"worker {event.worker} cannot be started, the others go on: {event.reason}")
-
-    def _given_up(self, group: Group, reason: str, journal: Journal, done: set[UnitKey]) -> Iterator[Recorded]:
-        for unit in group.units:
-            if unit.key not in done and journal.result_of(unit.key) is None:
-                failed = unit.failed(
-                    f"worker after worker was lost at it ({reason}); give it more memory, or leave it out"
-                )
-                yield journal.append(failed), False

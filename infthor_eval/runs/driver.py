@@ -16,6 +16,7 @@ from infthor_eval.runs.records import RunHeader, UnitRecord
 from infthor_eval.runs.request import PreparedRun
 from infthor_eval.runs.staff import Alone, View
 from infthor_eval.runs.suite import RunSummary, Workload
+from infthor_eval.runs.usage import Usage
 
 __all__ = ["Observer", "RunOutcome", "Silent", "execute"]
 
@@ -61,6 +62,7 @@ class RunOutcome:
         summary: who it was, and what it found.
         records: of every unit that was come to.
         n_missing: how many units were not come to, as the run was stopped.
+        usage: what all its requests took, those for memos with them.
         view: how other readers see its records.
     """
 
@@ -69,6 +71,7 @@ class RunOutcome:
     summary: RunSummary
     records: list[UnitRecord[Any]]
     n_missing: int
+    usage: Usage
     view: View
 
 
@@ -117,8 +120,9 @@ def _found(run: PreparedRun, folder: Path, header: RunHeader, workload: Workload
     journal.require_there()
     summary = RunSummary(header, run.suite.summarise(header, records))
     n_missing = workload.n_units - len(records)
-    _write_results(folder, summary, n_missing)
-    return RunOutcome(folder, run, summary, records, n_missing, run.evaluation.view)
+    usage = Usage.total([record.usage for record in records] + [memo.usage for memo in journal.memos])
+    _write_results(folder, summary, n_missing, usage)
+    return RunOutcome(folder, run, summary, records, n_missing, usage, run.evaluation.view)
 
 
 def _open_anew(run: PreparedRun, folder: Path, header: RunHeader) -> int:
@@ -134,7 +138,7 @@ def _asked(workload: Workload, journal: Journal) -> list[UnitRecord[Any]]:
     return [record for record in journal.records if record.key in asked]
 
 
-def _write_results(folder: Path, found: RunSummary, n_missing: int) -> None:
+def _write_results(folder: Path, found: RunSummary, n_missing: int, usage: Usage) -> None:
     header = found.header
     document = {
         "suite": header.suite,
@@ -142,6 +146,8 @@ def _write_results(folder: Path, found: RunSummary, n_missing: int) -> None:
         "identity": header.identity,
         "n_missing": n_missing,
         "summary": found.summary,
+        # Not what was cached: that differs between a run and the same run resumed, or shared out.
+        "usage": {name: getattr(usage, name) for name in ("requests", "context", "reply", "cost")},
     }
     path = folder / _RESULTS
     with (

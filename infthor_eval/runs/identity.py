@@ -5,12 +5,15 @@ from collections.abc import Mapping
 from typing import Any
 
 import infthor_eval
+from infthor_eval.formats.digests import fingerprint
 from infthor_eval.runs.records import RunHeader
 from infthor_eval.runs.request import PreparedRun
 from infthor_eval.runs.suite import Workload
 from model_adapters import Subject, adapter_identity
 
-__all__ = ["header_of", "identity_of"]
+__all__ = ["episode_fingerprint", "header_of", "identity_of"]
+
+_OF_ALL_TRAJECTORIES = ("trajectories", "broken")
 
 
 def header_of(run: PreparedRun, subject: Subject, workload: Workload) -> RunHeader:
@@ -46,3 +49,16 @@ def identity_of(
     }
     # As it is read back from the journal: tuples are lists, keys are strings.
     return dict(json.loads(json.dumps(identity)))
+
+
+def episode_fingerprint(identity: Mapping[str, Any], task: str, **inputs: Any) -> str:
+    """Hash of all that a unit in a simulator depends on.
+
+    Args:
+        identity: of the workload; of its tasks only what holds for each trajectory counts.
+        task: the unit's.
+        inputs: the unit's own: its trajectory, its place there, the seed.
+    """
+    every = {name: value for name, value in identity.items() if name != "tasks"}
+    settings = {name: value for name, value in identity["tasks"][task].items() if name not in _OF_ALL_TRAJECTORIES}
+    return fingerprint({"task": settings, **every, **inputs})

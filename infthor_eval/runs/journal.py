@@ -9,6 +9,7 @@ again.
 import fcntl
 import itertools
 import os
+import time
 from collections.abc import Iterable
 from contextlib import ExitStack
 from dataclasses import dataclass, field
@@ -25,11 +26,13 @@ from infthor_eval.formats.digests import canonical_json
 from infthor_eval.formats.files import written_atomically
 from infthor_eval.formats.reading import read_bytes, require_file
 from infthor_eval.runs.records import FORMAT, MemoRecord, RecordTypes, RunHeader, UnitKey, UnitRecord
+from infthor_eval.runs.usage import NOTHING, Usage
 
 __all__ = ["FOLDER", "Journal", "RunLog", "read_header", "read_run", "recover", "set_aside"]
 
 FOLDER = "journal"  # of a run's folder
 _SHARD = "worker-{:d}.jsonl"
+_GLANCE_S = 0.1  # between two tries to lock
 _BAD_LINES = "bad_lines.txt"
 _OLD = "journal.jsonl"  # the one file of format 1, in the run's folder
 Decoder = msgspec.json.Decoder[Any]
@@ -73,7 +76,9 @@ def _rank(record: UnitRecord[Any]) -> tuple[int, bool]:
 class Journal:
     """Append-only record of one run; this process holds one shard of it."""
 
-    def __init__(self, run: Path, header: RunHeader, types: RecordTypes, worker: int = 0) -> None:
+    def __init__(
+        self, run: Path, header: RunHeader, types: RecordTypes, worker: int = 0, patience_s: float = 0.0
+    ) -> None:
         """Open this worker's shard, or begin it, and read all others.
 
         Args:
@@ -81,6 +86,7 @@ class Journal:
             header: who the run is.
             types: payloads of the suite.
             worker: number of the shard.
+            patience_s: for another process to let go of the shard.
 
         Raises:
             UsageError: another process is writing the shard, or it cannot be written.
@@ -98,7 +104,7 @@ class Journal:
         self._path = path
         self._writing = Lock()
         try:
-            _lock(self._file, path)
+            _lock(self._file, path, patience_s)
             self._decoder = types.decoder()
             self._log = _read_shards(run, self._decoder)
             self._begin(path, header)
@@ -178,9 +184,14 @@ class Journal:
         record = self._log.memos.get(fingerprint)
         return None if record is None else record.payload
 
-    def keep(self, fingerprint: str, payload: Any) -> None:
+    @property
+    def memos(self) -> list[MemoRecord[Any]]:
+        """All that was kept, of all shards, in the order of its inputs."""
+        return [self._log.memos[key] for key in sorted(self._log.memos)]
+
+    def keep(self, fingerprint: str, payload: Any, usage: Usage = NOTHING) -> None:
         """Keep a payload; it is on disk when this returns."""
-        record: MemoRecord[Any] = MemoRecord(fingerprint=fingerprint, payload=payload)
+        record: MemoRecord[Any] = MemoRecord(fingerprint=fingerprint, payload=payload, usage=usage)
         self._write(record)
         self._log.add(record)
 
@@ -218,11 +229,16 @@ class Journal:
             raise DataError(f"{self._path}: was deleted or replaced while the run wrote it; run the same command again")
 
 
-def _lock(file: BinaryIO | FileIO, path: Path) -> None:
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError as error:
-        raise UsageError(f"{path}: another run is writing it; wait for it or stop it") from error
+def _lock(file: BinaryIO | FileIO, path: Path, patience_s: float = 0.0) -> None:
+    end = time.monotonic() + patience_s
+    while True:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            return
+        except OSError as error:
+            if time.monotonic() >= end:
+                raise UsageError(f"{path}: another run is writing it; wait for it or stop it") from error
+        time.sleep(_GLANCE_S)
 
 
 def read_header(run: Path) -> RunHeader:

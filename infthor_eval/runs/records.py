@@ -9,6 +9,8 @@ from typing import Any, Generic, NamedTuple, TypeVar
 
 import msgspec
 
+from infthor_eval.runs.usage import NOTHING, Usage
+
 __all__ = ["FORMAT", "MemoRecord", "RecordTypes", "RunHeader", "Tokens", "Unit", "UnitKey", "UnitRecord"]
 
 FORMAT = 2
@@ -81,6 +83,7 @@ class UnitRecord(
         faults: what went wrong and was survived on the way, a line each.
         seconds: time that it took.
         tokens: tokens that it took.
+        usage: what all its requests took together.
     """
 
     task: str
@@ -95,6 +98,7 @@ class UnitRecord(
     faults: tuple[str, ...] = ()
     seconds: float = 0.0
     tokens: Tokens = Tokens()
+    usage: Usage = NOTHING
 
     @property
     def key(self) -> UnitKey:
@@ -102,16 +106,20 @@ class UnitRecord(
         return UnitKey(self.task, self.id, self.variant)
 
 
-class MemoRecord(msgspec.Struct, Generic[P], frozen=True, kw_only=True, tag_field="type", tag="memo"):
+class MemoRecord(
+    msgspec.Struct, Generic[P], frozen=True, kw_only=True, omit_defaults=True, tag_field="type", tag="memo"
+):
     """What a suite found on the way to its units and would not compute again when the run is resumed.
 
     Attributes:
         fingerprint: of all its inputs; it is found again by it.
         payload: the suite's own.
+        usage: what the requests behind it took.
     """
 
     fingerprint: str
     payload: P
+    usage: Usage = NOTHING
 
 
 @dataclass(frozen=True)

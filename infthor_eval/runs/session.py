@@ -6,6 +6,7 @@ import msgspec
 
 from infthor_eval.runs.journal import Journal
 from infthor_eval.runs.records import Unit, UnitRecord
+from infthor_eval.runs.usage import NOTHING, Usage
 from model_adapters import Subject
 
 __all__ = ["JournalSession"]
@@ -26,9 +27,9 @@ class JournalSession:
         """See `Session`."""
         return self.journal.memo(fingerprint)
 
-    def keep(self, fingerprint: str, payload: Any) -> None:
+    def keep(self, fingerprint: str, payload: Any, usage: Usage = NOTHING) -> None:
         """See `Session`."""
-        self.journal.keep(fingerprint, payload)
+        self.journal.keep(fingerprint, payload, usage)
 
     def recorded(self, record: UnitRecord[Any]) -> tuple[UnitRecord[Any], bool]:
         """A record that a suite gave, on disk; and whether it was there already."""

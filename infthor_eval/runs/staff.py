@@ -57,17 +57,18 @@ class Alone:
             ModelError: it cannot be loaded.
         """
         self._run = run
-        self._subject = subject_of(run)
+        self.evaluation = run.evaluation
+        self.subject = subject_of(run)
 
     def begin(self) -> tuple[RunHeader, Workload]:
         """See `Staff`."""
-        self._workload = self._run.evaluation.workload(self._subject)
-        return header_of(self._run, self._subject, self._workload), self._workload
+        self._workload = self.evaluation.workload(self.subject)
+        return header_of(self._run, self.subject, self._workload), self._workload
 
     def evaluate(self, folder: Path, journal: Journal, should_stop: Callable[[], bool]) -> Iterator[Recorded]:
         """See `Staff`."""
-        session = JournalSession(self._subject, journal)
-        evaluation, in_flight = self._run.evaluation, self._subject.capabilities.max_in_flight
+        session = JournalSession(self.subject, journal)
+        evaluation, in_flight = self.evaluation, self.subject.capabilities.max_in_flight
         for record in evaluated(
             self._workload.groups, lambda group: group_records(evaluation, group, session), in_flight
         ):
@@ -77,9 +78,9 @@ class Alone:
 
     def view(self, records: Sequence[UnitRecord[Any]]) -> View:
         """See `Staff`."""
-        return self._run.evaluation.view
+        return self.evaluation.view
 
     def close(self) -> None:
         """See `Staff`."""
-        self._run.evaluation.close()
-        self._subject.close()
+        self.evaluation.close()
+        self.subject.close()

@@ -13,6 +13,7 @@ import msgspec
 
 from infthor_eval.runs.catalog import TaskFile
 from infthor_eval.runs.records import RecordTypes, RunHeader, Unit, UnitKey, UnitRecord
+from infthor_eval.runs.usage import NOTHING, Usage
 from infthor_eval.tables import Table
 from model_adapters import Subject
 
@@ -59,10 +60,12 @@ class Group:
     Attributes:
         units: at least one.
         context: what the suite itself wants to know when it does them.
+        frames: that the units look at, each counted once; what they share grows with it.
     """
 
     units: Sequence[Unit[Any]]
     context: Any = None
+    frames: int = 1
 
 
 @dataclass(frozen=True)
@@ -124,8 +127,8 @@ class Session(Protocol):
         """The payload that was kept under these inputs, if one was."""
         ...
 
-    def keep(self, fingerprint: str, payload: Any) -> None:
-        """Keep a payload for when the run is resumed."""
+    def keep(self, fingerprint: str, payload: Any, usage: Usage = NOTHING) -> None:
+        """Keep a payload for when the run is resumed, with what its requests took; nothing if not given."""
         ...
 
 

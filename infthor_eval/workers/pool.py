@@ -13,7 +13,7 @@ from infthor_eval.workers.link import Connect, Link, WorkerLostError
 
 __all__ = ["Event", "GivenUp", "Lost", "Made", "Pool", "Withdrawn"]
 
-_PATIENCE = 3  # losses in a row, of one job or of one worker's openings, without a result between them
+_PATIENCE = 3  # losses in a row, of one job or of one worker's openings
 _PARTING_S = 10.0  # for a thread whose worker is gone
 _GLANCE_S = 0.2  # between two looks at whether to stop
 
@@ -116,6 +116,7 @@ class Pool:
         self._board = _Board()
         self._events: SimpleQueue[Event | _Ended | Exception] = SimpleQueue()
         self._ready: SimpleQueue[Any] = SimpleQueue()  # greetings, and in the end why there are none
+        self._patience = _PATIENCE
         self._losses: Counter[int] = Counter()  # by job, since it last got further
         self._furthest: Counter[int] = Counter()  # results, by job
         self._present = count
@@ -138,7 +139,11 @@ class Pool:
         return greeting
 
     def run(
-        self, jobs: int, order: Callable[[int], Any], should_stop: Callable[[], bool] = lambda: False
+        self,
+        jobs: int,
+        order: Callable[[int], Any],
+        should_stop: Callable[[], bool] = lambda: False,
+        patience: int = _PATIENCE,
     ) -> Iterator[Event]:
         """Have jobs done; what happens, as it happens. Each job that is not stopped ends, or is given up.
 
@@ -147,10 +152,12 @@ class Pool:
             order: what a worker is sent for a job, made when its turn comes.
             should_stop: is asked all the time; once it says so the jobs in hand are left off after their next
                 result, and no further one is begun.
+            patience: losses in a row of a job, without a further result between them, before it is given up.
 
         Raises:
             Exception: what a worker raised on a job, or why the last of them withdrew.
         """
+        self._patience = patience
         self._losses.clear()
         self._furthest.clear()
         for job in range(jobs):
@@ -241,7 +248,7 @@ class Pool:
                     self._events.put(Made(number, job, result))
             except WorkerLostError as error:
                 self._losses[job] += 1
-                given_up = self._losses[job] >= _PATIENCE
+                given_up = self._losses[job] >= self._patience
                 self._events.put((GivenUp if given_up else Lost)(number, job, str(error)))
                 return False
             self._events.put(_Ended(job))

@@ -20,7 +20,7 @@ from infthor_eval.errors import ModelError
 from model_adapters.hf.choices import Choices
 from model_adapters.protocols import Decoding
 
-__all__ = ["Generation", "Writing", "cut_at_stop", "extend", "read_generation", "write"]
+__all__ = ["Generation", "Writing", "extend", "read_generation", "write"]
 
 # Settings that change what is decoded and that this decoder does not have, with the values that switch them off.
 _UNSUPPORTED: dict[str, tuple[Any, ...]] = {
@@ -196,9 +196,3 @@ def extend(replies: Sequence[tuple[Writing, torch.Tensor]]) -> None:
     pairs = torch.stack((best.values, best.indices.float())).T.tolist()
     for (reply, _), row, (score, token) in zip(replies, scores, pairs, strict=True):
         reply.take(row, int(token), score)
-
-
-def cut_at_stop(text: str, stop: Sequence[str]) -> str | None:
-    """The text before the first stop string in it, or None where there is none."""
-    found = [text.index(string) for string in stop if string in text]
-    return text[: min(found)] if found else None

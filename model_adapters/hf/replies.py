@@ -3,9 +3,10 @@
 from collections.abc import Iterable
 
 from model_adapters.hf.choices import read_choices
-from model_adapters.hf.decoding import Writing, cut_at_stop
+from model_adapters.hf.decoding import Writing
 from model_adapters.hf.loaded import Loaded
 from model_adapters.protocols import Decoding, Reply
+from model_adapters.stopping import cut_at_stop
 
 __all__ = ["begin_reply", "end_reply"]
 

@@ -49,7 +49,7 @@ def test_the_results_file_says_what_the_summary_says(prepared):
     outcome = execute(prepared(name="mine"))
     document = json.loads((outcome.folder / "results.json").read_text())
     assert outcome.folder.parent.name == "mine"
-    assert document.keys() == {"suite", "name", "identity", "summary"}
+    assert document.keys() == {"suite", "name", "identity", "summary", "usage"}
     assert (document["suite"], document["name"]) == ("nieh", "mine")
     assert document["identity"] == outcome.summary.header.identity
     strict = document["summary"]["tasks"]["nieh_gt"]["by_clues"]["total"]["scores"]["strict"]
@@ -125,7 +125,7 @@ class Talk:
 def recorder(monkeypatch):
     """Takes the place of the tiny model."""
     model = Recorder()
-    monkeypatch.setattr("infthor_eval.runs.driver.load", lambda *_: model)
+    monkeypatch.setattr("infthor_eval.runs.subjects.load", lambda *_: model)
     return model
 
 

@@ -18,6 +18,7 @@ from infthor_eval.runs import execute, prepare, read_run
 from infthor_eval.runs.journal import Journal
 from infthor_eval.workers import Staffing
 
+from ..clusters import two_nodes
 from .toy import Adder, Sum, Sums, ToySuite
 from .toy_command import request
 
@@ -123,11 +124,11 @@ def test_workers_that_are_killed_lose_nothing_that_was_finished(tmp_path):
 def test_a_unit_that_kills_every_worker_fails_and_the_others_have_results(tmp_path):
     shared, _ = run(request(tmp_path, staffing=TWO), DeadlySuite(tmp_path, {"2+1": 99}))
     failed = {record.id: record.failure for record in shared.records if record.failure is not None}
-    assert sorted(failed) == ["2+1", "2+2", "2+3"]
+    assert sorted(failed) == ["2+1"]
     assert "worker after worker was lost at it (worker" in failed["2+1"]
     again, watching = run(request(tmp_path), DeadlySuite(tmp_path, {}))
     assert [record.failure for record in again.records] == [None] * 24
-    assert sum(not resumed for _, resumed in watching.seen) == 3
+    assert sum(not resumed for _, resumed in watching.seen) == 1
 
 
 @pytest.mark.timeout(120)
@@ -142,6 +143,33 @@ def test_a_run_that_is_stopped_has_the_results_of_what_is_there_and_goes_on(tmp_
     outcome, watching = run(request(tmp_path, staffing=staffing), suite)
     assert (outcome.n_missing, len(outcome.records)) == (0, 24)
     assert sum(resumed for _, resumed in watching.seen) == len(stopped.records)
+
+
+class _Losing(Watching):
+    """Takes a node away once some units are done."""
+
+    def __init__(self, cluster, node):
+        super().__init__()
+        self._cluster, self._node = cluster, node
+
+    def done(self, record, resumed):
+        super().done(record, resumed)
+        if len(self.seen) == 5:
+            self._cluster.remove_node(self._node)
+
+
+@pytest.mark.timeout(200)
+def test_a_cluster_that_loses_a_node_finds_what_one_process_finds(tmp_path):
+    suite = DeadlySuite(tmp_path, {"4+1": 1})
+    with two_nodes() as (cluster, node):
+        watching = _Losing(cluster, node)
+        asked = request(tmp_path / "2", staffing=Staffing(2, cluster.address))
+        shared = execute(prepare(asked, suite), watching)
+    alone, _ = run(request(tmp_path / "1"), suite)
+    assert plain(shared.records) == plain(alone.records)
+    assert (shared.folder / "results.json").read_bytes() == (alone.folder / "results.json").read_bytes()
+    assert len(watching.seen) == 24
+    assert len(watching.notes) >= 2  # of the node's worker, and of the one that a unit killed
 
 
 class OtherElsewhere(Adder):

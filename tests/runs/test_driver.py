@@ -1,5 +1,6 @@
 """The driver, by the smallest suite: whatever it can do, it can do for every suite."""
 
+import itertools
 import json
 import os
 import signal
@@ -123,6 +124,12 @@ def test_a_record_that_cannot_be_written_fails_alone(tmp_path):
 def test_what_is_no_fault_of_the_suite_ends_the_run_and_keeps_what_is_done(tmp_path, error):
     with pytest.raises(error):
         run(request(tmp_path), broken_by(error()))
+    # Who stops it has the results of what is there; a machine without memory is asked for nothing more.
+    (folder,) = (tmp_path / "adder").iterdir()
+    results = folder / "results.json"
+    assert (json.loads(results.read_text())["n_missing"] if results.exists() else None) == (
+        None if error is MemoryError else 2
+    )
     assert [resumed for _, _, resumed in run(request(tmp_path))[1].seen[:2]] == [True, True]
 
 
@@ -141,6 +148,16 @@ def test_what_is_known_is_not_done_again_and_what_failed_is_tried_again(tmp_path
     outcome, watching = run(request(tmp_path))
     assert [resumed for _, _, resumed in watching.seen] == [True, True, False, False]
     assert [record.attempt for record in outcome.records] == [1, 1, 2, 2]
+
+
+def test_a_clock_that_goes_back_changes_nothing(tmp_path, monkeypatch):
+    back = itertools.count(2_000_000_000, -3600)
+    monkeypatch.setattr(time, "time", lambda: float(next(back)))
+    monkeypatch.setattr(time, "time_ns", lambda: next(back) * 10**9)
+    first, again = run(request(tmp_path))[0], run(request(tmp_path))[0]
+    assert [record.attempt for record in again.records] == [1, 1, 2, 2]
+    assert first.records[:2] == again.records[:2]
+    assert all(record.seconds >= 0 for record in again.records)
 
 
 def test_fresh_starts_anew_and_keeps_the_earlier_journal_aside(tmp_path):

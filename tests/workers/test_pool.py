@@ -12,21 +12,14 @@ import pytest
 from infthor_eval.errors import DataError, InfthorError, ModelError, UsageError
 from infthor_eval.workers import GivenUp, Lost, Made, Pool, Staffing, Withdrawn, WorkerLostError, shared_out
 
+from ..clusters import two_nodes
 from .toys import Job, OpenCounter, broken
 
 
 @pytest.fixture(scope="module")
 def cluster():
-    ray = pytest.importorskip("ray", reason="Ray is an extra: pip install 'infthor-eval[ray]'")
-    from ray.cluster_utils import Cluster
-
-    node = {"num_cpus": 1, "object_store_memory": 100 * 2**20}
-    made = Cluster(initialize_head=True, head_node_args=node)
-    made.add_node(**node)
-    ray.init(address=made.address, log_to_driver=False, logging_level="error")
-    yield made
-    ray.shutdown()
-    made.shutdown()
+    with two_nodes() as (made, _):
+        yield made
 
 
 @pytest.fixture(params=["processes", "ray"])
@@ -192,3 +185,21 @@ def test_jobs_of_one_result_come_with_their_numbers_and_what_is_given_up_is_an_e
     assert len(told) == 2
     alone = dict(shared_out(OpenCounter(), jobs[:1], Staffing(1), told.append))
     assert alone == {0: (os.getpid(), 0)}
+
+
+@pytest.mark.timeout(120)
+def test_a_worker_for_which_there_is_no_room_yet_joins_when_its_node_comes():
+    with two_nodes() as (cluster, second):
+        cluster.remove_node(second)
+        shared = Pool(Staffing(2, cluster.address).connect(OpenCounter()), 2)
+        shared.open()
+        events = []
+        for event in shared.run(400, lambda _: Job(1, slow=0.1)):
+            events.append(event)
+            if len(events) == 5:
+                assert len({made.worker for made in events}) == 1
+                cluster.add_node(num_cpus=1, object_store_memory=100 * 2**20)
+            if len({made.worker for made in events}) == 2:
+                break
+        shared.close()
+    assert {event.worker for event in events} == {1, 2}

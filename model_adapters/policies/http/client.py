@@ -6,9 +6,9 @@ import time
 import urllib.error
 import urllib.request
 from typing import Any
-from urllib.parse import urlsplit
 
 from infthor_eval.errors import ModelError, in_one_line
+from model_adapters.addresses import server_address
 
 __all__ = ["JsonClient", "act_url"]
 
@@ -22,17 +22,9 @@ def act_url(url: str) -> str:
     """The address that actions are asked of: a server's own with `/act` behind it, if it is not there.
 
     Raises:
-        ValueError: it is none of http or https, or holds what must not stand in records: a password or a query.
+        ValueError: see `server_address`.
     """
-    try:
-        parts = urlsplit(url)
-        known = parts.scheme in ("http", "https") and bool(parts.hostname) and (parts.port is None or parts.port > 0)
-    except ValueError:  # its text would tell what may be a password
-        known = False
-    if not known:
-        raise ValueError("url is no address of a server; write http://HOST:PORT")
-    if parts.username is not None or parts.password is not None or parts.query or parts.fragment:
-        raise ValueError("url holds a password, a query or a fragment, which would stand in every record; leave it out")
+    parts = server_address("url", url)
     path = parts.path.rstrip("/")
     return f"{parts.scheme}://{parts.netloc}{path if path.endswith('/act') else f'{path}/act'}"
 

@@ -8,7 +8,8 @@ from transformers import GenerationConfig, TemperatureLogitsWarper, TopPLogitsWa
 from infthor_eval.errors import ModelError
 from model_adapters import Decoding
 from model_adapters.hf.choices import Choices
-from model_adapters.hf.decoding import Generation, Writing, cut_at_stop, read_generation, write
+from model_adapters.hf.decoding import Generation, Writing, read_generation, write
+from model_adapters.stopping import cut_at_stop
 
 from ..asking import up_to
 

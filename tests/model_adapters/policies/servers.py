@@ -1,4 +1,4 @@
-"""Servers of the `/act` convention for tests: scripted ones, and one that a policy of ours answers for."""
+"""Servers for tests: scripted ones, and one that a policy of ours answers for."""
 
 import base64
 import json
@@ -23,13 +23,13 @@ Answer = Callable[[dict[str, Any], BaseHTTPRequestHandler], Any]
 
 
 @contextmanager
-def serving(answer: Answer) -> Iterator[str]:
-    """The address of a server that answers POSTs to `/act`, for as long as it is needed."""
+def serving(answer: Answer, path: str = "/act") -> Iterator[str]:
+    """The address of a server that answers POSTs to a path, for as long as it is needed."""
 
     class Handler(BaseHTTPRequestHandler):
         def do_POST(self) -> None:
             body = self.rfile.read(int(self.headers["Content-Length"]))
-            if self.path != "/act":
+            if self.path != path:
                 self.send_error(404)
                 return
             content = answer(json.loads(body), self)

@@ -1,0 +1,119 @@
+"""The options of a run, for every command that takes them: from what was typed to its requests."""
+
+import functools
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from infthor_eval.cli.options import LARGEST, SEED, FiniteRange, model_options_in, names_in
+from infthor_eval.cli.staffing_options import staffing_options
+from infthor_eval.cli.suite_options import suite_options
+from infthor_eval.workers import Staffing
+
+if TYPE_CHECKING:
+    from infthor_eval.runs import RunRequest, Suite
+
+__all__ = ["run_options"]
+
+_OPTIONS = (
+    click.option("--model", "models", required=True, help="Model name, or several with commas (see `ls models`)."),
+    click.option("--tasks", required=True, help="Task or group names with commas (see `ls tasks`)."),
+    click.option("--data", type=click.Path(path_type=Path), help="Folder of the data set to ask about."),
+    click.option("--model-args", default="", metavar="K=V,...", help="Options of the model (see `ls models`)."),
+    click.option(
+        "--rope",
+        metavar="TYPE:FACTOR",
+        help="Extend the model's context: yarn:4, linear:2, dynamic:4, longrope:8.",
+    ),
+    click.option(
+        "--max-tokens-total",
+        type=click.IntRange(1, LARGEST),
+        metavar="N",
+        help="Ask a served model nothing more once a run has taken so many tokens.",
+    ),
+    click.option(
+        "--max-cost",
+        type=FiniteRange(min=0, min_open=True),
+        metavar="USD",
+        help="Nor once it has cost so much, by the prices in --model-args.",
+    ),
+    click.option("--name", help="What the run is called in tables and folders; else by its checkpoint, or its model."),
+    click.option("--limit", type=click.IntRange(1, LARGEST), help="Ask only the first N questions of each task."),
+    click.option(
+        "--output",
+        type=click.Path(path_type=Path),
+        default=Path("results"),
+        show_default=True,
+        help="Results folder.",
+    ),
+    click.option("--seed", type=SEED, default=0, show_default=True, help="For whatever is random."),
+    click.option("--fresh", is_flag=True, help="Start anew; the journal of an earlier run is set aside."),
+    click.option("--recover", is_flag=True, help="Go on without the bad lines of a damaged journal."),
+)
+
+
+def run_options(*own: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Add all options of a run to a command, which is given what they ask for as `requests`.
+
+    Args:
+        own: names of the command's own parameters, which it is given as they are.
+    """
+
+    def with_options(command: Callable[..., Any]) -> Callable[..., Any]:
+        @functools.wraps(command)
+        def with_requests(**given: Any) -> Any:
+            kept = {name: given.pop(name) for name in own}
+            return command(requests=_requests(**given), **kept)
+
+        options = (*_OPTIONS, staffing_options, suite_options)
+        return functools.reduce(lambda wrapped, option: option(wrapped), reversed(options), with_requests)
+
+    return with_options
+
+
+def _requests(
+    models: str,
+    tasks: str,
+    model_args: str,
+    name: str | None,
+    data: Path | None,
+    limit: int | None,
+    seed: int,
+    output: Path,
+    fresh: bool,
+    recover: bool,
+    staffing: Staffing,
+    rope: str | None,
+    max_tokens_total: int | None,
+    max_cost: float | None,
+    **suites: Any,
+) -> "list[tuple[RunRequest, Suite]]":
+    from infthor_eval.cli.requests import Asked, requests_for
+
+    options = model_options_in(model_args)
+    for option, value in {"rope": rope, "max_tokens_total": max_tokens_total, "max_cost": max_cost}.items():
+        if value is not None:
+            if option in options:
+                typed = f"--{option.replace('_', '-')}"
+                raise click.UsageError(f"{typed} and {option}= in --model-args are the same option; give one of them")
+            options[option] = str(value)
+    capped = sorted({"max_tokens_total", "max_cost"} & options.keys())
+    if capped and not staffing.alone:
+        raise click.UsageError(f"{capped[0]} counts what one process asks for; leave out --workers, or the cap")
+    asked = Asked(
+        tasks=names_in(tasks, "--tasks"),
+        data=data,
+        limit=limit,
+        seed=seed,
+        output=output,
+        fresh=fresh,
+        recover=recover,
+        staffing=staffing,
+        suite_options=suites,
+    )
+    named = names_in(models, "--model")
+    if name is not None and len(named) > 1:
+        raise click.UsageError(f"--name {name}: names one run, and {len(named)} models are asked")
+    return [request for model in named for request in requests_for(asked, model, options, name)]

@@ -1,0 +1,34 @@
+"""The adapter `openai`: any model behind a server of OpenAI's chat completions."""
+
+from typing import TYPE_CHECKING, ClassVar
+from urllib.parse import urlsplit
+
+from infthor_eval.errors import ModelError, naming
+from model_adapters.openai.options import OpenAIOptions
+from model_adapters.openai.secret import read_key
+
+if TYPE_CHECKING:
+    from model_adapters.openai.model import ServedModel
+
+__all__ = ["OpenAI"]
+
+_NEEDS_KEY = "api.openai.com"
+
+
+class OpenAI:
+    """The adapter `openai`."""
+
+    Options: ClassVar[type] = OpenAIOptions
+
+    @classmethod
+    def build(cls, name: str, options: OpenAIOptions, seed: int) -> "ServedModel":  # noqa: ARG003
+        """Make the client; the server is asked when it is to reply.
+
+        Raises:
+            ModelError: the client library is not installed, or there is no key where one is needed.
+        """
+        mend = "pip install 'infthor-eval[openai]'"
+        with naming(f"{name} needs the package openai, 3 or newer", mend, of=ImportError, as_a=ModelError):
+            from model_adapters.openai.model import ServedModel
+        key = read_key(options.api_key_env, needed=urlsplit(options.url).hostname == _NEEDS_KEY)
+        return ServedModel(name, options, key)

@@ -1,0 +1,138 @@
+"""One request on the official client: no redirects, a limit in bytes, and an end in time whatever the server does."""
+
+import asyncio
+import logging
+from collections.abc import AsyncIterator, Mapping
+from concurrent.futures import CancelledError
+from threading import Thread
+from typing import Any
+from urllib.parse import urlsplit
+
+import httpx2
+import openai
+
+from model_adapters.addresses import is_here
+from model_adapters.openai.options import OpenAIOptions
+from model_adapters.openai.secret import Secret
+
+__all__ = ["UnreadableError", "Wire"]
+
+_LARGEST = 4 * 2**20  # bytes of a reply
+_CONNECT_S = 30.0  # at most, for a connection
+_TALKATIVE = ("httpcore2", "httpx2")  # they log heads of replies, in which a server may say the key again
+
+
+class UnreadableError(Exception):
+    """A reply that is not read to its end; the text says why."""
+
+
+class Wire:
+    """Sends requests to one server, from any number of threads.
+
+    They are sent from one thread of its own: there a request can be given up at any moment, while a name is looked up,
+    while the head of a reply drips in, or its body.
+
+    Args:
+        options: whom to ask, and for how long.
+        secret: the key.
+    """
+
+    def __init__(self, options: OpenAIOptions, secret: Secret) -> None:
+        self._timeout_s = options.timeout_s
+        self._closed = False
+        for name in _TALKATIVE:
+            logging.getLogger(name).setLevel(logging.WARNING)
+        self._loop = asyncio.new_event_loop()
+        self._thread = Thread(target=self._loop.run_forever, name="openai", daemon=True)
+        self._thread.start()
+        self._client = _client(options, secret)
+        self._headers: dict[str, Any] = {"Accept-Encoding": "identity"}
+        if secret.value is None:
+            self._headers["Authorization"] = openai.Omit()
+
+    def post(self, request: Mapping[str, Any]) -> bytes:
+        """What the server answers, as bytes.
+
+        Args:
+            request: the fields of a chat completion.
+
+        Raises:
+            openai.OpenAIError: no connection, or an error status.
+            TimeoutError: no whole reply in time.
+            UnreadableError: the reply is not read.
+        """
+        if self._closed:
+            raise UnreadableError("is not asked any more: the model is closed")
+        sent = asyncio.run_coroutine_threadsafe(self._post(request), self._loop)
+        try:
+            return sent.result()
+        except CancelledError as error:
+            raise UnreadableError("is not waited for any more: the model is closed") from error
+        except openai.APIConnectionError as error:
+            if isinstance(error.__cause__, UnreadableError):
+                raise error.__cause__ from error
+            raise
+        finally:
+            sent.cancel()  # where the one who waits was interrupted
+
+    async def _post(self, request: Mapping[str, Any]) -> bytes:
+        async with asyncio.timeout(self._timeout_s):
+            reply = await self._client.chat.completions.with_raw_response.create(**request, extra_headers=self._headers)
+            return bytes(reply.content)
+
+    def close(self) -> None:
+        """Give up what is in flight and close all connections."""
+        self._closed = True
+        asyncio.run_coroutine_threadsafe(self._end(), self._loop).result()
+        self._loop.call_soon_threadsafe(self._loop.stop)
+        self._thread.join()
+        self._loop.close()
+
+    async def _end(self) -> None:
+        in_flight = asyncio.all_tasks() - {asyncio.current_task()}
+        for task in in_flight:
+            task.cancel()
+        await asyncio.gather(*in_flight, return_exceptions=True)
+        await self._client.close()
+
+
+def _client(options: OpenAIOptions, secret: Secret) -> openai.AsyncOpenAI:
+    # A server on this machine is asked without the proxy of the environment, which may be another machine.
+    http = openai.DefaultAsyncHttpxClient(
+        timeout=httpx2.Timeout(None, connect=min(_CONNECT_S, options.timeout_s)),
+        limits=httpx2.Limits(max_connections=None, max_keepalive_connections=options.max_in_flight),
+        follow_redirects=False,
+        trust_env=not is_here(urlsplit(options.url)),
+        event_hooks={"response": [_limit]},
+    )
+    return openai.AsyncOpenAI(
+        base_url=options.url,
+        api_key=secret.value or "none",
+        max_retries=0,  # who asks sends again, and tells of it
+        timeout=httpx2.Timeout(None, connect=min(_CONNECT_S, options.timeout_s)),
+        http_client=http,
+    )
+
+
+async def _limit(response: httpx2.Response) -> None:
+    """Have a body end in an error where it is too long; packed ones, which can hide any length, are not unpacked."""
+    if response.headers.get("Content-Encoding", "identity").strip().lower() not in ("", "identity"):
+        raise UnreadableError("answers in an encoding that it was not asked for")
+    assert isinstance(response.stream, httpx2.AsyncByteStream)  # of an asynchronous client
+    response.stream = _Limited(response.stream)
+
+
+class _Limited(httpx2.AsyncByteStream):
+    def __init__(self, stream: httpx2.AsyncByteStream) -> None:
+        self._stream = stream
+
+    async def __aiter__(self) -> AsyncIterator[bytes]:
+        n_bytes = 0
+        async for piece in self._stream:
+            n_bytes += len(piece)
+            if n_bytes > _LARGEST:
+                raise UnreadableError(f"answers more than {_LARGEST} bytes")
+            yield piece
+
+    async def aclose(self) -> None:
+        await self._stream.aclose()

@@ -1,0 +1,36 @@
+"""Runs of real suites by several workers, from the command line: the bytes of one process's results."""
+
+import pytest
+
+from tests.agents.cut import FORK, MUG, cut, write
+
+
+def results(folder):
+    (path,) = folder.rglob("results.json")
+    return path.read_bytes()
+
+
+def exported(folder):
+    """What lm-eval's files have of each sample."""
+    return {path.name.rpartition("_")[0]: path.read_bytes() for path in folder.rglob("samples_*.jsonl")}
+
+
+@pytest.mark.timeout(300)
+@pytest.mark.parametrize(
+    ("model", "task"),
+    [("qwen2.5-vl-tiny", "nieh_gt"), ("planner", "infthor_plans"), ("planner-arm", "manipulathor_pickup")],
+)
+def test_two_workers_find_what_one_process_finds(run, make_nieh_set, tmp_path, model, task):
+    data = make_nieh_set(size=56) if task == "nieh_gt" else write(tmp_path / "data", cut(FORK, 3), cut(MUG, 4))
+    words = ("--model", model, "--tasks", task, "--data", data)
+    for workers in (1, 2):
+        code, shown, err = run(*words, "--output", tmp_path / str(workers), "--workers", workers)
+        assert code == 0, err
+        assert model in shown
+    one, two = tmp_path / "1", tmp_path / "2"
+    assert results(one) == results(two)
+    assert exported(one) == exported(two)
+    assert exported(one)
+    shards = [path for path in two.rglob("journal/worker-*.jsonl") if path.read_bytes().count(b"\n") > 1]
+    assert {path.name for path in shards} <= {"worker-1.jsonl", "worker-2.jsonl"}
+    assert shards

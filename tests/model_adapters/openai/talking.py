@@ -1,0 +1,88 @@
+"""A server of chat completions for tests: it says what follows from what it was shown, or what it is told to."""
+
+import base64
+import hashlib
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from http.server import BaseHTTPRequestHandler
+from io import BytesIO
+from typing import Any
+
+from PIL import Image
+
+from model_adapters import load
+
+from ..policies.servers import Answer, serving
+
+__all__ = ["chatting", "completion", "images_in", "kept", "opened", "says", "talkative"]
+
+PATH = "/v1/chat/completions"
+
+
+def completion(text: str | None = "yes", usage: Any = (10, 2), **choice: Any) -> dict[str, Any]:
+    """What a server answers: the text, and tokens read, written and (third, if there) cached."""
+    told = None
+    if usage is not None:
+        told = {"prompt_tokens": usage[0], "completion_tokens": usage[1], "total_tokens": usage[0] + usage[1]}
+        told |= {"prompt_tokens_details": {"cached_tokens": usage[2]}} if len(usage) > 2 else {}
+    message = {"role": "assistant", "content": text} | choice.pop("message", {})
+    return {
+        "id": "c",
+        "object": "chat.completion",
+        "created": 0,
+        "model": "m",
+        "choices": [{"index": 0, "message": message, "finish_reason": "stop"} | choice],
+        "usage": told,
+    }
+
+
+def talkative(request: dict[str, Any], _handler: BaseHTTPRequestHandler) -> dict[str, Any]:
+    """Words that follow from everything that a reply may depend on, as many as it may have."""
+    depends = {name: request.get(name) for name in ("messages", "temperature", "seed")}
+    drawn = hashlib.sha256(repr(depends).encode()).digest()
+    words = [("mug", "fridge", "table", "sink")[byte % 4] for byte in drawn][: request["max_tokens"]]
+    n_read = len(repr(request["messages"])) // 1000 + 1
+    return completion(" ".join(words), (n_read, len(words), n_read // 2))
+
+
+def says(text: str) -> Answer:
+    """Says the same whatever it is asked."""
+    return lambda *_: completion(text)
+
+
+@contextmanager
+def chatting(answer: Answer = talkative) -> Iterator[str]:
+    """The base_url of a server, for as long as it is needed."""
+    with serving(answer, PATH) as url:
+        yield f"{url}/v1"
+
+
+@contextmanager
+def opened(answer: Answer = talkative, **options: object) -> Iterator[Any]:
+    """A model behind such a server; nothing is left open."""
+    with chatting(answer) as url:
+        given = {name: str(value) for name, value in {"retries": 0, **options}.items()}
+        model: Any = load("openai", {"base_url": url, "model": "m", **given}, 0)
+        try:
+            yield model
+        finally:
+            model.close()
+
+
+def images_in(request: dict[str, Any]) -> list[Image.Image]:
+    """The frames in a request, decoded."""
+    parts = [
+        part for message in request["messages"] if isinstance(message["content"], list) for part in message["content"]
+    ]
+    urls = [part["image_url"]["url"] for part in parts if part["type"] == "image_url"]
+    return [Image.open(BytesIO(base64.b64decode(url.partition(",")[2]))) for url in urls]
+
+
+def kept(asked: list[dict[str, Any]], answer: Callable[..., Any] = talkative) -> Answer:
+    """Answers likewise, and keeps what was asked, with its head under "headers" (names in lower case)."""
+
+    def keep(request: dict[str, Any], handler: BaseHTTPRequestHandler) -> Any:
+        asked.append(request | {"headers": {name.lower(): value for name, value in handler.headers.items()}})
+        return answer(request, handler)
+
+    return keep

@@ -1,0 +1,82 @@
+"""Conversations as messages, and frames in them."""
+
+import base64
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from infthor_eval.errors import DataError, ModelError
+from infthor_eval.formats.frames import FrameRef
+from model_adapters import Turn
+from model_adapters.openai.messages import EncodedFrames, messages_of
+
+
+def _pixels(address: str) -> np.ndarray:
+    return np.asarray(Image.open(BytesIO(base64.b64decode(address.partition(",")[2]))).convert("RGB"))
+
+
+def test_texts_and_frames_keep_their_order(frames: list[FrameRef]) -> None:
+    encoded = EncodedFrames("png")
+    turns = (
+        Turn("system", ("Be brief.",)),
+        Turn("user", ("Look: ", frames[0], "and", frames[1])),
+        Turn("assistant", ("A mug.",)),
+        Turn("user", ("Where?",)),
+    )
+    first, second = (
+        {"type": "image_url", "image_url": {"url": encoded.address(frame), "detail": "low"}} for frame in frames[:2]
+    )
+    assert messages_of("m", turns, encoded, "low") == [
+        {"role": "system", "content": "Be brief."},
+        {
+            "role": "user",
+            "content": [{"type": "text", "text": "Look: "}, first, {"type": "text", "text": "and"}, second],
+        },
+        {"role": "assistant", "content": "A mug."},
+        {"role": "user", "content": "Where?"},
+    ]
+
+
+@pytest.mark.parametrize("role", ["system", "assistant"])
+def test_frames_are_the_users_alone(role, frames: list[FrameRef]) -> None:
+    with pytest.raises(ModelError, match=f"m is shown frames by the user alone, not by the {role}"):
+        messages_of("m", (Turn(role, (frames[0],)),), EncodedFrames("png"), None)
+
+
+def test_png_loses_nothing_and_jpeg_little_and_both_are_the_same_bytes_each_time(frames: list[FrameRef]) -> None:
+    seen = np.asarray(frames[0].load())
+    png, jpeg = EncodedFrames("png").address(frames[0]), EncodedFrames("jpeg").address(frames[0])
+    assert png.startswith("data:image/png;base64,")
+    assert jpeg.startswith("data:image/jpeg;base64,")
+    assert (_pixels(png) == seen).all()
+    assert 0 < np.abs(_pixels(jpeg).astype(int) - seen).mean() < 4
+    assert EncodedFrames("png").address(frames[0]) == png
+    assert EncodedFrames("jpeg").address(frames[0]) == jpeg
+
+
+def test_a_frame_is_encoded_once_by_its_content(tmp_path: Path, frames: list[FrameRef], monkeypatch) -> None:
+    twin = FrameRef(tmp_path / "twin.png")
+    twin.path.write_bytes(frames[0].path.read_bytes())
+    loaded, load = [], FrameRef.load
+    monkeypatch.setattr(FrameRef, "load", lambda frame: loaded.append(frame) or load(frame))
+    encoded = EncodedFrames("png")
+    assert len({encoded.address(frame) for frame in (frames[0], twin, FrameRef(frames[0].path))}) == 1
+    assert len(loaded) == 1
+
+
+def test_no_more_is_kept_than_there_is_room_for(frames: list[FrameRef], monkeypatch) -> None:
+    sizes = [len(EncodedFrames("png").address(frame)) for frame in frames[:3]]
+    encoded = EncodedFrames("png", room=sum(sizes) - 1)
+    loaded, load = [], FrameRef.load
+    monkeypatch.setattr(FrameRef, "load", lambda frame: loaded.append(frame) or load(frame))
+    for frame in (frames[0], frames[1], frames[0], frames[2], frames[0], frames[1]):
+        encoded.address(frame)
+    assert loaded == [frames[0], frames[1], frames[2], frames[1]]  # what was used longest ago made place
+
+
+def test_a_frame_that_cannot_be_read_is_a_fault_of_the_data(tmp_path: Path) -> None:
+    with pytest.raises(DataError):
+        EncodedFrames("png").address(FrameRef(tmp_path / "none.png"))

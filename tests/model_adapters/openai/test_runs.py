@@ -1,0 +1,252 @@
+"""Whole runs against a server, as their user types them."""
+
+import json
+import logging
+import signal
+import subprocess
+import sys
+import threading
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from infthor_eval.nieh.records import RECORDS
+from infthor_eval.runs import read_run
+
+from ..policies.servers import send
+from .talking import chatting, completion, kept, says, talkative
+
+KEY = "sk-0123456789abcdef0123456789"
+
+
+@pytest.fixture
+def ask(make_nieh_set: Any, tmp_path: Path, run: Any) -> Any:
+    """Runs `nieh_gt` on five questions."""
+    data = make_nieh_set(size=56)
+
+    def ask(url: str, *options: object, **model_args: object) -> tuple[int, str, str]:
+        given = {"base_url": url, "model": "m", "retries": 0, **model_args}
+        typed = ",".join(f"{name}={value}" for name, value in given.items())
+        arguments = ["--model", "openai", "--model-args", typed, "--tasks", "nieh_gt", "--data", data]
+        return run(*arguments, "--output", tmp_path / "out", *options)
+
+    return ask
+
+
+def _run(folder: Path) -> tuple[list[Any], dict[str, Any]]:
+    """The records of the one run in a folder, and its results."""
+    (results,) = folder.rglob("results.json")
+    return read_run(results.parent, RECORDS)[1], json.loads(results.read_text())
+
+
+def test_questions_are_answered_and_their_tokens_and_cost_are_in_the_results(ask: Any, tmp_path: Path) -> None:
+    prices = {"price_per_m_input": 2, "price_per_m_cached": 1, "price_per_m_output": 10}
+    with chatting(lambda *_: completion("yes", (1000, 10, 200))) as url:
+        code, out, err = ask(url, **prices)
+    assert code == 0, err
+    records, results = _run(tmp_path / "out")
+    assert (tmp_path / "out" / "m").is_dir()
+    each = (800 * 2 + 200 * 1 + 10 * 10) / 1e6
+    assert [record.payload.reply for record in records] == ["yes"] * 5
+    assert [record.usage.cost for record in records] == pytest.approx([each] * 5)
+    assert results["usage"] == {"requests": 5, "context": 5000, "reply": 50, "cost": pytest.approx(5 * each)}
+    assert f"m: 5 requests, 5,000 tokens read (1,000 of them cached), 50 written, {5 * each:.4f} US dollars" in out
+
+
+def test_a_run_that_reaches_its_cap_goes_on_with_a_higher_one(ask: Any, tmp_path: Path) -> None:
+    asked: list[Any] = []
+    with chatting(kept(asked, lambda *_: completion("yes", (95, 5)))) as url:
+        code, _, err = ask(url, "--max-tokens-total", 250)
+        assert code == 1
+        assert "2 sample(s) failed, counted as wrong: not asked: 300 tokens reach max_tokens_total=250; raise" in err
+        assert len(asked) == 3
+        code, _, err = ask(url, "--max-tokens-total", 10_000, max_in_flight=1, timeout_s=9)
+        assert code == 0, err
+        assert "2 answered now, 3 found in the journal" in err
+        assert len(asked) == 5
+    records, results = _run(tmp_path / "out")
+    assert [record.failure for record in records] == [None] * 5
+    assert results["usage"] == {"requests": 5, "context": 475, "reply": 25, "cost": None}
+
+
+def test_money_is_capped_likewise(ask: Any) -> None:
+    asked: list[Any] = []
+    with chatting(kept(asked, lambda *_: completion("yes", (1000, 0)))) as url:
+        code, _, err = ask(url, "--max-cost", 0.0015, price_per_m_input=1, price_per_m_output=1)
+    assert code == 1
+    assert len(asked) == 2
+    assert "not asked: 0.0020 US dollars reach max_cost=0.0015" in err
+
+
+@pytest.mark.parametrize(
+    ("options", "given", "said"),
+    [
+        (("--max-cost", 1), {}, "max_cost needs price_per_m_input and price_per_m_output; give both"),
+        (("--max-cost", 1), {"max_cost": 2}, "--max-cost and max_cost= in --model-args are the same option"),
+        (("--max-cost", 0), {}, "--max-cost"),
+        (("--max-tokens-total", 0), {}, "--max-tokens-total"),
+        ((), {"base_url": "http://10.1.2.3/v1"}, "base_url leads to 10.1.2.3 without encryption"),
+        ((), {"api_key_env": KEY}, "api_key_env is no name of an environment variable"),
+    ],
+)
+def test_misuse_is_one_line_before_anything_is_read(
+    options: tuple[object, ...], given: dict[str, object], said: str, ask: Any, tmp_path: Path
+) -> None:
+    code, out, err = ask("http://127.0.0.1:1/v1", *options, **given)
+    assert (code, out, len(err.splitlines())) == (2, "", 1)
+    assert said in err
+    assert KEY not in err
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_cap_is_not_for_models_that_cost_nothing(run: Any, make_nieh_set: Any, tmp_path: Path) -> None:
+    data = make_nieh_set(size=56)
+    arguments = ["--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out", "--max-cost", 1]
+    for model in ("qwen2.5-vl-tiny", "oracle"):
+        code, _, err = run("--model", model, *arguments)
+        assert code == 2
+        assert f"{model} has no option max_cost" in err
+
+
+def test_units_that_fail_are_named_and_the_others_answered(ask: Any, tmp_path: Path) -> None:
+    def answer(request: Any, handler: Any) -> Any:
+        text = request["messages"][0]["content"][-1]["text"]
+        return send(handler, 400, b"no fridge") if "fridge" in text else completion("yes")
+
+    with chatting(answer) as url:
+        code, _, err = ask(url)
+    assert code == 1
+    assert "Traceback" not in err
+    assert "1 sample(s) failed, counted as wrong: " in err
+    records, results = _run(tmp_path / "out")
+    (failed,) = [record for record in records if record.failure]
+    assert "answers 400 Bad Request: 'no fridge'" in failed.failure
+    assert results["usage"]["requests"] == 4
+
+
+def test_a_survived_fault_stands_in_the_record(ask: Any, tmp_path: Path) -> None:
+    n_asked = 0
+
+    def answer(request: Any, handler: Any) -> Any:
+        nonlocal n_asked
+        n_asked += 1
+        return send(handler, 503, b"busy") if n_asked == 1 else completion("yes")
+
+    with chatting(answer) as url:
+        assert ask(url, retries=1, max_in_flight=1)[0] == 0
+    faults = [fault for record in _run(tmp_path / "out")[0] for fault in record.faults]
+    assert len(faults) == 1
+    assert "answers 503 Service Unavailable: 'busy'" in faults[0]
+
+
+def _echoes(request: Any, handler: Any) -> Any:
+    """Says the key wherever it can: in a reply, in errors, in heads, as what a request failed for."""
+    key = handler.headers["Authorization"]
+    text = request["messages"][0]["content"][-1]["text"]
+    if "fridge" in text:
+        handler.send_response(401, f"no {key}")
+        handler.send_header("X-Key", key)
+        handler.end_headers()
+        handler.wfile.write(f'{{"error": {{"message": "Incorrect API key provided: {key}"}}}}'.encode())
+        return None
+    if "sink" in text:
+        return completion(None, finish_reason=key)
+    if "table" in text:
+        handler.wfile.write(f"{key}\r\n\r\n".encode())
+        handler.close_connection = True
+        return None
+    return completion(f"The key is {key}.")
+
+
+def test_the_key_is_in_no_file_and_in_nothing_that_is_said(
+    ask: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setenv("OPENAI_API_KEY", KEY)
+    heard: list[Any] = []
+    with caplog.at_level(logging.DEBUG), chatting(kept(heard, _echoes)) as url:
+        code, out, err = ask(url, retries=1)
+    assert code == 1
+    assert {request["headers"]["authorization"] for request in heard} == {f"Bearer {KEY}"}
+    assert "Traceback" not in err
+    files = [path for path in tmp_path.rglob("*") if path.is_file()]
+    assert {"worker-0.jsonl", "results.json"} <= {path.name for path in files}
+    written = b"".join(path.read_bytes() for path in files)
+    assert b"Bearer [key]" in written
+    for said in (written.decode("utf-8", "replace"), out, err, caplog.text):
+        assert KEY not in said
+        assert KEY[3:] not in said
+
+
+@pytest.mark.parametrize("in_flight", [1, 4])
+def test_an_interrupted_run_ends_at_once_in_one_line(make_nieh_set: Any, tmp_path: Path, in_flight: int) -> None:
+    asked, done = threading.Event(), threading.Event()
+
+    def answer(_request: Any, _handler: Any) -> None:
+        asked.set()
+        done.wait(60)
+
+    data = make_nieh_set(size=56)
+    with chatting(answer) as url:
+        given = f"base_url={url},model=m,max_in_flight={in_flight}"
+        arguments = ["--model", "openai", "--model-args", given, "--tasks", "nieh_full", "--data", data]
+        command = [sys.executable, "-c", "from infthor_eval.cli import main; main()", *map(str, arguments)]
+        stopped = subprocess.Popen(
+            [*command, "--output", tmp_path / "out"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
+        try:
+            assert asked.wait(60)
+            stopped.send_signal(signal.SIGINT)
+            out, err = stopped.communicate(timeout=30)
+        finally:
+            stopped.kill()
+            done.set()
+    assert (stopped.returncode, out) == (130, "")
+    assert err.splitlines()[-1] == "infthor-eval: stopped; the same command goes on where it was"
+    assert "Traceback" not in err
+    assert "never awaited" not in err
+    assert "pending" not in err
+
+
+def test_notes_are_paid_for_too(make_nieh_set: Any, tmp_path: Path, run: Any) -> None:
+    data = make_nieh_set(size=56)
+    with chatting(lambda *_: completion("a note", (100, 10))) as url:
+        given = f"base_url={url},model=m,price_per_m_input=1,price_per_m_output=10"
+        arguments = ["--model", "openai", "--model-args", given, "--tasks", "nieh_memory_notes", "--data", data]
+        code, out, err = run(*arguments, "--output", tmp_path / "out")
+    assert code == 0, err
+    _, results = _run(tmp_path / "out")
+    assert results["usage"] == {"requests": 7, "context": 700, "reply": 70, "cost": pytest.approx(7 * 200 / 1e6)}
+    assert "7 requests" in out
+
+
+def test_in_process_models_and_baselines_tell_what_they_read(make_nieh_set: Any, tmp_path: Path, run: Any) -> None:
+    arguments = ["--tasks", "nieh_gt", "--data", make_nieh_set(size=56), "--output", tmp_path / "out"]
+    assert "requests" not in run("--model", "oracle", *arguments)[1]
+    assert "qwen2.5-vl-tiny: 5 requests, " in (out := run("--model", "qwen2.5-vl-tiny", *arguments)[1])
+    assert "US dollars" not in out
+
+
+def test_several_trajectories_are_asked_about_at_once(make_nieh_set: Any, tmp_path: Path, run: Any) -> None:
+    both = threading.Barrier(2, timeout=10)
+    seen: set[int] = set()
+
+    def answer(request: Any, handler: Any) -> Any:
+        if len(seen) < 2:
+            seen.add(threading.get_ident())
+            both.wait()
+        return talkative(request, handler)
+
+    data = make_nieh_set(size=56)
+    with chatting(answer) as url:
+        given = f"base_url={url},model=m"
+        arguments = ["--model", "openai", "--model-args", given, "--tasks", "nieh_full", "--data", data]
+        code, _, err = run(*arguments, "--output", tmp_path / "out")
+    assert code == 0, err
+
+
+def test_a_server_that_says_nonsense_fails_every_unit_and_nothing_else(ask: Any) -> None:
+    with chatting(says("\x1b[2J\x00 not a word")) as url:
+        code, out, err = ask(url)
+    assert code == 0
+    assert "\x1b[2J" not in out + err

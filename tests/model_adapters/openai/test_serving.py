@@ -1,0 +1,150 @@
+"""The adapter against a server that nobody here wrote: transformers' own, with a tiny checkpoint on the CPU."""
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+import urllib.error
+import urllib.request
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pytest
+
+from infthor_eval.errors import ModelError
+from infthor_eval.formats.frames import FrameRef
+from infthor_eval.runs import UnitRecord, read_header, read_run
+from infthor_eval.suites import suite_named
+from model_adapters import check_adapter, load
+from tests.agents.cut import CANDLE, FORK, cut, write
+
+from ..asking import up_to
+from ..checkpoints import save
+
+for package in ("openai", "fastapi", "uvicorn", "multipart"):
+    pytest.importorskip(package, reason="what `transformers serve` needs is not installed (pip install -e '.[dev]')")
+
+SERVE = "from transformers.cli.transformers import main; main()"
+START_S = 120
+WITHOUT_STOP = {"send_stop": "false"}  # this server fails on stop strings for models with images
+
+
+class Served(NamedTuple):
+    """A checkpoint, and the server that it is behind."""
+
+    url: str
+    folder: Path
+
+    @property
+    def options(self) -> dict[str, str]:
+        return {"base_url": self.url, "model": str(self.folder)}
+
+
+@pytest.fixture(scope="module")
+def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+    root = tmp_path_factory.mktemp("served")
+    folder = root / "idefics3"
+    save("idefics3", folder)
+    settings = folder / "generation_config.json"  # without do_sample this server draws at no temperature
+    settings.write_text(json.dumps(json.loads(settings.read_text()) | {"do_sample": True}))
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    command = [sys.executable, "-c", SERVE, "serve", "--host", "127.0.0.1", "--port", str(port)]
+    environment = os.environ | {"HF_HUB_OFFLINE": "1", "HF_HOME": str(root / "home"), "OMP_NUM_THREADS": "1"}
+    with (root / "log").open("w") as log:
+        server = subprocess.Popen(
+            [*command, "--device", "cpu", "--dtype", "float32"], stdout=log, stderr=log, env=environment
+        )
+        try:
+            _wait_for(f"http://127.0.0.1:{port}/health", server, root / "log")
+            yield Served(f"http://127.0.0.1:{port}/v1", folder)
+        finally:
+            server.send_signal(signal.SIGKILL)
+            server.wait()
+
+
+def _wait_for(url: str, server: "subprocess.Popen[bytes]", log: Path) -> None:
+    end = time.monotonic() + START_S
+    while time.monotonic() < end and server.poll() is None:
+        try:
+            with urllib.request.urlopen(url, timeout=5):
+                return
+        except (urllib.error.URLError, ConnectionError):
+            time.sleep(0.2)
+    pytest.fail(f"transformers serve does not come up: {log.read_text()[-2000:]}")
+
+
+@pytest.fixture
+def both(served: Served, tmp_path: Path, run: Any) -> Callable[..., list[list[UnitRecord[Any]]]]:
+    """Runs the same tasks behind the server and in this process; gives the records of both."""
+
+    def both(*arguments: object, **more: str) -> list[list[UnitRecord[Any]]]:
+        here = {"pretrained": served.folder, "device": "cpu", "dtype": "float32", "max_tokens": 100_000}
+        found = []
+        for model, given in (("openai", served.options | more), ("hf-vlm", here)):
+            options = ",".join(f"{name}={value}" for name, value in given.items())
+            typed = ["--model", model, "--model-args", options, "--name", model, "--output", tmp_path / "out"]
+            code, _, err = run(*typed, *arguments)
+            assert code == 0, err
+            (results,) = (tmp_path / "out" / model).rglob("results.json")
+            found.append(read_run(results.parent, suite_named(read_header(results.parent).suite).records)[1])
+        return found
+
+    return both
+
+
+def test_it_keeps_the_contract(served: Served) -> None:
+    model: Any = load("openai", served.options | WITHOUT_STOP, 0)
+    check_adapter(model)
+    model.close()
+
+
+def test_questions_are_answered_as_in_this_process(both: Callable[..., list[list[UnitRecord[Any]]]]) -> None:
+    behind, here = both("--tasks", "nieh_mini", "--limit", 3)
+    assert len(behind) == 6
+    assert [record.payload for record in behind] == [record.payload for record in here]
+    assert [record.tokens.context for record in behind] == [record.tokens.context for record in here]
+    assert any(record.payload.reply for record in behind)
+    assert not any(record.faults for record in behind)
+
+
+def test_plans_are_carried_out_as_in_this_process(
+    both: Callable[..., list[list[UnitRecord[Any]]]], tmp_path: Path
+) -> None:
+    data = write(tmp_path / "data", cut(FORK, 2), cut(CANDLE, 2))
+    behind, here = both("--tasks", "infthor_plans", "--data", data, "--greedy", **WITHOUT_STOP)
+    assert len(behind) == 4
+    assert [record.payload for record in behind] == [record.payload for record in here]
+    assert {record.usage.requests for record in behind} == {len(record.payload.steps) for record in behind}
+
+
+def test_turns_and_systems_are_taken(served: Served, frames: list[FrameRef]) -> None:
+    models: list[Any] = [
+        load("openai", served.options, 0),
+        load("hf-vlm", {"pretrained": str(served.folder), "device": "cpu", "dtype": "float32"}, 0),
+    ]
+    replies = []
+    for model in models:
+        talk = model.conversation()
+        talk.append("Be brief.", role="system")
+        talk.append("Look:", frames[0], "and", frames[1], "\nWhat is it?")
+        first = talk.reply(up_to(6))
+        talk.append(first.text, role="assistant")
+        talk.append("\nAnd this?", frames[2])
+        replies.append((first.text, first.n_context_tokens, talk.reply(up_to(6)).text))
+        model.close()
+    assert replies[0] == replies[1]
+
+
+def test_what_the_server_refuses_is_one_line(served: Served, tmp_path: Path) -> None:
+    model: Any = load("openai", served.options | {"model": str(tmp_path / "none"), "retries": "0"}, 0)
+    talk = model.conversation()
+    talk.append("What is it?")
+    with pytest.raises(ModelError, match=r"/v1 answers 500 Internal Server Error: .*; see its log"):
+        talk.reply(up_to(4))
+    model.close()

@@ -1,0 +1,127 @@
+"""Caps on tokens and money, and keeping to so many a minute."""
+
+import time
+from concurrent.futures import ThreadPoolExecutor
+from threading import Lock
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from infthor_eval.errors import ModelError
+from model_adapters.openai import rate
+from model_adapters.openai.rate import Pace
+from model_adapters.openai.spend import Caps, Prices, Spend
+
+
+def _took(spend: Spend, tokens: int | None, cost: float = 0.0) -> None:
+    with spend.request() as charge:
+        charge.sent, charge.tokens, charge.cost = True, tokens, cost
+
+
+def test_cached_tokens_cost_what_they_cost() -> None:
+    prices = Prices(read=2.0, cached=0.5, written=8.0)
+    assert prices.cost(1_000_000, 0, 0) == 2.0
+    assert prices.cost(1_000_000, 400_000, 100_000) == pytest.approx(0.6 * 2 + 0.4 * 0.5 + 0.1 * 8)
+
+
+@given(st.lists(st.integers(0, 50), min_size=1, max_size=30), st.integers(1, 200))
+def test_nothing_is_begun_once_the_cap_is_reached(takes: list[int], cap: int) -> None:
+    spend, taken = Spend("m", Caps(tokens=cap)), 0
+    for tokens in takes:
+        if taken >= cap:
+            with pytest.raises(ModelError, match=f"not asked: {taken} tokens reach max_tokens_total={cap}; raise it"):
+                _took(spend, tokens)
+        else:
+            _took(spend, tokens)
+            taken += tokens
+
+
+def test_money_is_capped_likewise() -> None:
+    spend = Spend("m", Caps(cost=1.0))
+    _took(spend, 10, 0.6)
+    _took(spend, 10, 0.6)
+    with pytest.raises(ModelError, match=r"not asked: 1\.2000 US dollars reach max_cost=1; raise it and run the same"):
+        _took(spend, 10, 0.6)
+
+
+def test_a_request_that_failed_without_a_reply_takes_nothing() -> None:
+    spend = Spend("m", Caps(tokens=5))
+    with pytest.raises(OSError), spend.request():
+        raise OSError
+    _took(spend, 5)
+    with pytest.raises(ModelError):
+        _took(spend, 1)
+
+
+def test_a_server_that_does_not_tell_is_asked_once_under_a_cap_and_for_ever_without() -> None:
+    capped, free = Spend("m", Caps(tokens=100)), Spend("m", Caps())
+    for spend in (capped, free):
+        _took(spend, None)
+    _took(free, None)
+    with pytest.raises(ModelError, match="m does not tell what its replies take, so no cap can be kept"):
+        _took(capped, None)
+
+
+def test_a_reply_that_does_not_tell_counts_as_the_dearest_before_it() -> None:
+    spend = Spend("m", Caps(tokens=100))
+    for tokens in (10, 40, None, None):
+        _took(spend, tokens)
+    with pytest.raises(ModelError, match="not asked: 130 tokens reach max_tokens_total=100"):
+        _took(spend, 1)
+
+
+def test_threads_pass_a_cap_by_one_request_at_most() -> None:
+    spend, taken, lock = Spend("m", Caps(tokens=100)), [], Lock()
+
+    def ask(_number: int) -> bool:
+        try:
+            with spend.request() as charge:
+                time.sleep(0.002)
+                charge.sent, charge.tokens = True, 15
+                with lock:
+                    taken.append(15)
+        except ModelError:
+            return False
+        return True
+
+    with ThreadPoolExecutor(8) as pool:
+        asked = list(pool.map(ask, range(40)))
+    assert sum(taken) == 105
+    assert asked.count(True) == 7
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    """A clock that waiting turns on; its one item is the time."""
+    now = [100.0]
+    monkeypatch.setattr(rate.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(rate.time, "sleep", lambda seconds: now.__setitem__(0, now[0] + seconds))
+    return now
+
+
+def test_a_pace_is_even(clock: list[float]) -> None:
+    pace, begun = Pace(30), []
+    for _ in range(4):
+        pace.wait()
+        begun.append(clock[0] - 100)
+    assert begun == [0, 2, 4, 6]
+
+
+def test_what_was_taken_is_made_up_for_and_what_was_given_back_is_not_waited_for(clock: list[float]) -> None:
+    pace = Pace(60)
+    pace.wait(10)
+    pace.take(20)  # it was 30
+    pace.wait(10)
+    assert clock[0] == 130
+    pace.take(-10)  # it was none
+    pace.wait(0)
+    assert clock[0] == 130
+
+
+def test_without_a_limit_nothing_is_waited_for(clock: list[float]) -> None:
+    pace = Pace(None)
+    for _ in range(5):
+        pace.wait(1e9)
+        pace.take(1e9)
+    assert clock[0] == 100
