@@ -17,7 +17,7 @@ demo: $(INSTALLED)
 	$(BIN)/infthor-eval --model oracle,blind,qwen2.5-vl-tiny --tasks nieh_mini --output results/demo
 
 test: $(INSTALLED) $(PEERS)
-	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadfile
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 3 --dist loadfile
 
 lint: $(INSTALLED)
 	$(BIN)/ruff check .
