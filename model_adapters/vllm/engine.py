@@ -2,10 +2,11 @@
 
 import gc
 import importlib
+import multiprocessing
 import os
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 from PIL import Image
@@ -49,7 +50,7 @@ class Sampling:
     """
 
     settings: Mapping[str, Any]
-    choices: Sequence[str] = field(default=())
+    choices: Sequence[str] = ()
 
 
 @dataclass(frozen=True)
@@ -79,6 +80,8 @@ def import_vllm(name: str) -> Any:
         ModelError: it is not installed, or does not import.
     """
     os.environ.setdefault("VLLM_LOGGING_STREAM", "ext://sys.stderr")  # tables go to standard output
+    if multiprocessing.current_process().daemon:  # a worker of --workers, which may start no process of its own
+        os.environ.setdefault("VLLM_ENABLE_V1_MULTIPROCESSING", "0")
     mend = "pip install 'infthor-eval[vllm]', on a machine that vLLM runs on"
     with naming(f"{name} needs the package vllm", mend, of=(ImportError, OSError, RuntimeError), as_a=ModelError):
         return importlib.import_module("vllm")
@@ -91,6 +94,10 @@ class Engine:
         name: the registry's name, for messages.
         arguments: of `vllm.LLM`.
 
+    Attributes:
+        version: vLLM's.
+        batch_invariant: whether vLLM was told to compute a request the same way whatever is run beside it.
+
     Raises:
         ModelError: vLLM is not there, or does not start.
     """
@@ -99,6 +106,7 @@ class Engine:
         self._name = name
         self._vllm = import_vllm(name)
         self.version = str(self._vllm.__version__)
+        self.batch_invariant = os.environ.get("VLLM_BATCH_INVARIANT", "0") not in ("", "0")
         less = "read above what it printed; for less memory, a smaller max_model_len or max_frames"
         with self._naming("does not start", less):
             self._llm = self._vllm.LLM(**arguments)

@@ -83,6 +83,7 @@ class VllmModel:
             "parallel": [options.tensor_parallel_size, options.pipeline_parallel_size, options.data_parallel_size],
             "enforce_eager": options.enforce_eager,
             "prefix_caching": options.prefix_caching,
+            "batch_invariant": self._engine.batch_invariant,
             "seed": options.seed,
             "generation": {
                 "repetition_penalty": loaded.generation.repetition_penalty,

@@ -51,6 +51,7 @@ class OpenVLAOnVllm:
             "quantization": options.quantization,
             "parallel": [options.tensor_parallel_size, options.pipeline_parallel_size, options.data_parallel_size],
             "enforce_eager": options.enforce_eager,
+            "batch_invariant": engine.batch_invariant,
             "unnorm_key": described.key,
         }
         return VllmPolicy(name, _Network(name, engine, described), described, options, identity)

@@ -20,7 +20,8 @@ from ..asking import require_same
 from ..checkpoints import FAMILIES, OTHERS
 
 NEW = 6
-POLICIES = {"openvla", "openvla-tiny", "spatialvla", "spatialvla-tiny", "vla-http"}  # nobody converses with these
+# Nobody converses with these.
+POLICIES = {"openvla", "openvla@vllm", "openvla-tiny", "spatialvla", "spatialvla-tiny", "vla-http"}
 IMAGES = {
     "qwen2.5-vl": "<|vision_start|><|image_pad|><|vision_end|>",
     "llava-onevision": "<image>",

@@ -1,11 +1,13 @@
 """A model on the double: the same words, the same counts as in transformers, and what its cache finds."""
 
 import json
+import os
 import shutil
 import sys
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -13,6 +15,7 @@ import pytest
 from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.formats.frames import FrameRef
 from model_adapters import Decoding, Part, Reply, check_adapter, load
+from model_adapters.vllm.engine import import_vllm
 
 from ..asking import up_to, user
 from .double import Double
@@ -70,6 +73,20 @@ def test_options_that_change_what_is_read_change_it_alike(
     assert _facts(ours.answer(turns, up_to(8))) == _facts(theirs.answer(turns, up_to(8)))
     assert ours.capabilities.max_tokens == theirs.capabilities.max_tokens
     assert ours.capabilities.max_tokens_before_extension == theirs.capabilities.max_tokens_before_extension
+
+
+@pytest.mark.parametrize("rope", ["linear:2", "yarn:2"])
+def test_a_model_of_one_axis_is_extended_alike(
+    rope: str, start: Start, in_process: Start, vllm: Double, frames: list[FrameRef]
+) -> None:
+    ours, theirs, turns = start("pixtral", rope=rope), in_process("pixtral", rope=rope), user(frames[0], "Where?" * 20)
+    assert vllm.started[0]["hf_overrides"]["text_config"]["rope_parameters"]["rope_type"] == rope.partition(":")[0]
+    extended = theirs.answer(turns, up_to(12))
+    assert (
+        _facts(ours.answer(turns, up_to(12)))
+        == _facts(extended)
+        != _facts(in_process("pixtral").answer(turns, up_to(12)))
+    )
 
 
 def test_a_checkpoint_with_a_penalty_is_written_with_it(
@@ -302,6 +319,19 @@ def test_identities_tell_engines_and_what_changes_a_number_apart(start: Start, i
     others = [start(**options).identity() for options in changed]
     assert all(one != other for at, one in enumerate([plain, *others]) for other in others[at:])
     assert start(gpu_memory_utilization=0.5, mm_processor_cache_gb=1).identity() == plain
+
+
+@pytest.mark.parametrize("daemon", [True, False])
+def test_in_a_worker_vllm_starts_no_processes_and_its_log_is_no_output(
+    daemon: bool, vllm: Double, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    names = ("VLLM_LOGGING_STREAM", "VLLM_ENABLE_V1_MULTIPROCESSING")
+    for name in names:
+        monkeypatch.setenv(name, "")  # so that what is set is taken back
+        monkeypatch.delenv(name)
+    monkeypatch.setattr("multiprocessing.current_process", lambda: SimpleNamespace(daemon=daemon))
+    import_vllm("x")
+    assert [os.environ.get(name) for name in names] == ["ext://sys.stderr", "0" if daemon else None]
 
 
 def test_the_double_takes_no_argument_that_vllm_does_not_take(vllm: Double) -> None:

@@ -7,10 +7,12 @@ from typing import Any
 
 import pytest
 
+from infthor_eval.agents.records import RECORDS as PLAN_RECORDS
 from infthor_eval.errors import UsageError
 from infthor_eval.nieh.records import RECORDS
 from infthor_eval.runs import read_run
 from model_adapters import on_engine
+from tests.agents.cut import MUG, cut, write
 
 from .double import Double
 
@@ -77,6 +79,26 @@ def test_the_order_of_the_requests_makes_the_hits(
     assert kept > 0.4
     assert lost < 0.1
     assert [len(call.prompts) for call in vllm.calls] == [1, 2, 1, 1, 3, 2]
+
+
+def test_plans_are_carried_out_alike(
+    checkpoints: dict[str, Path], vllm: Double, task_files: Path, tmp_path: Path, run: Any
+) -> None:
+    task = task_files / "plans" / "infthor_plans.yaml"
+    task.write_text("include: _plans.yaml\ntask: infthor_plans\ndataset_kwargs: {plans: all, max_steps: 3}\n")
+    data = write(tmp_path / "data", cut(MUG, 2))
+    played = []
+    for engine, more in (("vllm", ""), ("transformers", ",device=cpu")):
+        given = f"pretrained={checkpoints['qwen2.5-vl']},dtype=float32{more}"
+        arguments = ["--model", "qwen2.5-vl", "--model-args", given, "--tasks", "infthor_plans", "--data", data]
+        output = tmp_path / "out" / engine
+        code, _, err = run(*arguments, "--engine", engine, "--constrained", "--output", output)
+        assert code == 0, err
+        (results,) = output.rglob("results.json")
+        records = read_run(results.parent, PLAN_RECORDS)[1]
+        played.append((json.loads(results.read_text())["usage"], [record.payload for record in records]))
+    assert played[0] == played[1]
+    assert all(call.params.structured_outputs is not None for call in vllm.calls)
 
 
 def test_engines_that_do_not_run_a_model_are_refused_in_one_line(run: Any, tmp_path: Path) -> None:

@@ -1,0 +1,65 @@
+"""What a run leaves beside its journal: what it found, equal for equal runs, and what it took."""
+
+import json
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from infthor_eval.runs import Usage, execute, prepare
+from infthor_eval.runs.results import write_took
+from tests.runs.toy import ToySuite
+from tests.runs.toy_command import request
+
+COUNTS = st.integers(0, 10**9)
+
+
+@given(st.lists(st.tuples(COUNTS, COUNTS), max_size=5))
+def test_the_hit_rate_is_a_share_of_what_was_read(counts: list[tuple[int, int]]) -> None:
+    usage = Usage.total(Usage(1, max(pair), min(pair)) for pair in counts)
+    if usage.context == 0:
+        assert usage.hit_rate is None
+        return
+    assert usage.hit_rate == usage.cached / usage.context
+    assert 0 <= usage.hit_rate <= 1
+
+
+@pytest.mark.parametrize(
+    ("usage", "said"),
+    [
+        (Usage(2, 1000, 250, 10), "2 requests, 1,000 tokens read (250 of them cached, 25.0 %), 10 written"),
+        (Usage(2), "2 requests, 0 tokens read (0 of them cached), 0 written"),
+        (
+            Usage(2, 1000, 0, 10, 0.5),
+            "2 requests, 1,000 tokens read (0 of them cached, 0.0 %), 10 written, 0.5000 US dollars",
+        ),
+    ],
+)
+def test_usage_in_words(usage: Usage, said: str) -> None:
+    assert usage.description == said
+
+
+def test_what_was_taken_is_written_as_it_is(tmp_path: Any) -> None:
+    records: Any = [SimpleNamespace(seconds=seconds) for seconds in (0.25, 1.5)]
+    write_took(tmp_path, records, Usage(3, 300, 100, 7, 0.125))
+    assert json.loads((tmp_path / "took.json").read_text()) == {
+        "requests": 3,
+        "read": 300,
+        "cached": 100,
+        "hit_rate": 0.333333,
+        "written": 7,
+        "seconds": 1.75,
+        "cost": 0.125,
+    }
+
+
+def test_a_run_writes_both_and_results_have_nothing_that_differs(tmp_path: Any) -> None:
+    suite = ToySuite()
+    outcome = execute(prepare(request(tmp_path), suite))
+    results, took = ((outcome.folder / name).read_bytes() for name in ("results.json", "took.json"))
+    again = execute(prepare(request(tmp_path), suite))
+    assert (again.folder / "results.json").read_bytes() == results
+    assert json.loads(took)["requests"] == json.loads(results)["usage"]["requests"]
+    assert not {"seconds", "cached", "hit_rate"} & json.loads(results)["usage"].keys()
