@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 from pathlib import Path
 from typing import Any
 
@@ -181,7 +182,7 @@ def test_the_key_is_in_no_file_and_in_nothing_that_is_said(
 
 
 @pytest.mark.parametrize("in_flight", [1, 4])
-def test_an_interrupted_run_ends_at_once_in_one_line(make_nieh_set: Any, tmp_path: Path, in_flight: int) -> None:
+def test_a_run_that_is_interrupted_twice_ends_at_once_in_one_line(make_nieh_set: Any, tmp_path: Path, in_flight: int) -> None:
     asked, done = threading.Event(), threading.Event()
 
     def answer(_request: Any, _handler: Any) -> None:
@@ -198,6 +199,8 @@ def test_an_interrupted_run_ends_at_once_in_one_line(make_nieh_set: Any, tmp_pat
         )
         try:
             assert asked.wait(60)
+            stopped.send_signal(signal.SIGINT)  # to end after the unit in hand, for which it waits
+            time.sleep(0.5)
             stopped.send_signal(signal.SIGINT)
             out, err = stopped.communicate(timeout=30)
         finally:
