@@ -169,7 +169,9 @@ def test_a_thing_falls_into_a_bowl_whose_floor_is_a_little_below_that_of_the_sin
 
     floor = float(surfaces(basin)[0].center[1])
     bowl.place_bottom(np.array([(low + high)[0] / 2, floor, (low + high)[2] / 2]))
-    bowl.place_bottom(np.array([bowl.center[0], 2 * floor - float(surfaces(bowl)[0].center[1]) - 0.005, bowl.center[2]]))
+    bowl.place_bottom(
+        np.array([bowl.center[0], 2 * floor - float(surfaces(bowl)[0].center[1]) - 0.005, bowl.center[2]])
+    )
     world.set_pose(bowl, bowl.position, bowl.rotation)
     world.detach(bowl)
     world.attach(bowl, basin)
