@@ -32,7 +32,7 @@ def let_fall(world: World, item: SimObject, point: Array) -> None:
     low, high = world.scene_bounds()
     margin = item.box_size.max() / 2
     inside = np.clip(point, np.add(low, (margin, 0, margin)), np.subtract(high, (margin, 0, margin)))
-    ground = max(_grounds(world, item, inside), key=lambda g: g.height, default=_floor(world, inside))
+    ground = max(_grounds(world, item, inside), key=_upmost, default=_floor(world, inside))
     pose = item.duplicate(item.object_id)
     pose.place_bottom(np.array([inside[0], ground.height, inside[2]]))
     fall = float(item.bounds()[0][1] - pose.bounds()[0][1])
@@ -65,20 +65,30 @@ def _grounds(world: World, item: SimObject, point: Array) -> Iterator[_Ground]:
     aside = {item.object_id, *(o.object_id for o in world.descendants(item)), *world.carried()}
     for other in world.objects.values():
         gone = other.object_id in aside or other.object_type == "Floor" or world.hidden(other)
-        if gone or not (other.type.receptacle or other.type.pickupable) or _cut_out(other, basins):
+        if gone or not (other.type.receptacle or other.type.pickupable):
             continue
-        for ground in _on(world, item, other, point, bottom):
+        for ground in _on(world, item, other, point, bottom, topped=not _cut_out(other, basins)):
             if 0.0 < ground.height <= bottom + _SUNK:
                 yield ground
 
 
-def _on(world: World, item: SimObject, other: SimObject, point: Array, bottom: float) -> Iterator[_Ground]:
-    """Where on or in another thing an object may come to lie."""
+def _upmost(ground: _Ground) -> float:
+    """By what a ground is above others: its height, but a dish is above what it stands on, however it is drawn."""
+    dish = ground.owner is not None and ground.owner.type.pickupable
+    return ground.height + (_SUNK if dish else 0.0)
+
+
+def _on(
+    world: World, item: SimObject, other: SimObject, point: Array, bottom: float, *, topped: bool
+) -> Iterator[_Ground]:
+    """Where on or in another thing an object may come to lie; what is not `topped` has no surface but those within."""
+    if not topped and not other.type.encloses:
+        return
     closed = other.type.encloses and other.type.openable and other.state.openness == 0
     open_surfaces = surfaces(other) if other.type.receptacle and not closed else []
     reached = [s for s in open_surfaces if _under(s, point) and _fits(item, other, s) and _open_above(other, s, bottom)]
     yield from (_Ground(float(surface.center[1]), other) for surface in reached)
-    topped = other.type.encloses and not other.type.slides
+    topped = topped and other.type.encloses and not other.type.slides
     if not reached and (topped or other.type.pickupable) and _over(other, point):
         # It lies on top: of what is closed or full of shelves, or across a loose thing and so where that lies.
         parent = world.objects[other.parent] if other.type.pickupable and other.parent is not None else None

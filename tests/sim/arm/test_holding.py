@@ -141,6 +141,45 @@ def test_things_fall_into_open_drawers_and_onto_closed_ones_not():
     assert not bench.object(potato)["visible"]
 
 
+def test_things_fall_into_an_open_cupboard_below_a_sink_and_past_it_into_the_sink():
+    bench = arm_bench()
+    world = bench.sim.world
+    basin = world.objects[bench.first("SinkBasin")]
+    low, high = basin.bounds()
+    middle = (low + high) / 2
+    cupboard = next(
+        o for o in world.objects.values()
+        if o.object_type == "Cabinet" and (o.bounds()[0] < middle).all() and (o.bounds()[1] > middle).all()
+    )  # fmt: skip
+    bench.ok("OpenObject", objectId=cupboard.object_id, forceAction=True)
+    for thing in list(cupboard.contents):
+        bench.ok("RemoveFromScene", objectId=thing)
+    potato = loose(bench, "Potato")
+    within = np.array([middle[0], cupboard.center[1] - 0.1, middle[2]])
+    assert drop_over(bench, potato, within)["parentReceptacles"] == [cupboard.object_id]
+    assert drop_over(bench, potato, middle + up(0.5))["parentReceptacles"] == [basin.object_id]
+
+
+def test_a_thing_falls_into_a_bowl_whose_floor_is_a_little_below_that_of_the_sink_it_stands_in():
+    bench = arm_bench()
+    world = bench.sim.world
+    basin, bowl = world.objects[bench.first("SinkBasin")], world.objects[bench.first("Bowl")]
+    low, high = basin.bounds()
+    from infthor_eval.sim.receptacles import surfaces
+
+    floor = float(surfaces(basin)[0].center[1])
+    bowl.place_bottom(np.array([(low + high)[0] / 2, floor, (low + high)[2] / 2]))
+    bowl.place_bottom(
+        np.array([bowl.center[0], 2 * floor - float(surfaces(bowl)[0].center[1]) - 0.005, bowl.center[2]])
+    )
+    world.set_pose(bowl, bowl.position, bowl.rotation)
+    world.detach(bowl)
+    world.attach(bowl, basin)
+    assert surfaces(bowl)[0].center[1] < floor
+    fallen = drop_over(bench, bench.first("Spoon"), bowl.center + up(0.3))
+    assert bowl.object_id in fallen["parentReceptacles"]
+
+
 def test_a_thing_lands_on_another_and_on_the_floor():
     bench = arm_bench()
     potato, plate = loose(bench, "Potato"), loose(bench, "Plate")

@@ -1,0 +1,197 @@
+"""Where in or on a receptacle a thing can be put down, and whether it would come to lie there from where it is held."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from infthor_eval.manipulation.environment import ArmEnvironment
+from infthor_eval.manipulation.geometry import middle_of, point_of, size_of
+from infthor_eval.manipulation.linkage import Array, Parts
+from infthor_eval.thor.view import ThorObject, View
+
+__all__ = [
+    "ENTERED",
+    "Entry",
+    "Places",
+    "entry_of",
+    "firmness",
+    "is_entered",
+    "others_on",
+    "places_of",
+    "support",
+    "taken",
+]
+
+ENTERED = {"Fridge", "Microwave", "Cabinet", "Safe", "CoffeeMachine", "Shelf", "ShelvingUnit"}  # from the front
+_SPACING = 0.05  # metres between places where there is but one
+_LEVEL = 0.01  # metres: places of one board
+_BREADTH = 0.05  # metres from the foremost places to the opening
+_THIN = 0.05  # metres above its topmost places from which on a receptacle has a roof
+_SHRUNK = 0.9  # of what is held: its outermost corners may stick out
+_FIRM, _WHOLE = 1.1, 4.0  # of the distance of places; and how many are so near to what is well within
+_BESIDE = 0.5  # of a place where another thing would be touched
+_OVER = 0.75  # of the distance of places: what is so near to one is on the board
+
+
+@dataclass(frozen=True)
+class Places:
+    """Points at which things can stand in or on a receptacle.
+
+    Attributes:
+        points: metres (n, 3).
+        spacing: from one to the next, metres.
+        top: height of the receptacle's box.
+        entered: whether it is entered from the front, and so may have a roof.
+    """
+
+    points: Array
+    spacing: float
+    top: float
+    entered: bool = False
+
+    @property
+    def heights(self) -> list[float]:
+        """Heights of the boards, from the lowest on."""
+        return sorted(set(np.round(self.points[:, 1], 3).tolist()))
+
+    def level(self, height: float) -> Array:
+        """The places of one board (n, 3)."""
+        chosen: Array = self.points[np.abs(self.points[:, 1] - height) < _LEVEL]
+        return chosen
+
+    def is_roofed(self, height: float) -> bool:
+        """Whether the receptacle reaches over the places of one of its boards."""
+        return height < self.heights[-1] - _LEVEL or (self.entered and self.top > height + _THIN)
+
+    def ceiling(self, height: float) -> float:
+        """Height of what is over the places of a board: the next one, or the receptacle's top."""
+        above = [other for other in self.heights if other > height + _LEVEL]
+        return above[0] if above else self.top
+
+
+@dataclass(frozen=True)
+class Entry:
+    """An opening at the front of a receptacle.
+
+    Attributes:
+        axis: the way out of it is along: 0 for x, 2 for z.
+        sign: and in this direction of it.
+        position: coordinate of the opening on that axis, metres.
+    """
+
+    axis: int
+    sign: int
+    position: float
+
+    def out(self, metres: float) -> Array:
+        """A way out of the opening (3,)."""
+        way = np.zeros(3)
+        way[self.axis] = self.sign * metres
+        return way
+
+
+def places_of(environment: ArmEnvironment, item: ThorObject) -> Places | None:
+    """What the simulator says of a receptacle's places; None where it has none."""
+    found = environment.query("GetSpawnCoordinatesAboveReceptacle", objectId=item.object_id, anywhere=True)
+    if not found:
+        return None
+    points = np.array([(place["x"], place["y"], place["z"]) for place in found], dtype=float)
+    top = middle_of(item)[1] + size_of(item)[1] / 2
+    return Places(points, _spacing(points), top, is_entered(item))
+
+
+def _spacing(points: Array) -> float:
+    """Metres from a place to the next one of the same board."""
+    board = points[np.abs(points[:, 1] - points[0, 1]) < _LEVEL]
+    apart = np.linalg.norm(board[1:] - board[0], axis=1)
+    apart = apart[apart > _LEVEL]
+    return float(apart.min()) if len(apart) else _SPACING
+
+
+def is_entered(item: ThorObject) -> bool:
+    """Whether things are brought into a receptacle from its front."""
+    return item.object_type in ENTERED
+
+
+def entry_of(view: View, item: ThorObject, places: Places) -> Entry | None:
+    """The opening of what is entered from the front.
+
+    An open door widens its box on that side; what has no door is open towards the agent.
+    """
+    if not is_entered(item):
+        return None
+    low, high = places.points.min(axis=0), places.points.max(axis=0)
+    towards = middle_of(item) if item.openable else point_of(view.agent.position)
+    way = np.array(towards) - (low + high) / 2
+    axis = 0 if abs(way[0]) > abs(way[2]) else 2
+    sign = 1 if way[axis] > 0 else -1
+    return Entry(axis, sign, float((high if sign > 0 else low)[axis]) + sign * _BREADTH)
+
+
+def others_on(view: View, item: ThorObject, held: str) -> list[ThorObject]:
+    """What may stand in or on a receptacle, but for what is held: loose things, wherever, and what is fixed to it."""
+    around = {name for name, other in view.objects.items() if item.object_id in (other.receptacle_object_ids or ())}
+    apart = {held, item.object_id, *around, *(item.parent_receptacles or ())}
+    return [
+        other for name, other in view.objects.items()
+        if name not in apart and (other.pickupable or item.object_id in (other.parent_receptacles or ()))
+    ]  # fmt: skip
+
+
+def support(held: Parts, places: Places) -> Array:
+    """How much (n,) of what is held would be over a board of its own height or below: 0, where its middle is not, to 1.
+
+    Args:
+        held: the box of what is held in some poses (n, 1).
+        places: of the receptacle.
+    """
+    corners = held.axes[:, 0].transpose(0, 2, 1)[:, None] @ (_CORNERS * held.half)[..., None]
+    spots = (held.center + _SHRUNK * corners[..., 0])[:, :, [0, 2]]
+    bottom = held.center[:, 0, 1] - (np.abs(held.axes[:, 0, :, 1]) * held.half[:, 0]).sum(axis=1)
+    found = np.zeros(len(spots))
+    for height in places.heights:
+        above = bottom > height
+        if places.is_roofed(height):
+            above &= bottom < places.ceiling(height)
+        if above.any():
+            board = places.level(height)[:, [0, 2]]
+            apart = np.linalg.norm(spots[above][:, :, None] - board, axis=-1).min(axis=-1)
+            on = apart <= _OVER * places.spacing
+            found[above] = np.where(on[:, 0], on.mean(axis=1), found[above])
+    return found
+
+
+_CORNERS: Array = np.array([(0, 0, 0), *((x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1))], dtype=float)
+
+
+def taken(held: Parts, places: Places, others: Sequence[ThorObject]) -> Array:
+    """How much (n,) other things are where what is held would fall: 1 where its middle would fall on one, half at all.
+
+    Args:
+        held: the box of what is held in some poses (n, 1).
+        places: of the receptacle.
+        others: what may stand there.
+    """
+    if not others:
+        return np.zeros(len(held.center))
+    middles, halves = np.array([middle_of(o) for o in others]), np.array([size_of(o) for o in others]) / 2
+    extent = (np.abs(held.axes[:, 0]) * held.half[:, 0, :, None]).sum(axis=-2)
+    bottom, top = held.center[:, 0, 1] - extent[:, 1], held.center[:, 0, 1] + extent[:, 1]
+    grounds = np.array(places.heights)
+    ground = np.where(grounds <= bottom[:, None], grounds, -np.inf).max(axis=1)
+    level = ((middles - halves)[:, 1] <= top[:, None]) & ((middles + halves)[:, 1] > ground[:, None] + _LEVEL)
+    apart = (np.abs(held.center - middles) - halves)[:, :, [0, 2]]
+    over = level & (apart <= 0).all(axis=-1)
+    beside = level & (apart <= extent[:, None, [0, 2]]).all(axis=-1)
+    found: Array = np.maximum(over.any(axis=1) * 1.0, beside.any(axis=1) * _BESIDE)
+    return found
+
+
+def firmness(held: Parts, places: Places) -> Array:
+    """How far (n,) the middle of what is held is from the edge of all boards: 0 at it, to 1."""
+    middles = held.center[:, 0]
+    apart = np.abs(middles[:, None, [0, 2]] - places.points[None, :, [0, 2]])
+    around = (np.linalg.norm(apart, axis=-1) <= _FIRM * places.spacing).sum(axis=1) / len(places.heights)
+    firm: Array = np.minimum(around, _WHOLE) / _WHOLE
+    return firm
