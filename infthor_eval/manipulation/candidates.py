@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.random import Generator
 
+from infthor_eval.manipulation.geometry import Corners
 from infthor_eval.manipulation.linkage import Array, Linkage, Poses, heading
 from infthor_eval.manipulation.places import Entry, Places, firmness, support, taken
 from infthor_eval.manipulation.roadmap import Contact, Terrain
 from infthor_eval.manipulation.stand import Stand
-from infthor_eval.thor.view import ThorObject
 
 __all__ = ["Ends", "Goal", "ends_of", "passed"]
 
@@ -46,12 +46,12 @@ class Goal:
     Attributes:
         places: at which it can stand.
         entry: the opening that it is brought in through; None of what is open above.
-        others: things that may stand there.
+        others: boxes of what may stand there, or be over it.
     """
 
     places: Places
     entry: Entry | None
-    others: Sequence[ThorObject]
+    others: Sequence[Corners]
 
 
 @dataclass(frozen=True)

@@ -4,10 +4,10 @@ import math
 from enum import IntEnum
 
 from infthor_eval.manipulation.environment import ArmEnvironment
-from infthor_eval.manipulation.geometry import Point
+from infthor_eval.manipulation.geometry import Corners, Point, corners_of
 from infthor_eval.manipulation.linkage import Linkage, Parts
-from infthor_eval.manipulation.places import Entry, Places, entry_of, is_entered, places_of
-from infthor_eval.manipulation.solids import Corners, Solids, cavity, columns, corners_of, gaps, solids_of
+from infthor_eval.manipulation.places import Entry, Places, entry_of, is_entered, others_on, places_of
+from infthor_eval.manipulation.solids import Solids, cavity, columns, gaps, solids_of
 from infthor_eval.thor.view import ThorObject
 
 __all__ = ["Belief", "Surroundings"]
@@ -67,6 +67,11 @@ class Surroundings:
         if belief == Belief.MET:
             around = [(name, box) for name, box in self._around[Belief.WHOLE] if name in self._met]
         return solids_of([*self._receptacle(hinge), *around])
+
+    def others(self) -> list[Corners]:
+        """What may stand on the receptacle's places, or cover them: loose things, and what is fixed around it."""
+        loose = others_on(self._environment.view, self._item, self._environment.moment.object_id)
+        return [*map(corners_of, loose), *(box for _, box in self._around[Belief.FILLED])]
 
     def met(self, parts: Parts, error: str) -> bool:
         """The arm met something in a pose (1): count that against each side of the door where nothing is known there.
