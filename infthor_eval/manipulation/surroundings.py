@@ -3,6 +3,8 @@
 import math
 from enum import IntEnum
 
+import numpy as np
+
 from infthor_eval.manipulation.environment import ArmEnvironment
 from infthor_eval.manipulation.geometry import Corners, Point, corners_of
 from infthor_eval.manipulation.linkage import Linkage, Parts
@@ -14,6 +16,7 @@ __all__ = ["Belief", "Surroundings"]
 
 _REACHED = 1.5  # metres from the wrist within which things are looked at
 _GROUND = 3.0  # metres to each side that the floor is told of
+_SUNK = 0.02  # metres that places may be in a box which they are only beside
 _UNSEEN = 0.03  # metres from all that was known: what was met there is something else
 _ASIDE = 0.25  # of an opening's width: an origin so far from its middle is at the hinge
 _LEFT = {"Microwave"}  # doors that hang on the left; others do on the right, where their origin does not tell
@@ -114,8 +117,16 @@ class Surroundings:
             if _apart(wrist, box) > _REACHED:
                 continue
             is_whole = belief == Belief.WHOLE and not self._is_in(box)
-            found += [(name, part) for part in ([box] if is_whole else self._boxes_of(item))]
+            boxes = [box] if is_whole else self._boxes_of(item)
+            found += [(name, part) for part in boxes if not self._has_places_in(part)]
         return found
+
+    def _has_places_in(self, box: Corners) -> bool:
+        """Whether places of the receptacle are in a box, as those of a shelf are in a table's: it is not filled."""
+        if self.places is None:
+            return False
+        points = self.places.points
+        return bool(((points > np.array(box.low) + _SUNK) & (points < np.array(box.high) - _SUNK)).all(axis=1).any())
 
     def _is_in(self, box: Corners) -> bool:
         """Whether the arm is in a box, which is then not filled."""
