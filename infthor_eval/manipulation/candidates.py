@@ -8,17 +8,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.random import Generator
 
+from infthor_eval.manipulation.geometry import Corners
 from infthor_eval.manipulation.linkage import Array, Linkage, Poses, heading
 from infthor_eval.manipulation.places import Entry, Places, firmness, support, taken
 from infthor_eval.manipulation.roadmap import Contact, Terrain
 from infthor_eval.manipulation.stand import Stand
-from infthor_eval.thor.view import ThorObject
 
 __all__ = ["Ends", "Goal", "ends_of", "passed"]
 
 # Poses in which to let go: drawn, rated of those within reach, looked at of the best, and kept.
 _DRAWN, _RATED, _TESTED, _KEPT = 8000, 1000, 400, 24
-_ABOVE = (0.02, 0.06, 0.12)  # metres between a place, or a rim, and what is let go above it
+_ABOVE = (0.02, 0.02, 0.06, 0.12, 0.25, 0.4)  # metres between a place, or a rim, and what is let go above it
+_FEW, _BEYOND = 1.5, 0.4  # distances of places: so wide is where there are few, and so far may one go beyond them
 _RIM = 0.05  # metres that a rim is above the places within
 _INTO = 0.3  # share of poses that are below a rim, as on the seat of a sofa
 _YAWS = np.radians(np.arange(-150.0, 151.0, 30.0))  # ways that the hand looks, from straight ahead
@@ -46,12 +47,12 @@ class Goal:
     Attributes:
         places: at which it can stand.
         entry: the opening that it is brought in through; None of what is open above.
-        others: things that may stand there.
+        others: boxes of what may stand there, or be over it.
     """
 
     places: Places
     entry: Entry | None
-    others: Sequence[ThorObject]
+    others: Sequence[Corners]
 
 
 @dataclass(frozen=True)
@@ -91,8 +92,7 @@ def _beside_contacts(goal: Goal, middles: Array, contacts: Sequence[Contact]) ->
 def _drawn_above(goal: Goal, linkage: Linkage, stand: Stand, draw: Generator) -> tuple[Poses, Array]:
     """Poses (n) with what is held above places, and what they cost (n,) but for how it would lie."""
     points = _within_reach(goal.places.points, linkage)
-    spots = points[draw.integers(len(points), size=_DRAWN)]
-    spots[:, [0, 2]] += goal.places.spacing * draw.uniform(-1 / 2, 1 / 2, size=(_DRAWN, 2))
+    spots = _between(points[draw.integers(len(points), size=_DRAWN)], goal.places, draw)
     yaws, pitches = draw.choice(_YAWS, size=_DRAWN), draw.choice(_PITCHES, size=_DRAWN)
     yaws = np.where(draw.random(_DRAWN) < 1 / 2, yaws, draw.uniform(_YAWS[0], _YAWS[-1], size=_DRAWN))
     turns = heading(stand.heading + yaws, pitches)
@@ -105,6 +105,16 @@ def _drawn_above(goal: Goal, linkage: Linkage, stand: Stand, draw: Generator) ->
     bases = np.clip(wrists[:, 1] + draw.choice(_BASES, size=_DRAWN), stand.low, stand.high)
     wrists[:, 1] -= bases
     return Poses(wrists, bases, turns), costs
+
+
+def _between(spots: Array, places: Places, draw: Generator) -> Array:
+    """Places (n, 3) moved about by up to half their distance, not beyond the outermost unless there are few."""
+    spacing = places.spacing
+    low, high = places.points.min(axis=0), places.points.max(axis=0)
+    margin = np.where(high - low < _FEW * spacing, _BEYOND * spacing, 0.0)
+    moved = spots + spacing * draw.uniform(-1 / 2, 1 / 2, size=spots.shape) * (1.0, 0.0, 1.0)
+    clipped: Array = np.clip(moved, low - margin, high + margin)
+    return clipped
 
 
 def _grounds(goal: Goal, spots: Array, draw: Generator) -> tuple[Array, Array]:

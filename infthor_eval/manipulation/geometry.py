@@ -1,12 +1,20 @@
 """Points, and boxes of objects, in metres of the world."""
 
 import math
+from typing import NamedTuple
 
 from infthor_eval.thor.view import ThorObject, Vector
 
-__all__ = ["Point", "along", "away", "gap", "middle_of", "point_of", "size_of", "xyz"]
+__all__ = ["Corners", "Point", "along", "away", "corners_of", "gap", "middle_of", "point_of", "size_of", "xyz"]
 
 Point = tuple[float, float, float]
+
+
+class Corners(NamedTuple):
+    """A box by its corners with the lowest and the highest numbers, metres."""
+
+    low: Point
+    high: Point
 
 
 def point_of(vector: Vector) -> Point:
@@ -46,3 +54,10 @@ def gap(point: Point, item: ThorObject) -> float:
     """Metres from a point to the nearest point of an object's box."""
     apart = away(middle_of(item), point)
     return math.hypot(*(max(0.0, abs(d) - size / 2) for d, size in zip(apart, size_of(item), strict=True)))
+
+
+def corners_of(item: ThorObject) -> Corners:
+    """The box of an object."""
+    (x, y, z), (width, height, depth) = middle_of(item), size_of(item)
+    half = width / 2, height / 2, depth / 2
+    return Corners((x - half[0], y - half[1], z - half[2]), (x + half[0], y + half[1], z + half[2]))

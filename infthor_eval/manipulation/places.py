@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from infthor_eval.manipulation.environment import ArmEnvironment
-from infthor_eval.manipulation.geometry import middle_of, point_of, size_of
+from infthor_eval.manipulation.geometry import Corners, middle_of, point_of, size_of
 from infthor_eval.manipulation.linkage import Array, Parts
 from infthor_eval.thor.view import ThorObject, View
 
@@ -25,6 +25,7 @@ __all__ = [
 
 ENTERED = {"Fridge", "Microwave", "Cabinet", "Safe", "CoffeeMachine", "Shelf", "ShelvingUnit"}  # from the front
 _SPACING = 0.05  # metres between places where there is but one
+_SUNK = 0.05  # metres that a thing may be below the places that it stands on, as their boxes are drawn
 _LEVEL = 0.01  # metres: places of one board
 _BREADTH = 0.05  # metres from the foremost places to the opening
 _THIN = 0.05  # metres above its topmost places from which on a receptacle has a roof
@@ -130,13 +131,10 @@ def entry_of(view: View, item: ThorObject, places: Places) -> Entry | None:
 
 
 def others_on(view: View, item: ThorObject, held: str) -> list[ThorObject]:
-    """What may stand in or on a receptacle, but for what is held: loose things, wherever, and what is fixed to it."""
+    """Loose things that may stand in or on a receptacle, but for what is held and what the receptacle is in."""
     around = {name for name, other in view.objects.items() if item.object_id in (other.receptacle_object_ids or ())}
     apart = {held, item.object_id, *around, *(item.parent_receptacles or ())}
-    return [
-        other for name, other in view.objects.items()
-        if name not in apart and (other.pickupable or item.object_id in (other.parent_receptacles or ()))
-    ]  # fmt: skip
+    return [other for name, other in view.objects.items() if name not in apart and other.pickupable]
 
 
 def support(held: Parts, places: Places) -> Array:
@@ -165,23 +163,24 @@ def support(held: Parts, places: Places) -> Array:
 _CORNERS: Array = np.array([(0, 0, 0), *((x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1))], dtype=float)
 
 
-def taken(held: Parts, places: Places, others: Sequence[ThorObject]) -> Array:
+def taken(held: Parts, places: Places, others: Sequence[Corners]) -> Array:
     """How much (n,) other things are where what is held would fall: 1 where its middle would fall on one, half at all.
 
     Args:
         held: the box of what is held in some poses (n, 1).
         places: of the receptacle.
-        others: what may stand there.
+        others: boxes of what may stand there, or be over it; what begins below the places is not on them.
     """
     if not others:
         return np.zeros(len(held.center))
-    middles, halves = np.array([middle_of(o) for o in others]), np.array([size_of(o) for o in others]) / 2
+    low, high = np.array([box.low for box in others]), np.array([box.high for box in others])
     extent = (np.abs(held.axes[:, 0]) * held.half[:, 0, :, None]).sum(axis=-2)
-    bottom, top = held.center[:, 0, 1] - extent[:, 1], held.center[:, 0, 1] + extent[:, 1]
+    middle = held.center[:, 0]
+    bottom, top = middle[:, 1] - extent[:, 1], middle[:, 1] + extent[:, 1]
     grounds = np.array(places.heights)
-    ground = np.where(grounds <= bottom[:, None], grounds, -np.inf).max(axis=1)
-    level = ((middles - halves)[:, 1] <= top[:, None]) & ((middles + halves)[:, 1] > ground[:, None] + _LEVEL)
-    apart = (np.abs(held.center - middles) - halves)[:, :, [0, 2]]
+    ground = np.where(grounds <= bottom[:, None], grounds, -np.inf).max(axis=1)[:, None]
+    level = (low[:, 1] <= top[:, None]) & (high[:, 1] > ground + _LEVEL) & (low[:, 1] > ground - _SUNK)
+    apart = np.maximum(low - middle[:, None], middle[:, None] - high)[:, :, [0, 2]]
     over = level & (apart <= 0).all(axis=-1)
     beside = level & (apart <= extent[:, None, [0, 2]]).all(axis=-1)
     found: Array = np.maximum(over.any(axis=1) * 1.0, beside.any(axis=1) * _BESIDE)

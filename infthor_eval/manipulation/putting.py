@@ -9,7 +9,6 @@ from infthor_eval.manipulation.conversion import Call
 from infthor_eval.manipulation.environment import ArmEnvironment, arm_of
 from infthor_eval.manipulation.geometry import xyz
 from infthor_eval.manipulation.linkage import Linkage, angles_of
-from infthor_eval.manipulation.places import others_on
 from infthor_eval.manipulation.roadmap import Contact, Kind, Move, Roadmap, Terrain, first_of
 from infthor_eval.manipulation.stand import Stand
 from infthor_eval.manipulation.surroundings import Belief, Surroundings
@@ -105,12 +104,8 @@ class _Putting:
 
     def _goal(self) -> Goal | None:
         """None where the receptacle has no places."""
-        view, moment = self._environment.view, self._environment.moment
-        places = self._surroundings.places
-        if places is None:
-            return None
-        others = others_on(view, view.objects[str(moment.receptacle_id)], moment.object_id)
-        return Goal(places, self._surroundings.entry, others)
+        around = self._surroundings
+        return None if around.places is None else Goal(around.places, around.entry, around.others())
 
     def _measured(self) -> Linkage:
         view = self._environment.view

@@ -3,17 +3,16 @@
 import itertools
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from infthor_eval.manipulation.geometry import Point, middle_of, size_of
+from infthor_eval.manipulation.geometry import Corners, corners_of
 from infthor_eval.manipulation.linkage import Array, Parts
 from infthor_eval.manipulation.places import Entry, Places
 from infthor_eval.thor.view import ThorObject
 
-__all__ = ["Corners", "Solids", "cavity", "columns", "corners_of", "gaps", "solids_of"]
+__all__ = ["Solids", "cavity", "columns", "gaps", "solids_of"]
 
 _BOARD = 0.02  # metres: half of what walls and boards of furniture are thick
 _LEAF = 0.04  # metres that a door is thick, with what is on its inner side
@@ -23,13 +22,6 @@ _FAR = 0.05  # metres between boxes that are not looked at more closely
 _LATTICE = 1.05  # of places' distance: neighbours in a row
 _TURNED = 4.0  # a lattice has more rows, as their number's square by that of its points, if it is turned
 _THIN = 0.1  # metres: a board reaches from its places to the top of its box
-
-
-class Corners(NamedTuple):
-    """A box by its corners with the lowest and the highest numbers, metres."""
-
-    low: Point
-    high: Point
 
 
 @dataclass(frozen=True)
@@ -86,13 +78,6 @@ def _apart(parts: Parts, extent: Array, center: Array, half: Array) -> Array:
     reach = parts.half[:, :, None] + half @ np.abs(turned)
     found: Array = np.maximum(along_world, (np.abs(between @ turned) - reach).max(axis=-1))
     return found
-
-
-def corners_of(item: ThorObject) -> Corners:
-    """The box of an object."""
-    (x, y, z), (width, height, depth) = middle_of(item), size_of(item)
-    half = width / 2, height / 2, depth / 2
-    return Corners((x - half[0], y - half[1], z - half[2]), (x + half[0], y + half[1], z + half[2]))
 
 
 def columns(item: ThorObject, places: Places) -> list[Corners]:

@@ -3,17 +3,20 @@
 import math
 from enum import IntEnum
 
+import numpy as np
+
 from infthor_eval.manipulation.environment import ArmEnvironment
-from infthor_eval.manipulation.geometry import Point
+from infthor_eval.manipulation.geometry import Corners, Point, corners_of
 from infthor_eval.manipulation.linkage import Linkage, Parts
-from infthor_eval.manipulation.places import Entry, Places, entry_of, is_entered, places_of
-from infthor_eval.manipulation.solids import Corners, Solids, cavity, columns, corners_of, gaps, solids_of
+from infthor_eval.manipulation.places import Entry, Places, entry_of, is_entered, others_on, places_of
+from infthor_eval.manipulation.solids import Solids, cavity, columns, gaps, solids_of
 from infthor_eval.thor.view import ThorObject
 
 __all__ = ["Belief", "Surroundings"]
 
 _REACHED = 1.5  # metres from the wrist within which things are looked at
 _GROUND = 3.0  # metres to each side that the floor is told of
+_SUNK = 0.02  # metres that places may be in a box which they are only beside
 _UNSEEN = 0.03  # metres from all that was known: what was met there is something else
 _ASIDE = 0.25  # of an opening's width: an origin so far from its middle is at the hinge
 _LEFT = {"Microwave"}  # doors that hang on the left; others do on the right, where their origin does not tell
@@ -68,6 +71,11 @@ class Surroundings:
             around = [(name, box) for name, box in self._around[Belief.WHOLE] if name in self._met]
         return solids_of([*self._receptacle(hinge), *around])
 
+    def others(self) -> list[Corners]:
+        """What may stand on the receptacle's places, or cover them: loose things, and what is fixed around it."""
+        loose = others_on(self._environment.view, self._item, self._environment.moment.object_id)
+        return [*map(corners_of, loose), *(box for _, box in self._around[Belief.FILLED])]
+
     def met(self, parts: Parts, error: str) -> bool:
         """The arm met something in a pose (1): count that against each side of the door where nothing is known there.
 
@@ -109,8 +117,16 @@ class Surroundings:
             if _apart(wrist, box) > _REACHED:
                 continue
             is_whole = belief == Belief.WHOLE and not self._is_in(box)
-            found += [(name, part) for part in ([box] if is_whole else self._boxes_of(item))]
+            boxes = [box] if is_whole else self._boxes_of(item)
+            found += [(name, part) for part in boxes if not self._has_places_in(part)]
         return found
+
+    def _has_places_in(self, box: Corners) -> bool:
+        """Whether places of the receptacle are in a box, as those of a shelf are in a table's: it is not filled."""
+        if self.places is None:
+            return False
+        points = self.places.points
+        return bool(((points > np.array(box.low) + _SUNK) & (points < np.array(box.high) - _SUNK)).all(axis=1).any())
 
     def _is_in(self, box: Corners) -> bool:
         """Whether the arm is in a box, which is then not filled."""

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
+from infthor_eval.manipulation.geometry import Corners
 from infthor_eval.manipulation.linkage import Parts
 from infthor_eval.manipulation.places import Entry, Places
-from infthor_eval.manipulation.solids import Corners, cavity, columns, gaps, solids_of
+from infthor_eval.manipulation.solids import cavity, columns, gaps, solids_of
 
 from .test_places import board, lattice, thing
 
