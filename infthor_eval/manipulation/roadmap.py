@@ -84,7 +84,8 @@ class Terrain:
             linkage: the arm, as it is now.
             solids: what is in its way.
             contacts: where something was met.
-            escapes: whether what is deep in a thing may leave it through other parts of it.
+            escapes: whether what is deep in a thing may leave it through other parts of it, as the embedded
+                simulator lets it; in Unity it is stuck.
         """
         self._deepest = -_STUCK if escapes else -np.inf
         self.linkage = linkage
@@ -144,7 +145,7 @@ class Terrain:
         """The first pose (1) in which movements, one after the other, meet something; None where they do not.
 
         What touches a thing at the start of a movement may not get deeper into it; what is in a thing may leave it
-        through other parts of it. So Unity's arm does, and the embedded simulator's.
+        through other parts of it, if that is believed.
         """
         path = Poses.join([start, *moves])
         least = np.minimum(_NEAR, self._start - _SAME) if leaving else _NEAR

@@ -55,6 +55,13 @@ def test_the_planner_picks_up_all_and_puts_nearly_all(room):
     assert [record.index for record in put if not record.done] == [79]  # the cloth into a bowl that is too far off
 
 
+def test_the_planner_puts_into_open_drawers(arena):
+    kitchen = arena("kitchen-2-seed4", 99)
+    put = [kitchen.play(actor("planner-arm"), errand.index).record for errand in kitchen.of(ErrandKind.PUT)]
+    assert [record.ended for record in put] == ["done"] * 3
+    assert all(len(record.steps) < 10 for record in put)
+
+
 def test_a_larger_sphere_takes_no_success_from_the_planner(room):
     radii = (0.06, 0.1, 0.2, 0.35, 0.5)
     found = {
