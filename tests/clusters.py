@@ -13,10 +13,13 @@ def two_nodes() -> Iterator[tuple[Any, Any]]:
     ray = pytest.importorskip("ray", reason="Ray is an extra: pip install 'infthor-eval[ray]'")
     from ray.cluster_utils import Cluster
 
+    ray.shutdown()  # whatever a test before this one was connected to
     node = {"num_cpus": 1, "object_store_memory": 100 * 2**20}
     made = Cluster(initialize_head=True, head_node_args=node)
-    second = made.add_node(**node)
-    ray.init(address=made.address, log_to_driver=False, logging_level="error")
-    yield made, second
-    ray.shutdown()
-    made.shutdown()
+    try:
+        second = made.add_node(**node)
+        ray.init(address=made.address, log_to_driver=False, logging_level="error")
+        yield made, second
+    finally:
+        ray.shutdown()
+        made.shutdown()

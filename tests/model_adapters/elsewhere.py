@@ -43,6 +43,7 @@ class _Elsewhere(torch.Tensor):
 
     held: torch.Tensor
     seen: Seen
+    is_meta = False  # it has values
 
     @staticmethod
     def __new__(cls, held: torch.Tensor, seen: Seen) -> "_Elsewhere":

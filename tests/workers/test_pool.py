@@ -18,6 +18,7 @@ from .toys import Job, OpenCounter, broken
 
 @pytest.fixture(scope="module")
 def cluster():
+    """For all tests but the one that takes a node away, which comes last."""
     with two_nodes() as (made, _):
         yield made
 

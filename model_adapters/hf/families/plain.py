@@ -48,10 +48,10 @@ class PlainFamily:
     def _inputs(self, images: Sequence[Image.Image]) -> Mapping[str, torch.Tensor]:
         """The image processor's output on the model's device, pixels in the model's type."""
         inputs = self._image_processor(images=list(images), return_tensors="pt")
-        device = self._model.get_input_embeddings().weight.device
+        weight = self._model.get_input_embeddings().weight
         # Of an outline's pixels the shapes are enough; what is counted by has to have values.
-        counts = torch.device("cpu") if device.type == "meta" else device
+        counts = torch.device("cpu") if weight.is_meta else weight.device
         return {
-            name: value.to(device, self._model.dtype) if value.is_floating_point() else value.to(counts)
+            name: value.to(weight.device, self._model.dtype) if value.is_floating_point() else value.to(counts)
             for name, value in inputs.items()
         }
