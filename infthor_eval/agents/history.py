@@ -1,12 +1,12 @@
 """The true history of a trajectory in the words that agents are trained on, plan by plan."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.household.sequence_text import action_part, goal_part, plan_part
 
-__all__ = ["Chapter", "Part", "chapter_parts"]
+__all__ = ["Chapter", "Part", "chapter_parts", "goal_before", "opened"]
 
 Part = str | FrameRef
 
@@ -45,3 +45,20 @@ class Chapter:
 def chapter_parts(chapters: Sequence[Chapter]) -> list[Part]:
     """The parts of chapters that follow each other."""
     return [part for chapter in chapters for part in chapter.parts()]
+
+
+def goal_before(chapters: Sequence[Chapter]) -> str:
+    """The goal that the last of some chapters serves."""
+    return next(chapter.goal for chapter in reversed(chapters) if chapter.goal is not None)
+
+
+def opened(chapters: Sequence[Chapter], first: int, end: int | None = None) -> list[Chapter]:
+    """Some chapters of a history in the form of its beginning: the first of them says its goal and shows its frame.
+
+    Args:
+        chapters: the history from its beginning on.
+        first: of those that are wanted.
+        end: the one behind the last; None takes all that follow.
+    """
+    opening = replace(chapters[first], goal=goal_before(chapters[: first + 1]))
+    return [opening, *chapters[first + 1 : end]]

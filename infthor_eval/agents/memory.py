@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
-from infthor_eval.agents.history import Chapter, Part, chapter_parts
+from infthor_eval.agents.history import Chapter, Part, chapter_parts, goal_before, opened
 from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.household.sequence_text import goal_part, plan_part
@@ -44,11 +44,6 @@ class Past:
         """Every frame before the present one."""
         after = [frame for chapter in self.chapters for _, frame in chapter.steps]
         return [chapter.before for chapter in self.all[:1] if after] + after[:-1]
-
-
-def goal_before(chapters: Sequence[Chapter]) -> str:
-    """The goal that the last of some chapters serves."""
-    return next(chapter.goal for chapter in reversed(chapters) if chapter.goal is not None)
 
 
 class Memory(Protocol):
@@ -126,10 +121,7 @@ class LastTokens:
 
 def _window(chapters: Sequence[Chapter], n_last: int) -> list[Part]:
     """The last chapters, the first of them beginning with its goal."""
-    at = len(chapters) - n_last
-    first = chapters[at]
-    opened = Chapter(first.plan, goal_before(chapters[: at + 1]), first.before, first.steps)
-    return chapter_parts([opened, *chapters[at + 1 :]])
+    return chapter_parts(opened(chapters, len(chapters) - n_last))
 
 
 class StateInWords:

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import ClassVar, TypeVar
 
+import torch
 from PIL import Image
 
 from infthor_eval.errors import ModelError, naming
@@ -69,7 +70,7 @@ def load_model(name: str, located: LocatedCheckpoint[CheckpointOptions], family:
         ModelError: it cannot be loaded, or its processor makes of a frame what its model does not.
     """
     loaded, pretrained = load_checkpoint(located, family), located.options.pretrained
-    with fitting(pretrained):
+    with fitting(pretrained), torch.inference_mode():
         n_slots = loaded.family.frame_ids(_SAMPLE).count(loaded.family.slot_id)
         n_features = len(loaded.family.features([Image.new("RGB", _SAMPLE)])[0])
     if n_slots != n_features:

@@ -31,7 +31,10 @@ class Family(Protocol):
         ...
 
     def features(self, images: Sequence[Image.Image]) -> list[torch.Tensor]:
-        """Embeddings for the slots of each image, (slots, hidden), on the embedding layer's device."""
+        """Embeddings for the slots of each image, (slots, hidden), on the embedding layer's device.
+
+        They can be trained through; whoever only evaluates asks under `torch.inference_mode`.
+        """
         ...
 
     def positions(self, ids: torch.Tensor, sizes: Sequence[Size], start: int) -> torch.Tensor:

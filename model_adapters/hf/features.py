@@ -25,6 +25,7 @@ class FeatureCache:
         self._bytes = 0
         self._kept: OrderedDict[str, torch.Tensor] = OrderedDict()
 
+    @torch.inference_mode()
     def get(self, frames: Sequence[Frame]) -> list[torch.Tensor]:
         """Features of each frame, (slots, hidden), in the order asked for; the missing ones in one batch.
 

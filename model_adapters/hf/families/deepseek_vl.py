@@ -16,7 +16,6 @@ __all__ = ["DeepseekVL", "DeepseekVLFamily"]
 class DeepseekVLFamily(PlainFamily):
     """Frames of DeepSeek-VL hybrid."""
 
-    @torch.inference_mode()
     def features(self, images: Sequence[Image.Image]) -> list[torch.Tensor]:
         """Aligned features of both vision towers, (tokens, hidden), for each image."""
         inputs = self._inputs(images)

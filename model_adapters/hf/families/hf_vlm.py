@@ -76,7 +76,6 @@ class ProcessorFamily(PlainFamily):
             return (self.placeholder_id,)
         return (markers[0], self.placeholder_id, markers[1])
 
-    @torch.inference_mode()
     def features(self, images: Sequence[Image.Image]) -> list[torch.Tensor]:
         """The model's own features, (slots, hidden), for each image."""
         compute = getattr(self._model, "get_image_features", None) or self._model.model.get_image_features

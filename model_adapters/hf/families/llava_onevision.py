@@ -20,7 +20,6 @@ class LlavaOnevisionFamily(PlainFamily):
     results come from the flat list, and so do these.
     """
 
-    @torch.inference_mode()
     def features(self, images: Sequence[Image.Image]) -> list[torch.Tensor]:
         """Packed features of overview, patches and row breaks, (tokens, hidden), for each image."""
         inputs = self._inputs(images)

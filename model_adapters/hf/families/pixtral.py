@@ -44,7 +44,6 @@ class PixtralFamily(PlainFamily):
         row = (self.slot_id,) * (width // side) + (self._break_id,)
         return (*(row * (height // side))[:-1], self._end_id)
 
-    @torch.inference_mode()
     def features(self, images: Sequence[Image.Image]) -> list[torch.Tensor]:
         """Projected patches, (tokens, hidden), for each image.
 

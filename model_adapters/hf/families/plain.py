@@ -29,6 +29,7 @@ class PlainFamily:
         self.placeholder_id: int = model.config.image_token_id
         self.slot_id = self.placeholder_id
 
+    @torch.inference_mode()
     def frame_ids(self, size: Size) -> tuple[int, ...]:
         """As many slots as a frame of this size has features."""
         return (self.slot_id,) * len(self.features([Image.new("RGB", size)])[0])

@@ -39,7 +39,6 @@ class Qwen25VLFamily(PlainFamily):
         config = self._model.config
         return (config.vision_start_token_id, self.placeholder_id, config.vision_end_token_id)
 
-    @torch.inference_mode()
     def features(self, images: Sequence[Image.Image]) -> list[torch.Tensor]:
         """The vision tower's merged patches, (tokens, hidden), for each image."""
         inputs = self._inputs(images)

@@ -1,0 +1,95 @@
+"""What a model learns acting from: a trajectory's true history, cut into windows of whole plans.
+
+Every window has the form in which an agent is given a shortened history (`--history last:N`): the goal in force and the
+frame that it begins with, then plans.
+"""
+
+from collections.abc import Iterator, Sequence
+
+from infthor_eval.agents.history import Chapter, chapter_parts, opened
+from infthor_eval.agents.plans import plans_of, tasks_of
+from infthor_eval.errors import DataError
+from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.step_log import Step
+from infthor_eval.formats.trajectory import Trajectory
+from infthor_eval.training.encoding import Encoded, Encoder, LeftOut
+from model_adapters.hf.prompt import n_tokens
+
+__all__ = ["recorded_chapters", "windows"]
+
+
+def recorded_chapters(trajectory: Trajectory, steps: Sequence[Step], frames: Sequence[FrameRef]) -> list[Chapter]:
+    """A trajectory's true history from its replay, a chapter a plan.
+
+    Args:
+        trajectory: has goals and plans.
+        steps: the replayed log in time order; of several frames of one action the last counts.
+        frames: of each step.
+
+    Raises:
+        DataError: the trajectory has a task without a goal or an unknown kind of plan, or an action has no frame.
+    """
+    plans, tasks = plans_of(trajectory), tasks_of(trajectory)
+    before: FrameRef | None = None
+    after: dict[int, tuple[str, FrameRef]] = {}
+    for step, frame in zip(steps, frames, strict=True):
+        if step.action is None:
+            before = before or frame
+        else:
+            after[step.step] = (step.action, frame)
+    if before is None:
+        raise DataError(f"trajectory {trajectory.traj_id}: no frame before the first action; replay it again")
+    chapters: list[Chapter] = []
+    for plan in plans:
+        missing = next((number for number in range(*plan.low) if number not in after), None)
+        if missing is not None:
+            raise DataError(f"trajectory {trajectory.traj_id}: no frame of action {missing}; replay it again")
+        begins = not chapters or plans[plan.index - 1].task != plan.task
+        goal = tasks[plan.task].text if begins else None
+        chapters.append(Chapter(plan.text, goal, before, tuple(after[number] for number in range(*plan.low))))
+        before = chapters[-1].steps[-1][1]
+    return chapters
+
+
+def windows(encoder: Encoder, name: str, chapters: Sequence[Chapter], limit: int) -> Iterator[Encoded | LeftOut]:
+    """A history as sequences, each with as many whole plans as fit; together they have every plan once.
+
+    Args:
+        encoder: makes the sequences.
+        name: of the trajectory.
+        chapters: its history.
+        limit: tokens of a sequence, frames expanded.
+
+    Yields:
+        The sequences, and plans that are longer than the limit by themselves.
+
+    Raises:
+        DataError: a frame cannot be read, or a text of the history holds a mark.
+        ModelError: the template refuses the history.
+    """
+    first = 0
+    while first < len(chapters):
+        end = _end(encoder, chapters, first, limit)
+        if end == first:
+            yield LeftOut(f"{name}, plan {first + 1}", f"longer than {limit} tokens by itself")
+            first += 1
+            continue
+        numbers = f"plan {end}" if end == first + 1 else f"plans {first + 1} to {end}"
+        yield encoder.actions(f"{name}, {numbers}", opened(chapters, first, end))
+        first = end
+
+
+def _end(encoder: Encoder, chapters: Sequence[Chapter], first: int, limit: int) -> int:
+    """The chapter behind the last one that fits; found by doubling and bisection, as each count takes a rendering."""
+
+    def fits(end: int) -> bool:
+        return n_tokens(encoder.pieces(chapter_parts(opened(chapters, first, end)))) <= limit
+
+    fitting, stride = first, 1
+    while fitting + stride <= len(chapters) and fits(fitting + stride):
+        fitting, stride = fitting + stride, 2 * stride
+    while stride:
+        if fitting + stride <= len(chapters) and fits(fitting + stride):
+            fitting += stride
+        stride //= 2
+    return fitting
