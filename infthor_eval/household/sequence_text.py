@@ -7,9 +7,10 @@ Per task: `<|goal|>Your main goal: ...<|goal|>`, the frame at its start, then pe
 from infthor_eval.formats.step_log import Step
 from infthor_eval.formats.trajectory import HighAction, SubTask, Trajectory
 
-__all__ = ["ACT", "action_part", "goal_part", "goal_text", "plan_part", "plan_text", "sequence_text"]
+__all__ = ["ACT", "MARKS", "action_part", "goal_part", "goal_text", "plan_part", "plan_text", "sequence_text"]
 
 ACT, _PLAN, _GOAL = "<|act|>", "<|plan|>", "<|goal|>"
+MARKS = (ACT, _PLAN, _GOAL)  # each a token of its own for models that are trained on sequences
 
 _PLANS = {
     "GotoLocation": "go to the {0}",

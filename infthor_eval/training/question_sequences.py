@@ -3,57 +3,50 @@
 from collections.abc import Iterator
 
 from infthor_eval.errors import DataError, UsageError
-from infthor_eval.formats.nieh_set import NiehSet, SkippedQuestion
-from infthor_eval.formats.question import Question
-from infthor_eval.nieh.contexts import Context, ContextSettings, context_named
+from infthor_eval.nieh.contexts import Sample
 from infthor_eval.nieh.docs import doc_target
 from infthor_eval.nieh.notes import Notes
+from infthor_eval.nieh.samples import TaskSamples
 from infthor_eval.training.encoding import Encoded, Encoder, LeftOut
 
 __all__ = ["question_sequences"]
 
 
-def question_sequences(
-    encoder: Encoder, data: NiehSet, context: str, settings: ContextSettings, limit: int
-) -> Iterator[Encoded | LeftOut]:
+def question_sequences(encoder: Encoder, asked: TaskSamples, limit: int) -> Iterator[Encoded | LeftOut]:
     """Sequences of a set's questions.
 
     Args:
         encoder: makes the sequences.
-        data: the set.
-        context: name of the context in which they are asked.
-        settings: of the context.
+        asked: all that a task in one context asks.
         limit: tokens of a sequence, frames expanded.
 
     Yields:
         A sequence for each sample, and what cannot be asked or is too long.
 
     Raises:
-        UsageError: there is no such context, it wants a model's notes, or a setting that it needs is not there.
+        UsageError: the context wants a model's notes.
         ModelError: the template refuses the turns.
     """
-    kind = context_named(context)
-    for skipped in data.skipped:
-        yield LeftOut(skipped.question.id, skipped.reason)
-    for question in data.questions:
+    for skipped in asked.skipped:
+        yield LeftOut(_name(skipped.question.id, skipped.variant), skipped.reason)
+    for sample in asked.samples:
+        name = _name(sample.question.id, sample.variant)
         try:
-            yield from _of_question(encoder, data, kind, question, settings, limit)
+            sequence = _sequence(encoder, asked, sample, name)
         except DataError as error:
-            yield LeftOut(question.id, str(error))
-
-
-def _of_question(
-    encoder: Encoder, data: NiehSet, context: Context, question: Question, settings: ContextSettings, limit: int
-) -> Iterator[Encoded | LeftOut]:
-    for sample in context.samples(data, question, settings):
-        if isinstance(sample, SkippedQuestion):
-            yield LeftOut(question.id, sample.reason)
+            yield LeftOut(name, str(error))
             continue
-        name = f"{question.id} {sample.variant}".rstrip()
-        shown, text = context.request(data, sample)
-        known = [part for part in shown if not isinstance(part, Notes)]
-        if len(known) < len(shown):
-            raise UsageError("a model that is being trained has no notes yet; train on another context")
-        sequence = encoder.answer(name, [*known, text], doc_target(question))
         too_long = sequence.n_tokens > limit
         yield LeftOut(name, f"longer than {limit} tokens") if too_long else sequence
+
+
+def _sequence(encoder: Encoder, asked: TaskSamples, sample: Sample, name: str) -> Encoded:
+    shown, text = asked.request(sample)
+    known = [part for part in shown if not isinstance(part, Notes)]
+    if len(known) < len(shown):
+        raise UsageError("a model that is being trained has no notes yet; train on another context")
+    return encoder.answer(name, [*known, text], doc_target(sample.question))
+
+
+def _name(question: str, variant: str) -> str:
+    return f"{question} {variant}".rstrip()

@@ -184,6 +184,7 @@ def assemble(
     return Loaded(
         model=model.eval(),
         tokenizer=tokenizer,
+        image_processor=image_processor,
         template=template,
         family=family,
         generation=read_generation(model.generation_config),

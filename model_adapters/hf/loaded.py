@@ -16,6 +16,7 @@ class Loaded:
     Attributes:
         model: the transformers model, in evaluation mode.
         tokenizer: its tokenizer.
+        image_processor: its image processor.
         template: what writes a conversation (Jinja): its chat template, or a plain one.
         family: how its frames become tokens, features and positions.
         generation: end tokens and penalties.
@@ -25,6 +26,7 @@ class Loaded:
 
     model: Any
     tokenizer: Any
+    image_processor: Any
     template: str
     family: Family
     generation: Generation

@@ -64,6 +64,11 @@ class TransformersModel:
         """Checkpoint, precision, kernels, versions and generation settings, as JSON values."""
         return identity(self.name, self._loaded, self._options)
 
+    @property
+    def loaded(self) -> Loaded:
+        """The checkpoint, for whoever goes on with it."""
+        return self._loaded
+
     def tokens_per_frame(self, frame: FrameRef) -> int:
         """How many tokens one frame becomes, as the checkpoint's processor has it."""
         with naming_model_errors(self.name):

@@ -1,0 +1,104 @@
+"""What a recipe is trained on: the sequences of replayed sets, and what none could be made of."""
+
+import random
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from infthor_eval.errors import DataError
+from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.step_log import read_steps
+from infthor_eval.formats.trajectory import iter_trajectories
+from infthor_eval.nieh.samples import find_samples
+from infthor_eval.training.action_sequences import recorded_chapters, windows
+from infthor_eval.training.encoding import Encoded, Encoder, LeftOut
+from infthor_eval.training.question_sequences import question_sequences
+from infthor_eval.training.recipe import Recipe
+
+__all__ = ["TrainingData", "read_training_data"]
+
+
+@dataclass(frozen=True)
+class TrainingData:
+    """All sequences of a recipe.
+
+    Attributes:
+        sequences: in the order of the sets.
+        left_out: what no sequence could be made of.
+    """
+
+    sequences: Sequence[Encoded]
+    left_out: Sequence[LeftOut]
+
+    @property
+    def n_tokens(self) -> int:
+        """Of all sequences, frames expanded."""
+        return sum(sequence.n_tokens for sequence in self.sequences)
+
+    @property
+    def n_trained(self) -> int:
+        """How many tokens loss is taken on."""
+        return sum(sequence.n_trained for sequence in self.sequences)
+
+    def reasons(self) -> Counter[str]:
+        """How much was left out, by reason."""
+        return Counter(item.reason for item in self.left_out)
+
+
+def read_training_data(recipe: Recipe, encoder: Encoder, folders: Sequence[Path]) -> TrainingData:
+    """The sequences that a recipe makes of replayed sets.
+
+    A trajectory or question that cannot be used is left out and counted; the others are not hurt by it.
+
+    Args:
+        recipe: says which sequences.
+        encoder: makes them.
+        folders: of the sets, in the form of NIEH sets; a question file is needed where there are to be questions.
+
+    Raises:
+        UsageError: a setting of the contexts does not fit.
+        DataError: a folder is no set, or nothing is left of all.
+        ModelError: the model's template refuses what there is.
+    """
+    found = [item for folder in folders for item in _of_set(recipe, encoder, folder)]
+    sequences = [item for item in found if isinstance(item, Encoded)]
+    left_out = [item for item in found if isinstance(item, LeftOut)]
+    if not sequences:
+        why = left_out[0].reason if left_out else "there are no trajectories and no questions"
+        raise DataError(f"{', '.join(map(str, folders))}: no sequence to train on ({why}); give another set")
+    return TrainingData(sequences, left_out)
+
+
+def _of_set(recipe: Recipe, encoder: Encoder, folder: Path) -> Iterator[Encoded | LeftOut]:
+    if recipe.actions is not None:
+        yield from _share(_actions(NiehSet(folder), encoder, recipe.max_tokens), recipe.actions.share, recipe.seed)
+    if recipe.questions is not None:
+        told = {"seed": recipe.seed} | recipe.questions.settings | {"data": str(folder)}
+        for context in recipe.questions.contexts:
+            made = question_sequences(encoder, find_samples({**told, "context": context}), recipe.max_tokens)
+            yield from _share(made, recipe.questions.share, recipe.seed)
+
+
+def _actions(data: NiehSet, encoder: Encoder, limit: int) -> Iterator[Encoded | LeftOut]:
+    """The windows of every trajectory of a set."""
+    for folder in sorted(path for path in (data.root / "metadata").iterdir() if path.is_dir()):
+        name = folder.name
+        try:
+            path = data.outline_file(name)
+            if path is None:
+                yield LeftOut(name, "its trajectory is not in the set")
+                continue
+            trajectory = next(iter(iter_trajectories(path)))
+            steps = sorted(read_steps(folder), key=lambda step: step.img_idx)
+            yield from windows(encoder, name, recorded_chapters(trajectory, steps, data.frames(name)), limit)
+        except DataError as error:
+            yield LeftOut(name, str(error))
+
+
+def _share(made: Iterable[Encoded | LeftOut], share: float, seed: int) -> Iterator[Encoded | LeftOut]:
+    """A part of the sequences, drawn by the seed; what was left out is told all the same."""
+    draw = random.Random(seed)
+    for item in made:
+        if isinstance(item, LeftOut) or share >= 1 or draw.random() < share:
+            yield item

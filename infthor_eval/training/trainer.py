@@ -1,0 +1,135 @@
+"""Training by transformers' own Trainer: one device, DDP, or weights sharded over processes (FSDP2).
+
+It is told what it cannot know: how sequences become batches, what a model is saved as, and that loss is taken by token.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import torch
+import transformers
+from safetensors.torch import load_model, save_model
+from transformers.trainer_utils import get_last_checkpoint
+
+from infthor_eval.errors import DataError, UsageError, naming
+from infthor_eval.training.encoding import Encoded
+from infthor_eval.training.network import SequenceModel
+from infthor_eval.training.recipe import Recipe
+
+__all__ = ["train_with_trainer"]
+
+_WEIGHTS = "model.safetensors"
+Told = Callable[[int, Mapping[str, float]], None]
+
+
+class _SequenceTrainer(transformers.Trainer):
+    """Saves the weights of the network alone: tied ones stand in them once, as transformers' own models save them."""
+
+    def _save(self, output_dir: str | None = None, state_dict: dict[str, Any] | None = None) -> None:
+        folder = Path(output_dir or str(self.args.output_dir))
+        folder.mkdir(parents=True, exist_ok=True)
+        save_model(self.accelerator.unwrap_model(self.model).model, str(folder / _WEIGHTS))
+
+    def _load_from_checkpoint(self, resume_from_checkpoint: str, model: torch.nn.Module | None = None) -> None:
+        if self.is_fsdp_enabled:
+            super()._load_from_checkpoint(resume_from_checkpoint, model)
+            return
+        network = self.accelerator.unwrap_model(model or self.model)
+        load_model(network.model, Path(resume_from_checkpoint) / _WEIGHTS)
+
+
+class _Telling(transformers.TrainerCallback):
+    def __init__(self, told: Told) -> None:
+        self._told = told
+
+    def on_log(self, args: Any, state: Any, control: Any, logs: Any = None, **kwargs: Any) -> None:
+        if logs and "loss" in logs:
+            self._told(state.global_step, {name: float(logs[name]) for name in ("loss", "learning_rate", "grad_norm")})
+
+
+def train_with_trainer(
+    network: SequenceModel,
+    sequences: Sequence[Encoded],
+    collate: Callable[[Sequence[Encoded]], Mapping[str, Any]],
+    recipe: Recipe,
+    out: Path,
+    told: Told,
+) -> int:
+    """Train, going on from the last checkpoint in the folder if there is one.
+
+    Args:
+        network: what is trained.
+        sequences: all of them; each process goes through its own.
+        collate: makes a batch of sequences.
+        recipe: how.
+        out: folder of checkpoints.
+        told: is given step, and loss, learning rate and norm of the gradients, after each step.
+
+    Returns:
+        Steps that were made, those of an earlier run included.
+
+    Raises:
+        UsageError: the processes cannot share the recipe's sequences evenly.
+        DataError: the checkpoint that is gone on from cannot be read.
+    """
+    trainer = _SequenceTrainer(
+        model=network,
+        args=_arguments(recipe, out),
+        train_dataset=list(sequences),  # type: ignore[arg-type]
+        data_collator=collate,  # type: ignore[arg-type]
+        callbacks=[_Telling(told)],
+    )
+    trainer.remove_callback(transformers.trainer_callback.PrinterCallback)
+    last = get_last_checkpoint(str(out)) if out.is_dir() else None
+    damaged = f"{last}: the checkpoint cannot be read"
+    with naming(damaged, "remove it to go on from the one before", of=(OSError, ValueError, KeyError), as_a=DataError):
+        trainer.train(resume_from_checkpoint=last)
+    return int(trainer.state.global_step)
+
+
+def _arguments(recipe: Recipe, out: Path) -> transformers.TrainingArguments:
+    optimizer, model_type = recipe.optimizer, recipe.model_args.get("dtype", "float32")
+    arguments = transformers.TrainingArguments(
+        output_dir=str(out),
+        per_device_train_batch_size=1,
+        num_train_epochs=recipe.epochs,
+        max_steps=recipe.max_steps or -1,
+        learning_rate=optimizer.lr,
+        adam_beta1=optimizer.betas[0],
+        adam_beta2=optimizer.betas[1],
+        weight_decay=optimizer.weight_decay,
+        max_grad_norm=optimizer.clip,
+        lr_scheduler_type="linear",
+        warmup_steps=optimizer.warmup_ratio,
+        optim="adamw_torch",
+        bf16=model_type == "bfloat16" and torch.cuda.is_available(),
+        seed=recipe.seed,
+        data_seed=recipe.seed,
+        average_tokens_across_devices=True,
+        ddp_find_unused_parameters=False,
+        remove_unused_columns=False,
+        logging_steps=1,
+        logging_nan_inf_filter=False,
+        save_steps=recipe.save_every,
+        save_total_limit=2,
+        report_to="none",
+        disable_tqdm=True,
+        use_cpu=not torch.cuda.is_available(),
+        dataloader_pin_memory=False,
+        fsdp="full_shard" if recipe.parallel.shard and _n_processes() > 1 else None,
+        fsdp_config={"version": 2} if recipe.parallel.shard and _n_processes() > 1 else None,
+    )
+    per_pass = arguments.world_size
+    if recipe.sequences_per_step % per_pass:
+        least = math.ceil(recipe.sequences_per_step / per_pass) * per_pass
+        raise UsageError(
+            f"sequences_per_step is {recipe.sequences_per_step} for {per_pass} processes; set it to {least}, say"
+        )
+    arguments.gradient_accumulation_steps = recipe.sequences_per_step // per_pass
+    return arguments
+
+
+def _n_processes() -> int:
+    return torch.distributed.get_world_size() if torch.distributed.is_initialized() else 1

@@ -1,0 +1,25 @@
+"""A tiny model that knows the marks, and a set that was replayed."""
+
+from pathlib import Path
+
+import pytest
+
+from infthor_eval.formats.packaged import packaged_folder
+from infthor_eval.training.encoding import Encoder
+from infthor_eval.training.starting_point import starting_point
+from model_adapters.hf.loaded import Loaded
+
+
+@pytest.fixture(scope="session")
+def bundled_set() -> Path:
+    return packaged_folder("sets/nieh_mini")
+
+
+@pytest.fixture(scope="session")
+def plain_tiny() -> Loaded:
+    return starting_point("qwen2.5-vl-tiny", {"prompt": "plain"}, seed=0)
+
+
+@pytest.fixture(scope="session")
+def encoder(plain_tiny: Loaded) -> Encoder:
+    return Encoder(plain_tiny)

@@ -1,0 +1,175 @@
+"""Windows of a history: what is in them, where loss is taken, and that agents are asked with the same tokens."""
+
+import itertools
+import re
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from infthor_eval.agents.history import Chapter, chapter_parts
+from infthor_eval.errors import DataError
+from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.step_log import read_steps
+from infthor_eval.formats.trajectory import iter_trajectories
+from infthor_eval.household.sequence_text import ACT
+from infthor_eval.training.action_sequences import recorded_chapters, windows
+from infthor_eval.training.encoding import Encoded, LeftOut
+from model_adapters.hf.prompt import Frame
+
+_ACTION = re.compile(r"<\|act\|>(.*?)<\|act\|>")
+
+
+def chapters_of(root, name):
+    data, folder = NiehSet(root), root / "metadata" / name
+    (trajectory,) = iter_trajectories(folder / "traj_data.json")
+    return recorded_chapters(trajectory, read_steps(folder), data.frames(name))
+
+
+def names_in(root):
+    return sorted(path.name for path in (root / "metadata").iterdir())
+
+
+def text_of(parts):
+    return "".join(part if isinstance(part, str) else "<image>" for part in parts)
+
+
+def said(encoder, pieces):
+    """Text of what loss is taken on, by the tokenizer alone."""
+    return encoder._tokenizer.decode(pieces, skip_special_tokens=False)
+
+
+def trained_text(encoder, sequence):
+    runs = itertools.groupby(zip(sequence.pieces, sequence.trained, strict=True), key=lambda pair: pair[1])
+    return [said(encoder, [piece for piece, _ in run]) for trained, run in runs if trained]
+
+
+def test_a_recorded_history_says_what_the_replay_wrote(bundled_set):
+    for name in names_in(bundled_set):
+        parts = chapter_parts(chapters_of(bundled_set, name))
+        assert text_of(parts) == (bundled_set / "metadata" / name / "traj.txt").read_text().strip()
+        frames = [part for part in parts if isinstance(part, FrameRef)]
+        shown = NiehSet(bundled_set).frames(name)
+        # One frame per action, the last one of it, and the first; those at the start of a task come again.
+        assert set(frames) <= set(shown)
+        assert [frame for frame, _ in itertools.groupby(frames)] == sorted(set(frames), key=lambda frame: frame.path)
+
+
+def test_windows_have_every_action_once_and_each_begins_as_a_trajectory_does(bundled_set, encoder):
+    for name in names_in(bundled_set)[:3]:
+        history = chapters_of(bundled_set, name)
+        goals = {chapter.goal for chapter in history}
+        made = list(windows(encoder, name, history, 5000))
+        assert len(made) > 1
+        assert all(window.n_tokens <= 5000 for window in made)
+        for window in made:
+            text = encoder._tokenizer.decode([piece for piece in window.pieces if isinstance(piece, int)])
+            goal = re.match(r"<\|goal\|>Your main goal: (.*?)<\|goal\|>", text)
+            assert goal[1] in goals
+        actions = [text for window in made for text in trained_text(encoder, window)]
+        assert actions == [f"{ACT}{action}{ACT}" for chapter in history for action, _ in chapter.steps]
+
+
+def test_windows_cannot_hold_another_plan(bundled_set, encoder):
+    name = names_in(bundled_set)[0]
+    history = chapters_of(bundled_set, name)
+    made = list(windows(encoder, name, history, 5000))
+    ends = itertools.accumulate(window_plans(window) for window in made)
+    for window, end in zip(made[:-1], ends, strict=False):
+        more = encoder.pieces(list(history[end].parts()))
+        assert window.n_tokens + sum(1 if isinstance(piece, int) else len(piece.ids) for piece in more) > 5000
+
+
+def window_plans(window):
+    numbers = [int(number) for number in re.findall(r"\d+", window.name.rpartition(", plan")[2])]
+    return numbers[-1] - numbers[0] + 1
+
+
+def test_a_plan_that_is_too_long_is_left_out_and_told(bundled_set, encoder):
+    name = names_in(bundled_set)[0]
+    history = chapters_of(bundled_set, name)
+    least = min(len(chapter.steps) for chapter in history)
+    limit = 150 + least * 130
+    made = list(windows(encoder, name, history, limit))
+    left = [item for item in made if isinstance(item, LeftOut)]
+    kept = [item for item in made if isinstance(item, Encoded)]
+    assert left
+    assert {item.reason for item in left} == {f"longer than {limit} tokens by itself"}
+    assert len(left) + sum(map(window_plans, kept)) == len(history)
+
+
+def test_an_agent_is_asked_with_what_it_was_trained_on(bundled_set, encoder):
+    """By the model's own prompts: an agent's at each action is the window up to the mark that opens it."""
+    name = names_in(bundled_set)[1]
+    history = chapters_of(bundled_set, name)[:3]
+    window = encoder.actions(name, history)
+    opens = [at for at, piece in enumerate(window.pieces) if piece == encoder._mark][::2]
+    parts = chapter_parts(history)
+    asked = [at for at, part in enumerate(parts) if isinstance(part, str) and part.startswith(ACT)]
+    assert len(opens) == len(asked)
+    for place, at in zip(opens, asked, strict=True):
+        assert encoder.pieces([*parts[:at], ACT]) == list(window.pieces[: place + 1])
+
+
+def test_ids_and_labels_of_a_short_history(tmp_path, encoder, bundled_set):
+    first, second = NiehSet(bundled_set).frames(names_in(bundled_set)[0])[:2]
+    window = encoder.actions("one", [Chapter("go to the sink", "wash a mug", first, (("MoveAhead", second),))])
+    ids = encoder._tokenizer
+    goal, plan, act = ids.convert_tokens_to_ids(["<|goal|>", "<|plan|>", ACT])
+    start, end = ids.convert_tokens_to_ids(["<|vision_start|>", "<|vision_end|>"])
+    words = {
+        text: ids(text)["input_ids"] for text in ("Your main goal: wash a mug", "Plan: go to the sink", "MoveAhead")
+    }
+    expected = [goal, *words["Your main goal: wash a mug"], goal, start, first, end]
+    expected += [plan, *words["Plan: go to the sink"], plan]
+    trained = [act, *words["MoveAhead"], act]
+    assert [piece.ref if isinstance(piece, Frame) else piece for piece in window.pieces] == [
+        *expected,
+        *trained,
+        start,
+        second,
+        end,
+    ]
+    assert window.trained == (False,) * len(expected) + (True,) * len(trained) + (False,) * 3
+    assert (window.n_trained, len(window.frames)) == (len(trained), 2)
+
+
+def test_a_text_that_holds_a_mark_is_refused(encoder, bundled_set):
+    first, second = NiehSet(bundled_set).frames(names_in(bundled_set)[0])[:2]
+    with pytest.raises(DataError, match=r"bad: a goal, a plan or an action holds <\|act\|>"):
+        encoder.actions("bad", [Chapter(f"go {ACT}", "goal", first, (("MoveAhead", second),))])
+
+
+@settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(lengths=st.lists(st.integers(1, 12), min_size=1, max_size=12), limit=st.integers(200, 4000))
+def test_windows_of_any_history(lengths, limit, encoder, bundled_set):
+    frame = NiehSet(bundled_set).frames(names_in(bundled_set)[0])[0]
+    history = [
+        Chapter(
+            f"plan {number}", f"goal {number}" if number % 3 == 0 else None, frame, (("MoveAhead", frame),) * length
+        )
+        for number, length in enumerate(lengths)
+    ]
+    made = list(windows(encoder, "any", history, limit))
+    kept = [item for item in made if isinstance(item, Encoded)]
+    assert all(window.n_tokens <= limit for window in kept)
+    assert sum(map(window_plans, kept)) + len(made) - len(kept) == len(history)
+
+
+def test_a_sequence_of_130k_tokens_is_built_and_its_labels_are_right(bundled_set, encoder):
+    frames = NiehSet(bundled_set).frames(names_in(bundled_set)[0])
+    actions = ("MoveAhead", "RotateLeft", "PickupObject Mug", "PutObject Mug Fridge", "LookDown")
+    cycle = zip(itertools.cycle(actions), itertools.cycle(frames))
+    history = [
+        Chapter(f"plan {number}", "goal" if number == 0 else None, frames[0], tuple(itertools.islice(cycle, 11)))
+        for number in range(100)
+    ]
+    window, *rest = windows(encoder, "long", history, 131_072)
+    assert 128_000 < window.n_tokens <= 131_072
+    assert len(rest) == 1
+    text = text_of(chapter_parts(history[: window_plans(window)]))
+    assert trained_text(encoder, window) == [f"{ACT}{action}{ACT}" for action in _ACTION.findall(text)]
+    assert not any(
+        trained for piece, trained in zip(window.pieces, window.trained, strict=True) if not isinstance(piece, int)
+    )

@@ -1,0 +1,50 @@
+"""Questions with their answers: asked as in the evaluation, loss on the answer alone."""
+
+import pytest
+
+from infthor_eval.errors import UsageError
+from infthor_eval.formats.question import Question
+from infthor_eval.nieh.samples import find_samples
+from infthor_eval.training.encoding import Encoded, Encoder, LeftOut
+from infthor_eval.training.question_sequences import question_sequences
+from infthor_eval.training.starting_point import starting_point
+from model_adapters import Turn
+
+
+def made(encoder, root, context="clues", limit=100_000):
+    return list(question_sequences(encoder, find_samples({"data": str(root), "context": context}), limit))
+
+
+@pytest.fixture(scope="session")
+def chat_tiny():
+    return starting_point("qwen2.5-vl-tiny", {}, seed=0)
+
+
+def test_questions_are_asked_as_the_evaluation_asks_them(bundled_set, chat_tiny, plain_tiny):
+    samples = find_samples({"data": str(bundled_set), "context": "clues"})
+    for loaded in (chat_tiny, plain_tiny):
+        encoder = Encoder(loaded)
+        sequences = made(encoder, bundled_set)
+        assert len(sequences) == len(samples.samples) == 147
+        for sequence, sample in zip(sequences, samples.samples, strict=True):
+            context, text = samples.request(sample)
+            asked = encoder._prompter.pieces([Turn("user", (*context, text))])
+            assert list(sequence.pieces[: len(asked)]) == asked
+            assert sequence.trained == (False,) * len(asked) + (True,) * (len(sequence.pieces) - len(asked))
+            reply = sequence.pieces[len(asked) :]
+            assert reply[-1] == loaded.tokenizer.convert_tokens_to_ids("<|im_end|>")
+            assert loaded.tokenizer.decode(reply[:-1]) == ", ".join(map(str, sample.question.answers))
+
+
+def test_what_cannot_be_asked_is_told(make_nieh_set, encoder):
+    root = make_nieh_set([Question("traj_a", "Is it?", (1,), ("yes",)), Question("traj_a", "Is it?", (77,), ("no",))])
+    sequence, left = sorted(made(encoder, root), key=lambda item: isinstance(item, LeftOut))
+    assert isinstance(sequence, Encoded)
+    assert "clue 77 is outside" in left.reason
+    (short, *_) = made(encoder, root, "trajectory", limit=100)
+    assert "longer than 100 tokens" in {short.reason, *(item.reason for item in made(encoder, root, limit=100))}
+
+
+def test_notes_cannot_be_trained_on(make_nieh_set, encoder):
+    with pytest.raises(UsageError, match="no notes yet"):
+        made(encoder, make_nieh_set(), "memory_notes")
