@@ -15,11 +15,7 @@ __all__ = ["ActionData", "Lora", "Optimizer", "Parallel", "QuestionData", "Recip
 _FOLDER = "training/recipes"
 
 
-class _Part(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    pass
-
-
-class ActionData(_Part):
+class ActionData(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Sequences of trajectories, which agents learn from.
 
     Attributes:
@@ -29,7 +25,7 @@ class ActionData(_Part):
     share: float = 1.0
 
 
-class QuestionData(_Part):
+class QuestionData(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Sequences of questions.
 
     Attributes:
@@ -43,7 +39,7 @@ class QuestionData(_Part):
     share: float = 1.0
 
 
-class Optimizer(_Part):
+class Optimizer(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """AdamW with a linear schedule; defaults are those of the published trainer.
 
     Attributes:
@@ -61,7 +57,7 @@ class Optimizer(_Part):
     warmup_ratio: float = 0.03
 
 
-class Lora(_Part):
+class Lora(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Low-rank adapters (peft) instead of the weights themselves.
 
     Attributes:
@@ -77,7 +73,7 @@ class Lora(_Part):
     targets: tuple[str, ...] = ("q_proj", "k_proj", "v_proj", "o_proj", "gate_proj", "up_proj", "down_proj")
 
 
-class Parallel(_Part):
+class Parallel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """How processes share the work; those that are left go through different sequences.
 
     Attributes:
@@ -89,7 +85,7 @@ class Parallel(_Part):
     shard: bool = False
 
 
-class Recipe(_Part):
+class Recipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """One way to train a model.
 
     Attributes:

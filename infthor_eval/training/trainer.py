@@ -78,7 +78,7 @@ def train_with_trainer(
         model=network,
         args=_arguments(recipe, out),
         train_dataset=list(sequences),  # type: ignore[arg-type]
-        data_collator=collate,  # type: ignore[arg-type]
+        data_collator=collate,
         callbacks=[_Telling(told)],
     )
     trainer.remove_callback(transformers.trainer_callback.PrinterCallback)
