@@ -1,0 +1,49 @@
+"""Tiny models of every family and sequences for them, the same in every process."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from PIL import Image
+
+from infthor_eval.formats.frames import FrameRef
+from infthor_eval.training.encoding import Encoded, Encoder
+from model_adapters import load
+from model_adapters.hf.loaded import Loaded
+
+__all__ = ["FAMILIES", "PAD", "everywhere", "loaded", "sequence", "write_frames"]
+
+FAMILIES = ("qwen2.5-vl", "llava-onevision", "deepseek-vl", "pixtral")
+PAD = 0
+
+
+def loaded(family: str) -> Loaded:
+    """A tiny model of a family with the weights of seed 0."""
+    model: Any = load(f"{family}-tiny", {}, seed=0)
+    found: Loaded = model._loaded
+    return found
+
+
+def write_frames(folder: Path, count: int) -> list[FrameRef]:
+    """Frames of coloured noise, all different; 9 tokens each in Qwen2.5-VL."""
+    folder.mkdir(parents=True, exist_ok=True)
+    draw = np.random.default_rng(0)
+    refs = []
+    for index in range(count):
+        path = folder / f"{index}.png"
+        Image.fromarray(draw.integers(0, 256, (4, 4, 3), dtype=np.uint8)).resize((84, 84)).save(path)
+        refs.append(FrameRef(path))
+    return refs
+
+
+def sequence(model: Loaded, frames: Sequence[FrameRef], answer: str = "a mug", name: str = "one") -> Encoded:
+    """Frames with a text behind each, a question, and the answer, on which loss is taken."""
+    parts = [part for number, frame in enumerate(frames) for part in (frame, f"\nRotateLeft {number}\n")]
+    return Encoder(model).answer(name, ["What happens?\n", *parts, "What do you see?"], answer)
+
+
+def everywhere(encoded: Encoded) -> Encoded:
+    """The same sequence with loss on every token of text."""
+    return replace(encoded, trained=tuple(isinstance(piece, int) for piece in encoded.pieces))
