@@ -52,7 +52,7 @@ class _Telling(transformers.TrainerCallback):
 def train_with_trainer(
     network: SequenceModel,
     sequences: Sequence[Encoded],
-    collate: Callable[[Sequence[Encoded]], Mapping[str, Any]],
+    collate: Callable[[list[Any]], dict[str, Any]],
     recipe: Recipe,
     out: Path,
     told: Told,
@@ -77,7 +77,7 @@ def train_with_trainer(
     trainer = _SequenceTrainer(
         model=network,
         args=_arguments(recipe, out),
-        train_dataset=list(sequences),  # type: ignore[arg-type]
+        train_dataset=list(sequences),
         data_collator=collate,
         callbacks=[_Telling(told)],
     )
