@@ -7,7 +7,7 @@ INSTALLED := $(VENV)/.installed
 # here. It must stay out of the environment itself, where transformers would find it and fail.
 PEERS := $(VENV)/test-peers
 
-.PHONY: demo test lint clean
+.PHONY: demo test test-all lint clean
 
 # A trajectory in a procedural kitchen, its frames and questions; then the bundled set, by the bounds and a tiny model.
 demo: $(INSTALLED)
@@ -17,6 +17,10 @@ demo: $(INSTALLED)
 	$(BIN)/infthor-eval --model oracle,blind,qwen2.5-vl-tiny --tasks nieh_mini --output results/demo
 
 test: $(INSTALLED) $(PEERS)
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 3 --dist loadfile -m "not slow"
+
+# The slow ones too; half an hour on two cores.
+test-all: $(INSTALLED) $(PEERS)
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 3 --dist loadfile
 
 lint: $(INSTALLED)

@@ -76,6 +76,7 @@ def kill_and_go_on(data, output, n_kills, draw):
     return killed
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(300)
 def test_a_run_that_is_killed_again_and_again_ends_as_one_that_is_not(tmp_path):
     data = write(tmp_path / "data", cut(FORK, 4), cut(MUG, 3))

@@ -18,7 +18,11 @@ def exported(folder):
 @pytest.mark.timeout(300)
 @pytest.mark.parametrize(
     ("model", "task"),
-    [("qwen2.5-vl-tiny", "nieh_gt"), ("planner", "infthor_plans"), ("planner-arm", "manipulathor_pickup")],
+    [
+        ("qwen2.5-vl-tiny", "nieh_gt"),
+        pytest.param("planner", "infthor_plans", marks=pytest.mark.slow),
+        pytest.param("planner-arm", "manipulathor_pickup", marks=pytest.mark.slow),
+    ],
 )
 def test_two_workers_find_what_one_process_finds(run, make_nieh_set, tmp_path, model, task):
     data = make_nieh_set(size=56) if task == "nieh_gt" else write(tmp_path / "data", cut(FORK, 3), cut(MUG, 4))

@@ -15,6 +15,7 @@ def files(folder):
     }
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(300)
 def test_the_files_are_the_same_whoever_makes_them(run, tmp_path):
     for workers in (1, 2):

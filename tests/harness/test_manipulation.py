@@ -32,6 +32,7 @@ def short(task_files):
     return task_files
 
 
+@pytest.mark.slow
 def test_one_request_an_episode_and_what_our_own_run_finds(tmp_path, short, run, start):
     data = write(tmp_path / "data", cut(MUG, 6))
     arguments = ["--model", TINY, "--tasks", "manipulathor_pickup", "--data", data, "--output", tmp_path / "ours"]
@@ -55,7 +56,12 @@ def test_one_request_an_episode_and_what_our_own_run_finds(tmp_path, short, run,
 @pytest.mark.parametrize(
     ("adapter", "task", "said"),
     [
-        ("qwen2.5-vl-tiny", "manipulathor_pickup", "drives no arm; tasks of manipulation need a policy"),
+        pytest.param(
+            "qwen2.5-vl-tiny",
+            "manipulathor_pickup",
+            "drives no arm; tasks of manipulation need a policy",
+            marks=pytest.mark.slow,
+        ),
         (TINY, "nieh_mini_gt", "cannot be talked to; it is a policy, for tasks of manipulation"),
     ],
 )

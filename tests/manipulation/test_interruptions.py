@@ -53,6 +53,7 @@ def found(output):
     return read_run(folder, RECORDS)[1], json.loads((folder / "results.json").read_text())["summary"]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("shared_simulators")
 def test_a_run_that_is_killed_ends_as_one_that_is_not(prepared, tmp_path):
     data = write(tmp_path / "two", cut(CANDLE, 6), cut(MUG))

@@ -100,7 +100,7 @@ def _play(model: Any, frames: Sequence[FrameRef], n: int, decoding: Any, every: 
 @pytest.mark.parametrize("decoding", CASES)
 @pytest.mark.parametrize("prompt", ["plain", "chat"])
 @pytest.mark.parametrize("tokens", ["usual", "added"])
-@pytest.mark.parametrize("family", ["qwen2.5-vl", "llava-onevision"])
+@pytest.mark.parametrize("family", ["qwen2.5-vl", pytest.param("llava-onevision", marks=pytest.mark.slow)])
 def test_replies_are_those_of_a_model_that_shares_nothing(
     folders: dict[tuple[str, str], Path], frames: list[FrameRef], family: str, tokens: str, prompt: str, decoding: str
 ) -> None:
