@@ -25,6 +25,7 @@ _COMMANDS = {
     "plan": "Estimate what a run will take, before it begins.",
     "fetch": "Download the published data.",
     "validate": "Keep the questions of a set that one of several models answers.",
+    "train": "Fine-tune a model on trajectories and questions.",
     "compare": "Compare two runs on the same data.",
     "check-parity": "Compare a policy's actions with another implementation's.",
     "report": "Draw a figure of the paper of your own runs.",

@@ -121,7 +121,7 @@ class Recipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     freeze: tuple[Literal["vision", "embeddings", "decoder", "head"], ...] = ("vision", "embeddings")
     optimizer: Optimizer = Optimizer()
     lora: Lora | None = None
-    epochs: float = 3.0
+    epochs: int = 3
     max_steps: int | None = None
     sequences_per_step: int = 8
     gradient_checkpointing: bool = True

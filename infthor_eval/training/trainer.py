@@ -4,7 +4,8 @@ It is told what it cannot know: how sequences become batches, what a model is sa
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+import time
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,13 +16,13 @@ from transformers.trainer_utils import get_last_checkpoint
 
 from infthor_eval.errors import DataError, UsageError, naming
 from infthor_eval.training.encoding import Encoded
+from infthor_eval.training.loop import Progress
 from infthor_eval.training.network import SequenceModel
 from infthor_eval.training.recipe import Recipe
 
 __all__ = ["train_with_trainer"]
 
 _WEIGHTS = "model.safetensors"
-Told = Callable[[int, Mapping[str, float]], None]
 
 
 class _SequenceTrainer(transformers.Trainer):
@@ -41,12 +42,21 @@ class _SequenceTrainer(transformers.Trainer):
 
 
 class _Telling(transformers.TrainerCallback):
-    def __init__(self, told: Told) -> None:
-        self._told = told
+    """Tells of every step what our own loop tells."""
+
+    def __init__(self, watcher: Callable[[Progress], None], n_tokens: float) -> None:
+        self._watcher = watcher
+        self._n_tokens = n_tokens  # of a step, on average
+        self._began = time.perf_counter()
 
     def on_log(self, args: Any, state: Any, control: Any, logs: Any = None, **kwargs: Any) -> None:
-        if logs and "loss" in logs:
-            self._told(state.global_step, {name: float(logs[name]) for name in ("loss", "learning_rate", "grad_norm")})
+        if not (state.is_world_process_zero and logs and "loss" in logs):
+            return
+        now = time.perf_counter()
+        loss, rate, norm = (float(logs[name]) for name in ("loss", "learning_rate", "grad_norm"))
+        speed = self._n_tokens / (now - self._began)
+        self._began = now
+        self._watcher(Progress(state.global_step, state.max_steps, loss, rate, norm, speed))
 
 
 def train_with_trainer(
@@ -55,8 +65,8 @@ def train_with_trainer(
     collate: Callable[[list[Any]], dict[str, Any]],
     recipe: Recipe,
     out: Path,
-    told: Told,
-) -> int:
+    watcher: Callable[[Progress], None],
+) -> None:
     """Train, going on from the last checkpoint in the folder if there is one.
 
     Args:
@@ -65,28 +75,25 @@ def train_with_trainer(
         collate: makes a batch of sequences.
         recipe: how.
         out: folder of checkpoints.
-        told: is given step, and loss, learning rate and norm of the gradients, after each step.
-
-    Returns:
-        Steps that were made, those of an earlier run included.
+        watcher: is told of every step, in the first process.
 
     Raises:
         UsageError: the processes cannot share the recipe's sequences evenly.
         DataError: the checkpoint that is gone on from cannot be read.
     """
+    n_tokens = sum(sequence.n_tokens for sequence in sequences)
     trainer = _SequenceTrainer(
         model=network,
         args=_arguments(recipe, out),
         train_dataset=list(sequences),
         data_collator=collate,
-        callbacks=[_Telling(told)],
+        callbacks=[_Telling(watcher, recipe.sequences_per_step * n_tokens / len(sequences))],
     )
     trainer.remove_callback(transformers.trainer_callback.PrinterCallback)
     last = get_last_checkpoint(str(out)) if out.is_dir() else None
     damaged = f"{last}: the checkpoint cannot be read"
     with naming(damaged, "remove it to go on from the one before", of=(OSError, ValueError, KeyError), as_a=DataError):
         trainer.train(resume_from_checkpoint=last)
-    return int(trainer.state.global_step)
 
 
 def _arguments(recipe: Recipe, out: Path) -> transformers.TrainingArguments:
