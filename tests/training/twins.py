@@ -41,7 +41,7 @@ def write_frames(folder: Path, count: int) -> list[FrameRef]:
 def sequence(model: Loaded, frames: Sequence[FrameRef], answer: str = "a mug", name: str = "one") -> Encoded:
     """Frames with a text behind each, a question, and the answer, on which loss is taken."""
     parts = [part for number, frame in enumerate(frames) for part in (frame, f"\nRotateLeft {number}\n")]
-    return Encoder(model).answer(name, ["What happens?\n", *parts, "What do you see?"], answer)
+    return Encoder(model).answer(name, ["What happens?\n", *parts, "What do you see now?"], answer)
 
 
 def everywhere(encoded: Encoded) -> Encoded:

@@ -1,0 +1,103 @@
+"""States of a training run that it can go on from, as if it had never ended."""
+
+import json
+import shutil
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import torch
+from safetensors.torch import load_model, save_model
+
+from infthor_eval.errors import DataError, UsageError, naming
+from infthor_eval.formats.files import prepared_folder, written_atomically
+
+__all__ = ["Checkpoints"]
+
+_WEIGHTS, _OPTIMIZER, _STATE = "model.safetensors", "optimizer.pt", "state.json"
+_MEND = "restore it, or remove the folder to begin anew"
+
+
+@dataclass(frozen=True)
+class Checkpoints:
+    """The folder `step-NUMBER` of a run's last state, with weights, the optimizer's moments and what run it is.
+
+    Nothing else is kept: order, learning rate and random numbers follow from the settings and the step.
+
+    Attributes:
+        folder: of the run.
+        about: what has to be equal for going on, as JSON values.
+    """
+
+    folder: Path
+    about: Mapping[str, Any]
+
+    def save(self, step: int, model: torch.nn.Module, optimizer: torch.optim.Optimizer) -> None:
+        """Write a state, and remove the one before.
+
+        Args:
+            step: how many steps are done.
+            model: with its weights after them.
+            optimizer: likewise.
+
+        Raises:
+            DataError: it cannot be written.
+        """
+        place = prepared_folder(self.folder) / f"step-{step:06d}"
+        with (
+            naming(f"{place}: cannot be written", "make room; the last checkpoint is still there"),
+            written_atomically(place) as folder,
+        ):
+            folder.mkdir()
+            save_model(model, str(folder / _WEIGHTS))
+            torch.save(optimizer.state_dict(), folder / _OPTIMIZER)
+            state = {"step": step, "about": self.about}
+            (folder / _STATE).write_text(json.dumps(state, indent=2) + "\n", encoding="utf-8")
+        for older in self._places():
+            if older != place:
+                shutil.rmtree(older)
+
+    def restore(self, model: torch.nn.Module, optimizer: torch.optim.Optimizer) -> int:
+        """Take over the last state, if there is one.
+
+        Args:
+            model: takes its weights.
+            optimizer: takes its moments.
+
+        Returns:
+            How many steps are done.
+
+        Raises:
+            DataError: it is damaged.
+            UsageError: it is of another run.
+        """
+        places = self._places()
+        if not places:
+            return 0
+        last = places[-1]
+        with naming(f"{last}: cannot be read", _MEND, of=Exception):
+            state = json.loads((last / _STATE).read_text(encoding="utf-8"))
+            step, about = int(state["step"]), dict(state["about"])
+        self._require_same(last, about)
+        with naming(f"{last}: cannot be read", _MEND, of=Exception):
+            load_model(model, last / _WEIGHTS)
+            device = next(model.parameters()).device
+            optimizer.load_state_dict(torch.load(last / _OPTIMIZER, map_location=device, weights_only=True))
+        return step
+
+    def _places(self) -> list[Path]:
+        return sorted(self.folder.glob("step-*"), key=_number) if self.folder.is_dir() else []
+
+    def _require_same(self, last: Path, about: Mapping[str, Any]) -> None:
+        for name in sorted({*self.about, *about}):
+            if self.about.get(name) != about.get(name):
+                raise UsageError(
+                    f"{last}: is of a run with {name}={about.get(name)}, not {self.about.get(name)}; go on with its "
+                    "settings, or give another folder"
+                )
+
+
+def _number(place: Path) -> int:
+    with naming(f"{place}: not a checkpoint", "remove it", of=ValueError, as_a=DataError):
+        return int(place.name.removeprefix("step-"))

@@ -1,0 +1,76 @@
+"""What a training run does in which step: which sequences, at which learning rate. Pure functions of its settings."""
+
+import math
+from dataclasses import dataclass
+
+import torch
+
+from infthor_eval.errors import UsageError
+from infthor_eval.formats.digests import seed_of
+
+__all__ = ["LoopSettings"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoopSettings:
+    """Settings of a training run. The defaults are those of the published trainer where it has any.
+
+    Attributes:
+        learning_rate: the highest; reached at the end of the warm-up, and falling to 0 along a line after it.
+        betas: of AdamW.
+        weight_decay: of AdamW; matrices decay, biases and norms do not.
+        clip: the largest norm of a step's gradient.
+        warmup_ratio: share of the steps in which the learning rate rises, along a line from 0.
+        epochs: how often each sequence is seen.
+        max_steps: where the run ends instead; it goes through the sequences as often as that takes.
+        sequences_per_step: of all processes together; the last step of an epoch takes what is left.
+        seed: of the order of the sequences, and of dropout.
+        save_every: steps from one checkpoint to the next; one at the end alone where None.
+
+    Raises:
+        UsageError: a value is out of its range.
+    """
+
+    learning_rate: float
+    betas: tuple[float, float] = (0.9, 0.95)
+    weight_decay: float = 0.1
+    clip: float = 1.0
+    warmup_ratio: float = 0.03
+    epochs: int = 3
+    max_steps: int | None = None
+    sequences_per_step: int = 8
+    seed: int = 0
+    save_every: int | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("learning_rate", "clip", "epochs", "max_steps", "sequences_per_step", "save_every"):
+            value = getattr(self, name)
+            if value is not None and not (value > 0 and math.isfinite(value)):
+                raise UsageError(f"{name}={value} is not a number above 0")
+        if not all(0 <= beta < 1 for beta in self.betas):
+            raise UsageError(f"betas={self.betas[0]},{self.betas[1]} are not at least 0 and below 1")
+        if not 0 <= self.warmup_ratio <= 1:
+            raise UsageError(f"warmup_ratio={self.warmup_ratio} is not between 0 and 1")
+        if not (self.weight_decay >= 0 and math.isfinite(self.weight_decay)):
+            raise UsageError(f"weight_decay={self.weight_decay} is not 0 or more")
+
+    def n_steps(self, n_sequences: int) -> int:
+        """Steps of a run on so many sequences."""
+        return self.epochs * self._epoch_steps(n_sequences) if self.max_steps is None else self.max_steps
+
+    def sequences_of(self, step: int, n_sequences: int) -> list[int]:
+        """Which of so many sequences a step trains on; steps count from 0. Each epoch has an order of its own."""
+        epoch, at = divmod(step, self._epoch_steps(n_sequences))
+        generator = torch.Generator().manual_seed(seed_of(f"{self.seed} epoch {epoch}") % 2**63)
+        order: list[int] = torch.randperm(n_sequences, generator=generator).tolist()
+        return order[at * self.sequences_per_step : (at + 1) * self.sequences_per_step]
+
+    def learning_rate_of(self, step: int, n_steps: int) -> float:
+        """Learning rate of one of so many steps, as transformers' linear schedule has it: the first one's is 0."""
+        n_warm = math.ceil(self.warmup_ratio * n_steps)
+        if step < n_warm:
+            return self.learning_rate * step / n_warm
+        return self.learning_rate * (n_steps - step) / max(1, n_steps - n_warm)
+
+    def _epoch_steps(self, n_sequences: int) -> int:
+        return math.ceil(n_sequences / self.sequences_per_step)

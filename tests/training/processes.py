@@ -1,0 +1,165 @@
+"""What each of several processes does in `test_many_processes.py`; started once for all its tests."""
+
+import os
+from dataclasses import dataclass
+from datetime import timedelta
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import torch
+import torch.distributed as dist
+from torch import Tensor
+from transformers.modeling_utils import ALL_ATTENTION_FUNCTIONS
+
+from infthor_eval.errors import InfthorError
+from infthor_eval.formats.frames import FrameRef
+from infthor_eval.training.batches import Batch, collate, n_labels
+from infthor_eval.training.context_parallel import context_parallel
+from infthor_eval.training.gradients import sum_gradients
+from infthor_eval.training.loop import Loop, LoopSettings, Progress
+from infthor_eval.training.network import SequenceModel, freeze
+from infthor_eval.training.ranks import Ranks, lay_out
+from model_adapters.hf.loaded import Loaded
+
+from .twins import PAD, everywhere, loaded, sequence
+
+__all__ = ["CASES", "N_RANKS", "RESULTS", "Case", "Found", "batch_of", "gradients_of", "model_of", "train", "work"]
+
+N_RANKS = 4
+RESULTS = "results.pt"
+ANSWERS = ("a mug", "a fork and a spoon", "no", "on the counter top", "yes")
+
+
+@dataclass(frozen=True)
+class Case:
+    """A sequence, and how a model is trained on it.
+
+    Attributes:
+        family: of the model.
+        n_frames: in the sequence.
+        answer_only: whether loss is taken on the answer alone, which stands in the last chunk; on all text else.
+        frozen: parts.
+        recomputed: whether activations are computed again for the gradient.
+    """
+
+    family: str
+    n_frames: int
+    answer_only: bool = False
+    frozen: tuple[str, ...] = ()
+    recomputed: bool = False
+
+
+@dataclass(frozen=True)
+class Found:
+    """What came of a case: each rank's share of the loss, and the gradients by name."""
+
+    shares: list[float]
+    gradients: dict[str, Tensor]
+
+
+CASES = (
+    Case("qwen2.5-vl", 5),
+    Case("qwen2.5-vl", 5, answer_only=True, recomputed=True),
+    Case("qwen2.5-vl", 5, frozen=("vision", "embeddings"), recomputed=True),
+    Case("qwen2.5-vl", 5, frozen=("embeddings", "decoder", "head")),
+    Case("qwen2.5-vl", 1, frozen=("embeddings",)),
+    Case("qwen2.5-vl", 0, answer_only=True),
+    Case("llava-onevision", 2, recomputed=True),
+    Case("llava-onevision", 2, answer_only=True, frozen=("vision", "embeddings")),
+)
+
+
+@cache
+def _loaded(family: str) -> Loaded:
+    return loaded(family)
+
+
+def model_of(case: Case) -> SequenceModel:
+    """The case's model, with no gradients."""
+    model = SequenceModel(_loaded(case.family))
+    model.zero_grad()
+    model.requires_grad_(True)
+    freeze(model, case.frozen)
+    model.gradient_checkpointing_disable()
+    if case.recomputed:
+        model.gradient_checkpointing_enable()
+    return model.train()
+
+
+def batch_of(case: Case, frames: list[FrameRef]) -> Batch:
+    """The case's sequence."""
+    checkpoint = _loaded(case.family)
+    encoded = sequence(checkpoint, frames[: case.n_frames])
+    return collate([encoded if case.answer_only else everywhere(encoded)], checkpoint.family, PAD)
+
+
+def gradients_of(model: SequenceModel) -> dict[str, Tensor]:
+    """The gradients that there are."""
+    return {name: one.grad.clone() for name, one in model.named_parameters() if one.grad is not None}
+
+
+def train(folder: Path, frames: list[FrameRef], ranks: Ranks) -> list[Progress]:
+    """Two steps of a loop, the first at learning rate 0: so the optimizer has the sum of gradients at equal weights."""
+    checkpoint = loaded("qwen2.5-vl")
+    model = SequenceModel(checkpoint)
+    sequences = [
+        sequence(checkpoint, frames[: number + 1], answer, f"sequence {number}")
+        for number, answer in enumerate(ANSWERS)
+    ]
+    settings = LoopSettings(learning_rate=1e-3, warmup_ratio=0.5, max_steps=2, sequences_per_step=3)
+    told: list[Progress] = []
+    Loop(model, PAD, sequences, settings, folder, ranks=ranks, report=told.append).run()
+    return told
+
+
+def work(rank: int, folder: Path, frames: list[FrameRef]) -> None:
+    """Do a process's part of everything; the first one writes down what came of it."""
+    torch.set_num_threads(1)
+    os.environ.setdefault("GLOO_SOCKET_IFNAME", "lo")
+    dist.init_process_group(
+        "gloo", f"file://{folder / 'meeting'}", timedelta(seconds=120), world_size=N_RANKS, rank=rank
+    )
+    results: dict[Any, Any] = {}
+    grids = {n_context: lay_out(n_context) for n_context in (2, 4)}
+    for case in CASES:
+        for n_context, ranks in grids.items():
+            results[case, n_context] = _run(case, frames, ranks)
+    results["loop"] = train(folder / "loop", frames, grids[2])
+    results["left behind"] = [name for name in ALL_ATTENTION_FUNCTIONS if "context" in name]
+    results["refused"] = _refusals(frames, grids[2])
+    if rank == 0:
+        torch.save(results, folder / RESULTS)
+    dist.destroy_process_group()
+
+
+def _run(case: Case, frames: list[FrameRef], ranks: Ranks) -> Found:
+    model, batch = model_of(case), batch_of(case, frames)
+    group = ranks.context_group
+    assert group is not None
+    with context_parallel(model, group) as parallel:
+        loss = parallel.loss(batch, n_labels(batch))
+        loss.backward()
+    sum_gradients(model.parameters(), group)
+    shares = [0.0] * ranks.n_context
+    dist.all_gather_object(shares, loss.item(), group)
+    return Found(shares, gradients_of(model))
+
+
+def _refusals(frames: list[FrameRef], ranks: Ranks) -> dict[str, str]:
+    case = CASES[0]
+    model, batch = model_of(case), batch_of(case, frames)
+    assert ranks.context_group is not None
+    found = {}
+    with context_parallel(model, ranks.context_group) as parallel:
+        for layer in model.decoder.layers:
+            layer.self_attn.sliding_window = 8
+        try:
+            parallel.loss(batch, 1)
+        except InfthorError as error:
+            found["sliding"] = str(error)
+    try:
+        lay_out(3)
+    except InfthorError as error:
+        found["three"] = str(error)
+    return found

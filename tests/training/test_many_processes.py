@@ -1,0 +1,113 @@
+"""Sequences cut over two and four processes: the loss and the gradients of one."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+import torch
+import torch.multiprocessing
+from torch import Tensor
+
+from infthor_eval.formats.frames import FrameRef
+from infthor_eval.training.batches import IGNORED, n_labels
+from infthor_eval.training.context_parallel import Cut
+from infthor_eval.training.ranks import Ranks
+
+from .processes import CASES, N_RANKS, RESULTS, Case, Found, batch_of, gradients_of, model_of, train, work
+from .twins import write_frames
+
+TOLERANCE = 1e-5
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("processes")
+
+
+@pytest.fixture(scope="module")
+def frames(folder: Path) -> list[FrameRef]:
+    return write_frames(folder / "frames", 5)
+
+
+@pytest.fixture(scope="module")
+def results(folder: Path, frames: list[FrameRef]) -> Any:
+    torch.multiprocessing.spawn(work, (folder, frames), nprocs=N_RANKS)
+    return torch.load(folder / RESULTS, weights_only=False)
+
+
+@pytest.fixture(scope="module", params=CASES, ids=str)
+def alone(request: pytest.FixtureRequest, frames: list[FrameRef]) -> tuple[Case, Found]:
+    """A case, and what comes of it in one process without recomputation."""
+    case: Case = request.param
+    model, batch = model_of(case), batch_of(case, frames)
+    model.gradient_checkpointing_disable()
+    loss = model(**batch)["loss"]
+    loss.backward()
+    return case, Found([loss.item()], gradients_of(model))
+
+
+def _assert_equal(found: dict[str, Tensor], expected: dict[str, Tensor]) -> None:
+    assert found.keys() == expected.keys()
+    whole = torch.stack([one.norm() for one in expected.values()]).norm()
+    for name, one in expected.items():
+        # Some gradients are 0 but for rounding (those of the biases of keys): these are held against the whole.
+        scale = max(one.norm(), 1e-3 * whole)
+        assert (found[name] - one).norm() <= TOLERANCE * scale, name
+
+
+@pytest.mark.parametrize("n_context", [2, 4])
+def test_a_cut_sequence_has_the_loss_and_gradients_of_the_whole(
+    results: Any, alone: tuple[Case, Found], n_context: int
+) -> None:
+    case, expected = alone
+    found: Found = results[case, n_context]
+    assert sum(found.shares) == pytest.approx(expected.shares[0], rel=TOLERANCE)
+    _assert_equal(found.gradients, expected.gradients)
+
+
+def test_the_cases_are_the_hard_ones(results: Any, frames: list[FrameRef]) -> None:
+    batch = batch_of(CASES[0], frames)
+    n_tokens = batch["input_ids"].shape[1]
+    assert n_tokens % 4
+    assert n_tokens % 8
+    # With the vision tower alone trained, a rank without features has nothing of its own that wants a gradient.
+    assert [bool(Cut(rank, 4).share(batch["slots"], False).any()) for rank in range(4)] == [False, True, True, True]
+    borders = [-(-n_tokens // 8) * number for number in range(1, 8)]
+    assert any(batch["slots"][0, border - 1] and batch["slots"][0, border] for border in borders)
+    assert any(batch["labels"][0, border] != IGNORED for border in borders)
+    shares = results[CASES[1], 4].shares
+    assert shares[0] > 0
+    assert shares[1:] == [0, 0, 0]
+
+
+def test_data_groups_of_cut_sequences_train_as_one_process(results: Any, frames: list[FrameRef], folder: Path) -> None:
+    expected = train(folder / "alone", frames, Ranks())
+    assert len(expected) == 2
+    for found, one in zip(results["loop"], expected, strict=True):
+        assert found.loss == pytest.approx(one.loss, rel=TOLERANCE)
+        assert found.gradient_norm == pytest.approx(one.gradient_norm, rel=TOLERANCE)
+        assert (found.step, found.n_steps, found.learning_rate) == (one.step, one.n_steps, one.learning_rate)
+    ours, theirs = (_moments(folder / name) for name in ("loop", "alone"))
+    _assert_equal(ours, theirs)
+
+
+def _moments(folder: Path) -> dict[str, Tensor]:
+    """The optimizer's sums of gradients."""
+    (state,) = folder.glob("step-*/optimizer.pt")
+    by_number = torch.load(state, weights_only=True)["state"]
+    return {str(number): moments["exp_avg"] for number, moments in by_number.items()}
+
+
+def test_nothing_is_left_behind(results: Any) -> None:
+    assert results["left behind"] == []
+
+
+def test_what_cannot_be_cut_is_refused(results: Any) -> None:
+    assert "attends in windows of 8 tokens" in results["refused"]["sliding"]
+    assert results["refused"]["three"] == "4 processes cannot share sequences by 3; give a divisor of 4"
+
+
+def test_labels_are_counted_over_the_whole_sequence(frames: list[FrameRef]) -> None:
+    batch = batch_of(CASES[0], frames)
+    text = int((~batch["slots"]).sum())
+    assert n_labels(batch) == text - 1
