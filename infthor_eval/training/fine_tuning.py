@@ -75,7 +75,7 @@ def prepared(recipe: Recipe, folders: Sequence[Path]) -> Prepared:
         ModelError: the model cannot be loaded.
         DataError: there is nothing to train on.
     """
-    loaded = starting_point(recipe.model, {**recipe.model_args, "prompt": recipe.prompt}, recipe.seed)
+    loaded = starting_point(recipe.model, recipe.model_args, recipe.prompt, recipe.seed)
     return Prepared(recipe, loaded, read_training_data(recipe, Encoder(loaded), folders))
 
 

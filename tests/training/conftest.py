@@ -17,7 +17,7 @@ def bundled_set() -> Path:
 
 @pytest.fixture(scope="session")
 def plain_tiny() -> Loaded:
-    return starting_point("qwen2.5-vl-tiny", {"prompt": "plain"}, seed=0)
+    return starting_point("qwen2.5-vl-tiny", {}, "plain", seed=0)
 
 
 @pytest.fixture(scope="session")

@@ -17,7 +17,7 @@ def made(encoder, root, context="clues", limit=100_000):
 
 @pytest.fixture(scope="session")
 def chat_tiny():
-    return starting_point("qwen2.5-vl-tiny", {}, seed=0)
+    return starting_point("qwen2.5-vl-tiny", {}, "chat", seed=0)
 
 
 def test_questions_are_asked_as_the_evaluation_asks_them(bundled_set, chat_tiny, plain_tiny):

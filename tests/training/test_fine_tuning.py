@@ -1,0 +1,134 @@
+"""Training runs as a whole: what they write, that they go on where they ended, and what they refuse."""
+
+import json
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+from safetensors.torch import load_file
+
+from infthor_eval.errors import InfthorError
+from infthor_eval.nieh.docs import doc_target
+from infthor_eval.nieh.samples import find_samples
+from infthor_eval.training.fine_tuning import fine_tune, prepared
+from infthor_eval.training.recipe import read_recipe
+from model_adapters import Decoding, load
+
+from ..conftest import QUESTIONS
+
+RECIPE = """
+title: a small one
+model: qwen2.5-vl-tiny
+max_tokens: 5000
+questions: {contexts: [clues]}
+freeze: [vision]
+optimizer: {lr: 1.0e-2, warmup_ratio: 0.0}
+epochs: 4
+sequences_per_step: 2
+save_every: 3
+"""
+
+
+@pytest.fixture
+def data(make_nieh_set):
+    return make_nieh_set(QUESTIONS, size=56)
+
+
+@pytest.fixture
+def recipe(tmp_path):
+    path = tmp_path / "small.yaml"
+    path.write_text(RECIPE)
+    return str(path)
+
+
+def train(recipe, data, out, **changes):
+    told = []
+    run = prepared(read_recipe(recipe, changes), [data])
+    return fine_tune(run, out, told.append), told
+
+
+def command(recipe, data, out, *more):
+    code = "from infthor_eval.cli import main; main()"
+    words = ["train", "--recipe", recipe, "--data", data, "--out", out, *more]
+    return [sys.executable, "-c", code, *map(str, words)]
+
+
+def weights(folder):
+    return load_file(folder / "checkpoint" / "model.safetensors")
+
+
+def same(first, second):
+    return first.keys() == second.keys() and all(first[name].equal(second[name]) for name in first)
+
+
+def test_a_trained_model_answers_as_it_was_trained_to_behind_its_familys_adapter(recipe, data, tmp_path):
+    checkpoint, told = train(recipe, data, tmp_path / "out", epochs=40)
+    assert [done.step for done in told] == list(range(1, told[-1].n_steps + 1))
+    assert told[-1].loss < told[0].loss / 20
+    model = load("qwen2.5-vl", {"pretrained": str(checkpoint), "dtype": "float32", "max_tokens": "0"}, seed=0)
+    samples = find_samples({"data": str(data), "context": "clues"})
+    for sample in samples.samples:
+        talk = model.conversation()
+        shown, text = samples.request(sample)
+        talk.append(*shown, text)
+        assert talk.reply(Decoding(max_new_tokens=10)).text == doc_target(sample.question)
+
+
+def test_a_run_that_is_killed_ends_with_the_weights_of_one_that_is_not(recipe, data, tmp_path):
+    train(recipe, data, tmp_path / "whole")
+    killed = subprocess.Popen(command(recipe, data, tmp_path / "killed"), stderr=subprocess.PIPE)
+    deadline = time.monotonic() + 120
+    while not list((tmp_path / "killed").glob("states/checkpoint-*/trainer_state.json")):
+        assert killed.poll() is None, killed.stderr.read()
+        assert time.monotonic() < deadline
+        time.sleep(0.005)
+    killed.send_signal(signal.SIGKILL)
+    killed.communicate()
+    assert not (tmp_path / "killed" / "checkpoint").exists()
+    _, told = train(recipe, data, tmp_path / "killed")
+    assert 1 < told[0].step <= told[-1].n_steps
+    assert same(weights(tmp_path / "killed"), weights(tmp_path / "whole"))
+
+
+def test_a_folder_is_one_runs(recipe, data, tmp_path, run):
+    train(recipe, data, tmp_path / "out", max_steps=1)
+    about = json.loads((tmp_path / "out" / "training.json").read_text())
+    assert (about["sequences"], about["recipe"]["max_steps"]) == (5, 1)
+    words = ["train", "--recipe", recipe, "--data", data, "--out", tmp_path / "out"]
+    code, _, err = run(*words, "--set", "max_steps=2")
+    assert (code, err.strip().splitlines()[-1]) == (
+        2,
+        f"infthor-eval: {tmp_path}/out is a run of another recipe; give another folder with --out",
+    )
+
+
+def test_adapters_are_trained_and_merged(recipe, data, tmp_path):
+    pytest.importorskip("peft", reason="peft is an extra: pip install 'infthor-eval[train]'")
+    lora = {"lora": {"rank": 4}, "freeze": ["vision", "embeddings", "head"], "max_steps": 3}
+    run = prepared(read_recipe(recipe, lora), [data])
+    before = {name: tensor.clone() for name, tensor in run.loaded.model.state_dict().items()}
+    fine_tune(run, tmp_path / "out", lambda done: None)
+    after = run.loaded.model.state_dict()
+    assert after.keys() == before.keys()
+    changed = {name.split(".")[-2] for name in after if not after[name].equal(before[name])}
+    assert changed == {"q_proj", "k_proj", "v_proj", "o_proj", "gate_proj", "up_proj", "down_proj"}
+    assert not any("lora" in name for name in weights(tmp_path / "out"))
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"optimizer.lr": "0"}, "optimizer.lr is 0"),
+        ({"optimiser.lr": "1"}, "unknown field `optimiser`"),
+        ({"freeze": ["wheels"]}, "Invalid enum value 'wheels'"),
+        ({"questions": None}, "nothing to train on"),
+        ({"model": "openvla-tiny"}, "openvla-tiny is nothing that can be trained here"),
+        ({"max_tokens": "10"}, "no sequence to train on \\(longer than 10 tokens\\)"),
+    ],
+)
+def test_what_cannot_be_is_refused(recipe, data, tmp_path, changes, said):
+    with pytest.raises(InfthorError, match=said):
+        train(recipe, data, tmp_path / "out", **changes)
+    assert not (tmp_path / "out").exists()
