@@ -14,6 +14,7 @@ from typing import Any
 import torch
 import torch.distributed as dist
 from torch import Tensor
+from torch.nn.attention.bias import causal_lower_right
 from torch.nn.functional import pad, scaled_dot_product_attention
 from torch.utils.checkpoint import checkpoint
 from transformers.modeling_utils import ALL_ATTENTION_FUNCTIONS
@@ -226,8 +227,6 @@ def attend(query: Tensor, key: Tensor, value: Tensor, dropout: float, scaling: f
 
 def _flash(query: Tensor, key: Tensor, value: Tensor, dropout: float, scaling: float | None) -> Tensor:
     """By a kernel that aligns the causal mask with the last token by itself."""
-    from torch.nn.attention.bias import causal_lower_right
-
     mask = causal_lower_right(query.shape[-2], key.shape[-2])
     grouped = query.shape[1] != key.shape[1]
     return scaled_dot_product_attention(query, key, value, mask, dropout, scale=scaling, enable_gqa=grouped)

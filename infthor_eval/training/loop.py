@@ -95,9 +95,10 @@ class Loop:
         self._checkpoints = Checkpoints(folder, self._about())
 
     def run(self) -> None:
-        """Train to the end; goes on from the folder's checkpoint, if there is one, to bit for bit the same weights.
+        """Train to the end, from the folder's checkpoint on if there is one.
 
-        All processes have to call it.
+        All processes have to call it, and to see the same folder. On as many processes as before, the weights at the
+        end are bit for bit those of a run that was never interrupted.
 
         Raises:
             DataError: a frame cannot be read, a sequence has no token to take loss on, or a checkpoint is damaged or
@@ -185,11 +186,12 @@ class Loop:
             dist.barrier()
 
     def _about(self) -> dict[str, object]:
-        """What makes a run the same; how often it is saved is no part of it."""
+        """What makes a run the same; how often it is saved, and on how many processes it runs, is no part of it."""
         settings = asdict(self._settings)
         del settings["save_every"]
         names = digest("\n".join(f"{sequence.name} {sequence.n_tokens}" for sequence in self._sequences))
-        return {**settings, "betas": list(self._settings.betas), "sequences": names, "n_data": self._ranks.n_data}
+        n_trained = sum(parameter.numel() for parameter in self._trained)
+        return {**settings, "betas": list(self._settings.betas), "sequences": names, "n_trained": n_trained}
 
 
 def _optimizer(parameters: Sequence[torch.nn.Parameter], settings: LoopSettings) -> torch.optim.AdamW:

@@ -99,10 +99,10 @@ def gradients_of(model: SequenceModel) -> dict[str, Tensor]:
     return {name: one.grad.clone() for name, one in model.named_parameters() if one.grad is not None}
 
 
-def train(folder: Path, frames: list[FrameRef], ranks: Ranks) -> list[Progress]:
+def train(checkpoint: Loaded, folder: Path, frames: list[FrameRef], ranks: Ranks) -> list[Progress]:
     """Two steps of a loop, the first at learning rate 0: so the optimizer has the sum of gradients at equal weights."""
-    checkpoint = loaded("qwen2.5-vl")
-    model = SequenceModel(checkpoint)
+    model = SequenceModel(checkpoint).requires_grad_(True)
+    model.zero_grad()
     sequences = [
         sequence(checkpoint, frames[: number + 1], answer, f"sequence {number}")
         for number, answer in enumerate(ANSWERS)
@@ -125,8 +125,8 @@ def work(rank: int, folder: Path, frames: list[FrameRef]) -> None:
     for case in CASES:
         for n_context, ranks in grids.items():
             results[case, n_context] = _run(case, frames, ranks)
-    results["loop"] = train(folder / "loop", frames, grids[2])
     results["left behind"] = [name for name in ALL_ATTENTION_FUNCTIONS if "context" in name]
+    results["loop"] = train(_loaded("qwen2.5-vl"), folder / "loop", frames, grids[2])
     results["refused"] = _refusals(frames, grids[2])
     if rank == 0:
         torch.save(results, folder / RESULTS)

@@ -1,10 +1,14 @@
 """How sequences are cut, and attention of a part to the whole."""
 
+from collections.abc import Callable
+
 import pytest
 import torch
 from torch.nn.functional import scaled_dot_product_attention
 
-from infthor_eval.training.context_parallel import Cut, attend
+from infthor_eval.training.context_parallel import Cut, _flash, attend
+
+Kernel = Callable[..., torch.Tensor]
 
 
 def test_each_rank_has_a_chunk_from_the_head_and_one_from_the_tail() -> None:
@@ -22,15 +26,16 @@ def test_shares_are_all_of_the_sequence(n_tokens: int) -> None:
     assert sorted(found[found >= 0].tolist()) == whole.flatten().tolist()
 
 
+@pytest.mark.parametrize("kernel", [attend, _flash])  # here the second takes the mask too, by the same call
 @pytest.mark.parametrize("n_own", [1, 300, 700])
 @pytest.mark.parametrize("n_key_heads", [1, 2, 4])
-def test_the_last_queries_see_what_they_see_in_the_whole(n_own: int, n_key_heads: int) -> None:
+def test_the_last_queries_see_what_they_see_in_the_whole(kernel: Kernel, n_own: int, n_key_heads: int) -> None:
     torch.manual_seed(0)
     query, key, value = (torch.randn(2, heads, 700, 8, requires_grad=True) for heads in (4, n_key_heads, n_key_heads))
     weights = torch.randn(2, 4, n_own, 8)
     whole = scaled_dot_product_attention(query, key, value, is_causal=True, scale=0.5, enable_gqa=True)[:, :, -n_own:]
     expected = torch.autograd.grad((whole * weights).sum(), (query, key, value))
-    found = attend(query[:, :, -n_own:], key, value, 0.0, 0.5)
+    found = kernel(query[:, :, -n_own:], key, value, 0.0, 0.5)
     torch.testing.assert_close(found, whole)
     gradients = torch.autograd.grad((found * weights).sum(), (query, key, value))
     for one, other in zip(gradients, expected, strict=True):

@@ -133,6 +133,9 @@ def test_another_runs_checkpoint_is_refused(model: SequenceModel, sequences: lis
         _run(model, sequences, tmp_path, max_steps=1, learning_rate=1e-3)
     with pytest.raises(UsageError, match="is of a run with sequences="):
         _run(model, sequences[:2], tmp_path, max_steps=1)
+    freeze(model, ["head"])
+    with pytest.raises(UsageError, match="is of a run with n_trained="):
+        _run(model, sequences, tmp_path, max_steps=1)
 
 
 @pytest.mark.parametrize("name", ["model.safetensors", "optimizer.pt", "state.json"])

@@ -1,5 +1,6 @@
 """Sequences cut over two and four processes: the loss and the gradients of one."""
 
+import multiprocessing
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from infthor_eval.training.context_parallel import Cut
 from infthor_eval.training.ranks import Ranks
 
 from .processes import CASES, N_RANKS, RESULTS, Case, Found, batch_of, gradients_of, model_of, train, work
-from .twins import write_frames
+from .twins import loaded, write_frames
 
 TOLERANCE = 1e-5
 
@@ -31,7 +32,9 @@ def frames(folder: Path) -> list[FrameRef]:
 
 @pytest.fixture(scope="module")
 def results(folder: Path, frames: list[FrameRef]) -> Any:
-    torch.multiprocessing.spawn(work, (folder, frames), nprocs=N_RANKS)
+    # Forked from a process that has imported everything once, which takes longer than the work.
+    multiprocessing.get_context("forkserver").set_forkserver_preload([work.__module__])
+    torch.multiprocessing.start_processes(work, (folder, frames), nprocs=N_RANKS, start_method="forkserver")
     return torch.load(folder / RESULTS, weights_only=False)
 
 
@@ -81,7 +84,7 @@ def test_the_cases_are_the_hard_ones(results: Any, frames: list[FrameRef]) -> No
 
 
 def test_data_groups_of_cut_sequences_train_as_one_process(results: Any, frames: list[FrameRef], folder: Path) -> None:
-    expected = train(folder / "alone", frames, Ranks())
+    expected = train(loaded("qwen2.5-vl"), folder / "alone", frames, Ranks())
     assert len(expected) == 2
     for found, one in zip(results["loop"], expected, strict=True):
         assert found.loss == pytest.approx(one.loss, rel=TOLERANCE)
