@@ -261,6 +261,16 @@ def _kill(pid: int) -> None:
         return  # it has ended meanwhile
 
 
+class _Listener(ThreadingHTTPServer):
+    """Says nothing of clients that were killed before they had their reply."""
+
+    daemon_threads = True
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        if not isinstance(sys.exception(), ConnectionError):
+            super().handle_error(request, client_address)
+
+
 class _Server:
     """Chat completions whose text follows from the request; once disturbing, every so many requests go wrong."""
 
@@ -280,8 +290,7 @@ class _Server:
             def log_message(self, *_: Any) -> None:
                 pass
 
-        self._http = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
-        self._http.daemon_threads = True
+        self._http = _Listener(("127.0.0.1", 0), Handler)
         self.url = f"http://127.0.0.1:{self._http.server_address[1]}/v1"
 
     def __enter__(self) -> "_Server":

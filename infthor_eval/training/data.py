@@ -16,7 +16,7 @@ from infthor_eval.training.encoding import Encoded, Encoder, LeftOut
 from infthor_eval.training.question_sequences import question_sequences
 from infthor_eval.training.recipe import Recipe
 
-__all__ = ["TrainingData", "read_training_data"]
+__all__ = ["TrainingData", "action_sequences", "read_training_data"]
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,9 @@ def read_training_data(recipe: Recipe, encoder: Encoder, folders: Sequence[Path]
 
 def _of_set(recipe: Recipe, encoder: Encoder, folder: Path) -> Iterator[Encoded | LeftOut]:
     if recipe.actions is not None:
-        yield from _share(_actions(NiehSet(folder), encoder, recipe.max_tokens), recipe.actions.share, recipe.seed)
+        yield from _share(
+            action_sequences(NiehSet(folder), encoder, recipe.max_tokens), recipe.actions.share, recipe.seed
+        )
     if recipe.questions is not None:
         told = {"seed": recipe.seed} | recipe.questions.settings | {"data": str(folder)}
         for context in recipe.questions.contexts:
@@ -80,8 +82,17 @@ def _of_set(recipe: Recipe, encoder: Encoder, folder: Path) -> Iterator[Encoded 
             yield from _share(made, recipe.questions.share, recipe.seed)
 
 
-def _actions(data: NiehSet, encoder: Encoder, limit: int) -> Iterator[Encoded | LeftOut]:
-    """The windows of every trajectory of a set."""
+def action_sequences(data: NiehSet, encoder: Encoder, limit: int) -> Iterator[Encoded | LeftOut]:
+    """The windows of every trajectory of a set.
+
+    Args:
+        data: the set; its trajectories are in it.
+        encoder: makes the sequences.
+        limit: tokens of a sequence, frames expanded.
+
+    Yields:
+        The sequences, and what none could be made of.
+    """
     for folder in sorted(path for path in (data.root / "metadata").iterdir() if path.is_dir()):
         name = folder.name
         try:

@@ -11,9 +11,9 @@ from transformers.models.qwen2_vl.image_processing_pil_qwen2_vl import Qwen2VLIm
 from model_adapters.hf.families.qwen2_5_vl import PixelLimits, Qwen25VLFamily
 from model_adapters.tiny.twin import SPREAD, TinyAdapter, TinyOptions, Twin
 
-__all__ = ["Qwen25VLTiny", "save_tiny_checkpoint"]
+__all__ = ["SPECIAL", "Qwen25VLTiny", "save_tiny_checkpoint"]
 
-_SPECIAL = (
+SPECIAL = (
     "<|endoftext|>",
     "<|im_start|>",
     "<|im_end|>",
@@ -94,7 +94,7 @@ class Qwen25VLTiny(TinyAdapter):
 
     Options = _Options
     twin = Twin(
-        special=_SPECIAL,
+        special=SPECIAL,
         end="<|im_end|>",
         pad="<|endoftext|>",
         image="<|image_pad|>",

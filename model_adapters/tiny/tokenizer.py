@@ -1,6 +1,6 @@
 """Byte-level BPE tokenizers trained on the spot, so that tiny models need no download."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from tokenizers import Regex, Tokenizer, decoders, models, normalizers, pre_tokenizers, processors, trainers
 from transformers import PreTrainedTokenizerFast
@@ -20,9 +20,10 @@ def train_tokenizer(
     pad: str,
     begin: str | None = None,
     named: Mapping[str, str],
+    corpus: Iterable[str] = tuple(CORPUS.splitlines()),
     n_merged: int = 600,
 ) -> PreTrainedTokenizerFast:
-    """Train a tokenizer on the package's corpus.
+    """Train a tokenizer.
 
     Args:
         special: special tokens, which take the ids behind the trained ones in this order; the tokens below are among
@@ -31,6 +32,7 @@ def train_tokenizer(
         pad: the padding token.
         begin: the token put before every text, if any.
         named: tokens that processors look up by attribute, as `image_token`.
+        corpus: what it is trained on; the package's own.
         n_merged: tokens that are trained, the 256 bytes among them.
     """
     tokenizer = Tokenizer(models.BPE())
@@ -47,7 +49,7 @@ def train_tokenizer(
         initial_alphabet=sorted(pre_tokenizers.ByteLevel.alphabet()),
         show_progress=False,
     )
-    tokenizer.train_from_iterator(CORPUS.splitlines(), trainer)
+    tokenizer.train_from_iterator(corpus, trainer)
     tokenizer.add_special_tokens(list(special))
     if begin is not None:
         tokenizer.post_processor = processors.TemplateProcessing(

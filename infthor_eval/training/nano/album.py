@@ -1,0 +1,115 @@
+"""All frames that the small model is trained on, as what its vision tower takes, and what is to be seen in them."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from infthor_eval.errors import DataError
+from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.step_log import Seen, Step, read_steps
+from infthor_eval.training.nano.architecture import GRID, PATCHES, TOKENS
+
+__all__ = ["Album", "read_album"]
+
+_LEAST_PIXELS = 90  # of an object that counts as shown: a thousandth of a frame of 300 x 300, as in the questions
+_OF_CELL, _OF_OBJECT = 0.4, 0.5  # shares of a cell, or of an object, that lie within each other where it is seen there
+
+
+@dataclass(frozen=True)
+class Album:
+    """Frames and what they show.
+
+    Attributes:
+        frames: each once.
+        types: of objects, sorted.
+        pixels: (frames, patches, values) of one of the two equal moments that the tower wants, float16.
+        cells: (frames, tokens, types), whether a token's part of the frame shows a type.
+        shown: (frames, types), whether the frame shows it near enough to be visible in AI2-THOR's sense.
+        present: (frames, types), whether anything of it is in the frame.
+    """
+
+    frames: tuple[FrameRef, ...]
+    types: tuple[str, ...]
+    pixels: Tensor
+    cells: Tensor
+    shown: Tensor
+    present: Tensor
+
+    def places(self) -> dict[str, int]:
+        """Digest of a frame's file to its place in the album."""
+        return {frame.digest: at for at, frame in enumerate(self.frames)}
+
+    def for_tower(self, places: Sequence[int]) -> Tensor:
+        """What the vision tower is fed for some frames, (frames x patches, values)."""
+        chosen = self.pixels[list(places)].float().reshape(len(places) * PATCHES, 3, 1, -1)
+        return chosen.expand(-1, -1, 2, -1).reshape(len(places) * PATCHES, -1)
+
+
+def read_album(folders: Iterable[Path], image_processor: Any) -> Album:
+    """Read all frames of replayed sets.
+
+    Args:
+        folders: of the sets.
+        image_processor: the model's.
+
+    Raises:
+        DataError: a set cannot be read, or does not say what its frames show.
+    """
+    frames: dict[str, tuple[FrameRef, Step]] = {}
+    for folder in folders:
+        data = NiehSet(folder)
+        for place in sorted(path for path in (folder / "metadata").iterdir() if path.is_dir()):
+            steps = sorted(read_steps(place), key=lambda step: step.img_idx)
+            if any(step.seen is None for step in steps):
+                raise DataError(f"{place}: does not say what its frames show; replay the trajectory")
+            for frame, step in zip(data.frames(place.name), steps, strict=True):
+                frames.setdefault(frame.digest, (frame, step))
+    found = list(frames.values())
+    types = sorted({_type(key) for _, step in found for key in step.seen or ()})
+    labels = [_labels(step.seen or {}, types, frame.size) for frame, step in found]
+    cells, shown, present = (torch.stack(parts) for parts in zip(*labels, strict=True))
+    pixels = torch.stack([_patches(frame, image_processor) for frame, _ in found])
+    return Album(tuple(frame for frame, _ in found), tuple(types), pixels, cells, shown, present)
+
+
+def _patches(frame: FrameRef, image_processor: Any) -> Tensor:
+    made = image_processor(images=[frame.load()], return_tensors="pt")
+    pixels: Tensor = made["pixel_values"]
+    if len(pixels) != PATCHES:
+        raise DataError(f"{frame.path}: is not square; train on square frames")
+    return pixels.reshape(PATCHES, 3, 2, -1)[:, :, 0].reshape(PATCHES, -1).half()
+
+
+def _type(key: str) -> str:
+    """The type in an object's id: that of a part ("...|SinkBasin") or a slice ("...|AppleSliced_1") where it is one."""
+    first, *_, last = key.split("|")
+    return last.partition("_")[0] if last[:1].isalpha() else first
+
+
+def _labels(seen: dict[str, Seen], types: Sequence[str], size: tuple[int, int]) -> tuple[Tensor, Tensor, Tensor]:
+    cells = torch.zeros(TOKENS, len(types))
+    shown, present = torch.zeros(len(types)), torch.zeros(len(types))
+    for key, item in seen.items():
+        at = types.index(_type(key))
+        present[at] = 1
+        if item.visible and item.pixels >= _LEAST_PIXELS:
+            shown[at] = 1
+        cells[:, at] = torch.maximum(cells[:, at], _covered(item.box, size))
+    return cells, shown, present
+
+
+def _covered(box: tuple[int, int, int, int], size: tuple[int, int]) -> Tensor:
+    """In which cells of a frame a box lies, (tokens,), row by row."""
+    spans = []
+    for low, high, extent in ((box[1], box[3] + 1, size[1]), (box[0], box[2] + 1, size[0])):
+        edges = torch.arange(GRID + 1) * (extent / GRID)
+        overlap = (edges[1:].clamp(max=high) - edges[:-1].clamp(min=low)).clamp(min=0)
+        spans.append(overlap / (extent / GRID))
+    area = spans[0][:, None] * spans[1][None, :]  # in cells
+    whole = (box[2] + 1 - box[0]) * (box[3] + 1 - box[1]) / (size[0] * size[1]) * TOKENS
+    return ((area >= _OF_CELL) | (area >= _OF_OBJECT * whole)).float().flatten()

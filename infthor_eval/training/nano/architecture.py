@@ -1,0 +1,110 @@
+"""The small model before it has learned anything: Qwen2.5-VL's classes, and a tokenizer that knows the household.
+
+A frame is 112 x 112 pixels and takes 16 tokens. Words are single tokens, and so is the sentence that every question of
+the published evaluation begins with: three quarters of a question's tokens would be the same in all of them.
+"""
+
+from collections.abc import Iterable
+from typing import Any, cast
+
+import torch
+from tokenizers import AddedToken
+from transformers import AutoModelForImageTextToText, GenerationConfig, Qwen2_5_VLConfig
+from transformers.models.qwen2_vl.image_processing_pil_qwen2_vl import Qwen2VLImageProcessorPil
+
+from infthor_eval.household.sequence_text import MARKS
+from infthor_eval.training.nano.settings import NanoRecipe
+from model_adapters.hf.checkpoint import assemble
+from model_adapters.hf.families.qwen2_5_vl import Qwen25VLFamily
+from model_adapters.hf.loaded import Loaded
+from model_adapters.hf.templates import plain_template
+from model_adapters.tiny.qwen2_5_vl import SPECIAL
+from model_adapters.tiny.tokenizer import train_tokenizer
+
+__all__ = ["GRID", "PATCHES", "PIXELS", "TOKENS", "untrained"]
+
+GRID = 4  # tokens of a frame, along each side
+TOKENS = GRID**2
+PATCHES = 4 * TOKENS  # two by two of them are merged to a token
+_SIDE = 14  # pixels of a patch
+# By the processor's own rounding 112 x 112 pixels; a limit of exactly as many would be rounded down to 84 x 84.
+PIXELS = 12_600
+_MERGES = 3000  # more than there are words, so that each of them is a token
+
+
+def untrained(recipe: NanoRecipe, corpus: Iterable[str], sentences: Iterable[str]) -> Loaded:
+    """The model with random weights of the recipe's seed, on the CPU in float32.
+
+    Args:
+        recipe: its size.
+        corpus: texts with all the words that it is to know.
+        sentences: texts that are a token as a whole.
+    """
+    tokenizer = train_tokenizer(
+        (*SPECIAL, *MARKS),
+        end="<|im_end|>",
+        pad="<|endoftext|>",
+        named={"image_token": "<|image_pad|>"},
+        corpus=corpus,
+        n_merged=_MERGES,
+    )
+    tokenizer.add_tokens([AddedToken(sentence, normalized=False) for sentence in sentences])
+    model = _model(recipe, tokenizer)
+    image_processor = Qwen2VLImageProcessorPil(min_pixels=PIXELS, max_pixels=PIXELS)
+    family = Qwen25VLFamily(model, image_processor, tokenizer)
+    return assemble(
+        model,
+        tokenizer,
+        image_processor,
+        template=plain_template(tokenizer, family),
+        family=family,
+        max_tokens=model.config.text_config.max_position_embeddings,
+        origin={"checkpoint": "nano", "seed": recipe.seed},
+    )
+
+
+def _model(recipe: NanoRecipe, tokenizer: Any) -> Any:
+    ids = {token: tokenizer.convert_tokens_to_ids(token) for token in SPECIAL}
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(recipe.seed)
+        model = cast(Any, AutoModelForImageTextToText).from_config(
+            _config(recipe, ids, len(tokenizer)), attn_implementation="sdpa", dtype=torch.float32
+        )
+    ends = [ids["<|im_end|>"], ids["<|endoftext|>"]]
+    model.generation_config = GenerationConfig(eos_token_id=ends, pad_token_id=ends[1])
+    return model
+
+
+def _config(recipe: NanoRecipe, ids: dict[str, int], vocab_size: int) -> Any:
+    width, layers = recipe.hidden, recipe.layers
+    return Qwen2_5_VLConfig(
+        image_token_id=ids["<|image_pad|>"],
+        video_token_id=ids["<|video_pad|>"],
+        vision_start_token_id=ids["<|vision_start|>"],
+        vision_end_token_id=ids["<|vision_end|>"],
+        tie_word_embeddings=True,
+        text_config={
+            "vocab_size": vocab_size,
+            "hidden_size": width,
+            "intermediate_size": 3 * width,
+            "num_hidden_layers": layers,
+            "num_attention_heads": 4,
+            "num_key_value_heads": 4,
+            "max_position_embeddings": 32_768,
+            "bos_token_id": None,
+            "eos_token_id": ids["<|im_end|>"],
+            "pad_token_id": ids["<|endoftext|>"],
+            "tie_word_embeddings": True,
+            "rope_parameters": {"rope_type": "default", "rope_theta": 1e4, "mrope_section": [4, 6, 6]},
+        },
+        vision_config={
+            "depth": layers,
+            "hidden_size": width,
+            "intermediate_size": 2 * width,
+            "num_heads": 4,
+            "out_hidden_size": width,
+            "patch_size": _SIDE,
+            "window_size": 2 * GRID * _SIDE,  # the whole frame
+            "fullatt_block_indexes": list(range(layers)),
+        },
+    )

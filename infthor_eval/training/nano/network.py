@@ -1,0 +1,92 @@
+"""The small model as a network: sequences to their loss, and what its vision tower says of each part of a frame.
+
+The tower is told what is where by the embeddings of the objects' names, in each way in which texts write them: so
+words and what they look like lie in one space before the decoder has to bring them together.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+import torch
+from torch import Tensor
+from torch.nn.functional import binary_cross_entropy_with_logits
+
+from infthor_eval.household.wording import compact, noun
+from infthor_eval.training.nano.album import Album
+from infthor_eval.training.nano.architecture import TOKENS
+from infthor_eval.training.network import SequenceModel
+from model_adapters.hf.loaded import Loaded
+from model_adapters.hf.prompt import Frame
+
+__all__ = ["NanoNetwork", "ways_of_writing"]
+
+_SCALE, _BIAS = 8.0, -4.0  # of how alike a part of a frame and a name are, to begin with
+
+
+def ways_of_writing(object_type: str) -> tuple[str, ...]:
+    """An object type as questions, answers, actions and plans write it."""
+    return f" {noun(object_type)}", compact(object_type), f" {object_type}", f" {compact(object_type)}"
+
+
+class NanoNetwork(SequenceModel):
+    """A `SequenceModel` that finds its frames in an album.
+
+    Args:
+        loaded: the model.
+        album: all frames.
+    """
+
+    def __init__(self, loaded: Loaded, album: Album) -> None:
+        super().__init__(loaded)
+        self._album = album
+        self._places = album.places()
+        self._names = [_bags(loaded.tokenizer, album.types, way) for way in range(len(ways_of_writing("Mug")))]
+        self.scale = torch.nn.Parameter(torch.tensor(_SCALE))
+        self.bias = torch.nn.Parameter(torch.full((len(album.types),), _BIAS))
+
+    def features(self, frames: Sequence[Frame]) -> list[Tensor]:
+        """See `SequenceModel`."""
+        distinct = list(dict.fromkeys(frame.digest for frame in frames))
+        seen = self.see([self._places[digest] for digest in distinct])
+        by_digest = dict(zip(distinct, seen, strict=True))
+        return [by_digest[frame.digest] for frame in frames]
+
+    def see(self, places: Sequence[int]) -> Tensor:
+        """Features of frames of the album, (frames, tokens, hidden)."""
+        grid = torch.tensor([[1, *([int(self._album.pixels.shape[1] ** 0.5)] * 2)]]).expand(len(places), 3)
+        output: Any = self.model.model.visual(self._album.for_tower(places), grid_thw=grid)
+        features: Tensor = output.pooler_output
+        return features.reshape(len(places), TOKENS, -1)
+
+    def seeing_loss(self, features: Tensor, places: Sequence[int], way: int) -> Tensor:
+        """How wrong the features are about what is to be seen, a scalar.
+
+        Of each part of a frame, and of the whole; what is in the frame but too far away to count is left open there.
+
+        Args:
+            features: (frames, tokens, hidden).
+            places: of the frames, in the album.
+            way: of writing the names.
+        """
+        chosen = list(places)
+        names = self._names[way] @ self.model.get_input_embeddings().weight
+        logits = self.scale * (features @ names.T) + self.bias
+        in_parts = binary_cross_entropy_with_logits(logits, self._album.cells[chosen], reduction="none")
+        shown, present = self._album.shown[chosen], self._album.present[chosen]
+        in_whole = binary_cross_entropy_with_logits(torch.logsumexp(logits, 1), shown, reduction="none")
+        return in_parts.sum(-1).mean() + (in_whole * (1 - present + shown).clamp(max=1)).sum(-1).mean()
+
+    @property
+    def n_ways(self) -> int:
+        """In how many ways names are written."""
+        return len(self._names)
+
+
+def _bags(tokenizer: Any, types: Sequence[str], way: int) -> Tensor:
+    """The mean of a name's tokens, as a matrix (types, vocabulary)."""
+    bags = torch.zeros(len(types), len(tokenizer))
+    for row, object_type in enumerate(types):
+        ids = tokenizer(ways_of_writing(object_type)[way], add_special_tokens=False)["input_ids"]
+        for token in ids:
+            bags[row, token] += 1 / len(ids)
+    return bags

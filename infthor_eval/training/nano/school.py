@@ -1,0 +1,132 @@
+"""From sets to a small model that has learned to see, to answer and to act."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import torch
+from torch import Tensor
+from transformers.models.qwen2_vl.image_processing_pil_qwen2_vl import Qwen2VLImageProcessorPil
+
+from infthor_eval.training.batches import collate
+from infthor_eval.training.encoding import Encoded, Encoder
+from infthor_eval.training.nano.album import read_album
+from infthor_eval.training.nano.architecture import PIXELS, untrained
+from infthor_eval.training.nano.lessons import Lessons, opening, texts
+from infthor_eval.training.nano.network import NanoNetwork
+from infthor_eval.training.nano.settings import NanoRecipe
+from model_adapters.hf.loaded import Loaded
+
+__all__ = ["Lesson", "teach"]
+
+_WARM_UP = 50  # steps
+_LOWEST = 0.05  # of the learning rate, in the end
+_BETAS = (0.9, 0.98)
+_CLIP = 1.0
+
+
+@dataclass(frozen=True)
+class Lesson:
+    """A step that is done.
+
+    Attributes:
+        part: "see" or "tell".
+        step: its number in the part, from 1 on.
+        n_steps: of the part.
+        loss: of what is seen, per frame, or told, per token, in nats.
+    """
+
+    part: str
+    step: int
+    n_steps: int
+    loss: float
+
+
+def teach(recipe: NanoRecipe, folders: Sequence[Path], watcher: Callable[[Lesson], None]) -> Loaded:
+    """Train the small model on replayed sets.
+
+    Args:
+        recipe: how.
+        folders: of the sets, with trajectories and questions.
+        watcher: is told of every step.
+
+    Returns:
+        The model, to be exported.
+
+    Raises:
+        DataError: a set cannot be read.
+    """
+    torch.set_num_threads(recipe.threads)
+    torch.manual_seed(recipe.seed)
+    album = read_album(folders, Qwen2VLImageProcessorPil(min_pixels=PIXELS, max_pixels=PIXELS))
+    loaded = untrained(recipe, texts(folders, album.types), [opening()])
+    network = NanoNetwork(loaded, album)
+    lessons = Lessons(Encoder(loaded), folders, album, window_tokens=recipe.window_tokens, seed=recipe.seed)
+    course = _Course(recipe, network, lessons)
+    network.train()
+    course.run("see", recipe.seeing_steps, course.see, watcher)
+    course.run("tell", recipe.telling_steps, course.tell, watcher)
+    network.eval()
+    return loaded
+
+
+class _Course:
+    """The steps of both parts."""
+
+    def __init__(self, recipe: NanoRecipe, network: NanoNetwork, lessons: Lessons) -> None:
+        self._recipe = recipe
+        self._network = network
+        self._lessons = lessons
+        self._trained = list(network.parameters())
+        matrices = [one for one in self._trained if one.ndim > 1]
+        others = [one for one in self._trained if one.ndim <= 1]
+        self._optimizer = torch.optim.AdamW(
+            [{"params": matrices, "weight_decay": recipe.weight_decay}, {"params": others, "weight_decay": 0.0}],
+            lr=recipe.lr,
+            betas=_BETAS,
+        )
+
+    def run(
+        self, part: str, n_steps: int, step: Callable[[], tuple[Tensor, Tensor]], watcher: Callable[[Lesson], None]
+    ) -> None:
+        """Make the steps of one part, at a learning rate that rises, and falls along a cosine."""
+        for number in range(n_steps):
+            rise = min(1.0, (number + 1) / _WARM_UP)
+            fall = _LOWEST + (1 - _LOWEST) * 0.5 * (1 + math.cos(math.pi * number / n_steps))
+            for group in self._optimizer.param_groups:
+                group["lr"] = self._recipe.lr * rise * fall
+            loss, told = step()
+            self._optimizer.zero_grad()
+            loss.backward()
+            torch.nn.utils.clip_grad_norm_(self._trained, _CLIP)
+            self._optimizer.step()
+            watcher(Lesson(part, number + 1, n_steps, told.item()))
+
+    def see(self) -> tuple[Tensor, Tensor]:
+        """What is in some frames."""
+        places = self._lessons.frames(self._recipe.frames_per_step)
+        loss = self._seen(self._network.see(places), places)
+        return loss, loss.detach()
+
+    def tell(self) -> tuple[Tensor, Tensor]:
+        """Answers and actions, and what is in the frames that they are about."""
+        recipe = self._recipe
+        questions = self._lessons.questions(recipe.questions_per_step, recipe.made_up)
+        told, n_told = self._told(questions)
+        total, n_items = told, n_told
+        for history in self._lessons.histories(recipe.windows_per_step):
+            acted, n_acted = self._told([history])
+            total, n_items = total + acted, n_items + n_acted
+        loss = total / n_items
+        places = self._lessons.frames(recipe.frames_per_step // 4)
+        return loss + recipe.seeing_weight * self._seen(self._network.see(places), places), loss.detach()
+
+    def _seen(self, features: Tensor, places: Sequence[int]) -> Tensor:
+        return self._network.seeing_loss(features, places, self._lessons.way(self._network.n_ways))
+
+    def _told(self, sequences: Sequence[Encoded]) -> tuple[Tensor, int]:
+        """Sum of the losses of some sequences' tokens, and how many there are."""
+        batch = collate(sequences, self._network.family, pad_id=0)
+        loss: Tensor = self._network(**batch, num_items_in_batch=1)["loss"]
+        return loss, sum(sequence.n_trained for sequence in sequences)

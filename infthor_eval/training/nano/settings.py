@@ -1,0 +1,68 @@
+"""What the small model is made by."""
+
+import msgspec
+
+__all__ = ["NanoRecipe", "Scenes"]
+
+
+class Scenes(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The procedural scenes that it is trained in.
+
+    Attributes:
+        kinds: of rooms.
+        first: number of the first scene of each kind; those that come with the package have lower ones.
+        count: scenes of each kind.
+        min_steps: of a trajectory, at least.
+    """
+
+    kinds: tuple[str, ...] = ("kitchen", "living-room", "bedroom", "bathroom")
+    first: int = 101
+    count: int = 24
+    min_steps: int = 70
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of all of them."""
+        return tuple(f"{kind}-{self.first + at}" for kind in self.kinds for at in range(self.count))
+
+
+class NanoRecipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """How the small model is trained: it learns to see, then to answer and to act.
+
+    Attributes:
+        architecture: marks the recipe.
+        title: what it is, in one line.
+        scenes: where its data is made, if none is given.
+        hidden: width of tower and decoder.
+        layers: of each.
+        seeing_steps: in which it learns which objects are in which part of a frame, by their names' embeddings.
+        telling_steps: in which it learns to answer questions and to act; it goes on learning to see.
+        frames_per_step: while it learns to see.
+        questions_per_step: while it learns to answer.
+        made_up: share of these that ask for the presence of an object in any frame.
+        windows_per_step: histories that it learns to act from, in each of these steps.
+        window_tokens: of each of them at most.
+        lr: the highest learning rate.
+        weight_decay: of AdamW.
+        seeing_weight: of what is seen beside what is told, in the second part.
+        threads: of torch; another number rounds otherwise.
+        seed: of everything that is random.
+    """
+
+    architecture: str = "nano"
+    title: str
+    scenes: Scenes = Scenes()
+    hidden: int = 128
+    layers: int = 4
+    seeing_steps: int = 400
+    telling_steps: int = 900
+    frames_per_step: int = 64
+    questions_per_step: int = 40
+    made_up: float = 0.4
+    windows_per_step: int = 1
+    window_tokens: int = 2048
+    lr: float = 1.5e-3
+    weight_decay: float = 0.05
+    seeing_weight: float = 0.1
+    threads: int = 2
+    seed: int = 0
