@@ -14,7 +14,7 @@ setup(
     ],
     package_dir={"infthor_eval.tasks": "tasks", "infthor_eval.results": "results"},
     package_data={
-        "infthor_eval": ["sets/**/*"],
+        "infthor_eval": ["models/**/*", "sets/**/*"],
         "infthor_eval.agents": ["*.yaml"],
         "infthor_eval.household": ["*.yaml"],
         "infthor_eval.nieh": ["*.yaml"],

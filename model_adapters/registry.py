@@ -50,6 +50,7 @@ _BUILT_IN = {
     "pixtral-tiny": "model_adapters.tiny.pixtral:PixtralTiny",
     "qwen2.5-vl": "model_adapters.hf.families.qwen2_5_vl:Qwen25VL",
     "qwen2.5-vl@vllm": "model_adapters.vllm.adapter:Qwen25VLOnVllm",
+    "qwen2.5-vl-nano": "model_adapters.tiny.qwen2_5_vl_nano:Qwen25VLNano",
     "qwen2.5-vl-tiny": "model_adapters.tiny.qwen2_5_vl:Qwen25VLTiny",
     "spatialvla": "model_adapters.policies.spatialvla.adapter:SpatialVLA",
     "spatialvla-tiny": "model_adapters.tiny.spatialvla:SpatialVLATiny",

@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from infthor_eval.cli.options import model_options_in
+from infthor_eval.cli.staffing_options import staffing_options
+
+if TYPE_CHECKING:
+    from infthor_eval.workers import Staffing
 
 __all__ = ["command"]
 
@@ -19,16 +24,17 @@ _PATH = click.Path(path_type=Path)
     "--data",
     "folders",
     multiple=True,
-    required=True,
     type=_PATH,
     metavar="SET",
-    help="A replayed set (`replay`), with a question file where there are to be questions; may be repeated.",
+    help="A replayed set (`replay`), with a question file where there are to be questions; may be repeated. "
+    "The recipe tiny makes its own where none is given.",
 )
 @click.option("--model", metavar="NAME", help="Another model than the recipe's.")
 @click.option("--model-args", metavar="K=V,...", help="Its options (pretrained, dtype, ...), beside the recipe's.")
 @click.option("--set", "changes", multiple=True, metavar="KEY=VALUE", help="Another setting of the recipe; repeatable.")
 @click.option("--out", required=True, type=_PATH, help="Folder of the run; the checkpoint is in checkpoint/ there.")
 @click.option("--dry-run", is_flag=True, help="Make the sequences, tell what they are, and train nothing.")
+@staffing_options
 def command(
     name: str,
     folders: tuple[Path, ...],
@@ -37,20 +43,34 @@ def command(
     changes: tuple[str, ...],
     out: Path,
     dry_run: bool,
+    staffing: Staffing,
 ) -> int:
     """Fine-tune a model, and write a checkpoint that its family's adapter loads.
 
-    Recipes of the package: infthor_32k, infthor_64k and infthor_130k (the paper's, Table 5), questions. Others are YAML
-    files of the same form. Stopped, the same command goes on. Several processes: torchrun --nproc-per-node N
-    --no-python infthor-eval train ...
+    Recipes of the package: infthor_32k, infthor_64k and infthor_130k (the paper's, Table 5), questions, and tiny, which
+    makes a small model from nothing. Others are YAML files of the same form.
+
+    Stopped, the same command goes on. Several processes: torchrun --nproc-per-node N --no-python infthor-eval train ...
+    Workers share the making of data.
     """
-    from infthor_eval.cli.training import train
+    from infthor_eval.training.nano.settings import NanoRecipe
     from infthor_eval.training.recipe import read_recipe
 
     told = dict(_setting(item) for item in changes)
     told |= {} if model is None else {"model": model}
     told |= {f"model_args.{key}": value for key, value in model_options_in(model_args or "").items()}
-    return train(read_recipe(name, told), folders, out, dry_run)
+    recipe = read_recipe(name, told)
+    if isinstance(recipe, NanoRecipe):
+        from infthor_eval.cli.nano_training import train_nano
+
+        if model is not None or model_args is not None or dry_run:
+            raise click.UsageError("--model, --model-args and --dry-run are for recipes that begin with a model")
+        return train_nano(recipe, folders, out, staffing)
+    from infthor_eval.cli.training import train
+
+    if not folders:
+        raise click.UsageError("give --data, a replayed set to train on")
+    return train(recipe, folders, out, dry_run)
 
 
 def _setting(item: str) -> tuple[str, str]:

@@ -9,6 +9,7 @@ import msgspec
 from infthor_eval.errors import UsageError, naming, unknown_name
 from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.formats.yaml_files import read_yaml
+from infthor_eval.training.nano.settings import NanoRecipe
 
 __all__ = ["ActionData", "Lora", "Optimizer", "Parallel", "QuestionData", "Recipe", "read_recipe", "recipe_names"]
 
@@ -161,7 +162,7 @@ def recipe_names() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in packaged_folder(_FOLDER).glob("*.yaml")))
 
 
-def read_recipe(name: str, changes: Mapping[str, Any] | None = None) -> Recipe:
+def read_recipe(name: str, changes: Mapping[str, Any] | None = None) -> Recipe | NanoRecipe:
     """A recipe by its name, or from a file.
 
     Args:
@@ -179,6 +180,8 @@ def read_recipe(name: str, changes: Mapping[str, Any] | None = None) -> Recipe:
     with naming(f"{path}: not a recipe", "mend the setting", of=(msgspec.ValidationError, TypeError), as_a=UsageError):
         for key, value in (changes or {}).items():
             _put(document, key.split("."), value)
+        if "architecture" in document:
+            return msgspec.convert(document, NanoRecipe, strict=False)
         return msgspec.convert(document, Recipe, strict=False)
 
 

@@ -3,19 +3,21 @@
 import pytest
 
 from infthor_eval.errors import UsageError
+from infthor_eval.formats.published import published_tables
 from infthor_eval.training.recipe import read_recipe, recipe_names
 
 
 def test_the_papers_recipes_are_table_5():
-    assert {"infthor_32k", "infthor_64k", "infthor_130k", "questions"} <= set(recipe_names())
-    sizes = {"infthor_32k": 32_768, "infthor_64k": 65_536, "infthor_130k": 131_072}
-    for name, n_tokens in sizes.items():
-        recipe = read_recipe(name)
-        assert recipe.max_tokens == n_tokens
+    (table,) = published_tables("training")
+    assert {"infthor_32k", "infthor_64k", "infthor_130k", "questions", "tiny"} == set(recipe_names())
+    for row in table.rows:
+        recipe, told = read_recipe(row.name), dict(zip(table.columns, row.values, strict=True))
+        assert recipe.max_tokens == told["context tokens"]
+        assert recipe.parallel.context == told["context parallel"]
+        assert recipe.model_args["pretrained"] in row.checkpoints
         assert (recipe.optimizer.lr, recipe.optimizer.warmup_ratio, recipe.epochs) == (1e-5, 0.03, 3)
         assert set(recipe.freeze) == {"vision", "embeddings"}
         assert recipe.model == "llava-onevision"
-    assert [read_recipe(name).parallel.context for name in sizes] == [1, 8, 16]
 
 
 def test_settings_are_changed_by_their_dotted_names():

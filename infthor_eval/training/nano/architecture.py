@@ -27,6 +27,7 @@ GRID = 4  # tokens of a frame, along each side
 TOKENS = GRID**2
 PATCHES = 4 * TOKENS  # two by two of them are merged to a token
 _SIDE = 14  # pixels of a patch
+_HEADS = 4
 # By the processor's own rounding 112 x 112 pixels; a limit of exactly as many would be rounded down to 84 x 84.
 PIXELS = 12_600
 _MERGES = 3000  # more than there are words, so that each of them is a token
@@ -88,23 +89,30 @@ def _config(recipe: NanoRecipe, ids: dict[str, int], vocab_size: int) -> Any:
             "hidden_size": width,
             "intermediate_size": 3 * width,
             "num_hidden_layers": layers,
-            "num_attention_heads": 4,
-            "num_key_value_heads": 4,
+            "num_attention_heads": _HEADS,
+            "num_key_value_heads": _HEADS,
             "max_position_embeddings": 32_768,
             "bos_token_id": None,
             "eos_token_id": ids["<|im_end|>"],
             "pad_token_id": ids["<|endoftext|>"],
             "tie_word_embeddings": True,
-            "rope_parameters": {"rope_type": "default", "rope_theta": 1e4, "mrope_section": [4, 6, 6]},
+            "rope_parameters": {"rope_type": "default", "rope_theta": 1e4, "mrope_section": _axes(width // _HEADS)},
         },
         vision_config={
             "depth": layers,
             "hidden_size": width,
             "intermediate_size": 2 * width,
-            "num_heads": 4,
+            "num_heads": _HEADS,
             "out_hidden_size": width,
             "patch_size": _SIDE,
             "window_size": 2 * GRID * _SIDE,  # the whole frame
             "fullatt_block_indexes": list(range(layers)),
         },
     )
+
+
+def _axes(head_width: int) -> list[int]:
+    """How many of a head's frequencies tell time, height and width, in about the family's proportion."""
+    frequencies = head_width // 2
+    space = 3 * frequencies // 8
+    return [frequencies - 2 * space, space, space]

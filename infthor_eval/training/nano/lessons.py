@@ -42,7 +42,7 @@ def texts(folders: Sequence[Path], types: Sequence[str]) -> Iterator[str]:
                 said = said.replace(mark, "\n")
             yield from said.splitlines()
         for question in NiehSet(folder).questions:
-            yield question.text
+            yield f" {question.text}"
             yield from (f"{way}{answer}" for answer in question.answers for way in ("", " "))
     yield from map(str, range(30))
     yield opening()

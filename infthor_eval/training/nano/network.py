@@ -34,7 +34,14 @@ class NanoNetwork(SequenceModel):
     Args:
         loaded: the model.
         album: all frames.
+
+    Attributes:
+        learns_to_see: whether sequences train the tower too; it takes two thirds of their time.
+        last_seen: places in the album and features of the last sequences' frames.
     """
+
+    learns_to_see = True
+    last_seen: tuple[list[int], Tensor]
 
     def __init__(self, loaded: Loaded, album: Album) -> None:
         super().__init__(loaded)
@@ -47,8 +54,10 @@ class NanoNetwork(SequenceModel):
     def features(self, frames: Sequence[Frame]) -> list[Tensor]:
         """See `SequenceModel`."""
         distinct = list(dict.fromkeys(frame.digest for frame in frames))
-        seen = self.see([self._places[digest] for digest in distinct])
-        by_digest = dict(zip(distinct, seen, strict=True))
+        places = [self._places[digest] for digest in distinct]
+        with torch.set_grad_enabled(self.learns_to_see):
+            self.last_seen = places, self.see(places)
+        by_digest = dict(zip(distinct, self.last_seen[1], strict=True))
         return [by_digest[frame.digest] for frame in frames]
 
     def see(self, places: Sequence[int]) -> Tensor:

@@ -110,17 +110,20 @@ class _Course:
         return loss, loss.detach()
 
     def tell(self) -> tuple[Tensor, Tensor]:
-        """Answers and actions, and what is in the frames that they are about."""
-        recipe = self._recipe
-        questions = self._lessons.questions(recipe.questions_per_step, recipe.made_up)
-        told, n_told = self._told(questions)
-        total, n_items = told, n_told
+        """Answers and actions, and what is in the frames that the questions are about.
+
+        Histories have most of the frames, and do not train the tower.
+        """
+        recipe, network = self._recipe, self._network
+        network.learns_to_see = True
+        total, n_items = self._told(self._lessons.questions(recipe.questions_per_step, recipe.made_up))
+        places, features = network.last_seen
+        network.learns_to_see = False
         for history in self._lessons.histories(recipe.windows_per_step):
             acted, n_acted = self._told([history])
             total, n_items = total + acted, n_items + n_acted
         loss = total / n_items
-        places = self._lessons.frames(recipe.frames_per_step // 4)
-        return loss + recipe.seeing_weight * self._seen(self._network.see(places), places), loss.detach()
+        return loss + recipe.seeing_weight * self._seen(features, places), loss.detach()
 
     def _seen(self, features: Tensor, places: Sequence[int]) -> Tensor:
         return self._network.seeing_loss(features, places, self._lessons.way(self._network.n_ways))

@@ -1,0 +1,96 @@
+"""What `train --recipe tiny` does: make data where none is given, teach the small model, and write it."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from infthor_eval.cli.progress import NOTES, say
+from infthor_eval.errors import DataError
+from infthor_eval.formats.files import prepared_folder
+from infthor_eval.formats.qa_csv import write_questions
+from infthor_eval.generation.generate_set import generate_with_workers
+from infthor_eval.generation.jobs import trajectory_jobs
+from infthor_eval.generation.questions.make import make_questions
+from infthor_eval.generation.replay_set import replay_with_workers, select
+from infthor_eval.terminal import console, progress_bar
+from infthor_eval.thor.launch import embedded
+from infthor_eval.training.export import export
+from infthor_eval.training.nano.school import Lesson, teach
+from infthor_eval.training.nano.settings import NanoRecipe, Scenes
+from infthor_eval.workers import Staffing
+
+__all__ = ["make_data", "train_nano"]
+
+_PER_TRAJECTORY = 500  # questions at most: all that there are
+_PARTS = {"see": "learning to see", "tell": "learning to answer and to act"}
+
+
+def train_nano(recipe: NanoRecipe, folders: Sequence[Path], out: Path, staffing: Staffing) -> int:
+    """Train the small model.
+
+    Args:
+        recipe: how.
+        folders: of replayed sets with questions; made in `out` where there are none.
+        out: folder of the run.
+        staffing: who makes the data.
+
+    Returns:
+        Exit code: 0.
+
+    Raises:
+        DataError: data cannot be made or read.
+    """
+    prepared_folder(out)
+    sets = list(folders) or [make_data(recipe.scenes, recipe.seed, out / "data", staffing)]
+    with progress_bar(NOTES) as progress:
+        bars = {part: progress.add_task(said, total=None) for part, said in _PARTS.items()}
+
+        def watch(done: Lesson) -> None:
+            said = f"{_PARTS[done.part]}: loss {done.loss:.3f}"
+            progress.update(bars[done.part], total=done.n_steps, completed=done.step, description=said)
+
+        loaded = teach(recipe, sets, watch)
+    export(loaded, out / "checkpoint")
+    console().print(f"{out / 'checkpoint'}")
+    return 0
+
+
+def make_data(scenes: Scenes, seed: int, out: Path, staffing: Staffing) -> Path:
+    """Trajectories in procedural scenes, replayed, with every question that can be asked on them.
+
+    What is there already is not made again.
+
+    Args:
+        scenes: which.
+        seed: of the trajectories and the questions.
+        out: folder of both.
+        staffing: who makes them.
+
+    Returns:
+        The folder of the set.
+
+    Raises:
+        DataError: a trajectory cannot be made or replayed.
+    """
+    trajectories, made_set = prepared_folder(out / "trajectories"), prepared_folder(out / "set")
+    jobs = trajectory_jobs(
+        scenes.names, seed=seed, count=1, min_steps=scenes.min_steps, min_subgoals=1, final_task=False, max_fail=20
+    )
+    with progress_bar(NOTES) as progress:
+        bars = [progress.add_task(name, total=len(jobs)) for name in ("trajectories", "frames")]
+        generated = generate_with_workers(
+            jobs, embedded(), trajectories, staffing, lambda: progress.advance(bars[0]), say
+        )
+        selection = select([trajectories])
+        replayed = replay_with_workers(
+            selection, embedded(), made_set, staffing, 1, lambda: progress.advance(bars[1]), say
+        )
+    failures = [str(item) for item in generated.failures]
+    failures += [f"{item.place}: {item.message}" for item in replayed.failures]
+    if failures:
+        raise DataError(f"{out}: {failures[0]}; give other scenes")
+    questions = make_questions(
+        made_set, seed=seed, per_trajectory=_PER_TRAJECTORY, further=True, staffing=staffing, say=say
+    )
+    write_questions(made_set / "qa_set_data.csv", questions.questions)
+    say(f"{len(jobs)} trajectories, {len(questions.questions):,} questions: {made_set}")
+    return made_set

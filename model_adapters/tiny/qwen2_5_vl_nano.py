@@ -1,0 +1,38 @@
+"""The small trained Qwen2.5-VL that comes with the package; its card lies beside its weights.
+
+`infthor-eval train --recipe tiny` makes it.
+"""
+
+from dataclasses import dataclass, replace
+
+from infthor_eval.formats.packaged import packaged_folder
+from model_adapters.hf.families.qwen2_5_vl import PixelLimits, Qwen25VL
+from model_adapters.hf.model import TransformersModel
+from model_adapters.hf.options import CheckpointOptions
+
+__all__ = ["FOLDER", "Qwen25VLNano"]
+
+FOLDER = "models/qwen2.5-vl-nano"
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Options(PixelLimits, CheckpointOptions):
+    pretrained: str = ""
+    dtype: str = "float32"
+    device: str = "cpu"
+
+
+class Qwen25VLNano(Qwen25VL):
+    """The adapter `qwen2.5-vl-nano`."""
+
+    Options = _Options
+
+    @classmethod
+    def build(cls, name: str, options: CheckpointOptions, seed: int) -> TransformersModel:
+        """Load the checkpoint of the package, or another one of its form.
+
+        Raises:
+            ModelError: it cannot be loaded.
+        """
+        pretrained = options.pretrained or str(packaged_folder(FOLDER))
+        return super().build(name, replace(options, pretrained=pretrained), seed)

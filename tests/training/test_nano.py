@@ -1,0 +1,147 @@
+"""The small model's course, on two scenes and a few steps: what it is told, and that it learns."""
+
+import shutil
+
+import pytest
+import torch
+from safetensors.torch import load_file
+
+from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.qa_csv import write_questions
+from infthor_eval.formats.step_log import Seen, read_steps
+from infthor_eval.training.encoding import Encoder
+from infthor_eval.training.export import export
+from infthor_eval.training.nano.album import _covered, _type, read_album
+from infthor_eval.training.nano.architecture import TOKENS, untrained
+from infthor_eval.training.nano.lessons import Lessons, opening, texts
+from infthor_eval.training.nano.network import NanoNetwork, ways_of_writing
+from infthor_eval.training.nano.school import teach
+from infthor_eval.training.nano.settings import NanoRecipe
+from model_adapters import check_adapter, load
+
+SMALL = NanoRecipe(
+    title="small",
+    hidden=64,
+    layers=2,
+    seeing_steps=20,
+    telling_steps=6,
+    frames_per_step=16,
+    questions_per_step=8,
+    windows_per_step=1,
+    window_tokens=600,
+    lr=1e-2,
+    threads=1,
+)
+
+
+@pytest.fixture(scope="module")
+def small_set(bundled_set, tmp_path_factory):
+    """Two trajectories of the bundled set, and the questions on them."""
+    root, names = tmp_path_factory.mktemp("small"), ("bedroom-1-seed7", "kitchen-1-seed7")
+    for name in names:
+        shutil.copytree(bundled_set / "metadata" / name, root / "metadata" / name)
+    questions = [item for item in NiehSet(bundled_set).questions if item.traj_id in names]
+    write_questions(root / "qa_set_small.csv", questions)
+    return root
+
+
+@pytest.fixture(scope="module")
+def blank(small_set):
+    """The model before it learned anything, and its album."""
+    from transformers.models.qwen2_vl.image_processing_pil_qwen2_vl import Qwen2VLImageProcessorPil
+
+    from infthor_eval.training.nano.architecture import PIXELS
+
+    album = read_album([small_set], Qwen2VLImageProcessorPil(min_pixels=PIXELS, max_pixels=PIXELS))
+    return untrained(SMALL, texts([small_set], album.types), [opening()]), album
+
+
+def test_an_album_shows_what_the_logs_say(small_set, blank):
+    _, album = blank
+    data = NiehSet(small_set)
+    at = album.places()
+    for folder in sorted((small_set / "metadata").iterdir()):
+        for frame, step in list(zip(data.frames(folder.name), read_steps(folder), strict=True))[::20]:
+            place = at[frame.digest]
+            present = {name for name, there in zip(album.types, album.present[place], strict=True) if there}
+            shown = {name for name, there in zip(album.types, album.shown[place], strict=True) if there}
+            assert present == {_type(key) for key in step.seen}
+            assert shown <= set(step.object_log.visible) | present
+
+
+def test_frames_are_what_the_familys_own_features_are_made_of(blank):
+    loaded, album = blank
+    network = NanoNetwork(loaded, album)
+    frames = [FrameRef(frame.path) for frame in album.frames[:5]]
+    with torch.no_grad():
+        theirs = torch.stack(loaded.family.features([frame.load() for frame in frames]))
+        ours = network.see(range(5))
+    assert ours.shape == (5, TOKENS, 64)
+    assert torch.allclose(ours, theirs, atol=5e-3)  # pixels are kept in half precision
+
+
+@pytest.mark.parametrize(
+    ("box", "cells"),
+    [
+        ((0, 0, 299, 299), set(range(16))),
+        ((0, 0, 74, 74), {0}),
+        ((225, 225, 299, 299), {15}),
+        ((100, 30, 110, 40), {1}),  # small, whole in one part
+        ((70, 0, 80, 10), {0, 1}),  # small, half in each of two: of 11 columns 5 and 6
+    ],
+)
+def test_where_a_box_lies(box, cells):
+    found = {at for at, there in enumerate(_covered(box, (300, 300))) if there}
+    assert found <= cells
+    assert found
+
+
+def test_types_are_those_of_parts_and_slices():
+    ids = ("Mug|+01.00|+00.90|-02.00", "Sink|-01.00|+00.50|+01.00|SinkBasin", "Apple|+1|+2|+3|AppleSliced_2")
+    assert [_type(key) for key in ids] == ["Mug", "SinkBasin", "AppleSliced"]
+    assert Seen(pixels=1, box=(0, 0, 1, 1)).visible is False
+
+
+def test_words_are_tokens(blank):
+    loaded, album = blank
+    asked = loaded.tokenizer.tokenize(f"{opening()} Have you seen a mug?")
+    assert len(asked) == 1 + 6
+    names = [way for name in album.types for way in ways_of_writing(name)]
+    lengths = [len(loaded.tokenizer.tokenize(name)) for name in names]
+    assert sum(lengths) / len(lengths) < 1.6
+
+
+def test_made_up_questions_are_true_and_their_names_tell_nothing(small_set, blank):
+    loaded, album = blank
+    lessons = Lessons(Encoder(loaded), [small_set], album, window_tokens=2048, seed=0)
+    places, counts = album.places(), {"yes": 0, "no": 0}
+    from infthor_eval.household.wording import noun
+
+    words = {noun(name): at for at, name in enumerate(album.types)}
+    for sequence in lessons.questions(200, made_up=1.0):
+        (frame,) = sequence.frames
+        text = loaded.tokenizer.decode([piece for piece in sequence.pieces if isinstance(piece, int)])
+        answer = text.rpartition("?")[2].removesuffix("<|im_end|>")
+        about = max((name for name in words if f" {name}" in text), key=len)
+        counts[answer] += 1
+        here = places[frame.digest]
+        assert bool(album.shown[here, words[about]]) == (answer == "yes")
+        assert answer == "yes" or not album.present[here, words[about]]
+    assert min(counts.values()) > 70
+
+
+def test_the_course_is_the_same_for_a_seed_and_lowers_the_loss(small_set, tmp_path):
+    losses = []
+    for name in ("a", "b"):
+        told = []
+        export(teach(SMALL, [small_set], told.append), tmp_path / name)
+        losses.append([lesson.loss for lesson in told])
+        assert [lesson.part for lesson in told] == ["see"] * 20 + ["tell"] * 6
+    assert losses[0] == losses[1]
+    assert sum(losses[0][15:20]) < 0.95 * sum(losses[0][:5])
+    first, second = (load_file(tmp_path / name / "model.safetensors") for name in ("a", "b"))
+    assert all(first[name].equal(second[name]) for name in first)
+    options = {"pretrained": str(tmp_path / "a"), "dtype": "float32"}
+    check_adapter(load("qwen2.5-vl-nano", options, seed=0))
+    check_adapter(load("qwen2.5-vl", options, seed=0))
