@@ -6,7 +6,8 @@
 from dataclasses import dataclass, replace
 
 from infthor_eval.formats.packaged import packaged_folder
-from model_adapters.hf.families.qwen2_5_vl import PixelLimits, Qwen25VL
+from model_adapters.hf.adapter import CheckpointAdapter
+from model_adapters.hf.families.qwen2_5_vl import PixelLimits, Qwen25VLFamily
 from model_adapters.hf.model import TransformersModel
 from model_adapters.hf.options import CheckpointOptions
 
@@ -22,10 +23,12 @@ class _Options(PixelLimits, CheckpointOptions):
     device: str = "cpu"
 
 
-class Qwen25VLNano(Qwen25VL):
+class Qwen25VLNano(CheckpointAdapter):
     """The adapter `qwen2.5-vl-nano`."""
 
     Options = _Options
+    family = Qwen25VLFamily
+    model_types = ("qwen2_5_vl",)
 
     @classmethod
     def build(cls, name: str, options: CheckpointOptions, seed: int) -> TransformersModel:
