@@ -26,6 +26,7 @@ _COMMANDS = {
     "fetch": "Download the published data.",
     "validate": "Keep the questions of a set that one of several models answers.",
     "train": "Fine-tune a model on trajectories and questions.",
+    "import-checkpoint": "Make a checkpoint of the published trainer one that models load.",
     "compare": "Compare two runs on the same data.",
     "check-parity": "Compare a policy's actions with another implementation's.",
     "report": "Draw a figure of the paper of your own runs.",

@@ -1,0 +1,58 @@
+"""Checkpoints of torch's distributed kind become ones that adapters load."""
+
+import pytest
+import torch
+import torch.distributed.checkpoint as dcp
+
+from infthor_eval.errors import DataError
+from infthor_eval.training.published import take_over
+from infthor_eval.training.starting_point import starting_point
+from model_adapters import load
+
+
+def tiny(seed):
+    return starting_point("llava-onevision-tiny", {}, "plain", seed)
+
+
+def saved(loaded, folder, prefix, *, without=(), more=None):
+    state = {f"{prefix}{name}": tensor for name, tensor in loaded.model.state_dict().items()}
+    state = {name: tensor for name, tensor in state.items() if not any(part in name for part in without)}
+    dcp.save(state | (more or {}), checkpoint_id=folder, no_dist=True)
+    return folder
+
+
+@pytest.mark.parametrize("prefix", ["", "model.", "app.model."])
+def test_weights_are_taken_over_whatever_stands_before_their_names(tmp_path, prefix):
+    trained, other = tiny(1), tiny(0)
+    moments = {f"optim.state.{name}.exp_avg": tensor for name, tensor in list(trained.model.state_dict().items())[:5]}
+    found = take_over(other, saved(trained, tmp_path / "dcp", prefix, without=("vision_tower",), more=moments))
+    assert found.n_ignored == 5
+    assert found.n_kept > 0
+    begun = tiny(0).model.state_dict()
+    for name, tensor in other.model.state_dict().items():
+        wanted = begun if "vision_tower" in name else trained.model.state_dict()
+        assert tensor.equal(wanted[name]), name
+
+
+def test_the_command_writes_what_the_adapter_loads(tmp_path, run):
+    folder = saved(tiny(0), tmp_path / "dcp", "model.")
+    words = ["import-checkpoint", folder, "--model", "llava-onevision-tiny", "--out", tmp_path / "out"]
+    code, said, err = run(*words)
+    assert (code, "0 kept, 0 other tensors ignored" in said) == (0, True), err
+    options = {"pretrained": str(tmp_path / "out"), "dtype": "float32", "max_tokens": "0"}
+    model = load("llava-onevision", options, seed=0)
+    ours, theirs = model.loaded.model.state_dict(), tiny(0).model.state_dict()
+    assert all(torch.equal(ours[name], theirs[name]) for name in theirs)
+    assert len(model.loaded.tokenizer("<|act|>MoveAhead<|act|>", add_special_tokens=False)["input_ids"]) >= 3
+
+
+def test_what_is_none_or_anothers_is_one_line(tmp_path):
+    with pytest.raises(DataError, match="not a distributed checkpoint"):
+        take_over(tiny(0), tmp_path)
+    dcp.save({"wheels": torch.zeros(2)}, checkpoint_id=tmp_path / "a", no_dist=True)
+    with pytest.raises(DataError, match="no weight of this model"):
+        take_over(tiny(0), tmp_path / "a")
+    name = next(iter(tiny(0).model.state_dict()))
+    dcp.save({name: torch.zeros(3)}, checkpoint_id=tmp_path / "b", no_dist=True)
+    with pytest.raises(DataError, match=r"is \(3,\), the model's"):
+        take_over(tiny(0), tmp_path / "b")
