@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from infthor_eval.cli.options import model_options_in
+from infthor_eval.cli.options import FiniteRange, model_options_in
 from infthor_eval.cli.staffing_options import staffing_options
 
 if TYPE_CHECKING:
@@ -33,7 +33,17 @@ _PATH = click.Path(path_type=Path)
 @click.option("--model-args", metavar="K=V,...", help="Its options (pretrained, dtype, ...), beside the recipe's.")
 @click.option("--set", "changes", multiple=True, metavar="KEY=VALUE", help="Another setting of the recipe; repeatable.")
 @click.option("--out", required=True, type=_PATH, help="Folder of the run; the checkpoint is in checkpoint/ there.")
-@click.option("--dry-run", is_flag=True, help="Make the sequences, tell what they are, and train nothing.")
+@click.option("--dry-run", is_flag=True, help="Tell what the sequences are and what the run would take; train nothing.")
+@click.option(
+    "--gpus", type=click.IntRange(1), default=8, show_default=True, metavar="N", help="Of the machine, for --dry-run."
+)
+@click.option(
+    "--tflops",
+    type=FiniteRange(min=0, min_open=True),
+    default=400.0,
+    show_default=True,
+    help="That one of them reaches, for --dry-run (an H100 has 989 in bfloat16).",
+)
 @staffing_options
 def command(
     name: str,
@@ -43,6 +53,8 @@ def command(
     changes: tuple[str, ...],
     out: Path,
     dry_run: bool,
+    gpus: int,
+    tflops: float,
     staffing: Staffing,
 ) -> int:
     """Fine-tune a model, and write a checkpoint that its family's adapter loads.
@@ -66,11 +78,11 @@ def command(
         if model is not None or model_args is not None or dry_run:
             raise click.UsageError("--model, --model-args and --dry-run are for recipes that begin with a model")
         return train_nano(recipe, folders, out, staffing)
-    from infthor_eval.cli.training import train
+    from infthor_eval.cli.training import Machine, train
 
     if not folders:
         raise click.UsageError("give --data, a replayed set to train on")
-    return train(recipe, folders, out, dry_run)
+    return train(recipe, folders, out, Machine(gpus, tflops) if dry_run else None)
 
 
 def _setting(item: str) -> tuple[str, str]:

@@ -2,25 +2,41 @@
 
 import os
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from infthor_eval.cli.progress import NOTES, say
 from infthor_eval.terminal import console, progress_bar
+from infthor_eval.training.estimate import estimate
 from infthor_eval.training.fine_tuning import Prepared, fine_tune, prepared
 from infthor_eval.training.loop import Progress
+from infthor_eval.training.network import SequenceModel, freeze
 from infthor_eval.training.recipe import Recipe
 
 __all__ = ["train"]
 
 
-def train(recipe: Recipe, folders: Sequence[Path], out: Path, dry_run: bool) -> int:
+@dataclass(frozen=True)
+class Machine:
+    """What a run is reckoned for.
+
+    Attributes:
+        n_gpus: that share it.
+        tflops: that one of them reaches.
+    """
+
+    n_gpus: int
+    tflops: float
+
+
+def train(recipe: Recipe, folders: Sequence[Path], out: Path, only_for: Machine | None = None) -> int:
     """Train by a recipe, and say what came of it.
 
     Args:
         recipe: how.
         folders: of replayed sets.
         out: folder of the run.
-        dry_run: makes the sequences alone.
+        only_for: tells what the run would take there, and trains nothing.
 
     Returns:
         Exit code: 0.
@@ -29,7 +45,8 @@ def train(recipe: Recipe, folders: Sequence[Path], out: Path, dry_run: bool) -> 
     speaks = os.environ.get("RANK", "0") == "0"
     if speaks:
         _tell(run)
-    if dry_run:
+    if only_for is not None:
+        _tell_estimate(run, only_for)
         return 0
     last: list[Progress] = []
     with progress_bar(NOTES) as progress:
@@ -58,3 +75,22 @@ def _tell(run: Prepared) -> None:
     )
     for reason, n in data.reasons().most_common(5):
         say(f"{n} left out: {reason}", "yellow")
+
+
+def _tell_estimate(run: Prepared, machine: Machine) -> None:
+    """Work, time and memory."""
+    network = SequenceModel(run.loaded)
+    freeze(network, run.recipe.freeze)
+    found = estimate(run.recipe, network, run.data, machine.n_gpus)
+    hours = found.hours(machine.n_gpus * machine.tflops)
+    console().print(
+        f"work: {found.flop:.2e} FLOP, {hours:,.1f} hours of {machine.n_gpus} GPUs at {machine.tflops:g} TFLOP/s each"
+    )
+    parts = {
+        "weights": found.weights,
+        "gradients": found.gradients,
+        "optimizer": found.optimizer,
+        "activations": found.activations,
+    }
+    said = ", ".join(f"{name} {size / 1e9:,.1f}" for name, size in parts.items())
+    console().print(f"memory of a process: {found.memory / 1e9:,.1f} GB ({said})")

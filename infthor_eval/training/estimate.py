@@ -1,0 +1,110 @@
+"""What a training run will take, before it begins: work, and memory of a process. docs/training.md has the formulae."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import torch
+from PIL import Image
+from torch.utils.flop_counter import FlopCounterMode
+
+from infthor_eval.training.data import TrainingData
+from infthor_eval.training.network import SequenceModel, parameters_by_part
+from infthor_eval.training.recipe import Recipe
+
+__all__ = ["Estimate", "estimate"]
+
+_SAMPLE = (300, 300)  # a frame's width and height in the published data
+_MOMENTS = 2  # of AdamW
+_LORA_SHARE = 0.02  # of the decoder's weights, about: adapters of rank 16
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Of one run.
+
+    Attributes:
+        flop: of all its steps.
+        weights: bytes, as are the others, of one process.
+        gradients: of what is trained.
+        optimizer: both moments.
+        activations: kept for the gradient of the longest sequence.
+    """
+
+    flop: float
+    weights: float
+    gradients: float
+    optimizer: float
+    activations: float
+
+    @property
+    def memory(self) -> float:
+        """All of it, in bytes."""
+        return self.weights + self.gradients + self.optimizer + self.activations
+
+    def hours(self, tflops: float) -> float:
+        """How long it takes at so many TFLOP a second, of all processes together."""
+        return self.flop / (tflops * 1e12) / 3600
+
+
+def estimate(recipe: Recipe, network: SequenceModel, data: TrainingData, n_processes: int) -> Estimate:
+    """Reckon what a run takes.
+
+    Args:
+        recipe: of the run.
+        network: its model, frozen as the run freezes it.
+        data: its sequences.
+        n_processes: that share them.
+    """
+    parts = parameters_by_part(network)
+    held = sum(parameter.nbytes for parameter in network.parameters())
+    trained = sum(parameter.nbytes for parameter in network.parameters() if parameter.requires_grad)
+    if recipe.lora is not None:
+        trained = int(_LORA_SHARE * sum(parameter.nbytes for parameter in parts["decoder"]))
+    shards = n_processes if recipe.parallel.shard else 1
+    longest = max(sequence.n_tokens for sequence in data.sequences)
+    passes = float(recipe.epochs)
+    if recipe.max_steps is not None:
+        passes = min(passes, recipe.max_steps * recipe.sequences_per_step / len(data.sequences))
+    return Estimate(
+        flop=passes * _flop(recipe, network, data, parts),
+        weights=held / shards,
+        gradients=trained / shards,
+        optimizer=_MOMENTS * trained / shards,
+        activations=_activations(recipe, network, longest / recipe.parallel.context),
+    )
+
+
+def _flop(recipe: Recipe, network: SequenceModel, data: TrainingData, parts: dict[str, Any]) -> float:
+    """Of all sequences once: forward, through the layers back, for their weights, and again where not all is kept."""
+    config = network.decoder.config
+    n_weights = sum(parameter.numel() for parameter in parts["decoder"])
+    width = config.num_attention_heads * getattr(config, "head_dim", config.hidden_size // config.num_attention_heads)
+    forward = sum(
+        2 * n_weights * item.n_tokens + 2 * config.num_hidden_layers * width * item.n_tokens**2
+        for item in data.sequences
+    )
+    trains_decoder = recipe.lora is None and any(parameter.requires_grad for parameter in parts["decoder"])
+    times = 2 + int(trains_decoder) + int(recipe.gradient_checkpointing)
+    n_frames = sum(len(item.frames) for item in data.sequences)
+    return times * forward + n_frames * _flop_of_frame(network) * (3 if network.trains_vision else 1)
+
+
+@torch.no_grad()
+def _flop_of_frame(network: SequenceModel) -> float:
+    """Counted while a blank frame is looked at."""
+    counter = FlopCounterMode(display=False)
+    with counter:
+        network.family.features([Image.new("RGB", _SAMPLE)])
+    return float(counter.get_total_flops())
+
+
+def _activations(recipe: Recipe, network: SequenceModel, n_tokens: float) -> float:
+    """Kept of one sequence: every layer's input, and all that one layer keeps; or that of all layers."""
+    config = network.decoder.config
+    size = network.model.dtype.itemsize
+    heads = config.num_key_value_heads / config.num_attention_heads
+    # Normed, queries, keys, values, attended, projected, normed; gate, up, their product; and the sums.
+    within = (6 + 2 * heads) * config.hidden_size + 4 * config.intermediate_size
+    layers = config.num_hidden_layers
+    kept = layers * config.hidden_size + within if recipe.gradient_checkpointing else layers * within
+    return kept * n_tokens * size
