@@ -19,7 +19,7 @@ from infthor_eval.formats.files import prepared_folder, written_atomically
 from infthor_eval.training.batches import collate
 from infthor_eval.training.data import TrainingData, read_training_data
 from infthor_eval.training.encoding import Encoder
-from infthor_eval.training.export import export
+from infthor_eval.training.export import export, whole_weights
 from infthor_eval.training.loop import Loop, LoopSettings, Progress
 from infthor_eval.training.lora import add_adapters
 from infthor_eval.training.network import SequenceModel, freeze
@@ -109,8 +109,9 @@ def fine_tune(run: Prepared, out: Path, watcher: Watcher) -> Path:
         _train(run, network, out / _STATES, watcher)
         if adapters is not None:
             adapters.merge()
+        weights = whole_weights(run.loaded.model)
         if is_first:
-            export(run.loaded, out / _CHECKPOINT)
+            export(run.loaded, out / _CHECKPOINT, weights)
     return out / _CHECKPOINT
 
 

@@ -31,6 +31,9 @@ class _SequenceTrainer(transformers.Trainer):
     def _save(self, output_dir: str | None = None, state_dict: dict[str, Any] | None = None) -> None:
         folder = Path(output_dir or str(self.args.output_dir))
         folder.mkdir(parents=True, exist_ok=True)
+        if state_dict is not None:  # put together out of shards
+            super()._save(output_dir, state_dict)
+            return
         save_model(self.accelerator.unwrap_model(self.model).model, str(folder / _WEIGHTS))
 
     def _load_from_checkpoint(self, resume_from_checkpoint: str, model: torch.nn.Module | None = None) -> None:
@@ -84,7 +87,7 @@ def train_with_trainer(
     n_tokens = sum(sequence.n_tokens for sequence in sequences)
     trainer = _SequenceTrainer(
         model=network,
-        args=_arguments(recipe, out),
+        args=_arguments(recipe, out, network),
         train_dataset=list(sequences),
         data_collator=collate,
         callbacks=[_Telling(watcher, recipe.sequences_per_step * n_tokens / len(sequences))],
@@ -96,7 +99,7 @@ def train_with_trainer(
         trainer.train(resume_from_checkpoint=last)
 
 
-def _arguments(recipe: Recipe, out: Path) -> transformers.TrainingArguments:
+def _arguments(recipe: Recipe, out: Path, network: SequenceModel) -> transformers.TrainingArguments:
     optimizer, model_type = recipe.optimizer, recipe.model_args.get("dtype", "float32")
     arguments = transformers.TrainingArguments(
         output_dir=str(out),
@@ -125,8 +128,7 @@ def _arguments(recipe: Recipe, out: Path) -> transformers.TrainingArguments:
         disable_tqdm=True,
         use_cpu=not torch.cuda.is_available(),
         dataloader_pin_memory=False,
-        fsdp="full_shard" if recipe.parallel.shard and _n_processes() > 1 else None,
-        fsdp_config={"version": 2} if recipe.parallel.shard and _n_processes() > 1 else None,
+        **_sharding(recipe, network),
     )
     per_pass = arguments.world_size
     if recipe.sequences_per_step % per_pass:
@@ -138,5 +140,9 @@ def _arguments(recipe: Recipe, out: Path) -> transformers.TrainingArguments:
     return arguments
 
 
-def _n_processes() -> int:
-    return torch.distributed.get_world_size() if torch.distributed.is_initialized() else 1
+def _sharding(recipe: Recipe, network: SequenceModel) -> dict[str, Any]:
+    """Weights, gradients and optimizer in shards, layer by layer; accelerate does it on GPUs alone."""
+    if not (recipe.parallel.shard and torch.distributed.is_initialized()):
+        return {}
+    layers = sorted(getattr(network.model, "_no_split_modules", None) or ())
+    return {"fsdp": True, "fsdp_config": {"version": 2, "transformer_layer_cls_to_wrap": layers}}

@@ -10,12 +10,14 @@ from typing import Any
 import torch
 import torch.distributed as dist
 from torch import Tensor
+from torch.distributed.fsdp import fully_shard
 from transformers.modeling_utils import ALL_ATTENTION_FUNCTIONS
 
 from infthor_eval.errors import InfthorError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.training.batches import Batch, collate, n_labels
 from infthor_eval.training.context_parallel import context_parallel
+from infthor_eval.training.export import whole_weights
 from infthor_eval.training.gradients import sum_gradients
 from infthor_eval.training.loop import Loop, LoopSettings, Progress
 from infthor_eval.training.network import SequenceModel, freeze
@@ -128,6 +130,7 @@ def work(rank: int, folder: Path, frames: list[FrameRef]) -> None:
     results["left behind"] = [name for name in ALL_ATTENTION_FUNCTIONS if "context" in name]
     results["loop"] = train(_loaded("qwen2.5-vl"), folder / "loop", frames, grids[2])
     results["refused"] = _refusals(frames, grids[2])
+    results["out of shards"] = _out_of_shards()
     if rank == 0:
         torch.save(results, folder / RESULTS)
     dist.destroy_process_group()
@@ -144,6 +147,16 @@ def _run(case: Case, frames: list[FrameRef], ranks: Ranks) -> Found:
     shares = [0.0] * ranks.n_context
     dist.all_gather_object(shares, loss.item(), group)
     return Found(shares, gradients_of(model))
+
+
+def _out_of_shards() -> bool:
+    """Whether weights that were shared out over all processes come back whole."""
+    model = loaded("qwen2.5-vl").model
+    before = {name: tensor.clone() for name, tensor in model.state_dict().items()}
+    assert whole_weights(model) is None
+    fully_shard(model)
+    after = whole_weights(model)
+    return after is not None and all(after[name].equal(before[name]) for name in before)
 
 
 def _refusals(frames: list[FrameRef], ranks: Ranks) -> dict[str, str]:

@@ -105,6 +105,10 @@ def test_nothing_is_left_behind(results: Any) -> None:
     assert results["left behind"] == []
 
 
+def test_weights_in_shards_are_written_whole(results: Any) -> None:
+    assert results["out of shards"] is True
+
+
 def test_what_cannot_be_cut_is_refused(results: Any) -> None:
     assert "attends in windows of 8 tokens" in results["refused"]["sliding"]
     assert results["refused"]["three"] == "4 processes cannot share sequences by 3; give a divisor of 4"
