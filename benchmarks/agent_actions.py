@@ -21,19 +21,18 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
 from functools import partial
-from pathlib import Path
 from typing import Any, NamedTuple
 from unittest import mock
 
 import torch
 
-from infthor_eval.agents.history import Chapter
-from infthor_eval.agents.plans import plans_of, tasks_of
 from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.formats.step_log import read_steps
-from infthor_eval.formats.trajectory import Trajectory, iter_trajectories
+from infthor_eval.formats.trajectory import iter_trajectories
 from infthor_eval.household.sequence_text import ACT
+from infthor_eval.training.action_sequences import recorded_chapters
 from model_adapters import Decoding
 from model_adapters.hf.model import TransformersModel
 from model_adapters.tiny.qwen2_5_vl import Qwen25VLTiny
@@ -109,29 +108,15 @@ def told(n_steps: int) -> tuple[list[Part], list[Step]]:
     """What stands before the first action, and so many steps, out of the bundled trajectories one after the other."""
     opening: list[Part] = []
     steps: list[Step] = []
-    for folder in sorted(packaged_folder("sets/nieh_mini").glob("metadata/*")):
+    data = NiehSet(packaged_folder("sets/nieh_mini"))
+    for folder in sorted(data.root.glob("metadata/*")):
         trajectory = next(iter_trajectories(folder / "traj_data.json"))
-        for chapter in chapters(trajectory, folder):
+        for chapter in recorded_chapters(trajectory, read_steps(folder), data.frames(folder.name)):
             (steps[-1][1] if steps else opening).extend(chapter.opening())
             steps += [(action, [frame]) for action, frame in chapter.steps]
     if len(steps) < n_steps:
         raise SystemExit(f"the bundled trajectories have {len(steps)} steps; ask for at most that many")
     return opening, steps[:n_steps]
-
-
-def chapters(trajectory: Trajectory, folder: Path) -> Iterator[Chapter]:
-    """The plans of a replayed trajectory, with their actions and frames."""
-    logged = read_steps(folder)
-    # Frame 0 shows the scene before the first action; of several frames of one action the last counts.
-    after = {step.step: FrameRef(folder / "img" / step.img_filename) for step in logged if step.action is not None}
-    said = {step.step: step.action or "" for step in logged if step.action is not None}
-    start = FrameRef(folder / "img" / logged[0].img_filename)
-    tasks, task = tasks_of(trajectory), -1
-    for plan in plans_of(trajectory):
-        goal, task = (tasks[plan.task].text if plan.task != task else None), plan.task
-        numbers = range(*plan.low)
-        before = after.get(numbers[0] - 1, start)
-        yield Chapter(plan.text, goal, before, tuple((said[number], after[number]) for number in numbers))
 
 
 def begun(model: TransformersModel, opening: Sequence[Part], history: Sequence[Step]) -> Any:

@@ -1,0 +1,107 @@
+"""How often a model's next action is the expert's on trajectories that it never saw, beside what needs no frame.
+
+    python benchmarks/next_action.py --data SET [--model qwen2.5-vl-nano] [--model-args k=v,...] [--frames shown,blank]
+
+SET is a replayed set (`infthor-eval replay`). At every action the model has the true history up to it (teacher forcing)
+and replies greedily. `history` is what experts did next in the set's other scenes after the same action in a plan of
+the same words (infthor_eval/agents/habits.py), `most frequent` the one action that is right most often.
+"""
+
+import argparse
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from infthor_eval.agents.habits import Habits
+from infthor_eval.agents.history import Chapter
+from infthor_eval.cli.options import model_options_in
+from infthor_eval.formats.blank import blank_like
+from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.step_log import read_steps
+from infthor_eval.formats.trajectory import Trajectory, iter_trajectories
+from infthor_eval.household.sequence_text import ACT
+from infthor_eval.statistics import Estimate, clustered_mean, paired_difference
+from infthor_eval.training.action_sequences import recorded_chapters
+from model_adapters import Decoding, load
+
+Show = Callable[[FrameRef], FrameRef]
+_SHOWN: dict[str, Show] = {"shown": lambda frame: frame, "blank": blank_like}
+
+
+def main() -> None:
+    """Ask, count, print."""
+    options = _arguments()
+    found = list(histories(options.data))
+    clusters = [trajectory.traj_id for trajectory, chapters in found for chapter in chapters for _ in chapter.steps]
+    rows = {
+        "most frequent": [float(hit) for hit in most_frequent(found)],
+        "history": [float(hit) for hit in habitual(found)],
+    }
+    model: Any = load(options.model, model_options_in(options.model_args), seed=0)
+    for way in options.frames.split(","):
+        rows[f"{options.model}, frames {way}"] = [
+            float(hit) for _, chapters in found for hit in said(model, chapters, _SHOWN[way])
+        ]
+    print(f"{len(clusters)} actions of {len(found)} trajectories; next action right, %, with its 95 % interval")
+    for name, hits in rows.items():
+        print(f"{name:40} {_interval(clustered_mean(hits, clusters))}", end="")
+        print(f"   over history {_interval(paired_difference(rows['history'], hits, clusters).estimate)}")
+
+
+def _arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--data", type=Path, required=True, help="a replayed set")
+    parser.add_argument("--model", default="qwen2.5-vl-nano")
+    parser.add_argument("--model-args", default="")
+    parser.add_argument("--frames", default="shown,blank")
+    return parser.parse_args()
+
+
+def histories(root: Path) -> Iterator[tuple[Trajectory, list[Chapter]]]:
+    """The trajectories of a set, each with its history."""
+    data = NiehSet(root)
+    for folder in sorted(path for path in (root / "metadata").iterdir() if path.is_dir()):
+        (trajectory,) = iter_trajectories(folder / "traj_data.json")
+        steps = sorted(read_steps(folder), key=lambda step: step.img_idx)
+        yield trajectory, recorded_chapters(trajectory, steps, data.frames(folder.name))
+
+
+def most_frequent(found: Sequence[tuple[Trajectory, Sequence[Chapter]]]) -> list[bool]:
+    """Whether each action is the most frequent one of all."""
+    actions = [action for _, chapters in found for chapter in chapters for action, _ in chapter.steps]
+    ((first, _),) = Counter(actions).most_common(1)
+    return [action == first for action in actions]
+
+
+def habitual(found: Sequence[tuple[Trajectory, Sequence[Chapter]]]) -> Iterator[bool]:
+    """Whether habits of the other scenes lead to each action."""
+    for trajectory, chapters in found:
+        scene = trajectory.scene.floor_plan
+        habits = Habits(other for other, _ in found if other.scene.floor_plan != scene)
+        for chapter in chapters:
+            done: list[str] = []
+            for action, _ in chapter.steps:
+                yield habits.next(chapter.plan, done) == action
+                done.append(action)
+
+
+def said(model: Any, chapters: Sequence[Chapter], show: Show) -> Iterator[bool]:
+    """Whether a model's replies are the actions, each on the true history before it."""
+    talk, decoding = model.conversation(), Decoding(max_new_tokens=10, stop=(ACT,))
+    for chapter in chapters:
+        talk.append(*(part if isinstance(part, str) else show(part) for part in chapter.opening()))
+        for action, frame in chapter.steps:
+            talk.append(ACT)
+            yield talk.reply(decoding).text.strip() == action
+            talk.append(f"{action}{ACT}", show(frame))
+
+
+def _interval(estimate: Estimate) -> str:
+    low, high = (value if value is None else round(100 * value, 1) for value in (estimate.low, estimate.high))
+    return f"{100 * estimate.mean:5.1f} [{low}, {high}]"
+
+
+if __name__ == "__main__":
+    main()
