@@ -34,7 +34,7 @@ class Lesson:
         part: "see" or "tell".
         step: its number in the part, from 1 on.
         n_steps: of the part.
-        loss: of what is seen, per frame, or told, per token, in nats.
+        loss: of what is seen, per frame; of answers and of actions, each per token, together. In nats.
     """
 
     part: str
@@ -52,7 +52,7 @@ def teach(recipe: NanoRecipe, folders: Sequence[Path], watcher: Callable[[Lesson
         watcher: is told of every step.
 
     Returns:
-        The model, to be exported.
+        The model, to be exported; its weights are rounded to bfloat16.
 
     Raises:
         DataError: a set cannot be read.
@@ -68,6 +68,7 @@ def teach(recipe: NanoRecipe, folders: Sequence[Path], watcher: Callable[[Lesson
     course.run("see", recipe.seeing_steps, course.see, watcher)
     course.run("tell", recipe.telling_steps, course.tell, watcher)
     network.eval()
+    loaded.model.to(torch.bfloat16)  # half the file, and no answer hangs on what is rounded off
     return loaded
 
 
@@ -112,24 +113,23 @@ class _Course:
     def tell(self) -> tuple[Tensor, Tensor]:
         """Answers and actions, and what is in the frames that the questions are about.
 
-        Histories have most of the frames, and do not train the tower.
+        Histories have most of the frames, and do not train the tower; they have most of the tokens too, so the two
+        count alike.
         """
         recipe, network = self._recipe, self._network
         network.learns_to_see = True
-        total, n_items = self._told(self._lessons.questions(recipe.questions_per_step, recipe.made_up))
+        answered = self._told(self._lessons.questions(recipe.questions_per_step, recipe.made_up))
         places, features = network.last_seen
         network.learns_to_see = False
-        for history in self._lessons.histories(recipe.windows_per_step):
-            acted, n_acted = self._told([history])
-            total, n_items = total + acted, n_items + n_acted
-        loss = total / n_items
+        acted = self._told(self._lessons.histories(recipe.windows_per_step))
+        loss = answered + acted
         return loss + recipe.seeing_weight * self._seen(features, places), loss.detach()
 
     def _seen(self, features: Tensor, places: Sequence[int]) -> Tensor:
         return self._network.seeing_loss(features, places, self._lessons.way(self._network.n_ways))
 
-    def _told(self, sequences: Sequence[Encoded]) -> tuple[Tensor, int]:
-        """Sum of the losses of some sequences' tokens, and how many there are."""
+    def _told(self, sequences: Sequence[Encoded]) -> Tensor:
+        """Loss of some sequences, by token."""
         batch = collate(sequences, self._network.family, pad_id=0)
-        loss: Tensor = self._network(**batch, num_items_in_batch=1)["loss"]
-        return loss, sum(sequence.n_trained for sequence in sequences)
+        loss: Tensor = self._network(**batch)["loss"]
+        return loss

@@ -54,8 +54,8 @@ class NanoRecipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     scenes: Scenes = Scenes()
     hidden: int = 128
     layers: int = 4
-    seeing_steps: int = 400
-    telling_steps: int = 900
+    seeing_steps: int = 350
+    telling_steps: int = 600
     frames_per_step: int = 64
     questions_per_step: int = 40
     made_up: float = 0.4
@@ -66,3 +66,17 @@ class NanoRecipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     seeing_weight: float = 0.1
     threads: int = 2
     seed: int = 0
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be.
+
+        Raises:
+            ValueError: names the setting.
+        """
+        for name in ("seeing_steps", "telling_steps", "frames_per_step", "questions_per_step", "windows_per_step"):
+            if getattr(self, name) < 1:
+                raise ValueError(f"{name} is {getattr(self, name)}; it is at least 1")
+        if self.hidden % 32:
+            raise ValueError(f"hidden is {self.hidden}; it is a multiple of 32")
+        if not 0 <= self.made_up <= 1:
+            raise ValueError(f"made_up is {self.made_up}; it is between 0 and 1")
