@@ -3,6 +3,7 @@
 It is told what it cannot know: how sequences become batches, what a model is saved as, and that loss is taken by token.
 """
 
+import json
 import math
 import time
 from collections.abc import Callable, Sequence
@@ -12,7 +13,6 @@ from typing import Any
 import torch
 import transformers
 from safetensors.torch import load_model, save_model
-from transformers.trainer_utils import get_last_checkpoint
 
 from infthor_eval.errors import DataError, UsageError, naming
 from infthor_eval.training.encoding import Encoded
@@ -93,10 +93,24 @@ def train_with_trainer(
         callbacks=[_Telling(watcher, recipe.sequences_per_step * n_tokens / len(sequences))],
     )
     trainer.remove_callback(transformers.trainer_callback.PrinterCallback)
-    last = get_last_checkpoint(str(out)) if out.is_dir() else None
+    last = _last_whole(out)
     damaged = f"{last}: the checkpoint cannot be read"
     with naming(damaged, "remove it to go on from the one before", of=(OSError, ValueError, KeyError), as_a=DataError):
         trainer.train(resume_from_checkpoint=last)
+
+
+def _last_whole(out: Path) -> str | None:
+    """The last checkpoint that was written to its end, of which the state is; a run may be killed while it writes one.
+
+    Trainer would take the last folder, whatever is in it, and go on without the optimizer where that is missing.
+    """
+    for place in sorted(out.glob("checkpoint-*"), key=lambda path: int(path.name.rpartition("-")[2]), reverse=True):
+        try:
+            json.loads((place / "trainer_state.json").read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            continue
+        return str(place)
+    return None
 
 
 def _arguments(recipe: Recipe, out: Path, network: SequenceModel) -> transformers.TrainingArguments:

@@ -1,6 +1,7 @@
 """Training runs as a whole: what they write, that they go on where they ended, and what they refuse."""
 
 import json
+import shutil
 import signal
 import subprocess
 import sys
@@ -87,6 +88,11 @@ def test_a_run_that_is_killed_ends_with_the_weights_of_one_that_is_not(recipe, d
     killed.send_signal(signal.SIGKILL)
     killed.communicate()
     assert not (tmp_path / "killed" / "checkpoint").exists()
+    # As if it had been killed once more, while it wrote a later state.
+    states = tmp_path / "killed" / "states"
+    shutil.copytree(next(states.glob("checkpoint-*")), states / "checkpoint-11")
+    for name in ("optimizer.pt", "trainer_state.json"):
+        (states / "checkpoint-11" / name).unlink(missing_ok=True)
     _, told = train(recipe, data, tmp_path / "killed")
     assert 1 < told[0].step <= told[-1].n_steps
     assert same(weights(tmp_path / "killed"), weights(tmp_path / "whole"))
