@@ -9,12 +9,12 @@ PEERS := $(VENV)/test-peers
 
 .PHONY: demo test test-all lint clean
 
-# A trajectory in a procedural kitchen, its frames and questions; then the bundled set, by the bounds and a tiny model.
+# A trajectory in a procedural kitchen, its frames and questions; then the bundled set, by the bounds and a small model.
 demo: $(INSTALLED)
 	$(BIN)/infthor-eval generate --scene kitchen-7 --min-steps 30 --min-subgoals 1 --seed 1 --out results/demo/trajectories
 	$(BIN)/infthor-eval replay results/demo/trajectories --out results/demo/set
 	$(BIN)/infthor-eval questions results/demo/set --out results/demo/set/qa_set_demo.csv
-	$(BIN)/infthor-eval --model oracle,blind,qwen2.5-vl-tiny --tasks nieh_mini --output results/demo
+	$(BIN)/infthor-eval --model oracle,blind,qwen2.5-vl-nano --tasks nieh_mini --output results/demo
 
 test: $(INSTALLED) $(PEERS)
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 3 --dist loadfile -m "not slow"
