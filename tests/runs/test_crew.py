@@ -158,6 +158,7 @@ class _Losing(Watching):
             self._cluster.remove_node(self._node)
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(200)
 def test_a_cluster_that_loses_a_node_finds_what_one_process_finds(tmp_path):
     suite = DeadlySuite(tmp_path, {"4+1": 1})
