@@ -29,10 +29,8 @@ import torch
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.packaged import packaged_folder
-from infthor_eval.formats.step_log import read_steps
-from infthor_eval.formats.trajectory import iter_trajectories
 from infthor_eval.household.sequence_text import ACT
-from infthor_eval.training.action_sequences import recorded_chapters
+from infthor_eval.training.data import read_history, recorded_names
 from model_adapters import Decoding
 from model_adapters.hf.model import TransformersModel
 from model_adapters.tiny.qwen2_5_vl import Qwen25VLTiny
@@ -109,9 +107,8 @@ def told(n_steps: int) -> tuple[list[Part], list[Step]]:
     opening: list[Part] = []
     steps: list[Step] = []
     data = NiehSet(packaged_folder("sets/nieh_mini"))
-    for folder in sorted(data.root.glob("metadata/*")):
-        trajectory = next(iter_trajectories(folder / "traj_data.json"))
-        for chapter in recorded_chapters(trajectory, read_steps(folder), data.frames(folder.name)):
+    for name in recorded_names(data):
+        for chapter in read_history(data, name)[1]:
             (steps[-1][1] if steps else opening).extend(chapter.opening())
             steps += [(action, [frame]) for action, frame in chapter.steps]
     if len(steps) < n_steps:

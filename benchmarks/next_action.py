@@ -19,11 +19,10 @@ from infthor_eval.cli.options import model_options_in
 from infthor_eval.formats.blank import blank_like
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
-from infthor_eval.formats.step_log import read_steps
-from infthor_eval.formats.trajectory import Trajectory, iter_trajectories
+from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.household.sequence_text import ACT
 from infthor_eval.statistics import Estimate, clustered_mean, paired_difference
-from infthor_eval.training.action_sequences import recorded_chapters
+from infthor_eval.training.data import read_history, recorded_names
 from model_adapters import Decoding, load
 
 Show = Callable[[FrameRef], FrameRef]
@@ -33,7 +32,8 @@ _SHOWN: dict[str, Show] = {"shown": lambda frame: frame, "blank": blank_like}
 def main() -> None:
     """Ask, count, print."""
     options = _arguments()
-    found = list(histories(options.data))
+    data = NiehSet(options.data)
+    found = [read_history(data, name) for name in recorded_names(data)]
     clusters = [trajectory.traj_id for trajectory, chapters in found for chapter in chapters for _ in chapter.steps]
     rows = {
         "most frequent": [float(hit) for hit in most_frequent(found)],
@@ -57,15 +57,6 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--model-args", default="")
     parser.add_argument("--frames", default="shown,blank")
     return parser.parse_args()
-
-
-def histories(root: Path) -> Iterator[tuple[Trajectory, list[Chapter]]]:
-    """The trajectories of a set, each with its history."""
-    data = NiehSet(root)
-    for folder in sorted(path for path in (root / "metadata").iterdir() if path.is_dir()):
-        (trajectory,) = iter_trajectories(folder / "traj_data.json")
-        steps = sorted(read_steps(folder), key=lambda step: step.img_idx)
-        yield trajectory, recorded_chapters(trajectory, steps, data.frames(folder.name))
 
 
 def most_frequent(found: Sequence[tuple[Trajectory, Sequence[Chapter]]]) -> list[bool]:

@@ -6,17 +6,18 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from infthor_eval.agents.history import Chapter
 from infthor_eval.errors import DataError
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.step_log import read_steps
-from infthor_eval.formats.trajectory import iter_trajectories
+from infthor_eval.formats.trajectory import Trajectory, iter_trajectories
 from infthor_eval.nieh.samples import find_samples
 from infthor_eval.training.action_sequences import recorded_chapters, windows
 from infthor_eval.training.encoding import Encoded, Encoder, LeftOut
 from infthor_eval.training.question_sequences import question_sequences
 from infthor_eval.training.recipe import Recipe
 
-__all__ = ["TrainingData", "action_sequences", "read_training_data"]
+__all__ = ["TrainingData", "action_sequences", "read_history", "read_training_data", "recorded_names"]
 
 
 @dataclass(frozen=True)
@@ -93,18 +94,34 @@ def action_sequences(data: NiehSet, encoder: Encoder, limit: int) -> Iterator[En
     Yields:
         The sequences, and what none could be made of.
     """
-    for folder in sorted(path for path in (data.root / "metadata").iterdir() if path.is_dir()):
-        name = folder.name
+    for name in recorded_names(data):
         try:
-            path = data.outline_file(name)
-            if path is None:
-                yield LeftOut(name, "its trajectory is not in the set")
-                continue
-            trajectory = next(iter(iter_trajectories(path)))
-            steps = sorted(read_steps(folder), key=lambda step: step.img_idx)
-            yield from windows(encoder, name, recorded_chapters(trajectory, steps, data.frames(name)), limit)
+            yield from windows(encoder, name, read_history(data, name)[1], limit)
         except DataError as error:
             yield LeftOut(name, str(error))
+
+
+def recorded_names(data: NiehSet) -> list[str]:
+    """Names of the trajectories of a set, those without a question too, sorted."""
+    return sorted(path.name for path in (data.root / "metadata").iterdir() if path.is_dir())
+
+
+def read_history(data: NiehSet, name: str) -> tuple[Trajectory, list[Chapter]]:
+    """A trajectory of a set, and its true history.
+
+    Args:
+        data: the set.
+        name: of the trajectory.
+
+    Raises:
+        DataError: it is not in the set, or its replay does not fit it.
+    """
+    path = data.outline_file(name)
+    if path is None:
+        raise DataError("its trajectory is not in the set")
+    trajectory = next(iter(iter_trajectories(path)))
+    steps = sorted(read_steps(data.folder(name)), key=lambda step: step.img_idx)
+    return trajectory, recorded_chapters(trajectory, steps, data.frames(name))
 
 
 def _share(made: Iterable[Encoded | LeftOut], share: float, seed: int) -> Iterator[Encoded | LeftOut]:

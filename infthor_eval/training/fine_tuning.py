@@ -14,7 +14,7 @@ import torch
 import torch.distributed as dist
 
 from infthor_eval.errors import DataError, UsageError, naming
-from infthor_eval.formats.digests import digest, fingerprint
+from infthor_eval.formats.digests import digest
 from infthor_eval.formats.files import prepared_folder, written_atomically
 from infthor_eval.training.batches import collate
 from infthor_eval.training.data import TrainingData, read_training_data
@@ -165,6 +165,7 @@ def _claim(out: Path, document: dict[str, Any]) -> None:
         return
     with naming(f"{path}: not JSON", "give another folder", of=(OSError, ValueError), as_a=DataError):
         earlier = json.loads(path.read_text(encoding="utf-8"))
-    if fingerprint(earlier) != fingerprint(json.loads(json.dumps(document))):
-        changed = sorted(name for name in document if earlier.get(name) != json.loads(json.dumps(document[name])))
+    now = json.loads(json.dumps(document))
+    if earlier != now:
+        changed = sorted(name for name in now if earlier.get(name) != now[name])
         raise UsageError(f"{out} is a run of another {', '.join(changed)}; give another folder with --out")

@@ -22,7 +22,7 @@ from infthor_eval.training.checkpoints import Checkpoints
 from infthor_eval.training.context_parallel import context_parallel
 from infthor_eval.training.encoding import Encoded
 from infthor_eval.training.gradients import sum_gradients
-from infthor_eval.training.network import SequenceModel
+from infthor_eval.training.network import SequenceModel, decay_groups
 from infthor_eval.training.ranks import Ranks
 from infthor_eval.training.schedule import LoopSettings
 
@@ -195,9 +195,5 @@ class Loop:
 
 
 def _optimizer(parameters: Sequence[torch.nn.Parameter], settings: LoopSettings) -> torch.optim.AdamW:
-    groups = [
-        {"params": [one for one in parameters if one.ndim > 1], "weight_decay": settings.weight_decay},
-        {"params": [one for one in parameters if one.ndim <= 1], "weight_decay": 0.0},
-    ]
-    groups = [group for group in groups if group["params"]]
+    groups = decay_groups(parameters, settings.weight_decay)
     return torch.optim.AdamW(groups, lr=settings.learning_rate, betas=settings.betas)

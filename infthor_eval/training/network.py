@@ -14,7 +14,7 @@ from infthor_eval.training.batches import IGNORED
 from model_adapters.hf.loaded import Loaded
 from model_adapters.hf.prompt import Frame
 
-__all__ = ["PARTS", "SequenceModel", "freeze", "next_labels", "parameters_by_part"]
+__all__ = ["PARTS", "SequenceModel", "decay_groups", "freeze", "next_labels", "parameters_by_part"]
 
 PARTS = ("vision", "embeddings", "decoder", "head")
 _FRAMES_AT_ONCE = (
@@ -212,6 +212,15 @@ def parameters_by_part(model: SequenceModel) -> dict[str, list[Parameter]]:
     language = in_embeddings | set(map(id, decoder)) | set(map(id, head))
     vision = [parameter for parameter in model.model.parameters() if id(parameter) not in language]
     return {"vision": vision, "embeddings": embeddings, "decoder": decoder, "head": head}
+
+
+def decay_groups(parameters: Sequence[Parameter], weight_decay: float) -> list[dict[str, Any]]:
+    """Parameters as an optimizer takes them: matrices decay, biases and norms do not."""
+    groups = [
+        {"params": [one for one in parameters if one.ndim > 1], "weight_decay": weight_decay},
+        {"params": [one for one in parameters if one.ndim <= 1], "weight_decay": 0.0},
+    ]
+    return [group for group in groups if group["params"]]
 
 
 def freeze(model: SequenceModel, parts: Collection[str]) -> None:

@@ -13,7 +13,7 @@ from infthor_eval.formats.step_log import Seen, read_steps
 from infthor_eval.training.encoding import Encoder
 from infthor_eval.training.export import export
 from infthor_eval.training.nano.album import _covered, _type, read_album
-from infthor_eval.training.nano.architecture import TOKENS, untrained
+from infthor_eval.training.nano.architecture import TOKENS, image_processor, untrained
 from infthor_eval.training.nano.lessons import Lessons, opening, texts
 from infthor_eval.training.nano.network import NanoNetwork, ways_of_writing
 from infthor_eval.training.nano.school import teach
@@ -49,11 +49,7 @@ def small_set(bundled_set, tmp_path_factory):
 @pytest.fixture(scope="module")
 def blank(small_set):
     """The model before it learned anything, and its album."""
-    from transformers.models.qwen2_vl.image_processing_pil_qwen2_vl import Qwen2VLImageProcessorPil
-
-    from infthor_eval.training.nano.architecture import PIXELS
-
-    album = read_album([small_set], Qwen2VLImageProcessorPil(min_pixels=PIXELS, max_pixels=PIXELS))
+    album = read_album([small_set], image_processor())
     return untrained(SMALL, texts([small_set], album.types), [opening()]), album
 
 

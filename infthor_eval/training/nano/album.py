@@ -12,6 +12,7 @@ from infthor_eval.errors import DataError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.step_log import Seen, Step, read_steps
+from infthor_eval.training.data import recorded_names
 from infthor_eval.training.nano.architecture import GRID, PATCHES, TOKENS
 
 __all__ = ["Album", "read_album"]
@@ -63,11 +64,12 @@ def read_album(folders: Iterable[Path], image_processor: Any) -> Album:
     frames: dict[str, tuple[FrameRef, Step]] = {}
     for folder in folders:
         data = NiehSet(folder)
-        for place in sorted(path for path in (folder / "metadata").iterdir() if path.is_dir()):
+        for name in recorded_names(data):
+            place = data.folder(name)
             steps = sorted(read_steps(place), key=lambda step: step.img_idx)
             if any(step.seen is None for step in steps):
                 raise DataError(f"{place}: does not say what its frames show; replay the trajectory")
-            for frame, step in zip(data.frames(place.name), steps, strict=True):
+            for frame, step in zip(data.frames(name), steps, strict=True):
                 frames.setdefault(frame.digest, (frame, step))
     found = list(frames.values())
     types = sorted({_type(key) for _, step in found for key in step.seen or ()})

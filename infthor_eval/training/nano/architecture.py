@@ -21,7 +21,7 @@ from model_adapters.hf.templates import plain_template
 from model_adapters.tiny.qwen2_5_vl import SPECIAL
 from model_adapters.tiny.tokenizer import train_tokenizer
 
-__all__ = ["GRID", "PATCHES", "PIXELS", "TOKENS", "untrained"]
+__all__ = ["GRID", "PATCHES", "TOKENS", "image_processor", "untrained"]
 
 GRID = 4  # tokens of a frame, along each side
 TOKENS = GRID**2
@@ -29,8 +29,13 @@ PATCHES = 4 * TOKENS  # two by two of them are merged to a token
 _SIDE = 14  # pixels of a patch
 _HEADS = 4
 # By the processor's own rounding 112 x 112 pixels; a limit of exactly as many would be rounded down to 84 x 84.
-PIXELS = 12_600
+_PIXELS = 12_600
 _MERGES = 3000  # more than there are words, so that each of them is a token
+
+
+def image_processor() -> Any:
+    """What makes patches of its frames."""
+    return Qwen2VLImageProcessorPil(min_pixels=_PIXELS, max_pixels=_PIXELS)
 
 
 def untrained(recipe: NanoRecipe, corpus: Iterable[str], sentences: Iterable[str]) -> Loaded:
@@ -51,12 +56,12 @@ def untrained(recipe: NanoRecipe, corpus: Iterable[str], sentences: Iterable[str
     )
     tokenizer.add_tokens([AddedToken(sentence, normalized=False) for sentence in sentences])
     model = _model(recipe, tokenizer)
-    image_processor = Qwen2VLImageProcessorPil(min_pixels=PIXELS, max_pixels=PIXELS)
-    family = Qwen25VLFamily(model, image_processor, tokenizer)
+    processor = image_processor()
+    family = Qwen25VLFamily(model, processor, tokenizer)
     return assemble(
         model,
         tokenizer,
-        image_processor,
+        processor,
         template=plain_template(tokenizer, family),
         family=family,
         max_tokens=model.config.text_config.max_position_embeddings,

@@ -7,15 +7,15 @@ from pathlib import Path
 
 import torch
 from torch import Tensor
-from transformers.models.qwen2_vl.image_processing_pil_qwen2_vl import Qwen2VLImageProcessorPil
 
 from infthor_eval.training.batches import collate
 from infthor_eval.training.encoding import Encoded, Encoder
 from infthor_eval.training.nano.album import read_album
-from infthor_eval.training.nano.architecture import PIXELS, untrained
+from infthor_eval.training.nano.architecture import image_processor, untrained
 from infthor_eval.training.nano.lessons import Lessons, opening, texts
 from infthor_eval.training.nano.network import NanoNetwork
 from infthor_eval.training.nano.settings import NanoRecipe
+from infthor_eval.training.network import decay_groups
 from model_adapters.hf.loaded import Loaded
 
 __all__ = ["Lesson", "teach"]
@@ -59,7 +59,7 @@ def teach(recipe: NanoRecipe, folders: Sequence[Path], watcher: Callable[[Lesson
     """
     torch.set_num_threads(recipe.threads)
     torch.manual_seed(recipe.seed)
-    album = read_album(folders, Qwen2VLImageProcessorPil(min_pixels=PIXELS, max_pixels=PIXELS))
+    album = read_album(folders, image_processor())
     loaded = untrained(recipe, texts(folders, album.types), [opening()])
     network = NanoNetwork(loaded, album)
     lessons = Lessons(Encoder(loaded), folders, album, window_tokens=recipe.window_tokens, seed=recipe.seed)
@@ -80,13 +80,8 @@ class _Course:
         self._network = network
         self._lessons = lessons
         self._trained = list(network.parameters())
-        matrices = [one for one in self._trained if one.ndim > 1]
-        others = [one for one in self._trained if one.ndim <= 1]
-        self._optimizer = torch.optim.AdamW(
-            [{"params": matrices, "weight_decay": recipe.weight_decay}, {"params": others, "weight_decay": 0.0}],
-            lr=recipe.lr,
-            betas=_BETAS,
-        )
+        groups = decay_groups(self._trained, recipe.weight_decay)
+        self._optimizer = torch.optim.AdamW(groups, lr=recipe.lr, betas=_BETAS)
 
     def run(
         self, part: str, n_steps: int, step: Callable[[], tuple[Tensor, Tensor]], watcher: Callable[[Lesson], None]
