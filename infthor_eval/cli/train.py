@@ -62,8 +62,8 @@ def command(
     Recipes of the package: infthor_32k, infthor_64k and infthor_130k (the paper's, Table 5), questions, and tiny, which
     makes a small model from nothing. Others are YAML files of the same form.
 
-    Stopped, the same command goes on (tiny keeps its data and learns anew). Several processes: torchrun --nproc-per-node N --no-python infthor-eval train ...
-    Workers share the making of data.
+    Stopped, the same command goes on (tiny keeps its data and learns anew). Workers share the making of data.
+    Several processes: torchrun --nproc-per-node N --no-python infthor-eval train ...
     """
     from infthor_eval.training.nano.settings import NanoRecipe
     from infthor_eval.training.recipe import read_recipe
