@@ -96,22 +96,24 @@ def _type(key: str) -> str:
 def _labels(seen: dict[str, Seen], types: Sequence[str], size: tuple[int, int]) -> tuple[Tensor, Tensor, Tensor]:
     cells = torch.zeros(TOKENS, len(types))
     shown, present = torch.zeros(len(types)), torch.zeros(len(types))
-    for key, item in seen.items():
+    covered = _covered(torch.tensor([item.box for item in seen.values()]).reshape(-1, 4), size)
+    for (key, item), within in zip(seen.items(), covered, strict=True):
         at = types.index(_type(key))
         present[at] = 1
         if item.visible and item.pixels >= _LEAST_PIXELS:
             shown[at] = 1
-        cells[:, at] = torch.maximum(cells[:, at], _covered(item.box, size))
+        cells[:, at] = torch.maximum(cells[:, at], within)
     return cells, shown, present
 
 
-def _covered(box: tuple[int, int, int, int], size: tuple[int, int]) -> Tensor:
-    """In which cells of a frame a box lies, (tokens,), row by row."""
+def _covered(boxes: Tensor, size: tuple[int, int]) -> Tensor:
+    """In which cells of a frame boxes lie, (boxes, tokens), row by row."""
+    left, top, right, bottom = boxes.T
     spans = []
-    for low, high, extent in ((box[1], box[3] + 1, size[1]), (box[0], box[2] + 1, size[0])):
+    for low, high, extent in ((top, bottom + 1, size[1]), (left, right + 1, size[0])):
         edges = torch.arange(GRID + 1) * (extent / GRID)
-        overlap = (edges[1:].clamp(max=high) - edges[:-1].clamp(min=low)).clamp(min=0)
-        spans.append(overlap / (extent / GRID))
-    area = spans[0][:, None] * spans[1][None, :]  # in cells
-    whole = (box[2] + 1 - box[0]) * (box[3] + 1 - box[1]) / (size[0] * size[1]) * TOKENS
-    return ((area >= _OF_CELL) | (area >= _OF_OBJECT * whole)).float().flatten()
+        overlap = torch.minimum(edges[1:], high[:, None]) - torch.maximum(edges[:-1], low[:, None])
+        spans.append(overlap.clamp(min=0) / (extent / GRID))
+    area = spans[0][:, :, None] * spans[1][:, None, :]  # in cells
+    whole = (right + 1 - left) * (bottom + 1 - top) / (size[0] * size[1]) * TOKENS
+    return ((area >= _OF_CELL) | (area >= _OF_OBJECT * whole[:, None, None])).float().flatten(1)
