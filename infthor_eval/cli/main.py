@@ -29,7 +29,7 @@ _COMMANDS = {
     "import-checkpoint": "Make a checkpoint of the published trainer one that models load.",
     "compare": "Compare two runs on the same data.",
     "check-parity": "Compare a policy's actions with another implementation's.",
-    "report": "Draw a figure of the paper of your own runs.",
+    "report": "Write runs as a page with every sample, or as a figure of the paper.",
     "watch": "Show what was done in a run of plans or of arms, as MP4 or GIF.",
     "ls": "List the models, the tasks or the scenes.",
     "scenes": "Look at a scene, or carry it to machines without Unity.",
