@@ -4,9 +4,9 @@ from infthor_eval.runs.catalog import Catalog, TaskFile
 from infthor_eval.runs.configuration import Configuration, read_configuration
 from infthor_eval.runs.driver import Observer, RunOutcome, Silent, execute
 from infthor_eval.runs.estimate import Estimate, TaskEstimate, estimate_run
-from infthor_eval.runs.journal import read_header, read_run
 from infthor_eval.runs.records import RecordTypes, RunHeader, Tokens, Unit, UnitKey, UnitRecord
 from infthor_eval.runs.request import PreparedRun, RunRequest, prepare
+from infthor_eval.runs.shards import read_header, read_run
 from infthor_eval.runs.suite import (
     Cost,
     Evaluation,

@@ -11,7 +11,7 @@ from infthor_eval.runs.crew import Crew
 from infthor_eval.runs.journal import Journal
 from infthor_eval.runs.records import RunHeader, UnitRecord
 from infthor_eval.runs.request import PreparedRun
-from infthor_eval.runs.results import write_results, write_took
+from infthor_eval.runs.results import results_document, write_results, write_took
 from infthor_eval.runs.staff import Alone, View
 from infthor_eval.runs.suite import RunSummary, Workload
 from infthor_eval.runs.usage import Usage
@@ -119,7 +119,7 @@ def _found(run: PreparedRun, folder: Path, header: RunHeader, workload: Workload
     summary = RunSummary(header, run.suite.summarise(header, records))
     n_missing = workload.n_units - len(records)
     usage = Usage.total([record.usage for record in records] + [memo.usage for memo in journal.memos])
-    write_results(folder, summary, n_missing, usage)
+    write_results(folder, results_document(summary, run.suite, n_missing, usage))
     write_took(folder, records, usage)
     return RunOutcome(folder, run, summary, records, n_missing, usage, run.evaluation.view)
 
