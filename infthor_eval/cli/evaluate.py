@@ -1,19 +1,22 @@
 """What `run` does with its requests, and what of it people see."""
 
 from collections.abc import Sequence
-from itertools import groupby
 
 from infthor_eval.cli.progress import NOTES, execute_with_progress, say
 from infthor_eval.cli.reasons import counted_reasons
+from infthor_eval.cli.showing import Showing, ShownRun, show
 from infthor_eval.harness.export import export
-from infthor_eval.report.terminal import print_table, table_console
 from infthor_eval.runs import RunOutcome, RunRequest, Suite, prepare
 
 __all__ = ["evaluate"]
 
 
-def evaluate(requests: Sequence[tuple[RunRequest, Suite]]) -> int:
-    """Run the requests one after another, and print one set of tables per suite.
+def evaluate(requests: Sequence[tuple[RunRequest, Suite]], showing: Showing) -> int:
+    """Run the requests one after another, and print what they found.
+
+    Args:
+        requests: the runs, each with its suite.
+        showing: how results are shown.
 
     Returns:
         Exit code: 130 where somebody stopped it, 1 where a unit failed, or nothing of a run counts, else 0.
@@ -26,22 +29,14 @@ def evaluate(requests: Sequence[tuple[RunRequest, Suite]]) -> int:
         export(outcomes[-1])
         if outcomes[-1].n_missing:
             break
-    console = table_console()
-    for _, of_suite in groupby(sorted(outcomes, key=_suite_name), key=_suite_name):
-        same = list(of_suite)
-        for table in same[0].run.suite.tables([outcome.summary for outcome in same]):
-            print_table(table, console)
-    for outcome in outcomes:
-        if outcome.usage.requests:
-            console.print(f"{outcome.summary.header.name}: {outcome.usage.description}")
-        console.print(f"{outcome.summary.header.name}: {outcome.folder}")
+    show([_shown(outcome) for outcome in outcomes], showing)
     n_failed = sum(map(_say_what_failed, outcomes))  # every run says what failed
     n_void = sum(map(_say_if_void, outcomes))
     return 130 if outcomes[-1].n_missing else int(n_failed + n_void > 0)
 
 
-def _suite_name(outcome: RunOutcome) -> str:
-    return outcome.run.suite.name
+def _shown(outcome: RunOutcome) -> ShownRun:
+    return ShownRun(outcome.folder, outcome.run.suite, outcome.summary, outcome.usage, outcome.n_missing)
 
 
 def _say_if_void(outcome: RunOutcome) -> bool:

@@ -5,17 +5,20 @@ from typing import Any
 import click
 
 from infthor_eval.cli.run_options import run_options
+from infthor_eval.cli.showing import SHOWING, Showing, showing_options
 
 __all__ = ["command"]
 
 
 @click.command("run")
-@run_options()
-def command(requests: Any) -> int:
-    """Evaluate MODEL on TASKS and print the results beside the published ones.
+@run_options(*SHOWING)
+@showing_options
+@click.option("--quiet", is_flag=True, help="Say nothing but what failed; print the runs' folders alone.")
+def command(requests: Any, showing: Showing) -> int:
+    """Evaluate MODEL on TASKS and print the results; --full prints all of them, beside the published ones.
 
     Stop it whenever you like: the same command goes on where it was.
     """
     from infthor_eval.cli.evaluate import evaluate
 
-    return evaluate(requests)
+    return evaluate(requests, showing)
