@@ -44,6 +44,7 @@ _OF_PAGE: dict[Any, Any] = {
     "grid.color": _GRID,
 }
 _PAGE_COLOURS = {_INK: "currentColor", _GRID: "var(--grid)", "#000000": "currentColor", "#444444": "currentColor"}
+_PER_INCH = 108  # pixels of a page, so that letters are as large as the page's own
 _SIZE = re.compile(r' (?:width|height)="[^"]*"(?: (?:width|height)="[^"]*")?')  # of the figure; it has a viewBox too
 LEGEND = 2.3  # inches beside the panels
 _NAME = 30  # letters of a line in the legend
@@ -90,17 +91,18 @@ def save_figure(make: Callable[[], Figure], folder: Path, name: str) -> list[Pat
 
 
 def inline_svg(make: Callable[[], Figure]) -> str:
-    """A figure as an element of a page: its ink is the page's own, light or dark, and it is as wide as there is room.
+    """A figure as an element of a page: its ink is the page's own, light or dark, and it shrinks with its room.
 
     Args:
         make: makes it, in the style of all of them.
     """
     with _in_style(_OF_PAGE):
-        written = io.StringIO()
-        make().savefig(written, format="svg", transparent=True, metadata=_OF_SVG)
+        written, figure = io.StringIO(), make()
+        figure.savefig(written, format="svg", transparent=True, metadata=_OF_SVG)
+        width = figure.get_figwidth()
     svg = written.getvalue()
     svg = svg[svg.index("<svg") :]
-    svg = _SIZE.sub("", svg, count=1)
+    svg = _SIZE.sub(rf' style="max-width: {round(_PER_INCH * width)}px"', svg, count=1)
     for colour, in_page in _PAGE_COLOURS.items():
         svg = svg.replace(colour, in_page)
     return svg

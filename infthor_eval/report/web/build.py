@@ -12,7 +12,7 @@ from infthor_eval.report.comparison import compare, comparison_table
 from infthor_eval.report.web.arm_samples import arm_samples
 from infthor_eval.report.web.episode_charts import arm_sections, plan_sections
 from infthor_eval.report.web.headlines import headline_table, left_out_table, took_table
-from infthor_eval.report.web.nieh_charts import MAIN_METRIC, nieh_charts
+from infthor_eval.report.web.nieh_charts import nieh_charts
 from infthor_eval.report.web.nieh_samples import nieh_samples
 from infthor_eval.report.web.page import About, Page
 from infthor_eval.report.web.plan_samples import plan_samples
@@ -23,7 +23,9 @@ from infthor_eval.report.web.thumbnails import Thumbnails
 
 __all__ = ["Wanted", "build_page"]
 
-_SUITES = {"nieh": "Questions", "plans": "Plans", "manipulation": "Pick-ups and puts"}
+_TITLES = {"nieh": "Questions", "plans": "Plans", "manipulation": "Pick-ups and puts"}
+_FEW = 4  # runs of which each is compared with each
+_MAIN_METRIC = "strict"  # stands first among the scorers of samples
 
 
 @dataclass(frozen=True)
@@ -49,7 +51,9 @@ def build_page(runs: Sequence[ReportRun], wanted: Wanted) -> Page:
     Raises:
         DataError: an identity is not that of a run of its suite.
     """
-    suites = {name: same for name in _SUITES if (same := [run for run in runs if run.suite.name == name])}
+    suites: dict[str, list[ReportRun]] = {}
+    for run in runs:
+        suites.setdefault(run.suite.name, []).append(run)
     sections = [Section("results", "Results", tables=(headline_table(runs),))]
     for name, same in suites.items():
         sections += _suite_sections(name, same)
@@ -80,7 +84,7 @@ def _title(runs: Sequence[ReportRun]) -> str:
 def _suite_sections(name: str, runs: Sequence[ReportRun]) -> Iterator[Section]:
     charts = nieh_charts(runs) if name == "nieh" else []
     tables = runs[0].suite.tables([run.summary for run in runs])
-    yield Section(name, _SUITES[name], tuple(charts), tuple(tables))
+    yield Section(name, _TITLES.get(name, name), tuple(charts), tuple(tables))
     if name == "plans":
         yield from plan_sections(runs)
     if name == "manipulation":
@@ -88,16 +92,19 @@ def _suite_sections(name: str, runs: Sequence[ReportRun]) -> Iterator[Section]:
 
 
 def _comparisons(suites: Iterable[Sequence[ReportRun]]) -> Iterator[Section]:
-    """Each run against each before it, of its suite."""
+    """Each run against each before it, of its suite; of many, each against the first."""
     tables, notes = [], []
     for runs in suites:
-        for first, second in combinations(runs, 2):
+        pairs = combinations(runs, 2) if len(runs) <= _FEW else ((runs[0], other) for other in runs[1:])
+        for first, second in pairs:
             try:
                 rows = compare(first.suite, first.records, second.records)
             except DataError as error:
                 notes.append(f"{second.label} against {first.label}: {error}")
                 continue
             tables.append(comparison_table(rows, first.label, second.label))
+        if len(runs) > _FEW:
+            notes.append(f"each run against {runs[0].label}; infthor-eval compare tells of any two")
     if tables or notes:
         yield Section("comparison", "Comparison", (), tuple(tables), tuple(notes))
 
@@ -109,11 +116,7 @@ def _samples(
     samples: list[Sample] = []
     notes: list[str] = []
     for name, same in suites.items():
-        if name == "nieh":
-            found, told = nieh_samples(same, wanted.data, thumbnails)
-        else:
-            of_suite = plan_samples if name == "plans" else arm_samples
-            found, told = of_suite(same, wanted.data, wanted.scenes, wanted.episodes, thumbnails)
+        found, told = _samples_of(name, same, wanted, thumbnails)
         places = [runs.index(run) for run in same]
         samples += [sample.among(len(runs), places) for sample in found]
         notes += told
@@ -122,11 +125,22 @@ def _samples(
     return samples, notes
 
 
+def _samples_of(
+    suite: str, runs: Sequence[ReportRun], wanted: Wanted, thumbnails: Thumbnails
+) -> tuple[list[Sample], list[str]]:
+    if suite == "nieh":
+        return nieh_samples(runs, wanted.data, thumbnails)
+    of_suite = {"plans": plan_samples, "manipulation": arm_samples}.get(suite)
+    if of_suite is None:  # of another package
+        return [], [f"samples of {suite} are not shown: how is not known here"]
+    return of_suite(runs, wanted.data, wanted.scenes, wanted.episodes, thumbnails)
+
+
 def _metrics(samples: Sequence[Sample]) -> list[str]:
     names = dict.fromkeys(
         name for sample in samples for result in sample.results if result is not None for name in result.scores
     )
-    return sorted(names, key=lambda name: name != MAIN_METRIC)
+    return sorted(names, key=lambda name: name != _MAIN_METRIC)
 
 
 def _about(run: ReportRun) -> About:

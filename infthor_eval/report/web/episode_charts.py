@@ -35,9 +35,11 @@ def plan_sections(runs: Sequence[ReportRun]) -> Iterator[Section]:
 
 
 def arm_sections(runs: Sequence[ReportRun]) -> Iterator[Section]:
-    """Reward of arms along trajectories, and success by radius."""
+    """Reward of arms along trajectories, and success by radius where there are several."""
     drawn = [arm_run(run) for run in runs]
     yield _section("arm-rewards", "Reward of pick-ups and puts", lambda: _curves(arm_curves(with_radii(drawn))))
+    if len({task.radius for run in drawn for task in run.about.tasks.values()}) < 2:
+        return  # one radius is no curve
     models = [replace(it, label=run.model) for it, run in zip(drawn, runs, strict=True)]
     yield _section("arm-radius", "Success by the hand's radius", lambda: _radii(models))
 

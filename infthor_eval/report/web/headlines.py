@@ -2,53 +2,29 @@
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from typing import Any
 
-from infthor_eval.agents.summary import PlansSummary
-from infthor_eval.manipulation.summary import ManipulationSummary
-from infthor_eval.nieh.summary import NiehSummary
 from infthor_eval.rates import Rate
-from infthor_eval.report.web.nieh_charts import MAIN_METRIC
 from infthor_eval.report.web.runs import ReportRun
 from infthor_eval.tables import Column, Row, Table
 
 __all__ = ["headline_table", "left_out_table", "took_table"]
 
+_MEASURES = {"nieh": "questions right", "plans": "plans carried out", "manipulation": "episodes that were a success"}
 _NAMES = (Column("run", False), Column("task", False))
 
 
 def headline_table(runs: Sequence[ReportRun]) -> Table:
     """A row per run and task."""
-    rows = [Row((run.label, *cells)) for run in runs for cells in _headlines(run)]
-    columns = (*_NAMES, Column("measure", False), *map(Column, ("%", "95 % interval", "units", "trajectories")))
+    rows = [
+        Row((run.label, task, _MEASURES.get(run.suite.name, run.suite.name), *_cells(rate), str(rate.n)))
+        for run in runs
+        for task, rate in run.suite.headline(run.summary.summary).items()
+    ]
+    columns = (*_NAMES, Column("measure", False), *map(Column, ("%", "95 % interval", "units")))
     return Table("", columns, tuple(rows))
 
 
-def _headlines(run: ReportRun) -> Iterator[tuple[str, ...]]:
-    found = run.summary.summary
-    if isinstance(found, NiehSummary):
-        for name, task in found.tasks.items():
-            score = task.by_clues["total"].scores.get(MAIN_METRIC)
-            if score is not None:
-                rate = Rate(score.mean, score.low, score.high, task.n)
-                yield name, f"accuracy, {MAIN_METRIC}", *_cells(rate), str(task.n), str(score.n_trajectories)
-    elif isinstance(found, PlansSummary):
-        for name, plans in found.tasks.items():
-            yield name, "reward, of what was to be had", *_cells(plans.reward_share), *_sizes(plans)
-            yield name, "plans carried out", *_cells(plans.success.get("total")), *_sizes(plans)
-    elif isinstance(found, ManipulationSummary):
-        for name, arm in found.tasks.items():
-            n = str(arm.success.n) if arm.success else "0"
-            yield name, f"success, radius {arm.radius:g} m", *_cells(arm.success), n, str(arm.n_trajectories)
-
-
-def _sizes(task: Any) -> tuple[str, str]:
-    return str(task.n_plans), str(task.n_trajectories)
-
-
-def _cells(rate: Rate | None) -> tuple[str, str]:
-    if rate is None:
-        return "-", "-"
+def _cells(rate: Rate) -> tuple[str, str]:
     interval = "-" if rate.low is None or rate.high is None else f"{100 * rate.low:.1f}–{100 * rate.high:.1f}"
     return f"{100 * rate.mean:.1f}", interval
 

@@ -8,15 +8,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from infthor_eval.formats.question import ABSENCE
-from infthor_eval.nieh.summary import CLUE_COLUMNS, Cell, TaskSummary
+from infthor_eval.nieh.summary import CLUE_COLUMNS, Cell, TaskSummary, main_metric
 from infthor_eval.report.drawing import LEGEND, Look, add_legend, inline_svg, looks_of
 from infthor_eval.report.web.runs import ReportRun
 from infthor_eval.report.web.sections import Chart
 from infthor_eval.terminal import shown
 
-__all__ = ["MAIN_METRIC", "nieh_charts"]
+__all__ = ["nieh_charts"]
 
-MAIN_METRIC = "strict"
 _COLUMNS = (*CLUE_COLUMNS, ABSENCE)
 _SPREAD = 0.6  # of the room between two columns that the dots of several runs take
 _PANEL, _ROW = (4.6, 2.6), 0.34  # inches
@@ -29,6 +28,11 @@ class _Line(NamedTuple):
     label: str
     task: TaskSummary
     look: Look
+
+    @property
+    def metric(self) -> str:
+        """That the task is known by."""
+        return main_metric(self.task)
 
 
 def nieh_charts(runs: Sequence[ReportRun]) -> list[Chart]:
@@ -51,12 +55,12 @@ def _by_clues(task: str, lines: Sequence[_Line]) -> Chart:
         figure = Figure(figsize=(_PANEL[0] + LEGEND, _PANEL[1]), layout="constrained")
         place = figure.subplots()
         for number, line in enumerate(lines):
-            _dots(place, [line.task.by_clues[name] for name in _COLUMNS], line.look, _off(number, len(lines)))
+            _dots(place, [line.task.by_clues[name] for name in _COLUMNS], line, _off(number, len(lines)))
         counts = [lines[0].task.by_clues[name].n for name in _COLUMNS]
         names = [f"{name}\n({n})" for name, n in zip(_COLUMNS, counts, strict=True)]
         place.set_xticks(range(len(_COLUMNS)), names)
         place.set_ylim(-3, 103)
-        place.set_ylabel(f"{MAIN_METRIC} (%)")
+        place.set_ylabel(f"{lines[0].metric} (%)")
         place.set_xlabel("clues (questions)")
         place.grid(axis="x", visible=False)
         add_legend(place, [(line.label, line.look) for line in lines])
@@ -74,10 +78,10 @@ def _by_type(task: str, lines: Sequence[_Line]) -> Chart:
         place = figure.subplots()
         for number, line in enumerate(lines):
             cells = [line.task.by_question_type.get(name) for name in types]
-            _dots(place, cells, line.look, -_off(number, len(lines)), is_flat=True)
+            _dots(place, cells, line, -_off(number, len(lines)), is_flat=True)
         place.set_yticks(range(len(types)), [shown(name)[:40] for name in types])
         place.set_xlim(-3, 103)
-        place.set_xlabel(f"{MAIN_METRIC} (%)")
+        place.set_xlabel(f"{lines[0].metric} (%)")
         place.grid(axis="y", visible=False)
         add_legend(place, [(line.label, line.look) for line in lines])
         return figure
@@ -89,37 +93,37 @@ def _off(number: int, n_lines: int) -> float:
     return 0.0 if n_lines == 1 else _SPREAD * (number / (n_lines - 1) - 0.5)
 
 
-def _dots(place: Axes, cells: Sequence[Cell | None], look: Look, off: float, *, is_flat: bool = False) -> None:
+def _dots(place: Axes, cells: Sequence[Cell | None], line: _Line, off: float, *, is_flat: bool = False) -> None:
     """A dot with its interval for each cell that was asked."""
     for at, cell in enumerate(cells):
-        if cell is None or MAIN_METRIC not in cell.scores:
+        if cell is None or not cell.n:
             continue
-        score = cell.scores[MAIN_METRIC]
+        score = cell.scores[line.metric]
         mean, where = 100 * score.mean, at + off
-        place.plot(*((mean, where) if is_flat else (where, mean)), marker="o", ms=4.5, color=look.colour, zorder=3)
+        place.plot(*((mean, where) if is_flat else (where, mean)), marker="o", ms=4.5, color=line.look.colour, zorder=3)
         if score.low is not None and score.high is not None:
             span = place.hlines if is_flat else place.vlines
-            span(where, 100 * score.low, 100 * score.high, color=look.colour, lw=1.3, zorder=2.8)
+            span(where, 100 * score.low, 100 * score.high, color=line.look.colour, lw=1.3, zorder=2.8)
 
 
 def _told(lines: Sequence[_Line]) -> str:
     """In words: the totals."""
-    totals = ((line.label, line.task.by_clues["total"].scores.get(MAIN_METRIC)) for line in lines)
-    return "; ".join(f"{label} {100 * score.mean:.1f} %" for label, score in totals if score is not None)
+    totals = ((line.label, line.task.by_clues["total"].scores[line.metric]) for line in lines)
+    return "; ".join(f"{label} {100 * score.mean:.1f} %" for label, score in totals)
 
 
 def _heat_map(run: ReportRun) -> Chart | None:
     """Accuracy of a run by depth of the needle and size of the context; None where no task of it has depths."""
-    by_size = {
-        int(run.dataset(name).get("ctx_size") or 0): task.by_variant
+    tasks = {
+        int(run.dataset(name).get("ctx_size") or 0): task
         for name, task in run.summary.summary.tasks.items()
         if any(variant.startswith(_DEPTH) for variant in task.by_variant)
     }
-    if not by_size:
+    if not tasks:
         return None
-    sizes = sorted(by_size)
-    depths = sorted({depth for cells in by_size.values() for depth in cells if depth.startswith(_DEPTH)})
-    means = [[_percent(by_size[size].get(depth)) for size in sizes] for depth in depths]
+    sizes, metric = sorted(tasks), main_metric(next(iter(tasks.values())))
+    depths = sorted({depth for task in tasks.values() for depth in task.by_variant if depth.startswith(_DEPTH)})
+    means = [[_percent(tasks[size].by_variant.get(depth), metric) for size in sizes] for depth in depths]
 
     def make() -> Figure:
         figure = Figure(figsize=(2.2 + 0.9 * len(sizes), 1.4 + 0.5 * len(depths)), layout="constrained")
@@ -136,11 +140,11 @@ def _heat_map(run: ReportRun) -> Chart | None:
         place.set_yticks(range(len(depths)), [depth.removeprefix(_DEPTH) for depth in depths])
         place.set_xlabel("context (thousand tokens)")
         place.set_ylabel("depth of the needle")
-        figure.colorbar(picture, ax=place, label=f"{MAIN_METRIC} (%)")
+        figure.colorbar(picture, ax=place, label=f"{metric} (%)")
         return figure
 
     return Chart(f"{run.label}: accuracy by depth and size of the context", inline_svg(make), "see the table by depth")
 
 
-def _percent(cell: Cell | None) -> float:
-    return math.nan if cell is None or not cell.n else 100 * cell.scores[MAIN_METRIC].mean
+def _percent(cell: Cell | None, metric: str) -> float:
+    return math.nan if cell is None or not cell.n else 100 * cell.scores[metric].mean

@@ -46,7 +46,7 @@
   fill("clues", distinct("clues"), "all");
   fill("run", runs.map((label, at) => [String(at), label]), "any");
   fill("outcome", Object.keys(MARKS).map(name => [name, name]), "all");
-  if (metrics.length < 2) byId("disagree").parentElement.hidden = true;
+  if (metrics.length < 2 || !samples.some(sample => sample.suite === "nieh")) byId("disagree").parentElement.hidden = true;
   if (runs.length < 2) byId("differ").parentElement.hidden = true;
 
   const resultsOf = sample => sample.results.filter(Boolean);
@@ -129,7 +129,7 @@
       make("p", { class: "gold" }, isEpisode || sample.suite !== "nieh" ? "for: " : "gold answer: ", make("b", {}, sample.wanted ?? "")),
       results(sample),
       ...(sample.timeline ? timeline(sample.timeline) : []),
-      ...sample.results.flatMap((result, at) => result?.steps ? [episode(result, runs[at])] : []),
+      ...episodes(sample),
       make("p", { class: "note" }, facts));
   };
 
@@ -166,7 +166,12 @@
     return [line, make("div", { class: "frames" }, ...cards), said];
   };
 
-  const episode = (result, label) => {
+  // Of many runs the first two are open, the others at a click.
+  const episodes = sample => sample.results
+    .map((result, at) => result?.steps ? [result, runs[at]] : null).filter(Boolean)
+    .map(([result, label], number) => episode(result, label, number < 2));
+
+  const episode = (result, label, isOpen) => {
     const seen = result.first !== undefined || result.steps.some(step => step.picture !== undefined);
     const earns = result.steps.some(step => step.reward !== undefined);
     const head = ["", ...(seen ? ["seen after it"] : []), "action", ...(earns ? ["reward"] : []), ""];
@@ -184,7 +189,8 @@
       make("tbody", {}, ...start, ...rows));
     const map = result.map === undefined ? null
       : make("img", { class: "map", src: `data:image/webp;base64,${pictures[result.map]}`, alt: "map at the end" });
-    return make("div", {}, make("h4", {}, label),
+    const count = `${result.steps.length} ${result.steps.length === 1 ? "action" : "actions"}`;
+    return make("details", isOpen ? { open: "" } : {}, make("summary", {}, make("b", {}, label), `: ${count}`),
       result.note ? make("p", { class: "note" }, `otherwise than recorded: ${result.note}`) : null,
       make("div", { class: "episode" }, make("div", { class: "steps" }, table), map));
   };

@@ -12,6 +12,7 @@ import msgspec
 from infthor_eval.errors import UsageError
 from infthor_eval.report.curves import model_names, run_labels
 from infthor_eval.runs import RunHeader, RunSummary, Suite, UnitKey, UnitRecord, read_header, read_run
+from infthor_eval.runs.configuration import read_configuration
 
 __all__ = ["ReportRun", "merged", "read_report_runs"]
 
@@ -83,6 +84,7 @@ def _read(folder: Path, label: str, suite_named: Callable[[str], Suite]) -> Repo
     suite = suite_named(read_header(folder).suite)
     header, records = read_run(folder, suite.records)
     (model,) = model_names([header])
+    asked = read_configuration(folder)
     return ReportRun(
         folder=folder,
         label=label,
@@ -92,6 +94,8 @@ def _read(folder: Path, label: str, suite_named: Callable[[str], Suite]) -> Repo
         records=tuple(records),
         took=_written(folder / "took.json"),
         n_missing=_written(folder / "results.json").get("n_missing"),
+        command=asked.command if asked else "",
+        data=asked.data if asked else None,
     )
 
 
