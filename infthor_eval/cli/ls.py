@@ -40,7 +40,7 @@ def _models() -> Table:
 def _tasks() -> Table:
     from infthor_eval.runs import Catalog
 
-    catalog = Catalog.packaged()
+    catalog = Catalog.installed()
     table = Table("task", "what it is", box=box.SIMPLE_HEAD)
     for name, members in catalog.groups.items():
         table.add_row(name, f"group of {', '.join(members)}")
