@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-__all__ = ["LARGEST", "SEED", "FiniteRange", "floor_plans_option", "model_options_in", "names_in"]
+__all__ = ["LARGEST", "SEED", "FiniteRange", "floor_plans_option", "model_options_in", "names_in", "pairs_in"]
 
 LARGEST = 2**63 - 1  # of the numbers that a run's identity can hold
 SEED = click.IntRange(-LARGEST, LARGEST)
@@ -47,12 +47,25 @@ def model_options_in(text: str) -> dict[str, str]:
     Raises:
         click.UsageError: an item is of another form, or a key stands twice.
     """
+    return pairs_in(text, "--model-args")
+
+
+def pairs_in(text: str, option: str) -> dict[str, str]:
+    """Keys and values written as `k=v,k=v`.
+
+    Args:
+        text: as typed.
+        option: that took it, for the message.
+
+    Raises:
+        click.UsageError: an item is of another form, or a key stands twice.
+    """
     options: dict[str, str] = {}
     for item in filter(None, (part.strip() for part in text.split(","))):
         key, equals, value = item.partition("=")
         if not equals or not key.strip():
-            raise click.UsageError(f"--model-args: {item!r} is not of the form key=value")
+            raise click.UsageError(f"{option}: {item!r} is not of the form key=value")
         if key.strip() in options:
-            raise click.UsageError(f"--model-args: {key.strip()!r} is given twice")
+            raise click.UsageError(f"{option}: {key.strip()!r} is given twice")
         options[key.strip()] = value.strip()
     return options

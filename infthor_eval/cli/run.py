@@ -5,17 +5,19 @@ from typing import Any
 import click
 
 from infthor_eval.cli.run_options import run_options
+from infthor_eval.cli.tracker_options import TRACKERS, tracker_options
 
 __all__ = ["command"]
 
 
 @click.command("run")
-@run_options()
-def command(requests: Any) -> int:
+@run_options(*TRACKERS)
+@tracker_options
+def command(requests: Any, trackers: Any) -> int:
     """Evaluate MODEL on TASKS and print the results beside the published ones.
 
     Stop it whenever you like: the same command goes on where it was.
     """
     from infthor_eval.cli.evaluate import evaluate
 
-    return evaluate(requests)
+    return evaluate(requests, trackers)
