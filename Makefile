@@ -7,7 +7,7 @@ INSTALLED := $(VENV)/.installed
 # here. It must stay out of the environment itself, where transformers would find it and fail.
 PEERS := $(VENV)/test-peers
 
-.PHONY: demo test test-all lint clean
+.PHONY: demo test test-all lint docs clean
 
 # A trajectory in a procedural kitchen, its frames and questions; then the bundled set, by the bounds and a small model.
 demo: $(INSTALLED)
@@ -30,10 +30,14 @@ lint: $(INSTALLED)
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
+# The documentation as a site, build/site/index.html; a link that leads nowhere ends it.
+docs: $(INSTALLED)
+	$(BIN)/mkdocs build --quiet
+
 $(INSTALLED): pyproject.toml setup.py constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or newer is needed: make PYTHON=python3.11 ...")'
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
+	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev,docs]'
 	touch $@
 
 $(PEERS): $(INSTALLED)

@@ -5,8 +5,10 @@ traceback and exits with the error's `exit_code`.
 """
 
 import difflib
+import traceback
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 __all__ = [
     "DataError",
@@ -15,6 +17,7 @@ __all__ = [
     "SceneError",
     "SimulatorError",
     "UsageError",
+    "fault",
     "in_one_line",
     "naming",
     "unknown_name",
@@ -72,6 +75,13 @@ def in_one_line(error: BaseException) -> str:
     if isinstance(error, KeyError):  # whose text is the key alone
         said = f"no {said}"
     return said if len(said) <= _LONGEST else said[: _LONGEST - 3] + "..."
+
+
+def fault(error: Exception) -> str:
+    """What a programming error is, where, and what it says."""
+    place = traceback.extract_tb(error.__traceback__)[-1]
+    where = f"{Path(place.filename).name}:{place.lineno} ({place.name})"
+    return f"{type(error).__name__} in {where}: {in_one_line(error)}"
 
 
 @contextmanager

@@ -1,21 +1,34 @@
 """The suites that there are, by the names that task files use.
 
-A suite, and its options for the command line, are imported only when asked for, so that `--help` stays quick.
+A suite, and its options for the command line, are imported only when asked for, so that `--help` stays quick. Packages
+add their own through the entry point group `infthor_eval.suites`, as "module:Class" under the suite's name.
 """
 
 import importlib
 from collections.abc import Iterable, Mapping
+from functools import reduce
+from importlib.metadata import EntryPoint, entry_points
 from typing import TYPE_CHECKING, Any
 
-from infthor_eval.errors import unknown_name
+from infthor_eval.errors import UsageError, naming, unknown_name
 
 if TYPE_CHECKING:
     from infthor_eval.runs import Suite, TaskFile
 
-__all__ = ["baseline_names", "options_of", "split_by_suite", "suite_named", "suite_names"]
+__all__ = [
+    "ENTRY_POINTS",
+    "baseline_names",
+    "options_of",
+    "split_by_suite",
+    "suite_identity",
+    "suite_named",
+    "suite_names",
+]
+
+ENTRY_POINTS = "infthor_eval.suites"
 
 # "module:Class" of the suite, and of its options.
-_SUITES = {
+_BUILT_IN = {
     "nieh": ("infthor_eval.nieh.suite:NiehSuite", "infthor_eval.nieh.options:NiehOptions"),
     "manipulation": (
         "infthor_eval.manipulation.suite:ManipulationSuite",
@@ -26,32 +39,51 @@ _SUITES = {
 
 
 def suite_names() -> tuple[str, ...]:
-    """All suites."""
-    return tuple(_SUITES)
+    """All suites, the built-in ones first."""
+    return tuple(_targets())
 
 
 def suite_named(name: str) -> "Suite":
     """The suite of that name.
 
     Raises:
-        UsageError: there is none.
+        UsageError: there is none, or that of another package is not what a suite must be.
     """
-    if name not in _SUITES:
-        raise unknown_name("suite", name, _SUITES)
-    made: Suite = _imported(_SUITES[name][0])()
+    targets = _targets()
+    if name not in targets:
+        raise unknown_name("suite", name, targets)
+    found = _imported(name, targets[name][0])
+    if name not in _BUILT_IN:
+        _check(name, found)
+    made: Suite = found()
     return made
 
 
 def options_of(name: str) -> type:
-    """The dataclass of a suite's options."""
-    found: type = _imported(_SUITES[name][1])
+    """The dataclass of a suite's options.
+
+    Raises:
+        UsageError: the suite of another package cannot be imported.
+    """
+    found: type = _imported(name, _targets()[name][1])
     return found
+
+
+def suite_identity(name: str) -> dict[str, Any]:
+    """What distinguishes a suite's code from other versions of it, as JSON values; nothing for a built-in one.
+
+    Raises:
+        ModelError: its source cannot be read.
+    """
+    from model_adapters.adapter_identity import identity_of
+
+    return {} if name in _BUILT_IN else identity_of(_entry_points()[name])
 
 
 def baseline_names() -> dict[str, str]:
     """The baselines of all suites, each with the suites that have it, in words."""
     found: dict[str, list[str]] = {}
-    for name in _SUITES:
+    for name in suite_names():
         for baseline in suite_named(name).baselines:
             found.setdefault(baseline, []).append(name)
     return {baseline: ", ".join(names) for baseline, names in found.items()}
@@ -65,6 +97,34 @@ def split_by_suite(tasks: Iterable["TaskFile"]) -> Mapping[str, list["TaskFile"]
     return found
 
 
-def _imported(target: str) -> Any:
-    module, _, attribute = target.partition(":")
-    return getattr(importlib.import_module(module), attribute)
+def _entry_points() -> dict[str, EntryPoint]:
+    return {point.name: point for point in entry_points(group=ENTRY_POINTS)}
+
+
+def _targets() -> dict[str, tuple[str, str]]:
+    # Built-in names win: a package cannot change what a known name means.
+    others = {name: (point.value, f"{point.value}.options") for name, point in _entry_points().items()}
+    return _BUILT_IN | {name: target for name, target in others.items() if name not in _BUILT_IN}
+
+
+def _imported(name: str, target: str) -> Any:
+    module, _, attributes = target.partition(":")
+    problem = f"the suite {name} cannot be imported from {target}"
+    with naming(problem, "mend its package, or uninstall it", of=(ImportError, AttributeError), as_a=UsageError):
+        return reduce(getattr, attributes.split("."), importlib.import_module(module))
+
+
+def _check(name: str, found: Any) -> None:
+    """Refuse a class of another package that lacks what a suite has.
+
+    Raises:
+        UsageError: names what it lacks.
+    """
+    from infthor_eval.runs import Suite
+
+    members = [*Suite.__annotations__, *(member for member in vars(Suite) if not member.startswith("_"))]
+    missing = [member for member in members if not hasattr(found, member)]
+    if missing:
+        raise UsageError(f"the suite {name} of another package lacks {', '.join(missing)}; see docs/own-tasks.md")
+    if found.name != name:
+        raise UsageError(f"the suite {name} of another package calls itself {found.name!r}; give it one name")

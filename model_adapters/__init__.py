@@ -4,7 +4,7 @@ Importing this package imports neither torch nor transformers; they come with th
 """
 
 from model_adapters.backend import Backend, BackendConversation
-from model_adapters.check import ContractError, check_adapter, check_policy
+from model_adapters.check import ContractError, Finding, check_adapter, check_policy, findings
 from model_adapters.protocols import (
     ROLES,
     Adapter,
@@ -22,7 +22,18 @@ from model_adapters.protocols import (
     Turn,
 )
 from model_adapters.refusals import check_decoding, check_turns, requesting
-from model_adapters.registry import adapter_identity, check_options, label, load, names, on_engine, options, takes
+from model_adapters.registry import (
+    adapter_identity,
+    check_options,
+    is_known,
+    label,
+    load,
+    names,
+    on_engine,
+    options,
+    takes,
+)
+from model_adapters.stopping import cut_at_stop
 from model_adapters.transcript import Transcript
 
 __all__ = [
@@ -35,6 +46,7 @@ __all__ = [
     "ContractError",
     "Conversation",
     "Decoding",
+    "Finding",
     "Mark",
     "Model",
     "Part",
@@ -50,6 +62,9 @@ __all__ = [
     "check_options",
     "check_policy",
     "check_turns",
+    "cut_at_stop",
+    "findings",
+    "is_known",
     "label",
     "load",
     "names",

@@ -1,4 +1,4 @@
-"""What identifies the code of an adapter that came with another package."""
+"""What identifies the code of an adapter, or a suite, that came with another package."""
 
 from collections.abc import Iterator
 from importlib.metadata import EntryPoint
@@ -25,7 +25,7 @@ def identity_of(point: EntryPoint) -> dict[str, Any]:
     try:
         source = fingerprint({name: digest_of_file(path) for name, path in _sources(package)})
     except (OSError, ValueError) as error:
-        raise ModelError(f"model {point.name}: the source of {package} cannot be read ({error})") from error
+        raise ModelError(f"{point.name}: the source of {package} cannot be read ({error})") from error
     return {
         "package": point.dist.name if point.dist else package,
         "version": point.dist.version if point.dist else None,

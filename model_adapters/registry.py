@@ -1,7 +1,8 @@
 """Names of models, and how to get from a name to a model.
 
 Targets are "module:Class" strings that are imported only when a model is asked for, so that listing names, and the
-options of built-in models, costs nothing. Packages add their own through the entry point group `infthor_eval.models`.
+options of built-in models, costs nothing. Packages add their own through the entry point group `infthor_eval.models`; a
+name may also be that of a file and a class in it, `./my_adapter.py:MyModel`.
 """
 
 import dataclasses
@@ -16,12 +17,14 @@ from infthor_eval.errors import ModelError, UsageError, unknown_name
 from model_adapters.adapter_identity import identity_of
 from model_adapters.built_in import BUILT_IN
 from model_adapters.options import describe, parse
+from model_adapters.own_file import class_in_file, class_name, identity_of_file, names_a_file
 from model_adapters.protocols import Adapter, Model, Policy
 
 __all__ = [
     "ENTRY_POINTS",
     "adapter_identity",
     "check_options",
+    "is_known",
     "label",
     "load",
     "names",
@@ -38,6 +41,11 @@ _TRANSFORMERS = "transformers"  # runs what no other engine is named for
 def names() -> tuple[str, ...]:
     """All model names, sorted: the built-in ones and those of installed packages."""
     return tuple(sorted(_targets()))
+
+
+def is_known(name: str) -> bool:
+    """Whether there is a model of this name, or it is that of a file with one."""
+    return name in _targets() or names_a_file(name)
 
 
 def on_engine(name: str, engine: str) -> str:
@@ -85,7 +93,7 @@ def load(name: str, options: Mapping[str, str], seed: int) -> Model | Policy:
     """Build the model or the policy of this name.
 
     Args:
-        name: one of `names()`.
+        name: one of `names()`, or FILE.py:CLASS.
         options: the adapter's options as typed, `{"dtype": "float32"}`; what is left out takes its default.
         seed: for whatever is random in it (random weights).
 
@@ -94,18 +102,21 @@ def load(name: str, options: Mapping[str, str], seed: int) -> Model | Policy:
         ModelError: the model cannot be loaded.
     """
     adapter = _adapter(name)
-    return adapter.build(name, parse(name, adapter.Options, options), seed)
+    return adapter.build(class_name(name) if names_a_file(name) else name, parse(name, adapter.Options, options), seed)
 
 
 def adapter_identity(name: str) -> dict[str, Any]:
     """What distinguishes this adapter's code from other versions of it, as JSON values.
 
-    Nothing for a built-in one, whose version is the harness's own; else package, version and a digest of the source.
+    Nothing for a built-in one, whose version is the harness's own; else package (or file), version and a digest of the
+    source.
 
     Raises:
         UsageError: there is no model of this name.
         ModelError: the adapter's source cannot be read.
     """
+    if names_a_file(name):
+        return identity_of_file(name)
     _target(name)
     return {} if name in BUILT_IN else identity_of(_entry_points()[name])
 
@@ -129,6 +140,7 @@ def label(name: str, options: Mapping[str, str]) -> str:
             model is named as the server does.
     """
     checkpoint = options.get("pretrained") or options.get("model")
+    name = class_name(name) if names_a_file(name) else name
     if not checkpoint:
         return _as_component(name)
     revision = options.get("revision")
@@ -171,13 +183,13 @@ def _options(name: str) -> type:
 
 
 def _adapter(name: str) -> type[Adapter]:
-    target = _target(name)
+    target = name if names_a_file(name) else _target(name)
     try:
-        found = _imported(target)
+        found = class_in_file(name) if names_a_file(name) else _imported(target)
     except (ImportError, AttributeError) as error:
         raise ModelError(f"model {name} cannot be imported from {target} ({error})") from error
     if not (hasattr(found, "Options") and hasattr(found, "build")):
-        raise ModelError(f"model {name}: {target} has no Options and build; see model_adapters.Adapter")
+        raise ModelError(f"model {name}: {target} has no Options and build; see docs/own-models.md")
     return cast(type[Adapter], found)
 
 

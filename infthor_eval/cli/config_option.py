@@ -57,6 +57,8 @@ def _as_typed(path: Path, name: str, value: Any, option: click.Parameter) -> Any
         return value
     if isinstance(value, Mapping) and isinstance(option.type, ModelOptions):
         return {str(key): _text(path, f"{name}: {key}", item) for key, item in value.items()}
+    if option.multiple:
+        return [_text(path, name, item) for item in (value if isinstance(value, list) else [value])]
     if isinstance(value, list):
         return ",".join(_text(path, name, item) for item in value)
     return _text(path, name, value)
@@ -73,6 +75,7 @@ def _text(path: Path, name: str, value: Any) -> str:
 def _try(path: Path, name: str, value: Any, option: click.Parameter, context: click.Context) -> None:
     """Refuse a value here, where it is known that the file has it."""
     try:
-        option.type.convert(value, option, context)
+        for one in value if option.multiple else (value,):
+            option.type.convert(one, option, context)
     except click.UsageError as error:
         raise UsageError(f"{path}: {name}: {error.message}") from error

@@ -1,26 +1,35 @@
 """What `run` does with its requests, and what of it people see."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from infthor_eval.cli.progress import NOTES, execute_with_progress, say
 from infthor_eval.cli.reasons import counted_reasons
 from infthor_eval.cli.showing import Showing, ShownRun, show
+from infthor_eval.errors import DataError
 from infthor_eval.harness.export import export
+from infthor_eval.harness.trackers import Trackers
 from infthor_eval.runs import RunOutcome, RunRequest, Suite, prepare
 
 __all__ = ["evaluate"]
 
 
-def evaluate(requests: Sequence[tuple[RunRequest, Suite]], showing: Showing) -> int:
+def evaluate(
+    requests: Sequence[tuple[RunRequest, Suite]],
+    showing: Showing,
+    trackers: Mapping[str, Mapping[str, str]] | None = None,
+) -> int:
     """Run the requests one after another, and print what they found.
 
     Args:
         requests: the runs, each with its suite.
         showing: how results are shown.
+        trackers: arguments of those that finished runs are sent to (see `Trackers`); None for none.
 
     Returns:
-        Exit code: 130 where somebody stopped it, 1 where a unit failed, or nothing of a run counts, else 0.
+        Exit code: 130 where somebody stopped it, 1 where a unit failed, nothing of a run counts, or a tracker did not
+        take one, else 0.
     """
+    sending = Trackers(**(trackers or {}))
     with NOTES.status("looking at the tasks and their data"):  # retrieval embeds every frame: minutes
         runs = [prepare(request, suite) for request, suite in requests]
     outcomes = []
@@ -32,7 +41,8 @@ def evaluate(requests: Sequence[tuple[RunRequest, Suite]], showing: Showing) -> 
     show([_shown(outcome) for outcome in outcomes], showing)
     n_failed = sum(map(_say_what_failed, outcomes))  # every run says what failed
     n_void = sum(map(_say_if_void, outcomes))
-    return 130 if outcomes[-1].n_missing else int(n_failed + n_void > 0)
+    n_unsent = sum(_say_what_is_unsent(outcome, sending) for outcome in outcomes if not outcome.n_missing)
+    return 130 if outcomes[-1].n_missing else int(n_failed + n_void + n_unsent > 0)
 
 
 def _shown(outcome: RunOutcome) -> ShownRun:
@@ -44,6 +54,15 @@ def _say_if_void(outcome: RunOutcome) -> bool:
     if void:
         say(f"{outcome.summary.header.name}: nothing that could be evaluated counts: all of it was left out", "red")
     return void
+
+
+def _say_what_is_unsent(outcome: RunOutcome, trackers: Trackers) -> bool:
+    try:
+        trackers.send(outcome)
+    except DataError as error:
+        say(str(error), "red")
+        return True
+    return False
 
 
 def _say_what_failed(outcome: RunOutcome) -> int:

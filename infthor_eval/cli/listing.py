@@ -31,7 +31,7 @@ def tasks() -> None:
     """Print all tasks, and the groups of them."""
     from infthor_eval.runs.catalog import Catalog
 
-    catalog = Catalog.packaged()
+    catalog = Catalog.installed()
     table = Table("task", "what it is", box=box.SIMPLE_HEAD)
     for name, members in catalog.groups.items():
         table.add_row(name, f"group of {', '.join(members)}")

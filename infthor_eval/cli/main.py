@@ -28,6 +28,7 @@ _COMMANDS = {
     "train": "Fine-tune a model on trajectories and questions.",
     "import-checkpoint": "Make a checkpoint of the published trainer one that models load.",
     "compare": "Compare two runs on the same data.",
+    "check-adapter": "Check that a model of your own keeps the contract of adapters.",
     "check-parity": "Compare a policy's actions with another implementation's.",
     "report": "Write runs as a page with every sample, or as a figure of the paper.",
     "watch": "Show what was done in a run of plans or of arms, as MP4 or GIF.",

@@ -16,6 +16,7 @@ __all__ = [
     "floor_plans_option",
     "model_options_in",
     "names_in",
+    "pairs_in",
 ]
 
 LARGEST = 2**63 - 1  # of the numbers that a run's identity can hold
@@ -73,7 +74,7 @@ def _models_in(text: str, option: str) -> dict[str, dict[str, str]]:
         found.setdefault(model, []).extend([item.removeprefix(f"{named}:")] if equals else [])
     if not found:
         raise click.UsageError(f"{option} is empty; give a name")
-    return {model: _options_in(items, f"{option} {model}") for model, items in found.items()}
+    return {model: pairs_in(items, f"{option} {model}") for model, items in found.items()}
 
 
 def names_in(text: str, option: str) -> tuple[str, ...]:
@@ -94,10 +95,19 @@ def model_options_in(text: str) -> dict[str, str]:
     Raises:
         click.UsageError: an item is of another form, or a key stands twice.
     """
-    return _options_in(text.split(","), "--model-args")
+    return pairs_in(text.split(","), "--model-args")
 
 
-def _options_in(items: Iterable[str], where: str) -> dict[str, str]:
+def pairs_in(items: Iterable[str], where: str) -> dict[str, str]:
+    """Keys and values written as `k=v`.
+
+    Args:
+        items: as typed.
+        where: they were typed, for the message.
+
+    Raises:
+        click.UsageError: an item is of another form, or a key stands twice.
+    """
     options: dict[str, str] = {}
     for item in filter(None, (part.strip() for part in items)):
         key, equals, value = item.partition("=")

@@ -9,7 +9,7 @@ from typing import Any
 from infthor_eval.cli.suite_options import chosen_options
 from infthor_eval.errors import UsageError
 from infthor_eval.runs import Catalog, RunRequest, Suite, TaskRequest
-from infthor_eval.suites import split_by_suite, suite_named
+from infthor_eval.suites import split_by_suite, suite_identity, suite_named
 from infthor_eval.workers import Staffing
 
 __all__ = ["Asked", "requests_for"]
@@ -28,6 +28,7 @@ class Asked:
         fresh: start anew.
         recover: go on without bad lines.
         staffing: how many workers, and where.
+        include: folders with further task files.
         suite_options: option names to values, of all suites; None where not given.
     """
 
@@ -39,6 +40,7 @@ class Asked:
     fresh: bool = False
     recover: bool = False
     staffing: Staffing = field(default_factory=Staffing)
+    include: tuple[Path, ...] = ()
     suite_options: Mapping[str, Any] = field(default_factory=dict)
 
 
@@ -59,7 +61,7 @@ def requests_for(
     """
     if name is not None and not re.fullmatch(r"\w[\w.@+ -]*", name):
         raise UsageError(f"--name {name!r}: names a folder; use letters, digits, '.', '_', '-', '@', '+' and blanks")
-    by_suite = split_by_suite(Catalog.packaged().expand(asked.tasks))
+    by_suite = split_by_suite(Catalog.installed(asked.include).expand(asked.tasks))
     requests = []
     for suite_name, tasks in by_suite.items():
         for options in chosen_options(suite_name, asked.suite_options, by_suite.keys()):
@@ -74,6 +76,8 @@ def requests_for(
                 fresh=asked.fresh,
                 recover=asked.recover,
                 staffing=asked.staffing,
+                include=asked.include,
+                suite_code=suite_identity(suite_name),
             )
             requests.append((request, suite_named(suite_name)))
     return requests

@@ -10,7 +10,7 @@ import click
 from infthor_eval.cli.config_option import comes_from_file, config_option
 from infthor_eval.cli.options import LARGEST, SEED, FiniteRange, ModelOptions, ModelsAsked, names_in
 from infthor_eval.cli.staffing_options import staffing_options
-from infthor_eval.cli.suite_options import suite_options
+from infthor_eval.cli.suite_options import refuse_twins, suite_options
 from infthor_eval.workers import Staffing
 
 if TYPE_CHECKING:
@@ -33,6 +33,13 @@ _OPTIONS = (
         help="What runs the model: transformers, unless its name says otherwise, or vLLM.",
     ),
     click.option("--tasks", required=True, help="Task or group names with commas (see `ls tasks`)."),
+    click.option(
+        "--include-path",
+        "include",
+        type=click.Path(exists=True, file_okay=False, path_type=Path),
+        multiple=True,
+        help="Folder with task files of your own; may be repeated.",
+    ),
     click.option("--data", type=click.Path(path_type=Path), help="Folder of the data set to ask about."),
     click.option(
         "--model-args",
@@ -87,7 +94,9 @@ def run_options(*own: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]
             return command(requests=_requests(**given), **kept)
 
         options = (config_option, *_OPTIONS, staffing_options, suite_options)
-        return functools.reduce(lambda wrapped, option: option(wrapped), reversed(options), with_requests)
+        made = functools.reduce(lambda wrapped, option: option(wrapped), reversed(options), with_requests)
+        refuse_twins(made)
+        return made
 
     return with_options
 
@@ -96,6 +105,7 @@ def _requests(
     models: Mapping[str, Mapping[str, str]],
     engine: str | None,
     tasks: str,
+    include: tuple[Path, ...],
     model_args: Mapping[str, str],
     name: str | None,
     data: Path | None,
@@ -118,6 +128,7 @@ def _requests(
     _refuse_shared_caps(options, staffing)
     asked = Asked(
         tasks=names_in(tasks, "--tasks"),
+        include=include,
         data=data,
         limit=limit,
         seed=seed,

@@ -13,7 +13,7 @@ from infthor_eval.cli.options import LARGEST, names_in
 from infthor_eval.errors import UsageError
 from infthor_eval.suites import options_of, suite_names
 
-__all__ = ["chosen_options", "suite_options"]
+__all__ = ["chosen_options", "refuse_twins", "suite_options"]
 
 
 def suite_options(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -35,7 +35,7 @@ def suite_options(command: Callable[..., Any]) -> Callable[..., Any]:
             is_flag=kind is bool,
             default=None,
             metavar=item.metadata.get("metavar"),
-            help=" ".join(f"{item.metadata['help']} [{suite}]" for suite, item in by_suite.items()),
+            help=" ".join(f"{item.metadata.get('help', '')} [{suite}]" for suite, item in by_suite.items()),
         )(command)
     return command
 
@@ -61,6 +61,23 @@ def chosen_options(suite: str, given: Mapping[str, Any], asked: typing.Collectio
             typed = names_in(given[item.name], f"--{item.name}") if item.metadata.get("each") else [given[item.name]]
             values[item.name] = [_type(known[item.name])(value) for value in typed]
     return [options_of(suite)(**dict(zip(values, chosen, strict=True))) for chosen in product(*values.values())]
+
+
+def refuse_twins(command: Callable[..., Any]) -> None:
+    """Refuse options of another package's suite that are a command's own.
+
+    Args:
+        command: with its own options and those of all suites.
+
+    Raises:
+        UsageError: names the option.
+    """
+    made: list[click.Parameter] = command.__click_params__  # type: ignore[attr-defined]
+    names = [option.name for option in made]
+    twins = sorted({str(name) for name in names if names.count(name) > 1})
+    if twins:
+        having = [suite for suite in suite_names() if twins[0] in {item.name for item in fields(options_of(suite))}]
+        raise UsageError(f"the option {twins[0]} of the suite {having[0]} is one of every run; give it another name")
 
 
 def _refuse_unasked(given: Mapping[str, Any], asked: typing.Collection[str]) -> None:

@@ -17,9 +17,36 @@ from infthor_eval.harness.registration import NAME
 from infthor_eval.runs import RunOutcome, SampleView, TaskFile, UnitRecord
 from infthor_eval.statistics import clustered_mean
 
-__all__ = ["export"]
+__all__ = ["Exported", "export", "exported"]
 
 _FILTER = "none"
+
+
+@dataclass(frozen=True)
+class Exported:
+    """A run in lm-eval's words.
+
+    Attributes:
+        model: the model's name, fit for a folder's.
+        results: what its `results_*.json` holds, as JSON values.
+        samples: by task, the lines of its `samples_*.jsonl`.
+    """
+
+    model: str
+    results: dict[str, Any]
+    samples: dict[str, list[dict[str, Any]]]
+
+
+def exported(outcome: RunOutcome) -> Exported:
+    """All of a run that lm-eval's files have."""
+    tasks = _tasks(outcome)
+    samples = {task.name: _rows(outcome, task) for task in tasks}
+    hashes = {
+        name: _hash("".join(row["doc_hash"] + row["prompt_hash"] + row["target_hash"] for row in rows))
+        for name, rows in samples.items()
+    }
+    model = _sanitised(outcome.run.request.model)
+    return Exported(model, _results(outcome, tasks) | {"task_hashes": hashes, "model_name_sanitized": model}, samples)
 
 
 def export(outcome: RunOutcome) -> Path:
@@ -31,23 +58,17 @@ def export(outcome: RunOutcome) -> Path:
     Raises:
         DataError: they cannot be written.
     """
-    model = _sanitised(outcome.run.request.model)
-    folder = outcome.folder / "lm_eval" / model
+    made = exported(outcome)
+    folder = outcome.folder / "lm_eval" / made.model
     stamp = datetime.now().isoformat().replace(":", "-")
-    tasks, hashes = _tasks(outcome), {}
     with naming(f"{folder}: cannot be written", "make room, the journal holds it all"):
         folder.mkdir(parents=True, exist_ok=True)
-        for task in tasks:
-            rows = _rows(outcome, task)
-            hashes[task.name] = _hash(
-                "".join(row["doc_hash"] + row["prompt_hash"] + row["target_hash"] for row in rows)
-            )
-            with written_atomically(folder / f"samples_{task.name}_{stamp}.jsonl") as partial:
+        for task, rows in made.samples.items():
+            with written_atomically(folder / f"samples_{task}_{stamp}.jsonl") as partial:
                 lines = (json.dumps(row, ensure_ascii=False) + "\n" for row in rows)
                 partial.write_text("".join(lines), encoding="utf-8")
         with written_atomically(folder / f"results_{stamp}.json") as partial:
-            document = _results(outcome, tasks) | {"task_hashes": hashes, "model_name_sanitized": model}
-            partial.write_text(json.dumps(document, indent=2, ensure_ascii=False), encoding="utf-8")
+            partial.write_text(json.dumps(made.results, indent=2, ensure_ascii=False), encoding="utf-8")
     return folder
 
 

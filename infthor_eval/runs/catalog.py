@@ -1,24 +1,27 @@
-"""The tasks that the package brings: what `--tasks` can name.
+"""The tasks that there are: what `--tasks` can name. The package brings some, others and their user may add to them.
 
 The files are lm-eval's own format, and say which suite evaluates them (`metadata: {suite: NAME}`). lm-eval passes over
 a broken file without a word, so they are read and checked here first, without importing lm-eval.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
+from importlib.metadata import EntryPoint, entry_points
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import yaml
 
-from infthor_eval.errors import DataError, naming, unknown_name
+from infthor_eval.errors import DataError, UsageError, naming, unknown_name
 from infthor_eval.formats.digests import canonical_json
 from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.formats.yaml_files import PlainLoader, read_yaml
 
-__all__ = ["Catalog", "TaskFile"]
+__all__ = ["ENTRY_POINTS", "Catalog", "TaskFile"]
 
+ENTRY_POINTS = "infthor_eval.tasks"  # of packages: "package.folder" with their task files
 
 _MEND = "mend the task file"
 
@@ -63,14 +66,34 @@ class TaskFile:
 
 @dataclass(frozen=True)
 class Catalog:
-    """The task files below one folder."""
+    """The task files below some folders.
+
+    Attributes:
+        folder: with the task files of this package; those of other folders may include what its tasks share
+            (`include: _nieh.yaml`) as if it lay beside them.
+        more: the other folders.
+    """
 
     folder: Path
+    more: tuple[Path, ...] = ()
 
     @classmethod
     def packaged(cls) -> "Catalog":
-        """The tasks of this installation."""
+        """The tasks of this package alone."""
         return cls(packaged_folder("tasks"))
+
+    @classmethod
+    def installed(cls, include: Sequence[Path] = ()) -> "Catalog":
+        """The tasks of this package, of those installed beside it, and further ones.
+
+        Args:
+            include: folders with further task files.
+
+        Raises:
+            UsageError: an installed package lacks the folder that it names.
+        """
+        others = (_folder_of(point) for point in entry_points(group=ENTRY_POINTS))
+        return replace(cls.packaged(), more=(*others, *include))
 
     @cached_property
     def tasks(self) -> dict[str, TaskFile]:
@@ -111,10 +134,8 @@ class Catalog:
     @cached_property
     def _entries(self) -> dict[str, tuple[Path, dict[str, Any]]]:
         entries: dict[str, tuple[Path, dict[str, Any]]] = {}
-        for path in sorted(self.folder.rglob("*.yaml")):
-            if path.name.startswith("_"):
-                continue
-            settings = _read(path, ())
+        for path in self._files():
+            settings = _read(path, (), self._shared)
             with naming(f"{path}: holds what JSON cannot", _MEND, of=(TypeError, ValueError)):
                 canonical_json(settings)  # it is part of a run's identity
             name = settings.get("group") or settings.get("task")
@@ -126,6 +147,28 @@ class Catalog:
                 raise DataError(f"{path}: 'task' of a group must be a list of task names")
             entries[name] = path, settings
         return entries
+
+    def _files(self) -> Iterator[Path]:
+        for folder in (self.folder, *self.more):
+            yield from (path for path in sorted(folder.rglob("*.yaml")) if not path.name.startswith("_"))
+
+    @cached_property
+    def _shared(self) -> dict[str, Path]:
+        """What tasks of this package share, by the names of the files."""
+        return {path.name: path for path in self.folder.rglob("_*.yaml")}
+
+
+def _folder_of(point: EntryPoint) -> Path:
+    """The folder of task files that a package names; nothing of it is imported."""
+    package, *inside = point.value.split(".")
+    spec = find_spec(package)
+    places = spec.submodule_search_locations if spec is not None else None
+    found = [Path(place, *inside) for place in places or () if Path(place, *inside).is_dir()]
+    if not found:
+        raise UsageError(
+            f"the tasks {point.name} of another package are not in {point.value}; mend its package, or uninstall it"
+        )
+    return found[0]
 
 
 def _task(name: str, path: Path, settings: Mapping[str, Any]) -> TaskFile:
@@ -140,7 +183,7 @@ def _are_names(value: object) -> bool:
     return isinstance(value, list) and all(isinstance(name, str) for name in value)
 
 
-def _read(path: Path, including: tuple[Path, ...]) -> dict[str, Any]:
+def _read(path: Path, including: tuple[Path, ...], shared: Mapping[str, Path]) -> dict[str, Any]:
     config = read_yaml(path, _MEND, _Loader)
     if not isinstance(config, dict) or not all(isinstance(key, str) for key in config):
         raise DataError(f"{path}: not a mapping of settings; {_MEND}")
@@ -149,7 +192,8 @@ def _read(path: Path, including: tuple[Path, ...]) -> dict[str, Any]:
         return config
     if not isinstance(included, str):
         raise DataError(f"{path}: include is {included!r:.60}, not the name of a file; {_MEND}")
-    other = (path.parent / included).resolve()
+    beside = path.parent / included
+    other = (beside if beside.exists() else shared.get(included, beside)).resolve()
     if other in (*including, path.resolve()):
         raise DataError(f"{path}: includes {included}, which includes it; {_MEND}")
-    return {**_read(path.parent / included, (*including, path.resolve())), **config}
+    return {**_read(other, (*including, path.resolve()), shared), **config}

@@ -17,6 +17,7 @@ __all__ = ["Configuration", "read_configuration", "read_options", "write_configu
 
 _FILE = "run.yaml"
 _HEAD = "# How this run was asked for: `infthor-eval run --config` with this file goes on with it, or repeats it.\n"
+_REPEATED = {"include_path"}  # options that are typed once for each of their values
 _CHECKPOINT = "pretrained"  # the model option that may name a folder
 _MEND = "write options of `infthor-eval run` by their long names, as `limit: 100`"
 
@@ -100,6 +101,7 @@ def _options_of(request: RunRequest) -> dict[str, Any]:
         "model": request.model,
         "model_args": given or None,
         "tasks": list(request.asked),
+        "include_path": [str(folder.absolute()) for folder in request.include] or None,
         "data": None if tasks.data is None else str(tasks.data.absolute()),
         "limit": tasks.limit,
         "seed": tasks.seed,
@@ -132,7 +134,11 @@ def _words(name: str, value: Any) -> Iterator[str]:
     """An option as it is typed."""
     if value is None or value is False:
         return
-    yield f"--{name.replace('_', '-')}"
+    typed = f"--{name.replace('_', '-')}"
+    if name in _REPEATED:
+        yield from (word for one in value for word in (typed, str(one)))
+        return
+    yield typed
     if isinstance(value, Mapping):
         yield ",".join(f"{key}={item}" for key, item in value.items())
     elif isinstance(value, list):

@@ -5,10 +5,9 @@ from typing import Any
 
 import msgspec
 
-from infthor_eval.errors import InfthorError
+from infthor_eval.errors import InfthorError, fault
 from infthor_eval.runs.records import UnitRecord
 from infthor_eval.runs.suite import Evaluation, Group, Session
-from infthor_eval.workers import fault
 
 __all__ = ["group_records"]
 

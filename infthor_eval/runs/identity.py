@@ -21,7 +21,8 @@ def header_of(run: PreparedRun, subject: Subject, workload: Workload) -> RunHead
     request, suite = run.request, run.suite
     code = {} if request.model in suite.baselines else adapter_identity(request.model)
     tasks = request.tasks
-    identity = identity_of(suite.name, subject, code, workload.identity, tasks.limit, tasks.seed)
+    ours = {"suite_code": dict(request.suite_code)} if request.suite_code else {}
+    identity = identity_of(suite.name, subject, code, {**ours, **workload.identity}, tasks.limit, tasks.seed)
     return RunHeader(suite=suite.name, name=request.label, identity=identity)
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from infthor_eval.errors import UsageError, unknown_name
 from infthor_eval.formats.digests import fingerprint
@@ -10,7 +11,7 @@ from infthor_eval.formats.files import require_writable
 from infthor_eval.runs.records import RunHeader
 from infthor_eval.runs.suite import Evaluation, Suite, TaskRequest
 from infthor_eval.workers import Staffing
-from model_adapters import check_options, label, names
+from model_adapters import check_options, is_known, label, names
 
 __all__ = ["PreparedRun", "RunRequest", "prepare"]
 
@@ -29,6 +30,8 @@ class RunRequest:
         fresh: set an earlier journal aside and start anew.
         recover: go on without the bad lines of an earlier journal.
         staffing: how many workers, and where; it changes no number.
+        include: folders with task files of one's own.
+        suite_code: what distinguishes the code of a suite that is not this package's, as JSON values.
     """
 
     model: str
@@ -40,6 +43,8 @@ class RunRequest:
     fresh: bool = False
     recover: bool = False
     staffing: Staffing = field(default_factory=Staffing)
+    include: tuple[Path, ...] = ()
+    suite_code: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def label(self) -> str:
@@ -67,7 +72,7 @@ def prepare(request: RunRequest, suite: Suite) -> PreparedRun:
         UsageError: an unknown model or option, or what the suite refuses.
         DataError: the suite's data are not what their format says, or the results folder cannot be written to.
     """
-    if request.model not in {*suite.baselines, *names()}:
+    if request.model not in suite.baselines and not is_known(request.model):
         raise unknown_name("model", request.model, [*suite.baselines, *names()])
     if request.model not in suite.baselines:
         check_options(request.model, request.model_options)  # refused before the data are read

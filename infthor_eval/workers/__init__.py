@@ -2,7 +2,7 @@
 
 from infthor_eval.workers.link import Connect, Link, OpenWorker, Worker, WorkerLostError
 from infthor_eval.workers.pool import Event, GivenUp, Lost, Made, Pool, Withdrawn
-from infthor_eval.workers.serving import Serving, fault
+from infthor_eval.workers.serving import Serving
 from infthor_eval.workers.sharing import shared_out
 from infthor_eval.workers.staffing import Staffing
 
@@ -20,6 +20,5 @@ __all__ = [
     "Withdrawn",
     "Worker",
     "WorkerLostError",
-    "fault",
     "shared_out",
 ]

@@ -1,15 +1,13 @@
 """What runs in a worker, however its driver reaches it: the worker, the job in hand, and what goes wrong there."""
 
-import traceback
 from collections.abc import Iterator
-from pathlib import Path
 from threading import Event
 from typing import Any
 
-from infthor_eval.errors import InfthorError, in_one_line
+from infthor_eval.errors import InfthorError, fault
 from infthor_eval.workers.link import OpenWorker, Worker
 
-__all__ = ["Serving", "fault", "portable"]
+__all__ = ["Serving", "portable"]
 
 
 class Serving:
@@ -40,13 +38,6 @@ class Serving:
     def close(self) -> None:
         """See `Worker`."""
         self._worker.close()
-
-
-def fault(error: Exception) -> str:
-    """What a programming error is, where, and what it says."""
-    place = traceback.extract_tb(error.__traceback__)[-1]
-    where = f"{Path(place.filename).name}:{place.lineno} ({place.name})"
-    return f"{type(error).__name__} in {where}: {in_one_line(error)}"
 
 
 def portable(error: BaseException) -> Exception:

@@ -5,7 +5,7 @@ import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic, Protocol
 
 from PIL import Image
 
@@ -44,7 +44,9 @@ def check_members(found: object, protocol: type) -> None:
     Raises:
         ContractError: names what is missing.
     """
-    missing = sorted(name for name in vars(protocol) if not name.startswith("_") and name not in dir(found))
+    bases = [base for base in protocol.__mro__ if base not in (Protocol, Generic, object)]
+    names = {name for base in bases for name in vars(base) if not name.startswith("_")}
+    missing = sorted(names - set(dir(found)))
     require(not missing, f"{type(found).__name__} lacks a member of {protocol.__name__}: {', '.join(missing)}")
 
 

@@ -1,12 +1,14 @@
 """The contract of policies."""
 
 import math
+from collections.abc import Callable
+from functools import partial
 
 from infthor_eval.formats.frames import FrameRef
 from model_adapters.check.clauses import check_identity, check_members, frames_of_one_colour, require
 from model_adapters.protocols import ArmDelta, Policy
 
-__all__ = ["check_policy"]
+__all__ = ["check_policy", "policy_checks"]
 
 _INSTRUCTION = "pick up the mug"
 
@@ -21,10 +23,28 @@ def check_policy(policy: Policy, frame_size: tuple[int, int] = (300, 300)) -> No
     Raises:
         ContractError: names the clause that does not hold.
     """
-    check_members(policy, Policy)
-    check_identity(policy)
-    with frames_of_one_colour(frame_size) as frames:
-        episodes = [_episode(policy, frames) for _ in range(2)]
+    with frames_of_one_colour(frame_size) as (black, white):
+        for check in policy_checks(policy, black, white).values():
+            check()
+
+
+def policy_checks(policy: Policy, black: FrameRef, white: FrameRef) -> dict[str, Callable[[], None]]:
+    """All checks of a policy, by what they are about; each raises ContractError where a clause does not hold.
+
+    Args:
+        policy: the adapter to check.
+        black: a frame of that colour.
+        white: likewise.
+    """
+    return {
+        "members": partial(check_members, policy, Policy),
+        "identity": partial(check_identity, policy),
+        "episodes": partial(_check_episodes, policy, (black, white)),
+    }
+
+
+def _check_episodes(policy: Policy, frames: tuple[FrameRef, ...]) -> None:
+    episodes = [_episode(policy, frames) for _ in range(2)]
     alike = episodes[0] == episodes[1] or not policy.capabilities.deterministic
     require(alike, "after reset() the same frames are not acted on the same way")
 

@@ -1,0 +1,51 @@
+"""The page of all commands, made of their own help (a hook of mkdocs)."""
+
+import inspect
+from collections.abc import Iterator
+from typing import Any
+
+import click
+
+from infthor_eval.cli.main import _infthor_eval
+from infthor_eval.cli.options import LARGEST
+
+__all__ = ["commands", "on_page_markdown"]
+
+_PLACE = "<!-- commands -->"
+
+
+def on_page_markdown(markdown: str, **_: Any) -> str:
+    """Put the commands where a page wants them."""
+    return markdown.replace(_PLACE, commands()) if _PLACE in markdown else markdown
+
+
+def commands() -> str:
+    """A section for each command: its usage, what it says of itself, its options."""
+    top = click.Context(_infthor_eval, info_name="infthor-eval")
+    return "\n\n".join(_section(context) for context in _all(top))
+
+
+def _all(parent: click.Context) -> Iterator[click.Context]:
+    """The commands below a group, and those below groups among them."""
+    assert isinstance(parent.command, click.Group)
+    for name in parent.command.list_commands(parent):
+        command = parent.command.get_command(parent, name)
+        assert command is not None
+        context = click.Context(command, info_name=name, parent=parent)
+        yield context
+        if isinstance(command, click.Group):
+            yield from _all(context)
+
+
+def _section(context: click.Context) -> str:
+    command = context.command
+    usage = " ".join([context.command_path, *command.collect_usage_pieces(context)])
+    rows = [record for option in command.get_params(context) if (record := option.get_help_record(context))]
+    table = [f"| `{names}` | {_cell(said)} |" for names, said in rows]
+    told = inspect.cleandoc(command.help or "")
+    return "\n".join([f"## {context.command_path}", f"`{usage}`", "", told, "", "| option | |", "|---|---|", *table])
+
+
+def _cell(text: str) -> str:
+    told = text.replace(f"<={LARGEST}]", "]")  # the largest number there is tells nobody anything
+    return told.replace("|", "\\|").replace("<", "&lt;").replace("\n", " ")

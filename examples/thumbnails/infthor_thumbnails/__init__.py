@@ -1,0 +1,1 @@
+"""A model for infthor-eval that looks at thumbnails, and a task for it."""

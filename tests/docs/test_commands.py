@@ -1,0 +1,106 @@
+"""Every command in the documentation is one: those of README and tutorials run, or are parsed where they cannot."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import click
+import pytest
+
+from infthor_eval.cli.main import _infthor_eval
+from infthor_eval.cli.options import model_options_in
+from infthor_eval.runs import Catalog
+from infthor_eval.suites import baseline_names
+from model_adapters import is_known, names, on_engine, takes
+
+from .blocks import ROOT, written_files
+from .commands import CANNOT_RUN, FLOOR_PLANS, SLOW, Command, command_blocks
+
+RUN_PAGES = ("README.md", "docs/tutorial.md", "docs/own-models.md", "docs/own-tasks.md")
+PAGES = sorted(
+    str(path.relative_to(ROOT))
+    for path in (*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("examples/**/*.md"))
+)
+COMMANDS = [(page, command) for page in PAGES for block in command_blocks(page) for command in block]
+LONG = (pytest.mark.slow, pytest.mark.timeout(1800))
+BLOCKS = [
+    pytest.param(
+        page,
+        block,
+        id=f"{page}-{number}",
+        marks=[pytest.mark.slow, pytest.mark.timeout(1800)]
+        if any(one.is_slow for one in block if one.reason is None)
+        else [],
+    )
+    for page in RUN_PAGES
+    for number, block in enumerate(command_blocks(page))
+    if any(command.reason is None for command in block)
+]
+
+
+@pytest.mark.parametrize(("page", "block"), BLOCKS)
+def test_the_commands_of_a_block_run_one_after_the_other(page, block, tmp_path, run, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    written_files(page, tmp_path)
+    (tmp_path / "tasks").symlink_to(ROOT / "tasks")
+    for command in block:
+        if command.reason == FLOOR_PLANS:
+            break  # what follows asks about what it makes
+        if command.reason is None:
+            code, _, err = (_apart if "lm-eval" in command.words else run)(*_with_globs(command.words[1:]))
+            assert code == 0, f"{page}: {command.text}\n{err}"
+
+
+def _apart(*words):
+    """In a process of its own: lm-eval remembers which model it has loaded."""
+    code = "import sys; from infthor_eval.cli import main; main(sys.argv[1:])"
+    done = subprocess.run([sys.executable, "-c", code, *words], check=False, capture_output=True, text=True)
+    return done.returncode, done.stdout, done.stderr
+
+
+def _with_globs(words):
+    return [path for word in words for path in (sorted(map(str, Path().glob(word))) if "*" in word else [word])]
+
+
+@pytest.mark.parametrize(
+    "command",
+    [pytest.param(command, id=f"{page}: {command.text}"[:110]) for page, command in COMMANDS if command.is_ours],
+)
+def test_the_options_of_every_command_are_known(command, monkeypatch):
+    monkeypatch.setattr(click.Path, "convert", lambda self, value, parameter, context: Path(value))
+    context = _infthor_eval.make_context("infthor-eval", list(command.words[1:]))
+    while isinstance(context.command, click.Group):
+        name, found, rest = context.command.resolve_command(context, [*context._protected_args, *context.args])
+        assert found is not None
+        context = found.make_context(name, rest, parent=context)
+    if context.info_name in ("run", "plan"):
+        _check_names(context.params)
+
+
+def _check_names(given):
+    """Models, their options and tasks are known, but for those of the example package and of files beside a page."""
+    engine, options = given["engine"], model_options_in(given["model_args"])
+    for model in given["models"].split(","):
+        if model == "thumbnails" or model in baseline_names():
+            continue
+        assert is_known(model), f"{model}: there are {names()}"
+        if model in names():
+            name = on_engine(model, engine) if engine else model
+            assert all(takes(name, option) for option in options), f"{name}: {options}"
+    own = {"nieh_mini_last", "nieh_mini_start", "nieh_mini_words", "my_task"}
+    catalog = Catalog.packaged()
+    for task in set(given["tasks"].split(",")) - own:
+        assert task in catalog.tasks or task in catalog.groups
+
+
+def test_every_exception_is_still_needed():
+    ours = [command.text for _, command in COMMANDS if command.is_ours]
+    for pattern in (*CANNOT_RUN, *SLOW):
+        assert any(re.search(pattern, text) for text in ours), pattern
+
+
+def test_a_renamed_option_would_be_found(monkeypatch):
+    words = ("infthor-eval", "--model", "oracle", "--tasks", "nieh_mini", "--limits", "3")
+    with pytest.raises(click.ClickException, match="No such option"):
+        test_the_options_of_every_command_are_known(Command(" ".join(words), words), monkeypatch)

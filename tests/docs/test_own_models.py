@@ -1,0 +1,126 @@
+"""docs/own-models.md says what the code says, and its adapter works."""
+
+import dataclasses
+import json
+import re
+
+import pytest
+
+from infthor_eval.formats.frames import FrameRef
+from model_adapters import Capabilities, adapter_identity, label
+from model_adapters.check.model import model_checks
+from model_adapters.check.policy import policy_checks
+from tests.model_adapters.test_check_policy import Scripted
+
+from .blocks import ROOT, written_files
+
+NAME = "./my_adapter.py:Brightness"
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    written_files("docs/own-models.md", tmp_path)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def rows(heading):
+    """The words in the first column of the first table below a heading."""
+    page = (ROOT / "docs/own-models.md").read_text().partition(f"## {heading}\n")[2]
+    table = re.search(r"\n\|---.*?\n\n", page, re.DOTALL).group()
+    return [word for row in table.splitlines() for word in re.findall(r"`(\w+)`", row.split("|")[1] if row else "")]
+
+
+def test_the_pages_adapter_keeps_the_contract(folder, run):
+    code, out, err = run("check-adapter", NAME)
+    assert (code, err) == (0, "")
+    assert out.splitlines()[-1] == f"{NAME}: keeps the contract"
+    assert [line.split()[0] for line in out.splitlines()[:-1]] == ["holds"] * 13
+
+
+def test_it_is_evaluated_and_a_run_of_its_own_when_it_is_edited(folder, run):
+    asked = ("--model", NAME, "--tasks", "nieh_mini_gt", "--limit", 5)
+    assert run(*asked)[0] == 0
+    source = folder / "my_adapter.py"
+    source.write_text(source.read_text().replace('"yes" if', '"maybe" if'))
+    assert run(*asked)[0] == 0
+    assert len(list((folder / "results" / "Brightness").iterdir())) == 2
+    identities = [json.loads(path.read_text())["identity"] for path in folder.rglob("results.json")]
+    assert {identity["adapter"]["file"] for identity in identities} == {"my_adapter.py"}
+    assert {identity["model"]["name"] for identity in identities} == {"Brightness"}
+
+
+@pytest.mark.slow
+def test_workers_find_it(folder, run):
+    code, _, err = run("--model", NAME, "--tasks", "nieh_mini_gt", "--limit", 3, "--workers", 2)
+    assert code == 0, err
+
+
+def test_the_table_of_checks_has_all_of_them():
+    frames = (FrameRef("black"), FrameRef("white"))
+    assert rows("What is checked") == list(model_checks(None, *frames))
+    policy = policy_checks(Scripted(), *frames)
+    assert (
+        f"has {', '.join(f'`{name}`' for name in policy)}".replace(", `episodes`", " and `episodes`")
+        in (ROOT / "docs/own-models.md").read_text()
+    )
+
+
+def test_the_table_of_capabilities_has_all_of_them_with_their_defaults():
+    page = (ROOT / "docs/own-models.md").read_text()
+    assert rows("What it can do") == [item.name for item in dataclasses.fields(Capabilities)]
+    for item in dataclasses.fields(Capabilities):
+        assert f"| `{item.name}` | `{item.default}` |" in page
+
+
+@pytest.mark.parametrize(
+    ("source", "name", "said"),
+    [
+        ("", "./none.py:A", "there is no such file"),
+        ("A = 1", "./own.py:B", "has no class B"),
+        ("A = 1", "./own.py:A", "has no Options and build"),
+        ("import nothing_of_this_name", "./own.py:A", "fails when it is imported (No module named"),
+        ("def f(:", "./own.py:A", "fails when it is imported (invalid syntax (own.py, line 1))"),
+    ],
+)
+@pytest.mark.parametrize("command", [("check-adapter",), ("--tasks", "nieh_mini_gt", "--model")])
+def test_a_file_that_is_no_adapter_is_refused_in_one_line(tmp_path, run, monkeypatch, command, source, name, said):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "own.py").write_text(source)
+    code, _, err = run(*command, name)
+    assert (code, len(err.splitlines())) == (2, 1), err
+    assert said in err
+    assert "Traceback" not in err
+
+
+def test_a_broken_clause_and_a_fault_are_told_with_the_others(folder, run):
+    source = folder / "my_adapter.py"
+    source.write_text(
+        source.read_text()
+        .replace("return Reply(text if", "return Reply('same' if")
+        .replace('asked = "".join(', 'asked = None + "".join(')
+    )
+    code, out, err = run("check-adapter", NAME)
+    assert (code, err) == (1, "")
+    found = {line.split()[1]: line for line in out.splitlines() if line.startswith(("holds", "broken"))}
+    assert len(found) == 13
+    assert found["members"].startswith("holds")
+    assert "it raises TypeError in my_adapter.py:" in found["reply"]
+    assert out.splitlines()[-1].endswith("broken")
+    source.write_text(source.read_text().replace("def close", "def shut"))
+    code, out, err = run("check-adapter", NAME)
+    assert (code, out.splitlines()[0]) == (1, "broken  members         Brightness lacks a member of Model: close")
+
+
+def test_a_policy_is_checked_by_the_same_command(run):
+    code, out, err = run("check-adapter", "openvla-tiny")
+    assert (code, err) == (0, "")
+    assert [line.split()[1] for line in out.splitlines()[:-1]] == ["members", "identity", "episodes"]
+
+
+def test_where_the_file_lies_changes_neither_name_nor_identity(folder, monkeypatch):
+    here = adapter_identity(NAME), label(NAME, {})
+    (folder / "deeper").mkdir()
+    monkeypatch.chdir(folder / "deeper")
+    assert (adapter_identity("../my_adapter.py:Brightness"), label("../my_adapter.py:Brightness", {})) == here
+    assert here[1] == "Brightness"

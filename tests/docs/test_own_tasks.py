@@ -1,0 +1,47 @@
+"""docs/own-tasks.md says what the code says, and its tasks run."""
+
+import json
+import re
+
+from infthor_eval.nieh.contexts import CONTEXTS
+
+from .blocks import ROOT, written_files
+from .settings_tables import PAGE, with_tables
+
+
+def test_the_tables_of_settings_are_the_codes_own():
+    page = PAGE.read_text()
+    assert page.count("| setting |") == page.count("<!-- end -->") == 3
+    assert with_tables(page) == page, "run: python -m tests.docs.settings_tables"
+
+
+def test_all_contexts_are_named():
+    said = (ROOT / "docs/own-tasks.md").read_text().partition("beside `context` (")[2].partition(";")[0]
+    assert re.findall(r"`(\w+)`", said) == list(CONTEXTS)
+
+
+def test_tasks_of_ones_own_run_with_the_files_that_this_package_shares(tmp_path, run, monkeypatch):
+    written_files("docs/own-tasks.md", tmp_path)
+    monkeypatch.chdir(tmp_path)
+    options = ("--include-path", "my_tasks", "--limit", 3)
+    code, _, err = run("--model", "oracle", "--tasks", "nieh_mini_words,nieh_mini_gt", *options)
+    assert code == 0, err
+    (results,) = tmp_path.rglob("results.json")
+    tasks = json.loads(results.read_text())["summary"]["tasks"]
+    assert {name: task["metrics"] for name, task in tasks.items()} == {
+        "nieh_mini_words": ["one_word"],
+        "nieh_mini_gt": ["reference", "strict"],
+    }
+
+
+def test_own_tasks_are_refused_in_one_line(tmp_path, run, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "a").mkdir()
+    (tmp_path / "a" / "task.yaml").write_text("include: _nieh.yaml\ntask: nieh_gt\n")
+    asked = ("--model", "oracle", "--tasks", "nieh_gt")
+    code, _, err = run(*asked, "--include-path", "a")
+    assert (code, len(err.splitlines())) == (2, 1)
+    assert "'nieh_gt' is the name of another task file too" in err
+    (tmp_path / "a" / "task.yaml").write_text("include: _none.yaml\ntask: own\n")
+    assert "_none.yaml: cannot be read" in run(*asked, "--include-path", "a")[2]
+    assert "Directory 'b' does not exist" in run(*asked, "--include-path", "b")[2]

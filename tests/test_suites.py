@@ -1,0 +1,136 @@
+"""Suites and tasks that come from other packages."""
+
+import json
+import os
+import subprocess
+import sys
+from importlib.metadata import EntryPoint
+from pathlib import Path
+
+import pytest
+
+from infthor_eval import suites
+from infthor_eval.errors import InfthorError, UsageError
+from infthor_eval.runs import Catalog
+from infthor_eval.suites import options_of, suite_identity, suite_named, suite_names
+
+ROOT = Path(__file__).parents[1]
+SUITE = """
+from dataclasses import dataclass, field
+from tests.runs.toy import ToySuite
+
+@dataclass(frozen=True)
+class Options:
+    abacus: str = field(default="wood", metadata={"help": "What it is made of."})
+
+class SumsSuite(ToySuite):
+    name, options = "sums", Options
+
+class Renamed(SumsSuite):
+    name = "other"
+
+class Limited(SumsSuite):
+    @dataclass(frozen=True)
+    class options:
+        limit: str = ""
+"""
+TASK = "task: sums\nmetadata: {suite: sums, version: 1}\n"
+
+
+@pytest.fixture
+def package(tmp_path, monkeypatch):
+    """A distribution with a suite and its task, as pip would leave it; its folder."""
+    (tmp_path / "sums_suite.py").write_text(SUITE)
+    tasks = tmp_path / "sums_tasks" / "here"
+    tasks.mkdir(parents=True)
+    (tasks / "sums.yaml").write_text(TASK)
+    info = tmp_path / "Sums-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: Sums\nVersion: 1.0\n")
+    points = "[infthor_eval.suites]\nsums = sums_suite:SumsSuite\n[infthor_eval.tasks]\nsums = sums_tasks.here\n"
+    (info / "entry_points.txt").write_text(points)
+    monkeypatch.syspath_prepend(tmp_path)
+    return tmp_path
+
+
+def command(package, *arguments):
+    """Our command in a process of its own, which imports every suite for its options."""
+    code = "import sys; from infthor_eval.cli import main; main(sys.argv[1:])"
+    env = os.environ | {"PYTHONPATH": f"{package}{os.pathsep}{ROOT}"}
+    words = [sys.executable, "-c", code, *map(str, arguments)]
+    return subprocess.run(words, check=False, capture_output=True, text=True, env=env, cwd=package)
+
+
+def test_a_suite_of_another_package_runs_with_its_task_and_its_options(package):
+    done = command(package, "--model", "adder", "--tasks", "sums", "--abacus", "bone", "--output", package / "out")
+    assert done.returncode == 1, done.stderr  # two of its sums cannot be done
+    assert "the abacus is broken" in done.stderr
+    (results,) = (package / "out").rglob("results.json")
+    identity = json.loads(results.read_text())["identity"]
+    assert identity["suite"] == "sums"
+    assert identity["suite_code"].keys() == {"package", "version", "source"}
+    helped = command(package, "run", "--help").stdout
+    assert "What it is made of. [sums]" in " ".join(helped.split())
+
+
+def test_it_is_found_by_name_behind_the_built_in_ones(package):
+    assert suite_names() == ("nieh", "manipulation", "plans", "sums")
+    assert suite_named("sums").name == "sums"
+    assert list(options_of("sums").__dataclass_fields__) == ["abacus"]
+    assert suite_identity("nieh") == {}
+    before = suite_identity("sums")
+    (package / "sums_suite.py").write_text(SUITE + "\n")
+    assert suite_identity("sums") != before
+    assert Catalog.installed().tasks["sums"].suite == "sums"
+    assert "sums" not in Catalog.packaged().tasks
+
+
+@pytest.fixture
+def point(package, monkeypatch):
+    """Makes another target the suite `sums`, or the folder of the tasks."""
+
+    def point(target, group="infthor_eval.suites"):
+        found = [EntryPoint("sums", target, group)]
+        for module in ("infthor_eval.suites", "infthor_eval.runs.catalog"):
+            monkeypatch.setattr(f"{module}.entry_points", lambda group: [one for one in found if one.group == group])
+
+    return point
+
+
+@pytest.mark.parametrize(
+    ("target", "said"),
+    [
+        ("no_such_module:A", "the suite sums cannot be imported from no_such_module:A"),
+        ("sums_suite:Nothing", "the suite sums cannot be imported"),
+        ("sums_suite:Options", "the suite sums of another package lacks name, needs"),
+        ("sums_suite:Renamed", "calls itself 'other'; give it one name"),
+    ],
+)
+def test_what_is_no_suite_is_refused_in_one_line(point, target, said):
+    point(target)
+    with pytest.raises(InfthorError, match=said) as caught:
+        suite_named("sums")
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("target", ["no_such_package.tasks", "sums_tasks.nowhere", "sums_suite"])
+def test_a_package_without_the_folder_that_it_names_is_told(point, target):
+    point(target, "infthor_eval.tasks")
+    with pytest.raises(UsageError, match=f"the tasks sums of another package are not in {target}"):
+        Catalog.installed()
+
+
+def test_an_option_that_every_run_has_is_refused(package):
+    (package / "Sums-1.0.dist-info" / "entry_points.txt").write_text(
+        "[infthor_eval.suites]\nsums = sums_suite:Limited\n"
+    )
+    done = command(package, "--model", "adder", "--tasks", "sums")
+    assert (done.returncode, done.stderr) == (
+        2,
+        "infthor-eval: the option limit of the suite sums is one of every run; give it another name\n",
+    )
+
+
+def test_no_package_can_take_a_built_in_name(monkeypatch):
+    monkeypatch.setattr(suites, "entry_points", lambda group: [EntryPoint("nieh", "json:loads", group)])
+    assert type(suite_named("nieh")).__name__ == "NiehSuite"
