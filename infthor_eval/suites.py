@@ -5,7 +5,7 @@ A suite, and its options for the command line, are imported only when asked for,
 
 import importlib
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from infthor_eval.errors import unknown_name
 
@@ -14,14 +14,37 @@ if TYPE_CHECKING:
 
 __all__ = ["baseline_names", "options_of", "split_by_suite", "suite_named", "suite_names"]
 
-# "module:Class" of the suite, and of its options.
+
+class _Entry(NamedTuple):
+    """Where a suite is found.
+
+    Attributes:
+        suite: "module:Class" of it.
+        options: "module:Class" of its options.
+        baselines: names of its `baselines`, which can be listed without importing them.
+    """
+
+    suite: str
+    options: str
+    baselines: tuple[str, ...]
+
+
 _SUITES = {
-    "nieh": ("infthor_eval.nieh.suite:NiehSuite", "infthor_eval.nieh.options:NiehOptions"),
-    "manipulation": (
+    "nieh": _Entry(
+        "infthor_eval.nieh.suite:NiehSuite",
+        "infthor_eval.nieh.options:NiehOptions",
+        ("oracle", "blind", "blind-count", "random"),
+    ),
+    "manipulation": _Entry(
         "infthor_eval.manipulation.suite:ManipulationSuite",
         "infthor_eval.manipulation.options:ManipulationOptions",
+        ("planner-arm", "random-arm", "still"),
     ),
-    "plans": ("infthor_eval.agents.suite:PlansSuite", "infthor_eval.agents.options:PlansOptions"),
+    "plans": _Entry(
+        "infthor_eval.agents.suite:PlansSuite",
+        "infthor_eval.agents.options:PlansOptions",
+        ("planner", "random", "scripted", "history"),
+    ),
 }
 
 
@@ -38,21 +61,21 @@ def suite_named(name: str) -> "Suite":
     """
     if name not in _SUITES:
         raise unknown_name("suite", name, _SUITES)
-    made: Suite = _imported(_SUITES[name][0])()
+    made: Suite = _imported(_SUITES[name].suite)()
     return made
 
 
 def options_of(name: str) -> type:
     """The dataclass of a suite's options."""
-    found: type = _imported(_SUITES[name][1])
+    found: type = _imported(_SUITES[name].options)
     return found
 
 
 def baseline_names() -> dict[str, str]:
     """The baselines of all suites, each with the suites that have it, in words."""
     found: dict[str, list[str]] = {}
-    for name in _SUITES:
-        for baseline in suite_named(name).baselines:
+    for name, entry in _SUITES.items():
+        for baseline in entry.baselines:
             found.setdefault(baseline, []).append(name)
     return {baseline: ", ".join(names) for baseline, names in found.items()}
 
