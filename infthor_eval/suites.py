@@ -8,7 +8,7 @@ import importlib
 from collections.abc import Iterable, Mapping
 from functools import reduce
 from importlib.metadata import EntryPoint, entry_points
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from infthor_eval.errors import UsageError, naming, unknown_name
 
@@ -27,14 +27,37 @@ __all__ = [
 
 ENTRY_POINTS = "infthor_eval.suites"
 
-# "module:Class" of the suite, and of its options.
+
+class _Target(NamedTuple):
+    """Where a suite is found.
+
+    Attributes:
+        suite: "module:Class" of it.
+        options: "module:Class" of its options.
+        baselines: names of its `baselines`, which can be listed without importing them; None asks the suite.
+    """
+
+    suite: str
+    options: str
+    baselines: tuple[str, ...] | None = None
+
+
 _BUILT_IN = {
-    "nieh": ("infthor_eval.nieh.suite:NiehSuite", "infthor_eval.nieh.options:NiehOptions"),
-    "manipulation": (
+    "nieh": _Target(
+        "infthor_eval.nieh.suite:NiehSuite",
+        "infthor_eval.nieh.options:NiehOptions",
+        ("oracle", "blind", "blind-count", "random"),
+    ),
+    "manipulation": _Target(
         "infthor_eval.manipulation.suite:ManipulationSuite",
         "infthor_eval.manipulation.options:ManipulationOptions",
+        ("planner-arm", "random-arm", "still"),
     ),
-    "plans": ("infthor_eval.agents.suite:PlansSuite", "infthor_eval.agents.options:PlansOptions"),
+    "plans": _Target(
+        "infthor_eval.agents.suite:PlansSuite",
+        "infthor_eval.agents.options:PlansOptions",
+        ("planner", "random", "scripted", "history"),
+    ),
 }
 
 
@@ -52,7 +75,7 @@ def suite_named(name: str) -> "Suite":
     targets = _targets()
     if name not in targets:
         raise unknown_name("suite", name, targets)
-    found = _imported(name, targets[name][0])
+    found = _imported(name, targets[name].suite)
     if name not in _BUILT_IN:
         _check(name, found)
     made: Suite = found()
@@ -65,7 +88,7 @@ def options_of(name: str) -> type:
     Raises:
         UsageError: the suite of another package cannot be imported.
     """
-    found: type = _imported(name, _targets()[name][1])
+    found: type = _imported(name, _targets()[name].options)
     return found
 
 
@@ -83,8 +106,8 @@ def suite_identity(name: str) -> dict[str, Any]:
 def baseline_names() -> dict[str, str]:
     """The baselines of all suites, each with the suites that have it, in words."""
     found: dict[str, list[str]] = {}
-    for name in suite_names():
-        for baseline in suite_named(name).baselines:
+    for name, target in _targets().items():
+        for baseline in suite_named(name).baselines if target.baselines is None else target.baselines:
             found.setdefault(baseline, []).append(name)
     return {baseline: ", ".join(names) for baseline, names in found.items()}
 
@@ -101,9 +124,9 @@ def _entry_points() -> dict[str, EntryPoint]:
     return {point.name: point for point in entry_points(group=ENTRY_POINTS)}
 
 
-def _targets() -> dict[str, tuple[str, str]]:
+def _targets() -> dict[str, _Target]:
     # Built-in names win: a package cannot change what a known name means.
-    others = {name: (point.value, f"{point.value}.options") for name, point in _entry_points().items()}
+    others = {name: _Target(point.value, f"{point.value}.options") for name, point in _entry_points().items()}
     return _BUILT_IN | {name: target for name, target in others.items() if name not in _BUILT_IN}
 
 

@@ -51,12 +51,13 @@ def scenes(data: Path | None) -> None:
     Raises:
         DataError: the folder has none.
     """
-    from infthor_eval.formats.floor_plans import floor_plan_names
-
     table = Table("scene", "what it is", box=box.SIMPLE_HEAD)
     for room in ("kitchen", "living-room", "bedroom", "bathroom"):
         table.add_row(f"{room}-<seed>", f"a {room.replace('-', ' ')} made from the seed")
     table.add_row("house-<seed>", "a house of several rooms made from the seed")
-    for name in floor_plan_names(data) if data else ():
-        table.add_row(name, f"recorded, in {data}")
+    if data is not None:
+        from infthor_eval.formats.floor_plans import floor_plan_names
+
+        for name in floor_plan_names(data):
+            table.add_row(name, f"recorded, in {data}")
     console().print(table, soft_wrap=False)

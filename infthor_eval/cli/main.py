@@ -70,6 +70,14 @@ class _Commands(click.Group):
             refuse_repeated(ctx, command, rest)
         return name, command, rest
 
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Also those of the default command, which are typed without its name."""
+        super().format_options(ctx, formatter)
+        run = self.get_command(ctx, _DEFAULT)
+        assert run is not None
+        with formatter.section("Options of a run"):
+            formatter.write_dl([told for option in run.params if (told := option.get_help_record(ctx)) is not None])
+
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         # Not click's own, which would import every command for its first line of help.
         with formatter.section("Commands"):
