@@ -54,8 +54,8 @@ def test_the_sections_have_their_pictures_and_tables(page):
 
 
 def test_frames_that_there_is_no_room_for_are_counted_and_clues_come_first(make_page, nieh_runs):
-    page = make_page(nieh_runs[0], data=DATA, pictures=200_000)
-    assert sum(map(len, page.pictures)) <= 200_000
+    page = make_page(nieh_runs[0], data=DATA, pictures=100_000)
+    assert sum(map(len, page.pictures)) <= 100_000
     assert any("pictures left out" in note for note in page.notes)
     frames = [(sample.cluster, frame) for sample in page.samples for frame in sample.timeline.frames]
     clues = {(trajectory, frame.at) for trajectory, frame in frames if frame.is_clue}
