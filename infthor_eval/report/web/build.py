@@ -9,13 +9,14 @@ from pathlib import Path
 import infthor_eval
 from infthor_eval.errors import DataError
 from infthor_eval.report.comparison import compare, comparison_table
-from infthor_eval.report.web.arm_samples import arm_samples
+from infthor_eval.report.web.arm_samples import ERRANDS
 from infthor_eval.report.web.episode_charts import arm_sections, plan_sections
+from infthor_eval.report.web.episode_samples import episode_samples
 from infthor_eval.report.web.headlines import headline_table, left_out_table, took_table
 from infthor_eval.report.web.nieh_charts import nieh_charts
 from infthor_eval.report.web.nieh_samples import nieh_samples
 from infthor_eval.report.web.page import About, Page
-from infthor_eval.report.web.plan_samples import plan_samples
+from infthor_eval.report.web.plan_samples import PLANS
 from infthor_eval.report.web.runs import ReportRun
 from infthor_eval.report.web.samples import Sample
 from infthor_eval.report.web.sections import Section
@@ -130,10 +131,10 @@ def _samples_of(
 ) -> tuple[list[Sample], list[str]]:
     if suite == "nieh":
         return nieh_samples(runs, wanted.data, thumbnails)
-    of_suite = {"plans": plan_samples, "manipulation": arm_samples}.get(suite)
-    if of_suite is None:  # of another package
+    kind = {"plans": PLANS, "manipulation": ERRANDS}.get(suite)
+    if kind is None:  # of another package
         return [], [f"samples of {suite} are not shown: how is not known here"]
-    return of_suite(runs, wanted.data, wanted.scenes, wanted.episodes, thumbnails)
+    return episode_samples(runs, kind, wanted.data, wanted.scenes, wanted.episodes, thumbnails)
 
 
 def _metrics(samples: Sequence[Sample]) -> list[str]:
