@@ -1,6 +1,6 @@
 """Pick-ups and puts of an arm as samples."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 
 from PIL import Image
@@ -9,7 +9,7 @@ from infthor_eval.manipulation.curve_runs import ArmRun
 from infthor_eval.manipulation.moments import ArmSight
 from infthor_eval.manipulation.records import ArmRecord
 from infthor_eval.report.reach_view import draw_reach
-from infthor_eval.report.web.episode_samples import EpisodeKind, Places, Stage
+from infthor_eval.report.web.episode_samples import EpisodeKind, Head, Places, Stage
 from infthor_eval.report.web.runs import ReportRun
 from infthor_eval.report.web.samples import StepRow
 from infthor_eval.runs import UnitRecord
@@ -38,10 +38,10 @@ def _drawn(sight: ArmSight, size: int) -> Image.Image:
     return draw_reach(sight.reach, size)
 
 
-def _head(record: Record) -> Mapping[str, str]:
+def _head(record: Record) -> Head:
     payload = record.payload
     target = payload.object_id if payload.receptacle_id is None else f"{payload.object_id} → {payload.receptacle_id}"
-    return {"title": payload.instruction, "kind": payload.kind, "wanted": target}
+    return Head(payload.instruction, payload.kind, target)
 
 
 def _rows(payload: ArmRecord) -> list[StepRow]:

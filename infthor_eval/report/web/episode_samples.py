@@ -1,11 +1,11 @@
 """Plans and errands of an arm as samples: what was done step by step, and of some what was seen."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from itertools import groupby
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import msgspec
 from PIL import Image
@@ -16,7 +16,7 @@ from infthor_eval.report.web.samples import Result, Sample, StepRow, outcome
 from infthor_eval.report.web.thumbnails import Thumbnails
 from infthor_eval.runs import UnitKey, UnitRecord
 
-__all__ = ["EpisodeKind", "Places", "Stage", "episode_samples"]
+__all__ = ["EpisodeKind", "Head", "Places", "Stage", "episode_samples"]
 
 Record = UnitRecord[Any]
 _DRAWN, _SHOWN = 560, 300  # pixels of a map's side; drawn larger than it is shown, its letters are read better
@@ -43,6 +43,20 @@ class Places:
     scenes: Path | None
 
 
+class Head(NamedTuple):
+    """What an episode is, in words.
+
+    Attributes:
+        title: what was to be done.
+        kind: of plan, or of errand.
+        wanted: the goal.
+    """
+
+    title: str
+    kind: str
+    wanted: str
+
+
 @dataclass(frozen=True)
 class EpisodeKind:
     """A kind of episode.
@@ -50,13 +64,13 @@ class EpisodeKind:
     Attributes:
         replayed: of a run, a task and a trajectory, the stage.
         drawn: a sight as a map of so many pixels.
-        head: of a record, title, kind and what was wanted.
+        head: of a record.
         rows: of a payload, its steps.
     """
 
     replayed: Callable[[ReportRun, str, str, Places], AbstractContextManager[Stage]]
     drawn: Callable[[Any, int], Image.Image]
-    head: Callable[[Any], Mapping[str, str]]
+    head: Callable[[Any], Head]
     rows: Callable[[Any], list[StepRow]]
 
 
@@ -163,7 +177,7 @@ def _sample(
         variant=key.variant,
         cluster=first.cluster,
         results=tuple(results),
-        **kind.head(first),
+        **kind.head(first)._asdict(),
     )
 
 

@@ -7,7 +7,7 @@ from typing import Any
 from infthor_eval.agents.curve_runs import PlansRun
 from infthor_eval.agents.records import PlanRecord
 from infthor_eval.report.room_map import draw_map
-from infthor_eval.report.web.episode_samples import EpisodeKind, Places, Stage
+from infthor_eval.report.web.episode_samples import EpisodeKind, Head, Places, Stage
 from infthor_eval.report.web.runs import ReportRun
 from infthor_eval.report.web.samples import StepRow
 from infthor_eval.runs import UnitRecord
@@ -31,9 +31,8 @@ def _replayed(run: ReportRun, task: str, trajectory: str, places: Places) -> Ite
         yield stage
 
 
-def _head(record: Record) -> Mapping[str, str]:
-    payload = record.payload
-    return {"title": payload.plan, "kind": payload.kind, "wanted": payload.goal}
+def _head(record: Record) -> Head:
+    return Head(record.payload.plan, record.payload.kind, record.payload.goal)
 
 
 def _rows(payload: PlanRecord) -> list[StepRow]:
