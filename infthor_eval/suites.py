@@ -40,7 +40,8 @@ _BUILT_IN = {
 
 def suite_names() -> tuple[str, ...]:
     """All suites, the built-in ones first."""
-    return tuple(_targets())
+    # Built-in names win: a package cannot change what a known name means.
+    return tuple(dict.fromkeys([*_BUILT_IN, *_entry_points()]))
 
 
 def suite_named(name: str) -> "Suite":
@@ -49,10 +50,9 @@ def suite_named(name: str) -> "Suite":
     Raises:
         UsageError: there is none, or that of another package is not what a suite must be.
     """
-    targets = _targets()
-    if name not in targets:
-        raise unknown_name("suite", name, targets)
-    found = _imported(name, targets[name][0])
+    if name not in suite_names():
+        raise unknown_name("suite", name, suite_names())
+    found = _imported(name, _target(name)[0])
     if name not in _BUILT_IN:
         _check(name, found)
     made: Suite = found()
@@ -65,7 +65,7 @@ def options_of(name: str) -> type:
     Raises:
         UsageError: the suite of another package cannot be imported.
     """
-    found: type = _imported(name, _targets()[name][1])
+    found: type = _imported(name, _target(name)[1])
     return found
 
 
@@ -101,10 +101,12 @@ def _entry_points() -> dict[str, EntryPoint]:
     return {point.name: point for point in entry_points(group=ENTRY_POINTS)}
 
 
-def _targets() -> dict[str, tuple[str, str]]:
-    # Built-in names win: a package cannot change what a known name means.
-    others = {name: (point.value, f"{point.value}.options") for name, point in _entry_points().items()}
-    return _BUILT_IN | {name: target for name, target in others.items() if name not in _BUILT_IN}
+def _target(name: str) -> tuple[str, str]:
+    """Where a suite is, and where its options; other packages are looked at for theirs alone, as that takes time."""
+    if name in _BUILT_IN:
+        return _BUILT_IN[name]
+    value = _entry_points()[name].value
+    return value, f"{value}.options"
 
 
 def _imported(name: str, target: str) -> Any:
