@@ -63,7 +63,8 @@ _BUILT_IN = {
 
 def suite_names() -> tuple[str, ...]:
     """All suites, the built-in ones first."""
-    return tuple(_targets())
+    # Built-in names win: a package cannot change what a known name means.
+    return tuple(dict.fromkeys([*_BUILT_IN, *_entry_points()]))
 
 
 def suite_named(name: str) -> "Suite":
@@ -72,10 +73,9 @@ def suite_named(name: str) -> "Suite":
     Raises:
         UsageError: there is none, or that of another package is not what a suite must be.
     """
-    targets = _targets()
-    if name not in targets:
-        raise unknown_name("suite", name, targets)
-    found = _imported(name, targets[name].suite)
+    if name not in suite_names():
+        raise unknown_name("suite", name, suite_names())
+    found = _imported(name, _target(name).suite)
     if name not in _BUILT_IN:
         _check(name, found)
     made: Suite = found()
@@ -88,7 +88,7 @@ def options_of(name: str) -> type:
     Raises:
         UsageError: the suite of another package cannot be imported.
     """
-    found: type = _imported(name, _targets()[name].options)
+    found: type = _imported(name, _target(name).options)
     return found
 
 
@@ -106,8 +106,9 @@ def suite_identity(name: str) -> dict[str, Any]:
 def baseline_names() -> dict[str, str]:
     """The baselines of all suites, each with the suites that have it, in words."""
     found: dict[str, list[str]] = {}
-    for name, target in _targets().items():
-        for baseline in suite_named(name).baselines if target.baselines is None else target.baselines:
+    for name in suite_names():
+        told = _target(name).baselines
+        for baseline in suite_named(name).baselines if told is None else told:
             found.setdefault(baseline, []).append(name)
     return {baseline: ", ".join(names) for baseline, names in found.items()}
 
@@ -124,10 +125,12 @@ def _entry_points() -> dict[str, EntryPoint]:
     return {point.name: point for point in entry_points(group=ENTRY_POINTS)}
 
 
-def _targets() -> dict[str, _Target]:
-    # Built-in names win: a package cannot change what a known name means.
-    others = {name: _Target(point.value, f"{point.value}.options") for name, point in _entry_points().items()}
-    return _BUILT_IN | {name: target for name, target in others.items() if name not in _BUILT_IN}
+def _target(name: str) -> _Target:
+    """Where a suite is found; other packages are looked at for theirs alone, as that takes time."""
+    if name in _BUILT_IN:
+        return _BUILT_IN[name]
+    value = _entry_points()[name].value
+    return _Target(value, f"{value}.options")
 
 
 def _imported(name: str, target: str) -> Any:

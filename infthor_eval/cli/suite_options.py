@@ -81,8 +81,9 @@ def refuse_twins(command: Callable[..., Any]) -> None:
 
 
 def _refuse_unasked(given: Mapping[str, Any], asked: typing.Collection[str]) -> None:
+    suites = suite_names()
     for name, value in given.items():
-        having = [suite for suite in suite_names() if name in {item.name for item in fields(options_of(suite))}]
+        having = [suite for suite in suites if name in {item.name for item in fields(options_of(suite))}]
         if value is not None and having and not set(having) & set(asked):
             raise UsageError(
                 f"--{name.replace('_', '-')} is for tasks of {' and '.join(having)}; none of them is asked"

@@ -229,7 +229,7 @@ def test_a_subject_that_cannot_do_what_the_suite_needs_is_refused(tmp_path, monk
         def reset(self):
             raise AssertionError
 
-    monkeypatch.setattr("infthor_eval.runs.request.names", lambda: ("arm",))
+    monkeypatch.setattr("infthor_eval.runs.request.is_known", lambda name: name == "arm")
     monkeypatch.setattr("infthor_eval.runs.request.check_options", lambda *_: None)
     monkeypatch.setattr("infthor_eval.runs.subjects.load", lambda *_: Policy())
     with pytest.raises(UsageError, match="arm cannot be evaluated on toy, which needs a conversation"):

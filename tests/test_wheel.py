@@ -1,0 +1,85 @@
+"""A wheel works away from the checkout: what it needs beside the code is in it."""
+
+import os
+import shutil
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+SOURCES = ("infthor_eval", "model_adapters", "tasks", "results/published")
+FILES = ("results/README.md", "README.md", "LICENSE", "pyproject.toml", "setup.py")
+QUIETLY = ("--quiet", "--disable-pip-version-check", "--no-index", "--no-deps")
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory):
+    source, out = tmp_path_factory.mktemp("source"), tmp_path_factory.mktemp("wheel")  # setuptools writes into it
+    for name in SOURCES:
+        shutil.copytree(ROOT / name, source / name, ignore=shutil.ignore_patterns("__pycache__"))
+    for name in FILES:
+        shutil.copy(ROOT / name, source / name)
+    pip("wheel", "--no-build-isolation", "--wheel-dir", out, source)
+    (found,) = out.iterdir()
+    return found
+
+
+@pytest.fixture(scope="module")
+def installed(wheel, tmp_path_factory):
+    target = tmp_path_factory.mktemp("installed")
+    pip("install", "--target", target, wheel)
+    return target
+
+
+@pytest.fixture
+def command(installed, tmp_path):
+    """Runs the installed command in an empty folder, where no checkout is in sight."""
+
+    def command(*words):
+        env = {**os.environ, "PYTHONPATH": str(installed)}
+        script = installed / "bin" / "infthor-eval"
+        done = subprocess.run(
+            [sys.executable, script, *words], check=False, cwd=tmp_path, env=env, capture_output=True, text=True
+        )
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    return command
+
+
+def pip(*words):
+    subprocess.run([sys.executable, "-m", "pip", words[0], *QUIETLY, *words[1:]], check=True)
+
+
+def test_all_data_of_the_packages_is_in_it(wheel):
+    packed = set(zipfile.ZipFile(wheel).namelist())
+    ours = {str(path.relative_to(ROOT)) for name in SOURCES for path in (ROOT / name).rglob("*") if path.is_file()}
+    moved = {f"infthor_eval/{path}" if path.startswith(("tasks/", "results/")) else path for path in ours}
+    missing = {path for path in moved - packed if "__pycache__" not in path}
+    assert missing == set()
+
+
+def test_what_runs_is_the_installed_code(installed, tmp_path):
+    code = "import infthor_eval, model_adapters as other; print(infthor_eval.__file__, other.__file__)"
+    env = {**os.environ, "PYTHONPATH": str(installed)}
+    found = subprocess.check_output([sys.executable, "-c", code], cwd=tmp_path, env=env, text=True).split()
+    assert all(Path(path).is_relative_to(installed) for path in found)
+
+
+def test_it_runs_in_an_empty_folder(command, tmp_path):
+    assert "nieh_haystack_128k" in command("ls", "tasks")
+    asked = ("--model", "blind,oracle,qwen2.5-vl-nano", "--tasks", "nieh_mini_gt", "--limit", "20")
+    table = command(*asked)
+    assert "Qwen2.5-VL 7B" in table  # the published numbers came with it
+    assert [path.name for path in tmp_path.iterdir()] == ["results"]
+
+
+def test_plans_and_scenes_run_too(command, tmp_path):
+    command("--model", "planner", "--tasks", "infthor_plans_mini", "--limit", "1")
+    command("scenes", "show", "kitchen-7", "--out", "kitchen.png")
+    assert (tmp_path / "kitchen.png").is_file()
