@@ -1,15 +1,12 @@
 """Pick-ups and puts of an arm as samples."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
-
 from PIL import Image
 
 from infthor_eval.manipulation.curve_runs import ArmRun
 from infthor_eval.manipulation.moments import ArmSight
 from infthor_eval.manipulation.records import ArmRecord
 from infthor_eval.report.reach_view import draw_reach
-from infthor_eval.report.web.episode_samples import EpisodeKind, Head, Places, Stage
+from infthor_eval.report.web.episode_samples import EpisodeKind, Head
 from infthor_eval.report.web.runs import ReportRun
 from infthor_eval.report.web.samples import StepRow
 from infthor_eval.runs import UnitRecord
@@ -22,16 +19,6 @@ Record = UnitRecord[ArmRecord]
 def arm_run(run: ReportRun) -> ArmRun:
     """The same run, as curves and replays take it."""
     return ArmRun(run.label, run.header, run.records)
-
-
-@contextmanager
-def _replayed(run: ReportRun, task: str, trajectory: str, places: Places) -> Iterator[Stage]:
-    # Replaying brings the simulator's client with it, which a page of questions does without.
-    from infthor_eval.manipulation.replaying import recorded_episodes, replay_episodes
-
-    recorded = recorded_episodes(arm_run(run), task, trajectory)
-    with replay_episodes(recorded, places.data, places.scenes) as stage:
-        yield stage
 
 
 def _drawn(sight: ArmSight, size: int) -> Image.Image:
@@ -56,4 +43,4 @@ def _rows(payload: ArmRecord) -> list[StepRow]:
     ]
 
 
-ERRANDS = EpisodeKind(_replayed, _drawn, _head, _rows)
+ERRANDS = EpisodeKind(_drawn, _head, _rows)

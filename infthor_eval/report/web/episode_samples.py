@@ -16,7 +16,7 @@ from infthor_eval.report.web.samples import Result, Sample, StepRow, outcome
 from infthor_eval.report.web.thumbnails import Thumbnails
 from infthor_eval.runs import UnitKey, UnitRecord
 
-__all__ = ["EpisodeKind", "Head", "Places", "Stage", "episode_samples"]
+__all__ = ["EpisodeKind", "Head", "Opener", "Stage", "episode_samples"]
 
 Record = UnitRecord[Any]
 _DRAWN, _SHOWN = 560, 300  # pixels of a map's side; drawn larger than it is shown, its letters are read better
@@ -30,17 +30,9 @@ class Stage(Protocol):
         ...
 
 
-@dataclass(frozen=True)
-class Places:
-    """Where data lie.
-
-    Attributes:
-        data: the trajectories, where they do not come with the package.
-        scenes: folder with recorded floor plans.
-    """
-
-    data: str | None
-    scenes: Path | None
+# Of a run, a task, a trajectory, and where data lie that do not come with the package (None where nobody says): the
+# stage. It brings a simulator with it, which this room does without; who asks for the page gives it.
+Opener = Callable[[ReportRun, str, str, Path | None], AbstractContextManager[Stage]]
 
 
 class Head(NamedTuple):
@@ -62,13 +54,11 @@ class EpisodeKind:
     """A kind of episode.
 
     Attributes:
-        replayed: of a run, a task and a trajectory, the stage.
         drawn: a sight as a map of so many pixels.
         head: of a record.
         rows: of a payload, its steps.
     """
 
-    replayed: Callable[[ReportRun, str, str, Places], AbstractContextManager[Stage]]
     drawn: Callable[[Any, int], Image.Image]
     head: Callable[[Any], Head]
     rows: Callable[[Any], list[StepRow]]
@@ -94,8 +84,8 @@ class _Seen:
 def episode_samples(
     runs: Sequence[ReportRun],
     kind: EpisodeKind,
+    opened: Opener | None,
     data: Path | None,
-    scenes: Path | None,
     most: int,
     thumbnails: Thumbnails,
 ) -> tuple[list[Sample], list[str]]:
@@ -104,29 +94,27 @@ def episode_samples(
     Args:
         runs: of one suite.
         kind: of its episodes.
+        opened: the stage on which they are carried out again; None shows nothing of what was seen.
         data: where the trajectories lie that do not come with the package; None asks each run where its were.
-        scenes: folder with recorded floor plans.
         most: episodes of each run that are carried out again: failed ones first, then evenly.
         thumbnails: takes what is seen.
 
     Returns:
         The samples, and what must be said.
     """
-    seen = [_seen(run, kind, Places(_text(data or run.data), scenes), most, thumbnails) for run in runs]
+    seen = [_Seen() if opened is None else _seen(run, kind, opened, data, most, thumbnails) for run in runs]
     samples = [_sample(runs, kind, key, records, seen) for key, records in merged(runs).items()]
     return samples, [problem for found in seen for problem in found.problems]
 
 
-def _text(path: Path | None) -> str | None:
-    return None if path is None else str(path)
-
-
-def _seen(run: ReportRun, kind: EpisodeKind, places: Places, most: int, thumbnails: Thumbnails) -> _Seen:
+def _seen(
+    run: ReportRun, kind: EpisodeKind, opened: Opener, data: Path | None, most: int, thumbnails: Thumbnails
+) -> _Seen:
     found = _Seen()
     chosen = sorted(_chosen(run, most), key=lambda record: (record.task, record.cluster, record.key))
     for (task, trajectory), records in groupby(chosen, key=lambda record: (record.task, record.cluster)):
         try:
-            with kind.replayed(run, task, trajectory, places) as stage:
+            with opened(run, task, trajectory, data or run.data) as stage:
                 for record in records:
                     name = f"{run.folder}/{record.key.task}/{record.key}"
                     found.looks[record.key] = _look(stage.moments([record]), kind, name, thumbnails)

@@ -1,13 +1,12 @@
 """Plans as samples."""
 
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from typing import Any
 
 from infthor_eval.agents.curve_runs import PlansRun
 from infthor_eval.agents.records import PlanRecord
 from infthor_eval.report.room_map import draw_map
-from infthor_eval.report.web.episode_samples import EpisodeKind, Head, Places, Stage
+from infthor_eval.report.web.episode_samples import EpisodeKind, Head
 from infthor_eval.report.web.runs import ReportRun
 from infthor_eval.report.web.samples import StepRow
 from infthor_eval.runs import UnitRecord
@@ -20,15 +19,6 @@ Record = UnitRecord[PlanRecord]
 def plans_run(run: ReportRun) -> PlansRun:
     """The same run, as curves and replays take it."""
     return PlansRun(run.label, run.header, run.records)
-
-
-@contextmanager
-def _replayed(run: ReportRun, task: str, trajectory: str, places: Places) -> Iterator[Stage]:
-    # Replaying brings the simulator's client with it, which a page of questions does without.
-    from infthor_eval.agents.replaying import recorded_plans, replay
-
-    with replay(recorded_plans(plans_run(run), task, trajectory), places.data, places.scenes) as stage:
-        yield stage
 
 
 def _head(record: Record) -> Head:
@@ -55,4 +45,4 @@ def _called(action: str, call: Mapping[str, Any] | None) -> str:
     return f"{action} {str(named).partition('|')[0]}" if bare else action
 
 
-PLANS = EpisodeKind(_replayed, draw_map, _head, _rows)
+PLANS = EpisodeKind(draw_map, _head, _rows)
