@@ -106,6 +106,10 @@ def main(args: list[str] | None = None) -> None:
     except click.exceptions.NoArgsIsHelpError as error:
         click.echo(error.format_message())
         sys.exit(2)
+    except (click.MissingParameter, click.NoSuchOption) as error:
+        assert error.ctx is not None
+        said = error.format_message().rstrip(".")
+        _fail(f"{said}; `{error.ctx.command_path} --help` tells what there is", error.exit_code)
     except click.ClickException as error:
         _fail(error.format_message(), error.exit_code)
     except InfthorError as error:
