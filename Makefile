@@ -15,6 +15,7 @@ demo: $(INSTALLED)
 	$(BIN)/infthor-eval replay results/demo/trajectories --out results/demo/set
 	$(BIN)/infthor-eval questions results/demo/set --out results/demo/set/qa_set_demo.csv
 	$(BIN)/infthor-eval --model oracle,blind,qwen2.5-vl-nano --tasks nieh_mini --output results/demo
+	$(BIN)/infthor-eval report results/demo/*/nieh_mini-* --out results/demo/report.html
 
 test: $(INSTALLED) $(PEERS)
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 3 --dist loadfile -m "not slow"

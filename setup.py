@@ -18,7 +18,7 @@ setup(
         "infthor_eval.agents": ["*.yaml"],
         "infthor_eval.household": ["*.yaml"],
         "infthor_eval.nieh": ["*.yaml"],
-        "infthor_eval.report": ["*.html"],
+        "infthor_eval.report": ["*.html", "web/*.html", "web/*.css", "web/*.js"],
         "infthor_eval.training": ["recipes/*.yaml"],
         "infthor_eval.tasks": ["**/*.yaml"],
         "infthor_eval.results": ["README.md", "published/*.yaml"],

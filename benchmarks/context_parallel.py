@@ -32,8 +32,8 @@ from infthor_eval.training.network import SequenceModel, freeze
 from infthor_eval.training.ranks import lay_out
 from model_adapters.hf.loaded import Loaded
 from model_adapters.hf.prompt import Prompter
+from model_adapters.options.tiny import TinyOptions
 from model_adapters.tiny.qwen2_5_vl import Qwen25VLTiny
-from model_adapters.tiny.twin import TinyOptions
 
 N_FRAMES = 8  # different ones, which stand in the sequence again and again
 WORDS = 60  # tokens of text behind each frame of 121

@@ -31,8 +31,9 @@ from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
 from model_adapters import Decoding
 from model_adapters.hf.model import TransformersModel
+from model_adapters.options.tiny import TinyOptions
 from model_adapters.tiny.qwen2_5_vl import Qwen25VLTiny
-from model_adapters.tiny.twin import TinyAdapter, TinyOptions
+from model_adapters.tiny.twin import TinyAdapter
 
 PROMPT = (
     "\nAnswer the question given the agent's views in time order. Do not include explanation or reasoning in the "

@@ -1,10 +1,15 @@
-"""Means with their intervals, as summaries keep them and tables show them."""
+"""Means with their intervals, as summaries keep them and tables show them.
+
+What reckons them is imported where it is needed: runs are listed without it.
+"""
 
 from collections.abc import Hashable, Sequence
+from typing import TYPE_CHECKING
 
 import msgspec
 
-from infthor_eval.statistics import Estimate, clustered_mean, mean_over_clusters
+if TYPE_CHECKING:
+    from infthor_eval.statistics import Estimate
 
 __all__ = ["Rate", "cluster_rate", "clustered_rate", "number", "percent"]
 
@@ -27,11 +32,15 @@ class Rate(msgspec.Struct, frozen=True):
 
 def clustered_rate(values: Sequence[float], clusters: Sequence[Hashable]) -> Rate | None:
     """The mean of values of units, see `clustered_mean`; None of nothing."""
+    from infthor_eval.statistics import clustered_mean
+
     return _rate(clustered_mean(values, clusters)) if values else None
 
 
 def cluster_rate(values: Sequence[float]) -> Rate | None:
     """The mean of numbers of which each cluster has one, see `mean_over_clusters`; None of nothing."""
+    from infthor_eval.statistics import mean_over_clusters
+
     return _rate(mean_over_clusters(values)) if values else None
 
 
@@ -45,7 +54,7 @@ def number(rate: Rate | None) -> str:
     return "-" if rate is None else _written(rate, 1.0)
 
 
-def _rate(estimate: Estimate) -> Rate:
+def _rate(estimate: "Estimate") -> Rate:
     return Rate(estimate.mean, estimate.low, estimate.high, estimate.n)
 
 

@@ -8,7 +8,7 @@ import importlib
 from collections.abc import Iterable, Mapping
 from functools import reduce
 from importlib.metadata import EntryPoint, entry_points
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from infthor_eval.errors import UsageError, naming, unknown_name
 
@@ -27,14 +27,37 @@ __all__ = [
 
 ENTRY_POINTS = "infthor_eval.suites"
 
-# "module:Class" of the suite, and of its options.
+
+class _Target(NamedTuple):
+    """Where a suite is found.
+
+    Attributes:
+        suite: "module:Class" of it.
+        options: "module:Class" of its options.
+        baselines: names of its `baselines`, which can be listed without importing them; None asks the suite.
+    """
+
+    suite: str
+    options: str
+    baselines: tuple[str, ...] | None = None
+
+
 _BUILT_IN = {
-    "nieh": ("infthor_eval.nieh.suite:NiehSuite", "infthor_eval.nieh.options:NiehOptions"),
-    "manipulation": (
+    "nieh": _Target(
+        "infthor_eval.nieh.suite:NiehSuite",
+        "infthor_eval.nieh.options:NiehOptions",
+        ("oracle", "blind", "blind-count", "random"),
+    ),
+    "manipulation": _Target(
         "infthor_eval.manipulation.suite:ManipulationSuite",
         "infthor_eval.manipulation.options:ManipulationOptions",
+        ("planner-arm", "random-arm", "still"),
     ),
-    "plans": ("infthor_eval.agents.suite:PlansSuite", "infthor_eval.agents.options:PlansOptions"),
+    "plans": _Target(
+        "infthor_eval.agents.suite:PlansSuite",
+        "infthor_eval.agents.options:PlansOptions",
+        ("planner", "random", "scripted", "history"),
+    ),
 }
 
 
@@ -52,7 +75,7 @@ def suite_named(name: str) -> "Suite":
     """
     if name not in suite_names():
         raise unknown_name("suite", name, suite_names())
-    found = _imported(name, _target(name)[0])
+    found = _imported(name, _target(name).suite)
     if name not in _BUILT_IN:
         _check(name, found)
     made: Suite = found()
@@ -65,7 +88,7 @@ def options_of(name: str) -> type:
     Raises:
         UsageError: the suite of another package cannot be imported.
     """
-    found: type = _imported(name, _target(name)[1])
+    found: type = _imported(name, _target(name).options)
     return found
 
 
@@ -84,7 +107,8 @@ def baseline_names() -> dict[str, str]:
     """The baselines of all suites, each with the suites that have it, in words."""
     found: dict[str, list[str]] = {}
     for name in suite_names():
-        for baseline in suite_named(name).baselines:
+        named = _target(name).baselines
+        for baseline in suite_named(name).baselines if named is None else named:
             found.setdefault(baseline, []).append(name)
     return {baseline: ", ".join(names) for baseline, names in found.items()}
 
@@ -101,12 +125,12 @@ def _entry_points() -> dict[str, EntryPoint]:
     return {point.name: point for point in entry_points(group=ENTRY_POINTS)}
 
 
-def _target(name: str) -> tuple[str, str]:
-    """Where a suite is, and where its options; other packages are looked at for theirs alone, as that takes time."""
+def _target(name: str) -> _Target:
+    """Where a suite is; other packages are looked at for suites of theirs alone, as that takes time."""
     if name in _BUILT_IN:
         return _BUILT_IN[name]
     value = _entry_points()[name].value
-    return value, f"{value}.options"
+    return _Target(value, f"{value}.options")
 
 
 def _imported(name: str, target: str) -> Any:

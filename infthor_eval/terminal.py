@@ -64,9 +64,9 @@ class _Description(TextColumn):
 
 
 def progress_bar(on: Console) -> Progress:
-    """A bar that goes away when the work is done."""
+    """A bar that goes away when the work is done; nothing where there is no terminal to draw it on."""
     columns = (_Description(), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    return Progress(*columns, console=on, transient=True)
+    return Progress(*columns, console=on, transient=True, disable=not on.is_terminal)
 
 
 def tell(text: str) -> None:

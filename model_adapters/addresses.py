@@ -3,7 +3,7 @@
 from ipaddress import ip_address
 from urllib.parse import SplitResult, urlsplit
 
-__all__ = ["is_here", "server_address"]
+__all__ = ["act_url", "is_here", "server_address"]
 
 
 def server_address(option: str, url: str) -> SplitResult:
@@ -37,3 +37,14 @@ def is_here(address: SplitResult) -> bool:
         return host == "localhost" or ip_address(host).is_loopback
     except ValueError:  # a name, which may mean any machine
         return False
+
+
+def act_url(url: str) -> str:
+    """The address that actions are asked of: a server's own with `/act` behind it, if it is not there.
+
+    Raises:
+        ValueError: see `server_address`.
+    """
+    parts = server_address("url", url)
+    path = parts.path.rstrip("/")
+    return f"{parts.scheme}://{parts.netloc}{path if path.endswith('/act') else f'{path}/act'}"

@@ -1,8 +1,8 @@
 """Names of models, and how to get from a name to a model.
 
-Targets are "module:Class" strings that are imported only when a model is asked for, so that listing names costs
-nothing. Packages add their own through the entry point group `infthor_eval.models`; a name may also be that of a file
-and a class in it, `./my_adapter.py:MyModel`.
+Targets are "module:Class" strings that are imported only when a model is asked for, so that listing names, and the
+options of built-in models, costs nothing. Packages add their own through the entry point group `infthor_eval.models`; a
+name may also be that of a file and a class in it, `./my_adapter.py:MyModel`.
 """
 
 import dataclasses
@@ -15,6 +15,7 @@ from typing import Any, cast
 
 from infthor_eval.errors import ModelError, UsageError, unknown_name
 from model_adapters.adapter_identity import identity_of
+from model_adapters.built_in import BUILT_IN
 from model_adapters.options import describe, parse
 from model_adapters.own_file import class_in_file, class_name, identity_of_file, names_a_file
 from model_adapters.protocols import Adapter, Model, Policy
@@ -35,30 +36,6 @@ __all__ = [
 ENTRY_POINTS = "infthor_eval.models"
 
 _TRANSFORMERS = "transformers"  # runs what no other engine is named for
-
-_BUILT_IN = {
-    "deepseek-vl": "model_adapters.hf.families.deepseek_vl:DeepseekVL",
-    "deepseek-vl-tiny": "model_adapters.tiny.deepseek_vl:DeepseekVLTiny",
-    "hf-vlm": "model_adapters.hf.families.hf_vlm:HfVlm",
-    "hf-vlm@vllm": "model_adapters.vllm.adapter:HfVlmOnVllm",
-    "llava-onevision": "model_adapters.hf.families.llava_onevision:LlavaOnevision",
-    "llava-onevision@vllm": "model_adapters.vllm.adapter:LlavaOnevisionOnVllm",
-    "llava-onevision-tiny": "model_adapters.tiny.llava_onevision:LlavaOnevisionTiny",
-    "openai": "model_adapters.openai.adapter:OpenAI",
-    "openvla": "model_adapters.policies.openvla.adapter:OpenVLA",
-    "openvla@vllm": "model_adapters.vllm.openvla:OpenVLAOnVllm",
-    "openvla-tiny": "model_adapters.tiny.openvla:OpenVLATiny",
-    "pixtral": "model_adapters.hf.families.pixtral:Pixtral",
-    "pixtral@vllm": "model_adapters.vllm.adapter:PixtralOnVllm",
-    "pixtral-tiny": "model_adapters.tiny.pixtral:PixtralTiny",
-    "qwen2.5-vl": "model_adapters.hf.families.qwen2_5_vl:Qwen25VL",
-    "qwen2.5-vl@vllm": "model_adapters.vllm.adapter:Qwen25VLOnVllm",
-    "qwen2.5-vl-nano": "model_adapters.tiny.qwen2_5_vl_nano:Qwen25VLNano",
-    "qwen2.5-vl-tiny": "model_adapters.tiny.qwen2_5_vl:Qwen25VLTiny",
-    "spatialvla": "model_adapters.policies.spatialvla.adapter:SpatialVLA",
-    "spatialvla-tiny": "model_adapters.tiny.spatialvla:SpatialVLATiny",
-    "vla-http": "model_adapters.policies.http.adapter:VlaHttp",
-}
 
 
 def names() -> tuple[str, ...]:
@@ -99,7 +76,7 @@ def options(name: str) -> str:
         UsageError: there is no model of this name.
         ModelError: the adapter cannot be imported.
     """
-    return describe(_adapter(name).Options)
+    return describe(_options(name))
 
 
 def check_options(name: str, options: Mapping[str, str]) -> None:
@@ -109,7 +86,7 @@ def check_options(name: str, options: Mapping[str, str]) -> None:
         UsageError: an unknown name or option, or a value that does not fit.
         ModelError: the adapter cannot be imported.
     """
-    parse(name, _adapter(name).Options, options)
+    parse(name, _options(name), options)
 
 
 def load(name: str, options: Mapping[str, str], seed: int) -> Model | Policy:
@@ -141,7 +118,7 @@ def adapter_identity(name: str) -> dict[str, Any]:
     if names_a_file(name):
         return identity_of_file(name)
     _target(name)
-    return {} if name in _BUILT_IN else identity_of(_entry_points()[name])
+    return {} if name in BUILT_IN else identity_of(_entry_points()[name])
 
 
 def takes(name: str, option: str) -> bool:
@@ -151,7 +128,7 @@ def takes(name: str, option: str) -> bool:
         UsageError: there is no model of this name.
         ModelError: the adapter cannot be imported.
     """
-    return option in {field.name for field in dataclasses.fields(_adapter(name).Options)}
+    return option in {field.name for field in dataclasses.fields(_options(name))}
 
 
 def label(name: str, options: Mapping[str, str]) -> str:
@@ -185,7 +162,9 @@ def _entry_points() -> dict[str, EntryPoint]:
 
 def _targets() -> dict[str, str]:
     # Built-in names win: a package cannot change what a known name means.
-    return {name: point.value for name, point in _entry_points().items()} | _BUILT_IN
+    return {name: point.value for name, point in _entry_points().items()} | {
+        name: built_in.adapter for name, built_in in BUILT_IN.items()
+    }
 
 
 def _target(name: str) -> str:
@@ -195,17 +174,25 @@ def _target(name: str) -> str:
     return targets[name]
 
 
+def _options(name: str) -> type:
+    """The dataclass of a model's options; of a built-in one without its adapter, which may import torch."""
+    if name not in BUILT_IN:
+        return _adapter(name).Options
+    found: type = _imported(BUILT_IN[name].options)
+    return found
+
+
 def _adapter(name: str) -> type[Adapter]:
     target = name if names_a_file(name) else _target(name)
-    found = class_in_file(name) if names_a_file(name) else _imported(name, target)
+    try:
+        found = class_in_file(name) if names_a_file(name) else _imported(target)
+    except (ImportError, AttributeError) as error:
+        raise ModelError(f"model {name} cannot be imported from {target} ({error})") from error
     if not (hasattr(found, "Options") and hasattr(found, "build")):
         raise ModelError(f"model {name}: {target} has no Options and build; see docs/own-models.md")
     return cast(type[Adapter], found)
 
 
-def _imported(name: str, target: str) -> Any:
+def _imported(target: str) -> Any:
     module, _, attribute = target.partition(":")
-    try:
-        return getattr(importlib.import_module(module), attribute)
-    except (ImportError, AttributeError) as error:
-        raise ModelError(f"model {name} cannot be imported from {target} ({error})") from error
+    return getattr(importlib.import_module(module), attribute)

@@ -30,7 +30,8 @@ class PlansOptions:
         metadata={"help": "embedded, unity, or the path of a Unity executable.", "metavar": "NAME"},
     )
     scenes: str | None = field(
-        default=None, metadata={"help": "Folder with recorded floor plans (thor_scenes/).", "metavar": "DIR"}
+        default=None,
+        metadata={"help": "Folder with recorded floor plans (thor_scenes/).", "metavar": "DIR", "is_place": True},
     )
     rewards: str | None = field(
         default=None,
@@ -53,7 +54,8 @@ class PlansOptions:
         metadata={"help": "Show what in the frames' places, a run with each.", "metavar": "HOW,...", "each": True},
     )
     retriever: str | None = field(
-        default=None, metadata={"help": "CLIP model that finds frames, a hub id or a folder.", "metavar": "NAME"}
+        default=None,
+        metadata={"help": "CLIP model that finds frames, a hub id or a folder.", "metavar": "NAME", "is_place": True},
     )
 
     def __post_init__(self) -> None:

@@ -8,7 +8,8 @@ from infthor_eval.agents.evaluation import PlansEvaluation
 from infthor_eval.agents.options import PlansOptions
 from infthor_eval.agents.records import RECORDS, PlanRecord
 from infthor_eval.agents.summary import PlansSummary, summarise
-from infthor_eval.agents.tables import tables
+from infthor_eval.agents.tables import overview, tables
+from infthor_eval.rates import Rate
 from infthor_eval.runs import RecordTypes, RunHeader, RunSummary, TaskRequest, UnitRecord
 from infthor_eval.runs.suite import Need
 from infthor_eval.tables import Table
@@ -37,6 +38,14 @@ class PlansSuite:
         """See `Suite.scores`: whether the plan was carried out, and what it earned."""
         payload = record.payload
         return {"success": float(payload.done), "reward": payload.reward} if payload.steps else {}
+
+    def headline(self, summary: PlansSummary) -> Mapping[str, Rate]:
+        """See `Suite.headline`: plans carried out."""
+        return {name: task.success["total"] for name, task in summary.tasks.items() if "total" in task.success}
+
+    def overview(self, runs: Sequence[RunSummary]) -> list[Table]:
+        """See `Suite.overview`."""
+        return overview(runs)
 
     def tables(self, runs: Sequence[RunSummary]) -> list[Table]:
         """See `Suite.tables`."""

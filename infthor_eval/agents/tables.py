@@ -8,12 +8,22 @@ from infthor_eval.rates import number, percent
 from infthor_eval.runs import RunSummary
 from infthor_eval.tables import Column, Row, Table, told_left_out
 
-__all__ = ["tables"]
+__all__ = ["overview", "tables"]
 
 _NAMES = (Column("model", False), Column("task", False))
 _EMBEDDED = (
     "Made in the embedded simulator: not comparable with the published rows, which are of AI2-THOR's own trajectories."
 )
+
+
+def overview(runs: Sequence[RunSummary]) -> list[Table]:
+    """Plans carried out and reward in one number a task."""
+    rows = [
+        Row((name, task_name, percent(task.success.get("total")), percent(task.reward_share), *_sizes(task)[:2]))
+        for name, task_name, task in _tasks(runs)
+    ]
+    columns = (*_NAMES, *map(Column, ("carried out, %", "reward, % of the most", "plans", "trajectories")))
+    return [Table("Plans, 95 % interval in brackets", columns, tuple(rows), tuple(_notes(runs)))]
 
 
 def tables(runs: Sequence[RunSummary]) -> list[Table]:

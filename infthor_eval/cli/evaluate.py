@@ -1,26 +1,28 @@
 """What `run` does with its requests, and what of it people see."""
 
 from collections.abc import Mapping, Sequence
-from itertools import groupby
 
-from infthor_eval.cli.progress import NOTES, execute_with_progress, say
+from infthor_eval.cli.progress import NOTES, complain, execute_with_progress, hushed
 from infthor_eval.cli.reasons import counted_reasons
+from infthor_eval.cli.showing import Showing, ShownRun, show
 from infthor_eval.errors import DataError
 from infthor_eval.harness.export import export
 from infthor_eval.harness.trackers import Trackers
-from infthor_eval.report.terminal import print_table, table_console
 from infthor_eval.runs import RunOutcome, RunRequest, Suite, prepare
 
 __all__ = ["evaluate"]
 
 
 def evaluate(
-    requests: Sequence[tuple[RunRequest, Suite]], trackers: Mapping[str, Mapping[str, str]] | None = None
+    requests: Sequence[tuple[RunRequest, Suite]],
+    showing: Showing,
+    trackers: Mapping[str, Mapping[str, str]] | None = None,
 ) -> int:
-    """Run the requests one after another, and print one set of tables per suite.
+    """Run the requests one after another, and print what they found.
 
     Args:
-        requests: what is asked.
+        requests: the runs, each with its suite.
+        showing: how results are shown.
         trackers: arguments of those that finished runs are sent to (see `Trackers`); None for none.
 
     Returns:
@@ -28,6 +30,17 @@ def evaluate(
         take one, else 0.
     """
     sending = Trackers(**(trackers or {}))
+    with hushed(showing.quiet):
+        outcomes = _executed(requests)
+    show([_shown(outcome) for outcome in outcomes], showing)
+    n_failed = sum(map(_say_what_failed, outcomes))  # every run says what failed
+    n_void = sum(map(_say_if_void, outcomes))
+    n_unsent = sum(_say_what_is_unsent(outcome, sending) for outcome in outcomes if not outcome.n_missing)
+    return 130 if outcomes[-1].n_missing else int(n_failed + n_void + n_unsent > 0)
+
+
+def _executed(requests: Sequence[tuple[RunRequest, Suite]]) -> list[RunOutcome]:
+    """All runs, or those up to the one that somebody stopped."""
     with NOTES.status("looking at the tasks and their data"):  # retrieval embeds every frame: minutes
         runs = [prepare(request, suite) for request, suite in requests]
     outcomes = []
@@ -36,29 +49,17 @@ def evaluate(
         export(outcomes[-1])
         if outcomes[-1].n_missing:
             break
-    console = table_console()
-    for _, of_suite in groupby(sorted(outcomes, key=_suite_name), key=_suite_name):
-        same = list(of_suite)
-        for table in same[0].run.suite.tables([outcome.summary for outcome in same]):
-            print_table(table, console)
-    for outcome in outcomes:
-        if outcome.usage.requests:
-            console.print(f"{outcome.summary.header.name}: {outcome.usage.description}")
-        console.print(f"{outcome.summary.header.name}: {outcome.folder}")
-    n_failed = sum(map(_say_what_failed, outcomes))  # every run says what failed
-    n_void = sum(map(_say_if_void, outcomes))
-    n_unsent = sum(_say_what_is_unsent(outcome, sending) for outcome in outcomes if not outcome.n_missing)
-    return 130 if outcomes[-1].n_missing else int(n_failed + n_void + n_unsent > 0)
+    return outcomes
 
 
-def _suite_name(outcome: RunOutcome) -> str:
-    return outcome.run.suite.name
+def _shown(outcome: RunOutcome) -> ShownRun:
+    return ShownRun(outcome.folder, outcome.run.suite, outcome.summary, outcome.usage, outcome.n_missing)
 
 
 def _say_if_void(outcome: RunOutcome) -> bool:
     void = bool(outcome.records) and all(record.excluded is not None for record in outcome.records)
     if void:
-        say(f"{outcome.summary.header.name}: nothing that could be evaluated counts: all of it was left out", "red")
+        complain(f"{outcome.summary.header.name}: nothing that could be evaluated counts: all of it was left out")
     return void
 
 
@@ -66,7 +67,7 @@ def _say_what_is_unsent(outcome: RunOutcome, trackers: Trackers) -> bool:
     try:
         trackers.send(outcome)
     except DataError as error:
-        say(str(error), "red")
+        complain(str(error))
         return True
     return False
 
@@ -74,5 +75,5 @@ def _say_what_is_unsent(outcome: RunOutcome, trackers: Trackers) -> bool:
 def _say_what_failed(outcome: RunOutcome) -> int:
     failed = [(record.task, record.failure) for record in outcome.records if record.failure is not None]
     for task, reason, n in counted_reasons(failed):
-        say(f"{task}: {n} sample(s) failed, counted as wrong: {reason}", "red")
+        complain(f"{task}: {n} sample(s) failed, counted as wrong: {reason}")
     return len(failed)

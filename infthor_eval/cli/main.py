@@ -30,9 +30,10 @@ _COMMANDS = {
     "compare": "Compare two runs on the same data.",
     "check-adapter": "Check that a model of your own keeps the contract of adapters.",
     "check-parity": "Compare a policy's actions with another implementation's.",
-    "report": "Draw a figure of the paper of your own runs.",
+    "report": "Write runs as a page with every sample, or as a figure of the paper.",
     "watch": "Show what was done in a run of plans or of arms, as MP4 or GIF.",
-    "ls": "List the models, the tasks or the scenes.",
+    "ls": "List the models, the tasks, the scenes, or the runs in a folder.",
+    "show": "Print the results of runs again, or write them as CSV, LaTeX, Markdown or JSON.",
     "scenes": "Look at a scene, or carry it to machines without Unity.",
     "generate": "Make long-horizon trajectories in a scene.",
     "replay": "Replay trajectories in the simulator into frames and metadata.",
@@ -68,6 +69,14 @@ class _Commands(click.Group):
         if command is not None:
             refuse_repeated(ctx, command, rest)
         return name, command, rest
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Also those of the default command, which are typed without its name."""
+        super().format_options(ctx, formatter)
+        run = self.get_command(ctx, _DEFAULT)
+        assert run is not None
+        with formatter.section("Options of a run"):
+            formatter.write_dl([told for option in run.params if (told := option.get_help_record(ctx)) is not None])
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         # Not click's own, which would import every command for its first line of help.

@@ -1,12 +1,23 @@
 """What several commands share: options, and how their values are written."""
 
 import math
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 import click
 
-__all__ = ["LARGEST", "SEED", "FiniteRange", "floor_plans_option", "model_options_in", "names_in", "pairs_in"]
+__all__ = [
+    "LARGEST",
+    "SEED",
+    "FiniteRange",
+    "ModelOptions",
+    "ModelsAsked",
+    "floor_plans_option",
+    "model_options_in",
+    "names_in",
+    "pairs_in",
+]
 
 LARGEST = 2**63 - 1  # of the numbers that a run's identity can hold
 SEED = click.IntRange(-LARGEST, LARGEST)
@@ -29,6 +40,43 @@ class FiniteRange(click.FloatRange):
         return number
 
 
+class ModelOptions(click.ParamType):
+    """Options of a model: `k=v,k=v`, or a mapping where a file gives them."""
+
+    name = "K=V,..."
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> dict[str, str]:
+        """See `click.ParamType`."""
+        return dict(value) if isinstance(value, Mapping) else model_options_in(value)
+
+
+class ModelsAsked(click.ParamType):
+    """Models by name, each with options of its own where it has any: `A:k=v,k=v,B`."""
+
+    name = "MODEL[:K=V,...],..."
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> dict[str, dict[str, str]]:
+        """See `click.ParamType`."""
+        return value if isinstance(value, dict) else _models_in(value, param.opts[0] if param else "--model")
+
+
+def _models_in(text: str, option: str) -> dict[str, dict[str, str]]:
+    found: dict[str, list[str]] = {}
+    model = ""
+    for item in filter(None, (part.strip() for part in text.split(","))):
+        before, equals, _ = item.partition("=")
+        named, _, _ = before.rpartition(":")  # a name may hold a colon, of a key none is known that does
+        model = named or model if equals else item
+        if not model:
+            raise click.UsageError(f"{option}: {item!r} stands before any model; write MODEL:{item}")
+        found.setdefault(model, []).extend([item.removeprefix(f"{named}:")] if equals else [])
+    if not found:
+        raise click.UsageError(f"{option} is empty; give a name")
+    return {model: pairs_in(items, f"{option} {model}") for model, items in found.items()}
+
+
 def names_in(text: str, option: str) -> tuple[str, ...]:
     """Names written with commas, each once.
 
@@ -47,25 +95,25 @@ def model_options_in(text: str) -> dict[str, str]:
     Raises:
         click.UsageError: an item is of another form, or a key stands twice.
     """
-    return pairs_in(text, "--model-args")
+    return pairs_in(text.split(","), "--model-args")
 
 
-def pairs_in(text: str, option: str) -> dict[str, str]:
-    """Keys and values written as `k=v,k=v`.
+def pairs_in(items: Iterable[str], where: str) -> dict[str, str]:
+    """Keys and values written as `k=v`.
 
     Args:
-        text: as typed.
-        option: that took it, for the message.
+        items: as typed.
+        where: they were typed, for the message.
 
     Raises:
         click.UsageError: an item is of another form, or a key stands twice.
     """
     options: dict[str, str] = {}
-    for item in filter(None, (part.strip() for part in text.split(","))):
+    for item in filter(None, (part.strip() for part in items)):
         key, equals, value = item.partition("=")
         if not equals or not key.strip():
-            raise click.UsageError(f"{option}: {item!r} is not of the form key=value")
+            raise click.UsageError(f"{where}: {item!r} is not of the form key=value")
         if key.strip() in options:
-            raise click.UsageError(f"{option}: {key.strip()!r} is given twice")
+            raise click.UsageError(f"{where}: {key.strip()!r} is given twice")
         options[key.strip()] = value.strip()
     return options

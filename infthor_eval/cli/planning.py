@@ -4,6 +4,7 @@ import resource
 import sys
 from collections.abc import Sequence
 
+from infthor_eval.cli.pace import duration
 from infthor_eval.cli.progress import NOTES, say
 from infthor_eval.cli.reasons import counted_reasons
 from infthor_eval.errors import ModelError
@@ -63,13 +64,13 @@ def _table(request: RunRequest, tasks: Sequence[TaskEstimate]) -> Table:
 def _row(item: TaskEstimate) -> Row:
     total = item.total
     counts = (item.n_units, item.n_measured, item.frames, total.requests, total.read, total.encoded, total.written)
-    return Row((item.task, *(f"{round(count):,}" for count in counts), _duration(total.seconds)))
+    return Row((item.task, *(f"{round(count):,}" for count in counts), duration(total.seconds)))
 
 
 def _totals(request: RunRequest, tasks: Sequence[TaskEstimate], price_per_hour: float | None) -> list[str]:
     seconds, workers = sum(item.total.seconds for item in tasks), request.staffing.workers
-    shared = f", {_duration(seconds / workers)} by {workers} workers" if workers > 1 else ""
-    lines = [f"time: {_duration(seconds)} of one worker{shared}, loading not counted"]
+    shared = f", {duration(seconds / workers)} by {workers} workers" if workers > 1 else ""
+    lines = [f"time: {duration(seconds)} of one worker{shared}, loading not counted"]
     lines.append(f"memory: {_peak_megabytes():,} MB at most while it was measured{_gpu_memory()}")
     cost = sum(item.total.cost for item in tasks)
     if cost:
@@ -79,12 +80,6 @@ def _totals(request: RunRequest, tasks: Sequence[TaskEstimate], price_per_hour: 
             f"money: {seconds / 3600 * price_per_hour:.2f} US dollars of machines at {price_per_hour:g} an hour"
         )
     return lines
-
-
-def _duration(seconds: float) -> str:
-    if seconds < 120:
-        return f"{seconds:.1f} s"
-    return f"{seconds / 60:.0f} min" if seconds < 7200 else f"{seconds / 3600:.1f} h"
 
 
 def _peak_megabytes() -> int:

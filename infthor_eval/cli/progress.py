@@ -1,27 +1,31 @@
 """What people see of a run while it goes, on standard error."""
 
+import contextlib
+import time
+from collections.abc import Iterator
 from typing import Any
 
 from rich.progress import Progress
 
+from infthor_eval.cli.pace import Pace
 from infthor_eval.cli.reasons import counted_reasons
 from infthor_eval.cli.stopping import Stop, stopped_by_sigint
 from infthor_eval.runs import PreparedRun, RunOutcome, UnitRecord, Workload, execute
 from infthor_eval.terminal import error_console, progress_bar
 
-__all__ = ["NOTES", "execute_with_progress", "say"]
+__all__ = ["NOTES", "complain", "execute_with_progress", "hushed", "say"]
 
 NOTES = error_console()
 
 
-class _Bar:
-    """Observes a run: what is skipped and what it costs beforehand, then a bar."""
+class _Watcher:
+    """Observes a run: what is skipped and what it costs beforehand, then how fast it goes."""
 
     def __init__(self, name: str, progress: Progress, stop: Stop) -> None:
         self._name = name
         self._progress = progress
         self._stop = stop
-        self.n_found = self.n_made = 0
+        self.pace = Pace(0, time.monotonic())
 
     def begin(self, workload: Workload, n_recovered: int) -> None:
         """See `Observer`."""
@@ -31,13 +35,17 @@ class _Bar:
             say(f"{task}: {n} sample(s) skipped: {reason}", "yellow")
         for cost in workload.costs:
             say(f"{cost.task}: {cost.description}")
+        self.pace = Pace(workload.n_units, time.monotonic())
         self._bar = self._progress.add_task(self._name, total=workload.n_units)
         self._stop.begun = True
 
     def done(self, record: UnitRecord[Any], resumed: bool) -> None:
         """See `Observer`."""
-        self.n_found, self.n_made = self.n_found + resumed, self.n_made + (not resumed)
-        self._progress.advance(self._bar)
+        now = time.monotonic()
+        self.pace.count(record.usage, resumed, now)
+        self._progress.update(self._bar, advance=1, description=f"{self._name}  {self.pace.speed(now)}")
+        if not NOTES.is_terminal and self.pace.is_due(now):
+            say(f"{self._name}: {self.pace.line(now)}")
 
     def note(self, text: str) -> None:
         """See `Observer`."""
@@ -45,16 +53,32 @@ class _Bar:
 
 
 def execute_with_progress(run: PreparedRun) -> RunOutcome:
-    """Execute one prepared run, with a progress bar, and with what is skipped and what failed."""
+    """Execute one prepared run, with a bar, or lines where there is no terminal, and with what is skipped."""
     with progress_bar(NOTES) as progress, stopped_by_sigint(say) as stop:
-        bar = _Bar(run.request.label, progress, stop)
-        outcome = execute(run, bar, stop)
-    say(f"{run.request.label}: {bar.n_made} answered now, {bar.n_found} found in the journal of an earlier run")
+        watcher = _Watcher(run.request.label, progress, stop)
+        outcome = execute(run, watcher, stop)
+    pace = watcher.pace
+    say(f"{run.request.label}: {pace.n_made} answered now, {pace.n_found} found in the journal of an earlier run")
     if outcome.n_missing:
         say(f"{run.request.label}: stopped, {outcome.n_missing} not come to; the same command goes on", "yellow")
     return outcome
 
 
+@contextlib.contextmanager
+def hushed(quiet: bool) -> Iterator[None]:
+    """Where it is to be quiet, nothing is said but what is complained of."""
+    NOTES.quiet = quiet
+    try:
+        yield
+    finally:
+        NOTES.quiet = False
+
+
 def say(text: str, style: str = "") -> None:
     """A line on standard error; whatever is in it is shown as text."""
     NOTES.print(text, style=style)
+
+
+def complain(text: str) -> None:
+    """A line of what went wrong, said even where it is to be quiet."""
+    error_console().print(text, style="red")

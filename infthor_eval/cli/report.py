@@ -1,4 +1,4 @@
-"""`infthor-eval report`: a figure of the paper, of one's own runs."""
+"""`infthor-eval report`: one's own runs as a page, or as a figure of the paper."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import click
 
+from infthor_eval.cli.options import LARGEST
+
 if TYPE_CHECKING:
     from infthor_eval.curves import RewardCurves
     from infthor_eval.runs import RunHeader
@@ -17,6 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["command"]
 
 _PATH = click.Path(path_type=Path)
+_PAGE, _FOLDER = Path("results/report.html"), Path("results/figures")
 
 
 class _Asked(NamedTuple):
@@ -45,34 +48,88 @@ class _Made(NamedTuple):
 @click.command("report")
 @click.argument("runs", metavar="RUN...", nargs=-1, required=True, type=_PATH)
 @click.option(
-    "--figure",
-    required=True,
-    metavar="WHICH",
-    help="6 (reward of arms along trajectories), 7 (reward of plans over steps and context tokens), "
-    "radius (success of arms by the hand's radius).",
+    "--out",
+    type=_PATH,
+    help=f"The page, an .html file, or the folder for a figure's pictures.  [default: {_PAGE}, {_FOLDER}]",
 )
-@click.option("--out", type=_PATH, default=Path("results/figures"), show_default=True, help="Folder for the pictures.")
+@click.option("--data", type=_PATH, help="The questions' set, or the trajectories, where runs do not tell.")
+@click.option("--scenes", type=_PATH, help="Folder with recorded floor plans (thor_scenes/), as for the run.")
+@click.option(
+    "--episodes",
+    type=click.IntRange(0, LARGEST),
+    default=12,
+    show_default=True,
+    metavar="N",
+    help="Plans and arm's errands of each run that are carried out again, to show what was seen.",
+)
+@click.option(
+    "--figure",
+    metavar="WHICH",
+    help="Draw a figure instead: 6 (reward of arms along trajectories), 7 (reward of plans over steps and context "
+    "tokens), radius (success of arms by the hand's radius).",
+)
 @click.option("--panels", type=_PATH, metavar="FILE.yaml", help="Which runs stand in which panel; else all in one.")
 @click.option("--task", help="The task to draw, where the runs share several; of arms, one of each kind: A,B.")
-def command(runs: tuple[Path, ...], figure: str, out: Path, panels: Path | None, task: str | None) -> None:
-    """Draw a figure of the paper from the journals of the runs in the folders RUN..., as PNG and SVG.
+def command(
+    runs: tuple[Path, ...],
+    out: Path | None,
+    data: Path | None,
+    scenes: Path | None,
+    episodes: int,
+    figure: str | None,
+    panels: Path | None,
+    task: str | None,
+) -> None:
+    """Write what the runs in the folders RUN... found as one page that works from a file: numbers, pictures, samples.
 
-    A run of the baseline `planner`, or `planner-arm`, among them is the upper bound. Only trajectories that all runs
-    have are drawn.
+    With --figure, draw a figure of the paper instead, as PNG and SVG. A run of the baseline `planner`, or
+    `planner-arm`, among them is the upper bound. Only trajectories that all runs have are drawn.
     """
+    if figure is not None:
+        _draw(_Asked(runs, _headers(runs, figure), task, panels), figure, out or _FOLDER)
+        return
+    _refuse({"--panels": panels, "--task": task})
+    _write(runs, out or _PAGE, data, scenes, episodes)
+
+
+def _refuse(given: dict[str, object]) -> None:
+    from infthor_eval.errors import UsageError
+
+    for option, value in given.items():
+        if value is not None:
+            raise UsageError(f"{option}: is for a figure; give --figure too, or leave it out")
+
+
+def _write(runs: tuple[Path, ...], out: Path, data: Path | None, scenes: Path | None, episodes: int) -> None:
+    from infthor_eval.errors import UsageError
+    from infthor_eval.formats.files import prepared_file
+    from infthor_eval.report.web.build import Wanted, build_page
+    from infthor_eval.report.web.page import write_page
+    from infthor_eval.report.web.runs import read_report_runs
+    from infthor_eval.suites import suite_named
+    from infthor_eval.terminal import error_console, tell
+
+    if out.suffix.lower() not in (".html", ".htm"):
+        raise UsageError(f"--out {out}: the page is an .html file; name one")
+    path = prepared_file(out)
+    found = read_report_runs(runs, suite_named)
+    with error_console().status("making the page"):
+        page = build_page(found, Wanted(data, scenes, episodes))
+    size = write_page(page, path)
+    tell(f"{len(page.samples):,} samples, {len(page.pictures):,} pictures, {size / 1e6:.1f} MB: {path}")
+
+
+def _draw(asked: _Asked, figure: str, out: Path) -> None:
     from infthor_eval.errors import UsageError
     from infthor_eval.formats.files import prepared_folder, require_writable
     from infthor_eval.report.terminal import print_table, table_console
     from infthor_eval.terminal import tell
 
-    if figure not in _FIGURES:
-        there = ", ".join(f"{name} ({found.about})" for name, found in _FIGURES.items())
-        raise UsageError(f"--figure {figure}: is none that can be drawn; there are {there}")
     require_writable(out)
     drawn = _FIGURES[figure]
-    if panels is not None and not drawn.has_panels:
+    if asked.panels is not None and not drawn.has_panels:
         raise UsageError(f"--panels: figure {figure} has panels of its own; leave it out")
-    made = drawn.make(_Asked(runs, _headers(runs, figure), task, panels))
+    made = drawn.make(asked)
     paths = made.draw(prepared_folder(out), f"figure{figure}" if figure.isdigit() else figure)
     print_table(made.table, table_console())
     for line in (*made.left, *map(str, paths)):
@@ -83,6 +140,9 @@ def _headers(folders: tuple[Path, ...], figure: str) -> list[RunHeader]:
     from infthor_eval.errors import UsageError
     from infthor_eval.runs import read_header
 
+    if figure not in _FIGURES:
+        there = ", ".join(f"{name} ({found.about})" for name, found in _FIGURES.items())
+        raise UsageError(f"--figure {figure}: is none that can be drawn; there are {there}")
     headers = [read_header(folder) for folder in folders]
     suite = _FIGURES[figure].suite
     for folder, header in zip(folders, headers, strict=True):

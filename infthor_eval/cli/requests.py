@@ -76,6 +76,7 @@ def requests_for(
                 fresh=asked.fresh,
                 recover=asked.recover,
                 staffing=asked.staffing,
+                include=asked.include,
                 suite_code=suite_identity(suite_name),
             )
             requests.append((request, suite_named(suite_name)))

@@ -1,13 +1,14 @@
 """The options of a run, for every command that takes them: from what was typed to its requests."""
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from infthor_eval.cli.options import LARGEST, SEED, FiniteRange, model_options_in, names_in
+from infthor_eval.cli.config_option import comes_from_file, config_option
+from infthor_eval.cli.options import LARGEST, SEED, FiniteRange, ModelOptions, ModelsAsked, names_in
 from infthor_eval.cli.staffing_options import staffing_options
 from infthor_eval.cli.suite_options import refuse_twins, suite_options
 from infthor_eval.workers import Staffing
@@ -18,7 +19,14 @@ if TYPE_CHECKING:
 __all__ = ["run_options"]
 
 _OPTIONS = (
-    click.option("--model", "models", required=True, help="Model name, or several with commas (see `ls models`)."),
+    click.option(
+        "--model",
+        "models",
+        type=ModelsAsked(),
+        required=True,
+        metavar="MODEL,...",
+        help="Model name, or several with commas (see `ls models`); MODEL:K=V,... gives one options of its own.",
+    ),
     click.option(
         "--engine",
         type=click.Choice(["transformers", "vllm"]),
@@ -33,7 +41,13 @@ _OPTIONS = (
         help="Folder with task files of your own; may be repeated.",
     ),
     click.option("--data", type=click.Path(path_type=Path), help="Folder of the data set to ask about."),
-    click.option("--model-args", default="", metavar="K=V,...", help="Options of the model (see `ls models`)."),
+    click.option(
+        "--model-args",
+        type=ModelOptions(),
+        default="",
+        metavar="K=V,...",
+        help="Options of the model, or of all of them (see `ls models`).",
+    ),
     click.option(
         "--rope",
         metavar="TYPE:FACTOR",
@@ -79,7 +93,7 @@ def run_options(*own: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]
             kept = {name: given.pop(name) for name in own}
             return command(requests=_requests(**given), **kept)
 
-        options = (*_OPTIONS, staffing_options, suite_options)
+        options = (config_option, *_OPTIONS, staffing_options, suite_options)
         made = functools.reduce(lambda wrapped, option: option(wrapped), reversed(options), with_requests)
         refuse_twins(made)
         return made
@@ -88,11 +102,11 @@ def run_options(*own: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]
 
 
 def _requests(
-    models: str,
+    models: Mapping[str, Mapping[str, str]],
     engine: str | None,
     tasks: str,
     include: tuple[Path, ...],
-    model_args: str,
+    model_args: Mapping[str, str],
     name: str | None,
     data: Path | None,
     limit: int | None,
@@ -109,16 +123,9 @@ def _requests(
     from infthor_eval.cli.requests import Asked, requests_for
     from model_adapters import on_engine
 
-    options = model_options_in(model_args)
-    for option, value in {"rope": rope, "max_tokens_total": max_tokens_total, "max_cost": max_cost}.items():
-        if value is not None:
-            if option in options:
-                typed = f"--{option.replace('_', '-')}"
-                raise click.UsageError(f"{typed} and {option}= in --model-args are the same option; give one of them")
-            options[option] = str(value)
-    capped = sorted({"max_tokens_total", "max_cost"} & options.keys())
-    if capped and not staffing.alone:
-        raise click.UsageError(f"{capped[0]} counts what one process asks for; leave out --workers, or the cap")
+    of_all = _with_short_ones(model_args, {"rope": rope, "max_tokens_total": max_tokens_total, "max_cost": max_cost})
+    options = {model: {**of_all, **own} for model, own in models.items()}
+    _refuse_shared_caps(options, staffing)
     asked = Asked(
         tasks=names_in(tasks, "--tasks"),
         include=include,
@@ -131,9 +138,28 @@ def _requests(
         staffing=staffing,
         suite_options=suites,
     )
-    named = names_in(models, "--model")
-    if name is not None and len(named) > 1:
-        raise click.UsageError(f"--name {name}: names one run, and {len(named)} models are asked")
+    if name is not None and len(options) > 1:
+        raise click.UsageError(f"--name {name}: names one run, and {len(options)} models are asked")
     if engine is not None:
-        named = tuple(on_engine(model, engine) for model in named)
-    return [request for model in named for request in requests_for(asked, model, options, name)]
+        options = {on_engine(model, engine): given for model, given in options.items()}
+    return [request for model, given in options.items() for request in requests_for(asked, model, given, name)]
+
+
+def _with_short_ones(model_args: Mapping[str, str], short: Mapping[str, Any]) -> dict[str, str]:
+    """The options of all models, with those that have an option of the command for themselves."""
+    options = dict(model_args)
+    for option, value in short.items():
+        if value is None:
+            continue
+        if option in options and comes_from_file(option) == comes_from_file("model_args"):
+            typed = f"--{option.replace('_', '-')}"
+            raise click.UsageError(f"{typed} and {option}= in --model-args are the same option; give one of them")
+        if option not in options or not comes_from_file(option):
+            options[option] = str(value)
+    return options
+
+
+def _refuse_shared_caps(options: Mapping[str, Mapping[str, str]], staffing: Staffing) -> None:
+    capped = sorted({"max_tokens_total", "max_cost"} & {name for given in options.values() for name in given})
+    if capped and not staffing.alone:
+        raise click.UsageError(f"{capped[0]} counts what one process asks for; leave out --workers, or the cap")

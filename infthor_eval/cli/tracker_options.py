@@ -26,7 +26,7 @@ def tracker_options(command: Callable[..., Any]) -> Callable[..., Any]:
     @functools.wraps(command)
     def with_trackers(**given: Any) -> Any:
         typed = {name: given.pop(name) for name in _HELP}
-        found = {name: pairs_in(text, _typed(name)) for name, text in typed.items() if text is not None}
+        found = {name: pairs_in(text.split(","), _typed(name)) for name, text in typed.items() if text is not None}
         return command(trackers=found, **given)
 
     options = (click.option(_typed(name), metavar="K=V,...", help=told) for name, told in reversed(_HELP.items()))

@@ -1,11 +1,12 @@
 """`infthor-eval validate`: keep the questions of a set that at least one of several models can answer."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Literal
 
 import click
 
-from infthor_eval.cli.options import SEED, model_options_in, names_in
+from infthor_eval.cli.options import SEED, ModelsAsked
 from infthor_eval.cli.staffing_options import staffing_options
 from infthor_eval.workers import Staffing
 
@@ -14,8 +15,13 @@ __all__ = ["command"]
 
 @click.command("validate")
 @click.argument("set_folder", metavar="SET", type=click.Path(path_type=Path))
-@click.option("--models", required=True, help="Model names with commas; the paper uses four.")
-@click.option("--model-args", multiple=True, metavar="MODEL:K=V,...", help="Options of one model; may be repeated.")
+@click.option(
+    "--models",
+    type=ModelsAsked(),
+    required=True,
+    metavar="MODEL,...",
+    help="Model names with commas; the paper uses four. MODEL:K=V,... gives one options of its own.",
+)
 @click.option("--out", type=click.Path(path_type=Path), required=True, help="Folder of the validated set.")
 @click.option("--decisions", type=click.Path(path_type=Path), help="The inspection list with keep or drop filled in.")
 @click.option("--scorer", type=click.Choice(["strict", "reference"]), default="strict", show_default=True)
@@ -23,8 +29,7 @@ __all__ = ["command"]
 @staffing_options
 def command(
     set_folder: Path,
-    models: str,
-    model_args: tuple[str, ...],
+    models: Mapping[str, Mapping[str, str]],
     out: Path,
     decisions: Path | None,
     scorer: Literal["strict", "reference"],
@@ -39,17 +44,6 @@ def command(
     from infthor_eval.cli.requests import Asked, requests_for
     from infthor_eval.cli.validation import validate
 
-    options: dict[str, str] = {}
-    for model, _, given in (item.partition(":") for item in model_args):
-        if model in options:
-            raise click.UsageError(f"--model-args for {model} is given twice; give it once")
-        options[model] = given
     asked = Asked(tasks=("nieh_gt",), data=set_folder, output=out / "runs", seed=seed, staffing=staffing)
-    requests = [
-        request
-        for model in names_in(models, "--models")
-        for request in requests_for(asked, model, model_options_in(options.pop(model, "")))
-    ]
-    if options:
-        raise click.UsageError(f"--model-args is about {', '.join(options)}, which --models does not name")
+    requests = [request for model, options in models.items() for request in requests_for(asked, model, options)]
     return validate(requests, out, decisions, scorer)

@@ -27,7 +27,8 @@ class ManipulationOptions:
         metadata={"help": "embedded, unity, or the path of a Unity executable.", "metavar": "NAME"},
     )
     scenes: str | None = field(
-        default=None, metadata={"help": "Folder with recorded floor plans (thor_scenes/).", "metavar": "DIR"}
+        default=None,
+        metadata={"help": "Folder with recorded floor plans (thor_scenes/).", "metavar": "DIR", "is_place": True},
     )
     radius: str | None = field(
         default=None,

@@ -8,7 +8,8 @@ from infthor_eval.manipulation.evaluation import ManipulationEvaluation
 from infthor_eval.manipulation.options import ManipulationOptions
 from infthor_eval.manipulation.records import RECORDS, ArmRecord
 from infthor_eval.manipulation.summary import ManipulationSummary, summarise
-from infthor_eval.manipulation.tables import tables
+from infthor_eval.manipulation.tables import overview, tables
+from infthor_eval.rates import Rate
 from infthor_eval.runs import RecordTypes, RunHeader, RunSummary, TaskRequest, UnitRecord
 from infthor_eval.runs.suite import Need
 from infthor_eval.tables import Table
@@ -37,6 +38,14 @@ class ManipulationSuite:
         """See `Suite.scores`: whether the episode was a success, and what it earned."""
         payload = record.payload
         return {"success": float(payload.done), "reward": payload.reward} if payload.ended else {}
+
+    def headline(self, summary: ManipulationSummary) -> Mapping[str, Rate]:
+        """See `Suite.headline`: episodes that were a success."""
+        return {name: task.success for name, task in summary.tasks.items() if task.success is not None}
+
+    def overview(self, runs: Sequence[RunSummary]) -> list[Table]:
+        """See `Suite.overview`."""
+        return overview(runs)
 
     def tables(self, runs: Sequence[RunSummary]) -> list[Table]:
         """See `Suite.tables`."""

@@ -38,7 +38,8 @@ class NiehOptions:
         },
     )
     retriever: str | None = field(
-        default=None, metadata={"help": "CLIP model of retrieval tasks, a hub id or a folder.", "metavar": "NAME"}
+        default=None,
+        metadata={"help": "CLIP model of retrieval tasks, a hub id or a folder.", "metavar": "NAME", "is_place": True},
     )
     retriever_revision: str | None = field(
         default=None, metadata={"help": "Branch, tag or commit of the retriever on the hub.", "metavar": "REVISION"}
@@ -48,6 +49,7 @@ class NiehOptions:
         metadata={
             "help": "Folder of the set's trajectories (TRAJ_ID.json or .txt) where they do not lie in the set.",
             "metavar": "DIR",
+            "is_place": True,
         },
     )
     frames: str = field(

@@ -7,8 +7,9 @@ from infthor_eval.nieh.baselines import BASELINES
 from infthor_eval.nieh.evaluation import NiehEvaluation
 from infthor_eval.nieh.options import NiehOptions
 from infthor_eval.nieh.records import RECORDS, NiehAnswer
-from infthor_eval.nieh.summary import NiehSummary, summarise
-from infthor_eval.nieh.tables import tables
+from infthor_eval.nieh.summary import NiehSummary, headline, summarise
+from infthor_eval.nieh.tables import overview, tables
+from infthor_eval.rates import Rate
 from infthor_eval.runs import RecordTypes, RunHeader, RunSummary, TaskRequest, UnitRecord
 from infthor_eval.runs.suite import Need
 from infthor_eval.tables import Table
@@ -36,6 +37,14 @@ class NiehSuite:
     def scores(self, record: UnitRecord[NiehAnswer]) -> Mapping[str, float]:
         """See `Suite.scores`."""
         return record.payload.scores
+
+    def headline(self, summary: NiehSummary) -> Mapping[str, Rate]:
+        """See `Suite.headline`: of the strict scorer, or of the task's own first metric."""
+        return headline(summary)
+
+    def overview(self, runs: Sequence[RunSummary]) -> list[Table]:
+        """See `Suite.overview`."""
+        return overview(runs)
 
     def tables(self, runs: Sequence[RunSummary]) -> list[Table]:
         """See `Suite.tables`."""

@@ -13,6 +13,7 @@ import msgspec
 from infthor_eval.formats.question import ABSENCE, clue_column
 from infthor_eval.nieh.answer_form import YesNo, format_failures, yes_no
 from infthor_eval.nieh.records import NiehAnswer
+from infthor_eval.rates import Rate
 from infthor_eval.runs import UnitRecord
 from infthor_eval.statistics import bootstrap_interval, clustered_mean
 
@@ -25,6 +26,8 @@ __all__ = [
     "Score",
     "SkippedSummary",
     "TaskSummary",
+    "headline",
+    "main_metric",
     "summarise",
 ]
 
@@ -144,6 +147,18 @@ def summarise(identity: Mapping[str, Any], records: Sequence[Record]) -> NiehSum
     kept = sorted(records, key=lambda record: record.key)
     tasks = identity["tasks"].items()
     return NiehSummary({task: _task([r for r in kept if r.task == task], about) for task, about in tasks})
+
+
+def main_metric(task: TaskSummary) -> str:
+    """The metric that a task is known by: the strict scorer, else the first of its own."""
+    return "strict" if "strict" in task.metrics else task.metrics[0]
+
+
+def headline(summary: NiehSummary) -> dict[str, Rate]:
+    """The mean of all samples of each task that asked any, under its main metric."""
+    totals = {name: (task.by_clues["total"], main_metric(task)) for name, task in summary.tasks.items()}
+    scores = {name: (cell.scores[metric], cell.n) for name, (cell, metric) in totals.items() if cell.n}
+    return {name: Rate(score.mean, score.low, score.high, n) for name, (score, n) in scores.items()}
 
 
 def _task(records: Sequence[Record], about: Mapping[str, Any]) -> TaskSummary:

@@ -6,15 +6,24 @@ from typing import Any
 from infthor_eval.formats.published import PublishedRow, PublishedTable, published_tables
 from infthor_eval.formats.question import ABSENCE
 from infthor_eval.nieh.options import SHOWN
-from infthor_eval.nieh.summary import CLUE_COLUMNS, OPEN_ENDED, Cell, NiehSummary, TaskSummary
+from infthor_eval.nieh.summary import CLUE_COLUMNS, OPEN_ENDED, Cell, NiehSummary, TaskSummary, main_metric
 from infthor_eval.runs import RunSummary
 from infthor_eval.statistics import paired_difference
 from infthor_eval.tables import Column, Row, Table
 
-__all__ = ["clues_table", "tables"]
+__all__ = ["clues_table", "overview", "tables"]
 
 _NAMES = (Column("model", False), Column("task", False))
 _METRIC = Column("scorer", False)
+_LEGEND = (
+    "total: all questions, those on absences among them; open-ended ones stand in the columns by clues too.",
+    "95 %: clustered by trajectory, honest near all right and all wrong. bootstrap: over resampled trajectories, which "
+    "assumes no shape of the scores; where the two differ much, there are few trajectories.",
+)
+_EMBEDDED = (
+    "Questions on frames of the embedded simulator: not comparable with the published rows, which are on AI2-THOR's "
+    "own frames."
+)
 
 
 def tables(runs: Sequence[RunSummary]) -> list[Table]:
@@ -35,6 +44,45 @@ def tables(runs: Sequence[RunSummary]) -> list[Table]:
         *([gains] if gains else []),
         _replies_table(runs),
     ]
+
+
+def overview(runs: Sequence[RunSummary]) -> list[Table]:
+    """Accuracy in one number a task, with its intervals; a task that asked nothing is a line below.
+
+    Where runs on true and on blank frames are shown, the gain of the one over the other.
+    """
+    found = list(_tasks(runs))
+    asked = [(run, name, task) for run, name, task in found if task.n]
+    left_out = any(task.skipped.n or task.by_clues["total"].n_failed for _, _, task in asked)
+    rows = [
+        Row((run, _with_metric(name, task), *_total(task), *(_left_out(task) if left_out else ())))
+        for run, name, task in asked
+    ]
+    numbers = ("total", "95 %", "bootstrap", "n", *(("skipped", "failed") if left_out else ()))
+    notes = [*dict.fromkeys(_nothing_asked(name, task) for _, name, task in found if not task.n), *_embedded(runs)]
+    table = Table("NIEH accuracy, %, strict scorer", (*_NAMES, *map(Column, numbers)), tuple(rows), tuple(notes))
+    gains = _gains_table(runs)
+    return [table, *([gains] if gains else [])]
+
+
+def _with_metric(name: str, task: TaskSummary) -> str:
+    """A task's name, with its main metric where that is one of its own."""
+    return name if main_metric(task) == "strict" else f"{name}, {main_metric(task)}"
+
+
+def _total(task: TaskSummary) -> tuple[str, ...]:
+    total, metric = task.by_clues["total"], main_metric(task)
+    return _mean(total, metric), *_intervals(total, metric), str(total.n)
+
+
+def _left_out(task: TaskSummary) -> tuple[str, str]:
+    return str(task.skipped.n), str(task.by_clues["total"].n_failed)
+
+
+def _nothing_asked(name: str, task: TaskSummary) -> str:
+    reasons = list(task.skipped.by_reason)
+    more = f", and {len(reasons) - 1} more reasons" if len(reasons) > 1 else ""
+    return f"{name}: nothing asked, {task.skipped.n} skipped{f': {reasons[0]}{more}' if reasons else ''}"
 
 
 def _is_by_clues(table: PublishedTable) -> bool:
@@ -68,14 +116,13 @@ def clues_table(runs: Sequence[RunSummary]) -> Table:
     rows = [row for run in runs for row in _rows_of(run)]
     for table in filter(_is_by_clues, published_tables("nieh")):
         rows += _published_rows(table, runs)
-    notes = []
-    if any(task.simulator == "embedded" for _, _, task in _tasks(runs)):
-        notes.append(
-            "Questions on frames of the embedded simulator: not comparable with the published rows, which are on "
-            "AI2-THOR's own frames."
-        )
     columns = (*_NAMES, _METRIC, *map(Column, numbers))
-    return Table("NIEH accuracy, % by number of clues", columns, tuple(rows), tuple(notes))
+    return Table("NIEH accuracy, % by number of clues (questions)", columns, tuple(rows), (*_LEGEND, *_embedded(runs)))
+
+
+def _embedded(runs: Sequence[RunSummary]) -> list[str]:
+    """What must be said where the frames are no published ones."""
+    return [_EMBEDDED] if any(task.simulator == "embedded" for _, _, task in _tasks(runs)) else []
 
 
 def _rows_of(run: RunSummary) -> list[Row]:
@@ -88,18 +135,28 @@ def _rows_of(run: RunSummary) -> list[Row]:
 
 def _cells(task: TaskSummary, metric: str) -> list[str]:
     total = task.by_clues["total"]
-    means = [_mean(task.by_clues[name], metric) for name in CLUE_COLUMNS]
-    score = total.scores.get(metric)
-    # One trajectory alone tells nothing about others: no interval.
-    interval = _range(score.low, score.high) if score else "-"
-    resampled = _range(*score.bootstrap) if score and score.bootstrap else "-"
-    counts = [str(total.n), str(task.skipped.n), str(total.n_failed)]
-    apart = [_mean(task.by_clues[name], metric) for name in (OPEN_ENDED, ABSENCE)]
-    return [*means, interval, resampled, *apart, *counts]
+    by_clues, apart = (
+        [_mean_of(task.by_clues[name], metric) for name in names]
+        for names in (CLUE_COLUMNS[:-1], (OPEN_ENDED, ABSENCE))
+    )
+    return [*by_clues, _mean(total, metric), *_intervals(total, metric), *apart, str(total.n), *_left_out(task)]
+
+
+def _intervals(cell: Cell, metric: str) -> tuple[str, str]:
+    """Clustered, and over resampled trajectories; one trajectory alone tells nothing about others."""
+    score = cell.scores.get(metric)
+    if score is None:
+        return "-", "-"
+    return _range(score.low, score.high), _range(*score.bootstrap) if score.bootstrap else "-"
 
 
 def _mean(cell: Cell, metric: str) -> str:
     return f"{100 * cell.scores[metric].mean:.2f}" if cell.n else "-"
+
+
+def _mean_of(cell: Cell | None, metric: str) -> str:
+    """With the number of questions behind it."""
+    return f"{_mean(cell, metric)} ({cell.n})" if cell and cell.n else "-"
 
 
 def _range(low: float | None, high: float | None) -> str:
@@ -215,17 +272,13 @@ def _depth_table(runs: Sequence[RunSummary]) -> Table | None:
     if not depths:
         return None
     rows = [
-        Row((run, name, metric, *(_at_depth(task.by_variant.get(depth), metric) for depth in depths)))
+        Row((run, name, metric, *(_mean_of(task.by_variant.get(depth), metric) for depth in depths)))
         for run, name, task in _tasks(runs)
         if set(depths) & set(task.by_variant)
         for metric in task.metrics
     ]
     columns = (*_NAMES, _METRIC, *map(Column, depths))
     return Table("Accuracy, % by depth of the needle (questions)", columns, tuple(rows))
-
-
-def _at_depth(cell: Cell | None, metric: str) -> str:
-    return f"{100 * cell.scores[metric].mean:.2f} ({cell.n})" if cell else "-"
 
 
 # -- form of the replies
@@ -236,6 +289,8 @@ def _replies_table(runs: Sequence[RunSummary]) -> Table:
     numbers = ("yes/no questions", "gold yes, %", "said yes, %", "not in the form asked for")
     rows = []
     for run, name, task in _tasks(runs):
+        if not task.n:
+            continue
         shares = [_percent(share) for share in (task.yes_no.share_gold_yes, task.yes_no.share_said_yes)]
         said = ", ".join(f"{n} {reason}" for reason, n in task.format_failures.items()) or "-"
         rows.append(Row((run, name, str(task.yes_no.n), *shares, said)))

@@ -1,8 +1,11 @@
 """What all figures have in common: their style, the looks of runs, words around panels, files in PNG and SVG."""
 
+import io
+import re
 import textwrap
 import warnings
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -15,7 +18,7 @@ from infthor_eval.errors import naming
 from infthor_eval.formats.files import written_atomically
 from infthor_eval.terminal import shown
 
-__all__ = ["BOUND", "LEGEND", "Look", "add_legend", "add_words", "looks_of", "save_figure"]
+__all__ = ["BOUND", "LEGEND", "Look", "add_legend", "add_words", "inline_svg", "looks_of", "save_figure"]
 
 # Okabe and Ito's colours, which the colour-blind tell apart, but for yellow, too faint for a line, and black, which is
 # the bound's. Runs beyond their number take them again in another style of line; dashes are the bound's alone.
@@ -33,6 +36,16 @@ _SETTINGS: dict[Any, Any] = {
     "svg.fonttype": "none",  # texts that can be found and edited
     "svg.hashsalt": "infthor-eval",  # without it the names of clips are drawn by chance
 }
+_OF_SVG: dict[str, Any] = {"Date": None}  # equal figures are equal files
+# In a page, ink takes the page's colours: these stand for them until the figure is written.
+_INK, _GRID = "#010203", "#040506"
+_OF_PAGE: dict[Any, Any] = {
+    **dict.fromkeys(("text.color", "axes.labelcolor", "axes.edgecolor", "xtick.color", "ytick.color"), _INK),
+    "grid.color": _GRID,
+}
+_PAGE_COLOURS = {_INK: "currentColor", _GRID: "var(--grid)", "#000000": "currentColor", "#444444": "currentColor"}
+_PER_INCH = 108  # pixels of a page, so that letters are as large as the page's own
+_SIZE = re.compile(r' (?:width|height)="[^"]*"(?: (?:width|height)="[^"]*")?')  # of the figure; it has a viewBox too
 LEGEND = 2.3  # inches beside the panels
 _NAME = 30  # letters of a line in the legend
 _LETTERS = 15  # of a note, on an inch
@@ -72,23 +85,43 @@ def save_figure(make: Callable[[], Figure], folder: Path, name: str) -> list[Pat
     Raises:
         DataError: a file cannot be written.
     """
-    # Not what the user's own settings of matplotlib say: they would change the picture.
-    with matplotlib.rc_context():
-        matplotlib.rcdefaults()
-        matplotlib.rcParams.update(_SETTINGS)
+    with _in_style():
         figure = make()
         return [_saved(figure, folder / f"{name}.{form}", form) for form in ("png", "svg")]
 
 
-def _saved(figure: Figure, path: Path, form: str) -> Path:
-    metadata = {"Date": None} if form == "svg" else {}
-    with (
-        naming(f"{path}: cannot be written", "give another --out"),
-        written_atomically(path) as partial,
-        warnings.catch_warnings(),
-    ):
+def inline_svg(make: Callable[[], Figure]) -> str:
+    """A figure as an element of a page: its ink is the page's own, light or dark, and it shrinks with its room.
+
+    Args:
+        make: makes it, in the style of all of them.
+    """
+    with _in_style(_OF_PAGE):
+        written, figure = io.StringIO(), make()
+        figure.savefig(written, format="svg", transparent=True, metadata=_OF_SVG)
+        width = figure.get_figwidth()
+    svg = written.getvalue()
+    svg = svg[svg.index("<svg") :]
+    svg = _SIZE.sub(rf' style="max-width: {round(_PER_INCH * width)}px"', svg, count=1)
+    for colour, in_page in _PAGE_COLOURS.items():
+        svg = svg.replace(colour, in_page)
+    return svg
+
+
+@contextmanager
+def _in_style(more: dict[Any, Any] | None = None) -> Iterator[None]:
+    """Not what the user's own settings of matplotlib say: they would change the picture."""
+    with matplotlib.rc_context(), warnings.catch_warnings():
+        matplotlib.rcdefaults()
+        matplotlib.rcParams.update(_SETTINGS | (more or {}))
         # Of a name in letters that the font lacks, the PNG has boxes; the SVG has the letters.
         warnings.filterwarnings("ignore", "Glyph .* missing")
+        yield
+
+
+def _saved(figure: Figure, path: Path, form: str) -> Path:
+    metadata = _OF_SVG if form == "svg" else {}
+    with naming(f"{path}: cannot be written", "give another --out"), written_atomically(path) as partial:
         figure.savefig(partial, format=form, dpi=160, metadata=metadata)
     return path
 

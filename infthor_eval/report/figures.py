@@ -12,7 +12,7 @@ from infthor_eval.report.curves import Panel, embedded_label, trajectories_told
 from infthor_eval.report.drawing import BOUND, LEGEND, Look, add_legend, add_words, looks_of, save_figure
 from infthor_eval.terminal import shown
 
-__all__ = ["draw_curves"]
+__all__ = ["curves_figure", "draw_curves"]
 
 _REWARD = "reward so far (points)"
 _PANEL, _NARROW = (4.6, 2.7), 3.5  # inches; the width of one of many
@@ -35,10 +35,11 @@ def draw_curves(curves: RewardCurves, panels: Sequence[Panel], folder: Path, nam
     Raises:
         DataError: a file cannot be written.
     """
-    return save_figure(lambda: _figure(curves, panels), folder, name)
+    return save_figure(lambda: curves_figure(curves, panels), folder, name)
 
 
-def _figure(curves: RewardCurves, panels: Sequence[Panel]) -> Figure:
+def curves_figure(curves: RewardCurves, panels: Sequence[Panel]) -> Figure:
+    """The figure that `draw_curves` writes."""
     facets = {name: it for name, it in curves.facets.items() if any(name in run.curves for run in curves.runs)}
     width = len(facets) * (_PANEL[0] if len(facets) < 3 else _NARROW) + LEGEND
     height = max(_PANEL[1], _LINE * (len(curves.runs) + 1))

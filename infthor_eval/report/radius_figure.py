@@ -13,7 +13,7 @@ from infthor_eval.report.curves import embedded_note, trajectories_told
 from infthor_eval.report.drawing import BOUND, LEGEND, Look, add_legend, add_words, looks_of, save_figure
 from infthor_eval.tables import Column, Row, Table
 
-__all__ = ["draw_radii", "radii_table"]
+__all__ = ["draw_radii", "radii_figure", "radii_table"]
 
 _FLOOR = "in the sphere at the start"
 _FLOOR_LOOK = Look("#9a9a9a", "solid", 3.0)
@@ -35,7 +35,7 @@ def draw_radii(found: SuccessByRadius, folder: Path, name: str) -> list[Path]:
     Raises:
         DataError: a file cannot be written.
     """
-    return save_figure(lambda: _figure(found), folder, name)
+    return save_figure(lambda: radii_figure(found), folder, name)
 
 
 def radii_table(found: SuccessByRadius) -> Table:
@@ -55,7 +55,8 @@ def _row(label: str, kind: ErrandKind, points: Sequence[tuple[float, Rate]], rad
     return Row((label, SHORT[kind], *(percent(rates.get(radius)) for radius in radii), str(points[0][1].n), end))
 
 
-def _figure(found: SuccessByRadius) -> Figure:
+def radii_figure(found: SuccessByRadius) -> Figure:
+    """The figure that `draw_radii` writes."""
     kinds = [kind for kind in ErrandKind if any(line.kind == kind for line in found.lines)]
     labels = list(dict.fromkeys(line.label for line in found.lines if not line.is_bound))
     looks = looks_of(labels) | {line.label: BOUND for line in found.lines if line.is_bound}

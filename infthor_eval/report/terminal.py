@@ -1,5 +1,7 @@
 """Tables on the terminal."""
 
+import textwrap
+
 from rich import box
 from rich.console import Console
 from rich.table import Table as RichTable
@@ -10,6 +12,7 @@ from infthor_eval.terminal import console, shown
 
 __all__ = ["print_table", "table_console"]
 
+_LINE = 100  # of a note
 _WIDTH = 180  # on a narrower terminal lines wrap; cut-off numbers would be worse
 
 
@@ -31,7 +34,7 @@ def print_table(table: Table, on: Console) -> None:
     for row in table.rows:
         _add_row(drawn, row)
     if table.notes:
-        drawn.caption = Text(shown("\n".join(table.notes)))
+        drawn.caption = Text("\n".join(textwrap.fill(shown(note), _LINE) for note in table.notes))
     on.print(drawn)
 
 

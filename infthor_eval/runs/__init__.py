@@ -1,11 +1,12 @@
 """One run of any suite: its identity, its journal, and the order of its work."""
 
 from infthor_eval.runs.catalog import Catalog, TaskFile
+from infthor_eval.runs.configuration import Configuration, read_configuration
 from infthor_eval.runs.driver import Observer, RunOutcome, Silent, execute
 from infthor_eval.runs.estimate import Estimate, TaskEstimate, estimate_run
-from infthor_eval.runs.journal import read_header, read_run
 from infthor_eval.runs.records import RecordTypes, RunHeader, Tokens, Unit, UnitKey, UnitRecord
 from infthor_eval.runs.request import PreparedRun, RunRequest, prepare
+from infthor_eval.runs.shards import read_header, read_run
 from infthor_eval.runs.suite import (
     Cost,
     Evaluation,
@@ -23,6 +24,7 @@ from infthor_eval.runs.usage import NOTHING, Usage
 __all__ = [
     "NOTHING",
     "Catalog",
+    "Configuration",
     "Cost",
     "Estimate",
     "Evaluation",
@@ -51,6 +53,7 @@ __all__ = [
     "estimate_run",
     "execute",
     "prepare",
+    "read_configuration",
     "read_header",
     "read_run",
 ]

@@ -6,11 +6,12 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from infthor_eval.runs import journal as journals
+from infthor_eval.runs.configuration import write_configuration
 from infthor_eval.runs.crew import Crew
 from infthor_eval.runs.journal import Journal
 from infthor_eval.runs.records import RunHeader, UnitRecord
 from infthor_eval.runs.request import PreparedRun
-from infthor_eval.runs.results import write_results, write_took
+from infthor_eval.runs.results import results_document, write_results, write_took
 from infthor_eval.runs.staff import Alone, View
 from infthor_eval.runs.suite import RunSummary, Workload
 from infthor_eval.runs.usage import Usage
@@ -75,8 +76,8 @@ def execute(
 ) -> RunOutcome:
     """Load the model, do what the journal does not hold yet, and write the results.
 
-    The folder `<output>/<name>/<tasks>-<identity>/` holds the journal, `results.json`
-    (what it found, equal for equal runs) and `took.json` (what it took).
+    The folder `<output>/<name>/<tasks>-<identity>/` holds the journal, `run.yaml` (how it was asked for),
+    `results.json` (what it found, equal for equal runs) and `took.json` (what it took).
 
     Args:
         run: what `prepare` found.
@@ -95,6 +96,7 @@ def execute(
         folder = run.request.folder(header)
         n_recovered = _open_anew(run, folder, header)
         with Journal(folder, header, run.suite.records) as journal:
+            write_configuration(folder, run.request)
             observer.begin(workload, n_recovered)
             try:
                 for record, resumed in staff.evaluate(folder, journal, should_stop):
@@ -117,7 +119,7 @@ def _found(run: PreparedRun, folder: Path, header: RunHeader, workload: Workload
     summary = RunSummary(header, run.suite.summarise(header, records))
     n_missing = workload.n_units - len(records)
     usage = Usage.total([record.usage for record in records] + [memo.usage for memo in journal.memos])
-    write_results(folder, summary, n_missing, usage)
+    write_results(folder, results_document(summary, run.suite, n_missing, usage))
     write_took(folder, records, usage)
     return RunOutcome(folder, run, summary, records, n_missing, usage, run.evaluation.view)
 

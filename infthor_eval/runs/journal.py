@@ -12,7 +12,6 @@ import os
 import time
 from collections.abc import Iterable
 from contextlib import ExitStack
-from dataclasses import dataclass, field
 from io import FileIO
 from pathlib import Path
 from threading import Lock
@@ -24,53 +23,16 @@ import msgspec
 from infthor_eval.errors import DataError, UsageError, in_one_line, naming
 from infthor_eval.formats.digests import canonical_json
 from infthor_eval.formats.files import written_atomically
-from infthor_eval.formats.reading import read_bytes, require_file
-from infthor_eval.runs.records import FORMAT, MemoRecord, RecordTypes, RunHeader, UnitKey, UnitRecord
+from infthor_eval.formats.reading import require_file
+from infthor_eval.runs.records import MemoRecord, RecordTypes, RunHeader, UnitKey, UnitRecord
+from infthor_eval.runs.shards import BAD, FOLDER, Decoder, lines_in, read_shard, read_shards, shards_of
 from infthor_eval.runs.usage import NOTHING, Usage
 
-__all__ = ["FOLDER", "Journal", "RunLog", "read_header", "read_run", "recover", "set_aside"]
+__all__ = ["Journal", "recover", "set_aside"]
 
-FOLDER = "journal"  # of a run's folder
 _SHARD = "worker-{:d}.jsonl"
 _GLANCE_S = 0.1  # between two tries to lock
 _BAD_LINES = "bad_lines.txt"
-_OLD = "journal.jsonl"  # the one file of format 1, in the run's folder
-Decoder = msgspec.json.Decoder[Any]
-_BAD = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
-_MEND = "run the same command with --recover to go on without such lines, or with --fresh to start anew"
-
-
-@dataclass
-class RunLog:
-    """What the shards of a run hold together.
-
-    Attributes:
-        header: who the run is; None where there is no shard yet.
-        units: the latest record of each unit.
-        memos: by fingerprint.
-    """
-
-    header: RunHeader | None = None
-    units: dict[UnitKey, UnitRecord[Any]] = field(default_factory=dict)
-    memos: dict[str, MemoRecord[Any]] = field(default_factory=dict)
-
-    def add(self, record: UnitRecord[Any] | MemoRecord[Any]) -> None:
-        """Take up a record; of a unit that was tried several times the last try counts, and of two the successful."""
-        if isinstance(record, MemoRecord):
-            self.memos[record.fingerprint] = record
-            return
-        known = self.units.get(record.key)
-        if known is None or _rank(record) >= _rank(known):
-            self.units[record.key] = record
-
-    @property
-    def records(self) -> list[UnitRecord[Any]]:
-        """The latest record of each unit, in the order of the units' keys."""
-        return [self.units[key] for key in sorted(self.units)]
-
-
-def _rank(record: UnitRecord[Any]) -> tuple[int, bool]:
-    return record.attempt, record.failure is None
 
 
 class Journal:
@@ -106,7 +68,7 @@ class Journal:
         try:
             _lock(self._file, path, patience_s)
             self._decoder = types.decoder()
-            self._log = _read_shards(run, self._decoder)
+            self._log = read_shards(run, self._decoder)
             self._begin(path, header)
         except (DataError, UsageError):
             self._file.close()
@@ -159,7 +121,7 @@ class Journal:
         """Know all that stands in the shard of a worker that was lost, what it could not tell any more included."""
         path = self._path.parent / _SHARD.format(worker)
         if path.exists():
-            _read_shard(path, self._decoder, self._log)
+            read_shard(path, self._decoder, self._log)
 
     def holds(self, record: UnitRecord[Any]) -> bool:
         """Whether this very record is in it already."""
@@ -241,91 +203,6 @@ def _lock(file: BinaryIO | FileIO, path: Path, patience_s: float = 0.0) -> None:
         time.sleep(_GLANCE_S)
 
 
-def read_header(run: Path) -> RunHeader:
-    """Who the run in a folder is.
-
-    Raises:
-        DataError: there is no journal, or of another format.
-    """
-    shards = _shards(run)
-    if not shards:
-        raise DataError(f"{run}: {_no_journal(run)}")
-    return _header(shards[0], _lines(shards[0]))
-
-
-def read_run(run: Path, types: RecordTypes) -> tuple[RunHeader, list[UnitRecord[Any]]]:
-    """The run in a folder: who it is, and the latest record of each unit of all shards.
-
-    Raises:
-        DataError: there is no journal, or one with a bad line, or of another format.
-    """
-    header = read_header(run)
-    return header, _read_shards(run, types.decoder()).records
-
-
-def _no_journal(run: Path) -> str:
-    if (run / _OLD).is_file():
-        return f"its journal is of format 1, this version reads {FORMAT}; run the evaluation again"
-    return "no journal in it; give the folder of a run"
-
-
-def _shards(run: Path) -> list[Path]:
-    shards = sorted((run / FOLDER).glob("worker-*.jsonl"))
-    for path in shards:
-        require_file(path, "take it out of the run's folder")
-    return shards
-
-
-def _read_shards(run: Path, decoder: Decoder) -> RunLog:
-    log = RunLog()
-    for path in _shards(run):
-        _read_shard(path, decoder, log)
-    return log
-
-
-def _read_shard(path: Path, decoder: Decoder, log: RunLog) -> None:
-    """Take up all that a shard holds."""
-    lines = _lines(path)
-    if not lines:
-        return  # begun by a worker that was killed before it said who it is
-    header = _header(path, lines)
-    if log.header is not None and canonical_json(header.identity) != canonical_json(log.header.identity):
-        raise DataError(f"{path}: belongs to another run than the shards beside it; take it out of the folder")
-    log.header = header
-    for number, line in enumerate(lines[1:], 2):
-        try:
-            record = decoder.decode(line)
-        except _BAD as error:
-            raise DataError(f"{path}, line {number}: not a line of a journal ({error}); {_MEND}") from error
-        if isinstance(record, RunHeader):
-            raise DataError(f"{path}, line {number}: the first line of a journal amid its records; {_MEND}")
-        log.add(record)
-
-
-def _lines(path: Path) -> list[bytes]:
-    """The whole lines of a shard; one that is not finished is none yet."""
-    content = read_bytes(path, "restore the file")
-    return content[: content.rfind(b"\n") + 1].splitlines()
-
-
-class _AnyFormat(msgspec.Struct):
-    format: int
-
-
-def _header(path: Path, lines: list[bytes]) -> RunHeader:
-    first = lines[0] if lines else b""
-    try:
-        version = msgspec.json.decode(first, type=_AnyFormat).format
-    except _BAD as error:
-        raise DataError(f"{path}, line 1: not the first line of a journal ({error}); {_MEND}") from error
-    if version != FORMAT:
-        raise DataError(f"{path}: a journal of format {version}, this version reads {FORMAT}; start anew with --fresh")
-    try:
-        return msgspec.json.decode(first, type=RunHeader)
-    except _BAD as error:
-        raise DataError(f"{path}, line 1: not the first line of a journal ({error}); {_MEND}") from error
-
-
 def recover(run: Path, header: RunHeader, types: RecordTypes) -> int:
     """Take the bad lines out of a run's shards and keep them beside; the units that they told of are tried again.
 
@@ -341,7 +218,7 @@ def recover(run: Path, header: RunHeader, types: RecordTypes) -> int:
         UsageError: another process is writing a shard.
         DataError: a shard is another run's, or of another format.
     """
-    return sum(_recover_shard(path, header, types) for path in _shards(run))
+    return sum(_recover_shard(path, header, types) for path in shards_of(run))
 
 
 def _recover_shard(path: Path, header: RunHeader, types: RecordTypes) -> int:
@@ -350,7 +227,7 @@ def _recover_shard(path: Path, header: RunHeader, types: RecordTypes) -> int:
         decoder = types.decoder()
         bad: list[bytes] = []
         good: list[bytes] = []
-        for number, line in enumerate(_lines(path)):
+        for number, line in enumerate(lines_in(path)):
             (good if _is_good(line, decoder, is_first=number == 0) else bad).append(line)
         if not bad:
             return 0
@@ -366,7 +243,7 @@ def _recover_shard(path: Path, header: RunHeader, types: RecordTypes) -> int:
 def _is_good(line: bytes, decoder: Decoder, *, is_first: bool) -> bool:
     try:
         return isinstance(decoder.decode(line), RunHeader) == is_first
-    except _BAD:
+    except BAD:
         return False
 
 
@@ -379,7 +256,7 @@ def set_aside(run: Path) -> None:
     if not (run / FOLDER).exists():
         return
     with ExitStack() as held:
-        for path in _shards(run):
+        for path in shards_of(run):
             _lock(held.enter_context(path.open("rb")), path)
         number = next(n for n in itertools.count(1) if not (run / f"{FOLDER}.{n}").exists())
         (run / FOLDER).rename(run / f"{FOLDER}.{number}")

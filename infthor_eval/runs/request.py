@@ -30,6 +30,7 @@ class RunRequest:
         fresh: set an earlier journal aside and start anew.
         recover: go on without the bad lines of an earlier journal.
         staffing: how many workers, and where; it changes no number.
+        include: folders with task files of one's own.
         suite_code: what distinguishes the code of a suite that is not this package's, as JSON values.
     """
 
@@ -42,6 +43,7 @@ class RunRequest:
     fresh: bool = False
     recover: bool = False
     staffing: Staffing = field(default_factory=Staffing)
+    include: tuple[Path, ...] = ()
     suite_code: Mapping[str, Any] = field(default_factory=dict)
 
     @property

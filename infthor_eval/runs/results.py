@@ -10,38 +10,48 @@ import msgspec
 from infthor_eval.errors import naming
 from infthor_eval.formats.files import written_atomically
 from infthor_eval.runs.records import UnitRecord
-from infthor_eval.runs.suite import RunSummary
+from infthor_eval.runs.suite import RunSummary, Suite
 from infthor_eval.runs.usage import Usage
 
-__all__ = ["write_results", "write_took"]
+__all__ = ["RESULTS", "results_document", "write_results", "write_took"]
 
-_RESULTS = "results.json"
+RESULTS = "results.json"
 _TOOK = "took.json"
 
 
-def write_results(folder: Path, found: RunSummary, n_missing: int, usage: Usage) -> None:
-    """Write what a run found; equal runs give equal bytes.
+def results_document(found: RunSummary, suite: Suite, n_missing: int | None, usage: Usage) -> dict[str, Any]:
+    """What a run found, as it is written; docs/formats.md describes it.
 
     Args:
-        folder: the run's.
         found: who it was, and what it found.
-        n_missing: how many units were not come to.
+        suite: that knows what the run is known by.
+        n_missing: how many units were not come to; None where that is not known.
         usage: what all its requests took.
-
-    Raises:
-        DataError: it cannot be written.
     """
     header = found.header
-    document = {
+    return {
         "suite": header.suite,
         "name": header.name,
         "identity": header.identity,
         "n_missing": n_missing,
+        "headline": suite.headline(found.summary),
         "summary": found.summary,
         # Not what was cached: that differs between a run and the same run resumed, or shared out.
         "usage": {name: getattr(usage, name) for name in ("requests", "context", "reply", "cost")},
     }
-    _write(folder / _RESULTS, document)
+
+
+def write_results(folder: Path, document: dict[str, Any]) -> None:
+    """Write what a run found; equal runs give equal bytes.
+
+    Args:
+        folder: the run's.
+        document: see `results_document`.
+
+    Raises:
+        DataError: it cannot be written.
+    """
+    _write(folder / RESULTS, document)
 
 
 def write_took(folder: Path, records: Sequence[UnitRecord[Any]], usage: Usage) -> None:

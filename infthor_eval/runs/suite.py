@@ -11,6 +11,7 @@ from typing import Any, ClassVar, Literal, Protocol
 
 import msgspec
 
+from infthor_eval.rates import Rate
 from infthor_eval.runs.catalog import TaskFile
 from infthor_eval.runs.records import RecordTypes, RunHeader, Unit, UnitKey, UnitRecord
 from infthor_eval.runs.usage import NOTHING, Usage
@@ -219,8 +220,16 @@ class Suite(Protocol):
         """The metrics of one unit by name; one that is missing, as all are where it failed, counts as 0."""
         ...
 
+    def headline(self, summary: Any) -> Mapping[str, Rate]:
+        """The number that each task is known by, a share from 0 to 1; a task of which nothing counts has none."""
+        ...
+
+    def overview(self, runs: Sequence["RunSummary"]) -> Sequence[Table]:
+        """What people are shown first of runs of this suite, side by side: what fits a screen of 100 columns."""
+        ...
+
     def tables(self, runs: Sequence["RunSummary"]) -> Sequence[Table]:
-        """What people are shown of runs of this suite, side by side."""
+        """All that there is to be shown of them, and the published numbers beside it."""
         ...
 
 

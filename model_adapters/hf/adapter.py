@@ -11,7 +11,7 @@ from infthor_eval.errors import ModelError, naming
 from model_adapters.hf.checkpoint import LocatedCheckpoint, load_checkpoint, locate
 from model_adapters.hf.family import MakeFamily
 from model_adapters.hf.model import TransformersModel
-from model_adapters.hf.options import CheckpointOptions, CheckpointReading
+from model_adapters.options.checkpoints import CheckpointOptions, CheckpointReading
 
 __all__ = ["CheckpointAdapter", "fitting", "load_model"]
 

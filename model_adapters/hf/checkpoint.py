@@ -24,9 +24,9 @@ from model_adapters.hf.decoding import read_generation
 from model_adapters.hf.family import Family, MakeFamily
 from model_adapters.hf.hub import fetch
 from model_adapters.hf.loaded import Loaded
-from model_adapters.hf.options import CheckpointOptions, CheckpointReading, Placement
 from model_adapters.hf.rope import apply_rope
 from model_adapters.hf.templates import chat_template, plain_template
+from model_adapters.options.checkpoints import CheckpointOptions, CheckpointReading, Placement
 
 __all__ = [
     "LocatedCheckpoint",

@@ -3,7 +3,7 @@
 from typing import Any
 
 from model_adapters.hf.loaded import Loaded
-from model_adapters.hf.options import HfOptions
+from model_adapters.options.checkpoints import HfOptions
 from model_adapters.protocols import Capabilities
 
 __all__ = ["capabilities", "identity"]

@@ -15,11 +15,11 @@ from model_adapters.hf.embedding import Embedder
 from model_adapters.hf.features import FeatureCache
 from model_adapters.hf.limits import check_limit, naming_memory_errors, naming_model_errors
 from model_adapters.hf.loaded import Loaded
-from model_adapters.hf.options import HfOptions
 from model_adapters.hf.prefix import Prefix
 from model_adapters.hf.prompt import Piece, Prompter, n_common, n_tokens, token_ids
 from model_adapters.hf.replies import begin_reply, end_reply
 from model_adapters.hf.rope import length_rope
+from model_adapters.options.checkpoints import HfOptions
 from model_adapters.protocols import Capabilities, Decoding, Reply, Turn
 
 __all__ = ["TransformersModel"]

@@ -21,8 +21,8 @@ from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.user_cache import user_cache
 from model_adapters.hf.checkpoint import loading, origin, resolve_device, versions
 from model_adapters.hf.hub import fetch
-from model_adapters.hf.options import Placement
 from model_adapters.hf.vectors import VectorFile
+from model_adapters.options.checkpoints import Placement
 
 __all__ = ["Retriever", "open_retriever"]
 

@@ -13,7 +13,7 @@ from typing import Any
 from transformers.modeling_rope_utils import ROPE_INIT_FUNCTIONS
 
 from infthor_eval.errors import ModelError
-from model_adapters.hf.options import parse_rope
+from model_adapters.options.checkpoints import parse_rope
 
 __all__ = ["LengthRope", "apply_rope", "length_rope"]
 

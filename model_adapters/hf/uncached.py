@@ -18,9 +18,9 @@ from model_adapters.hf.decoding import Writing, extend
 from model_adapters.hf.description import capabilities, identity
 from model_adapters.hf.limits import check_limit, naming_memory_errors, naming_model_errors
 from model_adapters.hf.loaded import Loaded
-from model_adapters.hf.options import HfOptions
 from model_adapters.hf.rendering import begins, render
 from model_adapters.hf.replies import begin_reply, end_reply
+from model_adapters.options.checkpoints import HfOptions
 from model_adapters.protocols import Capabilities, Decoding, Reply, Turn
 
 __all__ = ["UncachedModel", "expanded", "image_token", "processed"]

@@ -12,7 +12,7 @@ from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.formats.reading import read_json, require_file, require_plain_files
 from model_adapters.hf.checkpoint import loading, origin, resolve_device, resolve_dtype, versions
 from model_adapters.hf.hub import fetch
-from model_adapters.hf.options import Placement
+from model_adapters.options.checkpoints import Placement
 
 __all__ = ["PolicyCheckpoint", "find"]
 

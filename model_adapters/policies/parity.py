@@ -12,7 +12,8 @@ from infthor_eval.errors import DataError, UsageError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.scratch import ScratchFolder
 from infthor_eval.tables import Column, Row, Table
-from model_adapters.policies.http.adapter import HttpPolicy, VlaHttpOptions
+from model_adapters.options.policies import VlaHttpOptions
+from model_adapters.policies.http.adapter import HttpPolicy
 from model_adapters.protocols import ArmDelta, Policy
 from model_adapters.registry import load, takes
 

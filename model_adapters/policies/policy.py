@@ -8,8 +8,8 @@ from PIL import Image
 
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
+from model_adapters.options.policies import ActionOptions
 from model_adapters.policies.ensemble import ExponentialEnsemble
-from model_adapters.policies.options import ActionOptions
 from model_adapters.policies.statistics import ACTION_SIZE, Actions, ActionStatistics
 from model_adapters.protocols import ArmDelta, Capabilities
 from model_adapters.refusals import requesting

@@ -1,17 +1,16 @@
 """An OpenVLA of two layers with random weights and the vocabulary of the real one."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import msgspec
 from tokenizers import Tokenizer
 
+from model_adapters.options.tiny import OpenVLATinyOptions
 from model_adapters.policies.openvla.adapter import MODEL_TYPE, load_openvla
 from model_adapters.policies.openvla.config import OpenVLAConfig
 from model_adapters.policies.openvla.network import OpenVLAWeights, layout_of
 from model_adapters.policies.openvla.vision import TOWERS, TowerShape
-from model_adapters.policies.options import PolicyOptions
 from model_adapters.policies.policy import VlaPolicy
 from model_adapters.policies.weights import Layout, empty
 from model_adapters.tiny.policy_twin import BRIDGE, PolicyTwin
@@ -66,19 +65,13 @@ def _layout() -> Layout:
     return layout_of(weights, _TOWERS)
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Options(PolicyOptions):
-    dtype: str = "float32"
-    device: str = "cpu"
-
-
 class OpenVLATiny:
     """The adapter `openvla-tiny`."""
 
-    Options: ClassVar[type] = _Options
+    Options: ClassVar[type] = OpenVLATinyOptions
     twin: ClassVar[PolicyTwin] = PolicyTwin(files=_files, tokenizer=_tokenizer, layout=_layout, load=load_openvla)
 
     @classmethod
-    def build(cls, name: str, options: _Options, seed: int) -> VlaPolicy:
+    def build(cls, name: str, options: OpenVLATinyOptions, seed: int) -> VlaPolicy:
         """Make a policy with random weights of this seed."""
         return cls.twin.build(name, options, seed)

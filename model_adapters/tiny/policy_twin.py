@@ -12,8 +12,8 @@ from safetensors.torch import save_file
 from tokenizers import Tokenizer
 
 from infthor_eval.formats.scratch import ScratchFolder
+from model_adapters.options.policies import PolicyOptions
 from model_adapters.policies.checkpoint import PolicyCheckpoint
-from model_adapters.policies.options import PolicyOptions
 from model_adapters.policies.policy import VlaPolicy
 from model_adapters.policies.weights import Layout, Shape
 

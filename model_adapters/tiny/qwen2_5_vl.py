@@ -1,15 +1,15 @@
 """A Qwen2.5-VL of two layers with random weights: the real classes, template and frame tokens, without a download."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from transformers import Qwen2_5_VLConfig
 from transformers.models.qwen2_vl.image_processing_pil_qwen2_vl import Qwen2VLImageProcessorPil
 
-from model_adapters.hf.families.qwen2_5_vl import PixelLimits, Qwen25VLFamily
-from model_adapters.tiny.twin import SPREAD, TinyAdapter, TinyOptions, Twin
+from model_adapters.hf.families.qwen2_5_vl import Qwen25VLFamily
+from model_adapters.options.tiny import Qwen25VLTinyOptions
+from model_adapters.tiny.twin import SPREAD, TinyAdapter, Twin
 
 __all__ = ["SPECIAL", "Qwen25VLTiny", "save_tiny_checkpoint"]
 
@@ -84,15 +84,10 @@ def _config(ids: Mapping[str, int], vocab_size: int) -> Any:
     )
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Options(PixelLimits, TinyOptions):
-    pass
-
-
 class Qwen25VLTiny(TinyAdapter):
     """The adapter `qwen2.5-vl-tiny`."""
 
-    Options = _Options
+    Options = Qwen25VLTinyOptions
     twin = Twin(
         special=SPECIAL,
         end="<|im_end|>",

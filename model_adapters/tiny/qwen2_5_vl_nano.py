@@ -3,30 +3,24 @@
 `infthor-eval train --recipe tiny` makes it.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from infthor_eval.formats.packaged import packaged_folder
 from model_adapters.hf.adapter import CheckpointAdapter
-from model_adapters.hf.families.qwen2_5_vl import PixelLimits, Qwen25VLFamily
+from model_adapters.hf.families.qwen2_5_vl import Qwen25VLFamily
 from model_adapters.hf.model import TransformersModel
-from model_adapters.hf.options import CheckpointOptions
+from model_adapters.options.checkpoints import CheckpointOptions
+from model_adapters.options.families import Qwen25VLNanoOptions
 
 __all__ = ["FOLDER", "Qwen25VLNano"]
 
 FOLDER = "models/qwen2.5-vl-nano"
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Options(PixelLimits, CheckpointOptions):
-    pretrained: str = ""
-    dtype: str = "float32"
-    device: str = "cpu"
-
-
 class Qwen25VLNano(CheckpointAdapter):
     """The adapter `qwen2.5-vl-nano`."""
 
-    Options = _Options
+    Options = Qwen25VLNanoOptions
     family = Qwen25VLFamily
     model_types = ("qwen2_5_vl",)
 

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import msgspec
@@ -10,8 +9,9 @@ import numpy as np
 from scipy.stats import norm
 from tokenizers import Tokenizer
 
+from model_adapters.options.tiny import SpatialVLATinyOptions
 from model_adapters.policies.policy import VlaPolicy
-from model_adapters.policies.spatialvla.adapter import MODEL_TYPE, SpatialVLAOptions, load_spatialvla
+from model_adapters.policies.spatialvla.adapter import MODEL_TYPE, load_spatialvla
 from model_adapters.policies.spatialvla.config import SpatialVLAConfig
 from model_adapters.policies.spatialvla.network import SpatialVLAWeights
 from model_adapters.policies.weights import Layout, empty
@@ -162,19 +162,13 @@ def _layout() -> Layout:
         return SpatialVLAWeights(msgspec.convert(_config(), SpatialVLAConfig), "eager").layout()
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Options(SpatialVLAOptions):
-    dtype: str = "float32"
-    device: str = "cpu"
-
-
 class SpatialVLATiny:
     """The adapter `spatialvla-tiny`."""
 
-    Options: ClassVar[type] = _Options
+    Options: ClassVar[type] = SpatialVLATinyOptions
     twin: ClassVar[PolicyTwin] = PolicyTwin(files=_files, tokenizer=_tokenizer, layout=_layout, load=load_spatialvla)
 
     @classmethod
-    def build(cls, name: str, options: _Options, seed: int) -> VlaPolicy:
+    def build(cls, name: str, options: SpatialVLATinyOptions, seed: int) -> VlaPolicy:
         """Make a policy with random weights of this seed."""
         return cls.twin.build(name, options, seed)

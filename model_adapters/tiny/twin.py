@@ -12,12 +12,12 @@ from transformers import AutoModelForImageTextToText, GenerationConfig, PreTrain
 from model_adapters.hf.checkpoint import assemble, resolve_device, resolve_dtype
 from model_adapters.hf.family import MakeFamily
 from model_adapters.hf.model import TransformersModel
-from model_adapters.hf.options import HfOptions
 from model_adapters.hf.rope import apply_rope
 from model_adapters.hf.templates import plain_template
+from model_adapters.options.tiny import TinyOptions
 from model_adapters.tiny.tokenizer import train_tokenizer
 
-__all__ = ["SPREAD", "TinyAdapter", "TinyOptions", "Twin"]
+__all__ = ["SPREAD", "TinyAdapter", "Twin"]
 
 # Standard deviation of the weights. Ten times the usual one, so that replies of a model without training differ from
 # frame to frame and from question to question.
@@ -96,19 +96,6 @@ class Twin:
 
 def _ids(tokens: Sequence[str], tokenizer: PreTrainedTokenizerBase) -> dict[str, int]:
     return {token: cast(int, tokenizer.convert_tokens_to_ids(token)) for token in tokens}
-
-
-@dataclass(frozen=True, kw_only=True)
-class TinyOptions(HfOptions):
-    """Options of tiny models; their weights come from the run's seed.
-
-    Attributes:
-        dtype: float32 unless told otherwise, so that replies do not hang on rounding.
-        device: cpu unless told otherwise.
-    """
-
-    dtype: str = "float32"
-    device: str = "cpu"
 
 
 class TinyAdapter:

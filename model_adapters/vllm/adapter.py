@@ -1,7 +1,6 @@
 """Adapters of the checkpoints that vLLM runs: the families of `hf/`, their weights in vLLM."""
 
 import functools
-from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from model_adapters.hf.adapter import CheckpointAdapter
@@ -9,13 +8,19 @@ from model_adapters.hf.checkpoint import LocatedCheckpoint, outline, read_checkp
 from model_adapters.hf.families.hf_vlm import HfVlm, ProcessorFamily, known_family, load_processor
 from model_adapters.hf.families.llava_onevision import LlavaOnevision
 from model_adapters.hf.families.pixtral import Pixtral
-from model_adapters.hf.families.qwen2_5_vl import PixelLimits, Qwen25VL
+from model_adapters.hf.families.qwen2_5_vl import Qwen25VL
 from model_adapters.hf.family import MakeFamily
 from model_adapters.hf.limits import naming_model_errors
 from model_adapters.vllm.arguments import frame_limit, model_arguments, token_limit
 from model_adapters.vllm.engine import Engine, import_vllm
 from model_adapters.vllm.model import VllmModel
-from model_adapters.vllm.options import VllmOptions, usual_checkpoint
+from model_adapters.vllm.options import (
+    HfVlmOnVllmOptions,
+    LlavaOnevisionOnVllmOptions,
+    PixtralOnVllmOptions,
+    Qwen25VLOnVllmOptions,
+    VllmOptions,
+)
 
 __all__ = ["HfVlmOnVllm", "LlavaOnevisionOnVllm", "PixtralOnVllm", "Qwen25VLOnVllm"]
 
@@ -42,54 +47,34 @@ class _FamilyOnVllm:
         return _start(name, cls.runs.locate(options), cls.runs.family)
 
 
-@dataclass(frozen=True, kw_only=True)
-class _QwenOptions(PixelLimits, VllmOptions):
-    pretrained: str = usual_checkpoint(Qwen25VL.Options)
-
-
 class Qwen25VLOnVllm(_FamilyOnVllm):
     """The adapter `qwen2.5-vl@vllm`."""
 
-    Options = _QwenOptions
+    Options = Qwen25VLOnVllmOptions
     runs = Qwen25VL
-
-
-@dataclass(frozen=True, kw_only=True)
-class _LlavaOptions(VllmOptions):
-    pretrained: str = usual_checkpoint(LlavaOnevision.Options)
 
 
 class LlavaOnevisionOnVllm(_FamilyOnVllm):
     """The adapter `llava-onevision@vllm`."""
 
-    Options = _LlavaOptions
+    Options = LlavaOnevisionOnVllmOptions
     runs = LlavaOnevision
-
-
-@dataclass(frozen=True, kw_only=True)
-class _PixtralOptions(VllmOptions):
-    pretrained: str = usual_checkpoint(Pixtral.Options)
 
 
 class PixtralOnVllm(_FamilyOnVllm):
     """The adapter `pixtral@vllm`."""
 
-    Options = _PixtralOptions
+    Options = PixtralOnVllmOptions
     runs = Pixtral
-
-
-@dataclass(frozen=True, kw_only=True)
-class _AnyOptions(VllmOptions):
-    pretrained: str = ""
 
 
 class HfVlmOnVllm:
     """The adapter `hf-vlm@vllm`."""
 
-    Options: ClassVar[type] = _AnyOptions
+    Options: ClassVar[type] = HfVlmOnVllmOptions
 
     @classmethod
-    def build(cls, name: str, options: _AnyOptions, seed: int) -> VllmModel:  # noqa: ARG003
+    def build(cls, name: str, options: HfVlmOnVllmOptions, seed: int) -> VllmModel:  # noqa: ARG003
         """Start vLLM with any checkpoint that it knows.
 
         Raises:

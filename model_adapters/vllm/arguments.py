@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from infthor_eval.errors import ModelError
-from model_adapters.hf.options import parse_rope
+from model_adapters.options.checkpoints import parse_rope
 from model_adapters.vllm.options import EngineOptions, VllmOptions
 
 __all__ = ["engine_arguments", "frame_limit", "model_arguments", "rope_overrides", "token_limit"]

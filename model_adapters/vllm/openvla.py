@@ -1,6 +1,5 @@
 """OpenVLA in vLLM: its prompt, its action tokens and its statistics are those of the native port."""
 
-from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
@@ -9,30 +8,25 @@ from PIL import Image
 from infthor_eval.errors import ModelError
 from model_adapters.hf.checkpoint import versions
 from model_adapters.policies.checkpoint import find
-from model_adapters.policies.openvla.adapter import OpenVLA, OpenVLADescription, describe_openvla
+from model_adapters.policies.openvla.adapter import OpenVLADescription, describe_openvla
 from model_adapters.policies.openvla.network import prompt_ids
 from model_adapters.policies.policy import VlaPolicy
 from model_adapters.policies.statistics import ACTION_SIZE, Actions
 from model_adapters.protocols import Capabilities
 from model_adapters.vllm.arguments import engine_arguments
 from model_adapters.vllm.engine import Engine, Request, Sampling, import_vllm
-from model_adapters.vllm.options import VllmPolicyOptions, usual_checkpoint
+from model_adapters.vllm.options import OpenVLAOnVllmOptions, VllmPolicyOptions
 
 __all__ = ["OpenVLAOnVllm", "VllmPolicy"]
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Options(VllmPolicyOptions):
-    pretrained: str = usual_checkpoint(OpenVLA.Options)
 
 
 class OpenVLAOnVllm:
     """The adapter `openvla@vllm`."""
 
-    Options: ClassVar[type] = _Options
+    Options: ClassVar[type] = OpenVLAOnVllmOptions
 
     @classmethod
-    def build(cls, name: str, options: _Options, seed: int) -> "VllmPolicy":  # noqa: ARG003
+    def build(cls, name: str, options: OpenVLAOnVllmOptions, seed: int) -> "VllmPolicy":  # noqa: ARG003
         """Start vLLM with a checkpoint; nothing in it is random.
 
         Raises:

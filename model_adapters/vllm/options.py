@@ -1,11 +1,27 @@
 """Options of models that vLLM runs; docs/vllm.md says what becomes of each."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
-from model_adapters.hf.options import CheckpointReading
-from model_adapters.policies.options import ActionOptions
+from model_adapters.options.checkpoints import CheckpointReading
+from model_adapters.options.families import (
+    HfVlmOptions,
+    LlavaOnevisionOptions,
+    PixelLimits,
+    PixtralOptions,
+    Qwen25VLOptions,
+)
+from model_adapters.options.policies import ActionOptions, OpenVLAOptions
 
-__all__ = ["EngineOptions", "VllmOptions", "VllmPolicyOptions", "usual_checkpoint"]
+__all__ = [
+    "EngineOptions",
+    "HfVlmOnVllmOptions",
+    "LlavaOnevisionOnVllmOptions",
+    "OpenVLAOnVllmOptions",
+    "PixtralOnVllmOptions",
+    "Qwen25VLOnVllmOptions",
+    "VllmOptions",
+    "VllmPolicyOptions",
+]
 
 _DTYPES = ("auto", "bfloat16", "float16", "float32")
 _RANGES = {
@@ -19,15 +35,6 @@ _RANGES = {
     "max_frames": (1, 2**31 - 1),
 }
 _LAUNCHED = "external_launcher"
-
-
-def usual_checkpoint(options: type) -> str:
-    """The checkpoint that an adapter loads where none is named.
-
-    Args:
-        options: the adapter's.
-    """
-    return next(str(field.default) for field in fields(options) if field.name == "pretrained")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -116,3 +123,38 @@ class VllmPolicyOptions(EngineOptions, ActionOptions):
     def __post_init__(self) -> None:
         super().__post_init__()
         ActionOptions.__post_init__(self)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Qwen25VLOnVllmOptions(PixelLimits, VllmOptions):
+    """Options of `qwen2.5-vl@vllm`."""
+
+    pretrained: str = Qwen25VLOptions.pretrained
+
+
+@dataclass(frozen=True, kw_only=True)
+class LlavaOnevisionOnVllmOptions(VllmOptions):
+    """Options of `llava-onevision@vllm`."""
+
+    pretrained: str = LlavaOnevisionOptions.pretrained
+
+
+@dataclass(frozen=True, kw_only=True)
+class PixtralOnVllmOptions(VllmOptions):
+    """Options of `pixtral@vllm`."""
+
+    pretrained: str = PixtralOptions.pretrained
+
+
+@dataclass(frozen=True, kw_only=True)
+class HfVlmOnVllmOptions(VllmOptions):
+    """Options of `hf-vlm@vllm`."""
+
+    pretrained: str = HfVlmOptions.pretrained
+
+
+@dataclass(frozen=True, kw_only=True)
+class OpenVLAOnVllmOptions(VllmPolicyOptions):
+    """Options of `openvla@vllm`."""
+
+    pretrained: str = OpenVLAOptions.pretrained

@@ -1,4 +1,4 @@
-"""The command that draws figures."""
+"""The command that writes pages and draws figures."""
 
 import pytest
 
@@ -54,10 +54,23 @@ def test_what_is_no_run_of_plans_is_refused(folders, make_nieh_set, tmp_path, ru
 
 def test_misuse_is_one_line(folders, tmp_path, run):
     refused(run("report", *folders, "--figure", "5"), "--figure 5: is none that can be drawn; there are 6 (reward")
-    refused(run("report", *folders), "--figure")
+    refused(run("report", *folders, "--task", "a"), "--task: is for a figure; give --figure too, or leave it out")
+    refused(run("report", *folders, "--out", tmp_path / "page"), "the page is an .html file; name one")
     refused(run("report", "--figure", "7"), "RUN...")
     refused(run("report", folders[0], folders[0], "--figure", "7"), "given twice")
     (tmp_path / "file").write_text("")
     refused(run("report", folders[0], "--figure", "7", "--out", tmp_path / "file"), "cannot be written to")
     missing = tmp_path / "missing.yaml"
     refused(run("report", folders[0], "--figure", "7", "--panels", missing, "--out", tmp_path), f"{missing}: ")
+
+
+def test_a_page_is_written_and_its_size_is_told(make_nieh_set, tmp_path, run):
+    run("--model", "oracle,blind", "--tasks", "nieh_gt", "--data", make_nieh_set(size=56), "--output", tmp_path / "out")
+    runs = [folder for model in ("oracle", "blind") for folder in (tmp_path / "out" / model).iterdir()]
+    code, out, err = run("report", *runs, "--out", tmp_path / "pages" / "report.html")
+    assert (code, err) == (0, "")
+    assert out.startswith("5 samples, ")
+    assert out.strip().endswith(f"MB: {tmp_path / 'pages' / 'report.html'}")
+    page = (tmp_path / "pages" / "report.html").read_text()
+    assert "infthor-eval run --model oracle --tasks nieh_gt" in page  # how it is done again, and where its frames were
+    assert "no frames are shown" not in page

@@ -23,12 +23,16 @@ def only(folder, pattern):
 
 # By clues, total, interval, bootstrap, open-ended, absence, samples, skipped, failed. Two trajectories tell little,
 # also where all is right: Wilson's interval on 2 questions. A bootstrap of equal scores tells nothing.
-FULL_MARKS = ["100.00"] * 4 + ["34.2–100.0", "-", "100.00", "-", "5", "0", "0"]
+FULL_MARKS = [
+    *("100.00", "(3)", "100.00", "(1)", "100.00", "(1)", "100.00", "34.2–100.0", "-"),
+    *("100.00", "(2)", "-", "5", "0", "0"),
+]
 
 
 def test_the_table_shows_every_model_task_and_scorer_beside_the_published_rows(make_nieh_set, tmp_path, run):
     data = make_nieh_set(size=56)
-    code, out, _ = run("--model", "oracle,blind", "--tasks", "nieh", "--data", data, "--output", tmp_path / "out")
+    arguments = ["--model", "oracle,blind", "--tasks", "nieh", "--data", data, "--output", tmp_path / "out"]
+    code, out, _ = run(*arguments, "--full")
     assert code == 0
     rows = [line.split() for line in out.splitlines()]
     assert ["oracle", "nieh_gt", "strict", *FULL_MARKS] in rows
@@ -51,7 +55,7 @@ def test_frames_of_the_embedded_simulator_are_labelled(make_nieh_set, tmp_path, 
 def test_the_haystack_is_shown_by_depth_and_counts_what_does_not_fit(make_nieh_set, tmp_path, run):
     data = make_nieh_set([Question("t", "Is there a mug?", (70,), ("yes",))], n_frames=140, size=56)
     tasks = "nieh_haystack_8k,nieh_haystack_1m"
-    code, out, err = run("--model", "oracle", "--tasks", tasks, "--data", data, "--output", tmp_path / "out")
+    code, out, err = run("--model", "oracle", "--tasks", tasks, "--data", data, "--output", tmp_path / "out", "--full")
     assert code == 0
     rows = [line.split() for line in out.splitlines()]
     # 8,000 // 121 = 66 frames: from frame 70, 57, 44, 31, 18; all inside 140 frames.
@@ -106,12 +110,17 @@ def test_the_metrics_of_a_task_file_are_shown_beside_the_published_ones(make_nie
         "process_results: !function own.measure\nmetric_list: [{metric: letters}]\n"
     )
     arguments = ["--model", "oracle", "--data", make_nieh_set(size=56), "--output", tmp_path / "out"]
-    code, out, err = run(*arguments, "--tasks", "nieh_gt,nieh_own")
+    code, out, err = run(*arguments, "--tasks", "nieh_gt,nieh_own", "--full")
     assert code == 0, err
     rows = [line.split() for line in out.splitlines()]
     assert [row[2] for row in rows if row[:2] == ["oracle", "nieh_own"] and len(row) > 6] == ["letters"]
     # By clues: 3, 2 and 2 letters of 20; 10; 10.
-    assert next(row for row in rows if row[1:3] == ["nieh_own", "letters"])[3:7] == ["11.67", "50.00", "50.00", "27.00"]
+    assert next(row for row in rows if row[1:3] == ["nieh_own", "letters"])[3:10:2] == [
+        "11.67",
+        "50.00",
+        "50.00",
+        "27.00",
+    ]
     assert ["oracle", "nieh_gt", "strict", *FULL_MARKS] in rows
     found = json.loads(only(tmp_path / "out", "results.json").read_text())["summary"]["tasks"]["nieh_own"]
     assert found["by_clues"]["total"]["scores"]["letters"]["mean"] == pytest.approx(0.27)

@@ -72,8 +72,8 @@ def test_what_one_model_answers_stays_and_the_rest_is_rejected_or_shown_to_a_per
         inspected = list(csv.DictReader(file))
     assert [row["question"] for row in inspected] == ["Where was it?", "Which two?"]
     assert "5 questions: 2 kept, 1 rejected, 2 to inspect" in printed
-    assert next(line for line in printed.splitlines() if line.startswith("  yes")).split()[3:7] == [
-        *("100.00", "100.00", "-", "100.00")
+    assert next(line for line in printed.splitlines() if line.startswith("  yes")).split()[3:9] == [
+        *("100.00", "(1)", "100.00", "(1)", "-", "100.00")
     ]
     assert run("--model", "oracle", "--tasks", "nieh_gt", "--data", out, "--output", tmp_path / "o")[0] == 0
 

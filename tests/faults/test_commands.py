@@ -117,10 +117,7 @@ TYPED = [
     ([*TINY, "min_pixels=40000000"], "pixels at least and"),
     (["validate", "SET", "--models", "oracle", "--out", "SET"], "is the set itself"),
     (["validate", "SET", "--models", "oracle", "--out", "OUT", "--decisions", "file"], "no column question_id"),
-    (
-        ["validate", "SET", "--models", "blind", "--out", "OUT", *["--model-args", "blind:a=1"] * 2],
-        "--model-args for blind is given twice",
-    ),
+    (["validate", "SET", "--models", "a:x=1,oracle,a:x=1", "--out", "OUT"], "--models a: 'x' is given twice"),
     (["bundle", "file", "--out", "OUT"], "not in its documented form"),
     (
         ["validate", "nowhere", "--models", "oracle", "--out", "OUT"],

@@ -118,7 +118,7 @@ def calls(monkeypatch, shared_simulators):
     return found
 
 
-@pytest.mark.parametrize("mode", ["arm", "default"])
+@pytest.mark.parametrize("mode", ["arm", pytest.param("default", marks=pytest.mark.slow)])
 def test_a_simulator_that_dies_in_mid_episode_changes_no_result_and_is_told(prepared, tmp_path, calls, mode):
     whole = execute(prepared("random-arm", output=tmp_path / "whole"))
     n_calls = calls.n[mode]
@@ -133,7 +133,7 @@ def test_a_simulator_that_dies_in_mid_episode_changes_no_result_and_is_told(prep
 
 
 @pytest.mark.usefixtures("shared_simulators")
-@pytest.mark.parametrize("n_failures", [2, 3])
+@pytest.mark.parametrize("n_failures", [pytest.param(2, marks=pytest.mark.slow), 3])
 def test_an_episode_is_begun_anew_where_the_simulator_fails_for_good(prepared, tmp_path, monkeypatch, n_failures):
     whole = execute(prepared("random-arm", output=tmp_path / "whole"))
     step, failures = ArmEnvironment.step, []

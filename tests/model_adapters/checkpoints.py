@@ -25,7 +25,7 @@ from transformers.models.deepseek_vl.processing_deepseek_vl import DeepseekVLPro
 from transformers.models.gemma3.image_processing_pil_gemma3 import Gemma3ImageProcessorPil
 from transformers.models.idefics3.image_processing_pil_idefics3 import Idefics3ImageProcessorPil
 
-from model_adapters import registry
+from model_adapters.built_in import BUILT_IN
 from model_adapters.tiny.tokenizer import train_tokenizer
 from model_adapters.tiny.twin import Twin
 
@@ -164,7 +164,7 @@ OTHERS: dict[str, Callable[[Path], None]] = {
 
 def twin(family: str) -> Twin:
     """What the tiny model of one of our families is made from."""
-    module, _, name = registry._BUILT_IN[f"{family}-tiny"].partition(":")
+    module, _, name = BUILT_IN[f"{family}-tiny"].adapter.partition(":")
     found: Twin = getattr(import_module(module), name).twin
     return found
 

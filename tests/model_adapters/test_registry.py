@@ -1,3 +1,4 @@
+import importlib
 import subprocess
 import sys
 import types
@@ -10,15 +11,24 @@ import pytest
 
 from infthor_eval.errors import ModelError, UsageError
 from model_adapters import Capabilities, Policy, adapter_identity, label, load, names, options, registry
+from model_adapters.built_in import BUILT_IN
 from model_adapters.options import NoOptions
 
 
 def test_names_and_help_need_neither_torch_nor_transformers() -> None:
     code = (
-        "import sys, model_adapters as m; m.names(); m.label('hf-vlm', {});"
+        "import sys, model_adapters as m; [m.options(name) for name in m.names()]; m.label('hf-vlm', {});"
         "sys.exit(bool({'torch', 'transformers'} & set(sys.modules)))"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+@pytest.mark.parametrize("name", BUILT_IN)
+def test_the_options_that_are_told_without_an_adapter_are_the_adapters_own(name: str) -> None:
+    module, _, attribute = BUILT_IN[name].adapter.partition(":")
+    adapter = getattr(importlib.import_module(module), attribute)
+    module, _, attribute = BUILT_IN[name].options.partition(":")
+    assert adapter.Options is getattr(importlib.import_module(module), attribute)
 
 
 def test_built_in_names() -> None:

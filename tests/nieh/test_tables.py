@@ -38,12 +38,10 @@ def test_a_row_has_every_column_of_the_table():
         "run",
         "nieh_gt",
         "strict",
-        "75.00",
-        "100.00",
-        "0.00",
+        *("75.00", "(8)", "100.00", "(1)", "0.00", "(1)"),
         "70.00",
         *said,
-        "70.00",
+        *("70.00", "(10)"),
         "-",
         "10",
         "1",
@@ -110,8 +108,8 @@ def test_each_difference_stands_below_its_own_published_row():
 
 
 def test_simulated_frames_are_said_not_to_be_comparable():
-    assert clues_table([run_of(identity(), [record(0, "mug")])]).notes == ()
-    (note,) = clues_table([run_of(identity(simulator="embedded"), [record(0, "mug")])]).notes
+    assert "embedded" not in " ".join(clues_table([run_of(identity(), [record(0, "mug")])]).notes)
+    (*_, note) = clues_table([run_of(identity(simulator="embedded"), [record(0, "mug")])]).notes
     assert "embedded simulator: not comparable with the published rows" in note
 
 

@@ -4,6 +4,7 @@ import msgspec
 
 from infthor_eval import runs
 from infthor_eval.errors import DataError
+from infthor_eval.rates import Rate
 from infthor_eval.tables import Column, Row, Table
 from model_adapters import Capabilities
 
@@ -52,6 +53,13 @@ class ToySuite:
 
     def scores(self, record):
         return {"right": float(record.payload.answer == sum(record.payload.numbers))}
+
+    def headline(self, summary):
+        right, wrong = summary.numbers
+        return {"sums": Rate(right / (right + wrong), None, None, right + wrong)}
+
+    def overview(self, summaries):
+        return self.tables(summaries)
 
     def tables(self, summaries):
         rows = tuple(Row((run.header.name, str(run.summary.numbers[0]))) for run in summaries)

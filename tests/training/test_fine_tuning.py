@@ -64,6 +64,7 @@ def same(first, second):
     return first.keys() == second.keys() and all(first[name].equal(second[name]) for name in first)
 
 
+@pytest.mark.slow
 def test_a_trained_model_answers_as_it_was_trained_to_behind_its_familys_adapter(recipe, data, tmp_path):
     checkpoint, told = train(recipe, data, tmp_path / "out", epochs=40, save_every=1000)
     assert [done.step for done in told] == list(range(1, told[-1].n_steps + 1))

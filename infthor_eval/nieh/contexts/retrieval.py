@@ -1,4 +1,7 @@
-"""Contexts that show the frames that a CLIP model finds nearest, to the question or to the agent's current view."""
+"""Contexts that show the frames that a CLIP model finds nearest, to the question or to the agent's current view.
+
+What retrieves is imported where it is needed: it takes seconds, which tasks without it need not wait.
+"""
 
 from typing import TYPE_CHECKING, Any
 
@@ -6,7 +9,6 @@ from infthor_eval.errors import DataError
 from infthor_eval.formats.nieh_set import NiehSet, SkippedQuestion
 from infthor_eval.formats.question import Question
 from infthor_eval.nieh.contexts.base import ContextSettings, Sample
-from model_adapters.hf.vectors import nearest
 
 if TYPE_CHECKING:
     from model_adapters.hf.retrieval import Retriever
@@ -19,6 +21,8 @@ def clip_retrieval(data: NiehSet, question: Question, settings: ContextSettings)
 
     Of equally similar frames the earlier ones are taken; a trajectory of fewer frames is shown whole.
     """
+    from model_adapters.hf.vectors import nearest
+
     retriever = _retriever(settings)
     try:
         vectors = retriever.frames(data.frames(question.traj_id))
@@ -33,6 +37,8 @@ def memory_frames(data: NiehSet, question: Question, settings: ContextSettings) 
     The paper reports such a memory with the top 20 images (long-horizon tasks). The current view is shown beside the
     k, not counted among them.
     """
+    from model_adapters.hf.vectors import nearest
+
     try:
         vectors = _retriever(settings).frames(data.frames(question.traj_id))
     except DataError as error:

@@ -1,6 +1,7 @@
 """All frames that the small model is trained on, as what its vision tower takes, and what is to be seen in them."""
 
 from collections.abc import Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from infthor_eval.training.nano.architecture import GRID, PATCHES, TOKENS
 
 __all__ = ["Album", "read_album"]
 
+_READERS = 2  # threads
 _LEAST_PIXELS = 90  # of an object that counts as shown: a thousandth of a frame of 300 x 300, as in the questions
 _OF_CELL, _OF_OBJECT = 0.4, 0.5  # shares of a cell, or of an object, that lie within each other where it is seen there
 
@@ -75,7 +77,8 @@ def read_album(folders: Iterable[Path], image_processor: Any) -> Album:
     types = sorted({_type(key) for _, step in found for key in step.seen or ()})
     labels = [_labels(step.seen or {}, types, frame.size) for frame, step in found]
     cells, shown, present = (torch.stack(parts) for parts in zip(*labels, strict=True))
-    pixels = torch.stack([_patches(frame, image_processor) for frame, _ in found])
+    with ThreadPoolExecutor(_READERS) as readers:  # decoding and resizing let go of the interpreter
+        pixels = torch.stack(list(readers.map(lambda one: _patches(one[0], image_processor), found)))
     return Album(tuple(frame for frame, _ in found), tuple(types), pixels, cells, shown, present)
 
 

@@ -55,7 +55,7 @@ class NanoRecipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     hidden: int = 128
     layers: int = 4
     seeing_steps: int = 350
-    telling_steps: int = 550
+    telling_steps: int = 420
     frames_per_step: int = 64
     questions_per_step: int = 40
     made_up: float = 0.4

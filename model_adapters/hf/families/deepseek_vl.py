@@ -1,14 +1,13 @@
 """DeepSeek-VL 7B (hybrid: SAM at high and SigLIP at low resolution): any frame takes 576 tokens."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import torch
 from PIL import Image
 
 from model_adapters.hf.adapter import CheckpointAdapter
 from model_adapters.hf.families.plain import PlainFamily
-from model_adapters.hf.options import CheckpointOptions
+from model_adapters.options.families import DeepseekVLOptions
 
 __all__ = ["DeepseekVL", "DeepseekVLFamily"]
 
@@ -25,14 +24,9 @@ class DeepseekVLFamily(PlainFamily):
         return list(output.pooler_output)
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Options(CheckpointOptions):
-    pretrained: str = "deepseek-community/deepseek-vl-7b-chat"
-
-
 class DeepseekVL(CheckpointAdapter):
     """The adapter `deepseek-vl`."""
 
-    Options = _Options
+    Options = DeepseekVLOptions
     family = DeepseekVLFamily
     model_types = ("deepseek_vl_hybrid",)

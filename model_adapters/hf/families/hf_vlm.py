@@ -11,7 +11,6 @@ import functools
 import inspect
 import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -33,9 +32,10 @@ from model_adapters.hf.families.qwen2_5_vl import Qwen25VLFamily
 from model_adapters.hf.family import MakeFamily, Size
 from model_adapters.hf.loaded import Loaded
 from model_adapters.hf.model import TransformersModel
-from model_adapters.hf.options import CheckpointOptions, CheckpointReading
 from model_adapters.hf.prompt import token_ids
 from model_adapters.hf.uncached import UncachedModel, expanded, image_token, processed
+from model_adapters.options.checkpoints import CheckpointReading
+from model_adapters.options.families import HfVlmOptions
 from model_adapters.protocols import Model, Part, Turn
 
 __all__ = ["HfVlm", "ProcessorFamily", "known_family", "load_processor"]
@@ -98,18 +98,13 @@ def _markers(config: Any) -> tuple[int, int] | None:
     return None
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Options(CheckpointOptions):
-    pretrained: str = ""
-
-
 class HfVlm:
     """The adapter `hf-vlm`."""
 
-    Options = _Options
+    Options = HfVlmOptions
 
     @classmethod
-    def build(cls, name: str, options: _Options, seed: int) -> Model:  # noqa: ARG003
+    def build(cls, name: str, options: HfVlmOptions, seed: int) -> Model:  # noqa: ARG003
         """Load a checkpoint; nothing in it is random.
 
         Raises:

@@ -1,14 +1,13 @@
 """LLaVA-OneVision: a frame of 300x300 takes 1485 tokens, an overview and the frame itself with a break per row."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import torch
 from PIL import Image
 
 from model_adapters.hf.adapter import CheckpointAdapter
 from model_adapters.hf.families.plain import PlainFamily
-from model_adapters.hf.options import CheckpointOptions
+from model_adapters.options.families import LlavaOnevisionOptions
 
 __all__ = ["LlavaOnevision", "LlavaOnevisionFamily"]
 
@@ -27,14 +26,9 @@ class LlavaOnevisionFamily(PlainFamily):
         return list(output.pooler_output)
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Options(CheckpointOptions):
-    pretrained: str = "llava-hf/llava-onevision-qwen2-7b-ov-hf"
-
-
 class LlavaOnevision(CheckpointAdapter):
     """The adapter `llava-onevision`."""
 
-    Options = _Options
+    Options = LlavaOnevisionOptions
     family = LlavaOnevisionFamily
     model_types = ("llava_onevision",)

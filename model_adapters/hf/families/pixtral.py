@@ -1,7 +1,6 @@
 """Pixtral 12B: a frame of 300x300 takes 19 rows of 19 tokens, a break after each row but the last, and an end: 380."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import torch
@@ -11,7 +10,7 @@ from infthor_eval.errors import ModelError
 from model_adapters.hf.adapter import CheckpointAdapter
 from model_adapters.hf.families.plain import PlainFamily
 from model_adapters.hf.family import Size
-from model_adapters.hf.options import CheckpointOptions
+from model_adapters.options.families import PixtralOptions
 
 __all__ = ["Pixtral", "PixtralFamily"]
 
@@ -60,14 +59,9 @@ class PixtralFamily(PlainFamily):
         return found
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Options(CheckpointOptions):
-    pretrained: str = "mistral-community/pixtral-12b"
-
-
 class Pixtral(CheckpointAdapter):
     """The adapter `pixtral`."""
 
-    Options = _Options
+    Options = PixtralOptions
     family = PixtralFamily
     model_types = ("llava",)

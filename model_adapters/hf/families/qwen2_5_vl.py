@@ -2,19 +2,17 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import torch
 from PIL import Image
 
-from infthor_eval.formats.limits import IMAGE_MEGAPIXELS
 from model_adapters.hf.adapter import CheckpointAdapter
 from model_adapters.hf.families.plain import PlainFamily
 from model_adapters.hf.family import Size
-from model_adapters.hf.options import CheckpointOptions
+from model_adapters.options.families import Qwen25VLOptions
 
-__all__ = ["PixelLimits", "Qwen25VL", "Qwen25VLFamily"]
+__all__ = ["Qwen25VL", "Qwen25VLFamily"]
 
 
 class Qwen25VLFamily(PlainFamily):
@@ -69,42 +67,9 @@ class Qwen25VLFamily(PlainFamily):
         return self._grids[size]
 
 
-@dataclass(frozen=True, kw_only=True)
-class PixelLimits:
-    """Limits of a frame's area.
-
-    Attributes:
-        min_pixels: smaller frames are enlarged to this area; the checkpoint's setting where None.
-        max_pixels: larger frames are reduced to this area; the checkpoint's setting where None.
-    """
-
-    min_pixels: int | None = None
-    max_pixels: int | None = None
-
-    def __post_init__(self) -> None:
-        most = IMAGE_MEGAPIXELS.value * 1_000_000
-        for name in ("min_pixels", "max_pixels"):
-            value = getattr(self, name)
-            if value is not None and not 1 <= value <= most:
-                raise ValueError(f"{name}={value} is not between 1 and {most}")
-        if self.min_pixels is not None and self.max_pixels is not None and self.min_pixels > self.max_pixels:
-            raise ValueError(f"min_pixels={self.min_pixels} is above max_pixels={self.max_pixels}")
-        super().__post_init__()  # type: ignore[misc]  # it is mixed into options, which have one
-
-    def image_settings(self) -> dict[str, int]:
-        """Settings of the image processor that differ from the checkpoint's."""
-        limits = {"min_pixels": self.min_pixels, "max_pixels": self.max_pixels}
-        return {name: value for name, value in limits.items() if value is not None}
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Options(PixelLimits, CheckpointOptions):
-    pretrained: str = "Qwen/Qwen2.5-VL-7B-Instruct"
-
-
 class Qwen25VL(CheckpointAdapter):
     """The adapter `qwen2.5-vl`."""
 
-    Options = _Options
+    Options = Qwen25VLOptions
     family = Qwen25VLFamily
     model_types = ("qwen2_5_vl",)

@@ -1,50 +1,19 @@
 """The adapter `vla-http`: any policy that a server answers for."""
 
-from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
-from model_adapters.policies.http.client import JsonClient, act_url
+from model_adapters.addresses import act_url
+from model_adapters.options.policies import VlaHttpOptions
+from model_adapters.policies.http.client import JsonClient
 from model_adapters.policies.http.json_numpy import decoded_numbers, encoded
 from model_adapters.policies.policy import arm_deltas
 from model_adapters.protocols import ArmDelta, Capabilities
 
-__all__ = ["HttpPolicy", "VlaHttp", "VlaHttpOptions"]
-
-_ENCODINGS = ("json_numpy", "list")
-
-
-@dataclass(frozen=True, kw_only=True)
-class VlaHttpOptions:
-    """How a server is asked.
-
-    Attributes:
-        url: of the server; `/act` is put behind it.
-        unnorm_key: sent with every request where it is given.
-        image: json_numpy sends a frame in base 64, as OpenVLA's server expects; list as nested lists of numbers.
-        execute: how many steps of a chunk are given out; all where None.
-        timeout_s: for a reply.
-        retries: how often a request is sent again where the connection failed.
-    """
-
-    url: str = "http://localhost:8000"
-    unnorm_key: str | None = None
-    image: str = "json_numpy"
-    execute: int | None = None
-    timeout_s: float = 60.0
-    retries: int = 3
-
-    def __post_init__(self) -> None:
-        act_url(self.url)
-        if self.image not in _ENCODINGS:
-            raise ValueError(f"image={self.image} is not {' or '.join(_ENCODINGS)}")
-        if self.execute is not None and self.execute < 1:
-            raise ValueError(f"execute={self.execute} gives out no step; it is 1 or more")
-        if not 0 < self.timeout_s <= 86_400 or not 0 <= self.retries <= 10:
-            raise ValueError("timeout_s must be above 0 and at most a day, retries 0 to 10")
+__all__ = ["HttpPolicy", "VlaHttp"]
 
 
 class HttpPolicy:

@@ -8,25 +8,13 @@ import urllib.request
 from typing import Any
 
 from infthor_eval.errors import ModelError, in_one_line
-from model_adapters.addresses import server_address
 
-__all__ = ["JsonClient", "act_url"]
+__all__ = ["JsonClient"]
 
 _LARGEST = 16 * 2**20  # bytes of a reply
 _PIECE = 2**16
 _FIRST_WAIT_S = 0.5  # before the second attempt; doubled before each further one
 _QUOTED = 200  # characters of what a server says
-
-
-def act_url(url: str) -> str:
-    """The address that actions are asked of: a server's own with `/act` behind it, if it is not there.
-
-    Raises:
-        ValueError: see `server_address`.
-    """
-    parts = server_address("url", url)
-    path = parts.path.rstrip("/")
-    return f"{parts.scheme}://{parts.netloc}{path if path.endswith('/act') else f'{path}/act'}"
 
 
 class _NoRedirect(urllib.request.HTTPRedirectHandler):

@@ -7,11 +7,11 @@ from tokenizers import Tokenizer
 
 from infthor_eval.errors import ModelError
 from model_adapters.hf.checkpoint import loading
+from model_adapters.options.policies import OpenVLAOptions, PolicyOptions
 from model_adapters.policies.checkpoint import PolicyCheckpoint, find
 from model_adapters.policies.openvla.actions import ActionBins
 from model_adapters.policies.openvla.config import OpenVLAConfig
 from model_adapters.policies.openvla.network import OpenVLANetwork, OpenVLAWeights, layout_of
-from model_adapters.policies.options import CheckpointPolicyOptions, PolicyOptions
 from model_adapters.policies.policy import VlaPolicy
 from model_adapters.policies.statistics import ActionStatistics, statistics_of
 from model_adapters.policies.weights import empty, load_weights
@@ -22,18 +22,13 @@ MODEL_TYPE = "openvla"
 _FINE_TUNED = "dataset_statistics.json"
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Options(CheckpointPolicyOptions):
-    pretrained: str = "openvla/openvla-7b"
-
-
 class OpenVLA:
     """The adapter `openvla`: openvla/openvla-7b and what was fine-tuned from it."""
 
-    Options: ClassVar[type] = _Options
+    Options: ClassVar[type] = OpenVLAOptions
 
     @classmethod
-    def build(cls, name: str, options: _Options, seed: int) -> VlaPolicy:  # noqa: ARG003
+    def build(cls, name: str, options: OpenVLAOptions, seed: int) -> VlaPolicy:  # noqa: ARG003
         """Load a checkpoint; nothing in it is random.
 
         Raises:

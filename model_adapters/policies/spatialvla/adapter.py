@@ -1,65 +1,33 @@
 """The adapter `spatialvla`."""
 
-from dataclasses import dataclass
 from typing import ClassVar
 
 from tokenizers import Tokenizer
 
 from infthor_eval.errors import ModelError
 from model_adapters.hf.checkpoint import loading
+from model_adapters.options.policies import SpatialVLACheckpointOptions, SpatialVLAOptions, parse_field_of_view
 from model_adapters.policies.checkpoint import PolicyCheckpoint, find
-from model_adapters.policies.options import CheckpointPolicyOptions, PolicyOptions
 from model_adapters.policies.policy import VlaPolicy
 from model_adapters.policies.spatialvla.actions import ProcessorConfig, SpatialBins
-from model_adapters.policies.spatialvla.camera import DEFAULT, parse_field_of_view, published_intrinsics
+from model_adapters.policies.spatialvla.camera import published_intrinsics
 from model_adapters.policies.spatialvla.config import SpatialVLAConfig
 from model_adapters.policies.spatialvla.network import SpatialVLANetwork, SpatialVLAWeights, View
 from model_adapters.policies.statistics import statistics_of
 from model_adapters.policies.weights import empty, load_weights
 
-__all__ = ["MODEL_TYPE", "SpatialVLA", "SpatialVLAOptions", "load_spatialvla"]
+__all__ = ["MODEL_TYPE", "SpatialVLA", "load_spatialvla"]
 
 MODEL_TYPE = "spatialvla"
-_ATTENTION = ("eager", "sdpa")
-
-
-@dataclass(frozen=True, kw_only=True)
-class SpatialVLAOptions(PolicyOptions):
-    """What SpatialVLA takes beside the options of all policies.
-
-    Attributes:
-        attn_implementation: eager caps attention scores as Gemma 2 was trained; sdpa is faster and does not.
-        ensemble: exp as in the published evaluations in SimplerEnv.
-        intrinsics: default is the camera of the checkpoint's dataset; thor:DEGREES a simulator's with this vertical
-            field of view.
-    """
-
-    attn_implementation: str = "eager"
-    ensemble: str = "exp"
-    intrinsics: str = DEFAULT
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        parse_field_of_view(self.intrinsics)
-        if self.attn_implementation not in _ATTENTION:
-            raise ValueError(
-                f"attn_implementation={self.attn_implementation} cannot read the prefix in both directions; "
-                f"use {' or '.join(_ATTENTION)}"
-            )
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Options(SpatialVLAOptions, CheckpointPolicyOptions):
-    pretrained: str = "IPEC-COMMUNITY/spatialvla-4b-224-pt"
 
 
 class SpatialVLA:
     """The adapter `spatialvla`: IPEC-COMMUNITY/spatialvla-4b-224-pt and its relatives."""
 
-    Options: ClassVar[type] = _Options
+    Options: ClassVar[type] = SpatialVLACheckpointOptions
 
     @classmethod
-    def build(cls, name: str, options: _Options, seed: int) -> VlaPolicy:  # noqa: ARG003
+    def build(cls, name: str, options: SpatialVLACheckpointOptions, seed: int) -> VlaPolicy:  # noqa: ARG003
         """Load a checkpoint; nothing in it is random.
 
         Raises:

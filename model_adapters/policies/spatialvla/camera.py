@@ -6,29 +6,10 @@ from collections.abc import Mapping
 import torch
 
 from infthor_eval.errors import ModelError
+from model_adapters.options.policies import DEFAULT_INTRINSICS
 from model_adapters.policies.spatialvla.actions import Camera
 
-__all__ = ["DEFAULT", "parse_field_of_view", "published_intrinsics", "thor_intrinsics"]
-
-DEFAULT = "default"
-
-
-def parse_field_of_view(text: str) -> float | None:
-    """The vertical field of view of `thor:DEGREES`; None for `default`.
-
-    Raises:
-        ValueError: it has another form, or no camera has such a field.
-    """
-    if text == DEFAULT:
-        return None
-    kind, _, number = text.partition(":")
-    try:
-        degrees = float(number)
-    except ValueError:
-        degrees = 0.0
-    if kind != "thor" or not 0 < degrees < 180:
-        raise ValueError(f"intrinsics={text} is not {DEFAULT} or thor:DEGREES, DEGREES the vertical field of view")
-    return degrees
+__all__ = ["published_intrinsics", "thor_intrinsics"]
 
 
 def published_intrinsics(
@@ -45,7 +26,7 @@ def published_intrinsics(
     Raises:
         ModelError: it has neither, or a camera that is none.
     """
-    camera = cameras.get(unnorm_key) or cameras.get(DEFAULT)
+    camera = cameras.get(unnorm_key) or cameras.get(DEFAULT_INTRINSICS)
     rows = [] if camera is None else camera.intrinsic
     if camera is None or [len(row) for row in rows] != [3, 3, 3] or min(camera.width, camera.height) < 1:
         raise ModelError(

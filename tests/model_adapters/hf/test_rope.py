@@ -14,9 +14,9 @@ from infthor_eval.formats.frames import FrameRef
 from model_adapters import Part, load
 from model_adapters.hf.checkpoint import assemble
 from model_adapters.hf.model import TransformersModel
-from model_adapters.hf.options import HfOptions
 from model_adapters.hf.prompt import token_ids
 from model_adapters.hf.rope import apply_rope
+from model_adapters.options.checkpoints import HfOptions
 
 from ..asking import up_to, user
 

@@ -11,6 +11,7 @@ import pytest
 from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.formats.frames import FrameRef
 from model_adapters import Turn, check_adapter, load, registry
+from model_adapters.built_in import BUILT_IN
 from model_adapters.hf.families.hf_vlm import ProcessorFamily
 from model_adapters.hf.templates import plain_template
 from model_adapters.hf.uncached import UncachedModel
@@ -132,7 +133,7 @@ def test_the_model_without_sharing_is_asked_plainly_too(checkpoints: dict[str, P
     assert lengths[0] < lengths[1]
 
 
-@pytest.mark.parametrize("name", sorted(registry._BUILT_IN.keys() - POLICIES - {"openai"}))
+@pytest.mark.parametrize("name", sorted(BUILT_IN.keys() - POLICIES - {"openai"}))
 def test_every_model_has_the_option(name: str) -> None:
     assert "prompt=chat" in registry.options(name)
     with pytest.raises(UsageError, match="prompt=plane is not chat or plain"):

@@ -8,7 +8,7 @@ import pytest
 from infthor_eval.errors import DataError, ModelError
 from infthor_eval.formats.frames import FrameRef
 from model_adapters import ArmDelta, Policy, check_policy
-from model_adapters.policies.options import PolicyOptions
+from model_adapters.options.policies import PolicyOptions
 from model_adapters.policies.policy import VlaPolicy, arm_deltas
 from model_adapters.policies.statistics import ActionStatistics
 

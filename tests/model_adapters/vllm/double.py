@@ -21,7 +21,7 @@ from transformers import StoppingCriteriaList
 
 from model_adapters.hf.checkpoint import load_checkpoint, locate
 from model_adapters.hf.families.hf_vlm import ProcessorFamily, known_family, load_processor
-from model_adapters.hf.options import CheckpointOptions
+from model_adapters.options.checkpoints import CheckpointOptions
 from model_adapters.policies.decoding import embedded
 from model_adapters.policies.openvla.adapter import OpenVLA
 from model_adapters.policies.preprocessing import resized

@@ -5,8 +5,9 @@ import math
 import pytest
 
 from infthor_eval.errors import ModelError
+from model_adapters.options.policies import parse_field_of_view
 from model_adapters.policies.spatialvla.actions import Camera
-from model_adapters.policies.spatialvla.camera import parse_field_of_view, published_intrinsics, thor_intrinsics
+from model_adapters.policies.spatialvla.camera import published_intrinsics, thor_intrinsics
 
 DEFAULT = Camera(640, 480, [[623.588, 0, 319.501], [0, 623.588, 239.545], [0, 0, 1]])
 OTHER = Camera(224, 224, [[100, 0, 112], [0, 100, 112], [0, 0, 1]])

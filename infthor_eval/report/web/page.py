@@ -1,0 +1,114 @@
+"""The page itself: a file that needs nothing beside it."""
+
+import base64
+import hashlib
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import msgspec
+from jinja2 import Environment, StrictUndefined
+from markupsafe import Markup
+
+from infthor_eval.errors import naming
+from infthor_eval.formats.files import written_atomically
+from infthor_eval.report.web.samples import Sample
+from infthor_eval.report.web.sections import Section
+
+__all__ = ["About", "Page", "write_page"]
+
+# In a script element "</script" and "<!--" would end or twist it; the line separators end a line of a script.
+_ESCAPED = {"<": "\\u003c", ">": "\\u003e", "&": "\\u0026", "\u2028": "\\u2028", "\u2029": "\\u2029"}
+
+
+@dataclass(frozen=True)
+class About:
+    """Who a run is.
+
+    Attributes:
+        label: what it is called.
+        facts: names and values, in the order shown.
+        command: that runs it again; empty where it is not known.
+        identity: everything that can change a number, as JSON.
+    """
+
+    label: str
+    facts: tuple[tuple[str, str], ...]
+    command: str
+    identity: str
+
+
+@dataclass(frozen=True)
+class Page:
+    """All that stands on the page.
+
+    Attributes:
+        title: of it.
+        version: of the package that made it.
+        runs: who they are.
+        sections: what was found; the first stands above the runs.
+        samples: for the browser.
+        metrics: names of the scorers, the one that says right or wrong first.
+        pictures: WebP in base64, by their numbers in the samples.
+        notes: what must be said of the samples.
+    """
+
+    title: str
+    version: str
+    runs: Sequence[About]
+    sections: Sequence[Section]
+    samples: Sequence[Sample]
+    metrics: Sequence[str]
+    pictures: Sequence[str]
+    notes: Sequence[str] = ()
+
+
+def write_page(page: Page, path: Path) -> int:
+    """Write the page; equal pages are equal bytes.
+
+    Args:
+        page: what stands on it.
+        path: of the file.
+
+    Returns:
+        Its size in bytes.
+
+    Raises:
+        DataError: it cannot be written.
+    """
+    script = _read("report.js")
+    # Questions and replies come from data files and models: whatever they hold is shown as text.
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    text = environment.from_string(_read("report.html")).render(
+        page=page,
+        css=Markup(_read("report.css")),
+        js=Markup(script),
+        script_hash=base64.b64encode(hashlib.sha256(script.encode()).digest()).decode("ascii"),
+        data=_data(page),
+        svg=Markup,
+    )
+    encoded = text.encode("utf-8", "backslashreplace")
+    with naming(f"{path}: cannot be written", "give another --out"), written_atomically(path) as partial:
+        partial.write_bytes(encoded)
+    return len(encoded)
+
+
+def _read(name: str) -> str:
+    return resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
+
+
+def _data(page: Page) -> Markup:
+    """What the browser of samples reads, as JSON that may stand in a script element."""
+    document: dict[str, Any] = {
+        "runs": [run.label for run in page.runs],
+        "metrics": list(page.metrics),
+        "samples": msgspec.to_builtins(page.samples),
+        "pictures": list(page.pictures),
+    }
+    text = json.dumps(document, ensure_ascii=False, separators=(",", ":"))
+    for letter, escaped in _ESCAPED.items():
+        text = text.replace(letter, escaped)
+    return Markup(text)

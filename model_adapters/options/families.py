@@ -1,0 +1,88 @@
+"""Options of the model families of transformers, each with its usual checkpoint."""
+
+from dataclasses import dataclass
+
+from infthor_eval.formats.limits import IMAGE_MEGAPIXELS
+from model_adapters.options.checkpoints import CheckpointOptions
+
+__all__ = [
+    "DeepseekVLOptions",
+    "HfVlmOptions",
+    "LlavaOnevisionOptions",
+    "PixelLimits",
+    "PixtralOptions",
+    "Qwen25VLNanoOptions",
+    "Qwen25VLOptions",
+]
+
+
+@dataclass(frozen=True, kw_only=True)
+class PixelLimits:
+    """Limits of a frame's area.
+
+    Attributes:
+        min_pixels: smaller frames are enlarged to this area; the checkpoint's setting where None.
+        max_pixels: larger frames are reduced to this area; the checkpoint's setting where None.
+    """
+
+    min_pixels: int | None = None
+    max_pixels: int | None = None
+
+    def __post_init__(self) -> None:
+        most = IMAGE_MEGAPIXELS.value * 1_000_000
+        for name in ("min_pixels", "max_pixels"):
+            value = getattr(self, name)
+            if value is not None and not 1 <= value <= most:
+                raise ValueError(f"{name}={value} is not between 1 and {most}")
+        if self.min_pixels is not None and self.max_pixels is not None and self.min_pixels > self.max_pixels:
+            raise ValueError(f"min_pixels={self.min_pixels} is above max_pixels={self.max_pixels}")
+        super().__post_init__()  # type: ignore[misc]  # it is mixed into options, which have one
+
+    def image_settings(self) -> dict[str, int]:
+        """Settings of the image processor that differ from the checkpoint's."""
+        limits = {"min_pixels": self.min_pixels, "max_pixels": self.max_pixels}
+        return {name: value for name, value in limits.items() if value is not None}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Qwen25VLOptions(PixelLimits, CheckpointOptions):
+    """Options of `qwen2.5-vl`."""
+
+    pretrained: str = "Qwen/Qwen2.5-VL-7B-Instruct"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Qwen25VLNanoOptions(PixelLimits, CheckpointOptions):
+    """Options of `qwen2.5-vl-nano`, whose checkpoint comes with the package."""
+
+    pretrained: str = ""
+    dtype: str = "float32"
+    device: str = "cpu"
+
+
+@dataclass(frozen=True, kw_only=True)
+class LlavaOnevisionOptions(CheckpointOptions):
+    """Options of `llava-onevision`."""
+
+    pretrained: str = "llava-hf/llava-onevision-qwen2-7b-ov-hf"
+
+
+@dataclass(frozen=True, kw_only=True)
+class DeepseekVLOptions(CheckpointOptions):
+    """Options of `deepseek-vl`."""
+
+    pretrained: str = "deepseek-community/deepseek-vl-7b-chat"
+
+
+@dataclass(frozen=True, kw_only=True)
+class PixtralOptions(CheckpointOptions):
+    """Options of `pixtral`."""
+
+    pretrained: str = "mistral-community/pixtral-12b"
+
+
+@dataclass(frozen=True, kw_only=True)
+class HfVlmOptions(CheckpointOptions):
+    """Options of `hf-vlm`, which has no usual checkpoint."""
+
+    pretrained: str = ""

@@ -1,0 +1,37 @@
+"""Commands that only tell something import nothing that takes seconds."""
+
+import subprocess
+import sys
+
+import pytest
+
+from infthor_eval import suites
+
+HEAVY = {"torch", "transformers", "numpy", "scipy", "ai2thor", "lm_eval", "datasets", "matplotlib"}
+PROGRAM = """
+import sys
+from infthor_eval.cli import main
+try:
+    main(sys.argv[1:])
+except SystemExit as ended:
+    assert not ended.code
+print(*sorted({name.partition(".")[0] for name in sys.modules}), file=sys.stderr)
+"""
+
+
+@pytest.mark.parametrize(
+    "typed", ["--help", "run --help", "ls", "ls models", "ls tasks", "ls scenes", "ls runs tests", "--version"]
+)
+def test_what_is_told_is_told_at_once(typed: str) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM, *typed.split()], capture_output=True, text=True, check=False, timeout=60
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout
+    assert not HEAVY & set(done.stderr.splitlines()[-1].split())
+
+
+@pytest.mark.parametrize("name", suites.suite_names())
+def test_the_baselines_that_are_listed_are_the_suites_own(name: str) -> None:
+    listed = {baseline for baseline, having in suites.baseline_names().items() if name in having.split(", ")}
+    assert listed == set(suites.suite_named(name).baselines)

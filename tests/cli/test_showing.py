@@ -1,0 +1,118 @@
+"""What is listed of runs, and their results shown again: on the first screen, in full, and for other programs."""
+
+import csv
+import io
+import json
+
+import pytest
+
+from infthor_eval.formats.question import Question
+from tests.faults.told import said_in_one_line
+
+
+@pytest.fixture
+def ran(make_nieh_set, tmp_path, run):
+    """The folders of runs of the oracle and of the blind on five questions, and what was printed at their end."""
+    data = make_nieh_set(size=56)
+    arguments = ["--model", "oracle,blind", "--tasks", "nieh", "--data", data, "--output", tmp_path / "out"]
+
+    def ran(*options):
+        code, out, err = run(*arguments, *options)
+        assert code == 0, err
+        folders = [next((tmp_path / "out" / model).iterdir()) for model in ("oracle", "blind")]
+        return folders, out
+
+    return ran
+
+
+@pytest.mark.parametrize("options", [(), ("--full",), ("--json",), ("--format", "latex"), ("--format", "csv")])
+def test_a_run_is_shown_again_as_it_was_shown(ran, run, options):
+    folders, printed = ran(*options)
+    code, out, err = run("show", *folders, *options)
+    assert (code, out, err) == (0, printed, "")
+
+
+def test_the_first_screen_has_one_number_a_task_and_fits(ran):
+    _, printed = ran()
+    rows = [line.split() for line in printed.splitlines()]
+    assert ["model", "task", "total", "95", "%", "bootstrap", "n"] in rows
+    assert ["oracle", "nieh_gt", "100.00", "34.2–100.0", "-", "5"] in rows
+    assert "reference" not in printed
+    assert max(len(line) for line in printed.splitlines() if "/" not in line) <= 100
+
+
+def test_a_task_that_asks_nothing_is_a_line(make_nieh_set, tmp_path, run):
+    data = make_nieh_set([Question("t", "Is there a mug?", (70,), ("yes",))], n_frames=140, size=56)
+    tasks = "nieh_haystack_8k,nieh_haystack_1m"
+    code, out, err = run("--model", "oracle", "--tasks", tasks, "--data", data, "--output", tmp_path / "out")
+    assert code == 0, err
+    assert not any(line.split()[1:2] == ["nieh_haystack_1m"] for line in out.splitlines())
+    assert "nieh_haystack_1m: nothing asked, 5 skipped: the window reaches outside" in " ".join(out.split())
+
+
+def test_quiet_prints_folders_and_nothing_else(ran, capfd, run):
+    folders, printed = ran("--quiet")
+    assert printed.split() == [str(folder) for folder in folders]
+
+
+def test_json_alone_is_on_standard_output(ran):
+    folders, printed = ran("--json", "--quiet")
+    documents = json.loads(printed)
+    assert [document["folder"] for document in documents] == list(map(str, folders))
+    for document, folder in zip(documents, folders, strict=True):
+        del document["folder"]
+        assert document == json.loads((folder / "results.json").read_text())
+    assert documents[0]["headline"]["nieh_gt"]["mean"] == 1.0
+
+
+def test_csv_is_a_table_and_nothing_else(ran):
+    _, printed = ran("--format", "csv")
+    heading, *rows = csv.reader(io.StringIO(printed))
+    assert heading == ["model", "task", "total", "95 %", "bootstrap", "n"]
+    assert [row[:3] for row in rows][:2] == [["oracle", "nieh_gt", "100.00"], ["oracle", "nieh_full", "100.00"]]
+
+
+def test_json_leaves_nothing_to_choose(run, tmp_path):
+    said_in_one_line(run("show", tmp_path, "--json", "--full"), "--json holds everything")
+
+
+def test_a_folder_without_a_run_is_named(run, tmp_path):
+    said_in_one_line(run("show", tmp_path), f"{tmp_path}: no journal in it; give the folder of a run")
+
+
+# -- ls
+
+
+def test_runs_are_listed_with_what_was_done_and_what_they_are_known_by(ran, run, tmp_path):
+    folders, _ = ran()
+    code, out, err = run("ls", "runs", tmp_path / "out")
+    assert (code, err) == (0, "")
+    (oracle,) = [line for line in out.splitlines() if line.split()[:1] == ["oracle"]]
+    assert oracle.split()[1:5] == ["nieh", "10", "0", "0"]
+    assert "nieh_gt 100.0, nieh_full 100.0" in oracle
+    assert str(folders[0]) in oracle
+
+
+def test_a_killed_run_is_listed_without_results_and_a_broken_one_is_named(ran, run, tmp_path):
+    (oracle, blind), _ = ran()
+    (oracle / "results.json").unlink()
+    journal = blind / "journal" / "worker-0.jsonl"
+    journal.write_bytes(journal.read_bytes() + b"no record\n")
+    code, out, err = run("ls", "runs", tmp_path)
+    assert code == 0
+    (row,) = [line.split() for line in out.splitlines() if line.split()[:1] == ["oracle"]]
+    assert row[1:5] == ["nieh", "10", "?", "0"]
+    assert f"{blind}: cannot be read: " in err.replace("\n", "")
+
+
+def test_a_folder_without_runs_says_how_to_make_one(run, tmp_path):
+    code, out, _ = run("ls", "runs", tmp_path)
+    assert code == 0
+    assert "infthor-eval --model MODEL --tasks TASKS makes one" in out
+    said_in_one_line(run("ls", "runs", tmp_path / "no"), "no: no such folder")
+
+
+def test_bare_ls_says_what_can_be_listed(run):
+    code, out, _ = run("ls")
+    assert code == 0
+    assert all(name in out for name in ("models", "tasks", "scenes", "runs"))

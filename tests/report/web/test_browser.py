@@ -1,0 +1,124 @@
+"""The page in a real browser, from its file: it opens, filters work, pictures load, hostile text stays text."""
+
+import msgspec
+import pytest
+
+from infthor_eval.formats.packaged import packaged_folder
+
+from .conftest import HOSTILE
+
+DATA = packaged_folder("sets/nieh_mini")
+
+
+@pytest.fixture(scope="module")
+def page(make_page, nieh_runs):
+    return make_page(*nieh_runs, data=DATA)
+
+
+def count(tab):
+    return tab.locator("#count").inner_text()
+
+
+def test_it_opens_without_errors_and_fetches_nothing(page, opened):
+    found = opened(page)
+    assert count(found.tab) == f"{len(page.samples)} of {len(page.samples)}"
+    assert found.tab.locator("#sample h3").inner_text() == page.samples[0].title
+    assert found.tab.locator("figure.chart svg").count() == sum(len(section.charts) for section in page.sections)
+    assert found.errors == []
+    assert all(url.startswith(("file:", "data:")) for url in found.requests)
+
+
+def test_filters_show_what_they_say(page, opened):
+    tab = opened(page).tab
+    blind = next(at for at, run in enumerate(page.runs) if run.label == "blind")
+    tab.select_option("#run", label="blind")
+    tab.select_option("#outcome", "wrong")
+    wrong = [sample for sample in page.samples if sample.results[blind].outcome == "wrong"]
+    assert count(tab) == f"{len(wrong)} of {len(page.samples)}"
+    assert tab.locator("#sample h3").inner_text() == wrong[0].title
+    tab.keyboard.press("Escape")
+    tab.wait_for_function(
+        "document.getElementById('count').textContent.startsWith(" + repr(f"{len(page.samples)} of") + ")"
+    )
+    tab.check("#disagree")
+    disagreed = sum(any(len(set(it.scores.values())) > 1 for it in sample.results) for sample in page.samples)
+    assert count(tab).startswith(f"{disagreed} of")
+    tab.uncheck("#disagree")
+    tab.check("#differ")
+    differ = sum(len({it.outcome for it in sample.results}) > 1 for sample in page.samples)
+    assert count(tab).startswith(f"{differ} of")
+    tab.fill("#search", page.samples[3].title)
+    assert tab.locator(".item").count() >= 1
+    assert tab.locator("#sample h3").inner_text() == page.samples[3].title
+
+
+def test_pictures_of_a_sample_load(page, opened):
+    tab = opened(page).tab
+    tab.locator("#sample").scroll_into_view_if_needed()
+    tab.eval_on_selector_all("#sample img", "them => Promise.all(them.map(it => it.decode())).then(() => true)")
+    widths = tab.eval_on_selector_all("#sample img", "them => them.map(it => it.naturalWidth)")
+    assert len(widths) == len(page.samples[0].timeline.frames)
+    assert all(width > 100 for width in widths)
+
+
+def test_keys_go_through_the_samples(page, opened):
+    found = opened(page)
+    for key, place in (("j", 1), ("j", 2), ("k", 1)):
+        found.tab.keyboard.press(key)
+        assert found.tab.locator('[aria-selected="true"]').get_attribute("data-place") == str(place)
+        assert found.tab.locator("#sample h3").inner_text() == page.samples[place].title
+    found.tab.keyboard.press("/")
+    found.tab.keyboard.type("jk")  # letters of a search, not keys
+    assert found.tab.input_value("#search") == "jk"
+    found.tab.keyboard.press("Escape")
+    found.tab.keyboard.press("t")
+    assert found.tab.evaluate("document.documentElement.dataset.theme") == "dark"
+    assert found.errors == []
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_text_can_be_read_in_both_schemes(page, opened, scheme):
+    tab = opened(page, color_scheme=scheme).tab
+    ink, paper = (
+        tab.evaluate(f"getComputedStyle(document.body).{name}").removeprefix("rgb(").split(",")[0]
+        for name in ("color", "backgroundColor")
+    )
+    assert (int(ink) > 200, int(paper) < 60) == ((True, True) if scheme == "dark" else (False, False))
+    in_chart = tab.evaluate("getComputedStyle(document.querySelector('figure.chart svg text')).fill")
+    assert in_chart == tab.evaluate("getComputedStyle(document.body).color")
+
+
+def test_hostile_text_stays_text(page, opened):
+    sample = page.samples[0]
+    results = tuple(msgspec.structs.replace(it, said=HOSTILE, why=HOSTILE, faults=(HOSTILE,)) for it in sample.results)
+    hostile = msgspec.structs.replace(
+        sample, title=HOSTILE, wanted=HOSTILE, kind=HOSTILE, cluster=HOSTILE, variant=HOSTILE, results=results
+    )
+    runs = [page.runs[0].__class__(HOSTILE, ((HOSTILE, HOSTILE),), HOSTILE, HOSTILE) for _ in page.runs]
+    found = opened(page.__class__(**(vars(page) | {"samples": [hostile], "runs": runs, "title": HOSTILE})))
+    assert found.tab.locator("#sample h3").inner_text().startswith("</script><img")
+    assert found.tab.evaluate("window.hacked") is None
+    assert found.tab.locator("#sample img[onerror], #list img, main img[src=x]").count() == 0
+    assert found.errors == []
+
+
+def test_an_episode_has_its_steps_and_its_map(make_page, scripted_run, opened):
+    page = make_page(scripted_run, data=DATA, episodes=2)
+    found = opened(page)
+    place = next(at for at, sample in enumerate(page.samples) if sample.results[0].map is not None)
+    for _ in range(place):
+        found.tab.keyboard.press("j")
+    steps = page.samples[place].results[0].steps
+    assert found.tab.locator(".steps tbody tr").count() == len(steps) + 1
+    assert found.tab.locator("img.map").evaluate("it => it.naturalWidth") == 300
+    assert found.errors == []
+
+
+def test_many_samples_are_put_into_the_list_as_it_is_scrolled(page, opened):
+    many = page.__class__(**(vars(page) | {"samples": list(page.samples) * 10}))
+    tab = opened(many).tab
+    assert tab.locator(".item").count() < len(many.samples)
+    for _ in range(3):
+        tab.locator("#list").evaluate("it => it.scrollTo(0, it.scrollHeight)")
+        tab.wait_for_timeout(100)
+    assert tab.locator(".item").count() > 240

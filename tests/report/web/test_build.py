@@ -1,0 +1,107 @@
+"""What stands on the page of real runs."""
+
+import json
+import shutil
+
+import pytest
+
+from infthor_eval.formats.packaged import packaged_folder
+from infthor_eval.nieh.samples import open_set
+
+DATA = packaged_folder("sets/nieh_mini")
+
+
+@pytest.fixture(scope="module")
+def page(make_page, nieh_runs):
+    return make_page(*nieh_runs, data=DATA)
+
+
+def test_every_sample_of_every_run_is_there_with_its_frames(page, nieh_runs):
+    questions = {question.id: question for question in open_set(str(DATA)).questions}
+    asked = [sample for sample in page.samples if sample.task == "nieh_mini_gt"]
+    assert {sample.id for sample in asked} == set(questions)
+    assert len(page.samples) > len(asked)  # the haystack's too, at each depth
+    for sample in page.samples:
+        question = questions[sample.id]
+        assert (sample.title, len(sample.results)) == (question.text, len(nieh_runs))
+        clues = {frame.at for frame in sample.timeline.frames if frame.is_clue}
+        assert clues == set(question.clues)
+        assert all(frame.picture is not None for frame in sample.timeline.frames)
+        beside = {near for at in clues for near in (at - 1, at + 1) if 0 <= near < sample.timeline.n_frames}
+        assert {frame.at for frame in sample.timeline.frames} >= beside
+
+
+def test_outcomes_are_what_the_strict_scorer_says(page):
+    place = next(at for at, run in enumerate(page.runs) if run.label == "oracle")
+    assert {sample.results[place].outcome for sample in page.samples} == {"right"}
+    other = 1 - place
+    for sample in page.samples:
+        result = sample.results[other]
+        score = result.scores["strict"]
+        assert result.outcome == ("right" if score >= 1 else "partly" if score else "wrong")
+
+
+def test_the_sections_have_their_pictures_and_tables(page):
+    sections = {section.key: section for section in page.sections}
+    assert list(sections) == ["results", "nieh", "comparison", "cost", "left-out"]
+    titles = [chart.title for chart in sections["nieh"].charts]
+    assert "nieh_mini_gt: accuracy by number of clues" in titles
+    assert "oracle: accuracy by depth and size of the context" in titles
+    assert all(chart.svg.startswith("<svg") and "viewBox" in chart.svg for chart in sections["nieh"].charts)
+    assert any("Table 4" in row.cells[1] for table in sections["nieh"].tables for row in table.rows if row.is_published)
+    headline = {row.cells[:2]: row.cells[3] for row in sections["results"].tables[0].rows}
+    assert headline["oracle", "nieh_mini_gt"] == "100.0"
+
+
+def test_frames_that_there_is_no_room_for_are_counted_and_clues_come_first(make_page, nieh_runs):
+    page = make_page(nieh_runs[0], data=DATA, pictures=100_000)
+    assert sum(map(len, page.pictures)) <= 100_000
+    assert any("pictures left out" in note for note in page.notes)
+    frames = [(sample.cluster, frame) for sample in page.samples for frame in sample.timeline.frames]
+    clues = {(trajectory, frame.at) for trajectory, frame in frames if frame.is_clue}
+    pictured = {(trajectory, frame.at) for trajectory, frame in frames if frame.picture is not None}
+    assert pictured < clues
+
+
+def test_without_its_set_or_with_another_one_there_are_no_frames_and_it_is_said(
+    make_page, nieh_runs, make_nieh_set, tmp_path
+):
+    page = make_page(nieh_runs[0], data=make_nieh_set())
+    assert any("is not what it was" in note for note in page.notes)
+    haystack = [sample for sample in page.samples if sample.task != "nieh_mini_gt"]
+    assert haystack
+    assert all(sample.timeline is None for sample in haystack)
+
+
+def test_a_run_that_was_stopped_and_has_failures_says_so(make_page, nieh_runs, tmp_path):
+    copy = tmp_path / "stopped"
+    shutil.copytree(nieh_runs[0], copy)
+    (journal,) = (copy / "journal").glob("*.jsonl")
+    lines = journal.read_text().splitlines()
+    record = json.loads(lines[1])
+    record["failure"] = "the frame is gone"
+    record["payload"].pop("reply", None)
+    record["payload"].pop("scores", None)
+    journal.write_text("\n".join([lines[0], json.dumps(record), *lines[2:-3]]) + "\n")
+    results = json.loads((copy / "results.json").read_text())
+    (copy / "results.json").write_text(json.dumps(results | {"n_missing": 3}))
+    page = make_page(copy)
+    (table,) = next(section.tables for section in page.sections if section.key == "left-out")
+    told = {row.cells[2]: row.cells[3:] for row in table.rows}
+    assert told["failed"] == ("1", "the frame is gone")
+    assert told["not come to"][0] == "3"
+    assert sum(sample.results[0].outcome == "failed" for sample in page.samples) == 1
+
+
+def test_plans_have_their_steps_and_what_was_seen(make_page, scripted_run):
+    page = make_page(scripted_run, data=DATA, episodes=3)
+    assert {section.key for section in page.sections} >= {"results", "plans", "rewards-infthor_plans", "cost"}
+    seen = [sample for sample in page.samples if sample.results[0].map is not None]
+    assert len(seen) == 3
+    for sample in seen:
+        result = sample.results[0]
+        assert result.first is not None
+        assert all(step.picture is not None for step in result.steps)
+        assert not result.note  # it went as it was recorded
+    unseen = next(sample for sample in page.samples if sample.results[0].steps and sample not in seen)
+    assert unseen.results[0].steps[0].action
