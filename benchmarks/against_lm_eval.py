@@ -31,6 +31,8 @@ def main() -> None:
     parser.add_argument("--frames", type=int, default=120)
     parser.add_argument("--questions", type=int, default=24)
     chosen = parser.parse_args()
+    if not PEERS.is_dir():
+        sys.exit(f"{PEERS}: no torchvision, which lm-eval's model needs; run `make test` once, which puts it there")
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         save_tiny_checkpoint(folder / "checkpoint", seed=0)

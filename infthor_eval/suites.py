@@ -107,8 +107,8 @@ def baseline_names() -> dict[str, str]:
     """The baselines of all suites, each with the suites that have it, in words."""
     found: dict[str, list[str]] = {}
     for name in suite_names():
-        named = _target(name).baselines
-        for baseline in suite_named(name).baselines if named is None else named:
+        told = _target(name).baselines
+        for baseline in suite_named(name).baselines if told is None else told:
             found.setdefault(baseline, []).append(name)
     return {baseline: ", ".join(names) for baseline, names in found.items()}
 
@@ -126,7 +126,7 @@ def _entry_points() -> dict[str, EntryPoint]:
 
 
 def _target(name: str) -> _Target:
-    """Where a suite is; other packages are looked at for suites of theirs alone, as that takes time."""
+    """Where a suite is found; other packages are looked at for theirs alone, as that takes time."""
     if name in _BUILT_IN:
         return _BUILT_IN[name]
     value = _entry_points()[name].value

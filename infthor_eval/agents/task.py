@@ -13,6 +13,7 @@ from infthor_eval.agents.rewards import RewardRules, reward_rules
 from infthor_eval.agents.trajectories import Course, Courses, find_courses
 from infthor_eval.runs import TaskFile, TaskRequest
 from infthor_eval.runs.generation_kwargs import decoding_of
+from infthor_eval.runs.limiting import limited
 from infthor_eval.runs.task_settings import task_settings
 from model_adapters import Decoding
 
@@ -66,13 +67,13 @@ class PlansTask:
         self.memory: Memory = memory_named(self.settings.history, self._options.retriever)
         data = str(request.data) if request.data is not None else None
         self.courses: Courses = find_courses(data, self.settings.bundled)
-        self._limit = request.limit
+        self._limit, self._seed = request.limit, request.seed
 
     @property
     def limited(self) -> list[Course]:
         """The trajectories that are gone through."""
         having = [course for course in self.courses.found if self.plans(course)]
-        return having[: self._limit]
+        return limited(having, lambda course: course.traj_id, self._seed, self._limit)
 
     def plans(self, course: Course) -> list[Plan]:
         """The plans of a trajectory that are evaluated."""

@@ -34,6 +34,7 @@ _COMMANDS = {
     "watch": "Show what was done in a run of plans or of arms, as MP4 or GIF.",
     "ls": "List the models, the tasks, the scenes, or the runs in a folder.",
     "show": "Print the results of runs again, or write them as CSV, LaTeX, Markdown or JSON.",
+    "doctor": "Look at what this machine has, and tell what to do where something is missing.",
     "scenes": "Look at a scene, or carry it to machines without Unity.",
     "generate": "Make long-horizon trajectories in a scene.",
     "replay": "Replay trajectories in the simulator into frames and metadata.",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -13,6 +13,8 @@ from infthor_eval.cli.options import LARGEST
 
 if TYPE_CHECKING:
     from infthor_eval.curves import RewardCurves
+    from infthor_eval.report.web.episode_samples import Opener
+    from infthor_eval.report.web.runs import ReportRun
     from infthor_eval.runs import RunHeader
     from infthor_eval.tables import Table
 
@@ -114,9 +116,18 @@ def _write(runs: tuple[Path, ...], out: Path, data: Path | None, scenes: Path | 
     path = prepared_file(out)
     found = read_report_runs(runs, suite_named)
     with error_console().status("making the page"):
-        page = build_page(found, Wanted(data, scenes, episodes))
+        page = build_page(found, Wanted(data, _stages(found, scenes, episodes), episodes))
     size = write_page(page, path)
     tell(f"{len(page.samples):,} samples, {len(page.pictures):,} pictures, {size / 1e6:.1f} MB: {path}")
+
+
+def _stages(runs: Sequence[ReportRun], scenes: Path | None, episodes: int) -> Mapping[str, Opener]:
+    """None where nothing is carried out again: they bring the simulator's client with them."""
+    if not episodes or all(run.suite.name == "nieh" for run in runs):
+        return {}
+    from infthor_eval.cli.reported_episodes import stages
+
+    return stages(scenes)
 
 
 def _draw(asked: _Asked, figure: str, out: Path) -> None:

@@ -66,7 +66,13 @@ _OPTIONS = (
         help="Nor once it has cost so much, by the prices in --model-args.",
     ),
     click.option("--name", help="What the run is called in tables and folders; else by its checkpoint, or its model."),
-    click.option("--limit", type=click.IntRange(1, LARGEST), help="Ask only the first N questions of each task."),
+    click.option(
+        "--limit",
+        type=click.IntRange(1, LARGEST),
+        metavar="N",
+        help="Ask only N of each task (questions, trajectories of plans, episodes of arms), evenly from all "
+        "trajectories, drawn by --seed; a larger N asks these too. lm-eval's own command takes the first N instead.",
+    ),
     click.option(
         "--output",
         type=click.Path(path_type=Path),

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 __all__ = ["command"]
 
 _PATH = click.Path(path_type=Path)
+_GPUS, _TFLOPS = 8, 400.0
 
 
 @click.command("train")
@@ -34,15 +35,11 @@ _PATH = click.Path(path_type=Path)
 @click.option("--set", "changes", multiple=True, metavar="KEY=VALUE", help="Another setting of the recipe; repeatable.")
 @click.option("--out", required=True, type=_PATH, help="Folder of the run; the checkpoint is in checkpoint/ there.")
 @click.option("--dry-run", is_flag=True, help="Tell what the sequences are and what the run would take; train nothing.")
-@click.option(
-    "--gpus", type=click.IntRange(1), default=8, show_default=True, metavar="N", help="Of the machine, for --dry-run."
-)
+@click.option("--gpus", type=click.IntRange(1), metavar="N", help=f"Of the machine, for --dry-run.  [default: {_GPUS}]")
 @click.option(
     "--tflops",
     type=FiniteRange(min=0, min_open=True),
-    default=400.0,
-    show_default=True,
-    help="That one of them reaches, for --dry-run (an H100 has 989 in bfloat16).",
+    help=f"That one of them reaches, for --dry-run (an H100 has 989 in bfloat16).  [default: {_TFLOPS:g}]",
 )
 @staffing_options
 def command(
@@ -53,8 +50,8 @@ def command(
     changes: tuple[str, ...],
     out: Path,
     dry_run: bool,
-    gpus: int,
-    tflops: float,
+    gpus: int | None,
+    tflops: float | None,
     staffing: Staffing,
 ) -> int:
     """Fine-tune a model, and write a checkpoint that its family's adapter loads.
@@ -62,7 +59,7 @@ def command(
     Recipes of the package: infthor_32k, infthor_64k and infthor_130k (the paper's, Table 5), questions, and tiny, which
     makes a small model from nothing. Others are YAML files of the same form.
 
-    Stopped, the same command goes on (tiny keeps its data and learns anew). Workers share the making of data.
+    Stopped, the same command goes on (tiny keeps its data and learns anew). Workers share the making of its data.
     Several processes: torchrun --nproc-per-node N --no-python infthor-eval train ...
     """
     from infthor_eval.training.nano.settings import NanoRecipe
@@ -72,6 +69,13 @@ def command(
     told |= {} if model is None else {"model": model}
     told |= {f"model_args.{key}": value for key, value in model_options_in(model_args or "").items()}
     recipe = read_recipe(name, told)
+    if not dry_run and (gpus is not None or tflops is not None):
+        raise click.UsageError("--gpus and --tflops are what --dry-run reckons with; give it, or leave them out")
+    if not staffing.alone and (folders or not isinstance(recipe, NanoRecipe)):
+        raise click.UsageError(
+            "--workers and --ray-address share the making of data, which only the recipe tiny without --data does; "
+            "leave them out, and train in several processes with torchrun"
+        )
     if isinstance(recipe, NanoRecipe):
         from infthor_eval.cli.nano_training import train_nano
 
@@ -82,7 +86,7 @@ def command(
 
     if not folders:
         raise click.UsageError("give --data, a replayed set to train on")
-    return train(recipe, folders, out, Machine(gpus, tflops) if dry_run else None)
+    return train(recipe, folders, out, Machine(gpus or _GPUS, tflops or _TFLOPS) if dry_run else None)
 
 
 def _setting(item: str) -> tuple[str, str]:

@@ -15,6 +15,7 @@ from infthor_eval.manipulation.history import Errand, errands_of
 from infthor_eval.manipulation.kinds import SHORT, ErrandKind
 from infthor_eval.manipulation.options import RADII, ManipulationOptions
 from infthor_eval.runs import TaskFile, TaskRequest
+from infthor_eval.runs.limiting import limited
 from infthor_eval.runs.task_settings import task_settings
 
 __all__ = ["ArmCourse", "ManipulationTask", "TaskSettings"]
@@ -117,7 +118,8 @@ class ManipulationTask:
         data = str(request.data) if request.data is not None else None
         self.courses: TrajectorySet[ArmCourse] = find_trajectories(data, self.settings.bundled, _course)
         every = [(course, errand) for course in self.courses.found for errand in course.errands]
-        self.episodes = [(course, errand) for course, errand in every if errand.kind == self.kind][: request.limit]
+        of_kind = [(course, errand) for course, errand in every if errand.kind == self.kind]
+        self.episodes = limited(of_kind, lambda episode: episode[0].traj_id, request.seed, request.limit)
         if not self.episodes:
             raise UsageError(f"{self.name}: no trajectory there has a {SHORT[self.kind]}")
 

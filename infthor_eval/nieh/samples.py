@@ -1,6 +1,6 @@
 """What a task asks: every question of its set in every way its context knows, and what cannot be asked."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -14,6 +14,7 @@ from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.formats.question import Question
 from infthor_eval.nieh.contexts import Context, ContextPart, ContextSettings, Sample, context_named
 from infthor_eval.nieh.stand_ins import StandIns
+from infthor_eval.runs.limiting import spread
 
 __all__ = ["TaskSamples", "find_samples", "find_set", "open_set"]
 
@@ -81,7 +82,7 @@ def find_samples(config: Mapping[str, Any], limit: int | None = None) -> TaskSam
     Args:
         config: `dataset_kwargs` of the task file and what the run tells beside it: the name of the context, what
             `find_set` takes, and the context's settings (`infthor_eval.nieh.contexts.ContextSettings`).
-        limit: stop behind the first so many questions that can be asked.
+        limit: ask only so many questions, evenly from all trajectories, drawn by the seed; None asks all.
 
     Raises:
         UsageError: there is no set, the context is unknown or lacks a setting, or the set has no such stand-ins.
@@ -90,30 +91,38 @@ def find_samples(config: Mapping[str, Any], limit: int | None = None) -> TaskSam
     context, settings, data = context_named(config["context"]), ContextSettings.read(config), find_set(**config)
     stand_ins = StandIns(settings.frames, settings.seed)
     stand_ins.check(data)
-    samples: list[Sample] = []
-    skipped: list[SkippedQuestion] = []
-    for n_asked, found in enumerate(_asked(_by_question(data, context, settings)), 1):
-        samples += [item for item in found if isinstance(item, Sample)]
-        skipped += [item for item in found if isinstance(item, SkippedQuestion)]
-        if n_asked == limit:
-            break
+    found = [item for items in _by_question(data, context, settings, limit) for item in items]
+    samples = [item for item in found if isinstance(item, Sample)]
+    skipped = [item for item in found if isinstance(item, SkippedQuestion)]
     return TaskSamples(data, config["context"], context, samples, skipped, context.sources(data, settings), stand_ins)
 
 
 _Found = list[Sample | SkippedQuestion]
 
 
-def _by_question(data: NiehSet, context: Context, settings: ContextSettings) -> Iterator[_Found]:
-    """What comes of each question."""
+def _by_question(data: NiehSet, context: Context, settings: ContextSettings, limit: int | None) -> list[_Found]:
+    """What comes of each question, in the order of the set; with a limit, of those that were looked at to reach it."""
     problems: dict[FrameRef, str | None] = {}
 
     def checked(sample: Sample) -> Sample | SkippedQuestion:
         problem = _problem(context.shown(data, sample), problems)
         return SkippedQuestion(sample.question, problem, sample.variant) if problem else sample
 
-    for row in data.rows:
+    places = range(len(data.rows)) if limit is None else spread(data.rows, _trajectory_of, settings.seed)
+    by_place: dict[int, _Found] = {}
+    n_asked = 0
+    for place in places:
+        row = data.rows[place]
         found = _samples(context, data, row, settings) if isinstance(row, Question) else [row]
-        yield [checked(item) if isinstance(item, Sample) else item for item in found]
+        by_place[place] = [checked(item) if isinstance(item, Sample) else item for item in found]
+        n_asked += any(isinstance(item, Sample) for item in by_place[place])
+        if n_asked == limit:
+            break
+    return [by_place[place] for place in sorted(by_place)]
+
+
+def _trajectory_of(row: Question | SkippedQuestion) -> str:
+    return row.traj_id if isinstance(row, Question) else row.question.traj_id
 
 
 def _samples(context: Context, data: NiehSet, question: Question, settings: ContextSettings) -> _Found:
@@ -121,18 +130,6 @@ def _samples(context: Context, data: NiehSet, question: Question, settings: Cont
         return context.samples(data, question, settings)
     except DataError as error:  # of this trajectory's frames; the others can be asked about
         return [SkippedQuestion(question, str(error))]
-
-
-def _asked(questions: Iterator[_Found]) -> Iterator[_Found]:
-    """Questions that can be asked, each with those before it that cannot; at the end those that are left."""
-    waiting: _Found = []
-    for found in questions:
-        waiting += found
-        if any(isinstance(item, Sample) for item in found):
-            yield waiting
-            waiting = []
-    if waiting:
-        yield waiting
 
 
 def _problem(frames: list[FrameRef], known: dict[FrameRef, str | None]) -> str | None:

@@ -11,7 +11,7 @@ from infthor_eval.runs.crew import Crew
 from infthor_eval.runs.journal import Journal
 from infthor_eval.runs.records import RunHeader, UnitRecord
 from infthor_eval.runs.request import PreparedRun
-from infthor_eval.runs.results import results_document, write_results, write_took
+from infthor_eval.runs.results import results_document, write_results, write_scores, write_took
 from infthor_eval.runs.staff import Alone, View
 from infthor_eval.runs.suite import RunSummary, Workload
 from infthor_eval.runs.usage import Usage
@@ -77,7 +77,8 @@ def execute(
     """Load the model, do what the journal does not hold yet, and write the results.
 
     The folder `<output>/<name>/<tasks>-<identity>/` holds the journal, `run.yaml` (how it was asked for),
-    `results.json` (what it found, equal for equal runs) and `took.json` (what it took).
+    `results.json` (what it found) and `scores.jsonl` (of every unit), equal for equal runs, and `took.json` (what it
+    took).
 
     Args:
         run: what `prepare` found.
@@ -120,6 +121,7 @@ def _found(run: PreparedRun, folder: Path, header: RunHeader, workload: Workload
     n_missing = workload.n_units - len(records)
     usage = Usage.total([record.usage for record in records] + [memo.usage for memo in journal.memos])
     write_results(folder, results_document(summary, run.suite, n_missing, usage))
+    write_scores(folder, run.suite, records)
     write_took(folder, records, usage)
     return RunOutcome(folder, run, summary, records, n_missing, usage, run.evaluation.view)
 

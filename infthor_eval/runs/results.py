@@ -1,7 +1,8 @@
 """The files that a run leaves beside its journal: what it found, and what it took."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +14,10 @@ from infthor_eval.runs.records import UnitRecord
 from infthor_eval.runs.suite import RunSummary, Suite
 from infthor_eval.runs.usage import Usage
 
-__all__ = ["RESULTS", "results_document", "write_results", "write_took"]
+__all__ = ["RESULTS", "results_document", "write_results", "write_scores", "write_took"]
 
 RESULTS = "results.json"
+_SCORES = "scores.jsonl"
 _TOOK = "took.json"
 
 
@@ -54,6 +56,33 @@ def write_results(folder: Path, document: dict[str, Any]) -> None:
     _write(folder / RESULTS, document)
 
 
+def write_scores(folder: Path, suite: Suite, records: Sequence[UnitRecord[Any]]) -> None:
+    """Write the scores of every unit, a JSON object a line; equal runs give equal bytes.
+
+    Args:
+        folder: the run's.
+        suite: that scores.
+        records: of the run's units.
+
+    Raises:
+        DataError: it cannot be written.
+    """
+    rows = (
+        {
+            "task": record.task,
+            "id": record.id,
+            "variant": record.variant,
+            "cluster": record.cluster,
+            "scores": suite.scores(record),
+            "failure": record.failure,
+            "excluded": record.excluded,
+        }
+        for record in records
+    )
+    with _written(folder / _SCORES) as partial:
+        partial.write_bytes(b"".join(msgspec.json.encode(row) + b"\n" for row in rows))
+
+
 def write_took(folder: Path, records: Sequence[UnitRecord[Any]], usage: Usage) -> None:
     """Write what a run took, which differs from run to run.
 
@@ -78,9 +107,15 @@ def write_took(folder: Path, records: Sequence[UnitRecord[Any]], usage: Usage) -
 
 
 def _write(path: Path, document: dict[str, Any]) -> None:
+    with _written(path) as partial:
+        encoded = msgspec.json.encode(document, order="sorted")
+        partial.write_bytes(msgspec.json.format(encoded, indent=2) + b"\n")
+
+
+@contextmanager
+def _written(path: Path) -> Iterator[Path]:
     with (
         naming(f"{path}: cannot be written", "make room, the journal holds it all"),
         written_atomically(path) as partial,
     ):
-        encoded = msgspec.json.encode(document, order="sorted")
-        partial.write_bytes(msgspec.json.format(encoded, indent=2) + b"\n")
+        yield partial

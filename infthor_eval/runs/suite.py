@@ -43,7 +43,7 @@ class TaskRequest:
         tasks: the task files, all of this suite.
         options: an instance of the suite's `Options`.
         data: folder of the data set for tasks that do not bring their own.
-        limit: evaluate only the first so many items of each task.
+        limit: evaluate only so many items of each task; which, `infthor_eval.runs.limiting` says.
         seed: for whatever is random.
     """
 

@@ -118,6 +118,14 @@ TYPED = [
     (["validate", "SET", "--models", "oracle", "--out", "SET"], "is the set itself"),
     (["validate", "SET", "--models", "oracle", "--out", "OUT", "--decisions", "file"], "no column question_id"),
     (["validate", "SET", "--models", "a:x=1,oracle,a:x=1", "--out", "OUT"], "--models a: 'x' is given twice"),
+    (
+        ["train", "--recipe", "infthor_32k", "--data", "SET", "--out", "OUT", "--gpus", 4],
+        "--gpus and --tflops are what --dry-run reckons with; give it",
+    ),
+    (
+        ["train", "--recipe", "questions", "--data", "SET", "--out", "OUT", "--workers", 2],
+        "share the making of data, which only the recipe tiny without --data does",
+    ),
     (["bundle", "file", "--out", "OUT"], "not in its documented form"),
     (
         ["validate", "nowhere", "--models", "oracle", "--out", "OUT"],

@@ -1,3 +1,4 @@
+import itertools
 import json
 from collections import Counter
 
@@ -267,17 +268,29 @@ def test_the_limit_is_of_questions_that_can_be_asked_with_all_their_variants(mak
             [skipped.question.text for skipped in samples.skipped],
         )
 
-    assert found(1) == (["4"] * 5, [outside[0].text])
-    assert found(2) == (["4"] * 5 + ["5"] * 5, [outside[0].text])
-    assert found(3) == (["4"] * 5 + ["5"] * 5 + ["6"] * 5, [outside[0].text, outside[1].text])
+    taken = [found(limit) for limit in (1, 2, 3, 4, 9, None)]
+    for limit, (shown, _) in enumerate(taken[:4], 1):
+        assert shown == [digit for digit in sorted(set(shown)) for _ in range(5)]
+        assert len(set(shown)) == limit
+    for (few, few_left_out), (more, more_left_out) in itertools.pairwise(taken):
+        assert set(few) <= set(more)
+        assert set(few_left_out) <= set(more_left_out)
     assert (
-        found(None)
-        == found(9)
+        taken[-1]
+        == taken[-2]
         == (
             [digit for digit in "4567" for _ in range(5)],
             [question.text for question in outside],
         )
     )
+
+
+def test_the_limit_takes_from_all_trajectories(make_nieh_set):
+    questions = [Question(t, f"Is there a mug {n}?", (1,), ("yes",)) for t in ("a", "b", "c") for n in range(9)]
+    root = make_nieh_set(questions, size=56)
+    asked = [find_samples({"context": "clues", "data": str(root), "seed": seed}, 4).samples for seed in (0, 0, 1)]
+    assert {sample.question.traj_id for sample in asked[0]} == {"a", "b", "c"}
+    assert asked[0] == asked[1] != asked[2]
 
 
 def test_baselines_answer_the_same_whatever_runs_beside_them(prepared, make_nieh_set, task_files):

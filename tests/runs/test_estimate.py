@@ -91,7 +91,7 @@ def test_where_every_unit_fails_nothing_is_told(tmp_path, capfd):
 
 def test_the_command_prints_units_tokens_time_memory_and_money(run, tmp_path):
     words = ("--model", "qwen2.5-vl-tiny", "--tasks", "nieh_mini_gt", "--output", tmp_path / "out", "--workers", 2)
-    code, said, err = run("plan", *words, "--measure", 3, "--price-per-hour", 2.5, "--limit", 6)
+    code, said, err = run("plan", *words, "--measure", 9, "--price-per-hour", 2.5, "--limit", 6)
     assert code == 0, err
     (row,) = [line.split() for line in said.splitlines() if line.startswith("  nieh_mini_gt")]
     assert (row[1], row[2], row[4]) == ("6", "3", "6")

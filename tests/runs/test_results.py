@@ -55,6 +55,24 @@ def test_what_was_taken_is_written_as_it_is(tmp_path: Any) -> None:
     }
 
 
+def test_the_scores_of_every_unit_stand_in_a_file(tmp_path: Any) -> None:
+    folder = execute(prepare(request(tmp_path), ToySuite())).folder
+    rows = [json.loads(line) for line in (folder / "scores.jsonl").read_text().splitlines()]
+    assert [row["id"] for row in rows] == ["1+3", "1+4", "2+3", "2+4"]
+    assert rows[0] == {
+        **{"task": "sums", "id": "1+3", "variant": "", "cluster": "from 1"},
+        **{"scores": {"right": 1.0}, "failure": None, "excluded": None},
+    }
+    assert rows[2]["failure"] == "the abacus is broken"
+
+
+def test_what_a_task_is_known_by_stands_in_the_results(tmp_path: Any) -> None:
+    folder = execute(prepare(request(tmp_path), ToySuite())).folder
+    assert json.loads((folder / "results.json").read_text())["headline"] == {
+        "sums": {"mean": 0.5, "low": None, "high": None, "n": 4}
+    }
+
+
 def test_a_run_writes_both_and_results_have_nothing_that_differs(tmp_path: Any) -> None:
     suite = ToySuite()
     outcome = execute(prepare(request(tmp_path), suite))

@@ -1,21 +1,22 @@
 """From runs to the page: which sections there are, and which samples."""
 
 import json
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from itertools import combinations
 from pathlib import Path
 
 import infthor_eval
 from infthor_eval.errors import DataError
 from infthor_eval.report.comparison import compare, comparison_table
-from infthor_eval.report.web.arm_samples import arm_samples
+from infthor_eval.report.web.arm_samples import ERRANDS
 from infthor_eval.report.web.episode_charts import arm_sections, plan_sections
+from infthor_eval.report.web.episode_samples import Opener, episode_samples
 from infthor_eval.report.web.headlines import headline_table, left_out_table, took_table
 from infthor_eval.report.web.nieh_charts import nieh_charts
 from infthor_eval.report.web.nieh_samples import nieh_samples
 from infthor_eval.report.web.page import About, Page
-from infthor_eval.report.web.plan_samples import plan_samples
+from infthor_eval.report.web.plan_samples import PLANS
 from infthor_eval.report.web.runs import ReportRun
 from infthor_eval.report.web.samples import Sample
 from infthor_eval.report.web.sections import Section
@@ -34,13 +35,13 @@ class Wanted:
 
     Attributes:
         data: folder of the questions' set, or of the trajectories, where runs do not tell; None asks them.
-        scenes: folder with recorded floor plans, for episodes.
-        episodes: of each run that are carried out again, to be seen.
+        stages: on which episodes are carried out again, by suite; of another suite nothing is shown that was seen.
+        episodes: of each run that are carried out again.
         pictures: bytes of all pictures together.
     """
 
     data: Path | None = None
-    scenes: Path | None = None
+    stages: Mapping[str, Opener] = field(default_factory=dict)
     episodes: int = 12
     pictures: int = 15_000_000
 
@@ -130,10 +131,10 @@ def _samples_of(
 ) -> tuple[list[Sample], list[str]]:
     if suite == "nieh":
         return nieh_samples(runs, wanted.data, thumbnails)
-    of_suite = {"plans": plan_samples, "manipulation": arm_samples}.get(suite)
-    if of_suite is None:  # of another package
+    kind = {"plans": PLANS, "manipulation": ERRANDS}.get(suite)
+    if kind is None:  # of another package
         return [], [f"samples of {suite} are not shown: how is not known here"]
-    return of_suite(runs, wanted.data, wanted.scenes, wanted.episodes, thumbnails)
+    return episode_samples(runs, kind, wanted.stages.get(suite), wanted.data, wanted.episodes, thumbnails)
 
 
 def _metrics(samples: Sequence[Sample]) -> list[str]:

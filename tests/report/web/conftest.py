@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from infthor_eval.cli import main
+from infthor_eval.cli.reported_episodes import stages
 from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.report.web.build import Wanted, build_page
 from infthor_eval.report.web.page import Page, write_page
@@ -35,7 +36,7 @@ def make_page() -> Callable[..., Page]:
     """The page of runs in some folders."""
 
     def make(*folders: Path, **wanted: Any) -> Page:
-        return build_page(read_report_runs(folders, suite_named), Wanted(**wanted))
+        return build_page(read_report_runs(folders, suite_named), Wanted(stages=stages(None), **wanted))
 
     return make
 
