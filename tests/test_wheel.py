@@ -73,7 +73,7 @@ def test_what_runs_is_the_installed_code(installed, tmp_path):
 
 def test_it_runs_in_an_empty_folder(command, tmp_path):
     assert "nieh_haystack_128k" in command("ls", "tasks")
-    asked = ("--model", "blind,oracle,qwen2.5-vl-nano", "--tasks", "nieh_mini_gt", "--limit", "20")
+    asked = ("--model", "blind,oracle,qwen2.5-vl-nano", "--tasks", "nieh_mini_gt", "--limit", "20", "--full")
     table = command(*asked)
     assert "Qwen2.5-VL 7B" in table  # the published numbers came with it
     assert [path.name for path in tmp_path.iterdir()] == ["results"]

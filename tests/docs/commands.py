@@ -18,6 +18,7 @@ CANNOT_RUN = {
     r"/RUN\b|-ID\b|RUN\.\.\.": "names a run of the reader's",
     r"DATA\b|FOLDER|FloorPlan": FLOOR_PLANS,
     r"--data (DIR|TRAJECTORIES|trajectories) |--unity|--simulator unity": "needs Unity, or data of the reader's",
+    r"report results/\*/nieh_mini-\*|ls runs$": "shows runs that download weights",
     r"DIR$": "needs data of the reader's",
     r"--ray-address": "needs a cluster",
 }

@@ -1,5 +1,6 @@
 """Every command in the documentation is one: those of README and tutorials run, or are parsed where they cannot."""
 
+import functools
 import re
 import subprocess
 import sys
@@ -9,7 +10,6 @@ import click
 import pytest
 
 from infthor_eval.cli.main import _infthor_eval
-from infthor_eval.cli.options import model_options_in
 from infthor_eval.runs import Catalog
 from infthor_eval.suites import baseline_names
 from model_adapters import is_known, names, on_engine, takes
@@ -39,11 +39,23 @@ BLOCKS = [
 ]
 
 
+@pytest.fixture(scope="module")
+def folder_of(tmp_path_factory):
+    """Gives the folder in which a page's reader is: each block finds what those before it have left."""
+
+    @functools.cache
+    def folder_of(page):
+        folder = tmp_path_factory.mktemp("reader")
+        written_files(page, folder)
+        (folder / "tasks").symlink_to(ROOT / "tasks")
+        return folder
+
+    return folder_of
+
+
 @pytest.mark.parametrize(("page", "block"), BLOCKS)
-def test_the_commands_of_a_block_run_one_after_the_other(page, block, tmp_path, run, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    written_files(page, tmp_path)
-    (tmp_path / "tasks").symlink_to(ROOT / "tasks")
+def test_the_commands_of_a_page_run_one_after_the_other(page, block, folder_of, run, monkeypatch):
+    monkeypatch.chdir(folder_of(page))
     for command in block:
         if command.reason == FLOOR_PLANS:
             break  # what follows asks about what it makes
@@ -80,14 +92,14 @@ def test_the_options_of_every_command_are_known(command, monkeypatch):
 
 def _check_names(given):
     """Models, their options and tasks are known, but for those of the example package and of files beside a page."""
-    engine, options = given["engine"], model_options_in(given["model_args"])
-    for model in given["models"].split(","):
+    engine = given["engine"]
+    for model, own in given["models"].items():
         if model == "thumbnails" or model in baseline_names():
             continue
         assert is_known(model), f"{model}: there are {names()}"
         if model in names():
             name = on_engine(model, engine) if engine else model
-            assert all(takes(name, option) for option in options), f"{name}: {options}"
+            assert all(takes(name, option) for option in {**given["model_args"], **own}), name
     own = {"nieh_mini_last", "nieh_mini_start", "nieh_mini_words", "my_task"}
     catalog = Catalog.packaged()
     for task in set(given["tasks"].split(",")) - own:
