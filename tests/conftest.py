@@ -4,6 +4,7 @@ import json
 import os
 import shutil
 from collections.abc import Callable, Sequence
+from fnmatch import fnmatchcase
 from pathlib import Path
 
 import pytest
@@ -26,6 +27,15 @@ QUESTIONS = (
     Question("traj_b", "Is there a fridge?", (2,), ("no",), "object_presence"),
     Question("traj_b", "Is there a sink?", (0,), ("no",), "object_presence"),
 )
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Variants that take long are slow tests too."""
+    lines = (Path(__file__).parent / "slow_variants.txt").read_text().splitlines()
+    patterns = [line.replace("[", "[[]") for line in lines if line and not line.startswith("#")]
+    for item in items:
+        if any(fnmatchcase(item.nodeid, pattern) for pattern in patterns):
+            item.add_marker(pytest.mark.slow)
 
 
 @pytest.fixture(autouse=True)

@@ -301,13 +301,13 @@ def test_sigterm_leaves_no_temporary_folder(tmp_path):
     code = (
         "import sys, time\n"
         "from infthor_eval.cli import main\n"
-        "import infthor_eval.cli.ls as ls\n"
+        "import infthor_eval.cli.listing as listing\n"
         "from infthor_eval.formats.scratch import ScratchFolder\n"
         "def wait(*_):\n"
         "    with ScratchFolder():\n"
         "        print('waiting', flush=True)\n"
         "        time.sleep(60)\n"
-        "ls._tasks = wait\n"
+        "listing.tasks = wait\n"
         "main(['ls', 'tasks'])\n"
     )
     process = subprocess.Popen(

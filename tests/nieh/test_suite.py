@@ -50,7 +50,7 @@ def test_the_results_file_says_what_the_summary_says(prepared):
     outcome = execute(prepared(name="mine"))
     document = json.loads((outcome.folder / "results.json").read_text())
     assert outcome.folder.parent.name == "mine"
-    assert document.keys() == {"suite", "name", "identity", "n_missing", "summary", "usage"}
+    assert document.keys() == {"suite", "name", "identity", "n_missing", "headline", "summary", "usage"}
     assert (document["suite"], document["name"]) == ("nieh", "mine")
     assert document["identity"] == outcome.summary.header.identity
     strict = document["summary"]["tasks"]["nieh_gt"]["by_clues"]["total"]["scores"]["strict"]

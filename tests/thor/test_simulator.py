@@ -1,3 +1,4 @@
+import gc
 import os
 import shlex
 import sys
@@ -31,8 +32,10 @@ def open_files():
 @pytest.fixture(autouse=True)
 def nothing_left_behind(monkeypatch, tmp_path):
     monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    gc.collect()  # of what earlier tests left open
     before = children(), open_files(), threading.active_count()
     yield
+    gc.collect()
     assert (children(), open_files(), threading.active_count()) == before
     assert not (tmp_path / "home/.ai2thor").exists()
 

@@ -88,7 +88,7 @@ def test_frames_are_what_the_familys_own_features_are_made_of(blank):
     ],
 )
 def test_where_a_box_lies(box, cells):
-    found = {at for at, there in enumerate(_covered(box, (300, 300))) if there}
+    found = {at for at, there in enumerate(_covered(torch.tensor([box]), (300, 300))[0]) if there}
     assert found <= cells
     assert found
 

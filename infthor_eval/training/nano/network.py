@@ -20,6 +20,7 @@ from model_adapters.hf.prompt import Frame
 
 __all__ = ["NanoNetwork", "ways_of_writing"]
 
+_AT_ONCE = 256  # frames in the tower
 _SCALE, _BIAS = 8.0, -4.0  # of how alike a part of a frame and a name are, to begin with
 
 
@@ -36,17 +37,16 @@ class NanoNetwork(SequenceModel):
         album: all frames.
 
     Attributes:
-        learns_to_see: whether sequences train the tower too; it takes two thirds of their time.
         last_seen: places in the album and features of the last sequences' frames.
     """
 
-    learns_to_see = True
     last_seen: tuple[list[int], Tensor]
 
     def __init__(self, loaded: Loaded, album: Album) -> None:
         super().__init__(loaded)
         self._album = album
         self._places = album.places()
+        self._remembered: Tensor | None = None
         self._names = [_bags(loaded.tokenizer, album.types, way) for way in range(len(ways_of_writing("Mug")))]
         self.scale = torch.nn.Parameter(torch.tensor(_SCALE))
         self.bias = torch.nn.Parameter(torch.full((len(album.types),), _BIAS))
@@ -55,10 +55,18 @@ class NanoNetwork(SequenceModel):
         """See `SequenceModel`."""
         distinct = list(dict.fromkeys(frame.digest for frame in frames))
         places = [self._places[digest] for digest in distinct]
-        with torch.set_grad_enabled(self.learns_to_see):
-            self.last_seen = places, self.see(places)
+        self.last_seen = places, self.see(places) if self._remembered is None else self._remembered[places]
         by_digest = dict(zip(distinct, self.last_seen[1], strict=True))
         return [by_digest[frame.digest] for frame in frames]
+
+    def remember(self) -> None:
+        """See all frames; from then on sequences have their features from memory, and the tower is not trained.
+
+        It takes four fifths of a sequence's time.
+        """
+        every = range(len(self._album.frames))
+        with torch.no_grad():
+            self._remembered = torch.cat([self.see(every[at : at + _AT_ONCE]) for at in every[::_AT_ONCE]])
 
     def see(self, places: Sequence[int]) -> Tensor:
         """Features of frames of the album, (frames, tokens, hidden)."""

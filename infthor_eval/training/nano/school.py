@@ -66,6 +66,7 @@ def teach(recipe: NanoRecipe, folders: Sequence[Path], watcher: Callable[[Lesson
     course = _Course(recipe, network, lessons)
     network.train()
     course.run("see", recipe.seeing_steps, course.see, watcher)
+    network.remember()
     course.run("tell", recipe.telling_steps, course.tell, watcher)
     network.eval()
     loaded.model.to(torch.bfloat16)  # half the file, and no answer hangs on what is rounded off
@@ -106,16 +107,14 @@ class _Course:
         return loss, loss.detach()
 
     def tell(self) -> tuple[Tensor, Tensor]:
-        """Answers and actions, and what is in the frames that the questions are about.
+        """Answers and actions, which count alike, though histories have most of the tokens.
 
-        Histories have most of the frames, and do not train the tower; they have most of the tokens too, so the two
-        count alike.
+        What is in the questions' frames is asked too: the names' embeddings learn here, and are not to leave what they
+        look like.
         """
-        recipe, network = self._recipe, self._network
-        network.learns_to_see = True
+        recipe = self._recipe
         answered = self._told(self._lessons.questions(recipe.questions_per_step, recipe.made_up))
-        places, features = network.last_seen
-        network.learns_to_see = False
+        places, features = self._network.last_seen
         acted = self._told(self._lessons.histories(recipe.windows_per_step))
         loss = answered + acted
         return loss + recipe.seeing_weight * self._seen(features, places), loss.detach()

@@ -36,7 +36,7 @@ class NanoRecipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
         hidden: width of tower and decoder.
         layers: of each.
         seeing_steps: in which it learns which objects are in which part of a frame, by their names' embeddings.
-        telling_steps: in which it learns to answer questions and to act; it goes on learning to see.
+        telling_steps: in which it learns to answer questions and to act; its tower stays as it is.
         frames_per_step: while it learns to see.
         questions_per_step: while it learns to answer.
         made_up: share of these that ask for the presence of an object in any frame.
@@ -54,8 +54,8 @@ class NanoRecipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     scenes: Scenes = Scenes()
     hidden: int = 128
     layers: int = 4
-    seeing_steps: int = 350
-    telling_steps: int = 420
+    seeing_steps: int = 400
+    telling_steps: int = 600
     frames_per_step: int = 64
     questions_per_step: int = 40
     made_up: float = 0.4
