@@ -20,10 +20,11 @@ def scaled(name: str) -> Recipe:
     assert isinstance(recipe, Recipe)
     return msgspec.structs.replace(
         recipe,
-        model="llava-onevision-tiny",
+        model="qwen2.5-vl-tiny",  # a frame of which takes few tokens
         model_args={},
         max_tokens=recipe.max_tokens // SCALE,
         max_steps=2,
+        sequences_per_step=2,
         # Sharding weights needs GPUs; of processes that share a sequence there are two here.
         parallel=Parallel(context=min(recipe.parallel.context, 2)),
     )
