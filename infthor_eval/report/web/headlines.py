@@ -48,17 +48,11 @@ def took_table(runs: Sequence[ReportRun]) -> Table:
 def _took(run: ReportRun) -> Row:
     seconds = sum(record.seconds for record in run.records)
     rate = f"{len(run.records) / seconds:.2f}" if seconds else "-"
-    hit_rate = run.took.get("hit_rate")
-    cached = "-" if hit_rate is None else f"{100 * hit_rate:.1f}"
-    counts = (_count(run.took.get("requests")), _count(run.took.get("read")), cached, _count(run.took.get("written")))
-    cost = run.took.get("cost")
-    return Row(
-        (run.label, str(len(run.records)), f"{seconds:.1f}", rate, *counts, "-" if cost is None else f"{cost:.4f}")
-    )
-
-
-def _count(value: int | None) -> str:
-    return "-" if value is None else f"{value:,}"
+    usage = run.usage
+    cached = "-" if usage.hit_rate is None else f"{100 * usage.hit_rate:.1f}"
+    counts = f"{usage.requests:,}", f"{usage.context:,}", cached, f"{usage.reply:,}"
+    cost = "-" if usage.cost is None else f"{usage.cost:.4f}"
+    return Row((run.label, str(len(run.records)), f"{seconds:.1f}", rate, *counts, cost))
 
 
 def left_out_table(runs: Sequence[ReportRun]) -> Table | None:

@@ -1,6 +1,5 @@
 """Runs as the page shows them: who they are, their records, and what they took."""
 
-import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,8 +10,10 @@ import msgspec
 
 from infthor_eval.errors import UsageError
 from infthor_eval.report.curves import model_names, run_labels
-from infthor_eval.runs import RunHeader, RunSummary, Suite, UnitKey, UnitRecord, read_header, read_run
+from infthor_eval.runs import RunHeader, RunSummary, Suite, UnitKey, UnitRecord, Usage, read_header
 from infthor_eval.runs.configuration import read_configuration
+from infthor_eval.runs.finding import read_results
+from infthor_eval.runs.shards import read_shards
 
 __all__ = ["ReportRun", "merged", "read_report_runs"]
 
@@ -28,7 +29,7 @@ class ReportRun:
         suite: whose run it is.
         header: who it is, with the label for its name where names alone would not tell the runs apart.
         records: of all its units.
-        took: what it took, as `took.json` has it; empty where it was stopped before that was written.
+        usage: what all its requests took.
         n_missing: units that were not come to; None where nobody has counted them.
         command: that runs it again; empty where it is not known.
         data: folder of its data set, where the command named one.
@@ -40,7 +41,7 @@ class ReportRun:
     suite: Suite
     header: RunHeader
     records: tuple[UnitRecord[Any], ...]
-    took: Mapping[str, Any]
+    usage: Usage
     n_missing: int | None
     command: str = ""
     data: Path | None = None
@@ -77,34 +78,27 @@ def read_report_runs(folders: Sequence[Path], suite_named: Callable[[str], Suite
         raise UsageError("one run is given twice; give each once")
     headers = [read_header(folder) for folder in folders]
     labels = run_labels(folders, model_names(headers))
-    return [_read(folder, label, suite_named) for folder, label in zip(folders, labels, strict=True)]
+    return [
+        _read(folder, label, header, suite_named(header.suite))
+        for folder, label, header in zip(folders, labels, headers, strict=True)
+    ]
 
 
-def _read(folder: Path, label: str, suite_named: Callable[[str], Suite]) -> ReportRun:
-    suite = suite_named(read_header(folder).suite)
-    header, records = read_run(folder, suite.records)
+def _read(folder: Path, label: str, header: RunHeader, suite: Suite) -> ReportRun:
+    log, results, asked = read_shards(folder, suite.records.decoder()), read_results(folder), read_configuration(folder)
     (model,) = model_names([header])
-    asked = read_configuration(folder)
     return ReportRun(
         folder=folder,
         label=label,
         model=model,
         suite=suite,
         header=header if label == model else msgspec.structs.replace(header, name=label),
-        records=tuple(records),
-        took=_written(folder / "took.json"),
-        n_missing=_written(folder / "results.json").get("n_missing"),
+        records=tuple(log.records),
+        usage=log.usage,
+        n_missing=results.n_missing if results else None,
         command=asked.command if asked else "",
         data=asked.data if asked else None,
     )
-
-
-def _written(path: Path) -> Mapping[str, Any]:
-    """What a run wrote beside its journal; nothing where it was stopped before."""
-    if not path.is_file():
-        return {}
-    found: Mapping[str, Any] = json.loads(path.read_bytes())
-    return found
 
 
 def merged(runs: Sequence[ReportRun]) -> Mapping[UnitKey, list[UnitRecord[Any] | None]]:
