@@ -16,6 +16,7 @@ def command(manifest: Path, out: Path) -> int:
     Where the manifest has digests (that of a bundled set does), it says whether the same files came out; exit status 1
     where they differ.
     """
+    from infthor_eval.cli.paced_bar import PacedBar
     from infthor_eval.formats.files import prepared_folder
     from infthor_eval.generation.bundle import differing_files, make_bundle, read_manifest
     from infthor_eval.terminal import error_console, progress_bar, tell
@@ -25,8 +26,8 @@ def command(manifest: Path, out: Path) -> int:
     wanted = read_manifest(manifest)
     prepared_folder(out)
     with Simulator(embedded()) as simulator, progress_bar(error_console()) as progress:
-        bar = progress.add_task(wanted.name, total=2 * len(wanted.trajectories))
-        finished, made = make_bundle(wanted, simulator, out, lambda: progress.advance(bar))
+        bar = PacedBar(progress, wanted.name, 2 * len(wanted.trajectories))
+        finished, made = make_bundle(wanted, simulator, out, lambda resumed: bar.advance(resumed=resumed))
     size = sum(path.stat().st_size for path in out.rglob("*") if path.is_file())
     tell(f"{len(made.questions)} questions on {made.trajectories} trajectories, {size / 1e6:.1f} MB: {out}")
     tell(made.words())

@@ -3,11 +3,11 @@
 from collections.abc import Mapping, Sequence
 
 from infthor_eval.cli.progress import NOTES, complain, execute_with_progress, hushed
-from infthor_eval.cli.reasons import counted_reasons
 from infthor_eval.cli.showing import Showing, ShownRun, show
 from infthor_eval.errors import DataError
 from infthor_eval.harness.export import export
 from infthor_eval.harness.trackers import Trackers
+from infthor_eval.reasons import counted_reasons
 from infthor_eval.runs import RunOutcome, RunRequest, Suite, prepare
 
 __all__ = ["evaluate"]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from infthor_eval.cli.options import LARGEST, floor_plans_option
+from infthor_eval.cli.options import Whole, floor_plans_option
 from infthor_eval.cli.staffing_options import staffing_options
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ _PATH = click.Path(path_type=Path)
 @click.option("--min-steps", type=click.IntRange(1), default=300, show_default=True, help="Low-level actions at least.")
 @click.option("--min-subgoals", type=click.IntRange(1), default=10, show_default=True, help="Tasks at least.")
 @click.option("--max-fail", type=click.IntRange(1), default=20, show_default=True, help="Tasks that may fail, at most.")
-@click.option("--seed", type=click.IntRange(0, LARGEST), default=0, show_default=True, help="Of the first trajectory.")
+@click.option("--seed", type=Whole(0), default=0, show_default=True, help="Of the first trajectory.")
 @click.option("--count", type=click.IntRange(1), default=1, show_default=True, help="Trajectories for each scene.")
 @click.option("--final-task", is_flag=True, help="End with a task on what was seen at both ends of the trajectory.")
 @click.option("--test-set", is_flag=True, help="As the published test sets: with a final task, without bathrooms.")
@@ -54,6 +54,7 @@ def command(
 
     Trajectories that the directory has already are not made again. Exit status 1 where one could not be made.
     """
+    from infthor_eval.cli.paced_bar import PacedBar
     from infthor_eval.formats.files import prepared_folder
     from infthor_eval.generation.generate_set import generate_with_workers
     from infthor_eval.generation.jobs import trajectory_jobs, without_bathrooms
@@ -75,8 +76,10 @@ def command(
     )
     prepared_folder(out)
     with progress_bar(notes) as progress:
-        bar = progress.add_task("generate", total=len(jobs))
-        result = generate_with_workers(jobs, embedded(data), out, staffing, lambda: progress.advance(bar), notes.print)
+        bar = PacedBar(progress, "generate", len(jobs))
+        result = generate_with_workers(
+            jobs, embedded(data), out, staffing, lambda resumed: bar.advance(resumed=resumed), notes.print
+        )
     if as_json:
         import msgspec
 

@@ -1,5 +1,6 @@
 """What `ls` shows of what there is to evaluate, and on what."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from rich import box
@@ -27,18 +28,26 @@ def models() -> None:
     console().print(table, soft_wrap=False)
 
 
-def tasks() -> None:
-    """Print all tasks, and the groups of them."""
+def tasks(include: Sequence[Path]) -> None:
+    """Print all tasks, and the groups of them.
+
+    Args:
+        include: folders with further task files.
+
+    Raises:
+        UsageError: a task file cannot be read.
+    """
     from infthor_eval.runs.catalog import Catalog
 
-    catalog = Catalog.installed()
+    catalog = Catalog.installed(include)
     table = Table("task", "what it is", box=box.SIMPLE_HEAD)
     for name, members in catalog.groups.items():
         table.add_row(name, f"group of {', '.join(members)}")
     for name, task in catalog.tasks.items():
         settings = task.settings.get("dataset_kwargs", {})
         data = f"the bundled set {settings['bundled']}" if "bundled" in settings else "the set given with --data"
-        table.add_row(name, f"{task.suite}: context {settings.get('context')}, {data}")
+        context = f"context {settings['context']}, " if "context" in settings else ""
+        table.add_row(name, f"{task.suite}: {context}{data}")
     console().print(table, soft_wrap=False)
 
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from infthor_eval.cli.options import floor_plans_option
+from infthor_eval.cli.options import floor_plans_option, include_option
 
 __all__ = ["command"]
 
@@ -26,11 +26,12 @@ def _models() -> None:
 
 
 @command.command("tasks")
-def _tasks() -> None:
+@include_option
+def _tasks(include: tuple[Path, ...]) -> None:
     """Tasks and groups of tasks."""
     from infthor_eval.cli.listing import tasks
 
-    tasks()
+    tasks(include)
 
 
 @command.command("scenes")

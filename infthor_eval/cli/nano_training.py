@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+from infthor_eval.cli.paced_bar import PacedBar, StepBars
 from infthor_eval.cli.progress import NOTES, say
 from infthor_eval.errors import DataError
 from infthor_eval.formats.files import prepared_folder
@@ -42,11 +43,10 @@ def train_nano(recipe: NanoRecipe, folders: Sequence[Path], out: Path, staffing:
     prepared_folder(out)
     sets = list(folders) or [make_data(recipe.scenes, recipe.seed, out / "data", staffing)]
     with progress_bar(NOTES) as progress:
-        bars = {part: progress.add_task(said, total=None) for part, said in _PARTS.items()}
+        bars = StepBars(progress)
 
         def watch(done: Lesson) -> None:
-            said = f"{_PARTS[done.part]}: loss {done.loss:.3f}"
-            progress.update(bars[done.part], total=done.n_steps, completed=done.step, description=said)
+            bars.advance(_PARTS[done.part], done.step, done.n_steps, f"loss {done.loss:.3f}")
 
         loaded = teach(recipe, sets, watch)
     export(loaded, out / "checkpoint")
@@ -76,13 +76,13 @@ def make_data(scenes: Scenes, seed: int, out: Path, staffing: Staffing) -> Path:
         scenes.names, seed=seed, count=1, min_steps=scenes.min_steps, min_subgoals=1, final_task=False, max_fail=20
     )
     with progress_bar(NOTES) as progress:
-        bars = [progress.add_task(name, total=len(jobs)) for name in ("trajectories", "frames")]
+        made = PacedBar(progress, "trajectories", len(jobs))
         generated = generate_with_workers(
-            jobs, embedded(), trajectories, staffing, lambda: progress.advance(bars[0]), say
+            jobs, embedded(), trajectories, staffing, lambda resumed: made.advance(resumed=resumed), say
         )
-        selection = select([trajectories])
+        selection, shown = select([trajectories]), PacedBar(progress, "frames", len(jobs))
         replayed = replay_with_workers(
-            selection, embedded(), made_set, staffing, 1, lambda: progress.advance(bars[1]), say
+            selection, embedded(), made_set, staffing, 1, lambda resumed: shown.advance(resumed=resumed), say
         )
     failures = [str(item) for item in generated.failures]
     failures += [f"{item.place}: {item.message}" for item in replayed.failures]

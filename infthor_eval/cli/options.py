@@ -8,25 +8,54 @@ from typing import Any
 import click
 
 __all__ = [
-    "LARGEST",
-    "SEED",
     "FiniteRange",
     "ModelOptions",
     "ModelsAsked",
+    "Whole",
     "floor_plans_option",
+    "include_option",
     "model_options_in",
     "names_in",
     "pairs_in",
 ]
 
-LARGEST = 2**63 - 1  # of the numbers that a run's identity can hold
-SEED = click.IntRange(-LARGEST, LARGEST)
+_LARGEST = 2**63 - 1  # of the numbers that a run's identity can hold
 
 floor_plans_option = click.option(
     "--data",
     type=click.Path(exists=True, file_okay=False, path_type=Path),
     help="Folder with recorded floor plans (thor_scenes/, alfred/layouts/), for scenes among them.",
 )
+
+include_option = click.option(
+    "--include-path",
+    "include",
+    type=click.Path(exists=True, file_okay=False, path_type=Path),
+    multiple=True,
+    help="Folder with task files of your own; may be repeated.",
+)
+
+
+class Whole(click.ParamType):
+    """A whole number that a run's identity can hold. An `IntRange` would print that limit into every help text.
+
+    Args:
+        least: that it may be.
+    """
+
+    name = "integer"
+
+    def __init__(self, least: int = -_LARGEST) -> None:
+        self._least = least
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
+        """See `click.ParamType`."""
+        number = int(click.INT.convert(value, param, ctx))
+        if number < self._least:
+            self.fail(f"{number} is less than {self._least}.", param, ctx)
+        if number > _LARGEST:
+            self.fail(f"{number} is more than {_LARGEST}.", param, ctx)
+        return number
 
 
 class FiniteRange(click.FloatRange):

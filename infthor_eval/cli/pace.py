@@ -17,18 +17,19 @@ class Pace:
         n_made: units that this one has.
     """
 
-    def __init__(self, n_units: int, now: float) -> None:
+    def __init__(self, n_units: int, now: float, n_found: int = 0) -> None:
         """Begin.
 
         Args:
             n_units: of the run.
             now: seconds, of any clock that goes evenly.
+            n_found: units that an earlier run had done.
         """
         self._n_units = n_units
         self._usage: Usage = NOTHING
         self._begun = self._told_at = now
-        self._told_of = 0
-        self.n_found = self.n_made = 0
+        self.n_found, self.n_made = n_found, 0
+        self._told_of = n_found
 
     def count(self, usage: Usage, resumed: bool, now: float) -> None:
         """A unit is there; what an earlier run had done says nothing of the pace."""

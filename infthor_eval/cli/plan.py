@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from infthor_eval.cli.options import LARGEST, FiniteRange
+from infthor_eval.cli.options import FiniteRange, Whole
 from infthor_eval.cli.run_options import run_options
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ __all__ = ["command"]
 
 
 @click.command("plan")
-@click.option("--measure", type=click.IntRange(1, LARGEST), default=6, show_default=True, help="Units of each task.")
+@click.option("--measure", type=Whole(1), default=6, show_default=True, help="Units of each task.")
 @click.option(
     "--price-per-hour", type=FiniteRange(min=0), metavar="USD", help="Of the machine that a worker has, for its cost."
 )

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 from infthor_eval.cli.pace import duration
 from infthor_eval.cli.progress import NOTES, say
-from infthor_eval.cli.reasons import counted_reasons
 from infthor_eval.errors import ModelError
+from infthor_eval.reasons import counted_reasons
 from infthor_eval.report.terminal import print_table, table_console
 from infthor_eval.runs import RunRequest, Suite, TaskEstimate, Workload, estimate_run
 from infthor_eval.tables import Column, Row, Table

@@ -1,15 +1,14 @@
 """What people see of a run while it goes, on standard error."""
 
 import contextlib
-import time
 from collections.abc import Iterator
 from typing import Any
 
 from rich.progress import Progress
 
-from infthor_eval.cli.pace import Pace
-from infthor_eval.cli.reasons import counted_reasons
+from infthor_eval.cli.paced_bar import PacedBar
 from infthor_eval.cli.stopping import Stop, stopped_by_sigint
+from infthor_eval.reasons import counted_reasons
 from infthor_eval.runs import PreparedRun, RunOutcome, UnitRecord, Workload, execute
 from infthor_eval.terminal import error_console, progress_bar
 
@@ -25,7 +24,6 @@ class _Watcher:
         self._name = name
         self._progress = progress
         self._stop = stop
-        self.pace = Pace(0, time.monotonic())
 
     def begin(self, workload: Workload, n_recovered: int) -> None:
         """See `Observer`."""
@@ -35,17 +33,12 @@ class _Watcher:
             say(f"{task}: {n} sample(s) skipped: {reason}", "yellow")
         for cost in workload.costs:
             say(f"{cost.task}: {cost.description}")
-        self.pace = Pace(workload.n_units, time.monotonic())
-        self._bar = self._progress.add_task(self._name, total=workload.n_units)
+        self.bar = PacedBar(self._progress, self._name, workload.n_units)
         self._stop.begun = True
 
     def done(self, record: UnitRecord[Any], resumed: bool) -> None:
         """See `Observer`."""
-        now = time.monotonic()
-        self.pace.count(record.usage, resumed, now)
-        self._progress.update(self._bar, advance=1, description=f"{self._name}  {self.pace.speed(now)}")
-        if not NOTES.is_terminal and self.pace.is_due(now):
-            say(f"{self._name}: {self.pace.line(now)}")
+        self.bar.advance(record.usage, resumed=resumed)
 
     def note(self, text: str) -> None:
         """See `Observer`."""
@@ -57,7 +50,7 @@ def execute_with_progress(run: PreparedRun) -> RunOutcome:
     with progress_bar(NOTES) as progress, stopped_by_sigint(say) as stop:
         watcher = _Watcher(run.request.label, progress, stop)
         outcome = execute(run, watcher, stop)
-    pace = watcher.pace
+    pace = watcher.bar.pace
     say(f"{run.request.label}: {pace.n_made} answered now, {pace.n_found} found in the journal of an earlier run")
     if outcome.n_missing:
         say(f"{run.request.label}: stopped, {outcome.n_missing} not come to; the same command goes on", "yellow")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from infthor_eval.cli.options import LARGEST, FiniteRange
+from infthor_eval.cli.options import FiniteRange, Whole
 from infthor_eval.cli.staffing_options import staffing_options
 from infthor_eval.workers import Staffing
 
@@ -18,7 +18,7 @@ _PATH = click.Path(path_type=Path)
 @click.command("questions")
 @click.argument("folder", metavar="SET", type=_PATH)
 @click.option("--out", required=True, type=_PATH, help="The CSV file to write.")
-@click.option("--seed", type=click.IntRange(0, LARGEST), default=0, show_default=True, help="Makes every choice.")
+@click.option("--seed", type=Whole(0), default=0, show_default=True, help="Makes every choice.")
 @click.option("--per-trajectory", type=click.IntRange(1), default=25, show_default=True, help="Questions at most.")
 @click.option(
     "--min-share",

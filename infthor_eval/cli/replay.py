@@ -51,6 +51,7 @@ def command(
     itself. Trajectories that the set has already are not replayed again. A refused action is reported and the
     replay goes on. Exit status 1 where a trajectory could not be replayed at all.
     """
+    from infthor_eval.cli.paced_bar import PacedBar
     from infthor_eval.formats.files import prepared_folder
     from infthor_eval.generation.replay_set import replay_with_workers, select
     from infthor_eval.generation.replay_summary import summarise
@@ -64,9 +65,9 @@ def command(
     with supplement_file(trajectory for _, trajectory in selection.items) as supplement:
         start = launch.unity() if unity else launch.embedded(data, supplement)
         with progress_bar(notes) as progress:
-            bar = progress.add_task("replay", total=len(selection.items))
+            bar = PacedBar(progress, "replay", len(selection.items))
             replayed = replay_with_workers(
-                selection, start, out, staffing, frames, lambda: progress.advance(bar), notes.print
+                selection, start, out, staffing, frames, lambda resumed: bar.advance(resumed=resumed), notes.print
             )
     if as_json:
         import msgspec

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import click
 
-from infthor_eval.cli.options import LARGEST
+from infthor_eval.cli.options import Whole
 
 if TYPE_CHECKING:
     from infthor_eval.curves import RewardCurves
@@ -58,7 +58,7 @@ class _Made(NamedTuple):
 @click.option("--scenes", type=_PATH, help="Folder with recorded floor plans (thor_scenes/), as for the run.")
 @click.option(
     "--episodes",
-    type=click.IntRange(0, LARGEST),
+    type=Whole(0),
     default=12,
     show_default=True,
     metavar="N",

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from infthor_eval.cli.config_option import comes_from_file, config_option
-from infthor_eval.cli.options import LARGEST, SEED, FiniteRange, ModelOptions, ModelsAsked, names_in
+from infthor_eval.cli.options import FiniteRange, ModelOptions, ModelsAsked, Whole, include_option, names_in
 from infthor_eval.cli.staffing_options import staffing_options
 from infthor_eval.cli.suite_options import refuse_twins, suite_options
 from infthor_eval.workers import Staffing
@@ -33,13 +33,7 @@ _OPTIONS = (
         help="What runs the model: transformers, unless its name says otherwise, or vLLM.",
     ),
     click.option("--tasks", required=True, help="Task or group names with commas (see `ls tasks`)."),
-    click.option(
-        "--include-path",
-        "include",
-        type=click.Path(exists=True, file_okay=False, path_type=Path),
-        multiple=True,
-        help="Folder with task files of your own; may be repeated.",
-    ),
+    include_option,
     click.option("--data", type=click.Path(path_type=Path), help="Folder of the data set to ask about."),
     click.option(
         "--model-args",
@@ -55,7 +49,7 @@ _OPTIONS = (
     ),
     click.option(
         "--max-tokens-total",
-        type=click.IntRange(1, LARGEST),
+        type=Whole(1),
         metavar="N",
         help="Ask a served model nothing more once a run has taken so many tokens.",
     ),
@@ -68,7 +62,7 @@ _OPTIONS = (
     click.option("--name", help="What the run is called in tables and folders; else by its checkpoint, or its model."),
     click.option(
         "--limit",
-        type=click.IntRange(1, LARGEST),
+        type=Whole(1),
         metavar="N",
         help="Ask only N of each task (questions, trajectories of plans, episodes of arms), evenly from all "
         "trajectories, drawn by --seed; a larger N asks these too. lm-eval's own command takes the first N instead.",
@@ -80,7 +74,7 @@ _OPTIONS = (
         show_default=True,
         help="Results folder.",
     ),
-    click.option("--seed", type=SEED, default=0, show_default=True, help="For whatever is random."),
+    click.option("--seed", type=Whole(), default=0, show_default=True, help="For whatever is random."),
     click.option("--fresh", is_flag=True, help="Start anew; the journal of an earlier run is set aside."),
     click.option("--recover", is_flag=True, help="Go on without the bad lines of a damaged journal."),
 )

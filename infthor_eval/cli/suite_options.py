@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from infthor_eval.cli.options import LARGEST, names_in
+from infthor_eval.cli.options import Whole, names_in
 from infthor_eval.errors import UsageError
 from infthor_eval.suites import options_of, suite_names
 
@@ -35,7 +35,7 @@ def suite_options(command: Callable[..., Any]) -> Callable[..., Any]:
             is_flag=kind is bool,
             default=None,
             metavar=item.metadata.get("metavar"),
-            help=" ".join(f"{item.metadata.get('help', '')} [{suite}]" for suite, item in by_suite.items()),
+            help=_help(by_suite),
         )(command)
     return command
 
@@ -90,8 +90,16 @@ def _refuse_unasked(given: Mapping[str, Any], asked: typing.Collection[str]) -> 
             )
 
 
+def _help(by_suite: Mapping[str, Field[Any]]) -> str:
+    """What each suite says of its option, and whose it is; what several say alike, once."""
+    saying: dict[str, list[str]] = {}
+    for suite, item in by_suite.items():
+        saying.setdefault(item.metadata.get("help", ""), []).append(suite)
+    return " ".join(f"{said} [{', '.join(suites)}]" for said, suites in saying.items())
+
+
 def _click_type(kind: type) -> Any:
-    return click.IntRange(-LARGEST, LARGEST) if kind is int else kind
+    return Whole() if kind is int else kind
 
 
 def _type(hint: Any) -> type:

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from infthor_eval.cli.paced_bar import StepBars
 from infthor_eval.cli.progress import NOTES, say
 from infthor_eval.terminal import console, progress_bar
 from infthor_eval.training.estimate import estimate
@@ -50,12 +51,12 @@ def train(recipe: Recipe, folders: Sequence[Path], out: Path, only_for: Machine 
         return 0
     last: list[Progress] = []
     with progress_bar(NOTES) as progress:
-        bar = progress.add_task("train", total=None, visible=speaks)
+        bars = StepBars(progress)
 
         def watch(done: Progress) -> None:
             last[:] = [done]
-            said = f"train: loss {done.loss:.4f}, {done.tokens_per_second:,.0f} tokens/s"
-            progress.update(bar, total=done.n_steps, completed=done.step, description=said)
+            said = f"loss {done.loss:.4f}, {done.tokens_per_second:,.0f} tokens/s"
+            bars.advance("train", done.step, done.n_steps, said)
 
         checkpoint = fine_tune(run, out, watch)
     if speaks:

@@ -6,7 +6,7 @@ from typing import Literal
 
 import click
 
-from infthor_eval.cli.options import SEED, ModelsAsked
+from infthor_eval.cli.options import ModelsAsked, Whole
 from infthor_eval.cli.staffing_options import staffing_options
 from infthor_eval.workers import Staffing
 
@@ -25,7 +25,7 @@ __all__ = ["command"]
 @click.option("--out", type=click.Path(path_type=Path), required=True, help="Folder of the validated set.")
 @click.option("--decisions", type=click.Path(path_type=Path), help="The inspection list with keep or drop filled in.")
 @click.option("--scorer", type=click.Choice(["strict", "reference"]), default="strict", show_default=True)
-@click.option("--seed", type=SEED, default=0, show_default=True, help="For whatever is random.")
+@click.option("--seed", type=Whole(), default=0, show_default=True, help="For whatever is random.")
 @staffing_options
 def command(
     set_folder: Path,

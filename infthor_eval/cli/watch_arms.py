@@ -18,6 +18,7 @@ __all__ = ["watch_arms"]
 
 def watch_arms(wanted: Wanted) -> None:
     """Write the recording of a trajectory's episodes, or a sheet of their frames."""
+    from infthor_eval.cli.paced_bar import PacedBar
     from infthor_eval.errors import UsageError
     from infthor_eval.formats.files import prepared_file
     from infthor_eval.manipulation.curve_runs import arm_runs
@@ -35,8 +36,8 @@ def watch_arms(wanted: Wanted) -> None:
     above = heading([run.label, *sorted({record.task for record in chosen}), recorded.trajectory], run.about.simulator)
     notes = error_console()
     with replay_episodes(recorded, wanted.data, wanted.scenes) as stage, progress_bar(notes) as progress:
-        bar = progress.add_task(recorded.trajectory, total=sum(len(record.payload.steps) + 1 for record in chosen))
-        moments = followed(stage.moments(chosen), lambda: progress.advance(bar), notes)
+        bar = PacedBar(progress, recorded.trajectory, sum(len(record.payload.steps) + 1 for record in chosen))
+        moments = followed(stage.moments(chosen), bar.advance, notes)
         made = _recording(path, moments, above, wanted.fps) if wanted.sheet is None else _sheet(path, moments, above)
     tell(f"{len(chosen)} of {len(recorded.episodes)} episodes{made}: {path}")
 

@@ -19,6 +19,7 @@ def watch_plans(wanted: Wanted) -> None:
     from infthor_eval.agents.curve_runs import PlansRun
     from infthor_eval.agents.records import RECORDS
     from infthor_eval.agents.replaying import recorded_plans, replay
+    from infthor_eval.cli.paced_bar import PacedBar
     from infthor_eval.formats.files import prepared_file
     from infthor_eval.formats.moving_pictures import write_moving
     from infthor_eval.report.recording import pictures
@@ -35,8 +36,8 @@ def watch_plans(wanted: Wanted) -> None:
     above = heading([label, *parts], recorded.run.about.simulator)
     notes = error_console()
     with replay(recorded, wanted.data, wanted.scenes) as stage, progress_bar(notes) as progress:
-        bar = progress.add_task(recorded.trajectory, total=sum(len(plan.payload.steps) + 1 for plan in chosen))
-        moments = followed(stage.moments(chosen), lambda: progress.advance(bar), notes)
+        bar = PacedBar(progress, recorded.trajectory, sum(len(plan.payload.steps) + 1 for plan in chosen))
+        moments = followed(stage.moments(chosen), bar.advance, notes)
         n_pictures = write_moving(path, pictures(moments, above), wanted.fps)
     tell(f"{len(chosen)} of {stage.n_plans} plans, {n_pictures / wanted.fps:.0f} s: {path}")
 

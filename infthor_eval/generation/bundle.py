@@ -70,7 +70,7 @@ def read_manifest(path: Path) -> Manifest:
 
 
 def make_bundle(
-    manifest: Manifest, simulator: Simulator, out: Path, progress: Callable[[], None] = lambda: None
+    manifest: Manifest, simulator: Simulator, out: Path, progress: Callable[[bool], None] = lambda _: None
 ) -> tuple[Manifest, MadeQuestions]:
     """Make the set: generate, replay, ask, and store the frames small.
 
@@ -78,7 +78,7 @@ def make_bundle(
         manifest: what to make; its digests are not looked at.
         simulator: the embedded one.
         out: folder of the set; must not exist or be empty.
-        progress: is called twice for each trajectory.
+        progress: is called twice for each trajectory, with whether an earlier run had made it.
 
     Returns:
         The manifest with the digests of what was made, and the questions.

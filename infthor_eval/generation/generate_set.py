@@ -96,7 +96,10 @@ class _Outcome:
 
 
 def generate_set(
-    jobs: Sequence[TrajectorySettings], simulator: Simulator, out: Path, progress: Callable[[], None] = lambda: None
+    jobs: Sequence[TrajectorySettings],
+    simulator: Simulator,
+    out: Path,
+    progress: Callable[[bool], None] = lambda _: None,
 ) -> GeneratedSet:
     """Make the trajectories that `out` does not have yet, one file each, and beside it their tasks as PDDL.
 
@@ -104,7 +107,7 @@ def generate_set(
         jobs: what to make.
         simulator: where it happens.
         out: directory of the files; made where it does not exist.
-        progress: is called after each trajectory.
+        progress: is called after each trajectory, with whether an earlier run had made it.
 
     Raises:
         DataError: a trajectory cannot be written; those before it stay.
@@ -118,7 +121,7 @@ def generate_with_workers(
     launch: Launch,
     out: Path,
     staffing: Staffing,
-    progress: Callable[[], None] = lambda: None,
+    progress: Callable[[bool], None] = lambda _: None,
     say: Callable[[str], None] = lambda _: None,
 ) -> GeneratedSet:
     """As `generate_set`, by workers with a simulator each: the same files.
@@ -128,7 +131,7 @@ def generate_with_workers(
         launch: how a simulator is started.
         out: directory of the files, the same for all workers; made where it does not exist.
         staffing: how many workers, and where.
-        progress: is called after each trajectory.
+        progress: is called after each trajectory, with whether an earlier run had made it.
         say: is told what becomes of workers.
 
     Raises:
@@ -165,12 +168,16 @@ class _Maker:
         self._simulator.close()
 
 
-def _collected(outcomes: Iterable[tuple[int, _Outcome | InfthorError]], progress: Callable[[], None]) -> GeneratedSet:
+def _collected(
+    outcomes: Iterable[tuple[int, _Outcome | InfthorError]], progress: Callable[[bool], None]
+) -> GeneratedSet:
     """What came of it, in the order of the jobs."""
     found: dict[int, _Outcome] = {}
     for number, outcome in outcomes:
-        found[number] = _Outcome(failure=str(outcome)) if isinstance(outcome, InfthorError) else outcome
-        progress()
+        if isinstance(outcome, InfthorError):
+            outcome = _Outcome(failure=str(outcome))  # noqa: PLW2901
+        found[number] = outcome
+        progress(outcome.path is not None and outcome.statistics is None)
     result = GeneratedSet()
     for _, outcome in sorted(found.items()):
         if outcome.path is None:

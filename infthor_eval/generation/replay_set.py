@@ -118,7 +118,7 @@ def replay_set(
     selection: Selection,
     simulator: Simulator,
     out: Path,
-    progress: Callable[[], None] = lambda: None,
+    progress: Callable[[bool], None] = lambda _: None,
     frames: int = 1,
 ) -> ReplayedSet:
     """Replays the selected trajectories into `out/metadata/<traj_id>`.
@@ -127,7 +127,7 @@ def replay_set(
         selection: what to replay.
         simulator: runs them.
         out: the set; made where it does not exist.
-        progress: is called after each trajectory.
+        progress: is called after each trajectory, with whether an earlier run had made it.
         frames: per action that moves the agent or its camera.
 
     Returns:
@@ -144,7 +144,7 @@ def replay_with_workers(
     out: Path,
     staffing: Staffing,
     frames: int = 1,
-    progress: Callable[[], None] = lambda: None,
+    progress: Callable[[bool], None] = lambda _: None,
     say: Callable[[str], None] = lambda _: None,
 ) -> ReplayedSet:
     """As `replay_set`, by workers with a simulator each: the same files.
@@ -155,7 +155,7 @@ def replay_with_workers(
         out: the set, the same for all workers; made where it does not exist.
         staffing: how many workers, and where.
         frames: per action that moves the agent or its camera.
-        progress: is called after each trajectory.
+        progress: is called after each trajectory, with whether an earlier run had made it.
         say: is told what becomes of workers.
     """
     metadata = _prepared(out, launch.label)
@@ -200,7 +200,7 @@ def _prepared(out: Path, label: str) -> Path:
 
 
 def _collected(
-    outcomes: Iterable[tuple[int, _Outcome | InfthorError]], selection: Selection, progress: Callable[[], None]
+    outcomes: Iterable[tuple[int, _Outcome | InfthorError]], selection: Selection, progress: Callable[[bool], None]
 ) -> ReplayedSet:
     """What came of it, in the order of the selection."""
     started = time.monotonic()
@@ -209,7 +209,7 @@ def _collected(
         if isinstance(outcome, InfthorError):
             outcome = _failed(selection.items[number], outcome)  # noqa: PLW2901
         found[number] = outcome
-        progress()
+        progress(outcome.report is not None and not outcome.new)
     result = ReplayedSet(failures=list(selection.failures), seconds=time.monotonic() - started)
     for _, outcome in sorted(found.items()):
         if outcome.report is not None:

@@ -1,14 +1,14 @@
 """NIEH results as tables: accuracy by clues beside the published rows, by depth, gain by frames, form of replies."""
 
 from collections.abc import Iterator, Sequence
-from typing import Any
 
 from infthor_eval.formats.published import PublishedRow, PublishedTable, published_tables
 from infthor_eval.formats.question import ABSENCE
+from infthor_eval.nieh.gains import Gain, frames_of, gains
 from infthor_eval.nieh.options import SHOWN
 from infthor_eval.nieh.summary import CLUE_COLUMNS, OPEN_ENDED, Cell, NiehSummary, TaskSummary, main_metric
 from infthor_eval.runs import RunSummary
-from infthor_eval.statistics import paired_difference
+from infthor_eval.statistics import Estimate
 from infthor_eval.tables import Column, Row, Table
 
 __all__ = ["clues_table", "overview", "tables"]
@@ -36,12 +36,12 @@ def tables(runs: Sequence[RunSummary]) -> list[Table]:
     """
     by_depth = _depth_table(runs)
     others = [_beside(table, runs) for table in published_tables("nieh") if not _is_by_clues(table)]
-    gains = _gains_table(runs)
+    by_frames = _gains_table(runs)
     return [
         *([by_depth] if by_depth else []),
         *others,
         clues_table(runs),
-        *([gains] if gains else []),
+        *([by_frames] if by_frames else []),
         _replies_table(runs),
     ]
 
@@ -61,8 +61,8 @@ def overview(runs: Sequence[RunSummary]) -> list[Table]:
     numbers = ("total", "95 %", "bootstrap", "n", *(("skipped", "failed") if left_out else ()))
     notes = [*dict.fromkeys(_nothing_asked(name, task) for _, name, task in found if not task.n), *_embedded(runs)]
     table = Table("NIEH accuracy, %, strict scorer", (*_NAMES, *map(Column, numbers)), tuple(rows), tuple(notes))
-    gains = _gains_table(runs)
-    return [table, *([gains] if gains else [])]
+    by_frames = _gains_table(runs)
+    return [table, *([by_frames] if by_frames else [])]
 
 
 def _with_metric(name: str, task: TaskSummary) -> str:
@@ -99,12 +99,8 @@ def _tasks(runs: Sequence[RunSummary]) -> Iterator[tuple[str, str, TaskSummary]]
 
 def _name(run: RunSummary) -> str:
     """A run's name, with what it was shown instead of frames."""
-    frames = _frames(run)
+    frames = frames_of(run)
     return run.header.name if frames == SHOWN else f"{run.header.name}, {frames} frames"
-
-
-def _frames(run: RunSummary) -> str:
-    return str(run.header.identity["frames"])
 
 
 # -- by number of clues
@@ -175,7 +171,7 @@ def _published_rows(table: PublishedTable, runs: Sequence[RunSummary]) -> Iterat
 
 def _differences(run: RunSummary, row: PublishedRow, table: PublishedTable) -> Iterator[Row]:
     """How far a run of the published model is from its row, and whether its interval (=) holds the published value."""
-    if not row.is_of(run.header.identity["model"]) or _frames(run) != SHOWN:
+    if not row.is_of(run.header.identity["model"]) or frames_of(run) != SHOWN:
         return
     for _, name, task in _tasks([run]):
         # Frames that a simulator of ours rendered are another data set.
@@ -203,7 +199,7 @@ def _beside(table: PublishedTable, runs: Sequence[RunSummary]) -> Table:
         Row((row.name, table.context, table.metric, *(f"{value:.2f}" for value in row.values)), is_published=True)
         for row in table.rows
     ]
-    for run, name, task in _tasks([run for run in runs if _frames(run) == SHOWN]):
+    for run, name, task in _tasks([run for run in runs if frames_of(run) == SHOWN]):
         if task.context == table.context and table.metric in task.metrics:
             cells = task.by_clues | task.by_question_type | task.by_variant
             means = [_mean(cells[column], table.metric) if column in cells else "-" for column in table.columns]
@@ -216,11 +212,7 @@ def _beside(table: PublishedTable, runs: Sequence[RunSummary]) -> Table:
 
 def _gains_table(runs: Sequence[RunSummary]) -> Table | None:
     """What each run scores above the same run on blank frames; None where there is no such pair."""
-    rows = []
-    for run in runs:
-        for blind in runs:
-            if _frames(run) != "blank" and _frames(blind) == "blank" and _without_frames(run) == _without_frames(blind):
-                rows += [Row((_name(run), *cells)) for cells in _gains(run.summary, blind.summary)]
+    rows = [Row((_name(gain.run), gain.task, gain.metric, *_gain_cells(gain))) for gain in gains(runs)]
     if not rows:
         return None
     note = "95 %: of the total, paired by question and clustered by trajectory, as `infthor-eval compare` has it."
@@ -229,37 +221,19 @@ def _gains_table(runs: Sequence[RunSummary]) -> Table | None:
     return Table(title, (*_NAMES, _METRIC, *map(Column, columns)), tuple(rows), (note,))
 
 
-def _without_frames(run: RunSummary) -> dict[str, Any]:
-    return {name: value for name, value in run.header.identity.items() if name != "frames"}
+def _gain_cells(gain: Gain) -> tuple[str, ...]:
+    by_clues, apart = (tuple(map(_points, map(gain.of, names))) for names in (CLUE_COLUMNS, (OPEN_ENDED, ABSENCE)))
+    return *by_clues, _points_interval(gain.total()), *apart
 
 
-def _gains(seeing: NiehSummary, blind: NiehSummary) -> Iterator[tuple[str, ...]]:
-    for name, task in seeing.tasks.items():
-        other = blind.tasks[name]
-        for metric in task.metrics:
-            by_clues, apart = (
-                [_gain(task.by_clues[column], other.by_clues[column], metric) for column in columns]
-                for columns in (CLUE_COLUMNS, (OPEN_ENDED, ABSENCE))
-            )
-            yield name, metric, *by_clues, _gain_interval(task.scores[metric], other.scores[metric]), *apart
-
-
-def _gain_interval(seeing: dict[str, list[float]], blind: dict[str, list[float]]) -> str:
-    """That of the mean gain; runs of one identity but for their frames ask the same questions, in the same order."""
-    clusters = [trajectory for trajectory, found in seeing.items() for _ in found]
-    if not clusters:
+def _points_interval(total: Estimate | None) -> str:
+    if total is None or total.low is None or total.high is None:  # one trajectory alone tells nothing about others
         return "-"
-    ours, theirs = ([score for trajectory in seeing for score in scores[trajectory]] for scores in (seeing, blind))
-    gain = paired_difference(theirs, ours, clusters).estimate
-    if gain.low is None or gain.high is None:  # one trajectory alone tells nothing about others
-        return "-"
-    return f"[{100 * gain.low:+.2f}, {100 * gain.high:+.2f}]"
+    return f"[{100 * total.low:+.2f}, {100 * total.high:+.2f}]"
 
 
-def _gain(seeing: Cell, blind: Cell, metric: str) -> str:
-    if not seeing.n or not blind.n:
-        return "-"
-    return f"{100 * (seeing.scores[metric].mean - blind.scores[metric].mean):+.2f}"
+def _points(gain: float | None) -> str:
+    return "-" if gain is None else f"{100 * gain:+.2f}"
 
 
 # -- by depth

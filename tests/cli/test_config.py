@@ -87,7 +87,7 @@ def test_no_key_is_written(config, tmp_path, run, monkeypatch):
 BAD = {
     "limt": ({"limt": 3}, "asked.yaml: unknown option 'limt'; did you mean 'limit'?"),
     "config": ({"config": "other.yaml"}, "asked.yaml: unknown option 'config'"),
-    "limit": ({"limit": 0}, "asked.yaml: limit: 0 is not in the range"),
+    "limit": ({"limit": 0}, "asked.yaml: limit: 0 is less than 1"),
     "seed": ({"seed": "x"}, "asked.yaml: seed: 'x' is not a valid"),
     "tasks": ({"tasks": {"a": 1}}, "asked.yaml: tasks is {'a': 1}; write one value"),
     "model_args": ({"model_args": {"a": [1]}}, "asked.yaml: model_args: a is [1]; write one value"),

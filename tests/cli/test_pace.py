@@ -6,6 +6,7 @@ import pytest
 from rich.console import Console
 
 from infthor_eval.cli.pace import Pace, duration
+from infthor_eval.cli.paced_bar import PacedBar, StepBars
 from infthor_eval.runs import NOTHING, Usage
 from infthor_eval.terminal import progress_bar
 
@@ -46,6 +47,36 @@ def test_lines_come_at_sensible_intervals(n_units, every_s, expected):
             told.append(now)
     assert told[: len(expected)] == expected
     assert bool(told) == bool(expected)
+
+
+def test_work_in_a_pipe_says_lines_with_what_an_earlier_run_had_done_left_out(monkeypatch):
+    monkeypatch.setattr("infthor_eval.cli.pace._LEAST_S", 0.0)
+    clock = iter(range(100))
+    monkeypatch.setattr("infthor_eval.cli.paced_bar.time.monotonic", lambda: float(next(clock)))
+    said = io.StringIO()
+    with progress_bar(Console(file=said)) as progress:
+        bar = PacedBar(progress, "replay", 4)
+        for resumed in (True, True, False, False):
+            bar.advance(resumed=resumed)
+    *_, third, last = said.getvalue().splitlines()
+    assert third == "replay: 3 of 4 (75 %), 1.0 s left, 1.0 a second"
+    assert last == "replay: 4 of 4 (100 %), 0.0 s left, 1.0 a second"
+
+
+def test_a_training_that_goes_on_tells_its_own_pace(monkeypatch):
+    monkeypatch.setattr("infthor_eval.cli.pace._LEAST_S", 0.0)
+    clock = iter(range(0, 200, 2))
+    monkeypatch.setattr("infthor_eval.cli.paced_bar.time.monotonic", lambda: float(next(clock)))
+    said = io.StringIO()
+    with progress_bar(Console(file=said)) as progress:
+        bars = StepBars(progress)
+        for step in (7, 8, 9):
+            bars.advance("train", step, 10, f"loss {step}")
+        bars.advance("answer", 1, 5, "loss 3")
+    assert said.getvalue().splitlines() == [
+        "train: 8 of 10 (80 %), 4.0 s left, 2.0 s each; loss 8",
+        "train: 9 of 10 (90 %), 2.0 s left, 2.0 s each; loss 9",
+    ]
 
 
 def test_where_there_is_no_terminal_no_bar_is_left():

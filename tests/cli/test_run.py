@@ -244,3 +244,24 @@ def test_help_names_the_commands_and_the_version_is_told(run):
 def test_ls_lists_models_and_tasks(run):
     assert "qwen2.5-vl-tiny" in run("ls", "models")[1]
     assert "nieh_mini" in run("ls", "tasks")[1]
+
+
+def test_ls_lists_tasks_of_ones_own(run, tmp_path):
+    (tmp_path / "mine.yaml").write_text("include: _nieh.yaml\ntask: my_own_task\ndataset_kwargs: {context: clues}\n")
+    assert "my_own_task" not in run("ls", "tasks")[1]
+    assert "my_own_task" in run("ls", "tasks", "--include-path", tmp_path)[1]
+
+
+def test_help_of_a_run_says_each_thing_once(run):
+    said = " ".join(run("run", "--help")[1].split())
+    assert said.count("or the path of a Unity executable") == 1
+    assert "[manipulation, plans]" in said
+    assert "9223372036854775807" not in said
+
+
+@pytest.mark.parametrize(("limit", "reason"), [("0", "0 is less than 1"), (str(2**63), "is more than"), ("x", "'x'")])
+def test_a_number_that_cannot_be_is_refused(run, limit, reason):
+    code, _, said = run("--model", "oracle", "--tasks", "nieh_mini_gt", "--limit", limit)
+    assert code == 2
+    assert "--limit" in said
+    assert reason in said

@@ -1,9 +1,9 @@
 """The one number of each run and task that says most, with its interval; and what runs took and left out."""
 
-from collections import Counter
 from collections.abc import Iterator, Sequence
 
 from infthor_eval.rates import Rate
+from infthor_eval.reasons import counted_reasons
 from infthor_eval.report.web.runs import ReportRun
 from infthor_eval.tables import Column, Row, Table
 
@@ -60,7 +60,7 @@ def left_out_table(runs: Sequence[ReportRun]) -> Table | None:
     rows = [
         Row((run.label, task, what, str(n), reason))
         for run in runs
-        for (task, what, reason), n in sorted(Counter(_left_out(run)).items())
+        for (task, what), reason, n in counted_reasons(_left_out(run))
     ]
     rows += [
         Row((run.label, "", "not come to", str(run.n_missing), "the run was stopped; the same command goes on"))
@@ -73,16 +73,16 @@ def left_out_table(runs: Sequence[ReportRun]) -> Table | None:
     return Table("", columns, tuple(rows))
 
 
-def _left_out(run: ReportRun) -> Iterator[tuple[str, str, str]]:
+def _left_out(run: ReportRun) -> Iterator[tuple[tuple[str, str], str]]:
     for record in run.records:
         if record.failure is not None:
-            yield record.task, "failed", record.failure
+            yield (record.task, "failed"), record.failure
         if record.excluded is not None:
-            yield record.task, "left out", record.excluded
+            yield (record.task, "left out"), record.excluded
         for fault in record.faults:
-            yield record.task, "survived", fault
+            yield (record.task, "survived"), fault
     for task, about in run.tasks.items():
         for item in about.get("skipped", ()):
-            yield task, "skipped", item["reason"]
+            yield (task, "skipped"), item["reason"]
         for _, reason in about.get("broken", ()):
-            yield task, "skipped", reason
+            yield (task, "skipped"), reason

@@ -8,8 +8,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from infthor_eval.formats.question import ABSENCE
+from infthor_eval.nieh.gains import gains
 from infthor_eval.nieh.summary import CLUE_COLUMNS, Cell, TaskSummary, main_metric
-from infthor_eval.report.drawing import LEGEND, Look, add_legend, inline_svg, looks_of
+from infthor_eval.report.drawing import BOUND, LEGEND, Look, add_legend, inline_svg, looks_of
 from infthor_eval.report.web.runs import ReportRun
 from infthor_eval.report.web.sections import Chart
 from infthor_eval.terminal import shown
@@ -20,6 +21,7 @@ _COLUMNS = (*CLUE_COLUMNS, ABSENCE)
 _SPREAD = 0.6  # of the room between two columns that the dots of several runs take
 _PANEL, _ROW = (4.6, 2.6), 0.34  # inches
 _DEPTH = "depth="
+_GAIN = BOUND.colour
 
 
 class _Line(NamedTuple):
@@ -47,7 +49,9 @@ def nieh_charts(runs: Sequence[ReportRun]) -> list[Chart]:
         ]
         if lines:
             charts += [_by_clues(task, lines), _by_type(task, lines)]
-    return [*charts, *(chart for run in runs if (chart := _heat_map(run)) is not None)]
+    by_frames = _gains_chart(runs)
+    heat_maps = (chart for run in runs if (chart := _heat_map(run)) is not None)
+    return [*charts, *([by_frames] if by_frames else []), *heat_maps]
 
 
 def _by_clues(task: str, lines: Sequence[_Line]) -> Chart:
@@ -110,6 +114,34 @@ def _told(lines: Sequence[_Line]) -> str:
     """In words: the totals."""
     totals = ((line.label, line.task.by_clues["total"].scores[line.metric]) for line in lines)
     return "; ".join(f"{label} {100 * score.mean:.1f} %" for label, score in totals)
+
+
+def _gains_chart(runs: Sequence[ReportRun]) -> Chart | None:
+    """What each run scores above the same model on blank frames, a line a task; None where there is no such pair."""
+    found = [
+        (f"{gain.run.header.name}, {gain.task}", 100 * total.mean, total)
+        for gain in gains([run.summary for run in runs])
+        if gain.metric == main_metric(gain.seeing) and (total := gain.total()) is not None
+    ]
+    if not found:
+        return None
+
+    def make() -> Figure:
+        figure = Figure(figsize=(_PANEL[0] + LEGEND, max(_PANEL[1], 0.8 + _ROW * len(found))), layout="constrained")
+        place = figure.subplots()
+        place.axvline(0, color="#444444", lw=0.8)
+        for row, (_, mean, total) in enumerate(reversed(found)):
+            place.plot(mean, row, marker="o", ms=4.5, color=_GAIN, zorder=3)
+            if total.low is not None and total.high is not None:
+                place.hlines(row, 100 * total.low, 100 * total.high, color=_GAIN, lw=1.3, zorder=2.8)
+        place.set_yticks(range(len(found)), [shown(name)[:60] for name, _, _ in reversed(found)])
+        place.set_ylim(-0.6, len(found) - 0.4)
+        place.set_xlabel("points above the same model's run on blank frames, with the 95 % interval")
+        place.grid(axis="y", visible=False)
+        return figure
+
+    told = "; ".join(f"{name} {mean:+.1f} points" for name, mean, _ in found)
+    return Chart("Gain over blank frames", inline_svg(make), told)
 
 
 def _heat_map(run: ReportRun) -> Chart | None:

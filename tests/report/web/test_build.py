@@ -53,6 +53,16 @@ def test_the_sections_have_their_pictures_and_tables(page):
     assert headline["oracle", "nieh_mini_gt"] == "100.0"
 
 
+def test_a_run_on_blank_frames_beside_another_shows_the_gain(make_page, tmp_path, run):
+    words = ("--model", "oracle", "--tasks", "nieh_mini_gt", "--limit", "12", "--frames", "shown,blank")
+    assert run(*words, "--output", tmp_path)[0] == 0
+    page = make_page(*sorted((tmp_path / "oracle").iterdir()))
+    (questions,) = (section for section in page.sections if section.key == "nieh")
+    (chart,) = (chart for chart in questions.charts if chart.title == "Gain over blank frames")
+    assert chart.told == "oracle, nieh_mini_gt +0.0 points"
+    assert "95 % interval" in chart.svg
+
+
 def test_frames_that_there_is_no_room_for_are_counted_and_clues_come_first(make_page, nieh_runs):
     page = make_page(nieh_runs[0], data=DATA, pictures=100_000)
     assert sum(map(len, page.pictures)) <= 100_000

@@ -1,4 +1,4 @@
-from infthor_eval.cli.reasons import counted_reasons
+from infthor_eval.reasons import counted_reasons
 
 
 def test_reasons_that_differ_in_their_numbers_alone_are_one():
