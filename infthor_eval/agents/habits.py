@@ -8,7 +8,7 @@ from infthor_eval.agents.script import read_plan
 from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.thor.actions import text_of
 
-__all__ = ["Habits", "expert_texts"]
+__all__ = ["Habits", "expert_texts", "fill_action", "open_action"]
 
 _START = ""  # the action before the first one
 _Key = tuple[str, ...]
@@ -38,13 +38,13 @@ class Habits:
         for key in _situations(plan, done):
             if key in self._seen:
                 counts = self._seen[key]
-                return _filled(min(counts, key=lambda action: (-counts[action], action)), plan)
+                return fill_action(min(counts, key=lambda action: (-counts[action], action)), plan)
         return "NoOp"
 
     def _learn(self, plan: str, actions: Sequence[str]) -> None:
         for number, action in enumerate(actions):
             for key in _situations(plan, actions[:number]):
-                self._seen[key][_open(action, plan)] += 1
+                self._seen[key][open_action(action, plan)] += 1
 
 
 def expert_texts(trajectory: Trajectory, plan: Plan) -> list[str]:
@@ -56,7 +56,7 @@ def expert_texts(trajectory: Trajectory, plan: Plan) -> list[str]:
 def _situations(plan: str, done: Sequence[str]) -> Iterator[_Key]:
     """What tells of a situation, the most telling first."""
     verb, _ = read_plan(plan)
-    before, number = _open(done[-1], plan) if done else _START, str(len(done))
+    before, number = open_action(done[-1], plan) if done else _START, str(len(done))
     yield "text", plan, number, before
     yield "text", plan, before
     yield "verb", verb, number, before
@@ -64,13 +64,13 @@ def _situations(plan: str, done: Sequence[str]) -> Iterator[_Key]:
     yield "verb", verb
 
 
-def _open(action: str, plan: str) -> str:
+def open_action(action: str, plan: str) -> str:
     """An action with places for the objects that its plan names."""
     _, types = read_plan(plan)
     return " ".join(f"{{{types.index(word)}}}" if word in types else word for word in action.split())
 
 
-def _filled(action: str, plan: str) -> str:
+def fill_action(action: str, plan: str) -> str:
     """An action with the objects of a plan in their places."""
     _, types = read_plan(plan)
     for number, name in enumerate(types):

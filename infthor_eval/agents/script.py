@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from infthor_eval.household.affordances import KNOWN_TYPES
 from infthor_eval.household.wording import compact
 
-__all__ = ["read_plan", "scripted"]
+__all__ = ["about", "read_plan", "scripted"]
 
 _TYPES = {compact(name): name for name in sorted(KNOWN_TYPES)}
 _TYPES |= {"sink": "SinkBasin", "bathtub": "BathtubBasin"}  # things are put into the basin
@@ -29,6 +29,21 @@ def read_plan(plan: str) -> tuple[str, tuple[str, ...]]:
         return plan, ()
     verb, *words = found.groups()
     return verb, tuple(_TYPES.get(word, word) for word in words if word is not None)
+
+
+def about(plan: str, types: Sequence[str]) -> str:
+    """The same plan about other objects.
+
+    Args:
+        plan: its text, of the usual form.
+        types: for the objects that it names, in their order.
+    """
+    found = _PLAN.fullmatch(plan)
+    assert found is not None
+    for group, name in reversed([*enumerate(types, start=2)]):
+        start, end = found.span(group)
+        plan = plan[:start] + compact(name) + plan[end:]
+    return plan
 
 
 def scripted(plan: str, done: Sequence[str]) -> str:

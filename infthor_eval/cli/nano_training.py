@@ -48,7 +48,7 @@ def train_nano(recipe: NanoRecipe, folders: Sequence[Path], out: Path, staffing:
         def watch(done: Lesson) -> None:
             bars.advance(_PARTS[done.part], done.step, done.n_steps, f"loss {done.loss:.3f}")
 
-        loaded = teach(recipe, sets, watch)
+        loaded = teach(recipe, sets, watch, say)
     export(loaded, out / "checkpoint")
     console().print(f"{out / 'checkpoint'}")
     return 0

@@ -15,7 +15,7 @@ from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.training.encoding import Encoded, Encoder, LeftOut
 from model_adapters.hf.prompt import n_tokens
 
-__all__ = ["recorded_chapters", "windows"]
+__all__ = ["recorded_chapters", "single_plans", "windows"]
 
 
 def recorded_chapters(trajectory: Trajectory, steps: Sequence[Step], frames: Sequence[FrameRef]) -> list[Chapter]:
@@ -77,6 +77,23 @@ def windows(encoder: Encoder, name: str, chapters: Sequence[Chapter], limit: int
         numbers = f"plan {end}" if end == first + 1 else f"plans {first + 1} to {end}"
         yield encoder.actions(f"{name}, {numbers}", opened(chapters, first, end))
         first = end
+
+
+def single_plans(encoder: Encoder, name: str, chapters: Sequence[Chapter]) -> Iterator[Encoded]:
+    """A history as sequences of one plan each, behind the goal that it serves and the frame that it begins with.
+
+    Args:
+        encoder: makes the sequences.
+        name: of the trajectory.
+        chapters: its history.
+
+    Raises:
+        DataError: a frame cannot be read, or a text of the history holds a mark.
+        ModelError: the template refuses the history.
+    """
+    for number, chapter in enumerate(chapters):
+        if chapter.steps:
+            yield encoder.actions(f"{name}, plan {number + 1}", opened(chapters, number, number + 1))
 
 
 def _end(encoder: Encoder, chapters: Sequence[Chapter], first: int, limit: int) -> int:

@@ -9,7 +9,7 @@ from typing import Any
 
 from infthor_eval.agents.history import Chapter, chapter_parts
 from infthor_eval.errors import DataError
-from infthor_eval.household.sequence_text import ACT
+from infthor_eval.household.sequence_text import ACT, action_part, plan_part
 from model_adapters import Part, Turn
 from model_adapters.hf.loaded import Loaded
 from model_adapters.hf.prompt import Frame, Piece, Prompter, n_tokens
@@ -90,9 +90,20 @@ class Encoder:
             DataError: a frame cannot be read, or a text of the history holds a mark.
             ModelError: the template refuses them.
         """
-        pieces = self.pieces(chapter_parts(chapters))
-        n_marks = 2 * sum(len(chapter.steps) for chapter in chapters)
-        if pieces.count(self._mark) != n_marks:
+        return self._acted(name, chapter_parts(chapters), sum(len(chapter.steps) for chapter in chapters))
+
+    def order(self, name: str, plan: str, actions: Sequence[str]) -> Encoded:
+        """A plan and its actions without a frame; loss is taken as on a history.
+
+        Raises:
+            DataError: a text holds a mark.
+            ModelError: the template refuses them.
+        """
+        return self._acted(name, [plan_part(plan), *map(action_part, actions)], len(actions))
+
+    def _acted(self, name: str, parts: Sequence[Part], n_actions: int) -> Encoded:
+        pieces = self.pieces(parts)
+        if pieces.count(self._mark) != 2 * n_actions:
             raise DataError(f"{name}: a goal, a plan or an action holds {ACT}; leave the trajectory out")
         return Encoded(name, tuple(pieces), tuple(self._between_marks(pieces)))
 

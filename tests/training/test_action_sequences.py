@@ -14,7 +14,7 @@ from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.step_log import read_steps
 from infthor_eval.formats.trajectory import iter_trajectories
 from infthor_eval.household.sequence_text import ACT
-from infthor_eval.training.action_sequences import recorded_chapters, windows
+from infthor_eval.training.action_sequences import recorded_chapters, single_plans, windows
 from infthor_eval.training.encoding import Encoded, LeftOut
 from model_adapters.hf.prompt import Frame
 
@@ -69,6 +69,16 @@ def test_windows_have_every_action_once_and_each_begins_as_a_trajectory_does(bun
             assert goal[1] in goals
         actions = [text for window in made for text in trained_text(encoder, window)]
         assert actions == [f"{ACT}{action}{ACT}" for chapter in history for action, _ in chapter.steps]
+
+
+def test_single_plans_have_every_action_once_and_each_begins_as_a_trajectory_does(bundled_set, encoder):
+    for name in names_in(bundled_set):
+        chapters = chapters_of(bundled_set, name)
+        alone = list(single_plans(encoder, name, chapters))
+        assert len(alone) == sum(bool(chapter.steps) for chapter in chapters)
+        found = [_ACTION.findall(said(encoder, [one for one in plan.pieces if isinstance(one, int)])) for plan in alone]
+        assert found == [[action for action, _ in chapter.steps] for chapter in chapters if chapter.steps]
+        assert all(said(encoder, plan.pieces[:1]) == "<|goal|>" for plan in alone)
 
 
 def test_windows_cannot_hold_another_plan(bundled_set, encoder):

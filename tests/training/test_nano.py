@@ -1,11 +1,14 @@
 """The small model's course, on two scenes and a few steps: what it is told, and that it learns."""
 
+import random
 import shutil
 
+import msgspec
 import pytest
 import torch
 from safetensors.torch import load_file
 
+from infthor_eval.errors import DataError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.qa_csv import write_questions
@@ -16,6 +19,7 @@ from infthor_eval.training.nano.album import _covered, _type, read_album
 from infthor_eval.training.nano.architecture import TOKENS, image_processor, untrained
 from infthor_eval.training.nano.lessons import Lessons, opening, texts
 from infthor_eval.training.nano.network import NanoNetwork, ways_of_writing
+from infthor_eval.training.nano.orders import Orders
 from infthor_eval.training.nano.school import teach
 from infthor_eval.training.nano.settings import NanoRecipe
 from model_adapters import check_adapter, load
@@ -125,6 +129,67 @@ def test_made_up_questions_are_true_and_their_names_tell_nothing(small_set, blan
         assert bool(album.shown[here, words[about]]) == (answer == "yes")
         assert answer == "yes" or not album.present[here, words[about]]
     assert min(counts.values()) > 70
+
+
+def test_orders_are_about_objects_that_stood_there_and_are_carried_out_by_name():
+    carried_out = [
+        ("pick up the mug", ["PickupObject Mug"]),
+        ("pick up the butterknife", ["PickupObject ButterKnife"]),
+        ("put the mug in the fridge", ["OpenObject Fridge", "PutObject Mug Fridge", "CloseObject Fridge"]),
+        ("put the egg in the microwave", ["OpenObject Microwave", "PutObject Egg Microwave", "CloseObject Microwave"]),
+        ("put the egg in the sinkbasin", ["PutObject Egg SinkBasin"]),
+        ("go to the fridge", ["MoveAhead", "RotateLeft"]),
+    ]
+    draw, orders = random.Random(0), Orders(carried_out)
+    assert {(plan, *actions) for plan, actions in (orders.drawn(draw) for _ in range(200))} == {
+        ("pick up the mug", "PickupObject Mug"),
+        ("pick up the butterknife", "PickupObject ButterKnife"),
+        ("put the mug in the fridge", "OpenObject Fridge", "PutObject Mug Fridge", "CloseObject Fridge"),
+        ("put the egg in the fridge", "OpenObject Fridge", "PutObject Egg Fridge", "CloseObject Fridge"),
+        ("put the mug in the microwave", "OpenObject Microwave", "PutObject Mug Microwave", "CloseObject Microwave"),
+        ("put the egg in the microwave", "OpenObject Microwave", "PutObject Egg Microwave", "CloseObject Microwave"),
+        ("put the egg in the sinkbasin", "PutObject Egg SinkBasin"),
+    }
+    assert not Orders(carried_out[-1:])
+
+
+def test_orders_have_no_frame_and_loss_is_taken_on_their_actions(small_set, blank):
+    loaded, album = blank
+    lessons = Lessons(Encoder(loaded), [small_set], album, window_tokens=600, seed=0)
+    for order in lessons.orders(20):
+        assert not order.frames
+        ends = [
+            at for at, piece in enumerate(order.pieces) if piece == loaded.tokenizer.convert_tokens_to_ids("<|plan|>")
+        ]
+        assert order.trained == tuple(at > ends[1] for at in range(len(order.pieces)))
+
+
+def test_histories_are_windows_or_single_plans(small_set, blank):
+    loaded, album = blank
+    lessons = Lessons(Encoder(loaded), [small_set], album, window_tokens=600, seed=0)
+    assert len(lessons.histories(2, 5, alone=0.0)) == 2
+    plans = lessons.histories(2, 5, alone=1.0)
+    assert len(plans) == 5
+    mark = loaded.tokenizer.convert_tokens_to_ids("<|plan|>")
+    assert all(plan.pieces.count(mark) == 2 for plan in plans)
+
+
+def test_what_cannot_be_read_is_left_out_and_told(small_set, tmp_path):
+    shutil.copytree(small_set, tmp_path / "set")
+    (tmp_path / "set/metadata/kitchen-1-seed7/traj_data.json").unlink()
+    told = []
+    teach(
+        msgspec.structs.replace(SMALL, seeing_steps=1, telling_steps=1), [tmp_path / "set"], lambda _: None, told.append
+    )
+    assert any("trajectory is not in the set" in line for line in told)
+
+
+def test_a_set_without_questions_is_refused(small_set, tmp_path):
+    shutil.copytree(small_set, tmp_path / "set")
+    (tmp_path / "set/qa_set_small.csv").unlink()
+    write_questions(tmp_path / "set/qa_set_none.csv", [])
+    with pytest.raises(DataError, match="no question"):
+        teach(SMALL, [tmp_path / "set"], lambda _: None)
 
 
 def test_the_course_is_the_same_for_a_seed_and_lowers_the_loss(small_set, tmp_path):

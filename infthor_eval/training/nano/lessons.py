@@ -1,9 +1,11 @@
 """What the small model is told: questions of sets, questions made up on any frame, and histories to act from."""
 
 import random
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
+from infthor_eval.agents.history import Chapter
+from infthor_eval.errors import DataError
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question
 from infthor_eval.household.sequence_text import MARKS
@@ -11,10 +13,12 @@ from infthor_eval.household.wording import an, noun
 from infthor_eval.nieh.contexts import CONTEXTS
 from infthor_eval.nieh.prompts import question_text
 from infthor_eval.nieh.samples import find_samples
-from infthor_eval.training.data import action_sequences
-from infthor_eval.training.encoding import Encoded, Encoder
+from infthor_eval.training.action_sequences import single_plans, windows
+from infthor_eval.training.data import read_history, recorded_names
+from infthor_eval.training.encoding import Encoded, Encoder, LeftOut
 from infthor_eval.training.nano.album import Album
 from infthor_eval.training.nano.network import ways_of_writing
+from infthor_eval.training.nano.orders import Orders
 from infthor_eval.training.question_sequences import question_sequences
 from model_adapters import Part
 
@@ -57,6 +61,12 @@ class Lessons:
         album: all their frames.
         window_tokens: of a history at most.
         seed: of the draws.
+
+    Attributes:
+        left_out: what no sequence could be made of.
+
+    Raises:
+        DataError: there is nothing to learn answering or acting from.
     """
 
     def __init__(
@@ -64,18 +74,46 @@ class Lessons:
     ) -> None:
         self._encoder = encoder
         self._album = album
+        self._limit = window_tokens
         self._draw = random.Random(seed)
         self._questions: list[Encoded] = []
-        self._histories: list[Encoded] = []
+        self._windows: list[Encoded] = []
+        self._plans: list[Encoded] = []
+        self.left_out: list[LeftOut] = []
+        carried_out: list[tuple[str, list[str]]] = []
         for folder in folders:
             asked = find_samples({"data": str(folder), "context": "clues"})
-            made = (*question_sequences(encoder, asked, window_tokens),)
-            self._questions += [item for item in made if isinstance(item, Encoded)]
-            cut = action_sequences(NiehSet(folder), encoder, window_tokens)
-            self._histories += [item for item in cut if isinstance(item, Encoded)]
+            self._questions += self._kept(question_sequences(encoder, asked, window_tokens))
+            for chapters in self._histories(NiehSet(folder)):
+                carried_out += [(chapter.plan, [action for action, _ in chapter.steps]) for chapter in chapters]
+        self._orders = Orders(carried_out)
+        for what, pool in (("question", self._questions), ("history", self._windows), ("plan", self._orders)):
+            if not pool:
+                raise DataError(f"{', '.join(map(str, folders))}: no {what} to learn from; give another set")
         counts = album.shown.sum(0).tolist()
         often = {name: count for name, count in zip(album.types, counts, strict=True) if count >= _LEAST_SEEN}
         self._names, self._weights = list(often), list(often.values())
+
+    def _histories(self, data: NiehSet) -> Iterator[list[Chapter]]:
+        """Read the histories of a set; one that cannot be read is left out."""
+        for name in recorded_names(data):
+            try:
+                _, chapters = read_history(data, name)
+                cut = [*windows(self._encoder, name, chapters, self._limit)]
+                alone = [*single_plans(self._encoder, name, chapters)]
+            except DataError as error:
+                self.left_out.append(LeftOut(name, str(error)))
+                continue
+            self._windows += self._kept(cut)
+            self._plans += [plan for plan in alone if plan.n_tokens <= self._limit]
+            yield chapters
+
+    def _kept(self, made: Iterable[Encoded | LeftOut]) -> Iterator[Encoded]:
+        for item in made:
+            if isinstance(item, Encoded):
+                yield item
+            else:
+                self.left_out.append(item)
 
     def questions(self, n: int, made_up: float) -> list[Encoded]:
         """Some questions with their answers, a share of them made up."""
@@ -83,9 +121,20 @@ class Lessons:
             self._presence() if self._draw.random() < made_up else self._draw.choice(self._questions) for _ in range(n)
         ]
 
-    def histories(self, n: int) -> list[Encoded]:
-        """Some histories with their actions."""
-        return [self._draw.choice(self._histories) for _ in range(n)]
+    def histories(self, n_windows: int, n_plans: int, alone: float) -> list[Encoded]:
+        """Some histories with their actions.
+
+        Args:
+            n_windows: this many windows,
+            n_plans: or this many single plans,
+            alone: with this probability.
+        """
+        pool, n = (self._plans, n_plans) if self._draw.random() < alone else (self._windows, n_windows)
+        return [self._draw.choice(pool) for _ in range(n)]
+
+    def orders(self, n: int) -> list[Encoded]:
+        """Some plans that are made up, without a frame, with their actions."""
+        return [self._encoder.order("made up", *self._orders.drawn(self._draw)) for _ in range(n)]
 
     def frames(self, n: int) -> list[int]:
         """Places of some frames in the album."""

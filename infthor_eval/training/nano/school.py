@@ -8,6 +8,7 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
+from infthor_eval.reasons import counted_reasons
 from infthor_eval.training.batches import collate
 from infthor_eval.training.encoding import Encoded, Encoder
 from infthor_eval.training.nano.album import read_album
@@ -43,19 +44,25 @@ class Lesson:
     loss: float
 
 
-def teach(recipe: NanoRecipe, folders: Sequence[Path], watcher: Callable[[Lesson], None]) -> Loaded:
+def teach(
+    recipe: NanoRecipe,
+    folders: Sequence[Path],
+    watcher: Callable[[Lesson], None],
+    say: Callable[[str], None] = lambda _: None,
+) -> Loaded:
     """Train the small model on replayed sets.
 
     Args:
         recipe: how.
         folders: of the sets, with trajectories and questions.
         watcher: is told of every step.
+        say: is told what no sequence could be made of.
 
     Returns:
         The model, to be exported; its weights are rounded to bfloat16.
 
     Raises:
-        DataError: a set cannot be read.
+        DataError: a set cannot be read, or there is nothing in them to learn from.
     """
     torch.set_num_threads(recipe.threads)
     torch.manual_seed(recipe.seed)
@@ -63,6 +70,8 @@ def teach(recipe: NanoRecipe, folders: Sequence[Path], watcher: Callable[[Lesson
     loaded = untrained(recipe, texts(folders, album.types), [opening()])
     network = NanoNetwork(loaded, album)
     lessons = Lessons(Encoder(loaded), folders, album, window_tokens=recipe.window_tokens, seed=recipe.seed)
+    for _, reason, n in counted_reasons(("", item.reason) for item in lessons.left_out):
+        say(f"{n} left out: {reason}")
     course = _Course(recipe, network, lessons)
     network.train()
     course.run("see", recipe.seeing_steps, course.see, watcher)
@@ -107,7 +116,7 @@ class _Course:
         return loss, loss.detach()
 
     def tell(self) -> tuple[Tensor, Tensor]:
-        """Answers and actions, which count alike, though histories have most of the tokens.
+        """Answers and actions, which count alike, though histories have most of the tokens; and orders beside them.
 
         What is in the questions' frames is asked too: the names' embeddings learn here, and are not to leave what they
         look like.
@@ -115,8 +124,9 @@ class _Course:
         recipe = self._recipe
         answered = self._told(self._lessons.questions(recipe.questions_per_step, recipe.made_up))
         places, features = self._network.last_seen
-        acted = self._told(self._lessons.histories(recipe.windows_per_step))
-        loss = answered + acted
+        acted = self._told(self._lessons.histories(recipe.windows_per_step, recipe.plans_per_step, recipe.alone))
+        ordered = self._told(self._lessons.orders(recipe.orders_per_step))
+        loss = answered + acted + recipe.orders_weight * ordered
         return loss + recipe.seeing_weight * self._seen(features, places), loss.detach()
 
     def _seen(self, features: Tensor, places: Sequence[int]) -> Tensor:

@@ -4,6 +4,16 @@ import msgspec
 
 __all__ = ["NanoRecipe", "Scenes"]
 
+_COUNTS = (
+    "seeing_steps",
+    "telling_steps",
+    "frames_per_step",
+    "questions_per_step",
+    "windows_per_step",
+    "plans_per_step",
+    "orders_per_step",
+)
+
 
 class Scenes(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The procedural scenes that it is trained in.
@@ -40,8 +50,12 @@ class NanoRecipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
         frames_per_step: while it learns to see.
         questions_per_step: while it learns to answer.
         made_up: share of these that ask for the presence of an object in any frame.
-        windows_per_step: histories that it learns to act from, in each of these steps.
+        windows_per_step: histories that it learns to act from, in a step of these.
         window_tokens: of each of them at most.
+        alone: share of the steps in which it learns from single plans of histories instead.
+        plans_per_step: how many these are.
+        orders_per_step: plans that are made up and have no frame, from which it learns to do what their words say.
+        orders_weight: of these beside the histories.
         lr: the highest learning rate.
         weight_decay: of AdamW.
         seeing_weight: of what is seen beside what is told, in the second part.
@@ -61,6 +75,10 @@ class NanoRecipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     made_up: float = 0.4
     windows_per_step: int = 1
     window_tokens: int = 2048
+    alone: float = 0.5
+    plans_per_step: int = 12
+    orders_per_step: int = 24
+    orders_weight: float = 0.5
     lr: float = 1.5e-3
     weight_decay: float = 0.05
     seeing_weight: float = 0.1
@@ -73,10 +91,11 @@ class NanoRecipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
         Raises:
             ValueError: names the setting.
         """
-        for name in ("seeing_steps", "telling_steps", "frames_per_step", "questions_per_step", "windows_per_step"):
+        for name in _COUNTS:
             if getattr(self, name) < 1:
                 raise ValueError(f"{name} is {getattr(self, name)}; it is at least 1")
         if self.hidden % 32:
             raise ValueError(f"hidden is {self.hidden}; it is a multiple of 32")
-        if not 0 <= self.made_up <= 1:
-            raise ValueError(f"made_up is {self.made_up}; it is between 0 and 1")
+        for name in ("made_up", "alone"):
+            if not 0 <= getattr(self, name) <= 1:
+                raise ValueError(f"{name} is {getattr(self, name)}; it is between 0 and 1")

@@ -1,0 +1,40 @@
+"""Plans that are made up, with the actions that carry them out: what the words of a plan name, its actions name too."""
+
+import random
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
+
+from infthor_eval.agents.habits import fill_action, open_action
+from infthor_eval.agents.script import about, read_plan
+
+__all__ = ["Orders"]
+
+
+class Orders:
+    """What experts did, about other objects: each stood in the same place of a plan that was carried out alike."""
+
+    def __init__(self, carried_out: Iterable[tuple[str, Sequence[str]]]) -> None:
+        """Learn the kinds of plans; those whose actions name no object of theirs, as ways do, are left aside.
+
+        Args:
+            carried_out: texts of plans, each with its actions.
+        """
+        kinds: dict[tuple[str, tuple[str, ...]], list[str]] = defaultdict(list)
+        for plan, actions in carried_out:
+            opened = tuple(open_action(action, plan) for action in actions)
+            if opened != tuple(actions):
+                kinds[read_plan(plan)[0], opened].append(plan)
+        self._plans = list(kinds.values())
+        self._actions = [opened for _, opened in kinds]
+
+    def __bool__(self) -> bool:
+        """Whether any is known."""
+        return bool(self._plans)
+
+    def drawn(self, draw: random.Random) -> tuple[str, list[str]]:
+        """A plan and its actions, kinds as often as experts had them."""
+        (kind,) = draw.choices(range(len(self._plans)), [len(plans) for plans in self._plans])
+        plans = self._plans[kind]
+        columns = zip(*(read_plan(plan)[1] for plan in plans), strict=True)
+        plan = about(plans[0], [draw.choice(column) for column in columns])
+        return plan, [fill_action(action, plan) for action in self._actions[kind]]
