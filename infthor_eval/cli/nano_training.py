@@ -22,7 +22,7 @@ from infthor_eval.workers import Staffing
 __all__ = ["make_data", "train_nano"]
 
 _PER_TRAJECTORY = 500  # questions at most: all that there are
-_PARTS = {"see": "learning to see", "tell": "learning to answer and to act"}
+_PARTS = {"see": "learning to see", "read": "learning to read", "tell": "learning to answer and to act"}
 
 
 def train_nano(recipe: NanoRecipe, folders: Sequence[Path], out: Path, staffing: Staffing) -> int:

@@ -29,6 +29,7 @@ SMALL = NanoRecipe(
     hidden=64,
     layers=2,
     seeing_steps=20,
+    reading_steps=3,
     telling_steps=6,
     frames_per_step=16,
     questions_per_step=8,
@@ -179,7 +180,10 @@ def test_what_cannot_be_read_is_left_out_and_told(small_set, tmp_path):
     (tmp_path / "set/metadata/kitchen-1-seed7/traj_data.json").unlink()
     told = []
     teach(
-        msgspec.structs.replace(SMALL, seeing_steps=1, telling_steps=1), [tmp_path / "set"], lambda _: None, told.append
+        msgspec.structs.replace(SMALL, seeing_steps=1, reading_steps=1, telling_steps=1),
+        [tmp_path / "set"],
+        lambda _: None,
+        told.append,
     )
     assert any("trajectory is not in the set" in line for line in told)
 
@@ -198,7 +202,7 @@ def test_the_course_is_the_same_for_a_seed_and_lowers_the_loss(small_set, tmp_pa
         told = []
         export(teach(SMALL, [small_set], told.append), tmp_path / name)
         losses.append([lesson.loss for lesson in told])
-        assert [lesson.part for lesson in told] == ["see"] * 20 + ["tell"] * 6
+        assert [lesson.part for lesson in told] == ["see"] * 20 + ["read"] * 3 + ["tell"] * 6
     assert losses[0] == losses[1]
     assert sum(losses[0][15:20]) < 0.95 * sum(losses[0][:5])
     first, second = (load_file(tmp_path / name / "model.safetensors") for name in ("a", "b"))

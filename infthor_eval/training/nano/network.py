@@ -55,7 +55,7 @@ class NanoNetwork(SequenceModel):
         """See `SequenceModel`."""
         distinct = list(dict.fromkeys(frame.digest for frame in frames))
         places = [self._places[digest] for digest in distinct]
-        self.last_seen = places, self.see(places) if self._remembered is None else self._remembered[places]
+        self.last_seen = places, self.see(places)
         by_digest = dict(zip(distinct, self.last_seen[1], strict=True))
         return [by_digest[frame.digest] for frame in frames]
 
@@ -70,6 +70,8 @@ class NanoNetwork(SequenceModel):
 
     def see(self, places: Sequence[int]) -> Tensor:
         """Features of frames of the album, (frames, tokens, hidden)."""
+        if self._remembered is not None:
+            return self._remembered[list(places)]
         grid = torch.tensor([[1, *([int(self._album.pixels.shape[1] ** 0.5)] * 2)]]).expand(len(places), 3)
         output: Any = self.model.model.visual(self._album.for_tower(places), grid_thw=grid)
         features: Tensor = output.pooler_output

@@ -25,6 +25,7 @@ _WARM_UP = 50  # steps
 _LOWEST = 0.05  # of the learning rate, in the end
 _BETAS = (0.9, 0.98)
 _CLIP = 1.0
+_FRAMES_BESIDE = 16  # of which it is asked what is to be seen, while it reads
 
 
 @dataclass(frozen=True)
@@ -32,10 +33,11 @@ class Lesson:
     """A step that is done.
 
     Attributes:
-        part: "see" or "tell".
+        part: "see", "read" or "tell".
         step: its number in the part, from 1 on.
         n_steps: of the part.
-        loss: of what is seen, per frame; of answers and of actions, each per token, together. In nats.
+        loss: of what is seen, per frame; of what is read, per token; of answers and of actions, each per token,
+            together. In nats.
     """
 
     part: str
@@ -76,6 +78,7 @@ def teach(
     network.train()
     course.run("see", recipe.seeing_steps, course.see, watcher)
     network.remember()
+    course.run("read", recipe.reading_steps, course.read, watcher)
     course.run("tell", recipe.telling_steps, course.tell, watcher)
     network.eval()
     loaded.model.to(torch.bfloat16)  # half the file, and no answer hangs on what is rounded off
@@ -83,7 +86,7 @@ def teach(
 
 
 class _Course:
-    """The steps of both parts."""
+    """The steps of all parts."""
 
     def __init__(self, recipe: NanoRecipe, network: NanoNetwork, lessons: Lessons) -> None:
         self._recipe = recipe
@@ -115,11 +118,16 @@ class _Course:
         loss = self._seen(self._network.see(places), places)
         return loss, loss.detach()
 
+    def read(self) -> tuple[Tensor, Tensor]:
+        """Orders; and some frames, as the names' embeddings learn here and are not to leave what they look like."""
+        recipe, places = self._recipe, self._lessons.frames(_FRAMES_BESIDE)
+        loss = self._told(self._lessons.orders(recipe.orders_read))
+        return loss + recipe.seeing_weight * self._seen(self._network.see(places), places), loss.detach()
+
     def tell(self) -> tuple[Tensor, Tensor]:
         """Answers and actions, which count alike, though histories have most of the tokens; and orders beside them.
 
-        What is in the questions' frames is asked too: the names' embeddings learn here, and are not to leave what they
-        look like.
+        What is in the questions' frames is asked too, as in reading.
         """
         recipe = self._recipe
         answered = self._told(self._lessons.questions(recipe.questions_per_step, recipe.made_up))

@@ -6,8 +6,10 @@ __all__ = ["NanoRecipe", "Scenes"]
 
 _COUNTS = (
     "seeing_steps",
+    "reading_steps",
     "telling_steps",
     "frames_per_step",
+    "orders_read",
     "questions_per_step",
     "windows_per_step",
     "plans_per_step",
@@ -37,7 +39,7 @@ class Scenes(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 
 
 class NanoRecipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """How the small model is trained: it learns to see, then to answer and to act.
+    """How the small model is trained: it learns to see, to read, then to answer and to act.
 
     Attributes:
         architecture: marks the recipe.
@@ -46,19 +48,22 @@ class NanoRecipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
         hidden: width of tower and decoder.
         layers: of each.
         seeing_steps: in which it learns which objects are in which part of a frame, by their names' embeddings.
-        telling_steps: in which it learns to answer questions and to act; its tower stays as it is.
+        reading_steps: in which it learns to do what the words of a plan say, from plans that are made up, without a
+            frame; its tower stays as it is from here on.
+        telling_steps: in which it learns to answer questions and to act.
         frames_per_step: while it learns to see.
+        orders_read: plans that are made up, in each step of reading.
         questions_per_step: while it learns to answer.
         made_up: share of these that ask for the presence of an object in any frame.
         windows_per_step: histories that it learns to act from, in a step of these.
         window_tokens: of each of them at most.
         alone: share of the steps in which it learns from single plans of histories instead.
         plans_per_step: how many these are.
-        orders_per_step: plans that are made up and have no frame, from which it learns to do what their words say.
+        orders_per_step: plans that are made up, while it learns to answer.
         orders_weight: of these beside the histories.
         lr: the highest learning rate.
         weight_decay: of AdamW.
-        seeing_weight: of what is seen beside what is told, in the second part.
+        seeing_weight: of what is seen beside what is read or told.
         threads: of torch; another number rounds otherwise.
         seed: of everything that is random.
     """
@@ -69,8 +74,10 @@ class NanoRecipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     hidden: int = 128
     layers: int = 4
     seeing_steps: int = 400
+    reading_steps: int = 200
     telling_steps: int = 600
     frames_per_step: int = 64
+    orders_read: int = 96
     questions_per_step: int = 40
     made_up: float = 0.4
     windows_per_step: int = 1
