@@ -7,7 +7,6 @@ from typing import Any
 import click
 
 from infthor_eval.cli.main import _infthor_eval
-from infthor_eval.cli.options import LARGEST
 
 __all__ = ["commands", "on_page_markdown"]
 
@@ -47,5 +46,4 @@ def _section(context: click.Context) -> str:
 
 
 def _cell(text: str) -> str:
-    told = text.replace(f"<={LARGEST}]", "]")  # the largest number there is tells nobody anything
-    return told.replace("|", "\\|").replace("<", "&lt;").replace("\n", " ")
+    return text.replace("|", "\\|").replace("<", "&lt;").replace("\n", " ")

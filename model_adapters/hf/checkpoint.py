@@ -7,6 +7,7 @@ PIL ones: torchvision's resize gives other pixels, and the numbers must not depe
 
 import contextlib
 import json
+import sys
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -270,6 +271,8 @@ def loading(pretrained: str) -> Iterator[None]:
     """
     # There is no end to what transformers, tokenizers and safetensors raise on files that somebody damaged.
     mend = "restore its files, or give another checkpoint"
+    if not sys.stderr.isatty():  # a log would have the bar as a line
+        transformers.utils.logging.disable_progress_bar()
     with naming(f"the checkpoint {pretrained} cannot be loaded", mend, of=Exception, as_a=ModelError):
         yield
 
