@@ -57,7 +57,12 @@ class Pace:
         return f"{place}, {duration((self._n_units - n_done) / rate)} left, {self.speed(now)}"
 
     def is_due(self, now: float) -> bool:
-        """Whether a line is to be written: not too soon after the last, then at each step, and now and then anyway."""
+        """Whether a line is to be written: not too soon after the last, then at each step, and now and then anyway.
+
+        At the end there is none: what came of it is told then.
+        """
+        if self._n_done >= self._n_units:
+            return False
         since = now - self._told_at
         stepped = self._n_done - self._told_of >= _STEP * self._n_units
         due = since >= _MOST_S or (since >= _LEAST_S and stepped)

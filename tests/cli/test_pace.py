@@ -33,7 +33,7 @@ def test_a_slow_model_is_told_in_seconds_for_each():
     ("n_units", "every_s", "expected"),
     [
         (100, 0.01, []),  # all done within a second: the line at the end of the run tells it
-        (1000, 0.1, [10, 20, 30, 40, 50, 60, 70, 80, 90, 100]),
+        (1000, 0.1, [10, 20, 30, 40, 50, 60, 70, 80, 90]),
         (10_000, 1.0, [60, 120, 180]),  # a step is minutes
         (20, 200.0, [200, 400, 600]),
     ],
@@ -58,9 +58,7 @@ def test_work_in_a_pipe_says_lines_with_what_an_earlier_run_had_done_left_out(mo
         bar = PacedBar(progress, "replay", 4)
         for resumed in (True, True, False, False):
             bar.advance(resumed=resumed)
-    *_, third, last = said.getvalue().splitlines()
-    assert third == "replay: 3 of 4 (75 %), 1.0 s left, 1.0 a second"
-    assert last == "replay: 4 of 4 (100 %), 0.0 s left, 1.0 a second"
+    assert said.getvalue().splitlines()[-1] == "replay: 3 of 4 (75 %), 1.0 s left, 1.0 a second"
 
 
 def test_a_training_that_goes_on_tells_its_own_pace(monkeypatch):

@@ -123,6 +123,22 @@ def test_plans_are_carried_out_as_in_this_process(
     assert {record.usage.requests for record in behind} == {len(record.payload.steps) for record in behind}
 
 
+@pytest.mark.slow
+def test_all_bundled_questions_are_answered_alike(
+    both: Callable[..., list[list[UnitRecord[Any]]]],
+) -> None:
+    behind, here = both("--tasks", "nieh_mini")
+    assert len(behind) == 294
+    assert [record.payload for record in behind] == [record.payload for record in here]
+
+
+@pytest.mark.slow
+def test_bundled_plans_are_carried_out_alike(both: Callable[..., list[list[UnitRecord[Any]]]]) -> None:
+    behind, here = both("--tasks", "infthor_plans_mini", "--limit", 2, "--greedy", **WITHOUT_STOP)
+    assert len(behind) > 40
+    assert [record.payload for record in behind] == [record.payload for record in here]
+
+
 def test_turns_and_systems_are_taken(served: Served, frames: list[FrameRef]) -> None:
     models: list[Any] = [
         load("openai", served.options, 0),
