@@ -1,12 +1,16 @@
 """The paper's recipes as they are, but for a tiny model and a sixteenth of their lengths."""
 
+import os
 import socket
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import msgspec
+import psutil
 import pytest
+import torch
 import yaml
 from safetensors.torch import load_file
 
@@ -14,6 +18,36 @@ from infthor_eval.training.recipe import Parallel, Recipe, read_recipe
 
 SCALE = 16
 PROGRAM = Path(sys.executable).with_name("infthor-eval")
+
+
+def scaled(name: str, n_processes: int) -> Recipe:
+    """A recipe of the paper for a sixteenth of its length and two steps, on as many processes as there are."""
+    published = read_recipe(name)
+    assert isinstance(published, Recipe)
+    return msgspec.structs.replace(
+        published,
+        model="qwen2.5-vl-tiny",  # a frame of which takes few tokens
+        model_args={},
+        max_tokens=published.max_tokens // SCALE,
+        max_steps=2,
+        sequences_per_step=2,
+        # Sharding weights needs GPUs; a sequence is shared by as many processes as there are.
+        parallel=Parallel(context=n_processes),
+    )
+
+
+def started(recipe: Recipe, n_processes: int, data: Path, out: Path) -> "subprocess.Popen[str]":
+    """`train`, in one process or several."""
+    path = out.with_suffix(".yaml")
+    path.write_text(yaml.safe_dump(msgspec.to_builtins(recipe)))
+    words = [PROGRAM, "train", "--recipe", path, "--data", data, "--out", out]
+    return subprocess.Popen(
+        [*launcher(n_processes), *map(str, words)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        env=os.environ | {"OMP_NUM_THREADS": "1"},
+    )
 
 
 def launcher(n_processes: int) -> list[str]:
@@ -27,29 +61,45 @@ def launcher(n_processes: int) -> list[str]:
     return [sys.executable, "-m", "torch.distributed.run", "--nproc-per-node", str(n_processes), *place, "--no-python"]
 
 
+def weights_of(out: Path) -> dict[str, torch.Tensor]:
+    return load_file(out / "checkpoint" / "model.safetensors")
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "n_processes"), [("infthor_32k", 1), ("infthor_64k", 2), ("infthor_130k", 4)])
 def test_it_trains(bundled_set: Path, tmp_path: Path, name: str, n_processes: int) -> None:
-    published = read_recipe(name)
-    assert isinstance(published, Recipe)
-    recipe = msgspec.structs.replace(
-        published,
-        model="qwen2.5-vl-tiny",  # a frame of which takes few tokens
-        model_args={},
-        max_tokens=published.max_tokens // SCALE,
-        max_steps=2,
-        sequences_per_step=2,
-        # Sharding weights needs GPUs; a sequence is shared by as many processes as there are.
-        parallel=Parallel(context=n_processes),
-    )
-    out = tmp_path / "out"
-    (tmp_path / "recipe.yaml").write_text(yaml.safe_dump(msgspec.to_builtins(recipe)))
-    words = ["train", "--recipe", tmp_path / "recipe.yaml", "--data", bundled_set, "--out", out]
-    command = [*launcher(n_processes), PROGRAM, *words]
-    done = subprocess.run(list(map(str, command)), capture_output=True, text=True, check=False, timeout=580)
-    assert done.returncode == 0, done.stderr[-2000:]
-    about = msgspec.json.decode((out / "training.json").read_bytes())
+    recipe = scaled(name, n_processes)
+    training = started(recipe, n_processes, bundled_set, tmp_path / "out")
+    said, _ = training.communicate(timeout=580)
+    assert training.returncode == 0, said[-2000:]
+    about = msgspec.json.decode((tmp_path / "out" / "training.json").read_bytes())
     assert about["recipe"]["max_tokens"] == recipe.max_tokens
     assert about["sequences"] > 0
-    weights = load_file(out / "checkpoint" / "model.safetensors")
-    assert all(weight.isfinite().all() for weight in weights.values())
+    assert all(weight.isfinite().all() for weight in weights_of(tmp_path / "out").values())
+
+
+@pytest.mark.slow
+def test_processes_that_share_sequences_and_are_killed_end_with_the_weights_of_others(
+    bundled_set: Path, tmp_path: Path
+) -> None:
+    recipe = msgspec.structs.replace(scaled("infthor_64k", 2), max_tokens=1024, max_steps=6, save_every=2)
+    whole = started(recipe, 2, bundled_set, tmp_path / "whole")
+    assert whole.communicate(timeout=300)[0]
+    killed = started(recipe, 2, bundled_set, tmp_path / "killed")
+    deadline = time.monotonic() + 120
+    while not list((tmp_path / "killed" / "states").glob("step-00000?")):
+        assert killed.poll() is None
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+    launching = psutil.Process(killed.pid)
+    for process in (*launching.children(recursive=True), launching):  # each worker has a session of its own
+        process.kill()
+    killed.communicate()
+    assert not (tmp_path / "killed" / "checkpoint").exists()
+    again = started(recipe, 2, bundled_set, tmp_path / "killed")
+    said, _ = again.communicate(timeout=300)
+    assert again.returncode == 0, said[-2000:]
+    assert "step 6 of 6" in said
+    first, second = weights_of(tmp_path / "whole"), weights_of(tmp_path / "killed")
+    assert first.keys() == second.keys()
+    assert all(first[name].equal(second[name]) for name in first)
