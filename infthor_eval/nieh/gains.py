@@ -4,11 +4,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from infthor_eval.nieh.options import SHOWN
 from infthor_eval.nieh.summary import NiehSummary, TaskSummary
 from infthor_eval.runs import RunSummary
 from infthor_eval.statistics import Estimate, paired_difference
 
-__all__ = ["Gain", "frames_of", "gains"]
+__all__ = ["Gain", "frames_of", "gains", "name_of"]
 
 _BLANK = "blank"
 
@@ -70,6 +71,12 @@ def _gains(run: RunSummary, blind: RunSummary) -> Iterator[Gain]:
 def frames_of(run: RunSummary) -> str:
     """What was shown in the frames' places."""
     return str(run.header.identity["frames"])
+
+
+def name_of(run: RunSummary) -> str:
+    """A run's name, with what it was shown instead of frames."""
+    frames = frames_of(run)
+    return run.header.name if frames == SHOWN else f"{run.header.name}, {frames} frames"
 
 
 def _same_but_for_frames(run: RunSummary, blind: RunSummary) -> bool:

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 from infthor_eval.formats.published import PublishedRow, PublishedTable, published_tables
 from infthor_eval.formats.question import ABSENCE
-from infthor_eval.nieh.gains import Gain, frames_of, gains
+from infthor_eval.nieh.gains import Gain, frames_of, gains, name_of
 from infthor_eval.nieh.options import SHOWN
 from infthor_eval.nieh.summary import CLUE_COLUMNS, OPEN_ENDED, Cell, NiehSummary, TaskSummary, main_metric
 from infthor_eval.runs import RunSummary
@@ -94,13 +94,7 @@ def _tasks(runs: Sequence[RunSummary]) -> Iterator[tuple[str, str, TaskSummary]]
     for run in runs:
         assert isinstance(run.summary, NiehSummary)
         for name, task in run.summary.tasks.items():
-            yield _name(run), name, task
-
-
-def _name(run: RunSummary) -> str:
-    """A run's name, with what it was shown instead of frames."""
-    frames = frames_of(run)
-    return run.header.name if frames == SHOWN else f"{run.header.name}, {frames} frames"
+            yield name_of(run), name, task
 
 
 # -- by number of clues
@@ -124,7 +118,7 @@ def _embedded(runs: Sequence[RunSummary]) -> list[str]:
 def _rows_of(run: RunSummary) -> list[Row]:
     found = [(name, task, metric) for _, name, task in _tasks([run]) for metric in task.metrics]
     return [
-        Row((_name(run), name, metric, *_cells(task, metric)), ends_section=number == len(found))
+        Row((name_of(run), name, metric, *_cells(task, metric)), ends_section=number == len(found))
         for number, (name, task, metric) in enumerate(found, 1)
     ]
 
@@ -212,7 +206,7 @@ def _beside(table: PublishedTable, runs: Sequence[RunSummary]) -> Table:
 
 def _gains_table(runs: Sequence[RunSummary]) -> Table | None:
     """What each run scores above the same run on blank frames; None where there is no such pair."""
-    rows = [Row((_name(gain.run), gain.task, gain.metric, *_gain_cells(gain))) for gain in gains(runs)]
+    rows = [Row((name_of(gain.run), gain.task, gain.metric, *_gain_cells(gain))) for gain in gains(runs)]
     if not rows:
         return None
     note = "95 %: of the total, paired by question and clustered by trajectory, as `infthor-eval compare` has it."

@@ -8,9 +8,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from infthor_eval.formats.question import ABSENCE
-from infthor_eval.nieh.gains import gains
+from infthor_eval.nieh.gains import gains, name_of
 from infthor_eval.nieh.summary import CLUE_COLUMNS, Cell, TaskSummary, main_metric
-from infthor_eval.report.drawing import BOUND, LEGEND, Look, add_legend, inline_svg, looks_of
+from infthor_eval.report.drawing import LEGEND, Look, add_legend, inline_svg, looks_of
 from infthor_eval.report.web.runs import ReportRun
 from infthor_eval.report.web.sections import Chart
 from infthor_eval.terminal import shown
@@ -21,7 +21,7 @@ _COLUMNS = (*CLUE_COLUMNS, ABSENCE)
 _SPREAD = 0.6  # of the room between two columns that the dots of several runs take
 _PANEL, _ROW = (4.6, 2.6), 0.34  # inches
 _DEPTH = "depth="
-_GAIN = BOUND.colour
+_GAIN = looks_of(("gain",))["gain"].colour
 
 
 class _Line(NamedTuple):
@@ -119,7 +119,7 @@ def _told(lines: Sequence[_Line]) -> str:
 def _gains_chart(runs: Sequence[ReportRun]) -> Chart | None:
     """What each run scores above the same model on blank frames, a line a task; None where there is no such pair."""
     found = [
-        (f"{gain.run.header.name}, {gain.task}", 100 * total.mean, total)
+        (f"{name_of(gain.run)}, {gain.task}", 100 * total.mean, total)
         for gain in gains([run.summary for run in runs])
         if gain.metric == main_metric(gain.seeing) and (total := gain.total()) is not None
     ]
@@ -136,7 +136,7 @@ def _gains_chart(runs: Sequence[ReportRun]) -> Chart | None:
                 place.hlines(row, 100 * total.low, 100 * total.high, color=_GAIN, lw=1.3, zorder=2.8)
         place.set_yticks(range(len(found)), [shown(name)[:60] for name, _, _ in reversed(found)])
         place.set_ylim(-0.6, len(found) - 0.4)
-        place.set_xlabel("points above the same model's run on blank frames, with the 95 % interval")
+        place.set_xlabel("gain, in points, and its 95 % interval")
         place.grid(axis="y", visible=False)
         return figure
 
