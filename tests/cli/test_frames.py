@@ -29,7 +29,7 @@ def test_a_run_with_each_and_the_gain_between_them(make_nieh_set, tmp_path, run,
     assert results(out).keys() == {"shown", "blank", "shuffled", "other"}
     assert all(len(counts) == 1 for counts in tokens(out, records_in).values())  # blanks cost as much
     rows = [line.split() for line in shown.splitlines()]
-    assert [TINY + ",", "blank", "frames", "nieh_full", "strict"] in [row[:5] for row in rows]
+    assert [TINY + ",", "blank", "frames", "nieh_full"] in [row[:4] for row in rows]
     assert "Gain over the same model's run on blank frames, in points" in shown
     _, shown, err = run(*arguments)
     assert "0 answered now, 5 found" in err  # the run on true frames is the one without the option
