@@ -7,21 +7,19 @@ from typing import TypeVar
 
 __all__ = ["counted_reasons"]
 
-Where = TypeVar("Where", str, tuple[str, str])  # a task, or a task and what became of its units
+_Where = TypeVar("_Where", str, tuple[str, str])  # a task, or a task and what became of its units
 
 # A number that stands alone: those in paths, names and ids tell things apart.
 _NUMBER = re.compile(r"(?<![\w/.,-])\d+(?:,\d{3})*(?:\.\d+)?(?![\w/]|[.,-]\w)")
 
 
-def counted_reasons(
-    reasons: Iterable[tuple[Where, str]],
-) -> list[tuple[Where, str, int]]:
+def counted_reasons(reasons: Iterable[tuple[_Where, str]]) -> list[tuple[_Where, str, int]]:
     """Task, reason and how often, in the order of the alphabet; numbers that differ are told as a range.
 
     Args:
         reasons: task (or task and what became of it) and reason of each case.
     """
-    alike: dict[tuple[Where, str], list[str]] = defaultdict(list)
+    alike: dict[tuple[_Where, str], list[str]] = defaultdict(list)
     for where, reason in reasons:
         alike[where, _NUMBER.sub("#", reason)].append(reason)
     return [(where, _in_ranges(found), len(found)) for (where, _), found in sorted(alike.items())]

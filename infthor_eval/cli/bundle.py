@@ -27,7 +27,7 @@ def command(manifest: Path, out: Path) -> int:
     prepared_folder(out)
     with Simulator(embedded()) as simulator, progress_bar(error_console()) as progress:
         bar = PacedBar(progress, wanted.name, 2 * len(wanted.trajectories))
-        finished, made = make_bundle(wanted, simulator, out, lambda resumed: bar.advance(resumed=resumed))
+        finished, made = make_bundle(wanted, simulator, out, bar.advance)
     size = sum(path.stat().st_size for path in out.rglob("*") if path.is_file())
     tell(f"{len(made.questions)} questions on {made.trajectories} trajectories, {size / 1e6:.1f} MB: {out}")
     tell(made.words())

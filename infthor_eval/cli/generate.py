@@ -77,9 +77,7 @@ def command(
     prepared_folder(out)
     with progress_bar(notes) as progress:
         bar = PacedBar(progress, "generate", len(jobs))
-        result = generate_with_workers(
-            jobs, embedded(data), out, staffing, lambda resumed: bar.advance(resumed=resumed), notes.print
-        )
+        result = generate_with_workers(jobs, embedded(data), out, staffing, bar.advance, notes.print)
     if as_json:
         import msgspec
 

@@ -77,13 +77,9 @@ def make_data(scenes: Scenes, seed: int, out: Path, staffing: Staffing) -> Path:
     )
     with progress_bar(NOTES) as progress:
         made = PacedBar(progress, "trajectories", len(jobs))
-        generated = generate_with_workers(
-            jobs, embedded(), trajectories, staffing, lambda resumed: made.advance(resumed=resumed), say
-        )
+        generated = generate_with_workers(jobs, embedded(), trajectories, staffing, made.advance, say)
         selection, shown = select([trajectories]), PacedBar(progress, "frames", len(jobs))
-        replayed = replay_with_workers(
-            selection, embedded(), made_set, staffing, 1, lambda resumed: shown.advance(resumed=resumed), say
-        )
+        replayed = replay_with_workers(selection, embedded(), made_set, staffing, 1, shown.advance, say)
     failures = [str(item) for item in generated.failures]
     failures += [f"{item.place}: {item.message}" for item in replayed.failures]
     if failures:

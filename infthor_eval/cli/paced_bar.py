@@ -31,12 +31,12 @@ class PacedBar:
         self._progress = progress
         self._bar = progress.add_task(name, total=total, completed=n_found)
 
-    def advance(self, usage: Usage = NOTHING, *, resumed: bool = False, said: str = "") -> None:
+    def advance(self, resumed: bool = False, *, usage: Usage = NOTHING, said: str = "") -> None:
         """A unit is done.
 
         Args:
+            resumed: an earlier run had done it.
             usage: of models.
-            resumed: an earlier run had done it, or its time tells nothing of that of others.
             said: what is told beside the pace.
         """
         now = time.monotonic()

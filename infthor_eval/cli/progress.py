@@ -38,7 +38,7 @@ class _Watcher:
 
     def done(self, record: UnitRecord[Any], resumed: bool) -> None:
         """See `Observer`."""
-        self.bar.advance(record.usage, resumed=resumed)
+        self.bar.advance(resumed, usage=record.usage)
 
     def note(self, text: str) -> None:
         """See `Observer`."""

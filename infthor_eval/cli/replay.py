@@ -66,9 +66,7 @@ def command(
         start = launch.unity() if unity else launch.embedded(data, supplement)
         with progress_bar(notes) as progress:
             bar = PacedBar(progress, "replay", len(selection.items))
-            replayed = replay_with_workers(
-                selection, start, out, staffing, frames, lambda resumed: bar.advance(resumed=resumed), notes.print
-            )
+            replayed = replay_with_workers(selection, start, out, staffing, frames, bar.advance, notes.print)
     if as_json:
         import msgspec
 

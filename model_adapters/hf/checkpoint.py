@@ -261,7 +261,7 @@ def resolve_dtype(options: Placement) -> torch.dtype | str:
 
 @contextlib.contextmanager
 def loading(pretrained: str) -> Iterator[None]:
-    """Turn the errors of transformers' loading into one line.
+    """Turn the errors of transformers' loading into one line, and its bar off where there is no terminal.
 
     Args:
         pretrained: what was asked for, for the message.

@@ -9,10 +9,11 @@ from matplotlib.figure import Figure
 
 from infthor_eval.formats.question import ABSENCE
 from infthor_eval.nieh.gains import gains, name_of
-from infthor_eval.nieh.summary import CLUE_COLUMNS, Cell, TaskSummary, main_metric
+from infthor_eval.nieh.summary import CLUE_COLUMNS, Cell, Score, TaskSummary, main_metric
 from infthor_eval.report.drawing import LEGEND, Look, add_legend, inline_svg, looks_of
 from infthor_eval.report.web.runs import ReportRun
 from infthor_eval.report.web.sections import Chart
+from infthor_eval.statistics import Estimate
 from infthor_eval.terminal import shown
 
 __all__ = ["nieh_charts"]
@@ -100,14 +101,16 @@ def _off(number: int, n_lines: int) -> float:
 def _dots(place: Axes, cells: Sequence[Cell | None], line: _Line, off: float, *, is_flat: bool = False) -> None:
     """A dot with its interval for each cell that was asked."""
     for at, cell in enumerate(cells):
-        if cell is None or not cell.n:
-            continue
-        score = cell.scores[line.metric]
-        mean, where = 100 * score.mean, at + off
-        place.plot(*((mean, where) if is_flat else (where, mean)), marker="o", ms=4.5, color=line.look.colour, zorder=3)
-        if score.low is not None and score.high is not None:
-            span = place.hlines if is_flat else place.vlines
-            span(where, 100 * score.low, 100 * score.high, color=line.look.colour, lw=1.3, zorder=2.8)
+        if cell is not None and cell.n:
+            _dot(place, cell.scores[line.metric], at + off, line.look.colour, is_flat=is_flat)
+
+
+def _dot(place: Axes, score: Score | Estimate, where: float, colour: str, *, is_flat: bool) -> None:
+    mean = 100 * score.mean
+    place.plot(*((mean, where) if is_flat else (where, mean)), marker="o", ms=4.5, color=colour, zorder=3)
+    if score.low is not None and score.high is not None:
+        span = place.hlines if is_flat else place.vlines
+        span(where, 100 * score.low, 100 * score.high, color=colour, lw=1.3, zorder=2.8)
 
 
 def _told(lines: Sequence[_Line]) -> str:
@@ -119,7 +122,7 @@ def _told(lines: Sequence[_Line]) -> str:
 def _gains_chart(runs: Sequence[ReportRun]) -> Chart | None:
     """What each run scores above the same model on blank frames, a line a task; None where there is no such pair."""
     found = [
-        (f"{name_of(gain.run)}, {gain.task}", 100 * total.mean, total)
+        (f"{name_of(gain.run)}, {gain.task}", total)
         for gain in gains([run.summary for run in runs])
         if gain.metric == main_metric(gain.seeing) and (total := gain.total()) is not None
     ]
@@ -130,17 +133,15 @@ def _gains_chart(runs: Sequence[ReportRun]) -> Chart | None:
         figure = Figure(figsize=(_PANEL[0] + LEGEND, max(_PANEL[1], 0.8 + _ROW * len(found))), layout="constrained")
         place = figure.subplots()
         place.axvline(0, color="#444444", lw=0.8)
-        for row, (_, mean, total) in enumerate(reversed(found)):
-            place.plot(mean, row, marker="o", ms=4.5, color=_GAIN, zorder=3)
-            if total.low is not None and total.high is not None:
-                place.hlines(row, 100 * total.low, 100 * total.high, color=_GAIN, lw=1.3, zorder=2.8)
-        place.set_yticks(range(len(found)), [shown(name)[:60] for name, _, _ in reversed(found)])
+        for row, (_, total) in enumerate(reversed(found)):
+            _dot(place, total, row, _GAIN, is_flat=True)
+        place.set_yticks(range(len(found)), [shown(name)[:60] for name, _ in reversed(found)])
         place.set_ylim(-0.6, len(found) - 0.4)
         place.set_xlabel("gain, in points, and its 95 % interval")
         place.grid(axis="y", visible=False)
         return figure
 
-    told = "; ".join(f"{name} {mean:+.1f} points" for name, mean, _ in found)
+    told = "; ".join(f"{name} {100 * total.mean:+.1f} points" for name, total in found)
     return Chart("Gain over blank frames", inline_svg(make), told)
 
 

@@ -24,17 +24,15 @@ class Orders:
             opened = tuple(open_action(action, plan) for action in actions)
             if opened != tuple(actions):
                 kinds[read_plan(plan)[0], opened].append(plan)
-        self._plans = list(kinds.values())
-        self._actions = [opened for _, opened in kinds]
+        self._kinds = [(opened, plans) for (_, opened), plans in kinds.items()]
 
     def __bool__(self) -> bool:
         """Whether any is known."""
-        return bool(self._plans)
+        return bool(self._kinds)
 
     def drawn(self, draw: random.Random) -> tuple[str, list[str]]:
         """A plan and its actions, kinds as often as experts had them."""
-        (kind,) = draw.choices(range(len(self._plans)), [len(plans) for plans in self._plans])
-        plans = self._plans[kind]
+        ((opened, plans),) = draw.choices(self._kinds, [len(plans) for _, plans in self._kinds])
         columns = zip(*(read_plan(plan)[1] for plan in plans), strict=True)
         plan = about(plans[0], [draw.choice(column) for column in columns])
-        return plan, [fill_action(action, plan) for action in self._actions[kind]]
+        return plan, [fill_action(action, plan) for action in opened]
