@@ -15,7 +15,7 @@ setup(
     package_dir={"infthor_eval.tasks": "tasks", "infthor_eval.results": "results"},
     package_data={
         "infthor_eval": ["models/**/*", "sets/**/*"],
-        "infthor_eval.agents": ["*.yaml"],
+        "infthor_eval.plans": ["*.yaml"],
         "infthor_eval.household": ["*.yaml"],
         "infthor_eval.nieh": ["*.yaml"],
         "infthor_eval.report": ["*.html", "web/*.html", "web/*.css", "web/*.js"],

@@ -181,7 +181,7 @@ class Request:
     reply: int
 
 
-def reckoned(shape: Shape, machine: Machine) -> Rates:
+def estimated(shape: Shape, machine: Machine) -> Rates:
     """Rates from what a model has to compute and read; the GPU waits while frames are read."""
     frame = shape.vision_flop / (machine.tflops * 1e12) + shape.frame_seconds
     return Rates(

@@ -4,7 +4,7 @@
 
 SET is a replayed set (`infthor-eval replay`). At every action the model has the true history up to it (teacher forcing)
 and replies greedily. `history` is what experts did next in the set's other scenes after the same action in a plan of
-the same words (infthor_eval/agents/habits.py), `most frequent` the one action that is right most often.
+the same words (infthor_eval/plans/habits.py), `most frequent` the one action that is right most often.
 """
 
 import argparse
@@ -13,14 +13,14 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from infthor_eval.agents.habits import Habits
-from infthor_eval.agents.history import Chapter
 from infthor_eval.cli.options import model_options_in
 from infthor_eval.formats.blank import blank_like
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.household.sequence_text import ACT
+from infthor_eval.plans.habits import Habits
+from infthor_eval.plans.history import Chapter
 from infthor_eval.statistics import Estimate, clustered_mean, paired_difference
 from infthor_eval.training.data import read_history, recorded_names
 from model_adapters import Decoding, load

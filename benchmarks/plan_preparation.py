@@ -27,13 +27,13 @@ from pathlib import Path
 from typing import Any
 from unittest import mock
 
-from infthor_eval.agents import expert, rewards
-from infthor_eval.agents.environment import PlanEnvironment
-from infthor_eval.agents.plans import Plan, PlanKind
 from infthor_eval.formats.trajectory import Trajectory, iter_trajectories
 from infthor_eval.generation.generate_set import generate_set
 from infthor_eval.generation.settings import TrajectorySettings
 from infthor_eval.household.navigation import Grid
+from infthor_eval.plans import expert, rewards
+from infthor_eval.plans.environment import PlanEnvironment
+from infthor_eval.plans.plan import Plan, PlanKind
 from infthor_eval.thor import simulator as simulators
 from infthor_eval.thor.controller import SafeController
 from infthor_eval.thor.frames import FrameFolder, NoFrames

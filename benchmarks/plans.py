@@ -19,16 +19,16 @@ from contextlib import closing
 from pathlib import Path
 from typing import NamedTuple
 
-from infthor_eval.agents.environment import PlanEnvironment
-from infthor_eval.agents.expert import ExpertRefusedError
-from infthor_eval.agents.records import PlanRecord
-from infthor_eval.agents.suite import PlansSuite
-from infthor_eval.agents.summary import TaskSummary
+from infthor_eval.episodes.simulators import Simulators
 from infthor_eval.errors import DataError
 from infthor_eval.formats.trajectory import Source, iter_sources
+from infthor_eval.plans.environment import PlanEnvironment
+from infthor_eval.plans.expert import ExpertRefusedError
+from infthor_eval.plans.records import PlanRecord
+from infthor_eval.plans.suite import PlansSuite
+from infthor_eval.plans.summary import TaskSummary
 from infthor_eval.rates import Rate
 from infthor_eval.runs import UnitRecord, read_run
-from infthor_eval.thor.simulators import Simulators
 
 _BASELINES = ("planner", "random", "scripted", "history")
 _TASK = "infthor_plans"

@@ -24,11 +24,11 @@ from evaluation_costs import (
     Rates,
     Request,
     Shape,
+    estimated,
     gpus_for,
     largest_context,
     makespan,
     measured_prefill,
-    reckoned,
     seconds,
 )
 
@@ -190,7 +190,7 @@ def rates_of(shape: Shape, machine: Machine, options: argparse.Namespace) -> Rat
     """A model's rates: measured where they were, else reckoned."""
     if options.frame_seconds is not None:
         shape = replace(shape, frame_seconds=options.frame_seconds)
-    rates = reckoned(shape, machine)
+    rates = estimated(shape, machine)
     for name, _, text in (given.partition("=") for given in options.prefill):
         if name == shape.name:
             short, long = (point.split(":") for point in text.split(","))

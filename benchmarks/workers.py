@@ -29,7 +29,7 @@ _SCENES = (
     "kitchen-7",
     "bedroom-8",
 )
-_VARYING = {"replay.json", "run.yaml", "took.json"}  # hold times, how it was asked for, and what a cache held
+_VARYING = {"replay.json", "run.yaml", "usage.json"}  # hold times, how it was asked for, and what a cache held
 
 
 def main() -> None:

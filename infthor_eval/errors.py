@@ -1,6 +1,6 @@
 """Errors meant for people.
 
-Every message is one line that says what is wrong, where, and the mend. The command line prints it without a
+Every message is one line that says what is wrong, where, and how to fix it. The command line prints it without a
 traceback and exits with the error's `exit_code`.
 """
 
@@ -19,8 +19,8 @@ __all__ = [
     "UsageError",
     "fault",
     "in_one_line",
-    "naming",
     "unknown_name",
+    "wrap_errors",
 ]
 
 _LONGEST = 200  # characters of another library's message
@@ -85,27 +85,27 @@ def fault(error: Exception) -> str:
 
 
 @contextmanager
-def naming(
+def wrap_errors(
     problem: str,
-    mend: str,
+    hint: str,
     *,
-    of: type[BaseException] | tuple[type[BaseException], ...] = OSError,
-    as_a: type[InfthorError] = DataError,
+    catch: type[BaseException] | tuple[type[BaseException], ...] = OSError,
+    raise_as: type[InfthorError] = DataError,
 ) -> Iterator[None]:
-    """Turn the errors of another library, or of the system, into one line; ours pass as they are.
+    """Turn errors of another library, or of the system, into a one-line error for people; ours pass unchanged.
 
     Args:
         problem: what is wrong, and where ("set.json: not JSON").
-        mend: what to do about it.
-        of: the errors that are turned.
-        as_a: what they become.
+        hint: how to fix it.
+        catch: the errors to convert.
+        raise_as: the class to convert them to.
 
     Raises:
-        InfthorError: of the class `as_a`, as "PROBLEM (REASON); MEND".
+        InfthorError: an instance of `raise_as`, with the message "PROBLEM (REASON); HINT".
     """
     try:
         yield
     except InfthorError:
         raise
-    except of as error:
-        raise as_a(f"{problem} ({in_one_line(error)}); {mend}") from error
+    except catch as error:
+        raise raise_as(f"{problem} ({in_one_line(error)}); {hint}") from error

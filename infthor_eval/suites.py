@@ -10,7 +10,7 @@ from functools import reduce
 from importlib.metadata import EntryPoint, entry_points
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from infthor_eval.errors import UsageError, naming, unknown_name
+from infthor_eval.errors import UsageError, unknown_name, wrap_errors
 
 if TYPE_CHECKING:
     from infthor_eval.runs import Suite, TaskFile
@@ -54,8 +54,8 @@ _BUILT_IN = {
         ("planner-arm", "random-arm", "still"),
     ),
     "plans": _Target(
-        "infthor_eval.agents.suite:PlansSuite",
-        "infthor_eval.agents.options:PlansOptions",
+        "infthor_eval.plans.suite:PlansSuite",
+        "infthor_eval.plans.options:PlansOptions",
         ("planner", "random", "scripted", "history"),
     ),
 }
@@ -136,7 +136,9 @@ def _target(name: str) -> _Target:
 def _imported(name: str, target: str) -> Any:
     module, _, attributes = target.partition(":")
     problem = f"the suite {name} cannot be imported from {target}"
-    with naming(problem, "mend its package, or uninstall it", of=(ImportError, AttributeError), as_a=UsageError):
+    with wrap_errors(
+        problem, "mend its package, or uninstall it", catch=(ImportError, AttributeError), raise_as=UsageError
+    ):
         return reduce(getattr, attributes.split("."), importlib.import_module(module))
 
 

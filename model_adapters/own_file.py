@@ -7,7 +7,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from infthor_eval.errors import ModelError, naming
+from infthor_eval.errors import ModelError, wrap_errors
 from infthor_eval.formats.digests import digest
 
 __all__ = ["class_in_file", "class_name", "identity_of_file", "names_a_file"]
@@ -57,7 +57,7 @@ def _path(name: str) -> Path:
 
 
 def _source(path: Path) -> bytes:
-    with naming(f"{path}: cannot be read", "mend the adapter's file", as_a=ModelError):
+    with wrap_errors(f"{path}: cannot be read", "mend the adapter's file", raise_as=ModelError):
         return path.read_bytes()
 
 
@@ -67,6 +67,6 @@ def _module(path: Path, source: bytes) -> ModuleType:
     module = ModuleType(f"infthor_eval_own_{digest(source)}")
     module.__file__ = str(path)
     sys.modules[module.__name__] = module  # dataclasses look up their annotations there
-    with naming(f"{path}: fails when it is imported", "mend it", of=Exception, as_a=ModelError):
+    with wrap_errors(f"{path}: fails when it is imported", "mend it", catch=Exception, raise_as=ModelError):
         exec(compile(source, path, "exec"), vars(module))
     return module

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
 
-from infthor_eval.errors import ModelError, naming
+from infthor_eval.errors import ModelError, wrap_errors
 from model_adapters.protocols import Capabilities, Decoding, Turn
 
 __all__ = ["check_decoding", "check_turns", "requesting"]
@@ -51,4 +51,4 @@ def requesting(name: str) -> AbstractContextManager[None]:
     Args:
         name: of the model, for the message.
     """
-    return naming(f"{name} fails on the request", "report it to who made it", of=_FAILURES, as_a=ModelError)
+    return wrap_errors(f"{name} fails on the request", "report it to who made it", catch=_FAILURES, raise_as=ModelError)

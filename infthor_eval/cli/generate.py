@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 import click
 
 from infthor_eval.cli.options import Whole, floor_plans_option
-from infthor_eval.cli.staffing_options import staffing_options
+from infthor_eval.cli.worker_options import worker_options
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from infthor_eval.generation.generate_set import GenerationSummary
-    from infthor_eval.workers import Staffing
+    from infthor_eval.workers import WorkerSettings
 
 __all__ = ["command"]
 
@@ -32,7 +32,7 @@ _PATH = click.Path(path_type=Path)
 @click.option("--test-set", is_flag=True, help="As the published test sets: with a final task, without bathrooms.")
 @click.option("--out", required=True, type=_PATH, help="Directory for the trajectory files.")
 @floor_plans_option
-@staffing_options
+@worker_options
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as one JSON object.")
 @click.pass_context
 def command(
@@ -47,7 +47,7 @@ def command(
     test_set: bool,
     out: Path,
     data: Path | None,
-    staffing: Staffing,
+    worker_settings: WorkerSettings,
     as_json: bool,
 ) -> None:
     """Generate trajectories: tasks are sampled, planned, and carried out in the embedded simulator.
@@ -77,7 +77,7 @@ def command(
     prepared_folder(out)
     with progress_bar(notes) as progress:
         bar = PacedBar(progress, "generate", len(jobs))
-        result = generate_with_workers(jobs, embedded(data), out, staffing, bar.advance, notes.print)
+        result = generate_with_workers(jobs, embedded(data), out, worker_settings, bar.advance, notes.print)
     if as_json:
         import msgspec
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from infthor_eval.cli.progress import say
 from infthor_eval.report.terminal import print_table, table_console
-from infthor_eval.runs.finding import BrokenRun, FoundRun, find_runs
+from infthor_eval.runs.run_search import BrokenRun, StoredRun, find_runs
 from infthor_eval.tables import Column, Row, Table
 from infthor_eval.terminal import tell
 
@@ -24,7 +24,7 @@ def runs(folder: Path) -> None:
         DataError: there is no such folder.
     """
     found = list(find_runs(folder))
-    whole = [item for item in found if isinstance(item, FoundRun)]
+    whole = [item for item in found if isinstance(item, StoredRun)]
     if not found:
         tell(f"no runs in {folder}; infthor-eval --model MODEL --tasks TASKS makes one")
     if whole:
@@ -37,7 +37,7 @@ def runs(folder: Path) -> None:
             say(f"{item.folder}: cannot be read: {item.reason}", "red")
 
 
-def _cells(run: FoundRun) -> Iterator[str]:
+def _cells(run: StoredRun) -> Iterator[str]:
     yield run.header.name
     yield run.header.suite
     yield from (str(run.n_done), "?" if run.n_missing is None else str(run.n_missing), str(run.n_failed))
@@ -46,10 +46,13 @@ def _cells(run: FoundRun) -> Iterator[str]:
     yield str(run.folder)
 
 
-def _numbers(run: FoundRun) -> str:
+def _numbers(run: StoredRun) -> str:
     """The tasks, each with the number that it is known by, as far as a row has room."""
     tasks = list(run.header.identity.get("tasks", {}))
-    told = [f"{task} {100 * run.headline[task].mean:.1f}" if task in run.headline else task for task in tasks[:_MOST]]
+    told = [
+        f"{task} {100 * run.primary_metrics[task].mean:.1f}" if task in run.primary_metrics else task
+        for task in tasks[:_MOST]
+    ]
     return ", ".join([*told, *([f"{len(tasks) - _MOST} more"] if len(tasks) > _MOST else [])])
 
 

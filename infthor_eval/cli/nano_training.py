@@ -17,7 +17,7 @@ from infthor_eval.thor.launch import embedded
 from infthor_eval.training.export import export
 from infthor_eval.training.nano.school import Lesson, teach
 from infthor_eval.training.nano.settings import NanoRecipe, Scenes
-from infthor_eval.workers import Staffing
+from infthor_eval.workers import WorkerSettings
 
 __all__ = ["make_data", "train_nano"]
 
@@ -25,7 +25,7 @@ _PER_TRAJECTORY = 500  # questions at most: all that there are
 _PARTS = {"see": "learning to see", "read": "learning to read", "tell": "learning to answer and to act"}
 
 
-def train_nano(recipe: NanoRecipe, folders: Sequence[Path], out: Path, staffing: Staffing) -> int:
+def train_nano(recipe: NanoRecipe, folders: Sequence[Path], out: Path, worker_settings: WorkerSettings) -> int:
     """Train the small model.
 
     Args:
@@ -41,7 +41,7 @@ def train_nano(recipe: NanoRecipe, folders: Sequence[Path], out: Path, staffing:
         DataError: data cannot be made or read.
     """
     prepared_folder(out)
-    sets = list(folders) or [make_data(recipe.scenes, recipe.seed, out / "data", staffing)]
+    sets = list(folders) or [make_data(recipe.scenes, recipe.seed, out / "data", worker_settings)]
     with progress_bar(NOTES) as progress:
         bars = StepBars(progress)
 
@@ -54,7 +54,7 @@ def train_nano(recipe: NanoRecipe, folders: Sequence[Path], out: Path, staffing:
     return 0
 
 
-def make_data(scenes: Scenes, seed: int, out: Path, staffing: Staffing) -> Path:
+def make_data(scenes: Scenes, seed: int, out: Path, worker_settings: WorkerSettings) -> Path:
     """Trajectories in procedural scenes, replayed, with every question that can be asked on them.
 
     What is there already is not made again.
@@ -77,15 +77,15 @@ def make_data(scenes: Scenes, seed: int, out: Path, staffing: Staffing) -> Path:
     )
     with progress_bar(NOTES) as progress:
         made = PacedBar(progress, "trajectories", len(jobs))
-        generated = generate_with_workers(jobs, embedded(), trajectories, staffing, made.advance, say)
+        generated = generate_with_workers(jobs, embedded(), trajectories, worker_settings, made.advance, say)
         selection, shown = select([trajectories]), PacedBar(progress, "frames", len(jobs))
-        replayed = replay_with_workers(selection, embedded(), made_set, staffing, 1, shown.advance, say)
+        replayed = replay_with_workers(selection, embedded(), made_set, worker_settings, 1, shown.advance, say)
     failures = [str(item) for item in generated.failures]
     failures += [f"{item.place}: {item.message}" for item in replayed.failures]
     if failures:
         raise DataError(f"{out}: {failures[0]}; give other scenes")
     questions = make_questions(
-        made_set, seed=seed, per_trajectory=_PER_TRAJECTORY, further=True, staffing=staffing, say=say
+        made_set, seed=seed, per_trajectory=_PER_TRAJECTORY, further=True, worker_settings=worker_settings, say=say
     )
     write_questions(made_set / "qa_set_data.csv", questions.questions)
     say(f"{len(jobs)} trajectories, {len(questions.questions):,} questions: {made_set}")

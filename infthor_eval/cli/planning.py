@@ -68,7 +68,7 @@ def _row(item: TaskEstimate) -> Row:
 
 
 def _totals(request: RunRequest, tasks: Sequence[TaskEstimate], price_per_hour: float | None) -> list[str]:
-    seconds, workers = sum(item.total.seconds for item in tasks), request.staffing.workers
+    seconds, workers = sum(item.total.seconds for item in tasks), request.worker_settings.workers
     shared = f", {duration(seconds / workers)} by {workers} workers" if workers > 1 else ""
     lines = [f"time: {duration(seconds)} of one worker{shared}, loading not counted"]
     lines.append(f"memory: {_peak_megabytes():,} MB at most while it was measured{_gpu_memory()}")

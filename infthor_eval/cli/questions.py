@@ -7,8 +7,8 @@ from pathlib import Path
 import click
 
 from infthor_eval.cli.options import FiniteRange, Whole
-from infthor_eval.cli.staffing_options import staffing_options
-from infthor_eval.workers import Staffing
+from infthor_eval.cli.worker_options import worker_options
+from infthor_eval.workers import WorkerSettings
 
 __all__ = ["command"]
 
@@ -29,7 +29,7 @@ _PATH = click.Path(path_type=Path)
 )
 @click.option("--further", is_flag=True, help="Ask forms beside those of Table 3 too, under types of their own.")
 @click.option("--overwrite", is_flag=True, help="Replace a file that holds other questions.")
-@staffing_options
+@worker_options
 @click.pass_context
 def command(
     context: click.Context,
@@ -40,13 +40,13 @@ def command(
     min_share: float,
     further: bool,
     overwrite: bool,
-    staffing: Staffing,
+    worker_settings: WorkerSettings,
 ) -> None:
     """Make questions on a replayed set, in the words of the paper's Table 3.
 
     Exit status 1 where a trajectory of the set could not be read.
     """
-    from infthor_eval.errors import naming
+    from infthor_eval.errors import wrap_errors
     from infthor_eval.formats.files import prepared_file, refuse_loss, written_atomically
     from infthor_eval.formats.qa_csv import encode_questions
     from infthor_eval.generation.questions.make import make_questions
@@ -60,13 +60,13 @@ def command(
         per_trajectory=per_trajectory,
         share=min_share,
         further=further,
-        staffing=staffing,
+        worker_settings=worker_settings,
         say=notes.print,
     )
     content = encode_questions(made.questions)
     if not overwrite:
         refuse_loss(out, content)
-    with naming(f"{out}: cannot be written", "give another --out"), written_atomically(out) as partial:
+    with wrap_errors(f"{out}: cannot be written", "give another --out"), written_atomically(out) as partial:
         partial.write_bytes(content)
     told = f"{len(made.questions)} questions on {made.trajectories} trajectories: {out}\n{made.words()}"
     tell(told)

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 import click
 
 from infthor_eval.cli.options import floor_plans_option
-from infthor_eval.cli.staffing_options import staffing_options
+from infthor_eval.cli.worker_options import worker_options
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from infthor_eval.generation.replay_summary import ReplaySummary
-    from infthor_eval.workers import Staffing
+    from infthor_eval.workers import WorkerSettings
 
 __all__ = ["command"]
 
@@ -30,7 +30,7 @@ _SHOWN = 20  # failures and divergences printed one by one; all are in the JSON 
 @click.option("--per-floor-plan", type=click.IntRange(1), help="At most this many of one floor plan.")
 @click.option("--frames", type=click.IntRange(1), default=1, show_default=True, help="Frames per move or turn.")
 @click.option("--unity", is_flag=True, help="Use AI2-THOR's own Unity build, not the embedded simulator.")
-@staffing_options
+@worker_options
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as one JSON object.")
 @click.pass_context
 def command(
@@ -42,7 +42,7 @@ def command(
     per_floor_plan: int | None,
     frames: int,
     unity: bool,
-    staffing: Staffing,
+    worker_settings: WorkerSettings,
     as_json: bool,
 ) -> None:
     """Replay trajectories (.json, .jsonl, .jsonl.gz, directories) into an NIEH set.
@@ -66,7 +66,7 @@ def command(
         start = launch.unity() if unity else launch.embedded(data, supplement)
         with progress_bar(notes) as progress:
             bar = PacedBar(progress, "replay", len(selection.items))
-            replayed = replay_with_workers(selection, start, out, staffing, frames, bar.advance, notes.print)
+            replayed = replay_with_workers(selection, start, out, worker_settings, frames, bar.advance, notes.print)
     if as_json:
         import msgspec
 

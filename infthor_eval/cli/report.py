@@ -12,7 +12,7 @@ import click
 from infthor_eval.cli.options import Whole
 
 if TYPE_CHECKING:
-    from infthor_eval.curves import RewardCurves
+    from infthor_eval.episodes.curves import RewardCurves
     from infthor_eval.report.web.episode_samples import Opener
     from infthor_eval.report.web.runs import ReportRun
     from infthor_eval.runs import RunHeader
@@ -165,9 +165,9 @@ def _headers(folders: tuple[Path, ...], figure: str) -> list[RunHeader]:
 
 
 def _plans(asked: _Asked) -> _Made:
-    from infthor_eval.agents.curve_runs import PlansRun
-    from infthor_eval.agents.curves import reward_curves
-    from infthor_eval.agents.records import RECORDS
+    from infthor_eval.plans.curve_runs import PlansRun
+    from infthor_eval.plans.curves import reward_curves
+    from infthor_eval.plans.records import RECORDS
     from infthor_eval.report.curves import model_names, run_labels
     from infthor_eval.runs import read_run
 

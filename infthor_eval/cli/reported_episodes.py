@@ -4,8 +4,8 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
-from infthor_eval.agents.replaying import recorded_plans, replay
 from infthor_eval.manipulation.replaying import recorded_episodes, replay_episodes
+from infthor_eval.plans.replaying import recorded_plans, replay
 from infthor_eval.report.web.arm_samples import arm_run
 from infthor_eval.report.web.episode_samples import Opener, Stage
 from infthor_eval.report.web.plan_samples import plans_run

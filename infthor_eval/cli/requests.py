@@ -10,7 +10,7 @@ from infthor_eval.cli.suite_options import chosen_options
 from infthor_eval.errors import UsageError
 from infthor_eval.runs import Catalog, RunRequest, Suite, TaskRequest
 from infthor_eval.suites import split_by_suite, suite_identity, suite_named
-from infthor_eval.workers import Staffing
+from infthor_eval.workers import WorkerSettings
 
 __all__ = ["Asked", "requests_for"]
 
@@ -39,7 +39,7 @@ class Asked:
     seed: int = 0
     fresh: bool = False
     recover: bool = False
-    staffing: Staffing = field(default_factory=Staffing)
+    worker_settings: WorkerSettings = field(default_factory=WorkerSettings)
     include: tuple[Path, ...] = ()
     suite_options: Mapping[str, Any] = field(default_factory=dict)
 
@@ -75,7 +75,7 @@ def requests_for(
                 name=name,
                 fresh=asked.fresh,
                 recover=asked.recover,
-                staffing=asked.staffing,
+                worker_settings=asked.worker_settings,
                 include=asked.include,
                 suite_code=suite_identity(suite_name),
             )

@@ -9,9 +9,9 @@ import click
 
 from infthor_eval.cli.config_option import comes_from_file, config_option
 from infthor_eval.cli.options import FiniteRange, ModelOptions, ModelsAsked, Whole, include_option, names_in
-from infthor_eval.cli.staffing_options import staffing_options
 from infthor_eval.cli.suite_options import refuse_twins, suite_options
-from infthor_eval.workers import Staffing
+from infthor_eval.cli.worker_options import worker_options
+from infthor_eval.workers import WorkerSettings
 
 if TYPE_CHECKING:
     from infthor_eval.runs import RunRequest, Suite
@@ -93,7 +93,7 @@ def run_options(*own: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]
             kept = {name: given.pop(name) for name in own}
             return command(requests=_requests(**given), **kept)
 
-        options = (config_option, *_OPTIONS, staffing_options, suite_options)
+        options = (config_option, *_OPTIONS, worker_options, suite_options)
         made = functools.reduce(lambda wrapped, option: option(wrapped), reversed(options), with_requests)
         refuse_twins(made)
         return made
@@ -114,7 +114,7 @@ def _requests(
     output: Path,
     fresh: bool,
     recover: bool,
-    staffing: Staffing,
+    worker_settings: WorkerSettings,
     rope: str | None,
     max_tokens_total: int | None,
     max_cost: float | None,
@@ -125,7 +125,7 @@ def _requests(
 
     of_all = _with_short_ones(model_args, {"rope": rope, "max_tokens_total": max_tokens_total, "max_cost": max_cost})
     options = {model: {**of_all, **own} for model, own in models.items()}
-    _refuse_shared_caps(options, staffing)
+    _refuse_shared_caps(options, worker_settings)
     asked = Asked(
         tasks=names_in(tasks, "--tasks"),
         include=include,
@@ -135,7 +135,7 @@ def _requests(
         output=output,
         fresh=fresh,
         recover=recover,
-        staffing=staffing,
+        worker_settings=worker_settings,
         suite_options=suites,
     )
     if name is not None and len(options) > 1:
@@ -159,7 +159,7 @@ def _with_short_ones(model_args: Mapping[str, str], short: Mapping[str, Any]) ->
     return options
 
 
-def _refuse_shared_caps(options: Mapping[str, Mapping[str, str]], staffing: Staffing) -> None:
+def _refuse_shared_caps(options: Mapping[str, Mapping[str, str]], worker_settings: WorkerSettings) -> None:
     capped = sorted({"max_tokens_total", "max_cost"} & {name for given in options.values() for name in given})
-    if capped and not staffing.alone:
+    if capped and not worker_settings.is_local:
         raise click.UsageError(f"{capped[0]} counts what one process asks for; leave out --workers, or the cap")

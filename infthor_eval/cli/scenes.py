@@ -28,7 +28,7 @@ def show(name: str, data: Path | None, out: Path | None, size: int, overwrite: b
 
     from PIL import Image
 
-    from infthor_eval.errors import naming
+    from infthor_eval.errors import wrap_errors
     from infthor_eval.formats.files import prepared_file, refuse_loss, written_atomically
     from infthor_eval.terminal import tell
     from infthor_eval.thor.launch import embedded
@@ -48,7 +48,7 @@ def show(name: str, data: Path | None, out: Path | None, size: int, overwrite: b
     if not overwrite:
         refuse_loss(path, picture.getvalue())
     with (
-        naming(f"{path}: cannot be written", "give another place with --out"),
+        wrap_errors(f"{path}: cannot be written", "give another place with --out"),
         written_atomically(path) as partial,
     ):
         partial.write_bytes(picture.getvalue())

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from infthor_eval.cli.showing import ShownRun
 from infthor_eval.runs import RunSummary, read_header
-from infthor_eval.runs.finding import read_results
+from infthor_eval.runs.run_search import read_results
 from infthor_eval.runs.shards import read_shards
 from infthor_eval.suites import suite_named
 

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import click
 
 from infthor_eval.cli.options import FiniteRange, model_options_in
-from infthor_eval.cli.staffing_options import staffing_options
+from infthor_eval.cli.worker_options import worker_options
 
 if TYPE_CHECKING:
-    from infthor_eval.workers import Staffing
+    from infthor_eval.workers import WorkerSettings
 
 __all__ = ["command"]
 
@@ -41,7 +41,7 @@ _GPUS, _TFLOPS = 8, 400.0
     type=FiniteRange(min=0, min_open=True),
     help=f"That one of them reaches, for --dry-run (an H100 has 989 in bfloat16).  [default: {_TFLOPS:g}]",
 )
-@staffing_options
+@worker_options
 def command(
     name: str,
     folders: tuple[Path, ...],
@@ -52,7 +52,7 @@ def command(
     dry_run: bool,
     gpus: int | None,
     tflops: float | None,
-    staffing: Staffing,
+    worker_settings: WorkerSettings,
 ) -> int:
     """Fine-tune a model, and write a checkpoint that its family's adapter loads.
 
@@ -71,7 +71,7 @@ def command(
     recipe = read_recipe(name, told)
     if not dry_run and (gpus is not None or tflops is not None):
         raise click.UsageError("--gpus and --tflops are what --dry-run reckons with; give it, or leave them out")
-    if not staffing.alone and (folders or not isinstance(recipe, NanoRecipe)):
+    if not worker_settings.is_local and (folders or not isinstance(recipe, NanoRecipe)):
         raise click.UsageError(
             "--workers and --ray-address share the making of data, which only the recipe tiny without --data does; "
             "leave them out, and train in several processes with torchrun"
@@ -81,7 +81,7 @@ def command(
 
         if model is not None or model_args is not None or dry_run:
             raise click.UsageError("--model, --model-args and --dry-run are for recipes that begin with a model")
-        return train_nano(recipe, folders, out, staffing)
+        return train_nano(recipe, folders, out, worker_settings)
     from infthor_eval.cli.training import Machine, train
 
     if not folders:

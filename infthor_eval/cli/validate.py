@@ -7,8 +7,8 @@ from typing import Literal
 import click
 
 from infthor_eval.cli.options import ModelsAsked, Whole
-from infthor_eval.cli.staffing_options import staffing_options
-from infthor_eval.workers import Staffing
+from infthor_eval.cli.worker_options import worker_options
+from infthor_eval.workers import WorkerSettings
 
 __all__ = ["command"]
 
@@ -26,7 +26,7 @@ __all__ = ["command"]
 @click.option("--decisions", type=click.Path(path_type=Path), help="The inspection list with keep or drop filled in.")
 @click.option("--scorer", type=click.Choice(["strict", "reference"]), default="strict", show_default=True)
 @click.option("--seed", type=Whole(), default=0, show_default=True, help="For whatever is random.")
-@staffing_options
+@worker_options
 def command(
     set_folder: Path,
     models: Mapping[str, Mapping[str, str]],
@@ -34,7 +34,7 @@ def command(
     decisions: Path | None,
     scorer: Literal["strict", "reference"],
     seed: int,
-    staffing: Staffing,
+    worker_settings: WorkerSettings,
 ) -> int:
     """Ask every question of SET of each model, on its clue frames alone, and keep what one of them answers.
 
@@ -44,6 +44,6 @@ def command(
     from infthor_eval.cli.requests import Asked, requests_for
     from infthor_eval.cli.validation import validate
 
-    asked = Asked(tasks=("nieh_gt",), data=set_folder, output=out / "runs", seed=seed, staffing=staffing)
+    asked = Asked(tasks=("nieh_gt",), data=set_folder, output=out / "runs", seed=seed, worker_settings=worker_settings)
     requests = [request for model, options in models.items() for request in requests_for(asked, model, options)]
     return validate(requests, out, decisions, scorer)

@@ -50,12 +50,12 @@ def _recording(path: Path, moments: Iterable[ArmMoment], above: str, fps: float)
 
 
 def _sheet(path: Path, moments: Iterable[ArmMoment], above: str) -> str:
-    from infthor_eval.errors import naming
+    from infthor_eval.errors import wrap_errors
     from infthor_eval.formats.files import written_atomically
     from infthor_eval.report.episode_sheet import draw_sheet
 
     picture = draw_sheet(list(_rows(moments)), above)
-    with naming(f"{path}: cannot be written", "give another --sheet"), written_atomically(path) as partial:
+    with wrap_errors(f"{path}: cannot be written", "give another --sheet"), written_atomically(path) as partial:
         picture.save(partial, format="png")
     return ""
 

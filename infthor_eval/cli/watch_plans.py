@@ -9,19 +9,19 @@ from typing import TYPE_CHECKING
 from infthor_eval.cli.watching import Wanted, followed, heading, place_of, refuse_options
 
 if TYPE_CHECKING:
-    from infthor_eval.agents.replaying import Record, Recorded
+    from infthor_eval.plans.replaying import Record, Recorded
 
 __all__ = ["watch_plans"]
 
 
 def watch_plans(wanted: Wanted) -> None:
     """Write the recording of a trajectory's plans."""
-    from infthor_eval.agents.curve_runs import PlansRun
-    from infthor_eval.agents.records import RECORDS
-    from infthor_eval.agents.replaying import recorded_plans, replay
     from infthor_eval.cli.paced_bar import PacedBar
     from infthor_eval.formats.files import prepared_file
     from infthor_eval.formats.moving_pictures import write_moving
+    from infthor_eval.plans.curve_runs import PlansRun
+    from infthor_eval.plans.records import RECORDS
+    from infthor_eval.plans.replaying import recorded_plans, replay
     from infthor_eval.report.recording import pictures
     from infthor_eval.runs import read_run
     from infthor_eval.terminal import error_console, progress_bar, tell

@@ -5,7 +5,7 @@ import io
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
-from infthor_eval.errors import DataError, naming
+from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.formats.files import written_atomically
 from infthor_eval.formats.reading import read_text
 
@@ -32,7 +32,7 @@ def read_rows(
     """
     text = read_text(path, mend)
     reader = csv.reader(io.StringIO(text, newline=""), strict=True)
-    with naming(f"{path}: not a UTF-8 CSV file", mend, of=csv.Error):
+    with wrap_errors(f"{path}: not a UTF-8 CSV file", mend, catch=csv.Error):
         header = next(reader, [])
         _check_header(path, header, columns, mend)
         for cells in reader:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from infthor_eval.errors import DataError, naming
+from infthor_eval.errors import DataError, wrap_errors
 
 __all__ = [
     "INSTEAD_OF_LOSS",
@@ -34,7 +34,7 @@ def prepared_folder(path: Path, option: str = "--out") -> Path:
         DataError: it is a file, or cannot be made or written to.
     """
     require_writable(path, option)
-    with naming(f"{path}: cannot be written to", f"{_MEND} {option}"):
+    with wrap_errors(f"{path}: cannot be written to", f"{_MEND} {option}"):
         path.mkdir(parents=True, exist_ok=True)
     return path
 
@@ -49,7 +49,9 @@ def require_writable(path: Path, option: str = "--out") -> None:
     Raises:
         DataError: it cannot.
     """
-    with naming(f"{path}: cannot be written to", f"{_MEND} {option}", of=(OSError, ValueError)):  # ValueError: a null
+    with wrap_errors(
+        f"{path}: cannot be written to", f"{_MEND} {option}", catch=(OSError, ValueError)
+    ):  # ValueError: a null
         there = next(folder for folder in (path, *path.absolute().parents) if _is_there(folder))
         with tempfile.TemporaryFile(dir=there) as probe:
             probe.write(_PROBE)
@@ -77,7 +79,7 @@ def prepared_file(path: Path, option: str = "--out") -> Path:
         DataError: it is a folder, a pipe or a device, or its folder cannot be written to.
     """
     prepared_folder(path.parent, option)
-    with naming(f"{path}: cannot be written to", f"{_MEND} {option}"):
+    with wrap_errors(f"{path}: cannot be written to", f"{_MEND} {option}"):
         if path.exists() and not path.is_file():
             raise DataError(f"{path}: is not a file; give another place with {option}")
     return path
@@ -93,7 +95,7 @@ def refuse_loss(path: Path, content: bytes) -> None:
     Raises:
         DataError: the file holds something else.
     """
-    with naming(f"{path}: cannot be read", INSTEAD_OF_LOSS):
+    with wrap_errors(f"{path}: cannot be read", INSTEAD_OF_LOSS):
         if path.is_file() and path.read_bytes() != content:
             raise DataError(f"{path}: is there already and holds something else; {INSTEAD_OF_LOSS}")
 

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from infthor_eval.errors import DataError, naming
+from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.formats.digests import digest_of_files
 from infthor_eval.formats.files import INSTEAD_OF_LOSS, refuse_loss, written_atomically
 from infthor_eval.formats.reading import json_lines_of
@@ -41,7 +41,7 @@ def floor_plans_digest(root: Path) -> str:
     """
     if not (root / _OBJECTS).is_file():
         raise DataError(f"{root}: no {_OBJECTS} in it; give the folder of recorded floor plans")
-    with naming(f"{root}: cannot be read", "restore it, or give another folder"):
+    with wrap_errors(f"{root}: cannot be read", "restore it, or give another folder"):
         return digest_of_files([root / _OBJECTS, *sorted(root.glob("alfred/layouts/*.npy"))])
 
 
@@ -74,7 +74,7 @@ def write_floor_plan(
         for file, content in layout.items():
             refuse_loss(file, content)
     kept = [other for name, other in recorded.items() if name != scene]
-    with naming(f"{path}: {scene} cannot be added", "give another folder"):
+    with wrap_errors(f"{path}: {scene} cannot be added", "give another folder"):
         for file, content in layout.items():
             file.parent.mkdir(parents=True, exist_ok=True)
             with written_atomically(file) as partial:

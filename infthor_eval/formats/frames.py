@@ -14,7 +14,7 @@ from pathlib import Path
 
 from PIL import Image
 
-from infthor_eval.errors import DataError, naming
+from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.formats.digests import digest_of_file
 from infthor_eval.formats.limits import IMAGE_ASPECT, IMAGE_MEGAPIXELS
 from infthor_eval.formats.reading import require_file, why_no_file
@@ -58,7 +58,7 @@ class FrameRef:
             DataError: the file cannot be read.
         """
         require_file(self.path, _MEND)
-        with naming(f"{self.path}: cannot be read", _MEND):
+        with wrap_errors(f"{self.path}: cannot be read", _MEND):
             return digest_of_file(self.path)
 
     @cached_property
@@ -98,7 +98,7 @@ class FrameRef:
     def _opened(self) -> Iterator[Image.Image]:
         require_file(self.path, _MEND)
         with (
-            naming(f"{self.path}: not a readable image", _MEND, of=_DAMAGED),
+            wrap_errors(f"{self.path}: not a readable image", _MEND, catch=_DAMAGED),
             Image.open(self.path, formats=("PNG", "JPEG")) as image,
         ):
             problem = self._wrong_size(*image.size)

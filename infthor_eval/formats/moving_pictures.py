@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from infthor_eval.errors import DataError, UsageError, naming
+from infthor_eval.errors import DataError, UsageError, wrap_errors
 from infthor_eval.formats.files import written_atomically
 
 __all__ = ["FORMATS", "require_moving", "write_moving"]
@@ -48,7 +48,7 @@ def write_moving(path: Path, pictures: Iterable[Image.Image], per_second: float)
     require_moving(path)
     write = _write_gif if path.suffix.lower() == ".gif" else _write_mp4
     with (
-        naming(f"{path}: cannot be written", _MEND),
+        wrap_errors(f"{path}: cannot be written", _MEND),
         written_atomically(path) as partial,
         tempfile.TemporaryDirectory(dir=path.parent, prefix=".recording-") as folder,
     ):

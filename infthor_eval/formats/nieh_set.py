@@ -13,7 +13,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TypeVar
 
-from infthor_eval.errors import DataError, naming
+from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.formats.action_log import read_action_log
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.outline import Outline, find_outline, read_outline, read_states
@@ -238,7 +238,7 @@ def _once(known: dict[str, T | DataError], traj_id: str, read: Callable[[], T]) 
 
 def _read_frames(folder: Path) -> dict[int, FrameRef]:
     """Frames by their number (`img_idx`), in time order."""
-    with naming(f"trajectory {folder.name[:_LONGEST]}: its folder cannot be read", _MEND):
+    with wrap_errors(f"trajectory {folder.name[:_LONGEST]}: its folder cannot be read", _MEND):
         if not folder.is_dir():
             raise DataError(f"trajectory {folder.name} is not in metadata/")
     steps = sorted(read_steps(folder), key=lambda step: step.img_idx)

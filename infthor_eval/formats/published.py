@@ -11,7 +11,7 @@ from typing import Any
 
 import msgspec
 
-from infthor_eval.errors import DataError, naming
+from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.formats.yaml_files import read_yaml
 
@@ -79,7 +79,9 @@ def published_tables(suite: str) -> tuple[PublishedTable, ...]:
 
 
 def _read(path: Path) -> PublishedTable:
-    with naming(f"{path}: not a table of published numbers", "install infthor-eval again", of=msgspec.ValidationError):
+    with wrap_errors(
+        f"{path}: not a table of published numbers", "install infthor-eval again", catch=msgspec.ValidationError
+    ):
         table = msgspec.convert(read_yaml(path, "install infthor-eval again"), PublishedTable)
     for row in table.rows:
         if len(row.values) != len(table.columns):

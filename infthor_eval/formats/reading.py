@@ -17,7 +17,7 @@ from typing import Any, TypeVar, overload
 
 import msgspec
 
-from infthor_eval.errors import DataError, in_one_line, naming
+from infthor_eval.errors import DataError, in_one_line, wrap_errors
 from infthor_eval.formats.limits import FILE_MB, LINE_MB
 
 __all__ = [
@@ -74,7 +74,7 @@ def require_plain_files(folder: Path, mend: str) -> None:
     Raises:
         DataError: it has one, or a link that leads nowhere.
     """
-    with naming(f"{folder}: cannot be read", mend):
+    with wrap_errors(f"{folder}: cannot be read", mend):
         for path in sorted(folder.iterdir()):
             if not path.is_dir():
                 require_file(path, mend)
@@ -91,7 +91,7 @@ def read_bytes(path: Path, mend: str) -> bytes:
         DataError: no file, too large, or it cannot be read.
     """
     require_file(path, mend, FILE_MB.value)
-    with naming(f"{path}: cannot be read", mend):
+    with wrap_errors(f"{path}: cannot be read", mend):
         return path.read_bytes()
 
 
@@ -101,7 +101,7 @@ def read_text(path: Path, mend: str) -> str:
     Raises:
         DataError: as `read_bytes`, or it is not UTF-8.
     """
-    with naming(f"{path}: not UTF-8 text", mend, of=UnicodeDecodeError):
+    with wrap_errors(f"{path}: not UTF-8 text", mend, catch=UnicodeDecodeError):
         return read_bytes(path, mend).decode("utf-8-sig")
 
 
@@ -122,7 +122,7 @@ def read_json(path: Path, mend: str, form: Any = Any) -> Any:
     """
     content = read_bytes(path, mend)
     wanted = "valid JSON" if form is Any else "in its documented form"
-    with naming(f"{path}: not {wanted}", mend, of=(msgspec.DecodeError, UnicodeDecodeError, RecursionError)):
+    with wrap_errors(f"{path}: not {wanted}", mend, catch=(msgspec.DecodeError, UnicodeDecodeError, RecursionError)):
         return msgspec.json.decode(content, type=form)
 
 
@@ -156,7 +156,7 @@ def json_lines_of(path: Path, mend: str) -> Iterator[dict[str, Any]]:
         DataError: as `lines_of`, or a line is no JSON object.
     """
     for number, line in lines_of(path, mend):
-        with naming(f"{path}, line {number}: not JSON", mend, of=(ValueError, RecursionError)):
+        with wrap_errors(f"{path}, line {number}: not JSON", mend, catch=(ValueError, RecursionError)):
             found = json.loads(line)
         if not isinstance(found, dict):
             raise DataError(f"{path}, line {number}: not a JSON object; {mend}")

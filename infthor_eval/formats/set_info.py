@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import infthor_eval
-from infthor_eval.errors import DataError, naming
+from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.formats.reading import read_json
 
 __all__ = ["FORMAT", "claim_for_simulator", "simulator_of"]
@@ -36,7 +36,7 @@ def claim_for_simulator(root: Path, simulator: str) -> None:
     path, version = root / _FILE, infthor_eval.__version__
     if not path.exists():
         info = {"format": FORMAT, "simulator": simulator, "infthor_eval": version}
-        with naming(f"{path}: cannot be written", "make room, or give another folder"):
+        with wrap_errors(f"{path}: cannot be written", "make room, or give another folder"):
             path.write_text(json.dumps(info) + "\n", encoding="utf-8")
         return
     known = _read(path)

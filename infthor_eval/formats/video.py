@@ -11,7 +11,7 @@ from pathlib import Path
 
 from PIL import Image
 
-from infthor_eval.errors import DataError, naming
+from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.formats.digests import digest_of_file
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.reading import require_file
@@ -39,7 +39,7 @@ def frames_per_second(path: Path) -> tuple[FrameRef, ...]:
     import cv2
 
     require_file(path, _MEND)
-    with naming(f"{path}: cannot be read", _MEND):
+    with wrap_errors(f"{path}: cannot be read", _MEND):
         digest = digest_of_file(path)
     folder = user_cache("video_frames") / f"{digest}-1fps-opencv{cv2.__version__}"
     if not _is_complete(folder):

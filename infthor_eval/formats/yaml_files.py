@@ -5,7 +5,7 @@ from typing import Any
 
 import yaml
 
-from infthor_eval.errors import DataError, naming
+from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.formats.limits import ALIAS_NODES
 from infthor_eval.formats.reading import read_text
 
@@ -28,7 +28,7 @@ def read_yaml(path: Path, mend: str, loader: type[PlainLoader] = PlainLoader) ->
         DataError: it cannot be read, is no YAML, holds itself, or more than the limit once its aliases are written out.
     """
     text = read_text(path, mend)
-    with naming(f"{path}: not YAML", mend, of=(yaml.YAMLError, RecursionError, ValueError, TypeError)):
+    with wrap_errors(f"{path}: not YAML", mend, catch=(yaml.YAMLError, RecursionError, ValueError, TypeError)):
         reader = loader(text)
         try:
             node = reader.get_single_node()

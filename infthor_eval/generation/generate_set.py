@@ -6,7 +6,7 @@ from pathlib import Path
 
 import msgspec
 
-from infthor_eval.errors import InfthorError, UsageError, naming
+from infthor_eval.errors import InfthorError, UsageError, wrap_errors
 from infthor_eval.formats.files import written_atomically
 from infthor_eval.formats.trajectory import encode_trajectory, iter_sources
 from infthor_eval.generation.factory import GeneratedTrajectory, TaskStatistics, generate
@@ -15,7 +15,7 @@ from infthor_eval.generation.settings import TrajectorySettings
 from infthor_eval.household.pddl import DOMAIN
 from infthor_eval.thor.launch import Launch
 from infthor_eval.thor.simulator import Simulator
-from infthor_eval.workers import Staffing, shared_out
+from infthor_eval.workers import WorkerSettings, shared_out
 
 __all__ = ["GeneratedSet", "GenerationSummary", "TaskCounts", "generate_set", "generate_with_workers"]
 
@@ -120,7 +120,7 @@ def generate_with_workers(
     jobs: Sequence[TrajectorySettings],
     launch: Launch,
     out: Path,
-    staffing: Staffing,
+    worker_settings: WorkerSettings,
     progress: Callable[[bool], None] = lambda _: None,
     say: Callable[[str], None] = lambda _: None,
 ) -> GeneratedSet:
@@ -138,7 +138,7 @@ def generate_with_workers(
         DataError: a trajectory cannot be written; those before it stay.
     """
     out.mkdir(parents=True, exist_ok=True)
-    return _collected(shared_out(_OpenMaker(launch, out), jobs, staffing, say), progress)
+    return _collected(shared_out(_OpenMaker(launch, out), jobs, worker_settings, say), progress)
 
 
 @dataclass(frozen=True)
@@ -211,7 +211,9 @@ def _made(job: TrajectorySettings, simulator: Simulator) -> GeneratedTrajectory:
 
 def _write(made: GeneratedTrajectory, path: Path) -> None:
     folder = path.with_suffix(".pddl")
-    with naming(f"{path}: cannot be written", "make room and run the same command again, which goes on where it was"):
+    with wrap_errors(
+        f"{path}: cannot be written", "make room and run the same command again, which goes on where it was"
+    ):
         folder.mkdir(exist_ok=True)
         (folder / "domain.pddl").write_text(DOMAIN)
         for number, problem in enumerate(made.problems):

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import msgspec
 
-from infthor_eval.errors import DataError, InfthorError, SimulatorError, naming
+from infthor_eval.errors import DataError, InfthorError, SimulatorError, wrap_errors
 from infthor_eval.formats.digests import digest
 from infthor_eval.formats.files import written_atomically
 from infthor_eval.formats.reading import read_json
@@ -25,7 +25,7 @@ from infthor_eval.generation.replay import ReplayReport, replay
 from infthor_eval.thor.launch import Launch
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.supplement import agent_path
-from infthor_eval.workers import Staffing, shared_out
+from infthor_eval.workers import WorkerSettings, shared_out
 
 __all__ = ["Failure", "ReplayedSet", "Selection", "replay_set", "replay_with_workers", "select"]
 
@@ -142,7 +142,7 @@ def replay_with_workers(
     selection: Selection,
     launch: Launch,
     out: Path,
-    staffing: Staffing,
+    worker_settings: WorkerSettings,
     frames: int = 1,
     progress: Callable[[bool], None] = lambda _: None,
     say: Callable[[str], None] = lambda _: None,
@@ -159,7 +159,7 @@ def replay_with_workers(
         say: is told what becomes of workers.
     """
     metadata = _prepared(out, launch.label)
-    outcomes = shared_out(_OpenReplayer(launch, metadata, frames), selection.items, staffing, say)
+    outcomes = shared_out(_OpenReplayer(launch, metadata, frames), selection.items, worker_settings, say)
     return _collected(outcomes, selection, progress)
 
 
@@ -253,7 +253,9 @@ def _all_sources(paths: Iterable[Path], failures: list[Failure]) -> Iterator[Sou
 def _malformed(source: Source) -> AbstractContextManager[None]:
     """Names what a trajectory that is JSON of the right form can still be wrong in."""
     wrong = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError)
-    return naming(f"{source.place}: not a trajectory that can be replayed", "restore it or leave it out", of=wrong)
+    return wrap_errors(
+        f"{source.place}: not a trajectory that can be replayed", "restore it or leave it out", catch=wrong
+    )
 
 
 def _one(

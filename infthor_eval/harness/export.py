@@ -10,11 +10,11 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from infthor_eval.errors import naming
+from infthor_eval.errors import wrap_errors
 from infthor_eval.formats.digests import canonical_json
 from infthor_eval.formats.files import written_atomically
 from infthor_eval.harness.registration import NAME
-from infthor_eval.runs import RunOutcome, SampleView, TaskFile, UnitRecord
+from infthor_eval.runs import RunOutcome, TaskFile, UnitRecord, UnitSample
 from infthor_eval.statistics import clustered_mean
 
 __all__ = ["Exported", "export", "exported"]
@@ -61,7 +61,7 @@ def export(outcome: RunOutcome) -> Path:
     made = exported(outcome)
     folder = outcome.folder / "lm_eval" / made.model
     stamp = datetime.now().isoformat().replace(":", "-")
-    with naming(f"{folder}: cannot be written", "make room, the journal holds it all"):
+    with wrap_errors(f"{folder}: cannot be written", "make room, the journal holds it all"):
         folder.mkdir(parents=True, exist_ok=True)
         for task, rows in made.samples.items():
             with written_atomically(folder / f"samples_{task}_{stamp}.jsonl") as partial:
@@ -118,7 +118,7 @@ def _rows(outcome: RunOutcome, task: _Scored) -> list[dict[str, Any]]:
     return sorted(rows, key=lambda row: row["doc_id"])
 
 
-def _row(view: SampleView) -> dict[str, Any]:
+def _row(view: UnitSample) -> dict[str, Any]:
     return {
         "doc_id": view.number,
         "doc": dict(view.doc),

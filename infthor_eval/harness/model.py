@@ -7,8 +7,6 @@ from pathlib import Path
 from lm_eval.api.instance import Instance
 from lm_eval.api.model import LM
 
-from infthor_eval.agents import records as plan_records
-from infthor_eval.agents.evaluation import PlansEvaluation
 from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.formats.scratch import ScratchFolder
 from infthor_eval.harness.manipulation_task import arm_evaluation, arm_response
@@ -21,6 +19,8 @@ from infthor_eval.nieh.answering import ModelAnswerer, NiehUnit, answered
 from infthor_eval.nieh.baselines import BASELINES
 from infthor_eval.nieh.docs import sample_of, samples_around
 from infthor_eval.nieh.task import PreparedTask
+from infthor_eval.plans import records as plan_records
+from infthor_eval.plans.evaluation import PlansEvaluation
 from infthor_eval.runs import Group, RunHeader
 from infthor_eval.runs.generation_kwargs import decoding_of
 from infthor_eval.runs.identity import identity_of

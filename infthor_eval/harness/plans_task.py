@@ -9,13 +9,13 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from infthor_eval.agents.evaluation import PlansEvaluation
-from infthor_eval.agents.options import PlansOptions
-from infthor_eval.agents.records import PlanRecord
-from infthor_eval.agents.task import TaskSettings
 from infthor_eval.errors import UsageError
 from infthor_eval.harness.episode_docs import about_run
 from infthor_eval.harness.registration import model_takes_references, register
+from infthor_eval.plans.evaluation import PlansEvaluation
+from infthor_eval.plans.options import PlansOptions
+from infthor_eval.plans.records import PlanRecord
+from infthor_eval.plans.task import TaskSettings
 from infthor_eval.runs import TaskFile, TaskRequest, UnitRecord
 
 __all__ = ["dataset", "doc_to_target", "doc_to_text", "episode_response", "evaluation_around", "process_results"]

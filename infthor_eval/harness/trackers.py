@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
-from infthor_eval.errors import UsageError, in_one_line, naming
+from infthor_eval.errors import UsageError, in_one_line, wrap_errors
 from infthor_eval.harness.export import Exported, exported
 from infthor_eval.harness.registration import NAME
 from infthor_eval.runs import RunOutcome
@@ -60,7 +60,7 @@ class Trackers:
         for place, send in wanted.items():
             assert made is not None
             problem = f"{outcome.folder}: could not be sent to {place}"
-            with naming(problem, "run the same command again", of=Exception):
+            with wrap_errors(problem, "run the same command again", catch=Exception):
                 send(made, outcome.summary.header.name)
 
     def _to_wandb(self, made: Exported, name: str) -> None:

@@ -13,7 +13,7 @@ from infthor_eval.manipulation.conversion import Call
 from infthor_eval.manipulation.environment import ArmEnvironment
 from infthor_eval.manipulation.history import ErrandKind
 from infthor_eval.manipulation.reaching import plan
-from infthor_eval.runs.yardstick import Yardstick
+from infthor_eval.runs.baseline import BaselineSubject
 from model_adapters import ArmDelta, Capabilities, Policy, Subject
 
 __all__ = ["BASELINES", "ArmActor", "ArmBaseline", "ArmSituation", "PolicyActor"]
@@ -109,7 +109,7 @@ def _check(step: object) -> None:
         raise ModelError("the policy gives numbers that are not finite; its weights or its input are broken")
 
 
-class _Baseline(Yardstick):
+class _Baseline(BaselineSubject):
     """What the baselines of arms have in common."""
 
     capabilities = Capabilities(counts_tokens=False, token_ids=False, max_in_flight=_IN_FLIGHT)

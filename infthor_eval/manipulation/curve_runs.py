@@ -8,12 +8,12 @@ from typing import Any
 
 import msgspec
 
+from infthor_eval.episodes.run_identity import About, about, shared_tasks
+from infthor_eval.episodes.shared_units import differing, shared_units, sharing_notes
 from infthor_eval.errors import DataError, UsageError, unknown_name
 from infthor_eval.manipulation.kinds import ErrandKind
 from infthor_eval.manipulation.records import RECORDS, ArmRecord
 from infthor_eval.runs import RunHeader, UnitRecord, read_run
-from infthor_eval.runs.about import About, about, shared_tasks
-from infthor_eval.runs.sharing import differing, shared_units, sharing_notes
 
 __all__ = ["ArmRun", "SharedEpisodes", "TaskAbout", "arm_runs", "shared_episodes", "with_radii"]
 

@@ -8,7 +8,16 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
 
-from infthor_eval.curves import AT_MOST, Curve, Facet, RewardCurves, RunCurves, StepFunction, grid_of, mean_curve
+from infthor_eval.episodes.curves import (
+    AT_MOST,
+    Curve,
+    Facet,
+    RewardCurves,
+    RunCurves,
+    StepFunction,
+    grid_of,
+    mean_curve,
+)
 from infthor_eval.manipulation.curve_runs import ArmRun, SharedEpisodes, shared_episodes
 from infthor_eval.manipulation.kinds import SHORT, ErrandKind
 from infthor_eval.manipulation.records import ArmRecord

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import msgspec
 
+from infthor_eval.episodes.retries import with_retries
 from infthor_eval.formats.scratch import ScratchFolder
 from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.manipulation.actors import ArmActor, ArmSituation, Step
@@ -17,7 +18,6 @@ from infthor_eval.manipulation.records import ArmEnded, ArmRecord, ArmStep
 from infthor_eval.manipulation.task import ManipulationTask
 from infthor_eval.thor.frames import FrameFolder, FrameKeeper, NoFrames
 from infthor_eval.thor.simulator import Simulator
-from infthor_eval.thor.survival import survived
 from model_adapters import ArmDelta
 
 __all__ = ["ArmStage", "Played", "described"]
@@ -70,7 +70,7 @@ class ArmStage:
             SimulatorError: the simulator failed every time.
         """
         began = time.perf_counter()
-        record, faults = survived(self._simulator, lambda: self._played(task, errand), self._begin_anew)
+        record, faults = with_retries(self._simulator, lambda: self._played(task, errand), self._begin_anew)
         return Played(record, time.perf_counter() - began, faults)
 
     def _begin_anew(self) -> None:

@@ -11,6 +11,8 @@ from typing import Any
 
 import msgspec
 
+from infthor_eval.episodes.retries import with_retries
+from infthor_eval.episodes.simulators import Simulators
 from infthor_eval.errors import InfthorError, SceneError
 from infthor_eval.formats.floor_plans import floor_plans_digest
 from infthor_eval.manipulation.actors import ArmActor, ArmBaseline, PolicyActor
@@ -21,18 +23,16 @@ from infthor_eval.manipulation.records import ArmRecord
 from infthor_eval.manipulation.task import ArmCourse, ManipulationTask
 from infthor_eval.runs import (
     Group,
-    SampleView,
     Session,
     Skipped,
     TaskRequest,
     Unit,
     UnitKey,
     UnitRecord,
+    UnitSample,
     Workload,
 )
 from infthor_eval.runs.identity import episode_fingerprint
-from infthor_eval.thor.simulators import Simulators
-from infthor_eval.thor.survival import survived
 from model_adapters import Policy, Subject
 
 __all__ = ["ArmUnit", "ManipulationEvaluation"]
@@ -119,10 +119,10 @@ class ManipulationEvaluation:
         for camera, same in by_camera.items():
             yield from self._played(same, prints, camera)
 
-    def view(self, record: UnitRecord[ArmRecord]) -> SampleView:
+    def view(self, record: UnitRecord[ArmRecord]) -> UnitSample:
         """See `infthor_eval.runs.Evaluation.view`."""
         payload, task = record.payload, self._tasks[record.task]
-        return SampleView(
+        return UnitSample(
             number=self._numbers[record.key],
             doc={"traj_id": record.cluster, "action": payload.index, "kind": payload.kind},
             target=payload.instruction,
@@ -154,7 +154,7 @@ class ManipulationEvaluation:
         trajectory = units[0].course.trajectory
         try:
             with self._experts.one() as expert:
-                history, faults = survived(expert, lambda: history_of(trajectory, expert), lambda: None)
+                history, faults = with_retries(expert, lambda: history_of(trajectory, expert), lambda: None)
         except SceneError as error:
             yield from (unit.excluded(str(error), prints[unit.key]) for unit in units)
             return

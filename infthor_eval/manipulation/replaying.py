@@ -15,10 +15,12 @@ from typing import Any
 
 import msgspec
 
-from infthor_eval.errors import DataError, UsageError, naming
+from infthor_eval.episodes.shared_units import one_of
+from infthor_eval.episodes.simulators import Simulators
+from infthor_eval.episodes.trajectory_sets import find_again
+from infthor_eval.errors import DataError, UsageError, wrap_errors
 from infthor_eval.formats.digests import digest
 from infthor_eval.formats.trajectory import Source
-from infthor_eval.formats.trajectory_sets import find_again
 from infthor_eval.manipulation.conversion import Conversion
 from infthor_eval.manipulation.curve_runs import ArmRun
 from infthor_eval.manipulation.environment import ArmEnvironment, ArmOutcome, Grasp, arm_of
@@ -31,10 +33,8 @@ from infthor_eval.manipulation.seeing import Onlooker
 from infthor_eval.manipulation.task import ArmCourse, TaskSettings
 from infthor_eval.manipulation.wording import asked_in_words
 from infthor_eval.runs import UnitRecord
-from infthor_eval.runs.sharing import one_of
 from infthor_eval.thor.frames import NoFrames
 from infthor_eval.thor.simulator import Simulator
-from infthor_eval.thor.simulators import Simulators
 
 __all__ = ["ArmReplay", "RecordedEpisodes", "recorded_episodes", "replay_episodes"]
 
@@ -191,7 +191,7 @@ class ArmReplay:
     def _settings(self, record: Record) -> TaskSettings:
         about, label = self._recorded.run.about.tasks[record.task], self._recorded.run.label
         problem = f"{label}: settings of {record.task} that this version does not know"
-        with naming(problem, "run the evaluation again", of=msgspec.ValidationError):
+        with wrap_errors(problem, "run the evaluation again", catch=msgspec.ValidationError):
             return replace(msgspec.convert(about.settings, TaskSettings), radius=about.radius)
 
     @cached_property

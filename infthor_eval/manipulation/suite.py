@@ -39,8 +39,8 @@ class ManipulationSuite:
         payload = record.payload
         return {"success": float(payload.done), "reward": payload.reward} if payload.ended else {}
 
-    def headline(self, summary: ManipulationSummary) -> Mapping[str, Rate]:
-        """See `Suite.headline`: episodes that were a success."""
+    def primary_metrics(self, summary: ManipulationSummary) -> Mapping[str, Rate]:
+        """See `Suite.primary_metrics`: episodes that were a success."""
         return {name: task.success for name, task in summary.tasks.items() if task.success is not None}
 
     def overview(self, runs: Sequence[RunSummary]) -> list[Table]:

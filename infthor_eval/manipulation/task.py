@@ -4,10 +4,11 @@ import string
 from dataclasses import dataclass
 from typing import Any
 
+from infthor_eval.episodes.task_settings import task_settings
+from infthor_eval.episodes.trajectory_sets import TrajectorySet, find_trajectories
 from infthor_eval.errors import DataError, UsageError
 from infthor_eval.formats.digests import digest
 from infthor_eval.formats.trajectory import Source, Trajectory
-from infthor_eval.formats.trajectory_sets import TrajectorySet, find_trajectories
 from infthor_eval.household.wording import canonical, noun
 from infthor_eval.manipulation.conversion import Conversion
 from infthor_eval.manipulation.environment import Grasp
@@ -16,7 +17,6 @@ from infthor_eval.manipulation.kinds import SHORT, ErrandKind
 from infthor_eval.manipulation.options import RADII, ManipulationOptions
 from infthor_eval.runs import TaskFile, TaskRequest
 from infthor_eval.runs.limiting import limited
-from infthor_eval.runs.task_settings import task_settings
 
 __all__ = ["ArmCourse", "ManipulationTask", "TaskSettings"]
 

@@ -11,7 +11,7 @@ from infthor_eval.formats.question import Question
 from infthor_eval.nieh.contexts import Sample
 from infthor_eval.nieh.docs import doc_target
 from infthor_eval.nieh.guessing import Chain, Guesser, chains_of_words, chains_of_words_and_count
-from infthor_eval.runs.yardstick import Yardstick
+from infthor_eval.runs.baseline import BaselineSubject
 from model_adapters import Subject
 
 __all__ = ["BASELINES", "Baseline", "Predict", "question_type"]
@@ -37,7 +37,7 @@ class Baseline(Subject, Protocol):
         ...
 
 
-class Oracle(Yardstick):
+class Oracle(BaselineSubject):
     """Reads the answer key: what a perfect model would score."""
 
     name = "oracle"
@@ -47,7 +47,7 @@ class Oracle(Yardstick):
         return lambda sample: doc_target(sample.question)
 
 
-class Blind(Yardstick):
+class Blind(BaselineSubject):
     """The best guess from the question's words, learned on the other trajectories: what can be had without looking."""
 
     name = "blind"
@@ -65,7 +65,7 @@ class BlindCount(Blind):
     _chains = staticmethod(chains_of_words_and_count)
 
 
-class Random(Yardstick):
+class Random(BaselineSubject):
     """An answer drawn from those of the question's type, each as likely as it is frequent."""
 
     name = "random"

@@ -17,12 +17,12 @@ from infthor_eval.nieh.task import NiehTask, PreparedTask
 from infthor_eval.runs import (
     Cost,
     Group,
-    SampleView,
     Session,
     Skipped,
     TaskRequest,
     UnitKey,
     UnitRecord,
+    UnitSample,
     Workload,
 )
 from model_adapters import Subject
@@ -77,13 +77,13 @@ class NiehEvaluation:
         task = units[0].key.task
         yield from answered(units, self._prepared[task], self._respondent.answerer(task, session), session)
 
-    def view(self, record: UnitRecord[NiehAnswer]) -> SampleView:
+    def view(self, record: UnitRecord[NiehAnswer]) -> UnitSample:
         """See `infthor_eval.runs.Evaluation.view`."""
         prepared = self._prepared[record.task]
         number = self._numbers[record.key]
         sample = prepared.found.samples[number]
         settings = next(task.settings for task in self._tasks if task.name == record.task)
-        return SampleView(
+        return UnitSample(
             number=number,
             doc=doc_of(prepared.found, sample),
             target=doc_target(sample.question),

@@ -7,7 +7,7 @@ from infthor_eval.nieh.baselines import BASELINES
 from infthor_eval.nieh.evaluation import NiehEvaluation
 from infthor_eval.nieh.options import NiehOptions
 from infthor_eval.nieh.records import RECORDS, NiehAnswer
-from infthor_eval.nieh.summary import NiehSummary, headline, summarise
+from infthor_eval.nieh.summary import NiehSummary, primary_metrics, summarise
 from infthor_eval.nieh.tables import overview, tables
 from infthor_eval.rates import Rate
 from infthor_eval.runs import RecordTypes, RunHeader, RunSummary, TaskRequest, UnitRecord
@@ -38,9 +38,9 @@ class NiehSuite:
         """See `Suite.scores`."""
         return record.payload.scores
 
-    def headline(self, summary: NiehSummary) -> Mapping[str, Rate]:
-        """See `Suite.headline`: of the strict scorer, or of the task's own first metric."""
-        return headline(summary)
+    def primary_metrics(self, summary: NiehSummary) -> Mapping[str, Rate]:
+        """See `Suite.primary_metrics`: of the strict scorer, or of the task's own first metric."""
+        return primary_metrics(summary)
 
     def overview(self, runs: Sequence[RunSummary]) -> list[Table]:
         """See `Suite.overview`."""

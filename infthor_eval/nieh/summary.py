@@ -26,8 +26,8 @@ __all__ = [
     "Score",
     "SkippedSummary",
     "TaskSummary",
-    "headline",
     "main_metric",
+    "primary_metrics",
     "summarise",
 ]
 
@@ -154,7 +154,7 @@ def main_metric(task: TaskSummary) -> str:
     return "strict" if "strict" in task.metrics else task.metrics[0]
 
 
-def headline(summary: NiehSummary) -> dict[str, Rate]:
+def primary_metrics(summary: NiehSummary) -> dict[str, Rate]:
     """The mean of all samples of each task that asked any, under its main metric."""
     totals = {name: (task.by_clues["total"], main_metric(task)) for name, task in summary.tasks.items()}
     scores = {name: (cell.scores[metric], cell.n) for name, (cell, metric) in totals.items() if cell.n}

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from infthor_eval.curves import RewardCurves, RunCurves
+from infthor_eval.episodes.curves import RewardCurves, RunCurves
 from infthor_eval.errors import DataError
 from infthor_eval.formats.yaml_files import read_yaml
 from infthor_eval.runs import RunHeader

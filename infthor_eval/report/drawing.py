@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from infthor_eval.errors import naming
+from infthor_eval.errors import wrap_errors
 from infthor_eval.formats.files import written_atomically
 from infthor_eval.terminal import shown
 
@@ -121,7 +121,7 @@ def _in_style(more: dict[Any, Any] | None = None) -> Iterator[None]:
 
 def _saved(figure: Figure, path: Path, form: str) -> Path:
     metadata = _OF_SVG if form == "svg" else {}
-    with naming(f"{path}: cannot be written", "give another --out"), written_atomically(path) as partial:
+    with wrap_errors(f"{path}: cannot be written", "give another --out"), written_atomically(path) as partial:
         figure.savefig(partial, format=form, dpi=160, metadata=metadata)
     return path
 

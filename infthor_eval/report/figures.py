@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
-from infthor_eval.curves import Curve, Facet, RewardCurves, RunCurves
+from infthor_eval.episodes.curves import Curve, Facet, RewardCurves, RunCurves
 from infthor_eval.report.curves import Panel, embedded_label, trajectories_told
 from infthor_eval.report.drawing import BOUND, LEGEND, Look, add_legend, add_words, looks_of, save_figure
 from infthor_eval.terminal import shown

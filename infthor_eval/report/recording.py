@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator
 
 from PIL import Image
 
-from infthor_eval.agents.moments import Moment, PlanTitle
+from infthor_eval.plans.moments import Moment, PlanTitle
 from infthor_eval.report.lettering import one_line
 from infthor_eval.report.page import (
     BAD,

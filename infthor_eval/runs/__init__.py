@@ -12,11 +12,11 @@ from infthor_eval.runs.suite import (
     Evaluation,
     Group,
     RunSummary,
-    SampleView,
     Session,
     Skipped,
     Suite,
     TaskRequest,
+    UnitSample,
     Workload,
 )
 from infthor_eval.runs.usage import NOTHING, Usage
@@ -36,7 +36,6 @@ __all__ = [
     "RunOutcome",
     "RunRequest",
     "RunSummary",
-    "SampleView",
     "Session",
     "Silent",
     "Skipped",
@@ -48,6 +47,7 @@ __all__ = [
     "Unit",
     "UnitKey",
     "UnitRecord",
+    "UnitSample",
     "Usage",
     "Workload",
     "estimate_run",

@@ -14,7 +14,7 @@ from typing import Any
 
 import yaml
 
-from infthor_eval.errors import DataError, UsageError, naming, unknown_name
+from infthor_eval.errors import DataError, UsageError, unknown_name, wrap_errors
 from infthor_eval.formats.digests import canonical_json
 from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.formats.yaml_files import PlainLoader, read_yaml
@@ -136,7 +136,7 @@ class Catalog:
         entries: dict[str, tuple[Path, dict[str, Any]]] = {}
         for path in self._files():
             settings = _read(path, (), self._shared)
-            with naming(f"{path}: holds what JSON cannot", _MEND, of=(TypeError, ValueError)):
+            with wrap_errors(f"{path}: holds what JSON cannot", _MEND, catch=(TypeError, ValueError)):
                 canonical_json(settings)  # it is part of a run's identity
             name = settings.get("group") or settings.get("task")
             if not isinstance(name, str):

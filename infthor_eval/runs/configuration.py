@@ -8,7 +8,7 @@ from typing import Any
 
 import yaml
 
-from infthor_eval.errors import DataError, naming
+from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.formats.files import written_atomically
 from infthor_eval.formats.yaml_files import read_yaml
 from infthor_eval.runs.request import RunRequest
@@ -62,7 +62,9 @@ def write_configuration(folder: Path, request: RunRequest) -> None:
     path = folder / _FILE
     text = _HEAD + yaml.safe_dump(_options_of(request), sort_keys=False, allow_unicode=True)
     with (
-        naming(f"{path}: cannot be written", "make room and run the same command again, which goes on where it was"),
+        wrap_errors(
+            f"{path}: cannot be written", "make room and run the same command again, which goes on where it was"
+        ),
         written_atomically(path) as partial,
     ):
         partial.write_text(text, encoding="utf-8")
@@ -108,7 +110,7 @@ def _options_of(request: RunRequest) -> dict[str, Any]:
         "name": request.name,
         "output": str(request.output.absolute()),
         **_unlike_default(tasks.options),
-        **_unlike_default(request.staffing),
+        **_unlike_default(request.worker_settings),
     }
     return {name: value for name, value in every.items() if value is not None}
 

@@ -7,14 +7,14 @@ from typing import Any, Protocol
 
 from infthor_eval.runs import journal as journals
 from infthor_eval.runs.configuration import write_configuration
-from infthor_eval.runs.crew import Crew
+from infthor_eval.runs.executor import LocalExecutor, View
 from infthor_eval.runs.journal import Journal
 from infthor_eval.runs.records import RunHeader, UnitRecord
 from infthor_eval.runs.request import PreparedRun
-from infthor_eval.runs.results import results_document, write_results, write_scores, write_took
-from infthor_eval.runs.staff import Alone, View
+from infthor_eval.runs.results import results_document, write_results, write_scores, write_usage
 from infthor_eval.runs.suite import RunSummary, Workload
 from infthor_eval.runs.usage import Usage
+from infthor_eval.runs.worker_executor import WorkerPoolExecutor
 
 __all__ = ["Observer", "RunOutcome", "Silent", "execute"]
 
@@ -77,7 +77,7 @@ def execute(
     """Load the model, do what the journal does not hold yet, and write the results.
 
     The folder `<output>/<name>/<tasks>-<identity>/` holds the journal, `run.yaml` (how it was asked for),
-    `results.json` (what it found) and `scores.jsonl` (of every unit), equal for equal runs, and `took.json` (what it
+    `results.json` (what it found) and `scores.jsonl` (of every unit), equal for equal runs, and `usage.json` (what it
     took).
 
     Args:
@@ -91,16 +91,16 @@ def execute(
         DataError: the journal has a bad line, or the results cannot be written.
     """
     observer = observer or Silent()
-    staff = Alone(run) if run.request.staffing.alone else Crew(run, observer.note)
+    executor = LocalExecutor(run) if run.request.worker_settings.is_local else WorkerPoolExecutor(run, observer.note)
     try:
-        header, workload = staff.begin()
+        header, workload = executor.begin()
         folder = run.request.folder(header)
         n_recovered = _open_anew(run, folder, header)
         with Journal(folder, header, run.suite.records) as journal:
             write_configuration(folder, run.request)
             observer.begin(workload, n_recovered)
             try:
-                for record, resumed in staff.evaluate(folder, journal, should_stop):
+                for record, resumed in executor.evaluate(folder, journal, should_stop):
                     observer.done(record, resumed)
             except Exception:
                 raise
@@ -108,9 +108,9 @@ def execute(
                 _found(run, folder, header, workload, journal)
                 raise
             outcome = _found(run, folder, header, workload, journal)
-        return replace(outcome, view=staff.view(outcome.records))
+        return replace(outcome, view=executor.view(outcome.records))
     finally:
-        staff.close()
+        executor.close()
 
 
 def _found(run: PreparedRun, folder: Path, header: RunHeader, workload: Workload, journal: Journal) -> RunOutcome:
@@ -122,7 +122,7 @@ def _found(run: PreparedRun, folder: Path, header: RunHeader, workload: Workload
     usage = Usage.total([record.usage for record in records] + [memo.usage for memo in journal.memos])
     write_results(folder, results_document(summary, run.suite, n_missing, usage))
     write_scores(folder, run.suite, records)
-    write_took(folder, records, usage)
+    write_usage(folder, records, usage)
     return RunOutcome(folder, run, summary, records, n_missing, usage, run.evaluation.view)
 
 

@@ -14,15 +14,15 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
+from infthor_eval.runs.executor import LocalExecutor
 from infthor_eval.runs.groups import group_records
 from infthor_eval.runs.records import Unit, UnitRecord
 from infthor_eval.runs.request import RunRequest, prepare
-from infthor_eval.runs.staff import Alone
 from infthor_eval.runs.suite import Group, Suite, Workload
 from infthor_eval.runs.usage import NOTHING, Usage
 from model_adapters import Subject
 
-__all__ = ["Estimate", "Quantities", "TaskEstimate", "estimate_run", "reckoned"]
+__all__ = ["Estimate", "Quantities", "TaskEstimate", "estimate_run", "estimated"]
 
 _UNITS_OF_A_GROUP = 3  # that are measured: the first, one amid it, the last
 
@@ -145,29 +145,29 @@ def estimate_run(request: RunRequest, suite: Suite, n_units: int, progress: Call
         DataError: as `execute`.
         ModelError: as `execute`.
     """
-    staff = Alone(prepare(request, suite))
+    executor = LocalExecutor(prepare(request, suite))
     try:
-        _, workload = staff.begin()
+        _, workload = executor.begin()
         done = []
-        for item in _measured(staff, workload, n_units):
+        for item in _measured(executor, workload, n_units):
             done.append(item)
             progress()
     finally:
-        staff.close()
+        executor.close()
     failures = [failure for item in done for failure in item.failures]
-    return Estimate(workload, reckoned(workload, done) if any(item.took for item in done) else (), failures)
+    return Estimate(workload, estimated(workload, done) if any(item.took for item in done) else (), failures)
 
 
-def _measured(staff: Alone, workload: Workload, n_units: int) -> Iterator[_Measured]:
+def _measured(executor: LocalExecutor, workload: Workload, n_units: int) -> Iterator[_Measured]:
     """Do a few units of each task: of groups of all sizes, of each the first, one amid it and the last."""
-    session = _Scratch(staff.subject)
+    session = _Scratch(executor.subject)
     for group in _chosen(workload.groups, max(1, round(n_units / _UNITS_OF_A_GROUP))):
         units = list(group.units)
         part = list(dict.fromkeys((0, len(units) // 2, len(units) - 1)))
         took, failures = [], []
         few = replace(group, units=[units[n] for n in part])
         began = time.perf_counter()
-        for record in group_records(staff.evaluation, few, session):
+        for record in group_records(executor.evaluation, few, session):
             now = time.perf_counter()
             if record.failure is None:
                 took.append((record.task, Quantities.of(record, now - began)))
@@ -188,7 +188,7 @@ def _chosen(groups: Sequence[Group], n: int) -> Iterator[Group]:
         yield from (ordered[(2 * k + 1) * len(ordered) // (2 * n_taken)] for k in range(n_taken))
 
 
-def reckoned(workload: Workload, done: Sequence[_Measured]) -> list[TaskEstimate]:
+def estimated(workload: Workload, done: Sequence[_Measured]) -> list[TaskEstimate]:
     """What each task will take.
 
     Args:

@@ -1,75 +1,86 @@
-"""In which order, and how many at a time, groups are done."""
+"""Who does a run's work: this process, or several workers; either way the same records."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from queue import Empty, SimpleQueue
-from threading import Event, Thread
-from typing import TypeVar
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any, Protocol
 
-from infthor_eval.runs.records import UnitRecord
-from infthor_eval.runs.suite import Group
+from infthor_eval.runs.groups import group_records
+from infthor_eval.runs.identity import header_of
+from infthor_eval.runs.journal import Journal
+from infthor_eval.runs.records import RunHeader, UnitRecord
+from infthor_eval.runs.request import PreparedRun
+from infthor_eval.runs.scheduling import run_groups
+from infthor_eval.runs.session import JournalSession
+from infthor_eval.runs.subjects import subject_of
+from infthor_eval.runs.suite import UnitSample, Workload
 
-__all__ = ["evaluated"]
+__all__ = ["Executor", "LocalExecutor", "Recorded", "View"]
 
-T = TypeVar("T")
-Do = Callable[[Group], Iterable[UnitRecord]]
-
-
-def evaluated(groups: Sequence[Group], do: Do, max_in_flight: int) -> Iterator[UnitRecord]:
-    """The records of all groups, as they come.
-
-    Args:
-        groups: in the order in which they are begun.
-        do: does one group; called from several threads where several are in flight.
-        max_in_flight: how many groups are done at the same time.
-    """
-    if max_in_flight == 1 or len(groups) <= 1:
-        for group in groups:
-            yield from do(group)
-    else:
-        yield from _in_threads(groups, do, min(max_in_flight, len(groups)))
+Recorded = tuple[UnitRecord[Any], bool]  # one that is on disk; and whether an earlier run had put it there
+View = Callable[[UnitRecord[Any]], UnitSample]
 
 
-def _in_threads(groups: Sequence[Group], do: Do, n_threads: int) -> Iterator[UnitRecord]:
-    waiting: SimpleQueue[Group] = SimpleQueue()
-    for group in groups:
-        waiting.put(group)
-    made: SimpleQueue[UnitRecord | BaseException | None] = SimpleQueue()  # None: a thread has ended
-    stop = Event()
-    threads = [Thread(target=_work, args=(waiting, do, made, stop), daemon=True) for _ in range(n_threads)]
-    for thread in threads:
-        thread.start()
-    running = n_threads
-    try:
-        while running:
-            item = made.get()
-            if isinstance(item, BaseException):
-                raise item
-            if item is None:
-                running -= 1
-            else:
-                yield item
-    finally:
-        stop.set()
+class Executor(Protocol):
+    """Who does the work."""
+
+    def begin(self) -> tuple[RunHeader, Workload]:
+        """Get ready: who the run is, and all that there is to do."""
+        ...
+
+    def evaluate(self, folder: Path, journal: Journal, should_stop: Callable[[], bool]) -> Iterator[Recorded]:
+        """Do all groups; every record as soon as it is on disk.
+
+        Args:
+            folder: the run's.
+            journal: the driver's shard.
+            should_stop: once it says so, the units in hand are the last.
+        """
+        ...
+
+    def view(self, records: Sequence[UnitRecord[Any]]) -> View:
+        """How other readers see these records; it may be called after `close`."""
+        ...
+
+    def close(self) -> None:
+        """Let go of everything, whatever was reached."""
+        ...
 
 
-def _work(
-    waiting: "SimpleQueue[Group]", do: Do, made: "SimpleQueue[UnitRecord | BaseException | None]", stop: Event
-) -> None:
-    try:
-        while (group := _next(waiting)) is not None and not stop.is_set():
-            for record in do(group):
-                made.put(record)
-                if stop.is_set():
-                    return
-    except BaseException as error:  # noqa: BLE001 - raised again in the thread that waits for the records
-        made.put(error)
-    else:
-        made.put(None)
+class LocalExecutor:
+    """This process."""
 
+    def __init__(self, run: PreparedRun) -> None:
+        """Load the subject.
 
-def _next(waiting: SimpleQueue[Group]) -> Group | None:
-    """The next group; None where there is none. Not by asking first: another thread may take the last one meanwhile."""
-    try:
-        return waiting.get_nowait()
-    except Empty:
-        return None
+        Raises:
+            UsageError: the suite cannot evaluate it.
+            ModelError: it cannot be loaded.
+        """
+        self._run = run
+        self.evaluation = run.evaluation
+        self.subject = subject_of(run)
+
+    def begin(self) -> tuple[RunHeader, Workload]:
+        """See `Executor`."""
+        self._workload = self.evaluation.workload(self.subject)
+        return header_of(self._run, self.subject, self._workload), self._workload
+
+    def evaluate(self, folder: Path, journal: Journal, should_stop: Callable[[], bool]) -> Iterator[Recorded]:
+        """See `Executor`."""
+        session = JournalSession(self.subject, journal)
+        evaluation, in_flight = self.evaluation, self.subject.capabilities.max_in_flight
+        for record in run_groups(
+            self._workload.groups, lambda group: group_records(evaluation, group, session), in_flight
+        ):
+            yield session.recorded(record)
+            if should_stop():
+                return
+
+    def view(self, records: Sequence[UnitRecord[Any]]) -> View:
+        """See `Executor`."""
+        return self.evaluation.view
+
+    def close(self) -> None:
+        """See `Executor`."""
+        self.evaluation.close()
+        self.subject.close()

@@ -20,7 +20,7 @@ from typing import Any, BinaryIO, Self
 
 import msgspec
 
-from infthor_eval.errors import DataError, UsageError, in_one_line, naming
+from infthor_eval.errors import DataError, UsageError, in_one_line, wrap_errors
 from infthor_eval.formats.digests import canonical_json
 from infthor_eval.formats.files import written_atomically
 from infthor_eval.formats.reading import require_file
@@ -172,7 +172,7 @@ class Journal:
     def _write(self, record: msgspec.Struct) -> None:
         line = memoryview(msgspec.json.encode(record) + b"\n")
         mend = "make room and run the same command again, which goes on where it was"
-        with self._writing, naming(f"{self._path}: cannot be written", mend):
+        with self._writing, wrap_errors(f"{self._path}: cannot be written", mend):
             while line:
                 line = line[self._file.write(line) :]
             os.fsync(self._file.fileno())

@@ -10,7 +10,7 @@ from infthor_eval.formats.digests import fingerprint
 from infthor_eval.formats.files import require_writable
 from infthor_eval.runs.records import RunHeader
 from infthor_eval.runs.suite import Evaluation, Suite, TaskRequest
-from infthor_eval.workers import Staffing
+from infthor_eval.workers import WorkerSettings
 from model_adapters import check_options, is_known, label, names
 
 __all__ = ["PreparedRun", "RunRequest", "prepare"]
@@ -42,7 +42,7 @@ class RunRequest:
     name: str | None = None
     fresh: bool = False
     recover: bool = False
-    staffing: Staffing = field(default_factory=Staffing)
+    worker_settings: WorkerSettings = field(default_factory=WorkerSettings)
     include: tuple[Path, ...] = ()
     suite_code: Mapping[str, Any] = field(default_factory=dict)
 

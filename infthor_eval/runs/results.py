@@ -8,17 +8,17 @@ from typing import Any
 
 import msgspec
 
-from infthor_eval.errors import naming
+from infthor_eval.errors import wrap_errors
 from infthor_eval.formats.files import written_atomically
 from infthor_eval.runs.records import UnitRecord
 from infthor_eval.runs.suite import RunSummary, Suite
 from infthor_eval.runs.usage import Usage
 
-__all__ = ["RESULTS", "results_document", "write_results", "write_scores", "write_took"]
+__all__ = ["RESULTS", "results_document", "write_results", "write_scores", "write_usage"]
 
 RESULTS = "results.json"
 _SCORES = "scores.jsonl"
-_TOOK = "took.json"
+_TOOK = "usage.json"
 
 
 def results_document(found: RunSummary, suite: Suite, n_missing: int | None, usage: Usage) -> dict[str, Any]:
@@ -36,7 +36,7 @@ def results_document(found: RunSummary, suite: Suite, n_missing: int | None, usa
         "name": header.name,
         "identity": header.identity,
         "n_missing": n_missing,
-        "headline": suite.headline(found.summary),
+        "primary_metrics": suite.primary_metrics(found.summary),
         "summary": found.summary,
         # Not what was cached: that differs between a run and the same run resumed, or shared out.
         "usage": {name: getattr(usage, name) for name in ("requests", "context", "reply", "cost")},
@@ -83,7 +83,7 @@ def write_scores(folder: Path, suite: Suite, records: Sequence[UnitRecord[Any]])
         partial.write_bytes(b"".join(msgspec.json.encode(row) + b"\n" for row in rows))
 
 
-def write_took(folder: Path, records: Sequence[UnitRecord[Any]], usage: Usage) -> None:
+def write_usage(folder: Path, records: Sequence[UnitRecord[Any]], usage: Usage) -> None:
     """Write what a run took, which differs from run to run.
 
     Args:
@@ -115,7 +115,7 @@ def _write(path: Path, document: dict[str, Any]) -> None:
 @contextmanager
 def _written(path: Path) -> Iterator[Path]:
     with (
-        naming(f"{path}: cannot be written", "make room, the journal holds it all"),
+        wrap_errors(f"{path}: cannot be written", "make room, the journal holds it all"),
         written_atomically(path) as partial,
     ):
         yield partial

@@ -24,11 +24,11 @@ __all__ = [
     "Group",
     "Need",
     "RunSummary",
-    "SampleView",
     "Session",
     "Skipped",
     "Suite",
     "TaskRequest",
+    "UnitSample",
     "Workload",
 ]
 
@@ -134,7 +134,7 @@ class Session(Protocol):
 
 
 @dataclass(frozen=True)
-class SampleView:
+class UnitSample:
     """A unit and its result, for readers that know no suites (lm-eval's format).
 
     Attributes:
@@ -177,7 +177,7 @@ class Evaluation(Protocol):
         """
         ...
 
-    def view(self, record: UnitRecord[Any]) -> SampleView:
+    def view(self, record: UnitRecord[Any]) -> UnitSample:
         """A record for other readers; called after the work was found."""
         ...
 
@@ -220,7 +220,7 @@ class Suite(Protocol):
         """The metrics of one unit by name; one that is missing, as all are where it failed, counts as 0."""
         ...
 
-    def headline(self, summary: Any) -> Mapping[str, Rate]:
+    def primary_metrics(self, summary: Any) -> Mapping[str, Rate]:
         """The number that each task is known by, a share from 0 to 1; a task of which nothing counts has none."""
         ...
 

@@ -6,12 +6,12 @@ frame that it begins with, then plans.
 
 from collections.abc import Iterator, Sequence
 
-from infthor_eval.agents.history import Chapter, chapter_parts, opened
-from infthor_eval.agents.plans import plans_of, tasks_of
 from infthor_eval.errors import DataError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.step_log import Step
 from infthor_eval.formats.trajectory import Trajectory
+from infthor_eval.plans.history import Chapter, chapter_parts, opened
+from infthor_eval.plans.plan import plans_of, tasks_of
 from infthor_eval.training.encoding import Encoded, Encoder, LeftOut
 from model_adapters.hf.prompt import n_tokens
 

@@ -10,7 +10,7 @@ from typing import Any
 import torch
 from safetensors.torch import load_model, save_model
 
-from infthor_eval.errors import DataError, UsageError, naming
+from infthor_eval.errors import DataError, UsageError, wrap_errors
 from infthor_eval.formats.files import prepared_folder, written_atomically
 
 __all__ = ["Checkpoints"]
@@ -46,7 +46,7 @@ class Checkpoints:
         """
         place = prepared_folder(self.folder) / f"step-{step:06d}"
         with (
-            naming(f"{place}: cannot be written", "make room; the last checkpoint is still there"),
+            wrap_errors(f"{place}: cannot be written", "make room; the last checkpoint is still there"),
             written_atomically(place) as folder,
         ):
             folder.mkdir()
@@ -76,11 +76,11 @@ class Checkpoints:
         if not places:
             return 0
         last = places[-1]
-        with naming(f"{last}: cannot be read", _MEND, of=Exception):
+        with wrap_errors(f"{last}: cannot be read", _MEND, catch=Exception):
             state = json.loads((last / _STATE).read_text(encoding="utf-8"))
             step, about = int(state["step"]), dict(state["about"])
         self._require_same(last, about)
-        with naming(f"{last}: cannot be read", _MEND, of=Exception):
+        with wrap_errors(f"{last}: cannot be read", _MEND, catch=Exception):
             load_model(model, last / _WEIGHTS)
             device = next(model.parameters()).device
             optimizer.load_state_dict(torch.load(last / _OPTIMIZER, map_location=device, weights_only=True))
@@ -99,5 +99,5 @@ class Checkpoints:
 
 
 def _number(place: Path) -> int:
-    with naming(f"{place}: not a checkpoint", "remove it", of=ValueError, as_a=DataError):
+    with wrap_errors(f"{place}: not a checkpoint", "remove it", catch=ValueError, raise_as=DataError):
         return int(place.name.removeprefix("step-"))

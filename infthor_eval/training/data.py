@@ -6,12 +6,12 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from infthor_eval.agents.history import Chapter
 from infthor_eval.errors import DataError
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.step_log import read_steps
 from infthor_eval.formats.trajectory import Trajectory, iter_trajectories
 from infthor_eval.nieh.samples import find_samples
+from infthor_eval.plans.history import Chapter
 from infthor_eval.training.action_sequences import recorded_chapters, windows
 from infthor_eval.training.encoding import Encoded, Encoder, LeftOut
 from infthor_eval.training.question_sequences import question_sequences

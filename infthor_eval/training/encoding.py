@@ -7,9 +7,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from infthor_eval.agents.history import Chapter, chapter_parts
 from infthor_eval.errors import DataError
 from infthor_eval.household.sequence_text import ACT, action_part, plan_part
+from infthor_eval.plans.history import Chapter, chapter_parts
 from model_adapters import Part, Turn
 from model_adapters.hf.loaded import Loaded
 from model_adapters.hf.prompt import Frame, Piece, Prompter, n_tokens

@@ -7,7 +7,7 @@ from typing import Any
 import torch
 from torch.distributed.tensor import DTensor
 
-from infthor_eval.errors import DataError, naming
+from infthor_eval.errors import DataError, wrap_errors
 from model_adapters.hf.loaded import Loaded
 
 __all__ = ["export", "whole_weights"]
@@ -40,7 +40,9 @@ def export(loaded: Loaded, folder: Path, weights: Mapping[str, torch.Tensor] | N
         DataError: it cannot be written.
     """
     model: Any = loaded.model
-    with naming(f"{folder}: the checkpoint cannot be written", "make room, or choose another folder", as_a=DataError):
+    with wrap_errors(
+        f"{folder}: the checkpoint cannot be written", "make room, or choose another folder", raise_as=DataError
+    ):
         folder.mkdir(parents=True, exist_ok=True)
         loaded.tokenizer.chat_template = loaded.template
         loaded.tokenizer.save_pretrained(folder)

@@ -13,7 +13,7 @@ import msgspec
 import torch
 import torch.distributed as dist
 
-from infthor_eval.errors import DataError, UsageError, naming
+from infthor_eval.errors import DataError, UsageError, wrap_errors
 from infthor_eval.formats.digests import digest
 from infthor_eval.formats.files import prepared_folder, written_atomically
 from infthor_eval.training.batches import collate
@@ -163,7 +163,7 @@ def _claim(out: Path, document: dict[str, Any]) -> None:
         with written_atomically(path) as partial_file:
             partial_file.write_text(json.dumps(document, indent=2, sort_keys=True) + "\n", encoding="utf-8")
         return
-    with naming(f"{path}: not JSON", "give another folder", of=(OSError, ValueError), as_a=DataError):
+    with wrap_errors(f"{path}: not JSON", "give another folder", catch=(OSError, ValueError), raise_as=DataError):
         earlier = json.loads(path.read_text(encoding="utf-8"))
     now = json.loads(json.dumps(document))
     if earlier != now:

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from infthor_eval.errors import UsageError, naming
+from infthor_eval.errors import UsageError, wrap_errors
 from infthor_eval.training.network import SequenceModel
 from infthor_eval.training.recipe import Lora
 
@@ -48,6 +48,6 @@ def add_adapters(network: SequenceModel, settings: Lora) -> Adapters:
         r=settings.rank, lora_alpha=settings.alpha, lora_dropout=settings.dropout, target_modules=names
     )
     wrong = f"lora.targets {', '.join(settings.targets)}: the decoder has no such layers"
-    with naming(wrong, "name some of its linear layers", of=ValueError, as_a=UsageError):
+    with wrap_errors(wrong, "name some of its linear layers", catch=ValueError, raise_as=UsageError):
         tuner = peft.LoraModel(network.model, {"default": config}, "default")
     return Adapters(tuner)

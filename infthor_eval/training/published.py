@@ -13,7 +13,7 @@ import torch
 import torch.distributed.checkpoint as dcp
 from torch.distributed.checkpoint.metadata import TensorStorageMetadata
 
-from infthor_eval.errors import DataError, naming
+from infthor_eval.errors import DataError, wrap_errors
 from model_adapters.hf.loaded import Loaded
 
 __all__ = ["Imported", "take_over"]
@@ -48,7 +48,7 @@ def take_over(loaded: Loaded, folder: Path) -> Imported:
     Raises:
         DataError: it is none, or holds another model's weights.
     """
-    with naming(f"{folder}: not a distributed checkpoint", _MEND, of=Exception):
+    with wrap_errors(f"{folder}: not a distributed checkpoint", _MEND, catch=Exception):
         reader = dcp.FileSystemReader(folder)
         stored: Mapping[str, Any] = reader.read_metadata().state_dict_metadata
         sizes = {name: item.size for name, item in stored.items() if isinstance(item, TensorStorageMetadata)}
@@ -63,7 +63,7 @@ def take_over(loaded: Loaded, folder: Path) -> Imported:
                 "checkpoint, or other tokens"
             )
     read = {f"{prefix}{name}": torch.empty_like(weights[name]) for name in taken}
-    with naming(f"{folder}: cannot be read", "restore its files", of=Exception):
+    with wrap_errors(f"{folder}: cannot be read", "restore its files", catch=Exception):
         dcp.load(read, storage_reader=reader, no_dist=True)
     loaded.model.load_state_dict({name.removeprefix(prefix): tensor for name, tensor in read.items()}, strict=False)
     return Imported(len(taken), len(weights) - len(taken), len(sizes) - len(taken))

@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 import msgspec
 
-from infthor_eval.errors import UsageError, naming, unknown_name
+from infthor_eval.errors import UsageError, unknown_name, wrap_errors
 from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.formats.yaml_files import read_yaml
 from infthor_eval.training.nano.settings import NanoRecipe
@@ -177,7 +177,9 @@ def read_recipe(name: str, changes: Mapping[str, Any] | None = None) -> Recipe |
     if not path.is_file() and not name.endswith(".yaml"):
         raise unknown_name("recipe", name, recipe_names())
     document = read_yaml(path, "give a recipe as those in infthor_eval/training/recipes")
-    with naming(f"{path}: not a recipe", "mend the setting", of=(msgspec.ValidationError, TypeError), as_a=UsageError):
+    with wrap_errors(
+        f"{path}: not a recipe", "mend the setting", catch=(msgspec.ValidationError, TypeError), raise_as=UsageError
+    ):
         for key, value in (changes or {}).items():
             _put(document, key.split("."), value)
         if "architecture" in document:

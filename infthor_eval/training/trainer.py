@@ -14,7 +14,7 @@ import torch
 import transformers
 from safetensors.torch import load_model, save_model
 
-from infthor_eval.errors import DataError, UsageError, naming
+from infthor_eval.errors import DataError, UsageError, wrap_errors
 from infthor_eval.training.encoding import Encoded
 from infthor_eval.training.loop import Progress
 from infthor_eval.training.network import SequenceModel
@@ -95,7 +95,9 @@ def train_with_trainer(
     trainer.remove_callback(transformers.trainer_callback.PrinterCallback)
     last = _last_whole(out)
     damaged = f"{last}: the checkpoint cannot be read"
-    with naming(damaged, "remove it to go on from the one before", of=(OSError, ValueError, KeyError), as_a=DataError):
+    with wrap_errors(
+        damaged, "remove it to go on from the one before", catch=(OSError, ValueError, KeyError), raise_as=DataError
+    ):
         trainer.train(resume_from_checkpoint=last)
 
 

@@ -3,8 +3,8 @@
 from infthor_eval.workers.link import Connect, Link, OpenWorker, Worker, WorkerLostError
 from infthor_eval.workers.pool import Event, GivenUp, Lost, Made, Pool, Withdrawn
 from infthor_eval.workers.serving import Serving
+from infthor_eval.workers.settings import WorkerSettings
 from infthor_eval.workers.sharing import shared_out
-from infthor_eval.workers.staffing import Staffing
 
 __all__ = [
     "Connect",
@@ -16,9 +16,9 @@ __all__ = [
     "OpenWorker",
     "Pool",
     "Serving",
-    "Staffing",
     "Withdrawn",
     "Worker",
     "WorkerLostError",
+    "WorkerSettings",
     "shared_out",
 ]

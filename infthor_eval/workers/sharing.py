@@ -6,13 +6,13 @@ from typing import Any
 from infthor_eval.errors import InfthorError
 from infthor_eval.workers.link import OpenWorker, WorkerLostError
 from infthor_eval.workers.pool import GivenUp, Lost, Made, Pool, Withdrawn
-from infthor_eval.workers.staffing import Staffing
+from infthor_eval.workers.settings import WorkerSettings
 
 __all__ = ["shared_out"]
 
 
 def shared_out(
-    open_worker: OpenWorker, jobs: Sequence[Any], staffing: Staffing, say: Callable[[str], None]
+    open_worker: OpenWorker, jobs: Sequence[Any], worker_settings: WorkerSettings, say: Callable[[str], None]
 ) -> Iterator[tuple[int, Any | InfthorError]]:
     """The result of each job with its number, as they come; an error where worker after worker was lost at it.
 
@@ -25,10 +25,10 @@ def shared_out(
     Raises:
         Exception: what a worker raises, which ends all of them.
     """
-    if staffing.alone:
+    if worker_settings.is_local:
         yield from _alone(open_worker, jobs)
         return
-    pool = Pool(staffing.connect(open_worker), min(staffing.workers, max(1, len(jobs))))
+    pool = Pool(worker_settings.connect(open_worker), min(worker_settings.workers, max(1, len(jobs))))
     try:
         pool.open()
         for event in pool.run(len(jobs), lambda number: jobs[number]):

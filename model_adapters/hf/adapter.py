@@ -7,7 +7,7 @@ from typing import ClassVar, TypeVar
 import torch
 from PIL import Image
 
-from infthor_eval.errors import ModelError, naming
+from infthor_eval.errors import ModelError, wrap_errors
 from model_adapters.hf.checkpoint import LocatedCheckpoint, load_checkpoint, locate
 from model_adapters.hf.family import MakeFamily
 from model_adapters.hf.model import TransformersModel
@@ -90,5 +90,5 @@ def fitting(pretrained: str) -> Iterator[None]:
     """
     # Whatever it raises: settings of the processor come from a file, and end up in arithmetic and shapes.
     problem = f"{pretrained}: the model fails on what the processor makes of a frame"
-    with naming(problem, "do they belong to one checkpoint?", of=Exception, as_a=ModelError):
+    with wrap_errors(problem, "do they belong to one checkpoint?", catch=Exception, raise_as=ModelError):
         yield

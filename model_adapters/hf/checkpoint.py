@@ -18,7 +18,7 @@ import tokenizers
 import torch
 import transformers
 
-from infthor_eval.errors import ModelError, UsageError, naming
+from infthor_eval.errors import ModelError, UsageError, wrap_errors
 from infthor_eval.formats.digests import digest, digest_of_files
 from infthor_eval.formats.reading import require_plain_files
 from model_adapters.hf.decoding import read_generation
@@ -235,14 +235,18 @@ def resolve_device(options: Placement) -> torch.device:
     name = options.device
     if name == "auto":
         name = "cuda" if torch.cuda.is_available() else "cpu"
-    with naming(f"device={name} is not a torch device", "use cpu, cuda, cuda:1, ...", of=RuntimeError, as_a=UsageError):
+    with wrap_errors(
+        f"device={name} is not a torch device", "use cpu, cuda, cuda:1, ...", catch=RuntimeError, raise_as=UsageError
+    ):
         device = torch.device(name)
     if device.type == "meta":
         raise UsageError(f"device={name} computes nothing; use cpu, cuda, cuda:1, ...")
     if device.type == "cuda" and not torch.cuda.is_available():
         raise ModelError(f"device={name}: torch {torch.__version__} finds no GPU here; use device=cpu")
     # Each back end says in its own way that it is not there.
-    with naming(f"device={name}: torch {torch.__version__} has none here", "use cpu", of=Exception, as_a=ModelError):
+    with wrap_errors(
+        f"device={name}: torch {torch.__version__} has none here", "use cpu", catch=Exception, raise_as=ModelError
+    ):
         torch.empty(1, device=device)
     return device
 
@@ -273,7 +277,7 @@ def loading(pretrained: str) -> Iterator[None]:
     mend = "restore its files, or give another checkpoint"
     if not sys.stderr.isatty():  # a log would have the bar as a line
         transformers.utils.logging.disable_progress_bar()
-    with naming(f"the checkpoint {pretrained} cannot be loaded", mend, of=Exception, as_a=ModelError):
+    with wrap_errors(f"the checkpoint {pretrained} cannot be loaded", mend, catch=Exception, raise_as=ModelError):
         yield
 
 

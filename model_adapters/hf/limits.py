@@ -6,7 +6,7 @@ from contextlib import contextmanager
 
 import torch
 
-from infthor_eval.errors import ModelError, naming
+from infthor_eval.errors import ModelError, wrap_errors
 
 __all__ = ["check_limit", "naming_memory_errors", "naming_model_errors"]
 
@@ -42,7 +42,9 @@ def naming_model_errors(name: str) -> Iterator[None]:
     Raises:
         ModelError: it failed on the request.
     """
-    with naming(f"{name} fails on the request", "ask otherwise, or report it", of=_FAILURES, as_a=ModelError):
+    with wrap_errors(
+        f"{name} fails on the request", "ask otherwise, or report it", catch=_FAILURES, raise_as=ModelError
+    ):
         yield
 
 

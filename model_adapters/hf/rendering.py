@@ -7,7 +7,7 @@ from typing import Any
 
 from jinja2 import TemplateError
 
-from infthor_eval.errors import ModelError, naming
+from infthor_eval.errors import ModelError, wrap_errors
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.limits import TEMPLATE_CHARACTERS, TEMPLATE_MB, TEMPLATE_SECONDS
 from model_adapters.hf.memory_limit import OutOfMemoryError, taking_at_most
@@ -103,9 +103,9 @@ def _string_message(turn: Turn) -> dict[str, Any]:
 def _written(tokenizer: Any, template: str, turns: Sequence[Turn], messages: Sequence[dict[str, Any]]) -> str:
     refused = f"the chat template refuses {_roles(turns)}"
     with (
-        naming(refused, f"mend it; {TEMPLATE_SECONDS.mend}", of=OutOfTimeError, as_a=ModelError),
-        naming(refused, f"mend it; {TEMPLATE_MB.mend}", of=OutOfMemoryError, as_a=ModelError),
-        naming(refused, "ask in other turns, or mend it", of=_REFUSALS, as_a=ModelError),
+        wrap_errors(refused, f"mend it; {TEMPLATE_SECONDS.mend}", catch=OutOfTimeError, raise_as=ModelError),
+        wrap_errors(refused, f"mend it; {TEMPLATE_MB.mend}", catch=OutOfMemoryError, raise_as=ModelError),
+        wrap_errors(refused, "ask in other turns, or mend it", catch=_REFUSALS, raise_as=ModelError),
         computing_at_most(TEMPLATE_SECONDS.value),
         taking_at_most(TEMPLATE_MB.value),
     ):

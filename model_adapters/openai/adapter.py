@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING, ClassVar
 from urllib.parse import urlsplit
 
-from infthor_eval.errors import ModelError, naming
+from infthor_eval.errors import ModelError, wrap_errors
 from model_adapters.openai.options import OpenAIOptions
 from model_adapters.openai.secret import read_key
 
@@ -28,7 +28,7 @@ class OpenAI:
             ModelError: the client library is not installed, or there is no key where one is needed.
         """
         mend = "pip install 'infthor-eval[openai]'"
-        with naming(f"{name} needs the package openai, 3 or newer", mend, of=ImportError, as_a=ModelError):
+        with wrap_errors(f"{name} needs the package openai, 3 or newer", mend, catch=ImportError, raise_as=ModelError):
             from model_adapters.openai.model import ServedModel
         key = read_key(options.api_key_env, needed=urlsplit(options.url).hostname == _NEEDS_KEY)
         return ServedModel(name, options, key)

@@ -11,7 +11,7 @@ from typing import Any
 
 from PIL import Image
 
-from infthor_eval.errors import ModelError, naming
+from infthor_eval.errors import ModelError, wrap_errors
 
 __all__ = ["Engine", "Request", "Sampling", "Written", "import_vllm"]
 
@@ -83,7 +83,9 @@ def import_vllm(name: str) -> Any:
     if multiprocessing.current_process().daemon:  # a worker of --workers, which may start no process of its own
         os.environ.setdefault("VLLM_ENABLE_V1_MULTIPROCESSING", "0")
     mend = "pip install 'infthor-eval[vllm]', on a machine that vLLM runs on"
-    with naming(f"{name} needs the package vllm", mend, of=(ImportError, OSError, RuntimeError), as_a=ModelError):
+    with wrap_errors(
+        f"{name} needs the package vllm", mend, catch=(ImportError, OSError, RuntimeError), raise_as=ModelError
+    ):
         return importlib.import_module("vllm")
 
 
@@ -139,7 +141,7 @@ class Engine:
 
     def _naming(self, what: str, mend: str) -> AbstractContextManager[None]:
         # vLLM's errors have no common base, and some come from torch or from the processes that it started.
-        return naming(f"{self._name}: vLLM {self.version} {what}", mend, of=Exception, as_a=ModelError)
+        return wrap_errors(f"{self._name}: vLLM {self.version} {what}", mend, catch=Exception, raise_as=ModelError)
 
 
 def _written(output: Any) -> Written:

@@ -2,10 +2,10 @@
 
 import pytest
 
-from ..agents.made_runs import made_run as plans_run
-from ..agents.made_runs import plan
-from ..agents.made_runs import write_run as write_plans
 from ..manipulation.made_runs import episode, made_run, planner_run, write_run
+from ..plans.made_runs import made_run as plans_run
+from ..plans.made_runs import plan
+from ..plans.made_runs import write_run as write_plans
 
 EPISODES = [episode(name, 5 * number, kind) for name in "ab" for number, kind in enumerate(("pickup", "put"))]
 LOST = [episode(name, 5 * number, kind, done=False) for name in "ab" for number, kind in enumerate(("pickup", "put"))]

@@ -2,7 +2,7 @@
 
 import pytest
 
-from ..agents.made_runs import made_run, plan, planner_run, write_run
+from ..plans.made_runs import made_run, plan, planner_run, write_run
 
 PLANS = [plan(name, index, (index, index + 1), 1.0, context=10 * index) for name in "ab" for index in range(3)]
 

@@ -62,7 +62,7 @@ def test_json_alone_is_on_standard_output(ran):
     for document, folder in zip(documents, folders, strict=True):
         del document["folder"]
         assert document == json.loads((folder / "results.json").read_text())
-    assert documents[0]["headline"]["nieh_gt"]["mean"] == 1.0
+    assert documents[0]["primary_metrics"]["nieh_gt"]["mean"] == 1.0
 
 
 def test_csv_is_a_table_and_nothing_else(ran):

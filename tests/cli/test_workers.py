@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.agents.cut import FORK, MUG, cut, write
+from tests.plans.cut import FORK, MUG, cut, write
 
 
 def results(folder):

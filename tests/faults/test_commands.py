@@ -55,7 +55,7 @@ def test_a_folder_that_cannot_be_written_is_told_before_the_work(typed, tmp_path
     def work(*_: object, **__: object) -> None:
         raise AssertionError("work was begun")
 
-    for begins in ("thor.simulator.Simulator.__init__", "runs.staff.subject_of", "formats.hub_data._download"):
+    for begins in ("thor.simulator.Simulator.__init__", "runs.executor.subject_of", "formats.hub_data._download"):
         monkeypatch.setattr(f"infthor_eval.{begins}", work)
     (tmp_path / "file.json").write_text("{}")
     where, said = PLACES[place]

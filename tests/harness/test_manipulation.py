@@ -9,8 +9,8 @@ import pytest
 
 from infthor_eval.manipulation.records import RECORDS
 from infthor_eval.runs import read_run
-from tests.agents.cut import MUG, cut, write
 from tests.harness.conftest import OURS, only, samples
+from tests.plans.cut import MUG, cut, write
 
 TINY = "openvla-tiny"
 

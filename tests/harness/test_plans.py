@@ -7,11 +7,11 @@ import sys
 
 import pytest
 
-from infthor_eval.agents.records import RECORDS
 from infthor_eval.formats.packaged import packaged_folder
+from infthor_eval.plans.records import RECORDS
 from infthor_eval.runs import read_run
-from tests.agents.cut import FORK, MUG, cut, write
 from tests.harness.conftest import LM_EVAL, only, samples
+from tests.plans.cut import FORK, MUG, cut, write
 
 PACKAGED = packaged_folder("tasks") / "plans" / "infthor_plans.yaml"
 TINY = "qwen2.5-vl-tiny"

@@ -8,8 +8,8 @@ from infthor_eval.household.goals import achieved, goal_holds
 from infthor_eval.household.symbolic import ABSENT, FLOOR, Room, State
 from infthor_eval.household.tasks import Task, TaskType
 from infthor_eval.household.treatments import Treatments
-from tests.agents import building
-from tests.agents.building import kitchen
+from tests.plans import building
+from tests.plans.building import kitchen
 
 TYPES = {
     "table-1": "SideTable",

@@ -3,7 +3,7 @@
 import pytest
 
 from infthor_eval.household.treatments import Treatments
-from tests.agents.building import (
+from tests.plans.building import (
     APPLE,
     BASIN,
     BATH_FAUCET,

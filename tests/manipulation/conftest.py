@@ -12,7 +12,7 @@ from infthor_eval.runs import PreparedRun, prepare
 from infthor_eval.thor.launch import embedded
 from infthor_eval.thor.simulator import Simulator
 
-from ..agents.cut import MUG, cut, write
+from ..plans.cut import MUG, cut, write
 from .arena import Arena
 from .pool import Pool
 

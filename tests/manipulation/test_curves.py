@@ -2,7 +2,7 @@
 
 import pytest
 
-from infthor_eval.curves import AT_MOST
+from infthor_eval.episodes.curves import AT_MOST
 from infthor_eval.errors import DataError, UsageError
 from infthor_eval.manipulation.curve_runs import with_radii
 from infthor_eval.manipulation.curves import ALL, arm_curves

@@ -19,7 +19,7 @@ from infthor_eval.runs import Silent, execute, read_run
 from infthor_eval.thor.controller import SafeController
 from model_adapters import Capabilities
 
-from ..agents.cut import CANDLE, MUG, cut, write
+from ..plans.cut import CANDLE, MUG, cut, write
 
 OURS = "from infthor_eval.cli import main; main()"
 

@@ -14,7 +14,7 @@ from infthor_eval.manipulation.records import RECORDS
 from infthor_eval.runs import execute, prepare, read_run
 from model_adapters import ArmDelta, load
 
-from ..agents.cut import CANDLE, FORK, MUG, cut, write
+from ..plans.cut import CANDLE, FORK, MUG, cut, write
 from .scripted import ScriptedPolicy
 
 pytestmark = pytest.mark.usefixtures("shared_simulators")

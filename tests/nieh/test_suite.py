@@ -50,7 +50,7 @@ def test_the_results_file_says_what_the_summary_says(prepared):
     outcome = execute(prepared(name="mine"))
     document = json.loads((outcome.folder / "results.json").read_text())
     assert outcome.folder.parent.name == "mine"
-    assert document.keys() == {"suite", "name", "identity", "n_missing", "headline", "summary", "usage"}
+    assert document.keys() == {"suite", "name", "identity", "n_missing", "primary_metrics", "summary", "usage"}
     assert (document["suite"], document["name"]) == ("nieh", "mine")
     assert document["identity"] == outcome.summary.header.identity
     strict = document["summary"]["tasks"]["nieh_gt"]["by_clues"]["total"]["scores"]["strict"]
@@ -213,9 +213,9 @@ def test_batches_give_the_same_replies_and_one_that_fails_takes_no_other_with_it
         return whole(talk, continuations, decoding)
 
     monkeypatch.setattr(BackendConversation, "replies", one_at_a_time)
-    survived = execute(prepared(TINY, {"batch_size": "3"}, tasks=tasks))
-    assert replies(survived) == replies(alone)
-    assert Counter(record.faults for record in survived.records) == {
+    with_retries = execute(prepared(TINY, {"batch_size": "3"}, tasks=tasks))
+    assert replies(with_retries) == replies(alone)
+    assert Counter(record.faults for record in with_retries.records) == {
         ("asked with 2 others: out of memory on a batch",): 3,
         ("asked with 1 others: out of memory on a batch",): 2,
     }

@@ -6,12 +6,12 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from infthor_eval.agents.curves import reward_curves
 from infthor_eval.errors import DataError
+from infthor_eval.plans.curves import reward_curves
 from infthor_eval.report.curves import curves_table, embedded_label, one_panel, read_panels
 from infthor_eval.report.figures import draw_curves
 
-from ..agents.made_runs import made_run, plan, planner_run
+from ..plans.made_runs import made_run, plan, planner_run
 
 EXAMPLE = Path(__file__).parents[2] / "docs" / "figure7_panels.yaml"
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from infthor_eval.agents.moments import Moment, PlanTitle, Pose, Rewards, Room, Sight, Thing
+from infthor_eval.plans.moments import Moment, PlanTitle, Pose, Rewards, Room, Sight, Thing
 from infthor_eval.report.lettering import fitted, font, lines_of, one_line
 from infthor_eval.report.recording import END_HELD, SIZE, TITLE_HELD, draw_moment, draw_title, pictures
 from infthor_eval.report.room_map import draw_map

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from infthor_eval.runs import Configuration, TaskRequest, execute, prepare, read_configuration
 from infthor_eval.runs.configuration import write_configuration
-from infthor_eval.workers import Staffing
+from infthor_eval.workers import WorkerSettings
 from tests.faults.told import refused
 from tests.runs.toy import ToySuite
 from tests.runs.toy_command import request
@@ -54,7 +54,12 @@ def test_options_that_are_as_by_default_are_left_out_and_places_are_found_from_a
     tasks = TaskRequest([], Options(scenes="plans of floors", greedy=True), Path("set"), 3, 7)
     model_options = {"pretrained": "weights", "dtype": "float32"}
     asked = request(
-        Path("out"), tasks=tasks, model="m", model_options=model_options, name="a name", staffing=Staffing(workers=2)
+        Path("out"),
+        tasks=tasks,
+        model="m",
+        model_options=model_options,
+        name="a name",
+        worker_settings=WorkerSettings(workers=2),
     )
     found = written(tmp_path, asked)
     assert found.options == {

@@ -15,7 +15,7 @@ import pytest
 
 from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.runs import Group, RunRequest, Unit, UnitKey, execute, prepare, read_header, read_run
-from infthor_eval.runs.executor import evaluated
+from infthor_eval.runs.scheduling import run_groups
 from model_adapters import Capabilities
 from tests.runs.toy import Adder, Sum, Sums, ToySuite
 from tests.runs.toy_command import request
@@ -261,7 +261,7 @@ def test_groups_in_flight_are_done_at_the_same_time_and_each_in_its_order():
             yield unit.record("f", unit.payload)
         running.remove(group)
 
-    records = list(evaluated(groups(6), do, 3))
+    records = list(run_groups(groups(6), do, 3))
     assert 1 < max(most) <= 3
     assert sorted(record.id for record in records) == sorted(u.key.id for g in groups(6) for u in g.units)
     for number in range(6):
@@ -276,8 +276,8 @@ def test_a_thread_that_finds_the_last_group_taken_ends(monkeypatch):
             time.sleep(0.02)
             return found
 
-    monkeypatch.setattr("infthor_eval.runs.executor.SimpleQueue", Slow)
-    records = list(evaluated(groups(3), lambda group: (unit.record("f", unit.payload) for unit in group.units), 2))
+    monkeypatch.setattr("infthor_eval.runs.scheduling.SimpleQueue", Slow)
+    records = list(run_groups(groups(3), lambda group: (unit.record("f", unit.payload) for unit in group.units), 2))
     assert len(records) == 9
 
 
@@ -287,7 +287,7 @@ def test_an_error_in_a_thread_ends_the_run_with_that_error():
         raise ZeroDivisionError("a bug")
 
     with pytest.raises(ZeroDivisionError, match="a bug"):
-        list(evaluated(groups(5), do, 2))
+        list(run_groups(groups(5), do, 2))
 
 
 def test_a_subject_with_several_in_flight_gives_the_same_records(tmp_path):

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from infthor_eval.runs import Usage, execute, prepare
-from infthor_eval.runs.results import write_took
+from infthor_eval.runs.results import write_usage
 from tests.runs.toy import ToySuite
 from tests.runs.toy_command import request
 
@@ -43,8 +43,8 @@ def test_usage_in_words(usage: Usage, said: str) -> None:
 
 def test_what_was_taken_is_written_as_it_is(tmp_path: Any) -> None:
     records: Any = [SimpleNamespace(seconds=seconds) for seconds in (0.25, 1.5)]
-    write_took(tmp_path, records, Usage(3, 300, 100, 7, 0.125))
-    assert json.loads((tmp_path / "took.json").read_text()) == {
+    write_usage(tmp_path, records, Usage(3, 300, 100, 7, 0.125))
+    assert json.loads((tmp_path / "usage.json").read_text()) == {
         "requests": 3,
         "read": 300,
         "cached": 100,
@@ -68,7 +68,7 @@ def test_the_scores_of_every_unit_stand_in_a_file(tmp_path: Any) -> None:
 
 def test_what_a_task_is_known_by_stands_in_the_results(tmp_path: Any) -> None:
     folder = execute(prepare(request(tmp_path), ToySuite())).folder
-    assert json.loads((folder / "results.json").read_text())["headline"] == {
+    assert json.loads((folder / "results.json").read_text())["primary_metrics"] == {
         "sums": {"mean": 0.5, "low": None, "high": None, "n": 4}
     }
 
@@ -76,7 +76,7 @@ def test_what_a_task_is_known_by_stands_in_the_results(tmp_path: Any) -> None:
 def test_a_run_writes_both_and_results_have_nothing_that_differs(tmp_path: Any) -> None:
     suite = ToySuite()
     outcome = execute(prepare(request(tmp_path), suite))
-    results, took = ((outcome.folder / name).read_bytes() for name in ("results.json", "took.json"))
+    results, took = ((outcome.folder / name).read_bytes() for name in ("results.json", "usage.json"))
     again = execute(prepare(request(tmp_path), suite))
     assert (again.folder / "results.json").read_bytes() == results
     assert json.loads(took)["requests"] == json.loads(results)["usage"]["requests"]

@@ -35,7 +35,7 @@ class Sums:
 
     def view(self, record):
         a, b = record.payload.numbers
-        return runs.SampleView(a * 10 + b, {"numbers": [a, b]}, str(a + b), f"{a}+{b}", {}, str(record.payload.answer))
+        return runs.UnitSample(a * 10 + b, {"numbers": [a, b]}, str(a + b), f"{a}+{b}", {}, str(record.payload.answer))
 
     def close(self):
         self.closed = True
@@ -54,7 +54,7 @@ class ToySuite:
     def scores(self, record):
         return {"right": float(record.payload.answer == sum(record.payload.numbers))}
 
-    def headline(self, summary):
+    def primary_metrics(self, summary):
         right, wrong = summary.numbers
         return {"sums": Rate(right / (right + wrong), None, None, right + wrong)}
 

@@ -7,13 +7,13 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from infthor_eval.agents.history import Chapter, chapter_parts
 from infthor_eval.errors import DataError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.step_log import read_steps
 from infthor_eval.formats.trajectory import iter_trajectories
 from infthor_eval.household.sequence_text import ACT
+from infthor_eval.plans.history import Chapter, chapter_parts
 from infthor_eval.training.action_sequences import recorded_chapters, single_plans, windows
 from infthor_eval.training.encoding import Encoded, LeftOut
 from model_adapters.hf.prompt import Frame

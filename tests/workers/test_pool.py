@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from infthor_eval.errors import DataError, InfthorError, ModelError, UsageError
-from infthor_eval.workers import GivenUp, Lost, Made, Pool, Staffing, Withdrawn, WorkerLostError, shared_out
+from infthor_eval.workers import GivenUp, Lost, Made, Pool, Withdrawn, WorkerLostError, WorkerSettings, shared_out
 
 from ..clusters import two_nodes
 from .toys import Job, OpenCounter, broken
@@ -30,7 +30,7 @@ def pool(request):
 
     def make(opening=None, count=2, **more):
         address = request.getfixturevalue("cluster").address if request.param == "ray" else None
-        connect = Staffing(count, address).connect(opening or OpenCounter())
+        connect = WorkerSettings(count, address).connect(opening or OpenCounter())
         made.append(Pool(connect, count, **more))
         return made[-1]
 
@@ -142,7 +142,7 @@ def test_once_it_is_to_stop_the_results_in_hand_are_the_last_and_further_jobs_ca
 def test_processes_share_the_processors_of_the_machine(monkeypatch):
     monkeypatch.delenv("OMP_NUM_THREADS")
     monkeypatch.setattr(os, "cpu_count", lambda: 1)
-    shared = Pool(Staffing(2).connect(OpenCounter()), 2)
+    shared = Pool(WorkerSettings(2).connect(OpenCounter()), 2)
     assert shared.open()["threads"] == str(max(1, len(os.sched_getaffinity(0)) // 2))
     shared.close()
 
@@ -180,11 +180,11 @@ def is_running(pid):
 def test_jobs_of_one_result_come_with_their_numbers_and_what_is_given_up_is_an_error():
     told = []
     jobs = [Job(1), Job(1, dies=0), Job(1)]
-    found = dict(shared_out(OpenCounter(), jobs, Staffing(2), told.append))
+    found = dict(shared_out(OpenCounter(), jobs, WorkerSettings(2), told.append))
     assert (found[0][1], found[2][1]) == (0, 0)
     assert isinstance(found[1], WorkerLostError)
     assert len(told) == 2
-    alone = dict(shared_out(OpenCounter(), jobs[:1], Staffing(1), told.append))
+    alone = dict(shared_out(OpenCounter(), jobs[:1], WorkerSettings(1), told.append))
     assert alone == {0: (os.getpid(), 0)}
 
 
@@ -193,7 +193,7 @@ def test_jobs_of_one_result_come_with_their_numbers_and_what_is_given_up_is_an_e
 def test_a_worker_for_which_there_is_no_room_yet_joins_when_its_node_comes():
     with two_nodes() as (cluster, second):
         cluster.remove_node(second)
-        shared = Pool(Staffing(2, cluster.address).connect(OpenCounter()), 2)
+        shared = Pool(WorkerSettings(2, cluster.address).connect(OpenCounter()), 2)
         shared.open()
         events = []
         for event in shared.run(400, lambda _: Job(1, slow=0.1)):

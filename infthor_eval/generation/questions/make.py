@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from infthor_eval.errors import DataError, InfthorError, naming
+from infthor_eval.errors import DataError, InfthorError, wrap_errors
 from infthor_eval.formats.question import ABSENCE, Question, clue_column
 from infthor_eval.formats.set_info import simulator_of
 from infthor_eval.formats.step_log import read_steps
@@ -26,12 +26,12 @@ from infthor_eval.generation.questions import (
 from infthor_eval.generation.questions.candidates import Candidate
 from infthor_eval.generation.questions.checker import Checker
 from infthor_eval.generation.questions.history import DEFAULT_SHARE, History
-from infthor_eval.workers import Staffing, shared_out
+from infthor_eval.workers import WorkerSettings, shared_out
 
 __all__ = ["MadeQuestions", "candidates_of", "further_candidates_of", "make_questions"]
 
 
-_ALONE = Staffing()
+_ALONE = WorkerSettings()
 # What a log that is JSON of the right form can still be wrong in.
 _WRONG = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError)
 
@@ -75,7 +75,7 @@ def make_questions(
     per_trajectory: int = 25,
     share: float = DEFAULT_SHARE,
     further: bool = False,
-    staffing: Staffing = _ALONE,
+    worker_settings: WorkerSettings = _ALONE,
     say: Callable[[str], None] = lambda _: None,
 ) -> MadeQuestions:
     """Make questions on a replayed set.
@@ -106,14 +106,14 @@ def make_questions(
     made.trajectories = len(types)
     vocabulary = frozenset[str]().union(*types.values())
     asking = [_Asking(path, vocabulary, seed, share, further) for path in types]
-    found = _shared_out(asking, staffing, say, made)
+    found = _shared_out(asking, worker_settings, say, made)
     chooser = _Chooser()
     checking = []
     for path in [path for path in types if path in found]:  # one after the other: what was chosen before counts
         candidates, rng = found[path]
         chosen = chooser.choose(candidates, per_trajectory, rng)
         checking.append(_Checking(path, tuple(item.question(path.name) for item in chosen), share))
-    sound = _shared_out(checking, staffing, say, made)
+    sound = _shared_out(checking, worker_settings, say, made)
     for item in checking:
         for question, verdict in zip(item.questions, sound.get(item.path, ()), strict=False):
             (made.questions if verdict else made.doubted).append(question)
@@ -170,11 +170,14 @@ class _Asker:
 
 
 def _shared_out(
-    jobs: Sequence[_Asking] | Sequence[_Checking], staffing: Staffing, say: Callable[[str], None], made: MadeQuestions
+    jobs: Sequence[_Asking] | Sequence[_Checking],
+    worker_settings: WorkerSettings,
+    say: Callable[[str], None],
+    made: MadeQuestions,
 ) -> dict[Path, Any]:
     """What came of the jobs, by trajectory; where worker after worker was lost at one, it is skipped."""
     found: dict[Path, Any] = {}
-    for number, result in shared_out(_Asker, jobs, staffing, say):
+    for number, result in shared_out(_Asker, jobs, worker_settings, say):
         if isinstance(result, InfthorError):
             made.skipped.append(f"{jobs[number].path}: {result}")
         else:
@@ -183,7 +186,7 @@ def _shared_out(
 
 
 def _history(path: Path, share: float) -> History:
-    with naming(f"{path}: its log does not hang together", "replay the trajectory again", of=_WRONG):
+    with wrap_errors(f"{path}: its log does not hang together", "replay the trajectory again", catch=_WRONG):
         return History(path.name, read_steps(path), share)
 
 

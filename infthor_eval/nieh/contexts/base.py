@@ -6,7 +6,7 @@ from typing import Any
 
 import msgspec
 
-from infthor_eval.errors import UsageError, naming
+from infthor_eval.errors import UsageError, wrap_errors
 from infthor_eval.formats.digests import digest_of_file, fingerprint
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet, SkippedQuestion
@@ -79,7 +79,7 @@ class ContextSettings:
         known = {item.name for item in fields(cls)}
         told = {key: value for key, value in given.items() if key in known and value is not None}
         wrong = "a context's settings (dataset_kwargs of a task file) are not what they should be"
-        with naming(wrong, "mend them", of=msgspec.ValidationError, as_a=UsageError):
+        with wrap_errors(wrong, "mend them", catch=msgspec.ValidationError, raise_as=UsageError):
             settings = msgspec.convert(told, cls)
         if settings.k_tokens not in (None, 1000, 1024):
             raise UsageError(f"k_tokens is {settings.k_tokens}; a kilo-token is 1000 or 1024 tokens")

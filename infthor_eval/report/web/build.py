@@ -12,11 +12,11 @@ from infthor_eval.report.comparison import compare, comparison_table
 from infthor_eval.report.web.arm_samples import ERRANDS
 from infthor_eval.report.web.episode_charts import arm_sections, plan_sections
 from infthor_eval.report.web.episode_samples import Opener, episode_samples
-from infthor_eval.report.web.headlines import headline_table, left_out_table, took_table
 from infthor_eval.report.web.nieh_charts import nieh_charts
 from infthor_eval.report.web.nieh_samples import nieh_samples
 from infthor_eval.report.web.page import About, Page
 from infthor_eval.report.web.plan_samples import PLANS
+from infthor_eval.report.web.primary_metrics import left_out_table, primary_metrics_table, took_table
 from infthor_eval.report.web.runs import ReportRun
 from infthor_eval.report.web.samples import Sample
 from infthor_eval.report.web.sections import Section
@@ -55,7 +55,7 @@ def build_page(runs: Sequence[ReportRun], wanted: Wanted) -> Page:
     suites: dict[str, list[ReportRun]] = {}
     for run in runs:
         suites.setdefault(run.suite.name, []).append(run)
-    sections = [Section("results", "Results", tables=(headline_table(runs),))]
+    sections = [Section("results", "Results", tables=(primary_metrics_table(runs),))]
     for name, same in suites.items():
         sections += _suite_sections(name, same)
     sections += _comparisons(suites.values())

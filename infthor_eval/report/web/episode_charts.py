@@ -6,13 +6,13 @@ from functools import partial
 
 from matplotlib.figure import Figure
 
-from infthor_eval.agents.curve_runs import PlansRun
-from infthor_eval.agents.curves import reward_curves
-from infthor_eval.curves import RewardCurves
+from infthor_eval.episodes.curves import RewardCurves
 from infthor_eval.errors import InfthorError
 from infthor_eval.manipulation.curve_runs import ArmRun, with_radii
 from infthor_eval.manipulation.curves import arm_curves
 from infthor_eval.manipulation.radii import success_by_radius
+from infthor_eval.plans.curve_runs import PlansRun
+from infthor_eval.plans.curves import reward_curves
 from infthor_eval.report.curves import curves_table, one_panel
 from infthor_eval.report.drawing import inline_svg
 from infthor_eval.report.figures import curves_figure

@@ -12,7 +12,7 @@ from infthor_eval.errors import UsageError
 from infthor_eval.report.curves import model_names, run_labels
 from infthor_eval.runs import RunHeader, RunSummary, Suite, UnitKey, UnitRecord, Usage, read_header
 from infthor_eval.runs.configuration import read_configuration
-from infthor_eval.runs.finding import read_results
+from infthor_eval.runs.run_search import read_results
 from infthor_eval.runs.shards import read_shards
 
 __all__ = ["ReportRun", "merged", "read_report_runs"]

@@ -4,7 +4,6 @@ import random
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
-from infthor_eval.agents.history import Chapter
 from infthor_eval.errors import DataError
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question
@@ -13,6 +12,7 @@ from infthor_eval.household.wording import an, noun
 from infthor_eval.nieh.contexts import CONTEXTS
 from infthor_eval.nieh.prompts import question_text
 from infthor_eval.nieh.samples import find_samples
+from infthor_eval.plans.history import Chapter
 from infthor_eval.training.action_sequences import single_plans, windows
 from infthor_eval.training.data import read_history, recorded_names
 from infthor_eval.training.encoding import Encoded, Encoder, LeftOut

@@ -4,8 +4,8 @@ import random
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
 
-from infthor_eval.agents.habits import fill_action, open_action
-from infthor_eval.agents.script import about, read_plan
+from infthor_eval.plans.habits import fill_action, open_action
+from infthor_eval.plans.script import about, read_plan
 
 __all__ = ["Orders"]
 

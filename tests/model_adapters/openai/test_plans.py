@@ -8,9 +8,9 @@ from typing import Any
 import msgspec
 import pytest
 
-from infthor_eval.agents.records import RECORDS
+from infthor_eval.plans.records import RECORDS
 from infthor_eval.runs import UnitRecord, read_run
-from tests.agents.cut import CANDLE, FORK, MUG, cut, write
+from tests.plans.cut import CANDLE, FORK, MUG, cut, write
 
 from ..policies.servers import send
 from .talking import chatting, completion

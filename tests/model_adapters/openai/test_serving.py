@@ -20,7 +20,7 @@ from infthor_eval.formats.frames import FrameRef
 from infthor_eval.runs import UnitRecord, read_header, read_run
 from infthor_eval.suites import suite_named
 from model_adapters import check_adapter, load
-from tests.agents.cut import CANDLE, FORK, cut, write
+from tests.plans.cut import CANDLE, FORK, cut, write
 
 from ..asking import up_to
 from ..checkpoints import save

@@ -7,12 +7,12 @@ from typing import Any
 
 import pytest
 
-from infthor_eval.agents.records import RECORDS as PLAN_RECORDS
 from infthor_eval.errors import UsageError
 from infthor_eval.nieh.records import RECORDS
+from infthor_eval.plans.records import RECORDS as PLAN_RECORDS
 from infthor_eval.runs import read_run
 from model_adapters import on_engine
-from tests.agents.cut import MUG, cut, write
+from tests.plans.cut import MUG, cut, write
 
 from .double import Double
 
@@ -34,7 +34,7 @@ def ask(make_nieh_set: Any, checkpoints: dict[str, Path], tmp_path: Path, run: A
 def _found(folder: Path) -> tuple[list[Any], dict[str, Any], dict[str, Any]]:
     """The records of the one run in a folder, its results, and what it took."""
     (results,) = folder.rglob("results.json")
-    took = json.loads((results.parent / "took.json").read_text())
+    took = json.loads((results.parent / "usage.json").read_text())
     return read_run(results.parent, RECORDS)[1], json.loads(results.read_text()), took
 
 

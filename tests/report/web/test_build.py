@@ -49,8 +49,8 @@ def test_the_sections_have_their_pictures_and_tables(page):
     assert "oracle: accuracy by depth and size of the context" in titles
     assert all(chart.svg.startswith("<svg") and "viewBox" in chart.svg for chart in sections["nieh"].charts)
     assert any("Table 4" in row.cells[1] for table in sections["nieh"].tables for row in table.rows if row.is_published)
-    headline = {row.cells[:2]: row.cells[3] for row in sections["results"].tables[0].rows}
-    assert headline["oracle", "nieh_mini_gt"] == "100.0"
+    primary_metrics = {row.cells[:2]: row.cells[3] for row in sections["results"].tables[0].rows}
+    assert primary_metrics["oracle", "nieh_mini_gt"] == "100.0"
 
 
 def test_a_run_on_blank_frames_beside_another_shows_the_gain(make_page, tmp_path, run):

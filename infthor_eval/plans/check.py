@@ -1,0 +1,208 @@
+"""The contract of an environment of plans, for anyone to run on their own: on another simulator, or on a robot.
+
+It asks for behaviour through `reset`, `step` and the lists of plans and of the expert's actions only; each violated
+clause raises an error of one line.
+"""
+
+import math
+import re
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Protocol
+
+import numpy as np
+
+from infthor_eval.plans.environment import Ended, Observation, StepOutcome
+from infthor_eval.plans.expert import ExpertAction, ExpertRefusedError
+from infthor_eval.plans.plan import Plan
+from infthor_eval.thor.actions import object_type_of
+from infthor_eval.thor.view import View
+from model_adapters import ContractError
+
+__all__ = ["Environment", "check_env"]
+
+_ID = re.compile(r"[A-Za-z]+\|[^|]+\|[^|]+\|[^|]+(\|\w+)*")  # type, position, part
+_NONSENSE = ("", "fly to the moon", "MoveAhead Mug", "PutObject Mug", "pickupobject Mug")
+_UNKNOWN = "PickupObject Unicorn"
+_SMALL = 1e-6  # of rewards
+_PLANS = 3  # that are carried out, where no more are asked for
+
+
+class Environment(Protocol):
+    """What is checked: see `PlanEnvironment`, which says what each of these gives."""
+
+    @property
+    def plans(self) -> Sequence[Plan]:
+        """What can be reset to."""
+        ...
+
+    def reset(self, plan: int = 0) -> tuple[Observation, Mapping[str, Any]]:
+        """Bring the world to the true state before a plan."""
+        ...
+
+    def step(self, action: str | Mapping[str, Any]) -> StepOutcome:
+        """Carry out one action of the present plan."""
+        ...
+
+    def expert_actions(self, plan: int) -> Sequence[ExpertAction]:
+        """What the expert did for a plan."""
+        ...
+
+
+def check_env(environment: Environment, plans: Sequence[int] | None = None) -> None:
+    """Hold an environment to its contract.
+
+    Args:
+        environment: just made, with the default rules of rewards.
+        plans: which plans are carried out; the first ones where None. Those whose expert is refused are passed over.
+
+    Raises:
+        ContractError: names the clause that does not hold.
+    """
+    _check_plans(environment.plans)
+    _check_nothing_under_way(environment, "before the first reset()")
+    chosen = range(min(_PLANS, len(environment.plans))) if plans is None else plans
+    possible = [plan for plan in chosen if not _raises(ExpertRefusedError, environment.reset, plan)]
+    _require(bool(possible), "none of the plans can be reset to")
+    for plan in possible:
+        _check_reset(environment, plan)
+        _check_expert(environment, plan)
+    _check_state_is_the_plans_own(environment, possible)
+    _check_nonsense(environment, possible[0])
+    _check_limit(environment, possible[0])
+    for plan in (-1, len(environment.plans)):
+        _require(_raises(IndexError, environment.reset, plan), f"reset({plan}) does not raise IndexError: no such plan")
+
+
+def _require(holds: bool, clause: str) -> None:
+    if not holds:
+        raise ContractError(clause)
+
+
+def _raises(error_type: type[Exception], call: Callable[..., Any], *args: Any) -> bool:
+    try:
+        call(*args)
+    except error_type:
+        return True
+    return False
+
+
+def _check_plans(plans: Sequence[Plan]) -> None:
+    _require(bool(plans), "there is no plan")
+    _require([plan.index for plan in plans] == list(range(len(plans))), "plans are not numbered in their order")
+
+
+def _check_nothing_under_way(environment: Environment, when: str) -> None:
+    _require(_raises(RuntimeError, environment.step, "NoOp"), f"step() {when} does not raise RuntimeError")
+
+
+def _check_reset(environment: Environment, plan: int) -> None:
+    found = environment.reset(plan)
+    _require(isinstance(found, tuple) and len(found) == 2, "reset() does not give an observation and information")
+    observation, info = found
+    _require({"max_reward", "n_expert"} <= set(info), "the information of reset() lacks max_reward or n_expert")
+    most = info["max_reward"]
+    _require(math.isfinite(most) and most >= 0, f"max_reward of plan {plan} is {most}")
+    n_expert = len(environment.expert_actions(plan))
+    _require(info["n_expert"] == n_expert > 0, f"n_expert of plan {plan} is {info['n_expert']}, of {n_expert} actions")
+    _check_observation(observation)
+
+
+def _check_expert(environment: Environment, plan: int) -> None:
+    """The expert's own actions carry a plan out, and earn the most that there is."""
+    _, info = environment.reset(plan)
+    earned, over = 0.0, False
+    for action in environment.expert_actions(plan):
+        outcome = environment.step(action.call)
+        _check_outcome(outcome)
+        earned += outcome.reward
+        over = outcome.terminated or outcome.truncated
+        if over:
+            break
+    _require(
+        over and outcome.info.ended == Ended.DONE, f"the expert's actions do not carry plan {plan} out: {outcome.info}"
+    )
+    most = info["max_reward"]
+    _require(abs(earned - most) < _SMALL, f"the expert earns {earned:g} in plan {plan}, and max_reward says {most:g}")
+    _check_nothing_under_way(environment, "after a plan's end")
+
+
+def _check_state_is_the_plans_own(environment: Environment, plans: Sequence[int]) -> None:
+    """Whatever came before a reset, the plan begins the same."""
+    first = {plan: environment.reset(plan) for plan in plans}
+    for plan in (*reversed(plans), *plans):
+        observation, info = environment.reset(plan)
+        before, before_info = first[plan]
+        _require(_alike(observation.view, before.view), f"plan {plan} begins in another state the second time")
+        _require(_same_picture(observation, before), f"plan {plan} begins with another picture the second time")
+        _require(dict(info) == dict(before_info), f"the information of reset({plan}) differs the second time")
+        for action in ("RotateLeft", "LookUp"):
+            if environment.step(action).terminated:
+                break
+
+
+def _check_nonsense(environment: Environment, plan: int) -> None:
+    """What is no action ends the plan, and earns nothing."""
+    for text in (*_NONSENSE, _UNKNOWN):
+        environment.reset(plan)
+        outcome = environment.step(text)
+        _check_outcome(outcome)
+        _require(outcome.terminated, f"{text!r}, which is no action, does not terminate the plan")
+        _require(outcome.reward == 0, f"{text!r}, which is no action, earns {outcome.reward}")
+        wanted = Ended.UNKNOWN_OBJECT if text == _UNKNOWN else Ended.NO_ACTION
+        _require(outcome.info.ended == wanted, f"{text!r} ends the plan with {outcome.info.ended}, not {wanted}")
+        _require(outcome.info.call is None, f"{text!r}, which is no action, has a call")
+        _require(bool(outcome.info.message), f"{text!r}, which is no action, has no message")
+        _check_nothing_under_way(environment, "after what is no action")
+
+
+def _check_limit(environment: Environment, plan: int) -> None:
+    """Who does nothing for long is truncated."""
+    environment.reset(plan)
+    for _ in range(10_000):
+        outcome = environment.step("NoOp")
+        _check_outcome(outcome)
+        if outcome.terminated or outcome.truncated:
+            break
+    _require(outcome.truncated, "a plan in which nothing is done is not truncated")
+    _check_nothing_under_way(environment, "after the limit of steps")
+
+
+def _check_outcome(outcome: StepOutcome) -> None:
+    _require(isinstance(outcome, tuple) and len(outcome) == 5, "step() does not give five values")
+    observation, reward, terminated, truncated, info = outcome
+    _require(isinstance(terminated, bool) and isinstance(truncated, bool), "terminated and truncated are no booleans")
+    _require(not (terminated and truncated), "a plan is terminated and truncated at once")
+    _require(isinstance(reward, int | float) and math.isfinite(reward), f"a reward is {reward!r}")
+    _require(
+        (info.ended is None) == (not terminated and not truncated), f"info.ended is {info.ended} at the wrong time"
+    )
+    _require((info.ended == Ended.LIMIT) == truncated, f"truncated is {truncated}, and info.ended is {info.ended}")
+    _check_observation(observation)
+
+
+def _check_observation(observation: Observation) -> None:
+    view = observation.view
+    for key, item in view.objects.items():
+        _require(key == item.object_id, f"the object {item.object_id} is kept as {key}")
+        _require(bool(_ID.fullmatch(key)), f"{key!r:.80} is no id of the form Type|x|y|z")
+        named = object_type_of(key)
+        _require(named == item.object_type, f"{key} says that it is a {named}, and is a {item.object_type}")
+    for key in view.inventory:
+        _require(key in view.objects, f"{key}, which is held, is not among the objects")
+    if view.frame is not None:
+        shape, kind = view.frame.shape, view.frame.dtype
+        _require(kind == np.uint8, f"a frame is of {kind}, not of bytes")
+        _require(len(shape) == 3 and shape[2] == 3, f"a frame has the shape {shape}, not (height, width, 3)")
+    if observation.frame is not None and view.frame is not None:
+        kept = np.asarray(observation.frame.load())
+        _require(np.array_equal(kept, view.frame), f"{observation.frame.path} is another picture than the view's")
+
+
+def _alike(one: View, other: View) -> bool:
+    return (one.agent, one.inventory, one.objects) == (other.agent, other.inventory, other.objects)
+
+
+def _same_picture(one: Observation, other: Observation) -> bool:
+    if one.view.frame is None or other.view.frame is None:
+        return one.view.frame is other.view.frame
+    return np.array_equal(one.view.frame, other.view.frame)

@@ -1,0 +1,198 @@
+"""Plans set up for a run: which plans of which trajectories, and the doing of it, a trajectory at a time."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from importlib.metadata import version
+from pathlib import Path
+
+import msgspec
+
+from infthor_eval.episodes.simulators import Simulators
+from infthor_eval.errors import InfthorError, SceneError, UsageError
+from infthor_eval.formats.floor_plans import floor_plans_digest
+from infthor_eval.plans.cast import Cast, cast_of
+from infthor_eval.plans.episodes import Episode, described, episode
+from infthor_eval.plans.plan import Plan, UnfitPlanError
+from infthor_eval.plans.records import NOT_COME_TO, PlanRecord
+from infthor_eval.plans.task import PlansTask
+from infthor_eval.plans.trajectories import Course
+from infthor_eval.runs import (
+    Group,
+    Session,
+    Skipped,
+    TaskRequest,
+    Unit,
+    UnitKey,
+    UnitRecord,
+    UnitSample,
+    Workload,
+)
+from infthor_eval.runs.identity import episode_fingerprint
+from model_adapters import Subject
+
+__all__ = ["PlanUnit", "PlansEvaluation"]
+
+
+@dataclass(frozen=True)
+class PlanUnit(Unit[PlanRecord]):
+    """A unit that is a plan.
+
+    Attributes:
+        course: its trajectory.
+        plan: which plan of it.
+    """
+
+    course: Course
+    plan: Plan
+
+    @classmethod
+    def of(cls, task: str, course: Course, plan: Plan) -> "PlanUnit":
+        """The unit of a task's plan."""
+        key = UnitKey(task, f"{course.traj_id}/{plan.index:04d}")
+        return cls(key, course.traj_id, described(course, plan), course, plan)
+
+
+class PlansEvaluation:
+    """Plans set up for a run; see `infthor_eval.runs.Evaluation`."""
+
+    def __init__(self, request: TaskRequest) -> None:
+        """Read the tasks and their trajectories.
+
+        Raises:
+            UsageError: a task without its trajectories, or with no plan that it is about.
+            DataError: a task file or all of its trajectories are not what they should be.
+        """
+        self._seed = request.seed
+        self._options = request.options
+        self._tasks = {file.name: PlansTask(file, request) for file in request.tasks}
+        for task in self._tasks.values():
+            if not task.limited:
+                raise UsageError(f"{task.name}: no trajectory there has a final task; make some with --test-set")
+        self._scenes = Path(self._options.scenes) if self._options.scenes is not None else None
+        self._floor_plans = floor_plans_digest(self._scenes) if self._scenes is not None else None
+        every = {course.traj_id: course for task in self._tasks.values() for course in task.courses.found}
+        self._trajectories = [course.trajectory for course in every.values()]
+        self._cast: Cast | None = None
+        self._simulators: Simulators | None = None
+
+    def outline(self) -> list[tuple[str, list[str]]]:
+        """The trajectories that are gone through, by name, each with the texts of its plans."""
+        return [
+            (course.traj_id, [plan.text for plan in task.plans(course)])
+            for task in self._tasks.values()
+            for course in task.limited
+        ]
+
+    def workload(self, subject: Subject) -> Workload:
+        """See `infthor_eval.runs.Evaluation.workload`."""
+        self._cast = cast_of(subject)
+        self._cast.prepare(self._trajectories)
+        self._simulators = self._described_simulators(self._cast.sees)
+        self._identity = {
+            "tasks": {name: task.identity() for name, task in self._tasks.items()},
+            "simulator": self._options.simulator,
+            "ai2thor": version("ai2thor"),
+            "floor_plans": self._floor_plans,
+            "constrained": self._options.constrained,
+            "frames": self._options.frames,
+        }
+        return Workload(
+            groups=[
+                Group(
+                    [PlanUnit.of(task.name, course, plan) for plan in task.plans(course)],
+                    frames=len(course.trajectory.plan.low_actions),
+                )
+                for task in self._tasks.values()
+                for course in task.limited
+            ],
+            skipped=[
+                Skipped(UnitKey(task.name, place), reason)
+                for task in self._tasks.values()
+                for place, reason in task.courses.broken
+            ],
+            identity=self._identity,
+        )
+
+    def run(self, group: Group, session: Session) -> Iterator[UnitRecord[PlanRecord]]:
+        """See `infthor_eval.runs.Evaluation.run`."""
+        units: list[PlanUnit] = list(group.units)  # type: ignore[arg-type]  # its own groups
+        prints = {unit.key: self._fingerprint(unit) for unit in units}
+        known = {unit.key: session.known(unit, prints[unit.key]) for unit in units}
+        first = units[0]
+        if all(record is not None for record in known.values()):
+            yield from (record for record in known.values() if record is not None)
+            return
+        task = self._tasks[first.key.task]
+        assert self._cast is not None and self._simulators is not None  # the workload comes first
+        with episode(task, first.course, self._cast, self._simulators, self._seed) as stage:
+            over = False
+            for unit in units:
+                record = known[unit.key]
+                if record is None or (record.payload.ended == NOT_COME_TO and not over):
+                    record = _recorded(unit, prints[unit.key], stage, over)
+                yield record
+                failed = record.excluded is None and not record.payload.done
+                over = over or (failed and task.settings.after_failure == "stop")
+
+    def view(self, record: UnitRecord[PlanRecord]) -> UnitSample:
+        """See `infthor_eval.runs.Evaluation.view`."""
+        payload, task = record.payload, self._tasks[record.task]
+        return UnitSample(
+            number=self._numbers[record.key],
+            doc={"traj_id": record.cluster, "plan": payload.index, "kind": payload.kind, "goal": payload.goal},
+            target=payload.plan,
+            prompt=f"{payload.goal}\n{payload.plan}",
+            settings=task.file.settings["generation_kwargs"],
+            reply=", ".join(step.action or (step.reply or "") for step in payload.steps),
+        )
+
+    def close(self) -> None:
+        """See `infthor_eval.runs.Evaluation.close`."""
+        if self._simulators is not None:
+            self._simulators.close()
+
+    def _described_simulators(self, seen: bool) -> Simulators:
+        """What episodes run in; it draws nothing that nobody looks at."""
+        in_words = seen and any(task.memory.needs_state for task in self._tasks.values())
+        return Simulators(self._options.simulator, self._scenes, self._trajectories, image=seen, instances=in_words)
+
+    @cached_property
+    def _numbers(self) -> dict[UnitKey, int]:
+        """Places of the plans in their tasks."""
+        found: dict[UnitKey, int] = {}
+        for name, task in self._tasks.items():
+            plans = [(course, plan) for course in task.limited for plan in task.plans(course)]
+            found |= {PlanUnit.of(name, *plan).key: number for number, plan in enumerate(plans)}
+        return found
+
+    def _fingerprint(self, unit: PlanUnit) -> str:
+        return episode_fingerprint(
+            self._identity,
+            unit.key.task,
+            trajectory=unit.course.digest,
+            plan=unit.plan.index,
+            seed=self._seed,
+        )
+
+
+def _recorded(unit: PlanUnit, inputs: str, stage: Episode, over: bool) -> UnitRecord[PlanRecord]:
+    """The record of a plan that is played now, or passed over where the episode is over."""
+    try:
+        if over:
+            stage.pass_over(unit.plan)
+            return unit.record(inputs, msgspec.structs.replace(unit.payload, ended=NOT_COME_TO))
+        played = stage.play(unit.plan)
+    except (UnfitPlanError, SceneError) as error:
+        return unit.excluded(str(error), inputs)
+    except InfthorError as error:
+        begun = stage.begun if stage.begun is not None and stage.begun.index == unit.plan.index else unit.payload
+        return replace(unit, payload=begun).failed(str(error), inputs, usage=stage.usage)
+    return unit.record(
+        inputs,
+        played.record,
+        faults=played.faults,
+        seconds=round(played.seconds, 4),
+        tokens=played.tokens,
+        usage=played.usage,
+    )

@@ -1,0 +1,193 @@
+"""The expert's actions of one trajectory, carried out as far as they are needed: the true history."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.trajectory import Trajectory
+from infthor_eval.household.goals import goal_holds
+from infthor_eval.household.state_summary import state_summaries
+from infthor_eval.household.treatments import Treatments
+from infthor_eval.plans.history import Chapter
+from infthor_eval.plans.memory import Past
+from infthor_eval.plans.plan import Plan, TrajectoryTask, UnfitPlanError
+from infthor_eval.thor.actions import text_of
+from infthor_eval.thor.frames import FrameKeeper
+from infthor_eval.thor.grounding import Grounding
+from infthor_eval.thor.recorded import MissingObjectError, translate
+from infthor_eval.thor.recorder import Recorder
+from infthor_eval.thor.restore import restore
+from infthor_eval.thor.simulator import Simulator, SimulatorMark
+from infthor_eval.thor.view import AgentPose, View
+
+__all__ = ["Expert", "ExpertRefusedError", "PlanStart"]
+
+
+class ExpertRefusedError(UnfitPlanError):
+    """This simulator refuses an action of the expert: there is no true history from its plan on."""
+
+
+@dataclass(frozen=True)
+class ExpertAction:
+    """An action of the expert.
+
+    Attributes:
+        call: what the simulator is asked.
+        text: in words.
+        pose: where the agent stands after it.
+        completes: whether the goal of the plan's task holds after it, and did not when the plan began.
+    """
+
+    call: Mapping[str, Any]
+    text: str
+    pose: AgentPose
+    completes: bool
+
+
+@dataclass(frozen=True)
+class PlanStart:
+    """The true state before a plan.
+
+    Attributes:
+        mark: of the simulator.
+        frame: what the agent sees; None where nobody looks.
+        treatments: what was done to objects so far in the plan's task.
+    """
+
+    mark: SimulatorMark
+    frame: FrameRef | None
+    treatments: Treatments
+
+
+class _Step(NamedTuple):
+    """An action, and what came of it."""
+
+    action: ExpertAction
+    view: View
+    frame: FrameRef | None
+    treatments: Treatments
+
+
+class Expert:
+    """Goes through a trajectory as its expert did."""
+
+    def __init__(
+        self,
+        trajectory: Trajectory,
+        plans: Sequence[Plan],
+        tasks: Sequence[TrajectoryTask],
+        simulator: Simulator,
+        frames: FrameKeeper,
+        in_words: bool = False,
+    ) -> None:
+        """Restore the scene.
+
+        Raises:
+            SimulatorError: the simulator has no such scene or fails.
+        """
+        self._trajectory, self._plans, self._tasks = trajectory, plans, tasks
+        self._simulator, self._frames = simulator, frames
+        restore(simulator, trajectory.scene)
+        self.grounding = Grounding(simulator.view)
+        self._starts = [PlanStart(simulator.mark(), frames.keep(simulator.view), Treatments())]
+        self._actions: list[list[ExpertAction]] = []
+        self._chapters: list[Chapter] = []
+        self._refused: ExpertRefusedError | None = None
+        self._log = Recorder() if in_words else None
+        if self._log is not None:
+            self._log.record(simulator.view)
+
+    def start(self, plan: int) -> PlanStart:
+        """The true state before a plan; what comes before it is carried out the first time.
+
+        The number of plans stands for the end of the trajectory. The simulator is anywhere afterwards.
+
+        Raises:
+            ExpertRefusedError: an action before it is refused here.
+            SimulatorError: the simulator fails.
+        """
+        while len(self._starts) <= plan:
+            if self._refused is not None:
+                raise self._refused
+            self._carry_out(self._plans[len(self._starts) - 1])
+        return self._starts[plan]
+
+    def actions(self, plan: int) -> Sequence[ExpertAction]:
+        """What the expert did for a plan.
+
+        Raises:
+            ExpertRefusedError: as `start` of the next one.
+        """
+        self.start(plan + 1)
+        return self._actions[plan]
+
+    def past(self, plan: int) -> Past:
+        """What there is to remember before a plan; only where frames are kept.
+
+        Raises:
+            ExpertRefusedError: as `start`.
+        """
+        present = self._chapter(plan)
+        return Past(self._chapters[:plan], present, self._state(self._plans[plan].low[0]) if self._log else "")
+
+    def _chapter(self, plan: int) -> Chapter:
+        """What a plan's own chapter begins with."""
+        found = self._plans[plan]
+        begins = plan == 0 or self._plans[plan - 1].task != found.task
+        frame = self.start(plan).frame
+        assert frame is not None
+        return Chapter(found.text, self._tasks[found.task].text if begins else None, frame)
+
+    def _state(self, n_actions: int) -> str:
+        """The state after so many actions, in words."""
+        assert self._log is not None
+        told = state_summaries(self._log.steps[: n_actions + 1], {n_actions - 1})
+        return told.get(n_actions - 1, "")
+
+    def _carry_out(self, plan: Plan) -> None:
+        """The actions of the next plan; nothing is kept of them unless all can be."""
+        start = self._starts[-1]
+        steps = list(self._steps(plan, start))
+        mark, last = self._simulator.mark(), steps[-1]
+        if self._log is not None:
+            for number, step in zip(range(*plan.low), steps, strict=True):
+                self._log.record(step.view, step=number, action=step.action.text)
+        if start.frame is not None:
+            opening = self._chapter(plan.index)
+            told = tuple((step.action.text, step.frame) for step in steps if step.frame is not None)
+            self._chapters.append(Chapter(opening.plan, opening.goal, opening.before, told))
+        self._actions.append([step.action for step in steps])
+        following = self._plans[plan.index + 1 : plan.index + 2]
+        goes_on = any(item.task == plan.task for item in following)
+        self._starts.append(PlanStart(mark, last.frame, last.treatments if goes_on else Treatments()))
+
+    def _steps(self, plan: Plan, start: PlanStart) -> Iterator["_Step"]:
+        view, treatments = self._simulator.rewind(start.mark, exactly=True), start.treatments
+        task = self._tasks[plan.task].task
+        task_open = not goal_holds(task, view, treatments)
+        for number in range(*plan.low):
+            call = self._call(plan, number, view)
+            view = self._simulator.step(**call)
+            if not view.success:
+                raise self._refusal(plan, number, view.error or "refused without a message")
+            treatments = treatments.after(call["action"], call.get("objectId"), view)
+            completes = task_open and goal_holds(task, view, treatments)
+            action = ExpertAction(call, self._text(number), view.agent, completes)
+            yield _Step(action, view, self._frames.keep(view), treatments)
+
+    def _call(self, plan: Plan, number: int, view: View) -> dict[str, Any]:
+        try:
+            return translate(self._trajectory.plan.low_actions[number], self.grounding, view)
+        except MissingObjectError as error:
+            raise self._refusal(plan, number, str(error)) from error
+
+    def _text(self, number: int) -> str:
+        api = self._trajectory.plan.low_actions[number].api_action
+        return str(text_of(api.action, api.object_id, api.receptacle_id))
+
+    def _refusal(self, plan: Plan, number: int, why: str) -> ExpertRefusedError:
+        self._refused = ExpertRefusedError(
+            f"the expert's action {number} ({self._text(number)}, in plan {plan.index}) is refused here: {why}"
+        )
+        return self._refused

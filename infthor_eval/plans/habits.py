@@ -1,0 +1,78 @@
+"""What experts did next, by the words of their plan and the action before: how far one comes without a pixel."""
+
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Iterator, Sequence
+
+from infthor_eval.formats.trajectory import Trajectory
+from infthor_eval.plans.plan import Plan, plans_of
+from infthor_eval.plans.script import read_plan
+from infthor_eval.thor.actions import text_of
+
+__all__ = ["Habits", "expert_texts", "fill_action", "open_action"]
+
+_START = ""  # the action before the first one
+_Key = tuple[str, ...]
+
+
+class Habits:
+    """The most frequent next action in the nearest situation known, of equally frequent ones the first by name.
+
+    A situation is the plan's text, how far it has come, and the action before; where that was never met, less and less
+    of it is asked for (`_situations`). Actions are learnt with the plan's own objects left open.
+    """
+
+    def __init__(self, trajectories: Iterable[Trajectory]) -> None:
+        """Count what experts did."""
+        self._seen: dict[_Key, Counter[str]] = defaultdict(Counter)
+        for trajectory in trajectories:
+            for plan in plans_of(trajectory):
+                self._learn(plan.text, expert_texts(trajectory, plan))
+
+    def next(self, plan: str, done: Sequence[str]) -> str:
+        """The next action.
+
+        Args:
+            plan: its text.
+            done: the actions so far.
+        """
+        for key in _situations(plan, done):
+            if key in self._seen:
+                counts = self._seen[key]
+                return fill_action(min(counts, key=lambda action: (-counts[action], action)), plan)
+        return "NoOp"
+
+    def _learn(self, plan: str, actions: Sequence[str]) -> None:
+        for number, action in enumerate(actions):
+            for key in _situations(plan, actions[:number]):
+                self._seen[key][open_action(action, plan)] += 1
+
+
+def expert_texts(trajectory: Trajectory, plan: Plan) -> list[str]:
+    """The expert's actions of a plan, in words."""
+    calls = [trajectory.plan.low_actions[number].api_action for number in range(*plan.low)]
+    return [str(text_of(call.action, call.object_id, call.receptacle_id)) for call in calls]
+
+
+def _situations(plan: str, done: Sequence[str]) -> Iterator[_Key]:
+    """What tells of a situation, the most telling first."""
+    verb, _ = read_plan(plan)
+    before, number = open_action(done[-1], plan) if done else _START, str(len(done))
+    yield "text", plan, number, before
+    yield "text", plan, before
+    yield "verb", verb, number, before
+    yield "verb", verb, before
+    yield "verb", verb
+
+
+def open_action(action: str, plan: str) -> str:
+    """An action with places for the objects that its plan names."""
+    _, types = read_plan(plan)
+    return " ".join(f"{{{types.index(word)}}}" if word in types else word for word in action.split())
+
+
+def fill_action(action: str, plan: str) -> str:
+    """An action with the objects of a plan in their places."""
+    _, types = read_plan(plan)
+    for number, name in enumerate(types):
+        action = action.replace(f"{{{number}}}", name)
+    return action

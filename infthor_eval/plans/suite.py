@@ -1,0 +1,52 @@
+"""Plans as a suite: an agent carries out a long trajectory plan by plan."""
+
+from collections.abc import Mapping, Sequence
+from typing import ClassVar
+
+from infthor_eval.plans.baselines import BASELINES
+from infthor_eval.plans.evaluation import PlansEvaluation
+from infthor_eval.plans.options import PlansOptions
+from infthor_eval.plans.records import RECORDS, PlanRecord
+from infthor_eval.plans.summary import PlansSummary, summarise
+from infthor_eval.plans.tables import overview, tables
+from infthor_eval.rates import Rate
+from infthor_eval.runs import RecordTypes, RunHeader, RunSummary, TaskRequest, UnitRecord
+from infthor_eval.runs.suite import Need
+from infthor_eval.tables import Table
+
+__all__ = ["PlansSuite"]
+
+
+class PlansSuite:
+    """The suite."""
+
+    name: ClassVar[str] = "plans"
+    needs: ClassVar[Need] = "conversation"
+    options: ClassVar[type] = PlansOptions
+    baselines = BASELINES
+    records: ClassVar[RecordTypes] = RECORDS
+
+    def prepare(self, request: TaskRequest) -> "PlansEvaluation":
+        """See `Suite.prepare`."""
+        return PlansEvaluation(request)
+
+    def summarise(self, header: RunHeader, records: Sequence[UnitRecord[PlanRecord]]) -> PlansSummary:
+        """See `Suite.summarise`."""
+        return summarise(header.identity, records)
+
+    def scores(self, record: UnitRecord[PlanRecord]) -> Mapping[str, float]:
+        """See `Suite.scores`: whether the plan was carried out, and what it earned."""
+        payload = record.payload
+        return {"success": float(payload.done), "reward": payload.reward} if payload.steps else {}
+
+    def primary_metrics(self, summary: PlansSummary) -> Mapping[str, Rate]:
+        """See `Suite.primary_metrics`: plans carried out."""
+        return {name: task.success["total"] for name, task in summary.tasks.items() if "total" in task.success}
+
+    def overview(self, runs: Sequence[RunSummary]) -> list[Table]:
+        """See `Suite.overview`."""
+        return overview(runs)
+
+    def tables(self, runs: Sequence[RunSummary]) -> list[Table]:
+        """See `Suite.tables`."""
+        return tables(runs)

@@ -1,0 +1,88 @@
+"""The one number of each run and task that says most, with its interval; and what runs took and left out."""
+
+from collections.abc import Iterator, Sequence
+
+from infthor_eval.rates import Rate
+from infthor_eval.reasons import counted_reasons
+from infthor_eval.report.web.runs import ReportRun
+from infthor_eval.tables import Column, Row, Table
+
+__all__ = ["left_out_table", "primary_metrics_table", "took_table"]
+
+_MEASURES = {"nieh": "questions right", "plans": "plans carried out", "manipulation": "episodes that were a success"}
+_NAMES = (Column("run", False), Column("task", False))
+
+
+def primary_metrics_table(runs: Sequence[ReportRun]) -> Table:
+    """A row per run and task."""
+    rows = [
+        Row((run.label, task, _MEASURES.get(run.suite.name, run.suite.name), *_cells(rate), str(rate.n)))
+        for run in runs
+        for task, rate in run.suite.primary_metrics(run.summary.summary).items()
+    ]
+    columns = (*_NAMES, Column("measure", False), *map(Column, ("%", "95 % interval", "units")))
+    return Table("", columns, tuple(rows))
+
+
+def _cells(rate: Rate) -> tuple[str, str]:
+    interval = "-" if rate.low is None or rate.high is None else f"{100 * rate.low:.1f}–{100 * rate.high:.1f}"
+    return f"{100 * rate.mean:.1f}", interval
+
+
+def took_table(runs: Sequence[ReportRun]) -> Table:
+    """Speed and cost: a row per run."""
+    columns = (
+        "units",
+        "seconds",
+        "units / s",
+        "requests",
+        "tokens read",
+        "of them cached, %",
+        "tokens written",
+        "cost",
+    )
+    note = "Seconds are the units' own, added up: several workers take less by the clock. Cost is in US dollars."
+    return Table("", (Column("run", False), *map(Column, columns)), tuple(map(_took, runs)), (note,))
+
+
+def _took(run: ReportRun) -> Row:
+    seconds = sum(record.seconds for record in run.records)
+    rate = f"{len(run.records) / seconds:.2f}" if seconds else "-"
+    usage = run.usage
+    cached = "-" if usage.hit_rate is None else f"{100 * usage.hit_rate:.1f}"
+    counts = f"{usage.requests:,}", f"{usage.context:,}", cached, f"{usage.reply:,}"
+    cost = "-" if usage.cost is None else f"{usage.cost:.4f}"
+    return Row((run.label, str(len(run.records)), f"{seconds:.1f}", rate, *counts, cost))
+
+
+def left_out_table(runs: Sequence[ReportRun]) -> Table | None:
+    """What failed, was left out, was skipped or was not come to, by reason; None where all is well."""
+    rows = [
+        Row((run.label, task, what, str(n), reason))
+        for run in runs
+        for (task, what), reason, n in counted_reasons(_left_out(run))
+    ]
+    rows += [
+        Row((run.label, "", "not come to", str(run.n_missing), "the run was stopped; the same command goes on"))
+        for run in runs
+        if run.n_missing
+    ]
+    if not rows:
+        return None
+    columns = (*_NAMES, Column("what", False), Column("units"), Column("reason", False))
+    return Table("", columns, tuple(rows))
+
+
+def _left_out(run: ReportRun) -> Iterator[tuple[tuple[str, str], str]]:
+    for record in run.records:
+        if record.failure is not None:
+            yield (record.task, "failed"), record.failure
+        if record.excluded is not None:
+            yield (record.task, "left out"), record.excluded
+        for fault in record.faults:
+            yield (record.task, "retried"), fault
+    for task, about in run.tasks.items():
+        for item in about.get("skipped", ()):
+            yield (task, "skipped"), item["reason"]
+        for _, reason in about.get("broken", ()):
+            yield (task, "skipped"), reason

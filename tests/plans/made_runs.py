@@ -1,0 +1,91 @@
+"""Journals of plans made by hand: no simulator, no model."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from infthor_eval.plans.curve_runs import PlansRun
+from infthor_eval.plans.records import DONE, RECORDS, PlanRecord, StepRecord
+from infthor_eval.runs import RunHeader, Tokens, UnitRecord
+from infthor_eval.runs.journal import Journal
+
+TASK = "infthor_plans"
+RULES = {"name": "default"}
+
+
+def identity(
+    trajectories: Sequence[str],
+    model: Mapping[str, Any] | None = None,
+    simulator: str = "embedded",
+    task: str = TASK,
+    rewards: Mapping[str, Any] | None = None,
+    after_failure: str = "continue",
+) -> dict[str, Any]:
+    about = {
+        "trajectories": {name: f"digest of {name}" for name in trajectories},
+        "rewards": dict(rewards or RULES),
+        "after_failure": after_failure,
+        "broken": [],
+    }
+    model = dict(model or {"name": "a model"})
+    return {"suite": "plans", "model": model, "simulator": simulator, "frames": "shown", "tasks": {task: about}}
+
+
+def plan(
+    trajectory: str,
+    index: int,
+    steps: tuple[int, int],
+    reward: float = 0.0,
+    *,
+    most: float | None = None,
+    context: int | None = None,
+    context_of_step: int | None = None,
+    ended: str = DONE,
+    failure: str | None = None,
+    excluded: str | None = None,
+    task: str = TASK,
+) -> UnitRecord[PlanRecord]:
+    """A plan over the expert's steps [first, end)."""
+    first, end = steps
+    payload = PlanRecord(
+        index=index,
+        kind="GotoLocation",
+        plan="go to the fridge",
+        goal="put a mug into the fridge",
+        task=0,
+        first_step=first,
+        n_expert_steps=end - first,
+        steps=(StepRecord(n_context_tokens=context_of_step),) if context_of_step is not None else (),
+        reward=reward,
+        max_reward=most,
+        ended=ended,
+    )
+    return UnitRecord(
+        task=task,
+        id=f"{trajectory}/{index:04d}",
+        cluster=trajectory,
+        fingerprint=f"{trajectory}/{index}",
+        payload=payload,
+        failure=failure,
+        excluded=excluded,
+        tokens=Tokens(context=context),
+    )
+
+
+def made_run(label: str, records: Sequence[UnitRecord[PlanRecord]], **about: Any) -> PlansRun:
+    names = list(dict.fromkeys(record.cluster for record in records))
+    header = RunHeader(suite="plans", name=label, identity=identity(names, **about))
+    return PlansRun(label, header, records)
+
+
+def planner_run(records: Sequence[UnitRecord[PlanRecord]], **about: Any) -> PlansRun:
+    return made_run("planner", records, model={"name": "planner", "baseline": "planner"}, **about)
+
+
+def write_run(run: PlansRun, output: Path, name: str = "infthor_plans-0123") -> Path:
+    """Write its journal as the driver does; returns the run's folder."""
+    folder = output / run.label / name
+    with Journal(folder, run.header, RECORDS) as journal:
+        for record in run.records:
+            journal.append(record)
+    return folder

@@ -1,0 +1,187 @@
+"""Runs of plans that are killed, and simulators that die under them: nothing that counts changes."""
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from infthor_eval.errors import SimulatorError
+from infthor_eval.plans.environment import PlanEnvironment
+from infthor_eval.plans.records import RECORDS
+from infthor_eval.runs import execute, read_run
+from infthor_eval.thor.controller import SafeController
+
+from .cut import FORK, MUG, cut, write
+
+OURS = "from infthor_eval.cli import main; main()"
+
+
+def same(records):
+    """What is to be equal in two runs: all but times, attempts and faults."""
+    return [msgspec.structs.replace(record, seconds=0.0, attempt=1, faults=()) for record in records]
+
+
+def found(output):
+    (folder,) = (path.parent for path in output.rglob("journal"))
+    return same(read_run(folder, RECORDS)[1]), json.loads((folder / "results.json").read_text())["summary"]
+
+
+def start(data, output, *more):
+    arguments = ["run", "--model", "random", "--tasks", "infthor_plans", "--data", data, "--output", output, *more]
+    return subprocess.Popen(
+        [sys.executable, "-c", OURS, *map(str, arguments)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])},
+    )
+
+
+def n_lines(output):
+    return sum(path.read_bytes().count(b"\n") for path in output.rglob("worker-0.jsonl"))
+
+
+def finish(process):
+    _, said = process.communicate(timeout=120)
+    assert process.returncode == 0, said
+
+
+def wait_for(n, output, process):
+    """Until so many lines are in the journal, or the process has ended."""
+    deadline = time.monotonic() + 120
+    while n_lines(output) < n and process.poll() is None:
+        assert time.monotonic() < deadline
+        time.sleep(0.005)
+
+
+def kill_and_go_on(data, output, n_kills, draw):
+    """Kill runs at a random moment, each a bit further than the one before; then let one end. Returns the kills."""
+    killed = 0
+    for _ in range(n_kills):
+        process = start(data, output)
+        wait_for(n_lines(output) + draw.randint(1, 2), output, process)
+        time.sleep(draw.uniform(0.0, 0.3))
+        if process.poll() is None:
+            os.kill(process.pid, signal.SIGKILL)
+            killed += 1
+        process.communicate()
+    finish(start(data, output))
+    return killed
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(300)
+def test_a_run_that_is_killed_again_and_again_ends_as_one_that_is_not(tmp_path):
+    data = write(tmp_path / "data", cut(FORK, 4), cut(MUG, 3))
+    finish(start(data, tmp_path / "whole"))
+    killed = kill_and_go_on(data, tmp_path / "killed", 4, random.Random(0))
+    assert killed >= 2
+    assert found(tmp_path / "killed") == found(tmp_path / "whole")
+    assert len(found(tmp_path / "whole")[0]) == 7
+
+
+class Calls:
+    """The calls of simulators in this process: counted, and their processes killed before some of them.
+
+    Attributes:
+        n: how many there were so far.
+        deadly: numbers of those that come, before which the process is killed.
+        killed: how often it was.
+    """
+
+    def __init__(self):
+        self.n, self.deadly, self.killed = 0, set(), 0
+
+    def come(self, controller):
+        process = controller.server and controller.server.unity_proc
+        if controller.last_event is None or process is None:
+            return  # at starting
+        self.n += 1
+        if self.n in self.deadly:
+            os.kill(process.pid, signal.SIGKILL)
+            process.wait()
+            self.killed += 1
+
+    def deadly_from_now(self, numbers):
+        self.deadly = {self.n + number for number in numbers}
+
+
+@pytest.fixture
+def calls(monkeypatch, shared_simulator):
+    found, step = Calls(), SafeController.step
+
+    def counted(controller, action=None, **arguments):
+        found.come(controller)
+        return step(controller, action, **arguments)
+
+    monkeypatch.setattr(SafeController, "step", counted)
+    return found
+
+
+def n_restarts(outcome):
+    faults = [fault for record in outcome.records for fault in record.faults]
+    assert all(fault.startswith("simulator started again: ") for fault in faults)
+    return sum(int(fault.rpartition(" ")[2]) for fault in faults)
+
+
+@pytest.mark.parametrize("model", ["planner", pytest.param("random", marks=pytest.mark.slow)])
+def test_a_simulator_that_dies_in_mid_plan_changes_no_result_and_is_counted(prepared, tmp_path, calls, model):
+    whole = execute(prepared(model, output=tmp_path / "whole"))
+    n_calls = calls.n
+    calls.deadly_from_now(random.Random(3).sample(range(1, n_calls), 2))
+    disturbed = execute(prepared(model, output=tmp_path / "disturbed"))
+    assert same(disturbed.records) == same(whole.records)
+    assert disturbed.summary.summary == whole.summary.summary
+    assert (n_restarts(whole), n_restarts(disturbed), calls.killed) == (0, 2, 2)
+
+
+def test_an_episode_survives_more_deaths_than_one_plan_may_have(prepared, tmp_path, calls):
+    whole = execute(prepared(output=tmp_path / "whole"))
+    calls.deadly_from_now(range(10, 400, 28))
+    disturbed = execute(prepared(output=tmp_path / "disturbed"))
+    assert same(disturbed.records) == same(whole.records)
+    assert n_restarts(disturbed) == calls.killed > 3
+
+
+@pytest.mark.usefixtures("shared_simulator")
+@pytest.mark.parametrize("n_failures", [pytest.param(1, marks=pytest.mark.slow), 2, 3])
+def test_a_plan_is_begun_anew_where_the_simulator_fails_for_good(prepared, tmp_path, monkeypatch, n_failures):
+    whole = execute(prepared(output=tmp_path / "whole"))
+    step, failures = PlanEnvironment.step, []
+
+    def failing(environment, action):
+        if environment._plan.index == 2 and len(failures) < n_failures:
+            failures.append(f"it hangs ({len(failures)})")
+            raise SimulatorError(failures[-1])
+        return step(environment, action)
+
+    monkeypatch.setattr(PlanEnvironment, "step", failing)
+    outcome = execute(prepared(output=tmp_path / "failing"))
+    third = outcome.records[2]
+    if n_failures < 3:
+        assert third.faults == tuple(failures)
+        assert same(outcome.records) == same(whole.records)
+    else:
+        assert third.failure == "it hangs (2)"
+        assert [record.payload.done for record in outcome.records] == [True, True, False, True]
+        assert third.payload.max_reward == whole.records[2].payload.max_reward
+
+
+def test_no_simulator_outlives_a_run_that_is_killed(tmp_path):
+    process = start(write(tmp_path / "data", cut(FORK, 4)), tmp_path / "out")
+    wait_for(2, tmp_path / "out", process)
+    children = [int(pid) for pid in Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()]
+    os.kill(process.pid, signal.SIGKILL)
+    process.communicate()
+    assert children
+    deadline = time.monotonic() + 20
+    while any(Path(f"/proc/{pid}").exists() for pid in children):
+        assert time.monotonic() < deadline
+        time.sleep(0.05)

@@ -1,0 +1,174 @@
+"""Recorded plans carried out again, on the embedded simulator."""
+
+from dataclasses import replace
+
+import msgspec
+import numpy as np
+import pytest
+
+from infthor_eval.errors import DataError, UsageError
+from infthor_eval.formats.packaged import packaged_folder
+from infthor_eval.plans.curve_runs import PlansRun
+from infthor_eval.plans.records import RECORDS, StepRecord
+from infthor_eval.plans.replaying import recorded_plans, replay
+from infthor_eval.runs import read_run
+
+SET = str(packaged_folder("sets/nieh_mini"))
+NAME = "bedroom-1-seed7"
+
+
+@pytest.fixture(scope="module")
+def recorded(scripted_run):
+    return recorded_plans(PlansRun("scripted", *read_run(scripted_run, RECORDS)), None, None)
+
+
+@pytest.fixture(scope="module")
+def stage(recorded):
+    with replay(recorded, SET, None) as stage:
+        yield stage
+
+
+def changed(record, **fields):
+    """The same plan, otherwise recorded."""
+    return msgspec.structs.replace(record, payload=msgspec.structs.replace(record.payload, **fields))
+
+
+def with_identity(recorded, change):
+    """The same recording of a run with another identity."""
+    identity = msgspec.json.decode(msgspec.json.encode(recorded.run.header.identity))
+    change(identity)
+    header = msgspec.structs.replace(recorded.run.header, identity=identity)
+    return replace(recorded, run=PlansRun("scripted", header, recorded.run.records))
+
+
+def opened(recorded, data=SET):
+    with replay(recorded, data, None):
+        pass
+
+
+def test_a_plan_is_its_start_and_its_actions_as_they_were_recorded(recorded, stage):
+    plans = recorded.between(1, 2)
+    found = list(stage.moments(plans))
+    assert [moment.number for moment in found] == [n for plan in plans for n in range(len(plan.payload.steps) + 1)]
+    assert [moment.note for moment in found] == [""] * len(found)  # the world went where it went then
+    assert all(moment.sight.frame.shape == (300, 300, 3) for moment in found)
+    first, walk, end = found[0], found[1 : len(plans[0].payload.steps)], found[-1]
+    assert (first.title.number, first.title.n_plans, first.title.text) == (1, 12, "go to the mug")
+    assert (first.action, first.rewards.step, first.rewards.most_of_plan) == ("", None, plans[0].payload.max_reward)
+    assert [len(moment.sight.walked) for moment in walk] == list(range(2, len(walk) + 2))  # MoveAhead each time
+    assert (end.action, end.ending, end.done, end.sight.held) == ("PickupObject Mug", "done", True, ("Mug",))
+    refused = found[len(plans[0].payload.steps)]
+    assert (refused.ending, refused.done) == ("refused by the simulator", False)
+    assert refused.wrong.startswith("Wall is blocking")
+
+
+def test_the_map_has_what_the_plan_is_about_and_where_it_leads(recorded, stage):
+    going, putting = (next(stage.moments(recorded.between(number, number))).sight.room for number in (3, 4))
+    assert [thing.name for thing in going.things if thing.is_named] == ["Desk"]
+    assert going.goal.at in going.floor
+    assert putting.goal is None
+    assert {"Bed", "Dresser", "ArmChair"} <= {thing.name for thing in putting.things}
+    assert not {"Floor", "Pillow", "Mug"} & {thing.name for thing in putting.things}  # the mug is in the hand
+
+
+def test_rewards_add_up_over_the_trajectory(recorded, stage):
+    last = list(stage.moments(recorded.plans[3:4]))[-1]
+    before = recorded.plans[:4]
+    assert last.rewards.so_far == pytest.approx(sum(plan.payload.reward for plan in before))
+    assert last.rewards.most == pytest.approx(sum(plan.payload.max_reward for plan in before))
+    assert (last.rewards.plan, last.goal_reached) == (7.0, True)
+
+
+def test_excluded_plans_count_for_nothing(recorded):
+    left_out = msgspec.structs.replace(recorded.plans[1], excluded="the expert is refused")
+    plans = (recorded.plans[0], left_out, *recorded.plans[2:])
+    assert replace(recorded, plans=plans).earned_before(plans[2]) == recorded.plans[0].payload.reward
+
+
+def test_what_differs_is_told_once_and_it_goes_on(recorded, stage):
+    plan = recorded.plans[0]
+    steps = plan.payload.steps
+    paid = tuple(msgspec.structs.replace(step, reward=step.reward + 1) for step in steps)
+    notes = [moment.note for moment in stage.moments([changed(plan, steps=paid)])]
+    assert notes == ["", "plan 1, action 1: MoveAhead earns 0.2 now, and 1.2 in the run", *[""] * (len(steps) - 1)]
+    ended = (*steps[:-1], msgspec.structs.replace(steps[-1], message=""))
+    *_, last = stage.moments([changed(plan, steps=ended)])
+    assert last.note.startswith("plan 1, action 7: MoveAhead is refused (Wall is blocking")
+    longer = (*steps, steps[0])  # here the plan is over before
+    found = list(stage.moments([changed(plan, steps=longer)]))
+    assert len(found) == len(longer) + 1
+    assert found[-2].note == "plan 1, action 7: the plan ends now, and goes on in the run"
+
+
+def test_a_reply_that_could_not_be_tried_shows_the_world_as_it_was(recorded, stage):
+    step = StepRecord(reply="jump high", message="unknown action 'jump'")
+    start, end = stage.moments([changed(recorded.plans[0], steps=(step,), ended="no action")])
+    assert (end.action, end.reply, end.wrong, end.ending) == ("", "jump high", "unknown action 'jump'", "no action")
+    assert np.array_equal(start.sight.frame, end.sight.frame)
+    said = msgspec.structs.replace(recorded.plans[0].payload.steps[0], reply=" MoveAhead ")
+    _, moment = stage.moments([changed(recorded.plans[0], steps=(said,))])
+    assert moment.reply == ""  # it is the action
+
+
+def test_an_action_recorded_as_a_call_names_its_object(recorded, stage):
+    plan = recorded.plans[1]
+    bare = tuple(msgspec.structs.replace(step, action="PickupObject") for step in plan.payload.steps)
+    assert list(stage.moments([changed(plan, steps=bare)]))[1].action == "PickupObject Mug"
+
+
+def test_of_plans_that_were_never_begun_only_the_words_are_there(recorded, stage):
+    idle = changed(recorded.plans[0], steps=(), ended="not come to")
+    failed = msgspec.structs.replace(idle, failure="the model broke")
+    excluded = msgspec.structs.replace(idle, excluded="the expert is refused")
+    found = list(stage.moments([idle, failed, excluded]))
+    assert [moment.sight for moment in found] == [None] * 3
+    assert [moment.ending for moment in found] == [
+        "not come to",
+        "failed: the model broke",
+        "left out: the expert is refused",
+    ]
+
+
+def test_plans_tasks_and_trajectories_that_are_not_there_are_named(recorded):
+    run = recorded.run
+    for first, last in ((0, 3), (12, 13), (5, 4)):
+        with pytest.raises(UsageError, match=f"--plans {first}-{last}: the run has plans 1 to 12 of {NAME}"):
+            recorded.between(first, last)
+    with pytest.raises(UsageError, match=f"unknown trajectory of this run 'kitchen'; there are {NAME}"):
+        recorded_plans(run, None, "kitchen")
+    with pytest.raises(UsageError, match="unknown task of this run 'nieh'"):
+        recorded_plans(run, "nieh", None)
+    other = [msgspec.structs.replace(record, cluster="kitchen-1") for record in run.records]
+    with pytest.raises(UsageError, match=f"more than one trajectory; give one of them with --trajectory: {NAME}, kit"):
+        recorded_plans(PlansRun("scripted", run.header, [*run.records, *other]), None, None)
+    with pytest.raises(DataError, match="no record of a plan yet"):
+        recorded_plans(PlansRun("scripted", run.header, []), None, None)
+
+
+def test_only_the_runs_own_trajectory_will_do(recorded):
+    def change(identity):
+        identity["tasks"]["infthor_plans"]["trajectories"][NAME] = "0123"
+
+    with pytest.raises(DataError, match=f"{NAME}: is not what it was when the run was made; give the run's own"):
+        opened(with_identity(recorded, change))
+    with pytest.raises(UsageError, match="give them as --data FILE or FOLDER"):
+        opened(recorded, None)
+    kitchen = f"{SET}/metadata/kitchen-2-seed4/traj_data.json"
+    with pytest.raises(DataError, match=f"{NAME}: not among the trajectories of --data \\(kitchen-2-seed4\\)"):
+        opened(recorded, kitchen)
+
+
+def test_trajectories_that_come_with_the_package_are_found_by_name(recorded):
+    def change(identity):
+        identity["tasks"]["infthor_plans"]["config"]["dataset_kwargs"]["bundled"] = "nieh_mini"
+
+    opened(with_identity(recorded, change), None)
+
+
+def test_rewards_of_another_version_are_an_error(recorded):
+    def change(identity):
+        identity["tasks"]["infthor_plans"]["rewards"] = {"per_smile": 1}
+
+    strange = with_identity(recorded, change)
+    with replay(strange, SET, None) as stage, pytest.raises(DataError, match="rewards that this version does not know"):
+        list(stage.moments(strange.plans[:1]))

@@ -1,0 +1,46 @@
+"""Several episodes at once: each has a simulator to itself, and they find what one after the other finds."""
+
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from infthor_eval.plans.baselines import BASELINES
+from infthor_eval.runs import Silent, execute
+from model_adapters import Capabilities
+
+from .cut import CANDLE, FORK, MUG, cut, write
+
+
+def children():
+    return {child for task in Path("/proc/self/task").iterdir() for child in (task / "children").read_text().split()}
+
+
+class Counting(Silent):
+    """Counts the processes whenever a plan is done."""
+
+    def __init__(self):
+        self.before, self.most = children(), 0
+
+    def done(self, record, resumed):
+        self.most = max(self.most, len(children() - self.before))
+
+
+@pytest.mark.slow
+def test_four_episodes_at_once_find_what_one_after_the_other_finds(prepared, tmp_path, monkeypatch):
+    data = write(tmp_path / "three", cut(FORK, 2), cut(MUG, 2), cut(CANDLE, 3))
+    counting = Counting()
+    together = execute(prepared("random", data=data, output=tmp_path / "together"), counting)
+    assert 1 < counting.most <= 3
+    assert not children() - counting.before  # simulators end with their runs
+    assert BASELINES["random"](0).capabilities.max_in_flight == 4
+    one_by_one = Capabilities(counts_tokens=False, token_ids=False)
+    monkeypatch.setattr(BASELINES["random"], "capabilities", one_by_one)
+    alone = execute(prepared("random", data=data, output=tmp_path / "alone"))
+
+    def timeless(outcome):
+        return [msgspec.structs.replace(record, seconds=0.0) for record in outcome.records]
+
+    assert timeless(together) == timeless(alone)
+    assert together.summary == alone.summary
+    assert len(together.records) == 7

@@ -1,0 +1,440 @@
+"""Runs of plans by baselines, from the request to the tables."""
+
+import json
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from infthor_eval.errors import DataError, UsageError
+from infthor_eval.formats.published import PublishedRow, PublishedTable
+from infthor_eval.plans.records import NOT_COME_TO
+from infthor_eval.runs import execute
+
+from .cut import CANDLE, FORK, MUG, cut, write
+
+pytestmark = pytest.mark.usefixtures("shared_simulator")
+
+
+def payloads(outcome):
+    return [record.payload for record in outcome.records]
+
+
+def summary(outcome, task="infthor_plans"):
+    return outcome.summary.summary.tasks[task]
+
+
+def cells(outcome, title):
+    """A table's one row, by the names of its columns."""
+    (table,) = [table for table in outcome.run.suite.tables([outcome.summary]) if table.title.startswith(title)]
+    (row,) = [row for row in table.rows if not row.is_published]
+    return dict(zip((column.name for column in table.columns), row.cells, strict=False))
+
+
+# -- what a run finds
+
+
+def test_the_planner_carries_every_plan_out_and_earns_all_there_is(prepared, data):
+    write(data / "more", cut(MUG, 2))
+    outcome = execute(prepared())
+    found = {(record.cluster, record.payload.index): record.payload for record in outcome.records}
+    # By hand, from the expert's actions: eleven steps and a look, the last of which leaves a step (done with fewer
+    # than three to go); what is closed is opened and closed around a thing.
+    assert {key: (plan.ended, len(plan.steps), plan.n_expert_steps) for key, plan in found.items()} == {
+        (FORK, 0): ("done", 10, 12),
+        (FORK, 1): ("done", 2, 3),
+        (FORK, 2): ("done", 1, 1),
+        (FORK, 3): ("done", 3, 3),
+        (MUG, 0): ("done", 7, 9),
+        (MUG, 1): ("done", 1, 1),
+    }
+    assert {key: plan.reward for key, plan in found.items()} == {
+        (FORK, 0): pytest.approx(10 * 0.2 + 4),
+        (FORK, 1): 2,
+        (FORK, 2): pytest.approx(0.2 + 4),
+        (FORK, 3): 3 * 2 + 5,
+        (MUG, 0): pytest.approx(7 * 0.2 + 4),
+        (MUG, 1): 2,
+    }
+    assert all(plan.reward == plan.max_reward for plan in found.values())
+    assert [key for key, plan in found.items() if plan.goal_reached] == [(FORK, 3)]
+    assert [step.reward for step in found[FORK, 3].steps] == [2, 7, 2]
+    assert [plan.goal for plan in payloads(outcome)] == ["put a mug on the desk"] * 2 + ["put a fork in the drawer"] * 4
+    assert [plan.first_step for plan in payloads(outcome)] == [0, 9, 0, 12, 15, 16]
+    task = summary(outcome)
+    assert (task.n_plans, task.n_trajectories, task.n_failed, task.n_actions) == (6, 2, 0, 24)
+    assert task.reward.mean == task.max_reward.mean == pytest.approx(((6 + 2 + 4.2 + 11) + (5.4 + 2)) / 2)
+    assert {name: (rate.mean, rate.n) for name, rate in task.success.items()} == {
+        "Go to": (1, 3),
+        "Pick up": (1, 2),
+        "Put": (1, 1),
+        "total": (1, 6),
+    }
+    assert (task.goals.mean, task.goals.n) == (0.5, 2)  # the mug's task is cut off
+    assert task.endings == {"done": 6}
+    shown = cells(outcome, "Plans carried out")
+    assert (shown["total"][:5], shown["plans"], shown["excluded"]) == ("100.0", "6", "0")
+    assert cells(outcome, "Reward")["% of it"].startswith("100.0")
+    assert outcome.run.suite.scores(outcome.records[-1]) == {"success": 1.0, "reward": 11.0}
+
+
+def test_what_is_exported_has_a_sample_for_each_plan(prepared):
+    from infthor_eval.harness.export import export
+
+    outcome = execute(prepared())
+    export(outcome)
+    (path,) = outcome.folder.rglob("samples_infthor_plans_*.jsonl")
+    rows = [json.loads(line) for line in path.read_text().splitlines()]
+    assert [(row["doc_id"], row["target"], row["success"]) for row in rows] == [
+        (0, "go to the cabinet", 1.0),
+        (1, "pick up the fork", 1.0),
+        (2, "go to the drawer", 1.0),
+        (3, "put the fork in the drawer", 1.0),
+    ]
+    assert outcome.run.evaluation.view(outcome.records[1]).prompt == "put a fork in the drawer\npick up the fork"
+
+
+def test_the_published_rules_have_the_published_faults(prepared):
+    plans = payloads(execute(prepared(rewards="published-compat")))
+    assert [(plan.ended, plan.reward) for plan in plans] == [
+        ("done", pytest.approx(6)),
+        ("done", 2),
+        ("done", pytest.approx(4.2)),
+        ("wrong outcome", 2),  # the drawer is opened, and the put counts as refused
+    ]
+    assert [plan.max_reward for plan in plans[:3]] == [plan.reward for plan in plans[:3]]
+
+
+def test_the_limit_is_of_trajectories(prepared, tmp_path):
+    data = write(tmp_path / "two", cut(FORK, 1), cut(MUG, 1))
+    outcome = execute(prepared("scripted", data=data, limit=1))
+    assert [record.cluster for record in outcome.records] == [MUG]  # the first by name
+    assert outcome.summary.header.identity["limit"] == 1
+
+
+def test_equal_seeds_act_alike_and_other_seeds_do_not(prepared, tmp_path):
+    def actions(seed, folder):
+        outcome = execute(prepared("random", seed=seed, output=tmp_path / folder))
+        return [[step.action for step in plan.steps] for plan in payloads(outcome)]
+
+    first = actions(7, "a")
+    assert actions(7, "b") == first
+    assert actions(8, "c") != first
+
+
+def test_what_a_baseline_does_in_a_trajectory_depends_on_no_other(prepared, data, tmp_path):
+    alone = payloads(execute(prepared("random")))
+    write(data / "more", cut(MUG, 1))
+    beside = [record for record in execute(prepared("random", output=tmp_path / "b")).records if record.cluster == FORK]
+    assert [record.payload for record in beside] == alone
+
+
+def test_habits_are_learnt_in_other_scenes_alone(prepared, data, tmp_path):
+    alone = payloads(execute(prepared("history")))
+    assert {step.action for plan in alone for step in plan.steps} == {"NoOp"}
+    write(data / "more", cut(MUG, 4))
+    learnt = [record.payload for record in execute(prepared("history", output=tmp_path / "b")).records[4:]]
+    assert learnt[0].steps[0].action == "MoveAhead"
+    assert learnt[1].steps[0].message.startswith("PickupObject Fork: ")  # the cabinet is closed
+    assert learnt[1].ended == "not in view"
+
+
+# -- what cannot be evaluated
+
+
+def refused_in(plan):
+    """The kitchen, with an action of the expert in that plan that no simulator can carry out."""
+    document = cut(FORK)
+    low = next(low for low in document["plan"]["low_actions"] if low["high_idx"] == plan)
+    low["api_action"] = {"action": "OpenObject", "objectId": "Wardrobe|+00.00|+00.00|+00.00"}
+    return document
+
+
+@pytest.mark.parametrize("after_failure", ["continue", "stop"])
+def test_plans_that_the_expert_cannot_do_here_count_for_nobody(prepared, tmp_path, after_failure):
+    data = write(tmp_path / "refused", refused_in(2))
+    for model, ended in (("planner", "done"), ("scripted", "refused by the simulator")):
+        outcome = execute(prepared(model, data=data, after_failure=after_failure))
+        assert payloads(outcome)[0].ended == ended
+        task = summary(outcome)
+        assert (task.n_plans, task.n_failed, sum(task.endings.values())) == (2, 0, 2)
+        ((reason, number),) = task.excluded.items()
+        assert reason.startswith("the expert's action 15 (OpenObject Wardrobe, in plan 2) is refused here: ")
+        assert number == 2
+        assert {name: rate.n for name, rate in task.success.items()} == {"Go to": 1, "Pick up": 1, "total": 2}
+        assert cells(outcome, "Plans carried out")["excluded"] == "2"
+        (table, *_) = outcome.run.suite.tables([outcome.summary])
+        assert f"2 left out: {reason}" in table.notes
+
+
+def test_a_plan_about_what_is_not_there_counts_for_nobody(prepared, tmp_path):
+    document = cut(FORK)
+    document["plan"]["high_pddl"][3]["planner_action"]["receptacleObjectId"] = "Elephant|+00.00|+00.00|+00.00"
+    outcome = execute(prepared(data=write(tmp_path / "elephant", document)))
+    task = summary(outcome)
+    assert task.excluded == {"the scene has no object for 'Elephant|+00.00|+00.00|+00.00'": 1}
+    assert (task.n_plans, task.n_failed, task.endings) == (3, 0, {"done": 3})
+
+
+def test_trajectories_in_a_scene_that_is_not_here_count_for_nobody(prepared, data):
+    document = cut(MUG, 2, called="elsewhere")
+    document["scene"]["floor_plan"] = "FloorPlan7"
+    (data / "elsewhere.json").write_text(json.dumps(document))
+    outcome = execute(prepared("scripted"))
+    task = summary(outcome)
+    ((reason, number),) = task.excluded.items()
+    assert reason.startswith("scene FloorPlan7: ")
+    assert (number, task.n_plans, task.n_failed) == (2, 4, 0)
+    assert all(not record.faults for record in outcome.records)
+
+
+def test_where_all_is_left_out_the_exit_code_says_so(run, tmp_path):
+    document = cut(MUG, 2)
+    document["scene"]["floor_plan"] = "FloorPlan7"
+    data = write(tmp_path / "elsewhere", document)
+    arguments = (
+        "--model",
+        "scripted",
+        "--tasks",
+        "infthor_plans",
+        "--data",
+        str(data),
+        "--output",
+        str(tmp_path / "o"),
+    )
+    code, out, err = run("run", *arguments)
+    assert code == 1
+    assert "scene FloorPlan7" in out and "--scenes DIR" in " ".join(out.split())
+    assert "nothing that could be evaluated counts" in err
+
+
+BROKEN = {
+    "no JSON": ("{", "not a trajectory"),
+    "of another form": ('{"scene": 5}', "not a trajectory"),
+    "unknown plan kind": (
+        lambda it: it["plan"]["high_pddl"][1]["discrete_action"].update(action="Juggle"),
+        "sub-goal 1 is 'Juggle'; there are GotoLocation",
+    ),
+    "no goal": (lambda it: it["sub_tasks"][0]["task_info"].update(goal=""), "task 0: a task has no goal"),
+    "no action": (lambda it: it["plan"].update(low_actions=[]), "no plan with an action; leave it out"),
+}
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_a_broken_trajectory_is_skipped_named_and_counted(prepared, data, name):
+    damage, said = BROKEN[name]
+    document = cut(FORK, called="broken")
+    if isinstance(damage, str):
+        (data / "broken.json").write_text(damage)
+    else:
+        damage(document)
+        (data / "broken.json").write_text(json.dumps(document))
+    run = prepared("scripted")
+    (skipped,) = run.evaluation.workload(run.suite.baselines["scripted"](0)).skipped
+    assert skipped.key.id == "broken.json"
+    assert said in skipped.reason
+    assert "\n" not in skipped.reason
+    assert str(data) not in skipped.reason  # the run is the same one wherever its data lie
+
+
+def test_files_that_cannot_be_read_are_skipped_too(prepared, data):
+    (data / "a.jsonl.gz").write_bytes(b"no gzip")
+    (data / "b.json").mkdir()
+    (data / "c.json").symlink_to("nowhere")
+    (data / "d.jsonl").write_text(json.dumps(cut(MUG, 1, called="sound")) + "\n{\n")
+    outcome = execute(prepared())
+    assert {record.cluster for record in outcome.records} == {FORK, "sound"}
+    task = summary(outcome)
+    assert (sum(task.skipped.values()), task.n_trajectories) == (3, 2)
+    assert cells(outcome, "Plans carried out")["skipped"] == "3"
+    assert all(any(name in reason for reason in task.skipped) for name in ("a.jsonl.gz", "c.json", "d.jsonl:2"))
+
+
+def one_line(caught):
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+def test_nothing_to_evaluate_is_refused_in_one_line(prepared, tmp_path):
+    nowhere, empty, broken = (tmp_path / name for name in ("nowhere", "empty", "broken"))
+    empty.mkdir()
+    broken.mkdir()
+    (broken / "a.json").write_text("{")
+    for place, error, said in (
+        (None, UsageError, "no trajectories of its own; give them as --data"),
+        (nowhere, UsageError, "there is no such file or folder"),
+        (empty, DataError, "no .json, .jsonl, .jsonl.gz file"),
+        (broken, DataError, "nothing to evaluate"),
+    ):
+        with pytest.raises(error, match=said) as caught:
+            prepared(data=place)
+        one_line(caught)
+    twice = write(tmp_path / "twice", cut(FORK, 1))
+    write(twice / "again", cut(FORK, 2))
+    with pytest.raises(DataError, match=f"{FORK} is the name of another trajectory too"):
+        prepared(data=twice)
+
+
+# -- final tasks
+
+
+def test_final_tasks_are_those_of_trajectories_that_have_one_beside_the_published_rows(prepared, tmp_path, monkeypatch):
+    row = PublishedRow("a paper's model", (), 7.0, (10.0, 20.0, 30.0, 25.0))
+    table = PublishedTable("Table 5", "here", "plans", "", "success", ("Go to", "Pick up", "Put", "total"), (row,))
+    monkeypatch.setattr("infthor_eval.plans.tables.published_tables", {"plans": (table,)}.get)
+    data = write(tmp_path / "final", cut(FORK, 6, final=True), cut(MUG, 2))
+    outcome = execute(prepared(tasks=("infthor_final",), data=data))
+    assert [(record.cluster, record.payload.index, record.payload.is_final) for record in outcome.records] == [
+        (FORK, 4, True),
+        (FORK, 5, True),
+    ]
+    task = summary(outcome, "infthor_final")
+    assert (task.n_plans, task.n_trajectories, task.success["total"].mean) == (2, 1, 1)
+    (table, *_) = outcome.run.suite.tables([outcome.summary])
+    (published,) = [row for row in table.rows if row.is_published]
+    assert published.cells == ("a paper's model", "published, Table 5", "10.0", "20.0", "30.0", "25.0")
+    plain = execute(prepared(data=data))
+    assert len(plain.records) == 8
+    assert not any(row.is_published for row in plain.run.suite.tables([plain.summary])[0].rows)
+
+
+def test_where_no_trajectory_has_a_final_task_that_is_said(prepared, run, data, tmp_path):
+    with pytest.raises(UsageError, match="infthor_final: no trajectory there has a final task") as caught:
+        prepared(tasks=("infthor_final",))
+    one_line(caught)
+    code, out, err = run(
+        "--model", "planner", "--tasks", "infthor_final", "--data", data, "--output", tmp_path / "o", "--limit", 3
+    )
+    assert (code, out) == (2, "")
+    assert len(err.strip().splitlines()) == 1
+
+
+# -- after a failure
+
+
+def test_where_a_failure_ends_the_episode_later_plans_are_not_come_to_and_earn_nothing(prepared):
+    outcome = execute(prepared("scripted", after_failure="stop"))
+    first, *others = outcome.records
+    assert first.payload.ended == "refused by the simulator"  # it walks on and on
+    assert {record.payload.ended for record in others} == {NOT_COME_TO}
+    assert all((plan.steps, plan.reward, plan.max_reward) == ((), 0, None) for plan in payloads(outcome)[1:])
+    task = summary(outcome)
+    assert (task.n_plans, task.endings) == (4, {NOT_COME_TO: 3, "refused by the simulator": 1})
+    assert task.success["total"].mean == 0
+    assert outcome.run.suite.scores(others[0]) == {}
+    going_on = execute(prepared("scripted"))
+    assert [plan.ended for plan in payloads(going_on)][1:] != [NOT_COME_TO] * 3
+    assert execute(prepared(after_failure="stop")).records[-1].payload.done
+
+
+def test_a_failure_of_the_subject_that_is_mended_lets_a_stopped_episode_go_on(prepared, monkeypatch):
+    from infthor_eval.errors import ModelError
+    from infthor_eval.plans import baselines
+
+    act = baselines._ExpertActor.act
+
+    def fails(actor):
+        if actor._situation.plan.index == 1:
+            raise ModelError("out of memory")
+        return act(actor)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(baselines._ExpertActor, "act", fails)
+        broken = execute(prepared(after_failure="stop"))
+    assert [(record.failure, record.payload.ended) for record in broken.records] == [
+        (None, "done"),
+        ("out of memory", ""),
+        (None, NOT_COME_TO),
+        (None, NOT_COME_TO),
+    ]
+    assert broken.records[1].payload.max_reward == 2
+    task = summary(broken)
+    assert (task.n_failed, task.endings) == (1, {"done": 1, "failed": 1, NOT_COME_TO: 2})
+    mended = execute(prepared(after_failure="stop"))
+    assert [record.payload.ended for record in mended.records] == ["done"] * 4
+    assert [record.attempt for record in mended.records] == [1, 2, 2, 2]
+
+
+# -- task files
+
+SETTINGS = [
+    ("plan: all", "dataset_kwargs: plan is not known; did you mean plans?"),
+    ("colour: red", "dataset_kwargs: colour is not known; there are plans, bundled, rewards"),
+    ("plans: some", "dataset_kwargs: plans is 'some'; there are all, final"),
+    ("after_failure: weep", "dataset_kwargs: after_failure is 'weep'; there are continue, stop"),
+    ("max_steps: 0", "dataset_kwargs: max_steps is 0; it is a whole number above 0"),
+    ("max_steps: true", "dataset_kwargs: max_steps is True; it is a whole number above 0"),
+    ("max_steps: 2.5", "dataset_kwargs: max_steps is 2.5; it is a whole number above 0"),
+    ("preamble: 7", "dataset_kwargs: preamble is 7; it is a text"),
+    ("bundled:", "dataset_kwargs: bundled is None; it is a text"),
+    ("rewards: generous", "unknown reward rules 'generous'; there are default, published-compat"),
+    ("history: all", "history all: there are full, last:TOKENS, text and frames:K"),
+    ("bundled: nothing", "the installation lacks its data folder 'sets/nothing'"),
+]
+
+
+@pytest.fixture
+def task_file(task_files: Path):
+    """Has `infthor_plans` say something else."""
+
+    def write_task(settings, more=""):
+        (task_files / "plans" / "infthor_plans.yaml").write_text(
+            f"include: _plans.yaml\ntask: infthor_plans\ndataset_kwargs: {{{settings}}}\n{more}"
+        )
+
+    return write_task
+
+
+@pytest.mark.parametrize(("settings", "said"), SETTINGS, ids=[said for _, said in SETTINGS])
+def test_a_setting_that_would_not_act_is_refused(prepared, task_file, settings, said):
+    task_file(settings)
+    with pytest.raises((DataError, UsageError)) as caught:
+        prepared()
+    assert said in one_line(caught)
+
+
+def test_settings_of_a_task_file_act_and_options_go_before_them(prepared, task_file):
+    task_file("max_steps: 2, rewards: published-compat")
+    plans = payloads(execute(prepared()))
+    assert Counter(plan.ended for plan in plans) == {"step limit": 1, "done": 2, "wrong outcome": 1}
+    plans = payloads(execute(prepared(rewards="default")))
+    assert Counter(plan.ended for plan in plans) == {"step limit": 2, "done": 2}
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        ("", "no dataset_kwargs; tasks of plans need dataset_kwargs, generation_kwargs"),
+        ("dataset_kwargs: 5", "dataset_kwargs must be a mapping of settings"),
+        ("dataset_kwargs: {}\ngeneration_kwargs: {max_gen_toks: 0}", "max_new_tokens must be at least 1, not 0"),
+        ("dataset_kwargs: {}\ngeneration_kwargs: {max_gen_toks: 9, beams: 2}", "generation_kwargs: beams is not known"),
+        ("dataset_kwargs: {}\ngeneration_kwargs: 7", "generation_kwargs is 7; it is a mapping of settings"),
+    ],
+)
+def test_what_is_wrong_beside_the_settings_is_refused_too(prepared, task_files, more, said):
+    (task_files / "plans" / "infthor_plans.yaml").write_text(f"include: _plans.yaml\ntask: infthor_plans\n{more}\n")
+    with pytest.raises((DataError, UsageError)) as caught:
+        prepared(data=None)
+    assert said in one_line(caught)
+
+
+def test_another_setting_is_another_run(prepared, data):
+    def identity(**changes):
+        run = prepared(**changes)
+        return run.evaluation.workload(run.suite.baselines["planner"](0)).identity
+
+    plain = identity()
+    for changes in (
+        {"rewards": "published-compat"},
+        {"history": "last:100"},
+        {"after_failure": "stop"},
+        {"constrained": True},
+        {"greedy": True},
+        {"frames": "blank"},
+        {"tasks": ("infthor_final",), "data": write(data.parent / "final", cut(CANDLE, 2, final=True))},
+    ):
+        assert identity(**changes) != plain
+    document = cut(FORK)
+    document["plan"]["low_actions"].pop()
+    (data / f"{FORK}.json").write_text(json.dumps(document))
+    assert identity() != plain
