@@ -32,7 +32,7 @@ def train_nano(recipe: NanoRecipe, folders: Sequence[Path], out: Path, worker_se
         recipe: how.
         folders: of replayed sets with questions; made in `out` where there are none.
         out: folder of the run.
-        staffing: who makes the data.
+        worker_settings: who makes the data.
 
     Returns:
         Exit code: 0.
@@ -63,7 +63,7 @@ def make_data(scenes: Scenes, seed: int, out: Path, worker_settings: WorkerSetti
         scenes: which.
         seed: of the trajectories and the questions.
         out: folder of both.
-        staffing: who makes them.
+        worker_settings: who makes them.
 
     Returns:
         The folder of the set.

@@ -27,7 +27,7 @@ class Asked:
         output: results folder.
         fresh: start anew.
         recover: go on without bad lines.
-        staffing: how many workers, and where.
+        worker_settings: how many workers, and where.
         include: folders with further task files.
         suite_options: option names to values, of all suites; None where not given.
     """

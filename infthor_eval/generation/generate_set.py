@@ -130,7 +130,7 @@ def generate_with_workers(
         jobs: what to make.
         launch: how a simulator is started.
         out: directory of the files, the same for all workers; made where it does not exist.
-        staffing: how many workers, and where.
+        worker_settings: how many workers, and where.
         progress: is called after each trajectory, with whether an earlier run had made it.
         say: is told what becomes of workers.
 

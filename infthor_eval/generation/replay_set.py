@@ -153,7 +153,7 @@ def replay_with_workers(
         selection: what to replay.
         launch: how a simulator is started.
         out: the set, the same for all workers; made where it does not exist.
-        staffing: how many workers, and where.
+        worker_settings: how many workers, and where.
         frames: per action that moves the agent or its camera.
         progress: is called after each trajectory, with whether an earlier run had made it.
         say: is told what becomes of workers.

@@ -116,7 +116,7 @@ def _options_of(request: RunRequest) -> dict[str, Any]:
 
 
 def _unlike_default(options: Any) -> dict[str, Any]:
-    """The options of a suite, or of the staffing, that were told otherwise than they are by themselves."""
+    """The options of a suite, or of the worker_settings, that were told otherwise than they are by themselves."""
     if not is_dataclass(options):  # a suite without any
         return {}
     told = [(item, getattr(options, item.name)) for item in fields(options)]

@@ -29,7 +29,7 @@ class RunRequest:
         name: what the run is called; None takes the checkpoint's name, or the model's.
         fresh: set an earlier journal aside and start anew.
         recover: go on without the bad lines of an earlier journal.
-        staffing: how many workers, and where; it changes no number.
+        worker_settings: how many workers, and where; it changes no number.
         include: folders with task files of one's own.
         suite_code: what distinguishes the code of a suite that is not this package's, as JSON values.
     """

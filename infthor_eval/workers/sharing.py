@@ -19,7 +19,7 @@ def shared_out(
     Args:
         open_worker: makes a worker, which gives one result a job.
         jobs: what to do.
-        staffing: who does it; alone, it is done in this process, in the order given.
+        worker_settings: who does it; alone, it is done in this process, in the order given.
         say: is told what becomes of workers, a line each.
 
     Raises:

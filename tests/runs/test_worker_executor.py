@@ -132,7 +132,7 @@ def test_a_unit_that_kills_every_worker_fails_and_the_others_have_results(tmp_pa
 
 
 @pytest.mark.timeout(120)
-@pytest.mark.parametrize("staffing", [WorkerSettings(), TWO])
+@pytest.mark.parametrize("worker_settings", [WorkerSettings(), TWO])
 def test_a_run_that_is_stopped_has_the_results_of_what_is_there_and_goes_on(tmp_path, worker_settings):
     suite, watching = DeadlySuite(tmp_path, {}), Watching()
     run_ = prepare(request(tmp_path, worker_settings=worker_settings), suite)

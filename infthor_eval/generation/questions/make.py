@@ -86,7 +86,7 @@ def make_questions(
         per_trajectory: how many questions at most on one trajectory.
         share: of the frame's pixels that an object must fill to count as shown.
         further: whether to ask our further forms too.
-        staffing: how many workers, and where; the questions are the same.
+        worker_settings: how many workers, and where; the questions are the same.
         say: is told what becomes of workers.
 
     Returns:
