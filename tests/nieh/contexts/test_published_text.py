@@ -13,7 +13,7 @@ from infthor_eval.formats.question import Question
 from infthor_eval.nieh.contexts import CONTEXTS, ContextSettings
 from infthor_eval.nieh.samples import find_samples
 
-GOLDEN = Path(__file__).parents[4] / "shared" / "data" / "published_goldens" / "contexts.jsonl.gz"
+GOLDEN = Path(__file__).parents[2] / "goldens" / "contexts.jsonl.gz"
 QUESTION = Question("t", "Where is the mug?", (0,), ("Shelf",))
 NAMES = {"full_traj": "trajectory"}  # of contexts that are called otherwise there
 
@@ -77,7 +77,6 @@ def test_both_modes_are_the_published_text(make_set, name):
     assert parts("text_state", data)[:-1] == [" State: ten; Last agent's view: ", 4]
 
 
-@pytest.mark.skipif(not GOLDEN.is_file(), reason=f"no published contexts at {GOLDEN}")
 def test_contexts_equal_the_published_ones_part_for_part(make_set, tmp_path):
     with gzip.open(GOLDEN, "rt") as file:
         cases = [json.loads(line) for line in file]
