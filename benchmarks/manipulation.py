@@ -16,11 +16,11 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from infthor_eval.formats.trajectory import Source, iter_sources
+from infthor_eval.formats.trajectory import TrajectorySource, iter_sources
 from infthor_eval.manipulation.history import ErrandKind, errands_of
 from infthor_eval.manipulation.records import ArmRecord
 from infthor_eval.manipulation.suite import ManipulationSuite
-from infthor_eval.rates import percent
+from infthor_eval.rates import format_percent
 from infthor_eval.runs import UnitRecord, read_run
 
 _BASELINES = ("planner-arm", "still", "random-arm")
@@ -52,7 +52,7 @@ def _arguments() -> argparse.Namespace:
     return parser.parse_args()
 
 
-def chosen(options: argparse.Namespace) -> Iterator[Source]:
+def chosen(options: argparse.Namespace) -> Iterator[TrajectorySource]:
     """Trajectories, evenly out of all, until they have enough episodes of both kinds."""
     every = list(iter_sources(options.trajectories))
     counts: Counter[ErrandKind] = Counter()
@@ -88,8 +88,9 @@ def show(name: str, radius: str, folder: Path) -> None:
         seconds = sum(record.seconds for record in same)
         steps = sum(len(record.payload.steps) for record in same)
         print(
-            f"{name:12} radius {radius:5} {kind:7} {len(same):4} episodes, success {percent(about.success):24}"
-            f" in the sphere at the start {percent(about.inside):24} {steps} steps, {seconds / max(1, len(same)):.2f} s"
+            f"{name:12} radius {radius:5} {kind:7} {len(same):4} episodes, success {format_percent(about.success):24}"
+            f" in the sphere at the start {format_percent(about.inside):24}"
+            f" {steps} steps, {seconds / max(1, len(same)):.2f} s"
             f" an episode, {sum(about.excluded.values())} excluded, {about.n_failed} failed",
             flush=True,
         )

@@ -21,7 +21,7 @@ from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.household.sequence_text import ACT
 from infthor_eval.plans.habits import Habits
 from infthor_eval.plans.history import Chapter
-from infthor_eval.statistics import Estimate, clustered_mean, paired_difference
+from infthor_eval.statistics import MeanEstimate, clustered_mean, paired_difference
 from infthor_eval.training.data import read_history, recorded_names
 from model_adapters import Decoding, load
 
@@ -89,7 +89,7 @@ def said(model: Any, chapters: Sequence[Chapter], show: Show) -> Iterator[bool]:
             talk.append(f"{action}{ACT}", show(frame))
 
 
-def _interval(estimate: Estimate) -> str:
+def _interval(estimate: MeanEstimate) -> str:
     low, high = (value if value is None else round(100 * value, 1) for value in (estimate.low, estimate.high))
     return f"{100 * estimate.mean:5.1f} [{low}, {high}]"
 

@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 from infthor_eval.episodes.simulators import Simulators
 from infthor_eval.errors import DataError
-from infthor_eval.formats.trajectory import Source, iter_sources
+from infthor_eval.formats.trajectory import TrajectorySource, iter_sources
 from infthor_eval.plans.environment import PlanEnvironment
 from infthor_eval.plans.expert import ExpertRefusedError
 from infthor_eval.plans.records import PlanRecord
@@ -67,7 +67,7 @@ def _arguments() -> argparse.Namespace:
     return parser.parse_args()
 
 
-def generated(options: argparse.Namespace) -> list[Source]:
+def generated(options: argparse.Namespace) -> list[TrajectorySource]:
     """Long trajectories, evenly out of all."""
     found = [source for source in iter_sources(options.trajectories) if is_long(source, options.min_steps)]
     if len(found) < options.count:
@@ -75,12 +75,12 @@ def generated(options: argparse.Namespace) -> list[Source]:
     return [found[index * len(found) // options.count] for index in range(options.count)]
 
 
-def is_long(source: Source, min_steps: int) -> bool:
+def is_long(source: TrajectorySource, min_steps: int) -> bool:
     """Whether a trajectory has so many steps."""
     return len(source.read().plan.low_actions) >= min_steps
 
 
-def demonstrations(options: argparse.Namespace) -> Iterator[Source]:
+def demonstrations(options: argparse.Namespace) -> Iterator[TrajectorySource]:
     """The first demonstrations that the simulator carries out whole."""
     wanted = options.alfred
     sources = list(iter_sources(options.data / "alfred" / "valid_seen.jsonl.gz")) if wanted else []
@@ -94,7 +94,7 @@ def demonstrations(options: argparse.Namespace) -> Iterator[Source]:
                 yield source
 
 
-def is_whole(source: Source, simulators: Simulators) -> bool:
+def is_whole(source: TrajectorySource, simulators: Simulators) -> bool:
     """Whether no action of a demonstration is refused."""
     with simulators.one() as simulator:
         try:
@@ -108,7 +108,7 @@ def is_whole(source: Source, simulators: Simulators) -> bool:
     return True
 
 
-def run(sources: Sequence[Source], scenes: Path, out: Path) -> dict[str, Run]:
+def run(sources: Sequence[TrajectorySource], scenes: Path, out: Path) -> dict[str, Run]:
     """Copy trajectories, run the baselines on them, and read their records."""
     data, results = out / "trajectories.jsonl", out / "results"
     out.mkdir(parents=True, exist_ok=True)

@@ -17,7 +17,7 @@ __all__ = [
     "SceneError",
     "SimulatorError",
     "UsageError",
-    "fault",
+    "describe_exception",
     "in_one_line",
     "unknown_name",
     "wrap_errors",
@@ -77,7 +77,7 @@ def in_one_line(error: BaseException) -> str:
     return said if len(said) <= _LONGEST else said[: _LONGEST - 3] + "..."
 
 
-def fault(error: Exception) -> str:
+def describe_exception(error: Exception) -> str:
     """What a programming error is, where, and what it says."""
     place = traceback.extract_tb(error.__traceback__)[-1]
     where = f"{Path(place.filename).name}:{place.lineno} ({place.name})"

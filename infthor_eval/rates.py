@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import msgspec
 
 if TYPE_CHECKING:
-    from infthor_eval.statistics import Estimate
+    from infthor_eval.statistics import MeanEstimate
 
-__all__ = ["Rate", "cluster_rate", "clustered_rate", "number", "percent"]
+__all__ = ["Rate", "clustered_rate", "format_number", "format_percent", "rate_over_clusters"]
 
 
 class Rate(msgspec.Struct, frozen=True):
@@ -37,24 +37,24 @@ def clustered_rate(values: Sequence[float], clusters: Sequence[Hashable]) -> Rat
     return _rate(clustered_mean(values, clusters)) if values else None
 
 
-def cluster_rate(values: Sequence[float]) -> Rate | None:
+def rate_over_clusters(values: Sequence[float]) -> Rate | None:
     """The mean of numbers of which each cluster has one, see `mean_over_clusters`; None of nothing."""
     from infthor_eval.statistics import mean_over_clusters
 
     return _rate(mean_over_clusters(values)) if values else None
 
 
-def percent(rate: Rate | None) -> str:
+def format_percent(rate: Rate | None) -> str:
     """A share in a table's cell, in percent."""
     return "-" if rate is None else _written(rate, 100.0)
 
 
-def number(rate: Rate | None) -> str:
+def format_number(rate: Rate | None) -> str:
     """A number in a table's cell."""
     return "-" if rate is None else _written(rate, 1.0)
 
 
-def _rate(estimate: "Estimate") -> Rate:
+def _rate(estimate: "MeanEstimate") -> Rate:
     return Rate(estimate.mean, estimate.low, estimate.high, estimate.n)
 
 

@@ -5,7 +5,7 @@ from collections import defaultdict
 from collections.abc import Iterable
 from typing import TypeVar
 
-__all__ = ["counted_reasons"]
+__all__ = ["count_reasons"]
 
 _Where = TypeVar("_Where", str, tuple[str, str])  # a task, or a task and what became of its units
 
@@ -13,7 +13,7 @@ _Where = TypeVar("_Where", str, tuple[str, str])  # a task, or a task and what b
 _NUMBER = re.compile(r"(?<![\w/.,-])\d+(?:,\d{3})*(?:\.\d+)?(?![\w/]|[.,-]\w)")
 
 
-def counted_reasons(reasons: Iterable[tuple[_Where, str]]) -> list[tuple[_Where, str, int]]:
+def count_reasons(reasons: Iterable[tuple[_Where, str]]) -> list[tuple[_Where, str, int]]:
     """Task, reason and how often, in the order of the alphabet; numbers that differ are told as a range.
 
     Args:

@@ -16,7 +16,7 @@ from infthor_eval.errors import DataError
 
 __all__ = [
     "Difference",
-    "Estimate",
+    "MeanEstimate",
     "bootstrap_interval",
     "clustered_mean",
     "mean_over_clusters",
@@ -27,7 +27,7 @@ _LEVEL = 0.95
 
 
 @dataclass(frozen=True)
-class Estimate:
+class MeanEstimate:
     """A mean and how sure it is.
 
     Attributes:
@@ -56,11 +56,11 @@ class Difference:
         p: two-sided, from the clustered t statistic; None with fewer than two clusters.
     """
 
-    estimate: Estimate
+    estimate: MeanEstimate
     p: float | None
 
 
-def clustered_mean(scores: Sequence[float], clusters: Sequence[Hashable]) -> Estimate:
+def clustered_mean(scores: Sequence[float], clusters: Sequence[Hashable]) -> MeanEstimate:
     """The mean with a cluster-robust standard error, and an interval that stays honest near all right and all wrong.
 
     Scores from 0 to 1 get Wilson's interval on the effective sample size, which is not zero wide where all are equal;
@@ -81,7 +81,7 @@ def clustered_mean(scores: Sequence[float], clusters: Sequence[Hashable]) -> Est
     return replace(estimate, low=low, high=high)
 
 
-def mean_over_clusters(values: Sequence[float]) -> Estimate:
+def mean_over_clusters(values: Sequence[float]) -> MeanEstimate:
     """The mean of numbers of which each cluster has one (a trajectory's reward), with a t interval.
 
     Unlike `clustered_mean` it takes no number for a share: points of a curve that happen to lie between 0 and 1 get the
@@ -96,16 +96,16 @@ def mean_over_clusters(values: Sequence[float]) -> Estimate:
     return _with_t_interval(*_partition(values, range(len(values))))
 
 
-def _with_t_interval(totals: np.ndarray, sizes: np.ndarray) -> Estimate:
+def _with_t_interval(totals: np.ndarray, sizes: np.ndarray) -> MeanEstimate:
     n, n_clusters = int(sizes.sum()), len(sizes)
     mean = float(totals.sum() / n)
     if n_clusters < 2:
-        return Estimate(mean, None, None, None, n, n_clusters)
+        return MeanEstimate(mean, None, None, None, n, n_clusters)
     # Residual of each cluster's total: the ratio estimator's linearisation, as clusters differ in size.
     residuals = totals - mean * sizes
     stderr = math.sqrt(n_clusters / (n_clusters - 1) * float(residuals @ residuals)) / n
     reach = _quantile(n_clusters) * stderr
-    return Estimate(mean, stderr, mean - reach, mean + reach, n, n_clusters)
+    return MeanEstimate(mean, stderr, mean - reach, mean + reach, n, n_clusters)
 
 
 @cache
@@ -116,7 +116,7 @@ def _quantile(n_clusters: int) -> float:
 _NORMAL_QUANTILE = float(special.ndtri(0.5 + _LEVEL / 2))
 
 
-def _effective_size(estimate: Estimate) -> float:
+def _effective_size(estimate: MeanEstimate) -> float:
     """How many independent questions tell as much.
 
     The design effect says how much clustering inflates the variance; it is measured on few clusters, which counts

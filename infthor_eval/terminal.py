@@ -12,13 +12,13 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.text import Text
 
-__all__ = ["PlainConsole", "console", "error_console", "progress_bar", "say_error", "shown", "tell"]
+__all__ = ["PlainConsole", "console", "error_console", "print_error", "print_line", "printable", "progress_bar"]
 
 _KEPT = "\n\t"
 _HIDDEN = {"Cc", "Cf", "Cs", "Zl", "Zp"}  # controls, what reorders or hides text, halves of pairs, line separators
 
 
-def shown(text: str) -> str:
+def printable(text: str) -> str:
     r"""A text with what is no text in it written out (`\x1b`), but for line ends and tabs."""
     if text.isprintable():
         return text
@@ -39,7 +39,7 @@ class PlainConsole(Console):
     def render_str(self, text: str, **settings: Any) -> Text:
         """See `rich.console.Console.render_str`; every string that is shown comes by here."""
         settings |= {"markup": False, "emoji": False, "highlight": False}
-        return super().render_str(shown(text), **settings)
+        return super().render_str(printable(text), **settings)
 
 
 def console(**settings: Any) -> PlainConsole:
@@ -60,7 +60,7 @@ class _Description(TextColumn):
 
     def render(self, task: Any) -> Text:
         """See `rich.progress.TextColumn.render`."""
-        return Text(shown(task.description))
+        return Text(printable(task.description))
 
 
 def progress_bar(on: Console) -> Progress:
@@ -69,11 +69,11 @@ def progress_bar(on: Console) -> Progress:
     return Progress(*columns, console=on, transient=True, disable=not on.is_terminal)
 
 
-def tell(text: str) -> None:
+def print_line(text: str) -> None:
     """A line on standard output."""
-    click.echo(shown(text))
+    click.echo(printable(text))
 
 
-def say_error(text: str) -> None:
+def print_error(text: str) -> None:
     """An error of the whole command, one line on standard error."""
-    click.echo(f"infthor-eval: {shown(' '.join(text.split()))}", err=True)
+    click.echo(f"infthor-eval: {printable(' '.join(text.split()))}", err=True)

@@ -17,24 +17,24 @@ def command(manifest: Path, out: Path) -> int:
     where they differ.
     """
     from infthor_eval.cli.paced_bar import PacedBar
-    from infthor_eval.formats.files import prepared_folder
+    from infthor_eval.formats.files import prepare_folder
     from infthor_eval.generation.bundle import differing_files, make_bundle, read_manifest
-    from infthor_eval.terminal import error_console, progress_bar, tell
+    from infthor_eval.terminal import error_console, print_line, progress_bar
     from infthor_eval.thor.launch import embedded
     from infthor_eval.thor.simulator import Simulator
 
     wanted = read_manifest(manifest)
-    prepared_folder(out)
+    prepare_folder(out)
     with Simulator(embedded()) as simulator, progress_bar(error_console()) as progress:
         bar = PacedBar(progress, wanted.name, 2 * len(wanted.trajectories))
         finished, made = make_bundle(wanted, simulator, out, bar.advance)
     size = sum(path.stat().st_size for path in out.rglob("*") if path.is_file())
-    tell(f"{len(made.questions)} questions on {made.trajectories} trajectories, {size / 1e6:.1f} MB: {out}")
-    tell(made.words())
+    print_line(f"{len(made.questions)} questions on {made.trajectories} trajectories, {size / 1e6:.1f} MB: {out}")
+    print_line(made.words())
     if not wanted.files:
         return 0
     n_files, differing = len(wanted.files.keys() | finished.files.keys()), differing_files(wanted, finished)
-    tell(f"{n_files - len(differing)} of {n_files} files as in the manifest")
+    print_line(f"{n_files - len(differing)} of {n_files} files as in the manifest")
     for name in differing[:10]:
         error_console().print(f"differs: {name}")
     return int(bool(differing))

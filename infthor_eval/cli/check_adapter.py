@@ -16,7 +16,7 @@ def command(model: str, model_args: str) -> int:
     It is asked a few dozen short questions on frames of one colour. A line per clause says whether it holds
     (docs/own-models.md has what each asks). Exits with 0 where all hold, with 1 where one is broken.
     """
-    from infthor_eval.terminal import tell
+    from infthor_eval.terminal import print_line
     from model_adapters import findings, load
 
     n_broken = 0
@@ -24,10 +24,10 @@ def command(model: str, model_args: str) -> int:
     try:
         for finding in findings(adapter):
             found = "holds" if finding.broken is None else "broken"
-            tell(f"{found:8}{finding.about:16}{finding.broken or ''}".rstrip())
+            print_line(f"{found:8}{finding.about:16}{finding.broken or ''}".rstrip())
             n_broken += finding.broken is not None
     finally:
         if hasattr(adapter, "close"):  # what lacks it has been told so
             adapter.close()
-    tell(f"{model}: {f'{n_broken} broken' if n_broken else 'keeps the contract'}")
+    print_line(f"{model}: {f'{n_broken} broken' if n_broken else 'keeps the contract'}")
     return int(n_broken > 0)

@@ -18,16 +18,18 @@ def command(as_json: bool) -> int:
     from rich.text import Text
 
     from infthor_eval.cli.checks import checks
-    from infthor_eval.terminal import console, shown, tell
+    from infthor_eval.terminal import console, print_line, printable
 
     found = []
     on = console()
     for check in checks():
         found.append(check)
         if not as_json:
-            on.print(Text.assemble((f"{check.state:9}", _STYLES[check.state]), shown(f"{check.name}: {check.found}")))
+            on.print(
+                Text.assemble((f"{check.state:9}", _STYLES[check.state]), printable(f"{check.name}: {check.found}"))
+            )
             if check.mend:
-                tell(f"{'':9}{check.mend}")
+                print_line(f"{'':9}{check.mend}")
     if as_json:
         click.echo(msgspec.json.format(msgspec.json.encode(found), indent=2))
     return int(any(check.state == "wrong" for check in found))

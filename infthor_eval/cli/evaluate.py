@@ -7,7 +7,7 @@ from infthor_eval.cli.showing import Showing, ShownRun, show
 from infthor_eval.errors import DataError
 from infthor_eval.harness.export import export
 from infthor_eval.harness.trackers import Trackers
-from infthor_eval.reasons import counted_reasons
+from infthor_eval.reasons import count_reasons
 from infthor_eval.runs import RunOutcome, RunRequest, Suite, prepare
 
 __all__ = ["evaluate"]
@@ -74,6 +74,6 @@ def _say_what_is_unsent(outcome: RunOutcome, trackers: Trackers) -> bool:
 
 def _say_what_failed(outcome: RunOutcome) -> int:
     failed = [(record.task, record.failure) for record in outcome.records if record.failure is not None]
-    for task, reason, n in counted_reasons(failed):
+    for task, reason, n in count_reasons(failed):
         complain(f"{task}: {n} sample(s) failed, counted as wrong: {reason}")
     return len(failed)

@@ -17,11 +17,11 @@ def command(what: str, folder: Path | None, token: str | None, endpoint: str | N
 
     `--tasks nieh` finds it afterwards; with --dir, pass the same folder as --data.
     """
-    from infthor_eval.formats.files import prepared_folder
+    from infthor_eval.formats.files import prepare_folder
     from infthor_eval.formats.hub_data import default_folder, fetch_nieh
-    from infthor_eval.terminal import error_console, tell
+    from infthor_eval.terminal import error_console, print_line
 
-    data = fetch_nieh(prepared_folder(folder or default_folder(), "--dir"), token, endpoint)
-    tell(f"{what}: {len(data.questions)} questions in {data.root}")
+    data = fetch_nieh(prepare_folder(folder or default_folder(), "--dir"), token, endpoint)
+    print_line(f"{what}: {len(data.questions)} questions in {data.root}")
     for reason, n in data.reasons().most_common():
         error_console().print(f"skipped {n}: {reason}")

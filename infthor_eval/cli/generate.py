@@ -55,7 +55,7 @@ def command(
     Trajectories that the directory has already are not made again. Exit status 1 where one could not be made.
     """
     from infthor_eval.cli.paced_bar import PacedBar
-    from infthor_eval.formats.files import prepared_folder
+    from infthor_eval.formats.files import prepare_folder
     from infthor_eval.generation.generate_set import generate_with_workers
     from infthor_eval.generation.jobs import trajectory_jobs, without_bathrooms
     from infthor_eval.terminal import console, error_console, progress_bar
@@ -74,7 +74,7 @@ def command(
         final_task=final_task or test_set,
         max_fail=max_fail,
     )
-    prepared_folder(out)
+    prepare_folder(out)
     with progress_bar(notes) as progress:
         bar = PacedBar(progress, "generate", len(jobs))
         result = generate_with_workers(jobs, embedded(data), out, worker_settings, bar.advance, notes.print)

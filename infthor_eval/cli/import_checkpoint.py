@@ -21,15 +21,17 @@ def command(folder: Path, model: str, model_args: str, out: Path) -> int:
 
     Weights that it has not (those that were frozen) are those of the model that the training began with.
     """
-    from infthor_eval.formats.files import prepared_folder
-    from infthor_eval.terminal import tell
+    from infthor_eval.formats.files import prepare_folder
+    from infthor_eval.terminal import print_line
     from infthor_eval.training.export import export
     from infthor_eval.training.published import take_over
     from infthor_eval.training.starting_point import starting_point
 
-    prepared_folder(out)
+    prepare_folder(out)
     loaded = starting_point(model, model_options_in(model_args), "plain", seed=0)
     found = take_over(loaded, folder)
     export(loaded, out)
-    tell(f"{found.n_taken} weights taken over, {found.n_kept} kept, {found.n_ignored} other tensors ignored: {out}")
+    print_line(
+        f"{found.n_taken} weights taken over, {found.n_kept} kept, {found.n_ignored} other tensors ignored: {out}"
+    )
     return 0

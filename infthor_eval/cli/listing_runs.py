@@ -8,7 +8,7 @@ from infthor_eval.cli.progress import say
 from infthor_eval.report.terminal import print_table, table_console
 from infthor_eval.runs.run_search import BrokenRun, StoredRun, find_runs
 from infthor_eval.tables import Column, Row, Table
-from infthor_eval.terminal import tell
+from infthor_eval.terminal import print_line
 
 __all__ = ["runs"]
 
@@ -26,7 +26,7 @@ def runs(folder: Path) -> None:
     found = list(find_runs(folder))
     whole = [item for item in found if isinstance(item, StoredRun)]
     if not found:
-        tell(f"no runs in {folder}; infthor-eval --model MODEL --tasks TASKS makes one")
+        print_line(f"no runs in {folder}; infthor-eval --model MODEL --tasks TASKS makes one")
     if whole:
         columns = (Column("run", False), Column("suite", False), *map(Column, _NUMBERS))
         more = (Column("tasks, %", False), Column("age"), Column("folder", False))

@@ -15,7 +15,7 @@ import click
 import infthor_eval
 from infthor_eval.cli.repeated import refuse_repeated
 from infthor_eval.errors import InfthorError, in_one_line
-from infthor_eval.terminal import say_error
+from infthor_eval.terminal import print_error
 
 __all__ = ["main"]
 
@@ -158,5 +158,5 @@ def _discard_output() -> None:
 
 
 def _fail(message: str, code: int) -> None:
-    say_error(message)
+    print_error(message)
     sys.exit(code)

@@ -6,7 +6,7 @@ from pathlib import Path
 from infthor_eval.cli.paced_bar import PacedBar, StepBars
 from infthor_eval.cli.progress import NOTES, say
 from infthor_eval.errors import DataError
-from infthor_eval.formats.files import prepared_folder
+from infthor_eval.formats.files import prepare_folder
 from infthor_eval.formats.qa_csv import write_questions
 from infthor_eval.generation.generate_set import generate_with_workers
 from infthor_eval.generation.jobs import trajectory_jobs
@@ -40,7 +40,7 @@ def train_nano(recipe: NanoRecipe, folders: Sequence[Path], out: Path, worker_se
     Raises:
         DataError: data cannot be made or read.
     """
-    prepared_folder(out)
+    prepare_folder(out)
     sets = list(folders) or [make_data(recipe.scenes, recipe.seed, out / "data", worker_settings)]
     with progress_bar(NOTES) as progress:
         bars = StepBars(progress)
@@ -71,7 +71,7 @@ def make_data(scenes: Scenes, seed: int, out: Path, worker_settings: WorkerSetti
     Raises:
         DataError: a trajectory cannot be made or replayed.
     """
-    trajectories, made_set = prepared_folder(out / "trajectories"), prepared_folder(out / "set")
+    trajectories, made_set = prepare_folder(out / "trajectories"), prepare_folder(out / "set")
     jobs = trajectory_jobs(
         scenes.names, seed=seed, count=1, min_steps=scenes.min_steps, min_subgoals=1, final_task=False, max_fail=20
     )

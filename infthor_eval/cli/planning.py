@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from infthor_eval.cli.pace import duration
 from infthor_eval.cli.progress import NOTES, say
 from infthor_eval.errors import ModelError
-from infthor_eval.reasons import counted_reasons
+from infthor_eval.reasons import count_reasons
 from infthor_eval.report.terminal import print_table, table_console
 from infthor_eval.runs import RunRequest, Suite, TaskEstimate, Workload, estimate_run
 from infthor_eval.tables import Column, Row, Table
@@ -37,7 +37,7 @@ def plan(request: RunRequest, suite: Suite, measure: int, price_per_hour: float 
         bar = progress.add_task(f"{request.label}: measuring", total=None)
         found = estimate_run(request, suite, measure, lambda: progress.advance(bar))
     _say_beforehand(found.workload)
-    for task, reason, n in counted_reasons(found.failures):
+    for task, reason, n in count_reasons(found.failures):
         say(f"{task}: {n} measured unit(s) failed: {reason}", "red")
     if not found.tasks:
         raise ModelError(f"{request.label}: every unit that was measured failed; mend what is told above")
@@ -49,7 +49,7 @@ def plan(request: RunRequest, suite: Suite, measure: int, price_per_hour: float 
 
 
 def _say_beforehand(workload: Workload) -> None:
-    for task, reason, n in counted_reasons((item.key.task, item.reason) for item in workload.skipped):
+    for task, reason, n in count_reasons((item.key.task, item.reason) for item in workload.skipped):
         say(f"{task}: {n} sample(s) skipped: {reason}", "yellow")
     for cost in workload.costs:
         say(f"{cost.task}: {cost.description}")

@@ -8,7 +8,7 @@ from rich.progress import Progress
 
 from infthor_eval.cli.paced_bar import PacedBar
 from infthor_eval.cli.stopping import Stop, stopped_by_sigint
-from infthor_eval.reasons import counted_reasons
+from infthor_eval.reasons import count_reasons
 from infthor_eval.runs import PreparedRun, RunOutcome, UnitRecord, Workload, execute
 from infthor_eval.terminal import error_console, progress_bar
 
@@ -29,7 +29,7 @@ class _Watcher:
         """See `Observer`."""
         if n_recovered:
             say(f"{self._name}: {n_recovered} bad line(s) of the journal set aside; those units are tried again")
-        for task, reason, n in counted_reasons((item.key.task, item.reason) for item in workload.skipped):
+        for task, reason, n in count_reasons((item.key.task, item.reason) for item in workload.skipped):
             say(f"{task}: {n} sample(s) skipped: {reason}", "yellow")
         for cost in workload.costs:
             say(f"{cost.task}: {cost.description}")

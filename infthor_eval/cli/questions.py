@@ -47,12 +47,12 @@ def command(
     Exit status 1 where a trajectory of the set could not be read.
     """
     from infthor_eval.errors import wrap_errors
-    from infthor_eval.formats.files import prepared_file, refuse_loss, written_atomically
+    from infthor_eval.formats.files import prepare_file, refuse_overwrite, write_atomically
     from infthor_eval.formats.qa_csv import encode_questions
     from infthor_eval.generation.questions.make import make_questions
-    from infthor_eval.terminal import error_console, tell
+    from infthor_eval.terminal import error_console, print_line
 
-    prepared_file(out)
+    prepare_file(out)
     notes = error_console()
     made = make_questions(
         folder,
@@ -65,11 +65,11 @@ def command(
     )
     content = encode_questions(made.questions)
     if not overwrite:
-        refuse_loss(out, content)
-    with wrap_errors(f"{out}: cannot be written", "give another --out"), written_atomically(out) as partial:
+        refuse_overwrite(out, content)
+    with wrap_errors(f"{out}: cannot be written", "give another --out"), write_atomically(out) as partial:
         partial.write_bytes(content)
     told = f"{len(made.questions)} questions on {made.trajectories} trajectories: {out}\n{made.words()}"
-    tell(told)
+    print_line(told)
     for question in made.doubted:
         notes.print(f"skipped, the checker disagrees: {question.traj_id}: {question.text}")
     for line in made.skipped:

@@ -52,7 +52,7 @@ def command(
     replay goes on. Exit status 1 where a trajectory could not be replayed at all.
     """
     from infthor_eval.cli.paced_bar import PacedBar
-    from infthor_eval.formats.files import prepared_folder
+    from infthor_eval.formats.files import prepare_folder
     from infthor_eval.generation.replay_set import replay_with_workers, select
     from infthor_eval.generation.replay_summary import summarise
     from infthor_eval.terminal import console, error_console, progress_bar
@@ -60,7 +60,7 @@ def command(
     from infthor_eval.thor.supplement import supplement_file
 
     notes = error_console()
-    prepared_folder(out)
+    prepare_folder(out)
     selection = select(trajectories, limit, per_floor_plan)
     with supplement_file(trajectory for _, trajectory in selection.items) as supplement:
         start = launch.unity() if unity else launch.embedded(data, supplement)

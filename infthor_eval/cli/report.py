@@ -104,21 +104,21 @@ def _refuse(given: dict[str, object]) -> None:
 
 def _write(runs: tuple[Path, ...], out: Path, data: Path | None, scenes: Path | None, episodes: int) -> None:
     from infthor_eval.errors import UsageError
-    from infthor_eval.formats.files import prepared_file
+    from infthor_eval.formats.files import prepare_file
     from infthor_eval.report.web.build import Wanted, build_page
     from infthor_eval.report.web.page import write_page
     from infthor_eval.report.web.runs import read_report_runs
     from infthor_eval.suites import suite_named
-    from infthor_eval.terminal import error_console, tell
+    from infthor_eval.terminal import error_console, print_line
 
     if out.suffix.lower() not in (".html", ".htm"):
         raise UsageError(f"--out {out}: the page is an .html file; name one")
-    path = prepared_file(out)
+    path = prepare_file(out)
     found = read_report_runs(runs, suite_named)
     with error_console().status("making the page"):
         page = build_page(found, Wanted(data, _stages(found, scenes, episodes), episodes))
     size = write_page(page, path)
-    tell(f"{len(page.samples):,} samples, {len(page.pictures):,} pictures, {size / 1e6:.1f} MB: {path}")
+    print_line(f"{len(page.samples):,} samples, {len(page.pictures):,} pictures, {size / 1e6:.1f} MB: {path}")
 
 
 def _stages(runs: Sequence[ReportRun], scenes: Path | None, episodes: int) -> Mapping[str, Opener]:
@@ -132,19 +132,19 @@ def _stages(runs: Sequence[ReportRun], scenes: Path | None, episodes: int) -> Ma
 
 def _draw(asked: _Asked, figure: str, out: Path) -> None:
     from infthor_eval.errors import UsageError
-    from infthor_eval.formats.files import prepared_folder, require_writable
+    from infthor_eval.formats.files import prepare_folder, require_writable
     from infthor_eval.report.terminal import print_table, table_console
-    from infthor_eval.terminal import tell
+    from infthor_eval.terminal import print_line
 
     require_writable(out)
     drawn = _FIGURES[figure]
     if asked.panels is not None and not drawn.has_panels:
         raise UsageError(f"--panels: figure {figure} has panels of its own; leave it out")
     made = drawn.make(asked)
-    paths = made.draw(prepared_folder(out), f"figure{figure}" if figure.isdigit() else figure)
+    paths = made.draw(prepare_folder(out), f"figure{figure}" if figure.isdigit() else figure)
     print_table(made.table, table_console())
     for line in (*made.left, *map(str, paths)):
-        tell(line)
+        print_line(line)
 
 
 def _headers(folders: tuple[Path, ...], figure: str) -> list[RunHeader]:

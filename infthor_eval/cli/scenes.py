@@ -29,13 +29,13 @@ def show(name: str, data: Path | None, out: Path | None, size: int, overwrite: b
     from PIL import Image
 
     from infthor_eval.errors import wrap_errors
-    from infthor_eval.formats.files import prepared_file, refuse_loss, written_atomically
-    from infthor_eval.terminal import tell
+    from infthor_eval.formats.files import prepare_file, refuse_overwrite, write_atomically
+    from infthor_eval.terminal import print_line
     from infthor_eval.thor.launch import embedded
     from infthor_eval.thor.scenes import scene_pictures
     from infthor_eval.thor.simulator import Simulator
 
-    path = prepared_file(out or Path(f"{name}.png"))
+    path = prepare_file(out or Path(f"{name}.png"))
     if path.suffix.lower() not in _PICTURES:
         raise click.UsageError(f"--out {path}: not a picture; use {', '.join(_PICTURES)}")
     with Simulator(embedded(data), width=size, height=size, quality="Ultra") as simulator:
@@ -46,13 +46,13 @@ def show(name: str, data: Path | None, out: Path | None, size: int, overwrite: b
     picture = io.BytesIO()
     sheet.save(picture, format=Image.registered_extensions()[path.suffix.lower()])
     if not overwrite:
-        refuse_loss(path, picture.getvalue())
+        refuse_overwrite(path, picture.getvalue())
     with (
         wrap_errors(f"{path}: cannot be written", "give another place with --out"),
-        written_atomically(path) as partial,
+        write_atomically(path) as partial,
     ):
         partial.write_bytes(picture.getvalue())
-    tell(f"{name}: {path} (from above; first view)")
+    print_line(f"{name}: {path} (from above; first view)")
 
 
 @command.command("dump")
@@ -69,14 +69,14 @@ def dump(
 
     With that folder they run in the embedded simulator on machines without Unity.
     """
-    from infthor_eval.formats.files import prepared_folder
-    from infthor_eval.terminal import tell
+    from infthor_eval.formats.files import prepare_folder
+    from infthor_eval.terminal import print_line
     from infthor_eval.thor import launch
     from infthor_eval.thor.scenes import dump_scene
     from infthor_eval.thor.simulator import Simulator
 
-    prepared_folder(out)
+    prepare_folder(out)
     start = launch.embedded(data) if is_embedded else launch.unity(unity)
     with Simulator(start) as simulator:
         for name in names:
-            tell(f"{name}: {dump_scene(simulator, name, out, overwrite)} objects in {out}")
+            print_line(f"{name}: {dump_scene(simulator, name, out, overwrite)} objects in {out}")

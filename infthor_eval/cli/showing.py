@@ -117,15 +117,15 @@ def _print_tables(runs: Sequence[ShownRun], showing: Showing) -> None:
 
 
 def _print_folders(runs: Sequence[ShownRun], showing: Showing) -> None:
-    from infthor_eval.terminal import tell
+    from infthor_eval.terminal import print_line
 
     for run in runs:
         if showing.quiet:
-            tell(str(run.folder))
+            print_line(str(run.folder))
             continue
         if run.usage.requests:
-            tell(f"{run.found.header.name}: {run.usage.description}")
-        tell(f"{run.found.header.name}: {run.folder}")
+            print_line(f"{run.found.header.name}: {run.usage.description}")
+        print_line(f"{run.found.header.name}: {run.folder}")
 
 
 def _suite_name(run: ShownRun) -> str:

@@ -47,11 +47,11 @@ def command(
     from infthor_eval.cli.watch_arms import watch_arms
     from infthor_eval.cli.watch_plans import watch_plans
     from infthor_eval.errors import UsageError
-    from infthor_eval.formats.moving_pictures import require_moving
+    from infthor_eval.formats.animations import require_animation_name
     from infthor_eval.runs import read_header
 
     if out is not None:
-        require_moving(out)
+        require_animation_name(out)
     if sheet is not None and sheet.suffix.lower() != ".png":
         raise UsageError(f"--sheet {sheet}: a sheet is a PNG; give a file whose name ends in .png")
     wanted = Wanted(

@@ -20,11 +20,11 @@ def watch_arms(wanted: Wanted) -> None:
     """Write the recording of a trajectory's episodes, or a sheet of their frames."""
     from infthor_eval.cli.paced_bar import PacedBar
     from infthor_eval.errors import UsageError
-    from infthor_eval.formats.files import prepared_file
+    from infthor_eval.formats.files import prepare_file
     from infthor_eval.manipulation.curve_runs import arm_runs
     from infthor_eval.manipulation.replaying import recorded_episodes, replay_episodes
     from infthor_eval.runs import read_header
-    from infthor_eval.terminal import error_console, progress_bar, tell
+    from infthor_eval.terminal import error_console, print_line, progress_bar
 
     refuse_options(wanted, "manipulation", {"--plans": wanted.plans})
     if wanted.sheet is not None and wanted.out is not None:
@@ -32,30 +32,30 @@ def watch_arms(wanted: Wanted) -> None:
     (run,) = arm_runs([wanted.run], [read_header(wanted.run).name])
     recorded = recorded_episodes(run, wanted.task, wanted.trajectory)
     chosen = _chosen(recorded, wanted)
-    path = prepared_file(wanted.sheet or wanted.out or _place(recorded, wanted))
+    path = prepare_file(wanted.sheet or wanted.out or _place(recorded, wanted))
     above = heading([run.label, *sorted({record.task for record in chosen}), recorded.trajectory], run.about.simulator)
     notes = error_console()
     with replay_episodes(recorded, wanted.data, wanted.scenes) as stage, progress_bar(notes) as progress:
         bar = PacedBar(progress, recorded.trajectory, sum(len(record.payload.steps) + 1 for record in chosen))
         moments = followed(stage.moments(chosen), bar.advance, notes)
         made = _recording(path, moments, above, wanted.fps) if wanted.sheet is None else _sheet(path, moments, above)
-    tell(f"{len(chosen)} of {len(recorded.episodes)} episodes{made}: {path}")
+    print_line(f"{len(chosen)} of {len(recorded.episodes)} episodes{made}: {path}")
 
 
 def _recording(path: Path, moments: Iterable[ArmMoment], above: str, fps: float) -> str:
-    from infthor_eval.formats.moving_pictures import write_moving
+    from infthor_eval.formats.animations import write_animation
     from infthor_eval.report.arm_recording import arm_pictures
 
-    return f", {write_moving(path, arm_pictures(moments, above), fps) / fps:.0f} s"
+    return f", {write_animation(path, arm_pictures(moments, above), fps) / fps:.0f} s"
 
 
 def _sheet(path: Path, moments: Iterable[ArmMoment], above: str) -> str:
     from infthor_eval.errors import wrap_errors
-    from infthor_eval.formats.files import written_atomically
+    from infthor_eval.formats.files import write_atomically
     from infthor_eval.report.episode_sheet import draw_sheet
 
     picture = draw_sheet(list(_rows(moments)), above)
-    with wrap_errors(f"{path}: cannot be written", "give another --sheet"), written_atomically(path) as partial:
+    with wrap_errors(f"{path}: cannot be written", "give another --sheet"), write_atomically(path) as partial:
         picture.save(partial, format="png")
     return ""
 

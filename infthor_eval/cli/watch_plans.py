@@ -17,14 +17,14 @@ __all__ = ["watch_plans"]
 def watch_plans(wanted: Wanted) -> None:
     """Write the recording of a trajectory's plans."""
     from infthor_eval.cli.paced_bar import PacedBar
-    from infthor_eval.formats.files import prepared_file
-    from infthor_eval.formats.moving_pictures import write_moving
+    from infthor_eval.formats.animations import write_animation
+    from infthor_eval.formats.files import prepare_file
     from infthor_eval.plans.curve_runs import PlansRun
     from infthor_eval.plans.records import RECORDS
     from infthor_eval.plans.replaying import recorded_plans, replay
     from infthor_eval.report.recording import pictures
     from infthor_eval.runs import read_run
-    from infthor_eval.terminal import error_console, progress_bar, tell
+    from infthor_eval.terminal import error_console, print_line, progress_bar
 
     refuse_options(wanted, "plans", {"--episode": wanted.episode, "--sheet": wanted.sheet})
     header, records = read_run(wanted.run, RECORDS)
@@ -32,14 +32,14 @@ def watch_plans(wanted: Wanted) -> None:
     chosen = _chosen(recorded, wanted.plans)
     label, parts = recorded.run.label, [recorded.task, recorded.trajectory]
     choice = [] if wanted.plans is None else [wanted.plans.strip()]
-    path = prepared_file(wanted.out or place_of([label, *parts, *choice]))
+    path = prepare_file(wanted.out or place_of([label, *parts, *choice]))
     above = heading([label, *parts], recorded.run.about.simulator)
     notes = error_console()
     with replay(recorded, wanted.data, wanted.scenes) as stage, progress_bar(notes) as progress:
         bar = PacedBar(progress, recorded.trajectory, sum(len(plan.payload.steps) + 1 for plan in chosen))
         moments = followed(stage.moments(chosen), bar.advance, notes)
-        n_pictures = write_moving(path, pictures(moments, above), wanted.fps)
-    tell(f"{len(chosen)} of {stage.n_plans} plans, {n_pictures / wanted.fps:.0f} s: {path}")
+        n_pictures = write_animation(path, pictures(moments, above), wanted.fps)
+    print_line(f"{len(chosen)} of {stage.n_plans} plans, {n_pictures / wanted.fps:.0f} s: {path}")
 
 
 def _chosen(recorded: Recorded, plans: str | None) -> Sequence[Record]:

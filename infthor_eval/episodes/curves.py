@@ -11,7 +11,7 @@ from itertools import accumulate
 
 import numpy as np
 
-from infthor_eval.statistics import Estimate, mean_over_clusters
+from infthor_eval.statistics import MeanEstimate, mean_over_clusters
 
 __all__ = ["AT_MOST", "Curve", "Facet", "RewardCurves", "RunCurves", "StepFunction", "grid_of", "mean_curve"]
 
@@ -62,10 +62,10 @@ class Curve:
     """
 
     places: tuple[float, ...]
-    means: tuple[Estimate, ...]
+    means: tuple[MeanEstimate, ...]
 
     @property
-    def end(self) -> Estimate:
+    def end(self) -> MeanEstimate:
         """Where it ends."""
         return self.means[-1]
 

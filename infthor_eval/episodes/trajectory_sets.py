@@ -7,7 +7,7 @@ from typing import Generic, Protocol, TypeVar
 
 from infthor_eval.errors import DataError, UsageError
 from infthor_eval.formats.packaged import packaged_folder
-from infthor_eval.formats.trajectory import Source, iter_sources, trajectory_files
+from infthor_eval.formats.trajectory import TrajectorySource, iter_sources, trajectory_files
 
 __all__ = ["TrajectorySet", "find_again", "find_trajectories"]
 
@@ -40,7 +40,7 @@ class TrajectorySet(Generic[T]):
     broken: Sequence[tuple[str, str]]
 
 
-def find_trajectories(data: str | None, bundled: str | None, read: Callable[[Source], T]) -> TrajectorySet[T]:
+def find_trajectories(data: str | None, bundled: str | None, read: Callable[[TrajectorySource], T]) -> TrajectorySet[T]:
     """Read the trajectories.
 
     Args:
@@ -76,7 +76,7 @@ def find_trajectories(data: str | None, bundled: str | None, read: Callable[[Sou
 
 
 def find_again(
-    task: str, name: str, digest: str | None, data: str | None, bundled: object, read: Callable[[Source], D]
+    task: str, name: str, digest: str | None, data: str | None, bundled: object, read: Callable[[TrajectorySource], D]
 ) -> tuple[TrajectorySet[D], D]:
     """The trajectories that a run was made on, and one of them.
 
@@ -112,7 +112,7 @@ def _within(root: Path, text: str) -> str:
     return text.replace(f"{root if root.is_dir() else root.parent}/", "")
 
 
-def _sources(root: Path, broken: _Broken) -> Iterator[Source]:
+def _sources(root: Path, broken: _Broken) -> Iterator[TrajectorySource]:
     """What is there; files that cannot be read to their end are added to the broken ones.
 
     The trajectories of an NIEH set lie beside the logs of their replay.

@@ -6,17 +6,17 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 from infthor_eval.errors import DataError, wrap_errors
-from infthor_eval.formats.files import written_atomically
+from infthor_eval.formats.files import write_atomically
 from infthor_eval.formats.reading import read_text
 
-__all__ = ["read_rows", "unshielded", "write_sheet"]
+__all__ = ["read_rows", "unshield", "write_sheet"]
 
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")  # how spreadsheets recognise one
 _SHIELD = "'"  # how they recognise a text all the same
 
 
 def read_rows(
-    path: Path, columns: Sequence[str], mend: str, *, line_breaks: bool = False
+    path: Path, columns: Sequence[str], hint: str, *, line_breaks: bool = False
 ) -> Iterator[tuple[str, dict[str, str]]]:
     """The rows of a CSV file: each with its place, for messages, and its cells by column.
 
@@ -30,17 +30,17 @@ def read_rows(
         DataError: it cannot be read, lacks a column or has it twice, has a row of more cells than columns, or a quote
             that is not closed.
     """
-    text = read_text(path, mend)
+    text = read_text(path, hint)
     reader = csv.reader(io.StringIO(text, newline=""), strict=True)
-    with wrap_errors(f"{path}: not a UTF-8 CSV file", mend, catch=csv.Error):
+    with wrap_errors(f"{path}: not a UTF-8 CSV file", hint, catch=csv.Error):
         header = next(reader, [])
-        _check_header(path, header, columns, mend)
+        _check_header(path, header, columns, hint)
         for cells in reader:
             place = f"{path}, line {reader.line_num}"
             if not cells:
                 continue
             if len(cells) > len(header):
-                raise DataError(f"{place}: has {len(cells)} cells for {len(header)} columns; {mend}")
+                raise DataError(f"{place}: has {len(cells)} cells for {len(header)} columns; {hint}")
             row = dict.fromkeys(header, "") | dict(zip(header, cells, strict=False))
             broken = next((name for name, cell in row.items() if "\n" in cell or "\r" in cell), None)
             if broken is not None and not line_breaks:
@@ -48,10 +48,10 @@ def read_rows(
             yield place, row
 
 
-def _check_header(path: Path, header: Sequence[str], columns: Sequence[str], mend: str) -> None:
+def _check_header(path: Path, header: Sequence[str], columns: Sequence[str], hint: str) -> None:
     missing = [name for name in columns if name not in header]
     if missing:
-        raise DataError(f"{path}: no column {', '.join(missing)}; {mend}")
+        raise DataError(f"{path}: no column {', '.join(missing)}; {hint}")
     twice = next((name for name in header if name and header.count(name) > 1), None)
     if twice is not None:
         raise DataError(f"{path}: column {twice!r} stands twice; take one out")
@@ -63,13 +63,13 @@ def write_sheet(path: Path, columns: Sequence[str], rows: Iterable[Sequence[obje
     Raises:
         OSError: it cannot be written.
     """
-    with written_atomically(path) as partial, partial.open("w", newline="", encoding="utf-8") as file:
+    with write_atomically(path) as partial, partial.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(columns)
         writer.writerows([_shielded(str(cell)) for cell in row] for row in rows)
 
 
-def unshielded(cell: str) -> str:
+def unshield(cell: str) -> str:
     """What `write_sheet` was given for a cell."""
     return cell[1:] if cell.startswith(_SHIELD) and cell[1:].startswith((*_FORMULA, _SHIELD)) else cell
 

@@ -10,20 +10,20 @@ from pathlib import Path
 from infthor_eval.errors import DataError, wrap_errors
 
 __all__ = [
-    "INSTEAD_OF_LOSS",
-    "prepared_file",
-    "prepared_folder",
-    "refuse_loss",
+    "OVERWRITE_HINT",
+    "prepare_file",
+    "prepare_folder",
+    "refuse_overwrite",
     "require_writable",
-    "written_atomically",
+    "write_atomically",
 ]
 
-INSTEAD_OF_LOSS = "give another --out, or --overwrite if nobody edited it"
-_MEND = "make room, or give another place with"
+OVERWRITE_HINT = "give another --out, or --overwrite if nobody edited it"
+_HINT = "make room, or give another place with"
 _PROBE = b"x" * 4096  # a full disk may still take a name
 
 
-def prepared_folder(path: Path, option: str = "--out") -> Path:
+def prepare_folder(path: Path, option: str = "--out") -> Path:
     """Make a folder, and see that it can be written to; called before the work, which would be lost after it.
 
     Args:
@@ -34,7 +34,7 @@ def prepared_folder(path: Path, option: str = "--out") -> Path:
         DataError: it is a file, or cannot be made or written to.
     """
     require_writable(path, option)
-    with wrap_errors(f"{path}: cannot be written to", f"{_MEND} {option}"):
+    with wrap_errors(f"{path}: cannot be written to", f"{_HINT} {option}"):
         path.mkdir(parents=True, exist_ok=True)
     return path
 
@@ -50,7 +50,7 @@ def require_writable(path: Path, option: str = "--out") -> None:
         DataError: it cannot.
     """
     with wrap_errors(
-        f"{path}: cannot be written to", f"{_MEND} {option}", catch=(OSError, ValueError)
+        f"{path}: cannot be written to", f"{_HINT} {option}", catch=(OSError, ValueError)
     ):  # ValueError: a null
         there = next(folder for folder in (path, *path.absolute().parents) if _is_there(folder))
         with tempfile.TemporaryFile(dir=there) as probe:
@@ -68,7 +68,7 @@ def _is_there(path: Path) -> bool:
     return True
 
 
-def prepared_file(path: Path, option: str = "--out") -> Path:
+def prepare_file(path: Path, option: str = "--out") -> Path:
     """See that a file can be written, or replaced; called before the work.
 
     Args:
@@ -78,14 +78,14 @@ def prepared_file(path: Path, option: str = "--out") -> Path:
     Raises:
         DataError: it is a folder, a pipe or a device, or its folder cannot be written to.
     """
-    prepared_folder(path.parent, option)
-    with wrap_errors(f"{path}: cannot be written to", f"{_MEND} {option}"):
+    prepare_folder(path.parent, option)
+    with wrap_errors(f"{path}: cannot be written to", f"{_HINT} {option}"):
         if path.exists() and not path.is_file():
             raise DataError(f"{path}: is not a file; give another place with {option}")
     return path
 
 
-def refuse_loss(path: Path, content: bytes) -> None:
+def refuse_overwrite(path: Path, content: bytes) -> None:
     """Refuse to replace a file by another content: somebody may have edited it.
 
     Args:
@@ -95,13 +95,13 @@ def refuse_loss(path: Path, content: bytes) -> None:
     Raises:
         DataError: the file holds something else.
     """
-    with wrap_errors(f"{path}: cannot be read", INSTEAD_OF_LOSS):
+    with wrap_errors(f"{path}: cannot be read", OVERWRITE_HINT):
         if path.is_file() and path.read_bytes() != content:
-            raise DataError(f"{path}: is there already and holds something else; {INSTEAD_OF_LOSS}")
+            raise DataError(f"{path}: is there already and holds something else; {OVERWRITE_HINT}")
 
 
 @contextmanager
-def written_atomically(path: Path) -> Iterator[Path]:
+def write_atomically(path: Path) -> Iterator[Path]:
     """Write a file or a folder beside its place, and put it there when all of it is written.
 
     Args:

@@ -16,7 +16,7 @@ import numpy as np
 
 from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.formats.digests import digest_of_files
-from infthor_eval.formats.files import INSTEAD_OF_LOSS, refuse_loss, written_atomically
+from infthor_eval.formats.files import OVERWRITE_HINT, refuse_overwrite, write_atomically
 from infthor_eval.formats.reading import json_lines_of
 
 __all__ = ["floor_plan_names", "floor_plans_digest", "write_floor_plan"]
@@ -70,17 +70,17 @@ def write_floor_plan(
     layout = _layout(root, scene, objects, cells)
     if not overwrite:
         if recorded.get(scene, line) != line:
-            raise DataError(f"{path}: has {scene} already and holds something else of it; {INSTEAD_OF_LOSS}")
+            raise DataError(f"{path}: has {scene} already and holds something else of it; {OVERWRITE_HINT}")
         for file, content in layout.items():
-            refuse_loss(file, content)
+            refuse_overwrite(file, content)
     kept = [other for name, other in recorded.items() if name != scene]
     with wrap_errors(f"{path}: {scene} cannot be added", "give another folder"):
         for file, content in layout.items():
             file.parent.mkdir(parents=True, exist_ok=True)
-            with written_atomically(file) as partial:
+            with write_atomically(file) as partial:
                 partial.write_bytes(content)
         path.parent.mkdir(parents=True, exist_ok=True)
-        with written_atomically(path) as partial, gzip.open(partial, "wt", encoding="utf-8") as packed:
+        with write_atomically(path) as partial, gzip.open(partial, "wt", encoding="utf-8") as packed:
             packed.writelines(f"{text}\n" for text in [*kept, line])
 
 

@@ -17,7 +17,7 @@ from PIL import Image
 from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.formats.digests import digest_of_file
 from infthor_eval.formats.limits import IMAGE_ASPECT, IMAGE_MEGAPIXELS
-from infthor_eval.formats.reading import require_file, why_no_file
+from infthor_eval.formats.reading import file_problem, require_file
 
 __all__ = ["FrameRef"]
 
@@ -26,7 +26,7 @@ Image.MAX_IMAGE_PIXELS = None  # how large an image may be is judged here, and c
 _PNG = b"\x89PNG\r\n\x1a\n"
 _SIGNATURES = (_PNG, b"\xff\xd8\xff")  # PNG, JPEG
 _HEAD = 24  # bytes, of a PNG to behind its size
-_MEND = "restore the frame"
+_HINT = "restore the frame"
 # What Pillow's decoders raise on headers and content that somebody damaged or made up.
 _DAMAGED = (
     OSError,
@@ -57,8 +57,8 @@ class FrameRef:
         Raises:
             DataError: the file cannot be read.
         """
-        require_file(self.path, _MEND)
-        with wrap_errors(f"{self.path}: cannot be read", _MEND):
+        require_file(self.path, _HINT)
+        with wrap_errors(f"{self.path}: cannot be read", _HINT):
             return digest_of_file(self.path)
 
     @cached_property
@@ -73,7 +73,7 @@ class FrameRef:
 
     def problem(self) -> str | None:
         """Why this cannot be a frame, judged by the first bytes alone; None where nothing speaks against it."""
-        reason = why_no_file(self.path)
+        reason = file_problem(self.path)
         if reason is not None:
             return f"{self.path}: {reason}"
         try:
@@ -96,14 +96,14 @@ class FrameRef:
 
     @contextmanager
     def _opened(self) -> Iterator[Image.Image]:
-        require_file(self.path, _MEND)
+        require_file(self.path, _HINT)
         with (
-            wrap_errors(f"{self.path}: not a readable image", _MEND, catch=_DAMAGED),
+            wrap_errors(f"{self.path}: not a readable image", _HINT, catch=_DAMAGED),
             Image.open(self.path, formats=("PNG", "JPEG")) as image,
         ):
             problem = self._wrong_size(*image.size)
             if problem is not None:
-                raise DataError(f"{problem}; {_MEND}")
+                raise DataError(f"{problem}; {_HINT}")
             yield image
 
     def _wrong_size(self, width: int, height: int) -> str | None:
@@ -111,9 +111,9 @@ class FrameRef:
         if min(width, height) < 1:
             return f"{self.path}: an image of {width}x{height} pixels"
         if width * height > IMAGE_MEGAPIXELS.value * 1_000_000:
-            return f"{self.path}: an image of {width}x{height} pixels is too large; {IMAGE_MEGAPIXELS.mend}"
+            return f"{self.path}: an image of {width}x{height} pixels is too large; {IMAGE_MEGAPIXELS.hint}"
         if max(width, height) > IMAGE_ASPECT.value * min(width, height):
-            return f"{self.path}: an image of {width}x{height} pixels is too narrow; {IMAGE_ASPECT.mend}"
+            return f"{self.path}: an image of {width}x{height} pixels is too narrow; {IMAGE_ASPECT.hint}"
         return None
 
 

@@ -50,7 +50,7 @@ class Limit:
         return int(given)
 
     @property
-    def mend(self) -> str:
+    def hint(self) -> str:
         """How to raise it."""
         return f"if it is meant, set {self.name} to more than {self.value}"
 

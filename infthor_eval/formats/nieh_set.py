@@ -27,7 +27,7 @@ __all__ = ["NiehSet", "SkippedQuestion"]
 
 T = TypeVar("T")
 _LONGEST = 40  # characters of a name in a message
-_MEND = "unpack the trajectory again"
+_HINT = "unpack the trajectory again"
 _GIVE_A_SET = "give the folder of an NIEH set, or fetch the published one: fetch nieh"  # wherever it was to be given
 _IMAGE_FOLDERS = ("img", "img_768")
 _IMAGE_SUFFIXES = {".png", ".jpg", ".jpeg"}
@@ -163,7 +163,7 @@ class NiehSet:
         return self._outlines[traj_id]
 
     @property
-    def no_outline(self) -> str:
+    def missing_outline(self) -> str:
         """Why a trajectory's own file is not there."""
         place = "metadata/" if self.trajectories is None else f"{self.trajectories}"
         return f"the trajectory's JSON is not in {place}; name its folder with --trajectories"
@@ -238,7 +238,7 @@ def _once(known: dict[str, T | DataError], traj_id: str, read: Callable[[], T]) 
 
 def _read_frames(folder: Path) -> dict[int, FrameRef]:
     """Frames by their number (`img_idx`), in time order."""
-    with wrap_errors(f"trajectory {folder.name[:_LONGEST]}: its folder cannot be read", _MEND):
+    with wrap_errors(f"trajectory {folder.name[:_LONGEST]}: its folder cannot be read", _HINT):
         if not folder.is_dir():
             raise DataError(f"trajectory {folder.name} is not in metadata/")
     steps = sorted(read_steps(folder), key=lambda step: step.img_idx)
@@ -248,14 +248,14 @@ def _read_frames(folder: Path) -> dict[int, FrameRef]:
     for alike, what in ((_twice(names), "img_filename"), (_twice([step.img_idx for step in steps]), "img_idx")):
         if alike is not None:
             raise DataError(
-                f"trajectory {folder.name}: metadata.json numbers two frames alike ({what} {alike}); {_MEND}"
+                f"trajectory {folder.name}: metadata.json numbers two frames alike ({what} {alike}); {_HINT}"
             )
     by_stem = _images(home)
     unknown = sorted(by_stem.keys() - set(names))
     if len(unknown) > len(set(names) - by_stem.keys()):  # a frame under another name is one that is missing
         raise DataError(
             f"trajectory {folder.name}: {len(by_stem)} frames but {len(steps)} entries in metadata.json "
-            f"(none for {unknown[0]}); {_MEND}"
+            f"(none for {unknown[0]}); {_HINT}"
         )
     # A file that is missing spoils the questions that show it, and no other: whoever asks for it is told.
     return {
@@ -268,7 +268,7 @@ def _image_folder(folder: Path) -> Path:
     for name in _IMAGE_FOLDERS:
         if (folder / name).is_dir():
             return folder / name
-    raise DataError(f"trajectory {folder.name}: neither img/ nor img_768/ in {folder}; {_MEND}")
+    raise DataError(f"trajectory {folder.name}: neither img/ nor img_768/ in {folder}; {_HINT}")
 
 
 def _images(folder: Path) -> dict[str, Path]:

@@ -35,7 +35,7 @@ class PublishedRow(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     parameters: float
     values: tuple[float, ...]
 
-    def is_of(self, model: Mapping[str, Any]) -> bool:
+    def matches(self, model: Mapping[str, Any]) -> bool:
         """Whether a run's model, by its identity, is the one that this row is about."""
         checkpoint = str(model.get("checkpoint", "")).rstrip("/").rpartition("/")[2].lower()
         if checkpoint not in {name.rpartition("/")[2].lower() for name in self.checkpoints}:

@@ -15,7 +15,7 @@ from typing import Any
 
 from infthor_eval.errors import DataError
 from infthor_eval.formats.csv_files import read_rows
-from infthor_eval.formats.files import written_atomically
+from infthor_eval.formats.files import write_atomically
 from infthor_eval.formats.question import Question
 
 __all__ = ["encode_questions", "read_questions", "write_questions"]
@@ -32,13 +32,13 @@ def read_questions(path: Path) -> list[Question]:
     Raises:
         DataError: the file cannot be read, is no CSV file of that form, or a cell is not what the column holds.
     """
-    mend = f"a question file is a UTF-8 CSV file with the columns {', '.join(_COLUMNS)}"
-    return [_question(row, place) for place, row in read_rows(path, _COLUMNS, mend)]
+    hint = f"a question file is a UTF-8 CSV file with the columns {', '.join(_COLUMNS)}"
+    return [_question(row, place) for place, row in read_rows(path, _COLUMNS, hint)]
 
 
 def write_questions(path: Path, questions: Iterable[Question]) -> None:
     """Write a question file, whole or not at all."""
-    with written_atomically(path) as partial:
+    with write_atomically(path) as partial:
         partial.write_bytes(encode_questions(questions))
 
 

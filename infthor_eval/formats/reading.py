@@ -22,6 +22,7 @@ from infthor_eval.formats.limits import FILE_MB, LINE_MB
 
 __all__ = [
     "DAMAGED",
+    "file_problem",
     "json_lines_of",
     "lines_of",
     "read_bytes",
@@ -29,7 +30,6 @@ __all__ = [
     "read_text",
     "require_file",
     "require_plain_files",
-    "why_no_file",
 ]
 
 T = TypeVar("T")
@@ -39,7 +39,7 @@ DAMAGED = (EOFError, zlib.error, lzma.LZMAError)
 _MB = 2**20
 
 
-def why_no_file(path: Path) -> str | None:
+def file_problem(path: Path) -> str | None:
     """Why a file cannot be opened without waiting, or is none; None where it can."""
     try:
         mode = path.stat().st_mode
@@ -50,7 +50,7 @@ def why_no_file(path: Path) -> str | None:
     return "is a folder, not a file" if stat.S_ISDIR(mode) else "is a pipe or a device, not a file"
 
 
-def require_file(path: Path, mend: str, max_mb: int | None = None) -> None:
+def require_file(path: Path, hint: str, max_mb: int | None = None) -> None:
     """Refuse what is no file that can be read.
 
     Args:
@@ -61,26 +61,26 @@ def require_file(path: Path, mend: str, max_mb: int | None = None) -> None:
     Raises:
         DataError: it is not there, a folder, a pipe or a device, or too large.
     """
-    reason = why_no_file(path)
+    reason = file_problem(path)
     if reason is not None:
-        raise DataError(f"{path}: {reason}; {mend}")
+        raise DataError(f"{path}: {reason}; {hint}")
     if max_mb is not None and path.stat().st_size > max_mb * _MB:
-        raise DataError(f"{path}: is larger than {max_mb} MiB; {FILE_MB.mend}")
+        raise DataError(f"{path}: is larger than {max_mb} MiB; {FILE_MB.hint}")
 
 
-def require_plain_files(folder: Path, mend: str) -> None:
+def require_plain_files(folder: Path, hint: str) -> None:
     """Refuse a folder with pipes or devices in it, for what another library reads of it.
 
     Raises:
         DataError: it has one, or a link that leads nowhere.
     """
-    with wrap_errors(f"{folder}: cannot be read", mend):
+    with wrap_errors(f"{folder}: cannot be read", hint):
         for path in sorted(folder.iterdir()):
             if not path.is_dir():
-                require_file(path, mend)
+                require_file(path, hint)
 
 
-def read_bytes(path: Path, mend: str) -> bytes:
+def read_bytes(path: Path, hint: str) -> bytes:
     """The content of a file.
 
     Args:
@@ -90,26 +90,26 @@ def read_bytes(path: Path, mend: str) -> bytes:
     Raises:
         DataError: no file, too large, or it cannot be read.
     """
-    require_file(path, mend, FILE_MB.value)
-    with wrap_errors(f"{path}: cannot be read", mend):
+    require_file(path, hint, FILE_MB.value)
+    with wrap_errors(f"{path}: cannot be read", hint):
         return path.read_bytes()
 
 
-def read_text(path: Path, mend: str) -> str:
+def read_text(path: Path, hint: str) -> str:
     """The content of a UTF-8 file, without a byte order mark, its line ends as they are.
 
     Raises:
         DataError: as `read_bytes`, or it is not UTF-8.
     """
-    with wrap_errors(f"{path}: not UTF-8 text", mend, catch=UnicodeDecodeError):
-        return read_bytes(path, mend).decode("utf-8-sig")
+    with wrap_errors(f"{path}: not UTF-8 text", hint, catch=UnicodeDecodeError):
+        return read_bytes(path, hint).decode("utf-8-sig")
 
 
 @overload
-def read_json(path: Path, mend: str) -> Any: ...
+def read_json(path: Path, hint: str) -> Any: ...
 @overload
-def read_json(path: Path, mend: str, form: type[T]) -> T: ...
-def read_json(path: Path, mend: str, form: Any = Any) -> Any:
+def read_json(path: Path, hint: str, form: type[T]) -> T: ...
+def read_json(path: Path, hint: str, form: Any = Any) -> Any:
     """What a JSON file holds, in the form of a type.
 
     Args:
@@ -120,19 +120,19 @@ def read_json(path: Path, mend: str, form: Any = Any) -> Any:
     Raises:
         DataError: as `read_bytes`; not JSON, nested too deep, or of another form.
     """
-    content = read_bytes(path, mend)
+    content = read_bytes(path, hint)
     wanted = "valid JSON" if form is Any else "in its documented form"
-    with wrap_errors(f"{path}: not {wanted}", mend, catch=(msgspec.DecodeError, UnicodeDecodeError, RecursionError)):
+    with wrap_errors(f"{path}: not {wanted}", hint, catch=(msgspec.DecodeError, UnicodeDecodeError, RecursionError)):
         return msgspec.json.decode(content, type=form)
 
 
-def lines_of(path: Path, mend: str) -> Iterator[tuple[int, bytes]]:
+def lines_of(path: Path, hint: str) -> Iterator[tuple[int, bytes]]:
     """The lines of a file, packed by gzip if it is called `.gz`, that are not empty, with their numbers from 1.
 
     Raises:
         DataError: no file, damaged, or a line or the whole is longer than the limits.
     """
-    require_file(path, mend)
+    require_file(path, hint)
     number = 0
     try:
         with _opened(path) as file:
@@ -140,26 +140,26 @@ def lines_of(path: Path, mend: str) -> Iterator[tuple[int, bytes]]:
             while line := file.readline(LINE_MB.value * _MB + 1):
                 number, left = number + 1, left - len(line)
                 if len(line) > LINE_MB.value * _MB:
-                    raise DataError(f"{path}, line {number}: is longer than {LINE_MB.value} MiB; {LINE_MB.mend}")
+                    raise DataError(f"{path}, line {number}: is longer than {LINE_MB.value} MiB; {LINE_MB.hint}")
                 if left < 0:
-                    raise DataError(f"{path}: is longer than {FILE_MB.value} MiB; {FILE_MB.mend}")
+                    raise DataError(f"{path}: is longer than {FILE_MB.value} MiB; {FILE_MB.hint}")
                 if line.strip():
                     yield number, line
     except (OSError, *DAMAGED) as error:
-        raise DataError(f"{path}: cannot be read after line {number} ({in_one_line(error)}); {mend}") from error
+        raise DataError(f"{path}: cannot be read after line {number} ({in_one_line(error)}); {hint}") from error
 
 
-def json_lines_of(path: Path, mend: str) -> Iterator[dict[str, Any]]:
+def json_lines_of(path: Path, hint: str) -> Iterator[dict[str, Any]]:
     """The JSON objects of a file with one a line.
 
     Raises:
         DataError: as `lines_of`, or a line is no JSON object.
     """
-    for number, line in lines_of(path, mend):
-        with wrap_errors(f"{path}, line {number}: not JSON", mend, catch=(ValueError, RecursionError)):
+    for number, line in lines_of(path, hint):
+        with wrap_errors(f"{path}, line {number}: not JSON", hint, catch=(ValueError, RecursionError)):
             found = json.loads(line)
         if not isinstance(found, dict):
-            raise DataError(f"{path}, line {number}: not a JSON object; {mend}")
+            raise DataError(f"{path}, line {number}: not a JSON object; {hint}")
         yield found
 
 

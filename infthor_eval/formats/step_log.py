@@ -19,10 +19,19 @@ import msgspec
 from infthor_eval.errors import DataError
 from infthor_eval.formats.reading import read_json
 
-__all__ = ["ObjectLog", "ObjectState", "Pose", "Seen", "Step", "read_steps", "worlds", "write_steps"]
+__all__ = [
+    "LoggedPose",
+    "ObjectInFrame",
+    "ObjectLog",
+    "ObjectState",
+    "Step",
+    "iter_object_states",
+    "read_steps",
+    "write_steps",
+]
 
 _FILE = "metadata.json"
-_MEND = "replay the trajectory again or restore the published file"
+_HINT = "replay the trajectory again or restore the published file"
 
 
 class ObjectLog(msgspec.Struct, omit_defaults=False):
@@ -45,7 +54,7 @@ class ObjectLog(msgspec.Struct, omit_defaults=False):
     recep_objs: dict[str, list[str]] = msgspec.field(default_factory=dict)
 
 
-class Pose(msgspec.Struct):
+class LoggedPose(msgspec.Struct):
     """Where the agent is: position in metres, rotation about the vertical and camera horizon in degrees."""
 
     x: float
@@ -55,7 +64,7 @@ class Pose(msgspec.Struct):
     horizon: float
 
 
-class Seen(msgspec.Struct, omit_defaults=True):
+class ObjectInFrame(msgspec.Struct, omit_defaults=True):
     """One object instance as it appears in a frame.
 
     Attributes:
@@ -125,10 +134,10 @@ class Step(msgspec.Struct, omit_defaults=True):
     success: bool = True
     error: str | None = None
     high_idx: int | None = None
-    pose: Pose | None = None
+    pose: LoggedPose | None = None
     target: str | None = None
     receptacle: str | None = None
-    seen: dict[str, Seen] | None = None
+    seen: dict[str, ObjectInFrame] | None = None
     changes: dict[str, ObjectState] = msgspec.field(default_factory=dict)
 
 
@@ -145,7 +154,7 @@ def read_steps(folder: Path) -> list[Step]:
         DataError: the file is missing, not JSON, or not in one of the known layouts.
     """
     path = Path(folder) / _FILE
-    document = read_json(path, _MEND)
+    document = read_json(path, _HINT)
     return [_step(path, index, entry) for index, entry in enumerate(_entries(path, document))]
 
 
@@ -160,7 +169,7 @@ def write_steps(folder: Path, steps: Sequence[Step]) -> None:
     (Path(folder) / _FILE).write_bytes(b"[\n" + lines + b"\n]\n")
 
 
-def worlds(steps: Sequence[Step]) -> Iterator[dict[str, ObjectState]]:
+def iter_object_states(steps: Sequence[Step]) -> Iterator[dict[str, ObjectState]]:
     """The state of all objects at each step, from the changes that the log holds.
 
     Yields:
@@ -177,7 +186,7 @@ def _entries(path: Path, document: object) -> list[dict[str, Any]]:
     if isinstance(document, list):
         return document
     if not isinstance(document, dict) or "img_idx" not in document:
-        raise DataError(f"{path}: neither a list of entries nor columns with 'img_idx'; {_MEND}")
+        raise DataError(f"{path}: neither a list of entries nor columns with 'img_idx'; {_HINT}")
     if not isinstance(document["img_idx"], list):
         return [document]
     return _rows(path, document)
@@ -189,7 +198,7 @@ def _rows(path: Path, columns: dict[str, Any]) -> list[dict[str, Any]]:
     wanted = len(columns["img_idx"])
     for name, column in lists.items():
         if len(column) != wanted:
-            raise DataError(f"{path}: column '{name}' has {len(column)} entries, 'img_idx' has {wanted}; {_MEND}")
+            raise DataError(f"{path}: column '{name}' has {len(column)} entries, 'img_idx' has {wanted}; {_HINT}")
     return [dict(zip(lists, row, strict=True)) for row in zip(*lists.values(), strict=True)]
 
 
@@ -200,4 +209,4 @@ def _step(path: Path, index: int, entry: object) -> Step:
     try:
         return msgspec.convert(entry, Step)
     except msgspec.ValidationError as error:
-        raise DataError(f"{path}: entry {index}: {error}; {_MEND}") from error
+        raise DataError(f"{path}: entry {index}: {error}; {_HINT}") from error

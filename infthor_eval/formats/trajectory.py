@@ -20,19 +20,19 @@ from infthor_eval.formats.reading import lines_of, read_bytes
 __all__ = [
     "ApiAction",
     "DiscreteAction",
+    "ExpertPlan",
     "HighAction",
     "InitAction",
     "LowAction",
     "ObjectPose",
-    "Plan",
     "PlannerAction",
     "Scene",
-    "Source",
     "SubTask",
     "SubTrajectory",
     "TaskInfo",
     "Toggle",
     "Trajectory",
+    "TrajectorySource",
     "encode_trajectory",
     "folder_name",
     "iter_sources",
@@ -43,7 +43,7 @@ __all__ = [
 _SUFFIXES = (".json", ".jsonl", ".jsonl.gz")
 # What a replayed set holds beside its trajectories.
 _NOT_TRAJECTORIES = {"metadata.json", "expert_log.json", "state_summary.json"}
-_MEND = "restore the file or leave it out"
+_HINT = "restore the file or leave it out"
 _ALWAYS: dict[str, Callable[[], Any]] = {"long_horizon_task": dict, "sub_tasks": list, "sub_trajs": list}
 
 
@@ -148,7 +148,7 @@ class HighAction(_Fields, omit_defaults=False):
     planner_action: PlannerAction
 
 
-class Plan(_Fields, omit_defaults=False):
+class ExpertPlan(_Fields, omit_defaults=False):
     """The expert's plan at both levels."""
 
     low_actions: list[LowAction]
@@ -187,7 +187,7 @@ class Trajectory(_Fields):
     text)."""
 
     scene: Scene
-    plan: Plan
+    plan: ExpertPlan
     traj_id: str = ""
     task_id: str = ""
     task_type: str | None = None
@@ -203,7 +203,7 @@ class Trajectory(_Fields):
 
 
 @dataclass(frozen=True)
-class Source:
+class TrajectorySource:
     """One trajectory where it lies, not yet decoded, so that a malformed one does not hide the others.
 
     Attributes:
@@ -230,7 +230,7 @@ class Source:
         try:
             trajectory = msgspec.convert(_regular(msgspec.json.decode(self.raw)), type=Trajectory)
         except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-            raise DataError(f"{self.place}: not a trajectory ({error}); {_MEND}") from error
+            raise DataError(f"{self.place}: not a trajectory ({error}); {_HINT}") from error
         trajectory.traj_id = trajectory.traj_id or trajectory.task_id or self._stem()
         return trajectory
 
@@ -239,7 +239,7 @@ class Source:
         return stem if self.line is None else f"{stem}-{self.line}"
 
 
-def iter_sources(path: Path) -> Iterator[Source]:
+def iter_sources(path: Path) -> Iterator[TrajectorySource]:
     """Find the trajectories in a file (`.json`, `.jsonl`, `.jsonl.gz`) or a directory of such files.
 
     Yields:
@@ -253,9 +253,9 @@ def iter_sources(path: Path) -> Iterator[Source]:
         for file in trajectory_files(path):
             yield from iter_sources(file)
     elif path.name.endswith(".json"):
-        yield Source(path, None, read_bytes(path, _MEND))
+        yield TrajectorySource(path, None, read_bytes(path, _HINT))
     elif path.name.endswith((".jsonl", ".jsonl.gz")):
-        yield from (Source(path, line, raw) for line, raw in lines_of(path, _MEND))
+        yield from (TrajectorySource(path, line, raw) for line, raw in lines_of(path, _HINT))
     else:
         raise DataError(f"{path}: no trajectory file; name a {', '.join(_SUFFIXES)} file or a directory")
 

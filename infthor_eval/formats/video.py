@@ -24,7 +24,7 @@ __all__ = ["frames_per_second"]
 os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
 
 _COUNT = "n_frames"  # the file with the number of frames beside them
-_MEND = "make the video again, or delete it to show the frames instead"
+_HINT = "make the video again, or delete it to show the frames instead"
 
 
 def frames_per_second(path: Path) -> tuple[FrameRef, ...]:
@@ -38,8 +38,8 @@ def frames_per_second(path: Path) -> tuple[FrameRef, ...]:
     """
     import cv2
 
-    require_file(path, _MEND)
-    with wrap_errors(f"{path}: cannot be read", _MEND):
+    require_file(path, _HINT)
+    with wrap_errors(f"{path}: cannot be read", _HINT):
         digest = digest_of_file(path)
     folder = user_cache("video_frames") / f"{digest}-1fps-opencv{cv2.__version__}"
     if not _is_complete(folder):
@@ -80,18 +80,18 @@ def _decode(path: Path, folder: Path) -> None:
     try:
         fps, promised = video.get(cv2.CAP_PROP_FPS), int(video.get(cv2.CAP_PROP_FRAME_COUNT))
         if not video.isOpened() or not fps > 0:
-            raise DataError(f"{path}: not a video that OpenCV can decode; {_MEND}")
+            raise DataError(f"{path}: not a video that OpenCV can decode; {_HINT}")
         n_frames = n_sampled = 0
         while video.grab():
             if n_frames >= n_sampled * fps - 0.5:
                 decoded, pixels = video.retrieve()
                 if not decoded:
-                    raise DataError(f"{path}: frame {n_frames} cannot be decoded; {_MEND}")
+                    raise DataError(f"{path}: frame {n_frames} cannot be decoded; {_HINT}")
                 Image.fromarray(pixels[:, :, ::-1]).save(folder / f"{n_sampled:09d}.png")
                 n_sampled += 1
             n_frames += 1
     finally:
         video.release()
     if not n_sampled or n_frames < promised - fps:
-        raise DataError(f"{path}: only {n_frames} of its {promised} frames can be decoded; {_MEND}")
+        raise DataError(f"{path}: only {n_frames} of its {promised} frames can be decoded; {_HINT}")
     (folder / _COUNT).write_text(str(n_sampled))

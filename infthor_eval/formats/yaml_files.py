@@ -16,7 +16,7 @@ class PlainLoader(yaml.SafeLoader):
     """Plain YAML; what it is derived for are tags of a file's own."""
 
 
-def read_yaml(path: Path, mend: str, loader: type[PlainLoader] = PlainLoader) -> Any:
+def read_yaml(path: Path, hint: str, loader: type[PlainLoader] = PlainLoader) -> Any:
     """What a YAML file holds.
 
     Args:
@@ -27,8 +27,8 @@ def read_yaml(path: Path, mend: str, loader: type[PlainLoader] = PlainLoader) ->
     Raises:
         DataError: it cannot be read, is no YAML, holds itself, or more than the limit once its aliases are written out.
     """
-    text = read_text(path, mend)
-    with wrap_errors(f"{path}: not YAML", mend, catch=(yaml.YAMLError, RecursionError, ValueError, TypeError)):
+    text = read_text(path, hint)
+    with wrap_errors(f"{path}: not YAML", hint, catch=(yaml.YAMLError, RecursionError, ValueError, TypeError)):
         reader = loader(text)
         try:
             node = reader.get_single_node()
@@ -55,7 +55,7 @@ def _judge(root: yaml.Node, path: Path) -> None:
         return sizes[id(node)]
 
     if size(root) > ALIAS_NODES.value:
-        raise DataError(f"{path}: holds more than {ALIAS_NODES.value} values; {ALIAS_NODES.mend}")
+        raise DataError(f"{path}: holds more than {ALIAS_NODES.value} values; {ALIAS_NODES.hint}")
 
 
 def _children(node: yaml.Node, path: Path) -> list[yaml.Node]:

@@ -7,11 +7,11 @@ import msgspec
 
 from infthor_eval import __version__
 from infthor_eval.formats.trajectory import (
+    ExpertPlan,
     HighAction,
     InitAction,
     LowAction,
     ObjectPose,
-    Plan,
     Scene,
     SubTask,
     SubTrajectory,
@@ -125,7 +125,7 @@ class Draft:
         """
         return Trajectory(
             scene=self._scene,
-            plan=Plan(self._low, self._high),
+            plan=ExpertPlan(self._low, self._high),
             traj_id=self._settings.traj_id,
             sub_tasks=self._sub_tasks,
             sub_trajs=self._sub_trajs,

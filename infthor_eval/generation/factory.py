@@ -119,10 +119,10 @@ class _Factory:
         """
         if self._first_that_works(lambda _: True) is None:
             reasons = "; ".join(f"{reason} ({count})" for reason, count in self._statistics.reasons.most_common(3))
-            mend = "choose another scene or seed" + (" or a higher --max-fail" if self._out_of_tries else "")
+            hint = "choose another scene or seed" + (" or a higher --max-fail" if self._out_of_tries else "")
             raise UsageError(
                 f"{self._name}: no further task works after {self._draft.length.low} steps and "
-                f"{self._failures} failed tasks ({reasons or 'nothing there to do'}); {mend}"
+                f"{self._failures} failed tasks ({reasons or 'nothing there to do'}); {hint}"
             )
 
     def finish(self) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 import msgspec
 
 from infthor_eval.errors import InfthorError, UsageError, wrap_errors
-from infthor_eval.formats.files import written_atomically
+from infthor_eval.formats.files import write_atomically
 from infthor_eval.formats.trajectory import encode_trajectory, iter_sources
 from infthor_eval.generation.factory import GeneratedTrajectory, TaskStatistics, generate
 from infthor_eval.generation.garbage import libraries_set_aside
@@ -218,7 +218,7 @@ def _write(made: GeneratedTrajectory, path: Path) -> None:
         (folder / "domain.pddl").write_text(DOMAIN)
         for number, problem in enumerate(made.problems):
             (folder / f"task-{number:03d}.pddl").write_text(problem)
-        with written_atomically(path) as partial:  # it comes last: where it is, everything is
+        with write_atomically(path) as partial:  # it comes last: where it is, everything is
             partial.write_bytes(encode_trajectory(made.trajectory))
 
 

@@ -35,7 +35,7 @@ def trajectory_jobs(
         UsageError: there would be more of them than the limit.
     """
     if count * len(scenes) > TRAJECTORIES.value:
-        raise UsageError(f"{count} trajectories for each of {len(scenes)} scenes are too many; {TRAJECTORIES.mend}")
+        raise UsageError(f"{count} trajectories for each of {len(scenes)} scenes are too many; {TRAJECTORIES.hint}")
     seeds = range(seed, seed + count)
     return [
         TrajectorySettings(scene, k, min_steps, min_subgoals, final_task, max_fail=max_fail)

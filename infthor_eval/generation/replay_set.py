@@ -16,10 +16,10 @@ import msgspec
 
 from infthor_eval.errors import DataError, InfthorError, SimulatorError, wrap_errors
 from infthor_eval.formats.digests import digest
-from infthor_eval.formats.files import written_atomically
+from infthor_eval.formats.files import write_atomically
 from infthor_eval.formats.reading import read_json
 from infthor_eval.formats.set_info import claim_for_simulator
-from infthor_eval.formats.trajectory import Source, Trajectory, folder_name, iter_sources, trajectory_files
+from infthor_eval.formats.trajectory import Trajectory, TrajectorySource, folder_name, iter_sources, trajectory_files
 from infthor_eval.generation.garbage import libraries_set_aside
 from infthor_eval.generation.replay import ReplayReport, replay
 from infthor_eval.thor.launch import Launch
@@ -45,7 +45,7 @@ class Failure:
 class Selection:
     """The trajectories to replay, and those that could not even be read."""
 
-    items: list[tuple[Source, Trajectory]] = field(default_factory=list)
+    items: list[tuple[TrajectorySource, Trajectory]] = field(default_factory=list)
     failures: list[Failure] = field(default_factory=list)
 
 
@@ -96,7 +96,7 @@ def select(paths: Iterable[Path], limit: int | None = None, per_floor_plan: int 
     return selection
 
 
-Item = tuple[Source, Trajectory]
+Item = tuple[TrajectorySource, Trajectory]
 
 
 @dataclass(frozen=True)
@@ -234,7 +234,7 @@ def _failed(item: Item, error: InfthorError) -> _Outcome:
     return _Outcome(failure=Failure(source.place, f"{trajectory.traj_id}: {error}"))
 
 
-def _all_sources(paths: Iterable[Path], failures: list[Failure]) -> Iterator[Source]:
+def _all_sources(paths: Iterable[Path], failures: list[Failure]) -> Iterator[TrajectorySource]:
     """What is in the files; one of several that cannot be read to its end is a failure, and the others go on."""
     for path in paths:
         files = trajectory_files(path)
@@ -250,7 +250,7 @@ def _all_sources(paths: Iterable[Path], failures: list[Failure]) -> Iterator[Sou
                 failures.append(Failure(str(file), str(error)))
 
 
-def _malformed(source: Source) -> AbstractContextManager[None]:
+def _malformed(source: TrajectorySource) -> AbstractContextManager[None]:
     """Names what a trajectory that is JSON of the right form can still be wrong in."""
     wrong = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError)
     return wrap_errors(
@@ -259,7 +259,7 @@ def _malformed(source: Source) -> AbstractContextManager[None]:
 
 
 def _one(
-    source: Source, trajectory: Trajectory, simulator: Simulator, metadata: Path, frames: int
+    source: TrajectorySource, trajectory: Trajectory, simulator: Simulator, metadata: Path, frames: int
 ) -> tuple[ReplayReport, bool]:
     """The report of one trajectory, and whether it was made now."""
     content = source.raw.strip()
@@ -268,7 +268,7 @@ def _one(
         return _earlier(final, digest(content), frames), False
     started = time.monotonic()
     try:
-        with written_atomically(final) as partial:
+        with write_atomically(final) as partial:
             partial.mkdir()
             report = replay(trajectory, simulator, partial, digest(content), frames)
             report.seconds = round(time.monotonic() - started, 3)

@@ -12,7 +12,7 @@ from typing import Any
 
 from infthor_eval.errors import wrap_errors
 from infthor_eval.formats.digests import canonical_json
-from infthor_eval.formats.files import written_atomically
+from infthor_eval.formats.files import write_atomically
 from infthor_eval.harness.registration import NAME
 from infthor_eval.runs import RunOutcome, TaskFile, UnitRecord, UnitSample
 from infthor_eval.statistics import clustered_mean
@@ -64,10 +64,10 @@ def export(outcome: RunOutcome) -> Path:
     with wrap_errors(f"{folder}: cannot be written", "make room, the journal holds it all"):
         folder.mkdir(parents=True, exist_ok=True)
         for task, rows in made.samples.items():
-            with written_atomically(folder / f"samples_{task}_{stamp}.jsonl") as partial:
+            with write_atomically(folder / f"samples_{task}_{stamp}.jsonl") as partial:
                 lines = (json.dumps(row, ensure_ascii=False) + "\n" for row in rows)
                 partial.write_text("".join(lines), encoding="utf-8")
-        with written_atomically(folder / f"results_{stamp}.json") as partial:
+        with write_atomically(folder / f"results_{stamp}.json") as partial:
             partial.write_text(json.dumps(made.results, indent=2, ensure_ascii=False), encoding="utf-8")
     return folder
 

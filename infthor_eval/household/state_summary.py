@@ -4,7 +4,7 @@ A model that is given text in place of the whole trajectory reads this: of every
 place where it was last seen, what is open or on, and what the agent holds.
 """
 
-from infthor_eval.formats.step_log import ObjectState, Step, worlds
+from infthor_eval.formats.step_log import ObjectState, Step, iter_object_states
 from infthor_eval.household.affordances import preposition
 from infthor_eval.household.containment import logged_parent
 from infthor_eval.household.wording import an, noun
@@ -27,7 +27,7 @@ def state_summaries(steps: list[Step], at: set[int]) -> dict[int, str]:
     known: dict[str, tuple[ObjectState, str | None]] = {}
     held: list[str] = []
     found: dict[int, str] = {}
-    for step, world in zip(steps, worlds(steps), strict=True):
+    for step, world in zip(steps, iter_object_states(steps), strict=True):
         held = [noun(state.type) for state in world.values() if state.held and state.exists]
         for key in step.seen or {}:
             if world[key].type not in _SURROUNDINGS:

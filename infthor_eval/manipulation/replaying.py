@@ -20,7 +20,7 @@ from infthor_eval.episodes.simulators import Simulators
 from infthor_eval.episodes.trajectory_sets import find_again
 from infthor_eval.errors import DataError, UsageError, wrap_errors
 from infthor_eval.formats.digests import digest
-from infthor_eval.formats.trajectory import Source
+from infthor_eval.formats.trajectory import TrajectorySource
 from infthor_eval.manipulation.conversion import Conversion
 from infthor_eval.manipulation.curve_runs import ArmRun
 from infthor_eval.manipulation.environment import ArmEnvironment, ArmOutcome, Grasp, arm_of
@@ -128,7 +128,7 @@ def replay_episodes(recorded: RecordedEpisodes, data: str | None, scenes: Path |
         yield ArmReplay(recorded, course, opened)
 
 
-def _course(source: Source) -> ArmCourse:
+def _course(source: TrajectorySource) -> ArmCourse:
     trajectory = source.read()
     return ArmCourse(trajectory, tuple(errands_of(trajectory)), digest(source.raw.strip()))
 

@@ -6,7 +6,7 @@ from itertools import zip_longest
 from infthor_eval.formats.published import published_tables
 from infthor_eval.manipulation.history import ErrandKind
 from infthor_eval.manipulation.summary import ManipulationSummary, TaskSummary
-from infthor_eval.rates import Rate, percent
+from infthor_eval.rates import Rate, format_percent
 from infthor_eval.runs import RunSummary
 from infthor_eval.tables import Column, Row, Table, told_left_out
 
@@ -58,7 +58,7 @@ def _radii(pair: Sequence[TaskSummary | None]) -> str:
 
 def _cells(pair: Sequence[TaskSummary | None]) -> Iterator[str]:
     there = [task for task in pair if task is not None]
-    yield from (percent(task.success if task else None) for task in pair)
+    yield from (format_percent(task.success if task else None) for task in pair)
     yield from (str(_size(task.success) if task else 0) for task in pair)
     yield str(max(task.n_trajectories for task in there))
     yield str(sum(sum(task.excluded.values()) for task in there))
@@ -73,7 +73,8 @@ def _size(rate: Rate | None) -> int:
 def _episodes_table(runs: Sequence[RunSummary]) -> Table:
     rows = [
         Row((
-            name, task_name, f"{task.radius:g}", percent(task.inside if task.kind == ErrandKind.PICKUP else None),
+            name, task_name, f"{task.radius:g}",
+            format_percent(task.inside if task.kind == ErrandKind.PICKUP else None),
             _number(task.closest, 2), _number(task.steps), _number(task.collisions),
         ))
         for name, summary in _named(runs)

@@ -8,7 +8,7 @@ from infthor_eval.episodes.task_settings import task_settings
 from infthor_eval.episodes.trajectory_sets import TrajectorySet, find_trajectories
 from infthor_eval.errors import DataError, UsageError
 from infthor_eval.formats.digests import digest
-from infthor_eval.formats.trajectory import Source, Trajectory
+from infthor_eval.formats.trajectory import Trajectory, TrajectorySource
 from infthor_eval.household.wording import canonical, noun
 from infthor_eval.manipulation.conversion import Conversion
 from infthor_eval.manipulation.environment import Grasp
@@ -176,7 +176,7 @@ class ManipulationTask:
             )
 
 
-def _course(source: Source) -> ArmCourse:
+def _course(source: TrajectorySource) -> ArmCourse:
     trajectory = source.read()
     try:
         errands = errands_of(trajectory)

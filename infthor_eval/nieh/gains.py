@@ -7,7 +7,7 @@ from typing import Any
 from infthor_eval.nieh.options import SHOWN
 from infthor_eval.nieh.summary import NiehSummary, TaskSummary
 from infthor_eval.runs import RunSummary
-from infthor_eval.statistics import Estimate, paired_difference
+from infthor_eval.statistics import MeanEstimate, paired_difference
 
 __all__ = ["Gain", "frames_of", "gains", "name_of"]
 
@@ -39,7 +39,7 @@ class Gain:
             return None
         return seeing.scores[self.metric].mean - blind.scores[self.metric].mean
 
-    def total(self) -> Estimate | None:
+    def total(self) -> MeanEstimate | None:
         """The mean gain with its interval, paired by question and clustered by trajectory; None where none was asked.
 
         Runs of one identity but for their frames ask the same questions, in the same order.

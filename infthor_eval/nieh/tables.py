@@ -8,7 +8,7 @@ from infthor_eval.nieh.gains import Gain, frames_of, gains, name_of
 from infthor_eval.nieh.options import SHOWN
 from infthor_eval.nieh.summary import CLUE_COLUMNS, OPEN_ENDED, Cell, NiehSummary, TaskSummary, main_metric
 from infthor_eval.runs import RunSummary
-from infthor_eval.statistics import Estimate
+from infthor_eval.statistics import MeanEstimate
 from infthor_eval.tables import Column, Row, Table
 
 __all__ = ["clues_table", "overview", "tables"]
@@ -165,7 +165,7 @@ def _published_rows(table: PublishedTable, runs: Sequence[RunSummary]) -> Iterat
 
 def _differences(run: RunSummary, row: PublishedRow, table: PublishedTable) -> Iterator[Row]:
     """How far a run of the published model is from its row, and whether its interval (=) holds the published value."""
-    if not row.is_of(run.header.identity["model"]) or frames_of(run) != SHOWN:
+    if not row.matches(run.header.identity["model"]) or frames_of(run) != SHOWN:
         return
     for _, name, task in _tasks([run]):
         # Frames that a simulator of ours rendered are another data set.
@@ -220,7 +220,7 @@ def _gain_cells(gain: Gain) -> tuple[str, ...]:
     return *by_clues, _points_interval(gain.total()), *apart
 
 
-def _points_interval(total: Estimate | None) -> str:
+def _points_interval(total: MeanEstimate | None) -> str:
     if total is None or total.low is None or total.high is None:  # one trajectory alone tells nothing about others
         return "-"
     return f"[{100 * total.low:+.2f}, {100 * total.high:+.2f}]"

@@ -8,7 +8,7 @@ from typing import Any
 import msgspec
 
 from infthor_eval.errors import DataError, UsageError
-from infthor_eval.formats.files import prepared_folder, written_atomically
+from infthor_eval.formats.files import prepare_folder, write_atomically
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.qa_csv import write_questions
 from infthor_eval.nieh.validation import Judged, Verdicts, read_decisions, write_inspection_list
@@ -29,7 +29,7 @@ def check_place(out: Path, data: NiehSet) -> None:
         UsageError: it is the set itself.
         DataError: it holds the frames of another set, or an inspection list that cannot be read.
     """
-    prepared_folder(out)
+    prepare_folder(out)
     if out.resolve() == data.root.resolve():
         raise UsageError(f"--out {out}: is the set itself, in which every question would stand twice; give another")
     link = out / "metadata"
@@ -62,7 +62,7 @@ def write_validated_set(out: Path, data: NiehSet, verdicts: Verdicts) -> Path | 
             shutil.copy(data.root / "set.json", out / "set.json")
         write_questions(out / "qa_set_validated.csv", [item.question for item in verdicts.kept])
         lines = [msgspec.json.encode(_as_json(item)) for item in verdicts.rejected]
-        with written_atomically(out / "rejected.jsonl") as partial:
+        with write_atomically(out / "rejected.jsonl") as partial:
             partial.write_bytes(b"".join(line + b"\n" for line in lines))
         return write_inspection_list(out / INSPECTION, verdicts.to_inspect)
     except OSError as error:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from infthor_eval.errors import DataError
-from infthor_eval.formats.csv_files import read_rows, unshielded, write_sheet
+from infthor_eval.formats.csv_files import read_rows, unshield, write_sheet
 from infthor_eval.formats.question import Question
 from infthor_eval.nieh.prompts import last_line
 from infthor_eval.nieh.scoring import Scorer, score
@@ -148,7 +148,7 @@ def read_decisions(path: Path) -> dict[str, str]:
     decisions: dict[str, str] = {}
     mend = "fill the list that `validate` wrote"
     for place, row in read_rows(path, ("question_id", "decision"), mend, line_breaks=True):
-        name, decision = unshielded(row["question_id"]), row["decision"].strip().lower()
+        name, decision = unshield(row["question_id"]), row["decision"].strip().lower()
         if decision and decision not in DECISIONS:
             raise DataError(f"{place}: decision is {decision!r:.60}; write keep or drop")
         if decisions.get(name, decision) != decision:

@@ -8,7 +8,7 @@ import msgspec
 
 from infthor_eval.plans.plan import PlanKind
 from infthor_eval.plans.records import PlanRecord
-from infthor_eval.rates import Rate, cluster_rate, clustered_rate
+from infthor_eval.rates import Rate, clustered_rate, rate_over_clusters
 from infthor_eval.runs import UnitRecord
 
 __all__ = ["FINAL_COLUMNS", "PlansSummary", "TaskSummary", "summarise"]
@@ -124,4 +124,4 @@ def _of_trajectories(records: Sequence[Record], measure: Callable[[float, float]
     for record in records:
         got, most = sums.get(record.cluster, (0.0, 0.0))
         sums[record.cluster] = got + record.payload.reward, most + (record.payload.max_reward or 0.0)
-    return cluster_rate([measure(*sums[name]) for name in sorted(sums)])
+    return rate_over_clusters([measure(*sums[name]) for name in sorted(sums)])

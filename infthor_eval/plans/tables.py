@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 from infthor_eval.formats.published import published_tables
 from infthor_eval.plans.summary import FINAL_COLUMNS, PlansSummary, TaskSummary
-from infthor_eval.rates import number, percent
+from infthor_eval.rates import format_number, format_percent
 from infthor_eval.runs import RunSummary
 from infthor_eval.tables import Column, Row, Table, told_left_out
 
@@ -19,7 +19,15 @@ _EMBEDDED = (
 def overview(runs: Sequence[RunSummary]) -> list[Table]:
     """Plans carried out and reward in one number a task."""
     rows = [
-        Row((name, task_name, percent(task.success.get("total")), percent(task.reward_share), *_sizes(task)[:2]))
+        Row(
+            (
+                name,
+                task_name,
+                format_percent(task.success.get("total")),
+                format_percent(task.reward_share),
+                *_sizes(task)[:2],
+            )
+        )
         for name, task_name, task in _tasks(runs)
     ]
     columns = (*_NAMES, *map(Column, ("carried out, %", "reward, % of the most", "plans", "trajectories")))
@@ -44,7 +52,7 @@ def _tasks(runs: Sequence[RunSummary]) -> Iterator[tuple[str, str, TaskSummary]]
 def _success_table(runs: Sequence[RunSummary]) -> Table:
     """Plans carried out, by the columns of the published table of final tasks."""
     rows = [
-        Row((name, task_name, *(percent(task.success.get(column)) for column in FINAL_COLUMNS), *_sizes(task)))
+        Row((name, task_name, *(format_percent(task.success.get(column)) for column in FINAL_COLUMNS), *_sizes(task)))
         for name, task_name, task in _tasks(runs)
     ]
     notes = _notes(runs)
@@ -60,8 +68,8 @@ def _success_table(runs: Sequence[RunSummary]) -> Table:
 def _reward_table(runs: Sequence[RunSummary]) -> Table:
     rows = []
     for name, task_name, task in _tasks(runs):
-        of_trajectory = number(task.reward), number(task.max_reward), percent(task.reward_share)
-        rows.append(Row((name, task_name, *of_trajectory, percent(task.goals))))
+        of_trajectory = format_number(task.reward), format_number(task.max_reward), format_percent(task.reward_share)
+        rows.append(Row((name, task_name, *of_trajectory, format_percent(task.goals))))
     columns = (*_NAMES, *map(Column, ("reward", "at most", "% of it", "goals reached, %")))
     return Table("Reward of a trajectory, 95 % interval in brackets", columns, tuple(rows))
 

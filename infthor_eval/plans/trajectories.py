@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from infthor_eval.episodes.trajectory_sets import TrajectorySet, find_trajectories
 from infthor_eval.errors import DataError
 from infthor_eval.formats.digests import digest
-from infthor_eval.formats.trajectory import Source, Trajectory
+from infthor_eval.formats.trajectory import Trajectory, TrajectorySource
 from infthor_eval.plans.plan import Plan, TrajectoryTask, plans_of, tasks_of
 
 __all__ = ["Course", "Courses", "find_courses", "read_course"]
@@ -42,7 +42,7 @@ def find_courses(data: str | None, bundled: str | None) -> Courses:
     return find_trajectories(data, bundled, read_course)
 
 
-def read_course(source: Source) -> Course:
+def read_course(source: TrajectorySource) -> Course:
     """What evaluation needs of a trajectory.
 
     Raises:

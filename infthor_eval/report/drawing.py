@@ -15,8 +15,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from infthor_eval.errors import wrap_errors
-from infthor_eval.formats.files import written_atomically
-from infthor_eval.terminal import shown
+from infthor_eval.formats.files import write_atomically
+from infthor_eval.terminal import printable
 
 __all__ = ["BOUND", "LEGEND", "Look", "add_legend", "add_words", "inline_svg", "looks_of", "save_figure"]
 
@@ -121,7 +121,7 @@ def _in_style(more: dict[Any, Any] | None = None) -> Iterator[None]:
 
 def _saved(figure: Figure, path: Path, form: str) -> Path:
     metadata = _OF_SVG if form == "svg" else {}
-    with wrap_errors(f"{path}: cannot be written", "give another --out"), written_atomically(path) as partial:
+    with wrap_errors(f"{path}: cannot be written", "give another --out"), write_atomically(path) as partial:
         figure.savefig(partial, format=form, dpi=160, metadata=metadata)
     return path
 
@@ -129,7 +129,7 @@ def _saved(figure: Figure, path: Path, form: str) -> Path:
 def add_legend(place: Axes, entries: Sequence[tuple[str, Look]]) -> None:
     """Beside a panel: names, each with its line."""
     handles = [Line2D([], [], color=look.colour, ls=look.style, lw=look.width) for _, look in entries]
-    names = ["\n".join(textwrap.wrap(shown(label), _NAME)) for label, _ in entries]
+    names = ["\n".join(textwrap.wrap(printable(label), _NAME)) for label, _ in entries]
     place.legend(handles, names, loc="upper left", bbox_to_anchor=(1.02, 1.0), frameon=False, borderaxespad=0)
 
 
@@ -143,8 +143,8 @@ def add_words(figure: Figure, heading: Sequence[str], notes: Sequence[str], widt
         width: of the figure, inches.
     """
     settings: dict[str, Any] = {"x": 0.01, "ha": "left"}
-    wrapped = [part for line in heading for part in textwrap.wrap(shown(line), round(width * 12))]
+    wrapped = [part for line in heading for part in textwrap.wrap(printable(line), round(width * 12))]
     figure.suptitle("\n".join(wrapped), fontsize=10, **settings)
-    told = [part for note in notes for part in textwrap.wrap(shown(note), round(width * _LETTERS))]
+    told = [part for note in notes for part in textwrap.wrap(printable(note), round(width * _LETTERS))]
     if told:
         figure.supxlabel("\n".join(told), fontsize=8, color="#444444", **settings)

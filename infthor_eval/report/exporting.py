@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Sequence
 
 from infthor_eval.tables import Table
-from infthor_eval.terminal import shown
+from infthor_eval.terminal import printable
 
 __all__ = ["exported"]
 
@@ -39,13 +39,13 @@ def _rows(table: Table, escaped: Callable[[str], str]) -> list[list[str]]:
     """Heading and rows, each with a cell per column, in one line each."""
     width = len(table.columns)
     texts = [[column.name for column in table.columns], *(list(row.cells) for row in table.rows)]
-    return [[escaped(" ".join(shown(cell).split())) for cell in [*cells, *[""] * width][:width]] for cells in texts]
+    return [[escaped(" ".join(printable(cell).split())) for cell in [*cells, *[""] * width][:width]] for cells in texts]
 
 
 def _csv(table: Table, *, with_words: bool) -> str:
     text = io.StringIO()
     words = [word for word in (table.title, *table.notes) if word] if with_words else []
-    text.writelines(f"# {' '.join(shown(word).split())}\n" for word in words)
+    text.writelines(f"# {' '.join(printable(word).split())}\n" for word in words)
     csv.writer(text, lineterminator="\n").writerows(_rows(table, str))
     return text.getvalue()
 
@@ -56,8 +56,8 @@ def _latex(table: Table) -> str:
     lines = [rf"\begin{{tabular}}{{{aligned}}}", r"\toprule", _latex_row(heading), r"\midrule"]
     for cells, row in zip(rows, table.rows, strict=True):
         lines += [_latex_row(cells), *([r"\midrule"] if row.ends_section and cells is not rows[-1] else [])]
-    lines += [r"\bottomrule", r"\end{tabular}", *(f"% {' '.join(shown(note).split())}" for note in table.notes)]
-    title = [f"% {' '.join(shown(table.title).split())}"] if table.title else []
+    lines += [r"\bottomrule", r"\end{tabular}", *(f"% {' '.join(printable(note).split())}" for note in table.notes)]
+    title = [f"% {' '.join(printable(table.title).split())}"] if table.title else []
     return "\n".join([*title, *lines]) + "\n"
 
 
@@ -74,7 +74,7 @@ def _markdown(table: Table) -> str:
     rule = ["---:" if column.is_number else "---" for column in table.columns]
     title = [f"**{_markdown_text(table.title)}**", ""] if table.title else []
     lines = [f"| {' | '.join(cells)} |" for cells in (heading, rule, *rows)]
-    notes = [line for note in table.notes for line in ("", _markdown_text(" ".join(shown(note).split())))]
+    notes = [line for note in table.notes for line in ("", _markdown_text(" ".join(printable(note).split())))]
     return "\n".join([*title, *lines, *notes]) + "\n"
 
 

@@ -10,7 +10,7 @@ from matplotlib.ticker import FuncFormatter, MaxNLocator
 from infthor_eval.episodes.curves import Curve, Facet, RewardCurves, RunCurves
 from infthor_eval.report.curves import Panel, embedded_label, trajectories_told
 from infthor_eval.report.drawing import BOUND, LEGEND, Look, add_legend, add_words, looks_of, save_figure
-from infthor_eval.terminal import shown
+from infthor_eval.terminal import printable
 
 __all__ = ["curves_figure", "draw_curves"]
 
@@ -52,7 +52,7 @@ def curves_figure(curves: RewardCurves, panels: Sequence[Panel]) -> Figure:
         for place, (name, facet) in zip(row, facets.items(), strict=True):
             _draw_panel(place, name, facet, runs, looks)
         row[0].set_ylabel(_REWARD)
-        row[0].set_title(shown(panel.title), loc="left", fontweight="bold")
+        row[0].set_title(printable(panel.title), loc="left", fontweight="bold")
         # The bound first, as it lies on top.
         named = [run.label for run in reversed(runs) if run.is_bound] + [run.label for run in runs if not run.is_bound]
         add_legend(row[-1], [(label, looks[label]) for label in named])

@@ -6,7 +6,7 @@ from pathlib import Path
 import matplotlib
 from PIL import ImageFont
 
-from infthor_eval.terminal import shown
+from infthor_eval.terminal import printable
 
 __all__ = ["Font", "fitted", "font", "lines_of", "one_line"]
 
@@ -24,7 +24,7 @@ def font(size: int, style: str = "") -> Font:
 
 def one_line(text: str) -> str:
     """A text of data or of a model as one line without control characters."""
-    return shown(" ".join(text[:_LONGEST].split()))
+    return printable(" ".join(text[:_LONGEST].split()))
 
 
 def fitted(text: str, face: Font, width: float) -> str:

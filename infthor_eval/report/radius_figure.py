@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from infthor_eval.manipulation.kinds import SHORT, ErrandKind
 from infthor_eval.manipulation.radii import RadiusLine, SuccessByRadius
-from infthor_eval.rates import Rate, percent
+from infthor_eval.rates import Rate, format_percent
 from infthor_eval.report.curves import embedded_note, trajectories_told
 from infthor_eval.report.drawing import BOUND, LEGEND, Look, add_legend, add_words, looks_of, save_figure
 from infthor_eval.tables import Column, Row, Table
@@ -52,7 +52,7 @@ def radii_table(found: SuccessByRadius) -> Table:
 
 def _row(label: str, kind: ErrandKind, points: Sequence[tuple[float, Rate]], radii: Sequence[float], end: str) -> Row:
     rates = dict(points)
-    return Row((label, SHORT[kind], *(percent(rates.get(radius)) for radius in radii), str(points[0][1].n), end))
+    return Row((label, SHORT[kind], *(format_percent(rates.get(radius)) for radius in radii), str(points[0][1].n), end))
 
 
 def radii_figure(found: SuccessByRadius) -> Figure:

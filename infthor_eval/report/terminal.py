@@ -8,7 +8,7 @@ from rich.table import Table as RichTable
 from rich.text import Text
 
 from infthor_eval.tables import Column, Row, Table
-from infthor_eval.terminal import console, shown
+from infthor_eval.terminal import console, printable
 
 __all__ = ["print_table", "table_console"]
 
@@ -25,7 +25,7 @@ def print_table(table: Table, on: Console) -> None:
     """Show a table; whatever its cells hold is shown as text."""
     drawn = RichTable(
         box=box.SIMPLE_HEAD,
-        title=Text(shown(table.title)) if table.title else None,
+        title=Text(printable(table.title)) if table.title else None,
         title_justify="left",
         caption_justify="left",
     )
@@ -34,18 +34,18 @@ def print_table(table: Table, on: Console) -> None:
     for row in table.rows:
         _add_row(drawn, row)
     if table.notes:
-        drawn.caption = Text("\n".join(textwrap.fill(shown(note), _LINE) for note in table.notes))
+        drawn.caption = Text("\n".join(textwrap.fill(printable(note), _LINE) for note in table.notes))
     on.print(drawn)
 
 
 def _add_column(drawn: RichTable, column: Column) -> None:
     if column.is_number:
-        drawn.add_column(Text(shown(column.name)), justify="right", overflow="fold")
+        drawn.add_column(Text(printable(column.name)), justify="right", overflow="fold")
     else:
-        drawn.add_column(Text(shown(column.name)), no_wrap=True, overflow="fold")
+        drawn.add_column(Text(printable(column.name)), no_wrap=True, overflow="fold")
 
 
 def _add_row(drawn: RichTable, row: Row) -> None:
-    drawn.add_row(*(Text(shown(cell)) for cell in row.cells), style="dim" if row.is_published else "")
+    drawn.add_row(*(Text(printable(cell)) for cell in row.cells), style="dim" if row.is_published else "")
     if row.ends_section:
         drawn.add_section()

@@ -9,7 +9,7 @@ from typing import Any
 import yaml
 
 from infthor_eval.errors import DataError, wrap_errors
-from infthor_eval.formats.files import written_atomically
+from infthor_eval.formats.files import write_atomically
 from infthor_eval.formats.yaml_files import read_yaml
 from infthor_eval.runs.request import RunRequest
 
@@ -65,7 +65,7 @@ def write_configuration(folder: Path, request: RunRequest) -> None:
         wrap_errors(
             f"{path}: cannot be written", "make room and run the same command again, which goes on where it was"
         ),
-        written_atomically(path) as partial,
+        write_atomically(path) as partial,
     ):
         partial.write_text(text, encoding="utf-8")
 

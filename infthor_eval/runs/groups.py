@@ -5,7 +5,7 @@ from typing import Any
 
 import msgspec
 
-from infthor_eval.errors import InfthorError, fault
+from infthor_eval.errors import InfthorError, describe_exception
 from infthor_eval.runs.records import UnitRecord
 from infthor_eval.runs.suite import Evaluation, Group, Session
 
@@ -30,5 +30,5 @@ def group_records(evaluation: Evaluation, group: Group, session: Session) -> Ite
     except MemoryError:  # of the machine, and not of the group alone
         raise
     except Exception as error:  # noqa: BLE001 - a suite is anybody's code, and its fault is recorded whatever it is
-        reason = f"{fault(error)}; mend the suite and run the same command again"
+        reason = f"{describe_exception(error)}; mend the suite and run the same command again"
     yield from (unit.failed(reason) for unit in waiting.values())

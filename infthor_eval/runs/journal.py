@@ -22,7 +22,7 @@ import msgspec
 
 from infthor_eval.errors import DataError, UsageError, in_one_line, wrap_errors
 from infthor_eval.formats.digests import canonical_json
-from infthor_eval.formats.files import written_atomically
+from infthor_eval.formats.files import write_atomically
 from infthor_eval.formats.reading import require_file
 from infthor_eval.runs.records import MemoRecord, RecordTypes, RunHeader, UnitKey, UnitRecord
 from infthor_eval.runs.shards import BAD, FOLDER, Decoder, lines_in, read_shard, read_shards, shards_of
@@ -235,7 +235,7 @@ def _recover_shard(path: Path, header: RunHeader, types: RecordTypes) -> int:
             good.insert(0, msgspec.json.encode(header))
         with (path.parent / _BAD_LINES).open("ab") as kept:
             kept.write(b"".join(line + b"\n" for line in bad))
-        with written_atomically(path) as partial:
+        with write_atomically(path) as partial:
             partial.write_bytes(b"".join(line + b"\n" for line in good))
         return len(bad)
 

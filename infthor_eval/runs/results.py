@@ -9,7 +9,7 @@ from typing import Any
 import msgspec
 
 from infthor_eval.errors import wrap_errors
-from infthor_eval.formats.files import written_atomically
+from infthor_eval.formats.files import write_atomically
 from infthor_eval.runs.records import UnitRecord
 from infthor_eval.runs.suite import RunSummary, Suite
 from infthor_eval.runs.usage import Usage
@@ -116,6 +116,6 @@ def _write(path: Path, document: dict[str, Any]) -> None:
 def _written(path: Path) -> Iterator[Path]:
     with (
         wrap_errors(f"{path}: cannot be written", "make room, the journal holds it all"),
-        written_atomically(path) as partial,
+        write_atomically(path) as partial,
     ):
         yield partial

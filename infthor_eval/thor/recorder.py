@@ -5,7 +5,7 @@ from pathlib import Path
 from PIL import Image
 
 from infthor_eval.errors import SimulatorError
-from infthor_eval.formats.step_log import ObjectLog, ObjectState, Pose, Seen, Step
+from infthor_eval.formats.step_log import LoggedPose, ObjectInFrame, ObjectLog, ObjectState, Step
 from infthor_eval.thor.actions import object_type_of
 from infthor_eval.thor.view import ThorObject, View
 
@@ -129,18 +129,18 @@ def _types(items: list[ThorObject]) -> list[str]:
     return sorted({item.object_type for item in items})
 
 
-def _pose(view: View) -> Pose:
+def _pose(view: View) -> LoggedPose:
     at = view.agent.position
-    return Pose(
+    return LoggedPose(
         round(at.x, 4), round(at.y, 4), round(at.z, 4), round(view.agent.rotation, 2), round(view.agent.horizon, 2)
     )
 
 
-def _seen(view: View) -> dict[str, Seen] | None:
+def _seen(view: View) -> dict[str, ObjectInFrame] | None:
     if view.instances is None:
         return None
     return {
-        key: Seen(instance.pixels, instance.box, view.objects[key].visible)
+        key: ObjectInFrame(instance.pixels, instance.box, view.objects[key].visible)
         for key, instance in sorted(view.instances.items())
         if key in view.objects
     }

@@ -11,7 +11,7 @@ import torch
 from safetensors.torch import load_model, save_model
 
 from infthor_eval.errors import DataError, UsageError, wrap_errors
-from infthor_eval.formats.files import prepared_folder, written_atomically
+from infthor_eval.formats.files import prepare_folder, write_atomically
 
 __all__ = ["Checkpoints"]
 
@@ -44,10 +44,10 @@ class Checkpoints:
         Raises:
             DataError: it cannot be written.
         """
-        place = prepared_folder(self.folder) / f"step-{step:06d}"
+        place = prepare_folder(self.folder) / f"step-{step:06d}"
         with (
             wrap_errors(f"{place}: cannot be written", "make room; the last checkpoint is still there"),
-            written_atomically(place) as folder,
+            write_atomically(place) as folder,
         ):
             folder.mkdir()
             save_model(model, str(folder / _WEIGHTS))

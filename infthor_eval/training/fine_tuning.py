@@ -15,7 +15,7 @@ import torch.distributed as dist
 
 from infthor_eval.errors import DataError, UsageError, wrap_errors
 from infthor_eval.formats.digests import digest
-from infthor_eval.formats.files import prepared_folder, written_atomically
+from infthor_eval.formats.files import prepare_folder, write_atomically
 from infthor_eval.training.batches import collate
 from infthor_eval.training.data import TrainingData, read_training_data
 from infthor_eval.training.encoding import Encoder
@@ -100,7 +100,7 @@ def fine_tune(run: Prepared, out: Path, watcher: Watcher) -> Path:
     with _processes():
         is_first = not dist.is_initialized() or dist.get_rank() == 0
         if is_first:
-            _claim(prepared_folder(out), run.document())
+            _claim(prepare_folder(out), run.document())
         network = SequenceModel(run.loaded)
         freeze(network, run.recipe.freeze)
         adapters = add_adapters(network, run.recipe.lora) if run.recipe.lora is not None else None
@@ -160,7 +160,7 @@ def _claim(out: Path, document: dict[str, Any]) -> None:
     """Write down what the folder's run is of, or see that it is this one."""
     path = out / _ABOUT
     if not path.exists():
-        with written_atomically(path) as partial_file:
+        with write_atomically(path) as partial_file:
             partial_file.write_text(json.dumps(document, indent=2, sort_keys=True) + "\n", encoding="utf-8")
         return
     with wrap_errors(f"{path}: not JSON", "give another folder", catch=(OSError, ValueError), raise_as=DataError):

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from threading import Event
 from typing import Any
 
-from infthor_eval.errors import InfthorError, fault
+from infthor_eval.errors import InfthorError, describe_exception
 from infthor_eval.workers.link import OpenWorker, Worker
 
 __all__ = ["Serving", "portable"]
@@ -48,5 +48,5 @@ def portable(error: BaseException) -> Exception:
         return MemoryError(str(error))
     if isinstance(error, OSError):
         return OSError(error.errno, error.strerror, error.filename)
-    told = fault(error) if isinstance(error, Exception) else type(error).__name__
+    told = describe_exception(error) if isinstance(error, Exception) else type(error).__name__
     return InfthorError(f"a worker failed: {told}; mend what is named and run the same command again")

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import cast
 
-from infthor_eval.errors import InfthorError, fault
+from infthor_eval.errors import InfthorError, describe_exception
 from model_adapters.check.clauses import ContractError, frames_of_one_colour
 from model_adapters.check.model import model_checks
 from model_adapters.check.policy import policy_checks
@@ -57,5 +57,5 @@ def _broken(check: Callable[[], None]) -> str | None:
     except InfthorError as error:
         return f"it raises {type(error).__name__}: {error}"
     except Exception as error:  # noqa: BLE001 - an adapter is anybody's code, and what it raises is the finding
-        return f"it raises {fault(error)}"
+        return f"it raises {describe_exception(error)}"
     return None

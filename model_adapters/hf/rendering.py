@@ -103,8 +103,8 @@ def _string_message(turn: Turn) -> dict[str, Any]:
 def _written(tokenizer: Any, template: str, turns: Sequence[Turn], messages: Sequence[dict[str, Any]]) -> str:
     refused = f"the chat template refuses {_roles(turns)}"
     with (
-        wrap_errors(refused, f"mend it; {TEMPLATE_SECONDS.mend}", catch=OutOfTimeError, raise_as=ModelError),
-        wrap_errors(refused, f"mend it; {TEMPLATE_MB.mend}", catch=OutOfMemoryError, raise_as=ModelError),
+        wrap_errors(refused, f"mend it; {TEMPLATE_SECONDS.hint}", catch=OutOfTimeError, raise_as=ModelError),
+        wrap_errors(refused, f"mend it; {TEMPLATE_MB.hint}", catch=OutOfMemoryError, raise_as=ModelError),
         wrap_errors(refused, "ask in other turns, or mend it", catch=_REFUSALS, raise_as=ModelError),
         computing_at_most(TEMPLATE_SECONDS.value),
         taking_at_most(TEMPLATE_MB.value),
@@ -113,7 +113,7 @@ def _written(tokenizer: Any, template: str, turns: Sequence[Turn], messages: Seq
             list(messages), chat_template=template, tokenize=False, add_generation_prompt=True
         )
     if len(text) > TEMPLATE_CHARACTERS.value:  # which would take the tokenizer minutes, and gigabytes
-        raise ModelError(f"{refused} (it makes {len(text):,} characters); mend it; {TEMPLATE_CHARACTERS.mend}")
+        raise ModelError(f"{refused} (it makes {len(text):,} characters); mend it; {TEMPLATE_CHARACTERS.hint}")
     _check_texts(text, turns)
     return text
 

@@ -1,13 +1,13 @@
 import pytest
 
 from infthor_eval.formats.digests import digest, digest_of_file
-from infthor_eval.formats.files import written_atomically
+from infthor_eval.formats.files import write_atomically
 
 
 def test_a_file_replaces_the_earlier_one_when_it_is_whole(tmp_path):
     path = tmp_path / "a.txt"
     path.write_text("old")
-    with written_atomically(path) as partial:
+    with write_atomically(path) as partial:
         partial.write_text("new")
         assert path.read_text() == "old"
     assert path.read_text() == "new"
@@ -17,7 +17,7 @@ def test_a_file_replaces_the_earlier_one_when_it_is_whole(tmp_path):
 def test_an_error_leaves_the_earlier_file_and_nothing_else(tmp_path):
     path = tmp_path / "a.txt"
     path.write_text("old")
-    with pytest.raises(OSError, match="full"), written_atomically(path) as partial:
+    with pytest.raises(OSError, match="full"), write_atomically(path) as partial:
         partial.write_text("ne")
         raise OSError("full")
     assert path.read_text() == "old"
@@ -29,7 +29,7 @@ def test_a_folder_appears_whole_and_leftovers_of_a_killed_process_are_gone(tmp_p
     leftover = tmp_path / ".set.partial"
     leftover.mkdir()
     (leftover / "stale").touch()
-    with written_atomically(path) as partial:
+    with write_atomically(path) as partial:
         partial.mkdir()
         (partial / "fresh").touch()
     assert [item.name for item in path.iterdir()] == ["fresh"]

@@ -6,13 +6,13 @@ from hypothesis import strategies as st
 
 from infthor_eval.errors import DataError
 from infthor_eval.formats.step_log import (
+    LoggedPose,
+    ObjectInFrame,
     ObjectLog,
     ObjectState,
-    Pose,
-    Seen,
     Step,
+    iter_object_states,
     read_steps,
-    worlds,
     write_steps,
 )
 
@@ -84,8 +84,8 @@ logged = st.builds(
     img_filename=st.text(max_size=20),
     object_log=st.builds(ObjectLog, visible=st.lists(st.text(max_size=8), max_size=3)),
     action=st.none() | st.text(max_size=10),
-    pose=st.none() | st.just(Pose(0.25, 0.9, -1.0, 90.0, 30.0)),
-    seen=st.none() | st.dictionaries(st.text(max_size=5), st.just(Seen(12, (0, 0, 3, 4), True)), max_size=2),
+    pose=st.none() | st.just(LoggedPose(0.25, 0.9, -1.0, 90.0, 30.0)),
+    seen=st.none() | st.dictionaries(st.text(max_size=5), st.just(ObjectInFrame(12, (0, 0, 3, 4), True)), max_size=2),
     changes=st.dictionaries(st.text(max_size=5), states, max_size=3),
 )
 
@@ -102,5 +102,5 @@ def test_worlds_apply_changes_in_order():
         Step(0, "0.png", changes={"a": ObjectState("Mug"), "b": ObjectState("Fridge", is_open=False)}),
         Step(1, "1.png", changes={"b": ObjectState("Fridge", is_open=True)}),
     ]
-    opened = [dict(world)["b"].is_open for world in worlds(steps)]
+    opened = [dict(world)["b"].is_open for world in iter_object_states(steps)]
     assert opened == [False, True]

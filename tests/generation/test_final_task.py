@@ -1,8 +1,8 @@
 import pytest
 
 from infthor_eval.formats.trajectory import (
+    ExpertPlan,
     InitAction,
-    Plan,
     Scene,
     SubTask,
     SubTrajectory,
@@ -27,7 +27,7 @@ def trajectory(pickup, receptacle, movable=None, before=10):
     task = SubTask(TaskInfo("pick_and_place_simple", pickup, movable, receptacle), "put it there")
     return Trajectory(
         Scene("kitchen-1", InitAction(0, 0, 0)),
-        Plan([]),
+        ExpertPlan([]),
         sub_trajs=[SubTrajectory(0, (0, 1), (0, before)), SubTrajectory(1, (1, 2), (before, before + 3))],
         long_horizon_task=task,
         object_log=log("Aa", "Aa", *"BBBBBBB", "Cc", "Cc", *"XXX"),
@@ -54,4 +54,4 @@ def test_the_rule_is_derived_from_the_log(pickup, receptacle, movable, fine):
 
 
 def test_without_a_final_task():
-    assert violation(Trajectory(Scene("kitchen-1", InitAction(0, 0, 0)), Plan([]))) == "there is no final task"
+    assert violation(Trajectory(Scene("kitchen-1", InitAction(0, 0, 0)), ExpertPlan([]))) == "there is no final task"

@@ -6,7 +6,7 @@ import pytest
 from PIL import Image
 
 from infthor_eval.errors import SimulatorError
-from infthor_eval.formats.step_log import read_steps, worlds
+from infthor_eval.formats.step_log import iter_object_states, read_steps
 from infthor_eval.formats.trajectory import iter_sources, iter_trajectories
 from infthor_eval.generation.generate_set import generate_set
 from infthor_eval.generation.questions.make import make_questions
@@ -48,7 +48,7 @@ def test_a_generated_trajectory_replays_whole(generated, tmp_path):
     assert len(steps) == len(frames) == len(trajectory.plan.low_actions) + 1 >= 41
     assert Image.open(frames[0]).size == (300, 300)
     assert [entry["visible"] for entry in trajectory.object_log] == [step.object_log.visible for step in steps]
-    last = list(worlds(steps))[-1]
+    last = list(iter_object_states(steps))[-1]
     assert last and all(state.type for state in last.values())
     images = json.loads((folder / "expert_log.json").read_text())["images"]
     assert [image["low_idx"] for image in images[:4]] == [0, 0, 1, 2]

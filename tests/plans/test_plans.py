@@ -7,7 +7,7 @@ import msgspec
 import pytest
 
 from infthor_eval.errors import DataError
-from infthor_eval.formats.trajectory import Source, Trajectory, iter_trajectories
+from infthor_eval.formats.trajectory import Trajectory, TrajectorySource, iter_trajectories
 from infthor_eval.household.tasks import Task, TaskType
 from infthor_eval.plans.plan import PlanKind, plans_of, tasks_of
 
@@ -31,7 +31,7 @@ def alfred(number):
     if not path.exists():
         pytest.skip("ALFRED's trajectories are not at ../shared/data")
     with gzip.open(path) as lines:
-        return [Source(path, line, raw).read() for line, raw in enumerate(lines, 1) if line <= number]
+        return [TrajectorySource(path, line, raw).read() for line, raw in enumerate(lines, 1) if line <= number]
 
 
 def test_our_plans():

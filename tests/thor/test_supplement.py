@@ -5,9 +5,9 @@ import pytest
 
 from infthor_eval.formats.trajectory import (
     ApiAction,
+    ExpertPlan,
     InitAction,
     LowAction,
-    Plan,
     Scene,
     Trajectory,
     iter_trajectories,
@@ -20,7 +20,7 @@ SHARED = Path(__file__).parents[2] / "../shared/data"
 def trajectory(*names, objects=()):
     low = [LowAction(ApiAction(name)) for name in names]
     low += [LowAction(ApiAction(action, one, other)) for action, one, other in objects]
-    return Trajectory(Scene("FloorPlan1", InitAction(0.5, 0.9, -1.0, 90.0, 0.0)), Plan(low))
+    return Trajectory(Scene("FloorPlan1", InitAction(0.5, 0.9, -1.0, 90.0, 0.0)), ExpertPlan(low))
 
 
 def test_the_path_turns_with_the_agent():

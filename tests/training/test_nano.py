@@ -12,7 +12,7 @@ from infthor_eval.errors import DataError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.qa_csv import write_questions
-from infthor_eval.formats.step_log import Seen, read_steps
+from infthor_eval.formats.step_log import ObjectInFrame, read_steps
 from infthor_eval.training.encoding import Encoder
 from infthor_eval.training.export import export
 from infthor_eval.training.nano.album import _covered, _type, read_album
@@ -101,7 +101,7 @@ def test_where_a_box_lies(box, cells):
 def test_types_are_those_of_parts_and_slices():
     ids = ("Mug|+01.00|+00.90|-02.00", "Sink|-01.00|+00.50|+01.00|SinkBasin", "Apple|+1|+2|+3|AppleSliced_2")
     assert [_type(key) for key in ids] == ["Mug", "SinkBasin", "AppleSliced"]
-    assert Seen(pixels=1, box=(0, 0, 1, 1)).visible is False
+    assert ObjectInFrame(pixels=1, box=(0, 0, 1, 1)).visible is False
 
 
 def test_words_are_tokens(blank):

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from infthor_eval.errors import DataError
-from infthor_eval.formats.step_log import ObjectState, Seen, Step, worlds
+from infthor_eval.formats.step_log import ObjectInFrame, ObjectState, Step, iter_object_states
 from infthor_eval.household.containment import logged_parent
 from infthor_eval.household.wording import canonical
 
@@ -92,7 +92,7 @@ class History:
         """The true state of every object at a frame, by id."""
         return self._worlds[frame]
 
-    def seen(self, frame: int) -> dict[str, Seen]:
+    def seen(self, frame: int) -> dict[str, ObjectInFrame]:
         """What a frame shows, by id."""
         return self.steps[frame].seen or {}
 
@@ -231,7 +231,7 @@ def is_same(one: str, other: str) -> bool:
 def _snapshots(steps: list[Step]) -> Iterator[dict[str, ObjectState]]:
     """The worlds of a log; equal neighbours share one dict."""
     last: dict[str, ObjectState] = {}
-    for step, world in zip(steps, worlds(steps), strict=True):
+    for step, world in zip(steps, iter_object_states(steps), strict=True):
         if step.changes or not last:
             last = {key: state for key, state in world.items() if state.exists}
         yield last

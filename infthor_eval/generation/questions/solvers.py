@@ -8,7 +8,7 @@ from collections.abc import Callable, Container, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
-from infthor_eval.formats.step_log import ObjectState, Step, worlds
+from infthor_eval.formats.step_log import ObjectState, Step, iter_object_states
 
 __all__ = ["Glimpse", "answer", "glimpses"]
 
@@ -40,7 +40,7 @@ def glimpses(steps: Sequence[Step], share: float, frames: Container[int] | None 
     """
     found = []
     loose = frozenset(name for step in steps for name in step.object_log.pickupable)
-    for step, world in zip(steps, worlds(steps), strict=True):
+    for step, world in zip(steps, iter_object_states(steps), strict=True):
         there = {key: state for key, state in world.items() if state.exists}
         if frames is not None:
             if step.img_idx not in frames:

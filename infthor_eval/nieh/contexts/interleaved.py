@@ -17,7 +17,7 @@ def interleaved(data: NiehSet, question: Question, _settings: ContextSettings) -
     """Per task its goal and the frame before it, then every action with its frames."""
     outline = data.outline(question.traj_id)
     if outline is None:
-        return [SkippedQuestion(question, data.no_outline)]
+        return [SkippedQuestion(question, data.missing_outline)]
     layout = _layout(outline, data.action_frames(question.traj_id))
     return [Sample(question, tuple(item for item in layout if isinstance(item, int)))]
 

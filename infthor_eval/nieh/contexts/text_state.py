@@ -13,7 +13,7 @@ __all__ = ["state_parts", "text_state"]
 def text_state(data: NiehSet, question: Question, _settings: ContextSettings) -> list[Sample | SkippedQuestion]:
     """The last frame, beside the text of the last state."""
     if not data.states(question.traj_id):
-        reason = "the trajectory has no state_summary" if data.outline(question.traj_id) else data.no_outline
+        reason = "the trajectory has no state_summary" if data.outline(question.traj_id) else data.missing_outline
         return [SkippedQuestion(question, reason)]
     return [Sample(question, (len(data.frames(question.traj_id)) - 1,))]
 

@@ -13,8 +13,8 @@ from infthor_eval.nieh.summary import CLUE_COLUMNS, Cell, Score, TaskSummary, ma
 from infthor_eval.report.drawing import LEGEND, Look, add_legend, inline_svg, looks_of
 from infthor_eval.report.web.runs import ReportRun
 from infthor_eval.report.web.sections import Chart
-from infthor_eval.statistics import Estimate
-from infthor_eval.terminal import shown
+from infthor_eval.statistics import MeanEstimate
+from infthor_eval.terminal import printable
 
 __all__ = ["nieh_charts"]
 
@@ -84,7 +84,7 @@ def _by_type(task: str, lines: Sequence[_Line]) -> Chart:
         for number, line in enumerate(lines):
             cells = [line.task.by_question_type.get(name) for name in types]
             _dots(place, cells, line, -_off(number, len(lines)), is_flat=True)
-        place.set_yticks(range(len(types)), [shown(name)[:40] for name in types])
+        place.set_yticks(range(len(types)), [printable(name)[:40] for name in types])
         place.set_xlim(-3, 103)
         place.set_xlabel(f"{lines[0].metric} (%)")
         place.grid(axis="y", visible=False)
@@ -105,7 +105,7 @@ def _dots(place: Axes, cells: Sequence[Cell | None], line: _Line, off: float, *,
             _dot(place, cell.scores[line.metric], at + off, line.look.colour, is_flat=is_flat)
 
 
-def _dot(place: Axes, score: Score | Estimate, where: float, colour: str, *, is_flat: bool) -> None:
+def _dot(place: Axes, score: Score | MeanEstimate, where: float, colour: str, *, is_flat: bool) -> None:
     mean = 100 * score.mean
     place.plot(*((mean, where) if is_flat else (where, mean)), marker="o", ms=4.5, color=colour, zorder=3)
     if score.low is not None and score.high is not None:
@@ -135,7 +135,7 @@ def _gains_chart(runs: Sequence[ReportRun]) -> Chart | None:
         place.axvline(0, color="#444444", lw=0.8)
         for row, (_, total) in enumerate(reversed(found)):
             _dot(place, total, row, _GAIN, is_flat=True)
-        place.set_yticks(range(len(found)), [shown(name)[:60] for name, _ in reversed(found)])
+        place.set_yticks(range(len(found)), [printable(name)[:60] for name, _ in reversed(found)])
         place.set_ylim(-0.6, len(found) - 0.4)
         place.set_xlabel("gain, in points, and its 95 % interval")
         place.grid(axis="y", visible=False)

@@ -14,7 +14,7 @@ from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
 from infthor_eval.errors import wrap_errors
-from infthor_eval.formats.files import written_atomically
+from infthor_eval.formats.files import write_atomically
 from infthor_eval.report.web.samples import Sample
 from infthor_eval.report.web.sections import Section
 
@@ -91,7 +91,7 @@ def write_page(page: Page, path: Path) -> int:
         svg=Markup,
     )
     encoded = text.encode("utf-8", "backslashreplace")
-    with wrap_errors(f"{path}: cannot be written", "give another --out"), written_atomically(path) as partial:
+    with wrap_errors(f"{path}: cannot be written", "give another --out"), write_atomically(path) as partial:
         partial.write_bytes(encoded)
     return len(encoded)
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 
 from infthor_eval.rates import Rate
-from infthor_eval.reasons import counted_reasons
+from infthor_eval.reasons import count_reasons
 from infthor_eval.report.web.runs import ReportRun
 from infthor_eval.tables import Column, Row, Table
 
@@ -60,7 +60,7 @@ def left_out_table(runs: Sequence[ReportRun]) -> Table | None:
     rows = [
         Row((run.label, task, what, str(n), reason))
         for run in runs
-        for (task, what), reason, n in counted_reasons(_left_out(run))
+        for (task, what), reason, n in count_reasons(_left_out(run))
     ]
     rows += [
         Row((run.label, "", "not come to", str(run.n_missing), "the run was stopped; the same command goes on"))

@@ -12,7 +12,7 @@ from torch import Tensor
 from infthor_eval.errors import DataError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
-from infthor_eval.formats.step_log import Seen, Step, read_steps
+from infthor_eval.formats.step_log import ObjectInFrame, Step, read_steps
 from infthor_eval.training.data import recorded_names
 from infthor_eval.training.nano.architecture import GRID, PATCHES, TOKENS
 
@@ -96,7 +96,9 @@ def _type(key: str) -> str:
     return last.partition("_")[0] if last[:1].isalpha() else first
 
 
-def _labels(seen: dict[str, Seen], types: Sequence[str], size: tuple[int, int]) -> tuple[Tensor, Tensor, Tensor]:
+def _labels(
+    seen: dict[str, ObjectInFrame], types: Sequence[str], size: tuple[int, int]
+) -> tuple[Tensor, Tensor, Tensor]:
     cells = torch.zeros(TOKENS, len(types))
     shown, present = torch.zeros(len(types)), torch.zeros(len(types))
     covered = _covered(torch.tensor([item.box for item in seen.values()]).reshape(-1, 4), size)

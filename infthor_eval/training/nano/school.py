@@ -8,7 +8,7 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
-from infthor_eval.reasons import counted_reasons
+from infthor_eval.reasons import count_reasons
 from infthor_eval.training.batches import collate
 from infthor_eval.training.encoding import Encoded, Encoder
 from infthor_eval.training.nano.album import read_album
@@ -72,7 +72,7 @@ def teach(
     loaded = untrained(recipe, texts(folders, album.types), [opening()])
     network = NanoNetwork(loaded, album)
     lessons = Lessons(Encoder(loaded), folders, album, window_tokens=recipe.window_tokens, seed=recipe.seed)
-    for _, reason, n in counted_reasons(("", item.reason) for item in lessons.left_out):
+    for _, reason, n in count_reasons(("", item.reason) for item in lessons.left_out):
         say(f"{n} left out: {reason}")
     course = _Course(recipe, network, lessons)
     network.train()

@@ -1,6 +1,6 @@
 """Step logs made by hand: everything is always in sight, unless it is said not to be."""
 
-from infthor_eval.formats.step_log import ObjectLog, ObjectState, Seen, Step
+from infthor_eval.formats.step_log import ObjectInFrame, ObjectLog, ObjectState, Step
 from infthor_eval.generation.questions.history import History
 
 LOOSE = ("Apple", "Book", "Egg", "Laptop", "Mug", "Pan", "Vase")
@@ -21,8 +21,8 @@ def history(start, *events, boxes=None):
     steps, ids = [], list(start)
     told = ObjectLog(visible=[key.partition("|")[0] for key in ids], pickupable=list(LOOSE))
     for number, (action, target, receptacle, changes) in enumerate([(None, None, None, start), *events]):
-        shown = {key: Seen(400, (100, 100, 120, 120), True) for key in ids}
-        shown |= {key: Seen(400, box, True) for key, box in (boxes or {}).get(number, {}).items()}
+        shown = {key: ObjectInFrame(400, (100, 100, 120, 120), True) for key in ids}
+        shown |= {key: ObjectInFrame(400, box, True) for key, box in (boxes or {}).get(number, {}).items()}
         steps.append(
             Step(
                 number,

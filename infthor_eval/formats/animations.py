@@ -9,32 +9,32 @@ import numpy as np
 from PIL import Image
 
 from infthor_eval.errors import DataError, UsageError, wrap_errors
-from infthor_eval.formats.files import written_atomically
+from infthor_eval.formats.files import write_atomically
 
-__all__ = ["FORMATS", "require_moving", "write_moving"]
+__all__ = ["ANIMATION_FORMATS", "require_animation_name", "write_animation"]
 
-FORMATS = (".mp4", ".gif")
+ANIMATION_FORMATS = (".mp4", ".gif")
 # VP9, which browsers play, and MPEG-4 where an OpenCV lacks it. None of its wheels can encode H.264.
 _CODECS = ("vp09", "mp4v")
 _COLOURS = 128  # of a picture in a GIF
-_MEND = "make room, or give another place with --out"
+_HINT = "make room, or give another place with --out"
 
 
-def require_moving(path: Path) -> None:
+def require_animation_name(path: Path) -> None:
     """See that a file's name says in which format it is to be written.
 
     Raises:
         UsageError: it does not.
     """
-    if path.suffix.lower() not in FORMATS:
-        raise UsageError(f"--out {path}: a recording is {' or '.join(FORMATS)}; give a file of such a name")
+    if path.suffix.lower() not in ANIMATION_FORMATS:
+        raise UsageError(f"--out {path}: a recording is {' or '.join(ANIMATION_FORMATS)}; give a file of such a name")
 
 
-def write_moving(path: Path, pictures: Iterable[Image.Image], per_second: float) -> int:
+def write_animation(path: Path, pictures: Iterable[Image.Image], per_second: float) -> int:
     """Write pictures; they are asked for one at a time. The file is there whole or not at all.
 
     Args:
-        path: ends in one of `FORMATS`.
+        path: ends in one of `ANIMATION_FORMATS`.
         pictures: RGB, all of one even size; at least one.
         per_second: how many of them are shown in a second.
 
@@ -45,11 +45,11 @@ def write_moving(path: Path, pictures: Iterable[Image.Image], per_second: float)
         UsageError: the file's name has another ending.
         DataError: the file cannot be written.
     """
-    require_moving(path)
+    require_animation_name(path)
     write = _write_gif if path.suffix.lower() == ".gif" else _write_mp4
     with (
-        wrap_errors(f"{path}: cannot be written", _MEND),
-        written_atomically(path) as partial,
+        wrap_errors(f"{path}: cannot be written", _HINT),
+        write_atomically(path) as partial,
         tempfile.TemporaryDirectory(dir=path.parent, prefix=".recording-") as folder,
     ):
         made = Path(folder) / f"made{path.suffix.lower()}"  # OpenCV goes by the ending, which `partial` has not
@@ -84,7 +84,7 @@ def _write_mp4(path: Path, pictures: Iterable[Image.Image], per_second: float) -
     finally:
         cv2.utils.logging.setLogLevel(before)
     if kept != counted.n:  # OpenCV does not say when a disk is full
-        raise DataError(f"{path.parent}: only {kept} of {counted.n} pictures could be written; {_MEND}")
+        raise DataError(f"{path.parent}: only {kept} of {counted.n} pictures could be written; {_HINT}")
     return counted.n
 
 

@@ -5,7 +5,7 @@ import pytest
 from PIL import Image
 
 from infthor_eval.errors import DataError, UsageError
-from infthor_eval.formats.moving_pictures import require_moving, write_moving
+from infthor_eval.formats.animations import require_animation_name, write_animation
 
 SHADES = (0, 60, 60, 120, 180, 240)
 
@@ -16,7 +16,7 @@ def shades():
 
 def test_an_mp4_has_every_picture_in_its_size_and_time(tmp_path):
     path = tmp_path / "a.mp4"
-    assert write_moving(path, shades(), 3.0) == len(SHADES)
+    assert write_animation(path, shades(), 3.0) == len(SHADES)
     video = cv2.VideoCapture(str(path))
     assert video.get(cv2.CAP_PROP_FPS) == 3.0
     for shade in SHADES:
@@ -29,7 +29,7 @@ def test_an_mp4_has_every_picture_in_its_size_and_time(tmp_path):
 
 def test_a_gif_shows_every_picture_for_its_time(tmp_path):
     path = tmp_path / "a.GIF"
-    assert write_moving(path, shades(), 4.0) == len(SHADES)
+    assert write_animation(path, shades(), 4.0) == len(SHADES)
     with Image.open(path) as gif:
         assert gif.size == (64, 48)
         durations, seen = [], []
@@ -46,7 +46,7 @@ def test_the_same_pictures_are_the_same_bytes(tmp_path, name):
     (tmp_path / "other").mkdir()
     paths = tmp_path / name, tmp_path / "other" / name
     for path in paths:
-        write_moving(path, shades(), 2.0)
+        write_animation(path, shades(), 2.0)
     assert paths[0].read_bytes() == paths[1].read_bytes()
 
 
@@ -57,13 +57,13 @@ def test_nothing_is_left_where_a_picture_fails(tmp_path, name):
         raise DataError("no frame")
 
     with pytest.raises(DataError, match="no frame"):
-        write_moving(tmp_path / name, failing(), 2.0)
+        write_animation(tmp_path / name, failing(), 2.0)
     assert list(tmp_path.iterdir()) == []
 
 
 def test_other_names_are_refused(tmp_path):
     for name in ("a.avi", "a", ".mp4"):
         with pytest.raises(UsageError, match=r"a recording is \.mp4 or \.gif"):
-            require_moving(tmp_path / name)
+            require_animation_name(tmp_path / name)
     with pytest.raises(DataError, match="cannot be written"):
-        write_moving(tmp_path / "none" / "a.mp4", shades(), 2.0)
+        write_animation(tmp_path / "none" / "a.mp4", shades(), 2.0)
