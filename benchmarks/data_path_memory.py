@@ -21,7 +21,7 @@ from typing import Any
 import torch
 from noise_set import write_set
 
-from infthor_eval.cli.requests import Asked, requests_for
+from infthor_eval.cli.options.requests import Asked, requests_for
 from infthor_eval.runs import UnitRecord, execute, prepare
 from model_adapters.tiny.qwen2_5_vl import Qwen25VLTiny
 

@@ -10,7 +10,7 @@ import tempfile
 from collections import defaultdict
 from pathlib import Path
 
-from infthor_eval.cli.requests import Asked, requests_for
+from infthor_eval.cli.options.requests import Asked, requests_for
 from infthor_eval.runs import UnitKey, UnitRecord, execute, prepare
 
 

@@ -13,13 +13,13 @@ from types import FrameType
 import click
 
 import infthor_eval
-from infthor_eval.cli.repeated import refuse_repeated
+from infthor_eval.cli.options.repeated import refuse_repeated
 from infthor_eval.errors import InfthorError, in_one_line
 from infthor_eval.terminal import print_error
 
 __all__ = ["main"]
 
-# Name, and the one line that the overview shows; the module infthor_eval.cli.<name, with _ for -> has the command.
+# Name, and the one line that the overview shows.
 _COMMANDS = {
     "run": "Evaluate a model on tasks (the default command).",
     "plan": "Estimate what a run will take, before it begins.",
@@ -54,7 +54,7 @@ class _Commands(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in _COMMANDS:
             return None
-        command = importlib.import_module(f"infthor_eval.cli.{cmd_name.replace('-', '_')}").command
+        command = importlib.import_module(f"infthor_eval.cli.commands.{cmd_name.replace('-', '_')}").command
         assert isinstance(command, click.Command)
         return command
 

@@ -1,11 +1,15 @@
 """Commands that only tell something import nothing that takes seconds."""
 
+import pkgutil
 import subprocess
 import sys
 
+import click
 import pytest
 
 from infthor_eval import suites
+from infthor_eval.cli import commands
+from infthor_eval.cli.main import _infthor_eval
 
 HEAVY = {"torch", "transformers", "numpy", "scipy", "ai2thor", "lm_eval", "datasets", "matplotlib"}
 PROGRAM = """
@@ -35,3 +39,8 @@ def test_what_is_told_is_told_at_once(typed: str) -> None:
 def test_the_baselines_that_are_listed_are_the_suites_own(name: str) -> None:
     listed = {baseline for baseline, having in suites.baseline_names().items() if name in having.split(", ")}
     assert listed == set(suites.suite_named(name).baselines)
+
+
+def test_every_command_is_listed_by_name():
+    names = {module.name.replace("_", "-") for module in pkgutil.iter_modules(commands.__path__)}
+    assert names == set(_infthor_eval.list_commands(click.Context(_infthor_eval)))

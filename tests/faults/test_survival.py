@@ -301,7 +301,7 @@ def test_sigterm_leaves_no_temporary_folder(tmp_path):
     code = (
         "import sys, time\n"
         "from infthor_eval.cli import main\n"
-        "import infthor_eval.cli.listing as listing\n"
+        "import infthor_eval.cli.commands.ls as listing\n"
         "from infthor_eval.formats.scratch import ScratchFolder\n"
         "def wait(*_):\n"
         "    with ScratchFolder():\n"

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from infthor_eval.cli.requests import Asked, requests_for
+from infthor_eval.cli.options.requests import Asked, requests_for
 from infthor_eval.runs import PreparedRun, prepare
 from infthor_eval.thor.launch import embedded
 from infthor_eval.thor.simulator import Simulator

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from infthor_eval.cli.requests import Asked, requests_for
+from infthor_eval.cli.options.requests import Asked, requests_for
 from infthor_eval.errors import DataError, UsageError
 from infthor_eval.manipulation.records import RECORDS
 from infthor_eval.runs import execute, prepare, read_run

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from infthor_eval.cli.requests import Asked, requests_for
+from infthor_eval.cli.options.requests import Asked, requests_for
 from infthor_eval.runs import PreparedRun, prepare
 
 

@@ -134,7 +134,7 @@ def test_what_is_no_fault_of_the_suite_ends_the_run_and_keeps_what_is_done(tmp_p
 
 
 def test_a_programming_error_is_counted_and_told_at_the_end(tmp_path, capfd):
-    from infthor_eval.cli.evaluate import evaluate
+    from infthor_eval.cli.commands.run import evaluate
     from infthor_eval.cli.showing import Showing
 
     assert evaluate([(request(tmp_path), broken_by(ZeroDivisionError("of its own")))], Showing()) == 1

@@ -78,7 +78,7 @@ def test_units_that_fail_are_told_and_the_others_tell_what_it_takes(tmp_path):
 
 
 def test_where_every_unit_fails_nothing_is_told(tmp_path, capfd):
-    from infthor_eval.cli.planning import plan
+    from infthor_eval.cli.commands.plan import plan
 
     class Broken(Sums):
         def run(self, asked, session):

@@ -27,7 +27,7 @@ class Slow(Sums):
 
 
 if __name__ == "__main__":
-    from infthor_eval.cli.evaluate import evaluate
+    from infthor_eval.cli.commands.run import evaluate
     from infthor_eval.cli.showing import Showing
 
     sys.exit(evaluate([(request(Path(sys.argv[1])), SlowSuite() if len(sys.argv) > 2 else ToySuite())], Showing()))

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from infthor_eval.cli import main
-from infthor_eval.cli.reported_episodes import stages
+from infthor_eval.cli.commands.report import stages
 from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.report.web.build import Wanted, build_page
 from infthor_eval.report.web.page import Page, write_page

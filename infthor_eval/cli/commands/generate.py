@@ -1,0 +1,99 @@
+"""`infthor-eval generate`: make long trajectories from seeds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from infthor_eval.cli.options.values import Whole, floor_plans_option
+from infthor_eval.cli.options.workers import worker_options
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from infthor_eval.generation.generate_set import GenerationSummary
+    from infthor_eval.workers import WorkerSettings
+
+__all__ = ["command"]
+
+_PATH = click.Path(path_type=Path)
+
+
+@click.command("generate")
+@click.option("--scene", "scenes", multiple=True, required=True, help="kitchen-3, FloorPlan10, ...; may be repeated.")
+@click.option("--min-steps", type=click.IntRange(1), default=300, show_default=True, help="Low-level actions at least.")
+@click.option("--min-subgoals", type=click.IntRange(1), default=10, show_default=True, help="Tasks at least.")
+@click.option("--max-fail", type=click.IntRange(1), default=20, show_default=True, help="Tasks that may fail, at most.")
+@click.option("--seed", type=Whole(0), default=0, show_default=True, help="Of the first trajectory.")
+@click.option("--count", type=click.IntRange(1), default=1, show_default=True, help="Trajectories for each scene.")
+@click.option("--final-task", is_flag=True, help="End with a task on what was seen at both ends of the trajectory.")
+@click.option("--test-set", is_flag=True, help="As the published test sets: with a final task, without bathrooms.")
+@click.option("--out", required=True, type=_PATH, help="Directory for the trajectory files.")
+@floor_plans_option
+@worker_options
+@click.option("--json", "as_json", is_flag=True, help="Print the summary as one JSON object.")
+@click.pass_context
+def command(
+    context: click.Context,
+    scenes: tuple[str, ...],
+    min_steps: int,
+    min_subgoals: int,
+    max_fail: int,
+    seed: int,
+    count: int,
+    final_task: bool,
+    test_set: bool,
+    out: Path,
+    data: Path | None,
+    worker_settings: WorkerSettings,
+    as_json: bool,
+) -> None:
+    """Generate trajectories: tasks are sampled, planned, and carried out in the embedded simulator.
+
+    Trajectories that the directory has already are not made again. Exit status 1 where one could not be made.
+    """
+    from infthor_eval.cli.progress.bar import PacedBar
+    from infthor_eval.formats.files import prepare_folder
+    from infthor_eval.generation.generate_set import generate_with_workers
+    from infthor_eval.generation.jobs import trajectory_jobs, without_bathrooms
+    from infthor_eval.terminal import console, error_console, progress_bar
+    from infthor_eval.thor.launch import embedded
+
+    notes = error_console()
+    chosen, skipped = without_bathrooms(scenes) if test_set else (scenes, [])
+    if skipped:
+        notes.print(f"bathrooms are left out of test sets: {', '.join(skipped)}")
+    jobs = trajectory_jobs(
+        chosen,
+        seed=seed,
+        count=count,
+        min_steps=min_steps,
+        min_subgoals=min_subgoals,
+        final_task=final_task or test_set,
+        max_fail=max_fail,
+    )
+    prepare_folder(out)
+    with progress_bar(notes) as progress:
+        bar = PacedBar(progress, "generate", len(jobs))
+        result = generate_with_workers(jobs, embedded(data), out, worker_settings, bar.advance, notes.print)
+    if as_json:
+        import msgspec
+
+        click.echo(msgspec.json.encode(result.summary()))
+    else:
+        _print(result.summary(), out, console())
+    for failure in result.failures:
+        notes.print(f"not made: {failure}", style="red")
+    context.exit(1 if result.failures else 0)
+
+
+def _print(summary: GenerationSummary, out: Path, output: Console) -> None:
+    from infthor_eval.generation.tables import tasks_table
+    from infthor_eval.report.terminal import print_table
+
+    output.print(
+        f"{summary.trajectories} trajectories ({summary.resumed} made earlier), {summary.steps} steps: {out}",
+    )
+    print_table(tasks_table(summary), output)

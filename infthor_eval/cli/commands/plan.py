@@ -1,0 +1,112 @@
+"""`infthor-eval plan`: what a run will take, before it begins."""
+
+import resource
+import sys
+from collections.abc import Sequence
+
+import click
+
+from infthor_eval.cli.options.run import run_options
+from infthor_eval.cli.options.values import FiniteRange, Whole
+from infthor_eval.cli.progress.pace import duration
+from infthor_eval.cli.progress.progress import NOTES, say
+from infthor_eval.errors import ModelError
+from infthor_eval.reasons import count_reasons
+from infthor_eval.report.terminal import print_table, table_console
+from infthor_eval.runs import RunRequest, Suite, TaskEstimate, Workload, estimate_run
+from infthor_eval.tables import Column, Row, Table
+from infthor_eval.terminal import progress_bar
+
+__all__ = ["command", "plan"]
+
+_COLUMNS = ("units", "measured", "frames", "requests", "tokens read", "encoded", "written", "time")
+
+
+@click.command("plan")
+@click.option("--measure", type=Whole(1), default=6, show_default=True, help="Units of each task.")
+@click.option(
+    "--price-per-hour", type=FiniteRange(min=0), metavar="USD", help="Of the machine that a worker has, for its cost."
+)
+@run_options("measure", "price_per_hour")
+def command(requests: list[tuple[RunRequest, Suite]], measure: int, price_per_hour: float | None) -> int:
+    """Estimate what a run would take: requests, tokens, frames, memory, time and money.
+
+    Takes the options of `run`. A few units of each task are done to tell, and nothing of them is kept.
+    """
+    return max([plan(*request, measure, price_per_hour) for request in requests], default=0)
+
+
+def plan(request: RunRequest, suite: Suite, measure: int, price_per_hour: float | None) -> int:
+    """Print the estimate of one run.
+
+    Args:
+        request: the run.
+        suite: its suite.
+        measure: units of each task that are done.
+        price_per_hour: US dollars of a worker's machine; None asks for no such cost.
+
+    Returns:
+        Exit code: 1 where a unit that was measured failed, else 0.
+
+    Raises:
+        ModelError: all of them failed.
+    """
+    with progress_bar(NOTES) as progress:
+        bar = progress.add_task(f"{request.label}: measuring", total=None)
+        found = estimate_run(request, suite, measure, lambda: progress.advance(bar))
+    _say_beforehand(found.workload)
+    for task, reason, n in count_reasons(found.failures):
+        say(f"{task}: {n} measured unit(s) failed: {reason}", "red")
+    if not found.tasks:
+        raise ModelError(f"{request.label}: every unit that was measured failed; mend what is told above")
+    console = table_console()
+    print_table(_table(request, found.tasks), console)
+    for line in _totals(request, found.tasks, price_per_hour):
+        console.print(line)
+    return int(bool(found.failures))
+
+
+def _say_beforehand(workload: Workload) -> None:
+    for task, reason, n in count_reasons((item.key.task, item.reason) for item in workload.skipped):
+        say(f"{task}: {n} sample(s) skipped: {reason}", "yellow")
+    for cost in workload.costs:
+        say(f"{cost.task}: {cost.description}")
+
+
+def _table(request: RunRequest, tasks: Sequence[TaskEstimate]) -> Table:
+    rows = [_row(item) for item in tasks]
+    title = f"What {request.label} will take, by {sum(item.n_measured for item in tasks)} units that were done"
+    return Table(title, (Column("task", False), *map(Column, _COLUMNS)), tuple(rows))
+
+
+def _row(item: TaskEstimate) -> Row:
+    total = item.total
+    counts = (item.n_units, item.n_measured, item.frames, total.requests, total.read, total.encoded, total.written)
+    return Row((item.task, *(f"{round(count):,}" for count in counts), duration(total.seconds)))
+
+
+def _totals(request: RunRequest, tasks: Sequence[TaskEstimate], price_per_hour: float | None) -> list[str]:
+    seconds, workers = sum(item.total.seconds for item in tasks), request.worker_settings.workers
+    shared = f", {duration(seconds / workers)} by {workers} workers" if workers > 1 else ""
+    lines = [f"time: {duration(seconds)} of one worker{shared}, loading not counted"]
+    lines.append(f"memory: {_peak_megabytes():,} MB at most while it was measured{_gpu_memory()}")
+    cost = sum(item.total.cost for item in tasks)
+    if cost:
+        lines.append(f"money: {cost:.2f} US dollars by the prices of the model")
+    if price_per_hour is not None:
+        lines.append(
+            f"money: {seconds / 3600 * price_per_hour:.2f} US dollars of machines at {price_per_hour:g} an hour"
+        )
+    return lines
+
+
+def _peak_megabytes() -> int:
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss  # in kilobytes, but for macOS
+    return peak // (1024 * 1024 if sys.platform == "darwin" else 1024)
+
+
+def _gpu_memory() -> str:
+    torch = sys.modules.get("torch")  # loaded by the model, where it needs it
+    if torch is None or not torch.cuda.is_available():
+        return ""
+    return f", {torch.cuda.max_memory_allocated() // 2**20:,} MB of the GPU"

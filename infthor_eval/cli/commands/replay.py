@@ -1,0 +1,98 @@
+"""`infthor-eval replay`: run recorded trajectories in a simulator and write frames and logs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from infthor_eval.cli.options.values import floor_plans_option
+from infthor_eval.cli.options.workers import worker_options
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from infthor_eval.generation.replay_summary import ReplaySummary
+    from infthor_eval.workers import WorkerSettings
+
+__all__ = ["command"]
+
+_PATH = click.Path(path_type=Path)
+_SHOWN = 20  # failures and divergences printed one by one; all are in the JSON summary
+
+
+@click.command("replay")
+@click.argument("trajectories", nargs=-1, required=True, type=_PATH)
+@click.option("--out", required=True, type=_PATH, help="The set to write or to continue.")
+@floor_plans_option
+@click.option("--limit", type=click.IntRange(1), help="Replay at most this many trajectories.")
+@click.option("--per-floor-plan", type=click.IntRange(1), help="At most this many of one floor plan.")
+@click.option("--frames", type=click.IntRange(1), default=1, show_default=True, help="Frames per move or turn.")
+@click.option("--unity", is_flag=True, help="Use AI2-THOR's own Unity build, not the embedded simulator.")
+@worker_options
+@click.option("--json", "as_json", is_flag=True, help="Print the summary as one JSON object.")
+@click.pass_context
+def command(
+    context: click.Context,
+    trajectories: tuple[Path, ...],
+    out: Path,
+    data: Path | None,
+    limit: int | None,
+    per_floor_plan: int | None,
+    frames: int,
+    unity: bool,
+    worker_settings: WorkerSettings,
+    as_json: bool,
+) -> None:
+    """Replay trajectories (.json, .jsonl, .jsonl.gz, directories) into an NIEH set.
+
+    Writes one frame per low-level action (and the first one), the log of every frame, and the trajectory
+    itself. Trajectories that the set has already are not replayed again. A refused action is reported and the
+    replay goes on. Exit status 1 where a trajectory could not be replayed at all.
+    """
+    from infthor_eval.cli.progress.bar import PacedBar
+    from infthor_eval.formats.files import prepare_folder
+    from infthor_eval.generation.replay_set import replay_with_workers, select
+    from infthor_eval.generation.replay_summary import summarise
+    from infthor_eval.terminal import console, error_console, progress_bar
+    from infthor_eval.thor import launch
+    from infthor_eval.thor.supplement import supplement_file
+
+    notes = error_console()
+    prepare_folder(out)
+    selection = select(trajectories, limit, per_floor_plan)
+    with supplement_file(trajectory for _, trajectory in selection.items) as supplement:
+        start = launch.unity() if unity else launch.embedded(data, supplement)
+        with progress_bar(notes) as progress:
+            bar = PacedBar(progress, "replay", len(selection.items))
+            replayed = replay_with_workers(selection, start, out, worker_settings, frames, bar.advance, notes.print)
+    if as_json:
+        import msgspec
+
+        click.echo(msgspec.json.encode(summarise(replayed)))
+    else:
+        _print(summarise(replayed), console())
+    for failure in replayed.failures[:_SHOWN]:
+        notes.print(f"not replayed: {failure.place}: {failure.message}", style="red")
+    context.exit(1 if replayed.failures else 0)
+
+
+def _print(summary: ReplaySummary, output: Console) -> None:
+    from infthor_eval.generation.tables import actions_table, overlaps_table
+    from infthor_eval.report.terminal import print_table
+
+    output.print(
+        f"{summary.trajectories} trajectories on {summary.floor_plans} floor plans ({summary.resumed} replayed "
+        f"earlier, {summary.failed} failed), {summary.complete} whole, {summary.seconds} s",
+    )
+    print_table(actions_table(summary), output)
+    overlaps = overlaps_table(summary)
+    if overlaps is not None:
+        print_table(overlaps, output)
+    for item in summary.diverged[:_SHOWN]:
+        line = f"diverged: {item.traj_id}: step {item.step}: {item.action}: {item.error}"
+        output.print(line)
+    hidden = len(summary.diverged) - _SHOWN
+    if hidden > 0:
+        output.print(f"and {hidden} more; --json lists all")

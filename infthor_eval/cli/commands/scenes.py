@@ -1,0 +1,82 @@
+"""`infthor-eval scenes`: look at a scene, or carry it to machines without Unity."""
+
+from pathlib import Path
+
+import click
+
+from infthor_eval.cli.options.values import floor_plans_option
+
+__all__ = ["command"]
+
+_PICTURES = (".png", ".jpg", ".jpeg")
+
+
+@click.group("scenes")
+def command() -> None:
+    """Look at scenes (show), or carry them to machines without Unity (dump)."""
+
+
+@command.command("show")
+@click.argument("name")
+@floor_plans_option
+@click.option("--out", type=click.Path(path_type=Path), help="The picture to write; NAME.png otherwise.")
+@click.option("--size", type=click.IntRange(64, 2048), default=600, show_default=True, help="Of each view, pixels.")
+@click.option("--overwrite", is_flag=True, help="Replace a file that holds something else.")
+def show(name: str, data: Path | None, out: Path | None, size: int, overwrite: bool) -> None:
+    """Draw scene NAME from above and as the agent first sees it, side by side."""
+    import io
+
+    from PIL import Image
+
+    from infthor_eval.errors import wrap_errors
+    from infthor_eval.formats.files import prepare_file, refuse_overwrite, write_atomically
+    from infthor_eval.terminal import print_line
+    from infthor_eval.thor.launch import embedded
+    from infthor_eval.thor.scenes import scene_pictures
+    from infthor_eval.thor.simulator import Simulator
+
+    path = prepare_file(out or Path(f"{name}.png"))
+    if path.suffix.lower() not in _PICTURES:
+        raise click.UsageError(f"--out {path}: not a picture; use {', '.join(_PICTURES)}")
+    with Simulator(embedded(data), width=size, height=size, quality="Ultra") as simulator:
+        above, first = scene_pictures(simulator, name)
+    sheet = Image.new("RGB", (2 * size, size))
+    sheet.paste(Image.fromarray(above), (0, 0))
+    sheet.paste(Image.fromarray(first), (size, 0))
+    picture = io.BytesIO()
+    sheet.save(picture, format=Image.registered_extensions()[path.suffix.lower()])
+    if not overwrite:
+        refuse_overwrite(path, picture.getvalue())
+    with (
+        wrap_errors(f"{path}: cannot be written", "give another place with --out"),
+        write_atomically(path) as partial,
+    ):
+        partial.write_bytes(picture.getvalue())
+    print_line(f"{name}: {path} (from above; first view)")
+
+
+@command.command("dump")
+@click.argument("names", nargs=-1, required=True)
+@click.option("--out", type=click.Path(path_type=Path), required=True, help="Folder of floor plans, made or added to.")
+@click.option("--unity", type=click.Path(path_type=Path), help="Unity's executable, not the build ai2thor downloads.")
+@click.option("--embedded", "is_embedded", is_flag=True, help="Dump scenes of the embedded simulator instead.")
+@click.option("--overwrite", is_flag=True, help="Replace scenes of which the folder has something else.")
+@floor_plans_option
+def dump(
+    names: tuple[str, ...], out: Path, unity: Path | None, is_embedded: bool, overwrite: bool, data: Path | None
+) -> None:
+    """Write what Unity reports of the scenes NAMES, for --data of the other commands.
+
+    With that folder they run in the embedded simulator on machines without Unity.
+    """
+    from infthor_eval.formats.files import prepare_folder
+    from infthor_eval.terminal import print_line
+    from infthor_eval.thor import launch
+    from infthor_eval.thor.scenes import dump_scene
+    from infthor_eval.thor.simulator import Simulator
+
+    prepare_folder(out)
+    start = launch.embedded(data) if is_embedded else launch.unity(unity)
+    with Simulator(start) as simulator:
+        for name in names:
+            print_line(f"{name}: {dump_scene(simulator, name, out, overwrite)} objects in {out}")

@@ -1,0 +1,109 @@
+"""`infthor-eval validate`: keep the questions of a set that at least one of several models can answer."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Literal
+
+import click
+
+from infthor_eval.cli.options.requests import Asked, requests_for
+from infthor_eval.cli.options.values import ModelsAsked, Whole
+from infthor_eval.cli.options.workers import worker_options
+from infthor_eval.cli.progress.progress import execute_with_progress, say
+from infthor_eval.nieh.samples import find_set
+from infthor_eval.nieh.scoring import Scorer
+from infthor_eval.nieh.tables import clues_table
+from infthor_eval.nieh.validated_set import check_place, write_validated_set
+from infthor_eval.nieh.validation import Verdicts, check_decisions, judge, read_decisions
+from infthor_eval.report.inspection import write_inspection_page
+from infthor_eval.report.terminal import print_table, table_console
+from infthor_eval.runs import RunOutcome, RunRequest, RunSummary, Suite, prepare
+from infthor_eval.workers import WorkerSettings
+
+__all__ = ["command", "validate"]
+
+
+@click.command("validate")
+@click.argument("set_folder", metavar="SET", type=click.Path(path_type=Path))
+@click.option(
+    "--models",
+    type=ModelsAsked(),
+    required=True,
+    metavar="MODEL,...",
+    help="Model names with commas; the paper uses four. MODEL:K=V,... gives one options of its own.",
+)
+@click.option("--out", type=click.Path(path_type=Path), required=True, help="Folder of the validated set.")
+@click.option("--decisions", type=click.Path(path_type=Path), help="The inspection list with keep or drop filled in.")
+@click.option("--scorer", type=click.Choice(["strict", "reference"]), default="strict", show_default=True)
+@click.option("--seed", type=Whole(), default=0, show_default=True, help="For whatever is random.")
+@worker_options
+def command(
+    set_folder: Path,
+    models: Mapping[str, Mapping[str, str]],
+    out: Path,
+    decisions: Path | None,
+    scorer: Literal["strict", "reference"],
+    seed: int,
+    worker_settings: WorkerSettings,
+) -> int:
+    """Ask every question of SET of each model, on its clue frames alone, and keep what one of them answers.
+
+    Rejected questions go to rejected.jsonl with every reply. Those with several clues that no model answers go to
+    inspection.csv and inspection.html; decide, and pass the decisions back. Stopped, the same command goes on.
+    """
+    asked = Asked(tasks=("nieh_gt",), data=set_folder, output=out / "runs", seed=seed, worker_settings=worker_settings)
+    requests = [request for model, options in models.items() for request in requests_for(asked, model, options)]
+    return validate(requests, out, decisions, scorer)
+
+
+def validate(
+    requests: Sequence[tuple[RunRequest, Suite]], out: Path, decisions_file: Path | None, scorer: Scorer
+) -> int:
+    """Run the models, sort the questions out, write the validated set, and print Table 4 on it.
+
+    Args:
+        requests: one per model, all on the clue frames of the same set.
+        out: folder of the validated set; the runs lie in it too.
+        decisions_file: an inspection list with decisions.
+        scorer: under which an answer is correct.
+
+    Returns:
+        Exit code: 130 where somebody stopped it, 1 where a model failed on a question, else 0.
+    """
+    decisions = read_decisions(decisions_file) if decisions_file else {}
+    data = find_set(str(requests[0][0].tasks.data))
+    check_decisions(decisions, data.questions)
+    check_place(out, data)
+    runs = [prepare(request, suite) for request, suite in requests]
+    outcomes = []
+    for run in runs:
+        outcomes.append(execute_with_progress(run))
+        if outcomes[-1].n_missing:
+            return 130
+    asked = {record.id for record in outcomes[0].records}
+    questions = [question for question in data.questions if question.id in asked]
+    replies = {outcome.run.request.model: _replies(outcome) for outcome in outcomes}
+    verdicts = judge(questions, replies, decisions, scorer)
+    earlier = write_validated_set(out, data, verdicts)
+    if earlier is not None:
+        say(f"{earlier}: the earlier list, with decisions on questions that are not to be inspected any more")
+    write_inspection_page(out / "inspection.html", verdicts.to_inspect, data)
+    console = table_console()
+    print_table(clues_table([_on_kept(outcome, verdicts) for outcome in outcomes]), console)
+    console.print(
+        f"{len(questions)} questions: {len(verdicts.kept)} kept, {len(verdicts.rejected)} rejected, "
+        f"{len(verdicts.to_inspect)} to inspect: {out}",
+    )
+    return int(any(record.failure is not None for outcome in outcomes for record in outcome.records))
+
+
+def _replies(outcome: RunOutcome) -> dict[str, str | None]:
+    return {record.id: record.payload.reply for record in outcome.records}
+
+
+def _on_kept(outcome: RunOutcome, verdicts: Verdicts) -> RunSummary:
+    """The run's summary on the questions that stay."""
+    kept = {item.question.id for item in verdicts.kept}
+    header = outcome.summary.header
+    records = [record for record in outcome.records if record.id in kept]
+    return RunSummary(header, outcome.run.suite.summarise(header, records))

@@ -1,0 +1,1 @@
+"""What people see of work while it goes on."""

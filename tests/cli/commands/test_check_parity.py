@@ -1,0 +1,61 @@
+"""`infthor-eval check-parity`, against a server that a tiny twin answers for."""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from PIL import Image
+
+from model_adapters.policies.parity import loaded
+
+from ...model_adapters.policies.servers import policy_answers, serving
+
+Run = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture(autouse=True)
+def no_proxy(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("no_proxy", "127.0.0.1")
+
+
+@pytest.fixture(scope="module")
+def url() -> Iterator[str]:
+    with serving(policy_answers(loaded("openvla-tiny", {}))) as address:
+        yield address
+
+
+def test_equal_policies_end_with_0(run: Run, url: str) -> None:
+    code, out, _ = run("check-parity", "openvla-tiny", "--reference-url", url)
+    assert code == 0
+    assert "openvla-tiny and its reference" in out
+    assert "they are taken for equal: equal." in out
+    assert out.count("pick up the") == 2
+
+
+def test_different_policies_end_with_1(run: Run, tmp_path: Path) -> None:
+    Image.new("RGB", (64, 64), "red").save(tmp_path / "red.png")
+    words = ("--frames", tmp_path, "--instruction", "open the drawer")
+    with serving(policy_answers(loaded("openvla-tiny", {}), change=0.125)) as other:
+        code, out, _ = run("check-parity", "openvla-tiny", "--reference-url", other, *words)
+        tolerated, _, _ = run("check-parity", "openvla-tiny", "--reference-url", other, *words, "--tolerance", "0.2")
+    assert (code, tolerated) == (1, 0)
+    assert "0.12" in out
+    assert "open the drawer" in out
+    assert "they differ" in out
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("openvla-tin", "--reference-url", "http://127.0.0.1:9"), "did you mean 'openvla-tiny'"),
+        (("openvla-tiny",), "--reference-url"),
+        (("openvla-tiny", "--reference-url", "nowhere"), "--reference-url: url is no address"),
+        (("openvla-tiny", "--reference-url", "http://x", "--frames", "/nowhere"), "holds no pictures"),
+        (("openvla-tiny", "--reference-url", "http://x", "--model-args", "unnorm_key=a"), "unnorm_key=a is no dataset"),
+    ],
+)
+def test_misuse_is_one_line(run: Run, words: tuple[str, ...], said: str) -> None:
+    code, out, err = run("check-parity", *words)
+    assert (code, out) == (2, "")
+    assert said in err
+    assert "Traceback" not in err

@@ -1,0 +1,190 @@
+"""`--config`: a run by a file, and the file that every run leaves; models with options of their own."""
+
+import json
+import shlex
+from pathlib import Path
+
+import click
+import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+
+from infthor_eval.cli.options.run import run_options
+from infthor_eval.cli.options.values import ModelsAsked
+from infthor_eval.runs import RunRequest, Suite, read_configuration
+from tests.faults.told import said_in_one_line
+
+KEY = "sk-of-nobody-0123456789"
+
+
+def only(folder: Path, pattern: str) -> Path:
+    (path,) = folder.rglob(pattern)
+    return path
+
+
+@pytest.fixture
+def config(make_nieh_set, tmp_path):
+    """Writes a file for a run of the oracle on five questions, with changes."""
+    data = make_nieh_set(size=56)
+
+    def config(**changes: object) -> Path:
+        path = tmp_path / "asked.yaml"
+        options = {"model": "oracle", "tasks": ["nieh_gt"], "data": str(data), "output": str(tmp_path / "out")}
+        path.write_text(yaml.safe_dump({**options, **changes}))
+        return path
+
+    return config
+
+
+@pytest.mark.parametrize("words", [("run", "--config"), ("--config",)])
+def test_a_run_by_a_file_and_what_is_typed_wins(config, tmp_path, run, words):
+    code, _, err = run(*words, config(limit=2))
+    assert code == 0, err
+    assert "oracle: 2 answered now" in err
+    code, _, err = run(*words, config(limit=2), "--limit", 3, "--model", "blind")
+    assert "blind: 3 answered now" in err
+
+
+def test_the_file_that_a_run_leaves_goes_on_with_that_very_run(config, tmp_path, run, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    run("--config", config(data="set", output="out", limit=4, frames="blank,shown", seed=3, name="mine"))
+    left = sorted((tmp_path / "out" / "mine").rglob("run.yaml"))
+    assert len(left) == 2
+    monkeypatch.chdir("/")
+    before = [(path.parent / "results.json").read_bytes() for path in left]
+    for path in left:
+        code, _, err = run("--config", path)
+        assert code == 0
+        assert "mine: 0 answered now, 4 found" in err
+    assert sorted((tmp_path / "out" / "mine").rglob("run.yaml")) == left
+    assert [(path.parent / "results.json").read_bytes() for path in left] == before
+
+
+def test_the_command_that_it_stands_for_is_the_run(config, run):
+    run("--config", config(limit=2, frames="blank"))
+    found = read_configuration(only(config().parent / "out", "run.yaml").parent)
+    _, _, err = run(*shlex.split(found.command)[1:])
+    assert "oracle: 0 answered now, 2 found" in err
+
+
+@pytest.mark.slow
+def test_several_workers_leave_it_too(config, tmp_path, run):
+    code, _, err = run("--config", config(workers=2))
+    assert code == 0, err
+    assert yaml.safe_load(only(tmp_path / "out", "run.yaml").read_text())["workers"] == 2
+
+
+def test_no_key_is_written(config, tmp_path, run, monkeypatch):
+    monkeypatch.setenv("OPENAI_API_KEY", KEY)
+    typed = {"model": "m", "base_url": "http://localhost:9/v1", "retries": 0}
+    run("--config", config(model="openai", model_args=typed))
+    assert only(tmp_path / "out", "run.yaml")
+    for path in (tmp_path / "out").rglob("*"):
+        assert path.is_dir() or KEY.encode() not in path.read_bytes()
+
+
+BAD = {
+    "limt": ({"limt": 3}, "asked.yaml: unknown option 'limt'; did you mean 'limit'?"),
+    "config": ({"config": "other.yaml"}, "asked.yaml: unknown option 'config'"),
+    "limit": ({"limit": 0}, "asked.yaml: limit: 0 is less than 1"),
+    "seed": ({"seed": "x"}, "asked.yaml: seed: 'x' is not a valid"),
+    "tasks": ({"tasks": {"a": 1}}, "asked.yaml: tasks is {'a': 1}; write one value"),
+    "model_args": ({"model_args": {"a": [1]}}, "asked.yaml: model_args: a is [1]; write one value"),
+    "model options": ({"model_args": "a"}, "asked.yaml: model_args: --model-args: 'a' is not of the form key=value"),
+    "frames": ({"frames": "none"}, "--frames none: there are shown, blank"),
+    "unknown model option": ({"model": "qwen2.5-vl-tiny", "model_args": {"dtpe": "x"}}, "did you mean dtype?"),
+    "choice": ({"engine": "trt"}, "asked.yaml: engine: 'trt' is not one of"),
+    "flag": ({"greedy": "maybe"}, "asked.yaml: greedy: 'maybe' is not a valid boolean"),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_what_a_file_cannot_say_is_named(config, tmp_path, run, name):
+    changes, said = BAD[name]
+    said_in_one_line(run("--config", config(**changes)), said)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_file_that_is_not_there_is_named(tmp_path, run):
+    said_in_one_line(run("--config", tmp_path / "no.yaml"), "no.yaml")
+
+
+@pytest.fixture
+def requests():
+    """What a command with the options of a run is given."""
+
+    def requests(*arguments: object) -> list[RunRequest]:
+        found: list[tuple[RunRequest, Suite]] = []
+
+        @click.command()
+        @run_options()
+        def command(requests: list[tuple[RunRequest, Suite]]) -> None:
+            found.extend(requests)
+
+        command.main(list(map(str, arguments)), standalone_mode=False)
+        return [request for request, _ in found]
+
+    return requests
+
+
+def test_an_option_that_is_typed_wins_over_the_same_one_of_the_file(config, requests):
+    asked = config(model_args={"rope": "yarn:4", "dtype": "float32"}, max_cost=2)
+    (request,) = requests("--config", asked, "--rope", "linear:2")
+    assert request.model_options == {"rope": "linear:2", "dtype": "float32", "max_cost": "2.0"}
+    (request,) = requests("--config", asked, "--model-args", "max_cost=5")
+    assert request.model_options == {"max_cost": "5"}
+    with pytest.raises(click.UsageError, match="give one of them"):
+        requests("--config", config(rope="yarn:4", model_args={"rope": "yarn:2"}))
+
+
+def test_each_model_has_its_own_options(config, requests):
+    typed = ("--model", "qwen2.5-vl:dtype=float32,max_tokens=1000,pixtral", "--engine", "vllm")
+    found = requests("--config", config(), *typed, "--model-args", "dtype=bfloat16,seed=1")
+    assert {request.model: request.model_options for request in found} == {
+        "qwen2.5-vl@vllm": {"dtype": "float32", "max_tokens": "1000", "seed": "1"},
+        "pixtral@vllm": {"dtype": "bfloat16", "seed": "1"},
+    }
+    with pytest.raises(click.UsageError, match="max_cost counts what one process asks for"):
+        requests("--config", config(workers=2), "--model", "oracle,openai:max_cost=2")
+
+
+TYPED = {
+    "A": {"A": {}},
+    "A, B": {"A": {}, "B": {}},
+    "A:x=1,y=2,B,C:x=3": {"A": {"x": "1", "y": "2"}, "B": {}, "C": {"x": "3"}},
+    "A:url=http://h:1/v=2,B": {"A": {"url": "http://h:1/v=2"}, "B": {}},
+    "./a.py:Class,B": {"./a.py:Class": {}, "B": {}},
+    "./a.py:Class:x=1": {"./a.py:Class": {"x": "1"}},
+    "A:x=1,B:x=1,y=2,A:z=1,w=2": {"A": {"x": "1", "z": "1", "w": "2"}, "B": {"x": "1", "y": "2"}},
+}
+
+
+@pytest.mark.parametrize("typed", TYPED)
+def test_models_as_typed(typed):
+    assert ModelsAsked().convert(typed, None, None) == TYPED[typed]
+
+
+NAMES = st.text("ab.5-", min_size=1)
+OPTIONS = st.dictionaries(st.text("xy_", min_size=1), st.text("/:=1 z", min_size=1).map(str.strip))
+
+
+@given(st.dictionaries(NAMES, OPTIONS, min_size=1))
+def test_models_as_typed_come_back(models):
+    parts = [
+        ",".join([name if not given else ""] + [f"{name}:{k}={v}" for k, v in given.items()])
+        for name, given in models.items()
+    ]
+    assert ModelsAsked().convert(",".join(parts), None, None) == models
+
+
+@pytest.mark.parametrize(
+    ("typed", "said"), [("x=1,A", "stands before any model"), (",", "--model is empty"), ("A:x=1,x=2", "given twice")]
+)
+def test_models_that_cannot_be_meant(run, typed, said):
+    said_in_one_line(run("--model", typed, "--tasks", "nieh_gt"), said)
+
+
+def test_results_do_not_know_of_it(config, tmp_path, run):
+    run("--config", config(limit=1))
+    assert "config" not in json.loads(only(tmp_path / "out", "results.json").read_text())

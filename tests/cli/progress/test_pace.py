@@ -1,0 +1,108 @@
+"""How fast a run goes: in lines where there is no terminal, and in the bar where there is one."""
+
+import io
+
+import pytest
+from rich.console import Console
+
+from infthor_eval.cli.progress.bar import PacedBar, StepBars
+from infthor_eval.cli.progress.pace import Pace, duration
+from infthor_eval.runs import NOTHING, Usage
+from infthor_eval.terminal import progress_bar
+
+
+def test_what_an_earlier_run_had_done_says_nothing_of_the_pace():
+    pace = Pace(100, 0.0)
+    for _ in range(40):
+        pace.count(NOTHING, True, 5.0)
+    assert pace.line(5.0) == "40 of 100 (40 %)"
+    for number in range(10):
+        pace.count(Usage(1, 100, 80, 5), False, 6.0 + number)
+    assert pace.line(15.0) == "50 of 100 (50 %), 50.0 s left, 1.0 a second, 80 % of tokens cached"
+    assert (pace.n_found, pace.n_made) == (40, 10)
+
+
+def test_a_slow_model_is_told_in_seconds_for_each():
+    pace = Pace(3, 0.0)
+    pace.count(Usage(1), False, 60.0)
+    assert pace.speed(60.0) == "60.0 s each"
+    assert pace.line(60.0) == "1 of 3 (33 %), 2 min left, 60.0 s each"
+
+
+@pytest.mark.parametrize(
+    ("n_units", "every_s", "expected"),
+    [
+        (100, 0.01, []),  # all done within a second: the line at the end of the run tells it
+        (1000, 0.1, [10, 20, 30, 40, 50, 60, 70, 80, 90]),
+        (10_000, 1.0, [60, 120, 180]),  # a step is minutes
+        (20, 200.0, [200, 400, 600]),
+    ],
+)
+def test_lines_come_at_sensible_intervals(n_units, every_s, expected):
+    pace, told = Pace(n_units, 0.0), []
+    for number in range(1, n_units + 1):
+        now = round(number * every_s, 6)
+        pace.count(NOTHING, False, now)
+        if pace.is_due(now):
+            told.append(now)
+    assert told[: len(expected)] == expected
+    assert bool(told) == bool(expected)
+
+
+def test_work_in_a_pipe_says_lines_with_what_an_earlier_run_had_done_left_out(monkeypatch):
+    monkeypatch.setattr("infthor_eval.cli.progress.pace._LEAST_S", 0.0)
+    clock = iter(range(100))
+    monkeypatch.setattr("infthor_eval.cli.progress.bar.time.monotonic", lambda: float(next(clock)))
+    said = io.StringIO()
+    with progress_bar(Console(file=said)) as progress:
+        bar = PacedBar(progress, "replay", 4)
+        for resumed in (True, True, False, False):
+            bar.advance(resumed=resumed)
+    assert said.getvalue().splitlines()[-1] == "replay: 3 of 4 (75 %), 1.0 s left, 1.0 a second"
+
+
+def test_a_training_that_goes_on_tells_its_own_pace(monkeypatch):
+    monkeypatch.setattr("infthor_eval.cli.progress.pace._LEAST_S", 0.0)
+    clock = iter(range(0, 200, 2))
+    monkeypatch.setattr("infthor_eval.cli.progress.bar.time.monotonic", lambda: float(next(clock)))
+    said = io.StringIO()
+    with progress_bar(Console(file=said)) as progress:
+        bars = StepBars(progress)
+        for step in (7, 8, 9):
+            bars.advance("train", step, 10, f"loss {step}")
+        bars.advance("answer", 1, 5, "loss 3")
+    assert said.getvalue().splitlines() == [
+        "train: 8 of 10 (80 %), 4.0 s left, 2.0 s each; loss 8",
+        "train: 9 of 10 (90 %), 2.0 s left, 2.0 s each; loss 9",
+    ]
+
+
+def test_where_there_is_no_terminal_no_bar_is_left():
+    said = io.StringIO()
+    with progress_bar(Console(file=said)) as progress:
+        progress.advance(progress.add_task("work", total=1))
+    assert said.getvalue() == ""
+
+
+def test_a_run_in_a_pipe_says_lines_without_colour(make_nieh_set, tmp_path, run, monkeypatch):
+    monkeypatch.setattr("infthor_eval.cli.progress.pace._LEAST_S", 0.0)
+    arguments = ["--model", "oracle", "--tasks", "nieh_gt", "--data", make_nieh_set(size=56), "--output", tmp_path]
+    _, out, err = run(*arguments)
+    lines = err.splitlines()
+    assert [line.partition(")")[0] for line in lines[:-1]] == [f"oracle: {n} of 5 ({20 * n} %" for n in range(1, 5)]
+    assert lines[-1] == "oracle: 5 answered now, 0 found in the journal of an earlier run"
+    assert "\x1b" not in out + err
+
+
+def test_quiet_says_nothing_but_what_failed(make_nieh_set, tmp_path, run):
+    data = make_nieh_set(size=56)
+    frame = data / "metadata" / "traj_a" / "img" / "000000001.png"
+    frame.write_bytes(frame.read_bytes()[:50])
+    arguments = ["--model", "qwen2.5-vl-tiny", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out"]
+    code, _, err = run(*arguments, "--quiet")
+    assert code == 1
+    assert err.startswith("nieh_gt: 2 sample(s) failed")
+
+
+def test_a_time_is_told_in_one_unit():
+    assert [duration(seconds) for seconds in (1.5, 119, 240, 7200)] == ["1.5 s", "119.0 s", "4 min", "2.0 h"]
