@@ -30,7 +30,7 @@ from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.household.sequence_text import ACT
-from infthor_eval.training.data import read_history, recorded_names
+from infthor_eval.training.data import read_history, trajectory_names
 from model_adapters import Decoding
 from model_adapters.hf.model import TransformersModel
 from model_adapters.tiny.qwen2_5_vl import Qwen25VLTiny
@@ -107,7 +107,7 @@ def told(n_steps: int) -> tuple[list[Part], list[Step]]:
     opening: list[Part] = []
     steps: list[Step] = []
     data = NiehSet(packaged_folder("sets/nieh_mini"))
-    for name in recorded_names(data):
+    for name in trajectory_names(data):
         for chapter in read_history(data, name)[1]:
             (steps[-1][1] if steps else opening).extend(chapter.opening())
             steps += [(action, [frame]) for action, frame in chapter.steps]

@@ -27,9 +27,9 @@ from PIL import Image
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.training.batches import Batch, collate, n_labels
 from infthor_eval.training.context_parallel import context_parallel
-from infthor_eval.training.encoding import Encoded
+from infthor_eval.training.encoding import TrainingSequence
 from infthor_eval.training.network import SequenceModel, freeze
-from infthor_eval.training.ranks import lay_out
+from infthor_eval.training.ranks import assign_ranks
 from model_adapters.hf.loaded import Loaded
 from model_adapters.hf.prompt import Prompter
 from model_adapters.options.tiny import TinyOptions
@@ -82,7 +82,7 @@ def measure(rank: int, n_ranks: int, n_tokens: int, folder: Path) -> None:
     model = SequenceModel(loaded).train()
     freeze(model, ["vision", "embeddings"])
     long, short = (batch_of(loaded, folder, length) for length in (n_tokens, n_tokens // 16))
-    group = lay_out(n_ranks).context_group or dist.group.WORLD
+    group = assign_ranks(n_ranks).context_group or dist.group.WORLD
     model.gradient_checkpointing_enable()
     step(model, short, group)  # what is made once is made here
     before = megabytes("VmRSS")
@@ -126,7 +126,7 @@ def batch_of(loaded: Loaded, folder: Path, n_tokens: int) -> Batch:
         pieces += [*range(10, 10 + WORDS), frame]
         length, number = length + WORDS + len(frame.ids), number + 1
     trained = tuple(isinstance(piece, int) for piece in pieces)
-    return collate([Encoded("long", tuple(pieces), trained)], loaded.family, 0)
+    return collate([TrainingSequence("long", tuple(pieces), trained)], loaded.family, 0)
 
 
 def write_frames(folder: Path) -> None:

@@ -22,7 +22,7 @@ from infthor_eval.household.sequence_text import ACT
 from infthor_eval.plans.habits import Habits
 from infthor_eval.plans.history import Chapter
 from infthor_eval.statistics import MeanEstimate, clustered_mean, paired_difference
-from infthor_eval.training.data import read_history, recorded_names
+from infthor_eval.training.data import read_history, trajectory_names
 from model_adapters import Decoding, load
 
 Show = Callable[[FrameRef], FrameRef]
@@ -33,7 +33,7 @@ def main() -> None:
     """Ask, count, print."""
     options = _arguments()
     data = NiehSet(options.data)
-    found = [read_history(data, name) for name in recorded_names(data)]
+    found = [read_history(data, name) for name in trajectory_names(data)]
     clusters = [trajectory.traj_id for trajectory, chapters in found for chapter in chapters for _ in chapter.steps]
     rows = {
         "most frequent": [float(hit) for hit in most_frequent(found)],

@@ -98,9 +98,9 @@ def suite_identity(name: str) -> dict[str, Any]:
     Raises:
         ModelError: its source cannot be read.
     """
-    from model_adapters.adapter_identity import identity_of
+    from model_adapters.adapter_identity import package_identity
 
-    return {} if name in _BUILT_IN else identity_of(_entry_points()[name])
+    return {} if name in _BUILT_IN else package_identity(_entry_points()[name])
 
 
 def baseline_names() -> dict[str, str]:

@@ -4,7 +4,7 @@ Importing this package imports neither torch nor transformers; they come with th
 """
 
 from model_adapters.backend import Backend, BackendConversation
-from model_adapters.check import ContractError, Finding, check_adapter, check_policy, findings
+from model_adapters.check import CheckResult, ContractError, check_adapter, check_policy, run_checks
 from model_adapters.protocols import (
     ROLES,
     Adapter,
@@ -21,17 +21,17 @@ from model_adapters.protocols import (
     Subject,
     Turn,
 )
-from model_adapters.refusals import check_decoding, check_turns, requesting
+from model_adapters.refusals import check_decoding, check_turns, wrap_request_errors
 from model_adapters.registry import (
     adapter_identity,
     check_options,
+    has_option,
     is_known,
     label,
     load,
+    name_on_engine,
     names,
-    on_engine,
     options,
-    takes,
 )
 from model_adapters.stopping import cut_at_stop
 from model_adapters.transcript import Transcript
@@ -43,10 +43,10 @@ __all__ = [
     "Backend",
     "BackendConversation",
     "Capabilities",
+    "CheckResult",
     "ContractError",
     "Conversation",
     "Decoding",
-    "Finding",
     "Mark",
     "Model",
     "Part",
@@ -63,13 +63,13 @@ __all__ = [
     "check_policy",
     "check_turns",
     "cut_at_stop",
-    "findings",
+    "has_option",
     "is_known",
     "label",
     "load",
+    "name_on_engine",
     "names",
-    "on_engine",
     "options",
-    "requesting",
-    "takes",
+    "run_checks",
+    "wrap_request_errors",
 ]

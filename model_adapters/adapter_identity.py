@@ -9,10 +9,10 @@ from typing import Any
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.digests import digest_of_file, fingerprint
 
-__all__ = ["identity_of"]
+__all__ = ["package_identity"]
 
 
-def identity_of(point: EntryPoint) -> dict[str, Any]:
+def package_identity(point: EntryPoint) -> dict[str, Any]:
     """The package behind an entry point, its version and its source, as JSON values.
 
     An adapter that is edited without a new version is another one: so the source itself counts, of all modules of its

@@ -6,7 +6,7 @@ from contextlib import AbstractContextManager
 from infthor_eval.errors import ModelError, wrap_errors
 from model_adapters.protocols import Capabilities, Decoding, Turn
 
-__all__ = ["check_decoding", "check_turns", "requesting"]
+__all__ = ["check_decoding", "check_turns", "wrap_request_errors"]
 
 _FAILURES = (RuntimeError, ValueError, TypeError, LookupError, AttributeError, ArithmeticError, OSError, MemoryError)
 
@@ -45,7 +45,7 @@ def check_turns(name: str, turns: Sequence[Turn]) -> None:
         raise ModelError(f"{name} has nothing to reply to: {found}; append a user turn")
 
 
-def requesting(name: str) -> AbstractContextManager[None]:
+def wrap_request_errors(name: str) -> AbstractContextManager[None]:
     """Turns what an adapter, anybody's, raises on a request into a failure of that request: the others go on.
 
     Args:

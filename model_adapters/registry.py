@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from infthor_eval.errors import ModelError, UsageError, unknown_name
-from model_adapters.adapter_identity import identity_of
+from model_adapters.adapter_identity import package_identity
 from model_adapters.built_in import BUILT_IN
 from model_adapters.options import describe, parse
 from model_adapters.own_file import class_in_file, class_name, identity_of_file, names_a_file
@@ -24,13 +24,13 @@ __all__ = [
     "ENTRY_POINTS",
     "adapter_identity",
     "check_options",
+    "has_option",
     "is_known",
     "label",
     "load",
+    "name_on_engine",
     "names",
-    "on_engine",
     "options",
-    "takes",
 ]
 
 ENTRY_POINTS = "infthor_eval.models"
@@ -48,7 +48,7 @@ def is_known(name: str) -> bool:
     return name in _targets() or names_a_file(name)
 
 
-def on_engine(name: str, engine: str) -> str:
+def name_on_engine(name: str, engine: str) -> str:
     """The name of a model where an engine of one's choice is to run it.
 
     Args:
@@ -118,10 +118,10 @@ def adapter_identity(name: str) -> dict[str, Any]:
     if names_a_file(name):
         return identity_of_file(name)
     _target(name)
-    return {} if name in BUILT_IN else identity_of(_entry_points()[name])
+    return {} if name in BUILT_IN else package_identity(_entry_points()[name])
 
 
-def takes(name: str, option: str) -> bool:
+def has_option(name: str, option: str) -> bool:
     """Whether a model has an option.
 
     Raises:

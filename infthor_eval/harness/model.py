@@ -27,7 +27,7 @@ from infthor_eval.runs.identity import identity_of
 from infthor_eval.runs.journal import Journal
 from infthor_eval.runs.records import UnitKey
 from infthor_eval.runs.session import JournalSession
-from model_adapters import Model, Policy, adapter_identity, label, load, takes
+from model_adapters import Model, Policy, adapter_identity, has_option, label, load
 
 __all__ = ["InfthorLM"]
 
@@ -75,7 +75,7 @@ class InfthorLM(LM):
             raise UsageError(f"{adapter} reads the answer key; run it with infthor-eval --model {adapter}")
         given = {key: str(value) for key, value in options.items()}
         theirs = {"device": None if device == _DEFAULT_DEVICE else device, "batch_size": _number(batch_size)}
-        given |= {key: value for key, value in theirs.items() if value is not None and takes(adapter, key)}
+        given |= {key: value for key, value in theirs.items() if value is not None and has_option(adapter, key)}
         say_model_takes_references()
         self._model = load(adapter, given, seed)
         self._seed = seed

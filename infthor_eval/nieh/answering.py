@@ -20,7 +20,7 @@ from infthor_eval.nieh.notes import Notes
 from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.nieh.task import PreparedTask
 from infthor_eval.runs import NOTHING, Session, Tokens, Unit, UnitKey, UnitRecord, Usage
-from model_adapters import Model, Reply, requesting
+from model_adapters import Model, Reply, wrap_request_errors
 
 __all__ = ["Answerer", "BaselineAnswerer", "ModelAnswerer", "NiehUnit", "answered"]
 
@@ -150,13 +150,13 @@ class ModelAnswerer:
 
     def read(self, context: Sequence[ContextPart]) -> tuple[str | FrameRef, ...]:
         """See `Answerer`."""
-        with requesting(self._name):
+        with wrap_request_errors(self._name):
             return tuple(self._notebook.text(part) if isinstance(part, Notes) else part for part in context)
 
     def answer(self, asked: Sequence[_Asked]) -> list[Reply]:
         """See `Answerer`."""
         context = asked[0].shown
-        with requesting(self._name):
+        with wrap_request_errors(self._name):
             if context != self._context:
                 self._conversation.rewind(self._start)
                 self._context = None

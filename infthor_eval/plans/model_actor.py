@@ -13,7 +13,7 @@ from infthor_eval.plans.environment import StepOutcome
 from infthor_eval.plans.history import Part
 from infthor_eval.plans.memory import Memory
 from infthor_eval.thor.actions import applicable
-from model_adapters import Decoding, Model, requesting
+from model_adapters import Decoding, Model, wrap_request_errors
 
 __all__ = ["Manner", "ModelActor"]
 
@@ -53,7 +53,7 @@ class ModelActor:
         environment, plan = situation.environment, situation.plan.index
         self._seed, self._n_acts = situation.seed, 0
         self._observation = situation.observation
-        with requesting(self._model.name):
+        with wrap_request_errors(self._model.name):
             parts = self._manner.memory.recall(environment.past(plan), self._count)
             self._conversation.rewind(self._start)
             self._conversation.append(self._manner.preamble, *self._shown(parts), ACT)
@@ -65,7 +65,7 @@ class ModelActor:
             possible = tuple(str(text) for text in applicable(self._observation.view))
             decoding = replace(decoding, choices=possible, max_new_tokens=max(decoding.max_new_tokens, _LONGEST))
         self._n_acts += 1
-        with requesting(self._model.name):
+        with wrap_request_errors(self._model.name):
             reply = self._conversation.reply(decoding)
         return Act(reply.text, reply)
 

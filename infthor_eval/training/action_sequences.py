@@ -12,7 +12,7 @@ from infthor_eval.formats.step_log import Step
 from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.plans.history import Chapter, chapter_parts, opened
 from infthor_eval.plans.plan import plans_of, tasks_of
-from infthor_eval.training.encoding import Encoded, Encoder, LeftOut
+from infthor_eval.training.encoding import Encoder, SkippedItem, TrainingSequence
 from model_adapters.hf.prompt import n_tokens
 
 __all__ = ["recorded_chapters", "single_plans", "windows"]
@@ -51,7 +51,9 @@ def recorded_chapters(trajectory: Trajectory, steps: Sequence[Step], frames: Seq
     return chapters
 
 
-def windows(encoder: Encoder, name: str, chapters: Sequence[Chapter], limit: int) -> Iterator[Encoded | LeftOut]:
+def windows(
+    encoder: Encoder, name: str, chapters: Sequence[Chapter], limit: int
+) -> Iterator[TrainingSequence | SkippedItem]:
     """A history as sequences, each with as many whole plans as fit; together they have every plan once.
 
     Args:
@@ -71,7 +73,7 @@ def windows(encoder: Encoder, name: str, chapters: Sequence[Chapter], limit: int
     while first < len(chapters):
         end = _end(encoder, chapters, first, limit)
         if end == first:
-            yield LeftOut(f"{name}, plan {first + 1}", f"longer than {limit} tokens by itself")
+            yield SkippedItem(f"{name}, plan {first + 1}", f"longer than {limit} tokens by itself")
             first += 1
             continue
         numbers = f"plan {end}" if end == first + 1 else f"plans {first + 1} to {end}"
@@ -79,7 +81,7 @@ def windows(encoder: Encoder, name: str, chapters: Sequence[Chapter], limit: int
         first = end
 
 
-def single_plans(encoder: Encoder, name: str, chapters: Sequence[Chapter]) -> Iterator[Encoded]:
+def single_plans(encoder: Encoder, name: str, chapters: Sequence[Chapter]) -> Iterator[TrainingSequence]:
     """A history as sequences of one plan each, behind the goal that it serves and the frame that it begins with.
 
     Args:

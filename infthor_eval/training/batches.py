@@ -7,7 +7,7 @@ import torch
 from torch.nn.utils.rnn import pad_sequence
 
 from infthor_eval.errors import DataError
-from infthor_eval.training.encoding import Encoded
+from infthor_eval.training.encoding import TrainingSequence
 from model_adapters.hf.family import Family
 from model_adapters.hf.prompt import Frame, token_ids
 
@@ -37,7 +37,7 @@ class Batch(TypedDict):
     frames: list[Frame]
 
 
-def collate(sequences: Sequence[Encoded], family: Family, pad_id: int) -> Batch:
+def collate(sequences: Sequence[TrainingSequence], family: Family, pad_id: int) -> Batch:
     """Lay sequences out side by side.
 
     Args:
@@ -66,7 +66,7 @@ def n_labels(batch: Batch) -> int:
     return int((batch["labels"] != IGNORED).sum())
 
 
-def _labels(sequence: Encoded, ids: torch.Tensor) -> torch.Tensor:
+def _labels(sequence: TrainingSequence, ids: torch.Tensor) -> torch.Tensor:
     trained: list[bool] = []
     for piece, learned in zip(sequence.pieces, sequence.trained, strict=True):
         trained.extend([learned] if isinstance(piece, int) else [False] * len(piece.ids))
@@ -77,7 +77,7 @@ def _labels(sequence: Encoded, ids: torch.Tensor) -> torch.Tensor:
     return ids.where(chosen, IGNORED)
 
 
-def _positions(sequences: Sequence[Encoded], ids: Sequence[torch.Tensor], family: Family) -> torch.Tensor:
+def _positions(sequences: Sequence[TrainingSequence], ids: Sequence[torch.Tensor], family: Family) -> torch.Tensor:
     """Of whole sequences, each counted from 0; padding stands at position 0, where it stretches no scaled RoPE."""
     rows = [
         family.positions(own, [frame.size for frame in sequence.frames], 0)
@@ -87,7 +87,7 @@ def _positions(sequences: Sequence[Encoded], ids: Sequence[torch.Tensor], family
     return torch.cat([torch.nn.functional.pad(row, (0, longest - row.shape[-1])) for row in rows], dim=-2)
 
 
-def _slots(sequence: Encoded, slot_id: int) -> torch.Tensor:
+def _slots(sequence: TrainingSequence, slot_id: int) -> torch.Tensor:
     slots: list[bool] = []
     for piece in sequence.pieces:
         slots.extend([False] if isinstance(piece, int) else [token == slot_id for token in piece.ids])

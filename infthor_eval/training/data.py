@@ -13,11 +13,11 @@ from infthor_eval.formats.trajectory import Trajectory, iter_trajectories
 from infthor_eval.nieh.samples import find_samples
 from infthor_eval.plans.history import Chapter
 from infthor_eval.training.action_sequences import recorded_chapters, windows
-from infthor_eval.training.encoding import Encoded, Encoder, LeftOut
+from infthor_eval.training.encoding import Encoder, SkippedItem, TrainingSequence
 from infthor_eval.training.question_sequences import question_sequences
 from infthor_eval.training.recipe import Recipe
 
-__all__ = ["TrainingData", "action_sequences", "read_history", "read_training_data", "recorded_names"]
+__all__ = ["TrainingData", "action_sequences", "read_history", "read_training_data", "trajectory_names"]
 
 
 @dataclass(frozen=True)
@@ -29,8 +29,8 @@ class TrainingData:
         left_out: what no sequence could be made of.
     """
 
-    sequences: Sequence[Encoded]
-    left_out: Sequence[LeftOut]
+    sequences: Sequence[TrainingSequence]
+    left_out: Sequence[SkippedItem]
 
     @property
     def n_tokens(self) -> int:
@@ -63,15 +63,15 @@ def read_training_data(recipe: Recipe, encoder: Encoder, folders: Sequence[Path]
         ModelError: the model's template refuses what there is.
     """
     found = [item for folder in folders for item in _of_set(recipe, encoder, folder)]
-    sequences = [item for item in found if isinstance(item, Encoded)]
-    left_out = [item for item in found if isinstance(item, LeftOut)]
+    sequences = [item for item in found if isinstance(item, TrainingSequence)]
+    left_out = [item for item in found if isinstance(item, SkippedItem)]
     if not sequences:
         why = left_out[0].reason if left_out else "there are no trajectories and no questions"
         raise DataError(f"{', '.join(map(str, folders))}: no sequence to train on ({why}); give another set")
     return TrainingData(sequences, left_out)
 
 
-def _of_set(recipe: Recipe, encoder: Encoder, folder: Path) -> Iterator[Encoded | LeftOut]:
+def _of_set(recipe: Recipe, encoder: Encoder, folder: Path) -> Iterator[TrainingSequence | SkippedItem]:
     if recipe.actions is not None:
         yield from _share(
             action_sequences(NiehSet(folder), encoder, recipe.max_tokens), recipe.actions.share, recipe.seed
@@ -83,7 +83,7 @@ def _of_set(recipe: Recipe, encoder: Encoder, folder: Path) -> Iterator[Encoded 
             yield from _share(made, recipe.questions.share, recipe.seed)
 
 
-def action_sequences(data: NiehSet, encoder: Encoder, limit: int) -> Iterator[Encoded | LeftOut]:
+def action_sequences(data: NiehSet, encoder: Encoder, limit: int) -> Iterator[TrainingSequence | SkippedItem]:
     """The windows of every trajectory of a set.
 
     Args:
@@ -94,14 +94,14 @@ def action_sequences(data: NiehSet, encoder: Encoder, limit: int) -> Iterator[En
     Yields:
         The sequences, and what none could be made of.
     """
-    for name in recorded_names(data):
+    for name in trajectory_names(data):
         try:
             yield from windows(encoder, name, read_history(data, name)[1], limit)
         except DataError as error:
-            yield LeftOut(name, str(error))
+            yield SkippedItem(name, str(error))
 
 
-def recorded_names(data: NiehSet) -> list[str]:
+def trajectory_names(data: NiehSet) -> list[str]:
     """Names of the trajectories of a set, those without a question too, sorted."""
     return sorted(path.name for path in (data.root / "metadata").iterdir() if path.is_dir())
 
@@ -124,9 +124,11 @@ def read_history(data: NiehSet, name: str) -> tuple[Trajectory, list[Chapter]]:
     return trajectory, recorded_chapters(trajectory, steps, data.frames(name))
 
 
-def _share(made: Iterable[Encoded | LeftOut], share: float, seed: int) -> Iterator[Encoded | LeftOut]:
+def _share(
+    made: Iterable[TrainingSequence | SkippedItem], share: float, seed: int
+) -> Iterator[TrainingSequence | SkippedItem]:
     """A part of the sequences, drawn by the seed; what was left out is told all the same."""
     draw = random.Random(seed)
     for item in made:
-        if isinstance(item, LeftOut) or share >= 1 or draw.random() < share:
+        if isinstance(item, SkippedItem) or share >= 1 or draw.random() < share:
             yield item

@@ -14,11 +14,11 @@ from model_adapters import Part, Turn
 from model_adapters.hf.loaded import Loaded
 from model_adapters.hf.prompt import Frame, Piece, Prompter, n_tokens
 
-__all__ = ["Encoded", "Encoder", "LeftOut"]
+__all__ = ["Encoder", "SkippedItem", "TrainingSequence"]
 
 
 @dataclass(frozen=True)
-class Encoded:
+class TrainingSequence:
     """One sequence.
 
     Attributes:
@@ -48,7 +48,7 @@ class Encoded:
 
 
 @dataclass(frozen=True)
-class LeftOut:
+class SkippedItem:
     """Something that no sequence could be made of.
 
     Attributes:
@@ -83,7 +83,7 @@ class Encoder:
         """
         return self._prompter.pieces([Turn("user", tuple(parts))])
 
-    def actions(self, name: str, chapters: Sequence[Chapter]) -> Encoded:
+    def actions(self, name: str, chapters: Sequence[Chapter]) -> TrainingSequence:
         """A history; loss is taken on its actions and the marks around them (appendix B).
 
         Raises:
@@ -92,7 +92,7 @@ class Encoder:
         """
         return self._acted(name, chapter_parts(chapters), sum(len(chapter.steps) for chapter in chapters))
 
-    def order(self, name: str, plan: str, actions: Sequence[str]) -> Encoded:
+    def order(self, name: str, plan: str, actions: Sequence[str]) -> TrainingSequence:
         """A plan and its actions without a frame; loss is taken as on a history.
 
         Raises:
@@ -101,13 +101,13 @@ class Encoder:
         """
         return self._acted(name, [plan_part(plan), *map(action_part, actions)], len(actions))
 
-    def _acted(self, name: str, parts: Sequence[Part], n_actions: int) -> Encoded:
+    def _acted(self, name: str, parts: Sequence[Part], n_actions: int) -> TrainingSequence:
         pieces = self.pieces(parts)
         if pieces.count(self._mark) != 2 * n_actions:
             raise DataError(f"{name}: a goal, a plan or an action holds {ACT}; leave the trajectory out")
-        return Encoded(name, tuple(pieces), tuple(self._between_marks(pieces)))
+        return TrainingSequence(name, tuple(pieces), tuple(self._between_marks(pieces)))
 
-    def answer(self, name: str, parts: Sequence[Part], answer: str) -> Encoded:
+    def answer(self, name: str, parts: Sequence[Part], answer: str) -> TrainingSequence:
         """A question and its answer; loss is taken on the answer and the token that ends the turn.
 
         Raises:
@@ -116,7 +116,7 @@ class Encoder:
         """
         asked = self.pieces(parts)
         reply: list[int] = [*self._tokenizer(answer, add_special_tokens=False)["input_ids"], self._end]
-        return Encoded(name, (*asked, *reply), (False,) * len(asked) + (True,) * len(reply))
+        return TrainingSequence(name, (*asked, *reply), (False,) * len(asked) + (True,) * len(reply))
 
     def _between_marks(self, pieces: Sequence[Piece]) -> Iterator[bool]:
         within = False

@@ -23,20 +23,20 @@ from infthor_eval.training.export import export, whole_weights
 from infthor_eval.training.loop import Loop, LoopSettings, Progress
 from infthor_eval.training.lora import add_adapters
 from infthor_eval.training.network import SequenceModel, freeze
-from infthor_eval.training.ranks import lay_out
+from infthor_eval.training.ranks import assign_ranks
 from infthor_eval.training.recipe import Recipe
-from infthor_eval.training.starting_point import starting_point
+from infthor_eval.training.starting_model import load_starting_model
 from infthor_eval.training.trainer import train_with_trainer
 from model_adapters.hf.loaded import Loaded
 
-__all__ = ["Prepared", "Watcher", "fine_tune", "prepared"]
+__all__ = ["TrainingRun", "Watcher", "fine_tune", "prepare_run"]
 
 _ABOUT, _STATES, _CHECKPOINT = "training.json", "states", "checkpoint"
 Watcher = Callable[[Progress], None]
 
 
 @dataclass(frozen=True)
-class Prepared:
+class TrainingRun:
     """A run that can begin.
 
     Attributes:
@@ -63,7 +63,7 @@ class Prepared:
         }
 
 
-def prepared(recipe: Recipe, folders: Sequence[Path]) -> Prepared:
+def prepare_run(recipe: Recipe, folders: Sequence[Path]) -> TrainingRun:
     """Load the model and make the sequences.
 
     Args:
@@ -75,11 +75,11 @@ def prepared(recipe: Recipe, folders: Sequence[Path]) -> Prepared:
         ModelError: the model cannot be loaded.
         DataError: there is nothing to train on.
     """
-    loaded = starting_point(recipe.model, recipe.model_args, recipe.prompt, recipe.seed)
-    return Prepared(recipe, loaded, read_training_data(recipe, Encoder(loaded), folders))
+    loaded = load_starting_model(recipe.model, recipe.model_args, recipe.prompt, recipe.seed)
+    return TrainingRun(recipe, loaded, read_training_data(recipe, Encoder(loaded), folders))
 
 
-def fine_tune(run: Prepared, out: Path, watcher: Watcher) -> Path:
+def fine_tune(run: TrainingRun, out: Path, watcher: Watcher) -> Path:
     """Train, and write the checkpoint; the same command goes on where an earlier one ended.
 
     Every process of a run has to call it (`torchrun`); the first one writes.
@@ -115,7 +115,7 @@ def fine_tune(run: Prepared, out: Path, watcher: Watcher) -> Path:
     return out / _CHECKPOINT
 
 
-def _train(run: Prepared, network: SequenceModel, states: Path, watcher: Watcher) -> None:
+def _train(run: TrainingRun, network: SequenceModel, states: Path, watcher: Watcher) -> None:
     recipe, sequences, pad_id = run.recipe, run.data.sequences, run.loaded.tokenizer.pad_token_id
     if recipe.parallel.context == 1:
         join = partial(collate, family=run.loaded.family, pad_id=pad_id)
@@ -123,7 +123,7 @@ def _train(run: Prepared, network: SequenceModel, states: Path, watcher: Watcher
         return
     if recipe.lora is not None:
         raise UsageError("a recipe with lora and parallel.context is not there; leave one of them out")
-    ranks = lay_out(recipe.parallel.context)
+    ranks = assign_ranks(recipe.parallel.context)
     Loop(network, pad_id, sequences, _settings(recipe), states, ranks=ranks, report=watcher).run()
 
 

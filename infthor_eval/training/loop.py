@@ -20,7 +20,7 @@ from infthor_eval.formats.digests import digest, seed_of
 from infthor_eval.training.batches import Batch, collate, n_labels
 from infthor_eval.training.checkpoints import Checkpoints
 from infthor_eval.training.context_parallel import context_parallel
-from infthor_eval.training.encoding import Encoded
+from infthor_eval.training.encoding import TrainingSequence
 from infthor_eval.training.gradients import sum_gradients
 from infthor_eval.training.network import SequenceModel, decay_groups
 from infthor_eval.training.ranks import Ranks
@@ -72,7 +72,7 @@ class Loop:
         self,
         model: SequenceModel,
         pad_id: int,
-        sequences: Sequence[Encoded],
+        sequences: Sequence[TrainingSequence],
         settings: LoopSettings,
         folder: Path,
         *,

@@ -16,13 +16,13 @@ from torch.distributed.checkpoint.metadata import TensorStorageMetadata
 from infthor_eval.errors import DataError, wrap_errors
 from model_adapters.hf.loaded import Loaded
 
-__all__ = ["Imported", "take_over"]
+__all__ = ["ImportedWeights", "import_weights"]
 
 _MEND = "give a folder with .metadata and *.distcp files of the model that --model names"
 
 
 @dataclass(frozen=True)
-class Imported:
+class ImportedWeights:
     """What was taken over.
 
     Attributes:
@@ -36,7 +36,7 @@ class Imported:
     n_ignored: int
 
 
-def take_over(loaded: Loaded, folder: Path) -> Imported:
+def import_weights(loaded: Loaded, folder: Path) -> ImportedWeights:
     """Put the weights of a distributed checkpoint into a model.
 
     Weights may stand under any prefix ("model.", "app.model."), one for all of them.
@@ -66,7 +66,7 @@ def take_over(loaded: Loaded, folder: Path) -> Imported:
     with wrap_errors(f"{folder}: cannot be read", "restore its files", catch=Exception):
         dcp.load(read, storage_reader=reader, no_dist=True)
     loaded.model.load_state_dict({name.removeprefix(prefix): tensor for name, tensor in read.items()}, strict=False)
-    return Imported(len(taken), len(weights) - len(taken), len(sizes) - len(taken))
+    return ImportedWeights(len(taken), len(weights) - len(taken), len(sizes) - len(taken))
 
 
 def _prefix(sizes: Mapping[str, Any], weights: Mapping[str, Any], folder: Path) -> str:

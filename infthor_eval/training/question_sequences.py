@@ -7,12 +7,12 @@ from infthor_eval.nieh.contexts import Sample
 from infthor_eval.nieh.docs import doc_target
 from infthor_eval.nieh.notes import Notes
 from infthor_eval.nieh.samples import TaskSamples
-from infthor_eval.training.encoding import Encoded, Encoder, LeftOut
+from infthor_eval.training.encoding import Encoder, SkippedItem, TrainingSequence
 
 __all__ = ["question_sequences"]
 
 
-def question_sequences(encoder: Encoder, asked: TaskSamples, limit: int) -> Iterator[Encoded | LeftOut]:
+def question_sequences(encoder: Encoder, asked: TaskSamples, limit: int) -> Iterator[TrainingSequence | SkippedItem]:
     """Sequences of a set's questions.
 
     Args:
@@ -28,19 +28,19 @@ def question_sequences(encoder: Encoder, asked: TaskSamples, limit: int) -> Iter
         ModelError: the template refuses the turns.
     """
     for skipped in asked.skipped:
-        yield LeftOut(_name(skipped.question.id, skipped.variant), skipped.reason)
+        yield SkippedItem(_name(skipped.question.id, skipped.variant), skipped.reason)
     for sample in asked.samples:
         name = _name(sample.question.id, sample.variant)
         try:
             sequence = _sequence(encoder, asked, sample, name)
         except DataError as error:
-            yield LeftOut(name, str(error))
+            yield SkippedItem(name, str(error))
             continue
         too_long = sequence.n_tokens > limit
-        yield LeftOut(name, f"longer than {limit} tokens") if too_long else sequence
+        yield SkippedItem(name, f"longer than {limit} tokens") if too_long else sequence
 
 
-def _sequence(encoder: Encoder, asked: TaskSamples, sample: Sample, name: str) -> Encoded:
+def _sequence(encoder: Encoder, asked: TaskSamples, sample: Sample, name: str) -> TrainingSequence:
     shown, text = asked.request(sample)
     known = [part for part in shown if not isinstance(part, Notes)]
     if len(known) < len(shown):

@@ -6,7 +6,7 @@ import torch.distributed as dist
 
 from infthor_eval.errors import UsageError
 
-__all__ = ["Ranks", "lay_out"]
+__all__ = ["Ranks", "assign_ranks"]
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Ranks:
         return self.n_data * self.n_context
 
 
-def lay_out(n_context: int = 1) -> Ranks:
+def assign_ranks(n_context: int = 1) -> Ranks:
     """This process's place; neighbouring ranks, which the fastest links join, share sequences.
 
     All processes of the default process group have to call it. Without one the process is alone.

@@ -15,7 +15,7 @@ import transformers
 from safetensors.torch import load_model, save_model
 
 from infthor_eval.errors import DataError, UsageError, wrap_errors
-from infthor_eval.training.encoding import Encoded
+from infthor_eval.training.encoding import TrainingSequence
 from infthor_eval.training.loop import Progress
 from infthor_eval.training.network import SequenceModel
 from infthor_eval.training.recipe import Recipe
@@ -64,7 +64,7 @@ class _Telling(transformers.TrainerCallback):
 
 def train_with_trainer(
     network: SequenceModel,
-    sequences: Sequence[Encoded],
+    sequences: Sequence[TrainingSequence],
     collate: Callable[[list[Any]], dict[str, Any]],
     recipe: Recipe,
     out: Path,

@@ -5,8 +5,8 @@ error of one line.
 """
 
 from model_adapters.check.clauses import ContractError
-from model_adapters.check.findings import Finding, findings
 from model_adapters.check.model import check_adapter
 from model_adapters.check.policy import check_policy
+from model_adapters.check.results import CheckResult, run_checks
 
-__all__ = ["ContractError", "Finding", "check_adapter", "check_policy", "findings"]
+__all__ = ["CheckResult", "ContractError", "check_adapter", "check_policy", "run_checks"]

@@ -5,7 +5,7 @@ from typing import Any
 
 import torch
 
-from model_adapters.hf.decoding import Writing, write
+from model_adapters.hf.decoding import ReplyState, write
 from model_adapters.hf.embedding import Embedder
 from model_adapters.hf.prefix import Prefix
 from model_adapters.hf.prompt import Piece
@@ -79,7 +79,7 @@ def answer_together(
     prefix: Prefix,
     prompts: Sequence[Sequence[Piece]],
     n_shared: int,
-    replies: Sequence[Writing],
+    replies: Sequence[ReplyState],
 ) -> None:
     """Answer prompts that begin with the same pieces.
 

@@ -20,7 +20,7 @@ from infthor_eval.errors import ModelError
 from model_adapters.hf.choices import Choices
 from model_adapters.protocols import Decoding
 
-__all__ = ["Generation", "Writing", "extend", "read_generation", "write"]
+__all__ = ["Generation", "ReplyState", "extend_replies", "read_generation", "write"]
 
 # Settings that change what is decoded and that this decoder does not have, with the values that switch them off.
 _UNSUPPORTED: dict[str, tuple[Any, ...]] = {
@@ -68,7 +68,7 @@ def read_generation(config: GenerationConfig) -> Generation:
     return Generation(frozenset(listed), float(penalty))
 
 
-class Writing:
+class ReplyState:
     """One reply in the making: every token of every reply is chosen here.
 
     Args:
@@ -164,7 +164,7 @@ class Writing:
         return self._finished(self.ids) if self._choices is None else not self._choices.after(self.ids)
 
 
-def write(logits: torch.Tensor, step: Callable[[Sequence[int]], torch.Tensor], replies: Sequence[Writing]) -> None:
+def write(logits: torch.Tensor, step: Callable[[Sequence[int]], torch.Tensor], replies: Sequence[ReplyState]) -> None:
     """Write replies token by token, all in step, until each of them is done.
 
     Args:
@@ -173,14 +173,14 @@ def write(logits: torch.Tensor, step: Callable[[Sequence[int]], torch.Tensor], r
         replies: what is written.
     """
     while True:
-        extend([(reply, logits[row]) for row, reply in enumerate(replies) if not reply.done])
+        extend_replies([(reply, logits[row]) for row, reply in enumerate(replies) if not reply.done])
         if all(reply.done for reply in replies):
             return
         # Those that are done are fed something, which nobody reads.
         logits = step([0 if reply.done else reply.ids[-1] for reply in replies])
 
 
-def extend(replies: Sequence[tuple[Writing, torch.Tensor]]) -> None:
+def extend_replies(replies: Sequence[tuple[ReplyState, torch.Tensor]]) -> None:
     """Choose the next token of replies by their logits, (vocabulary,), or end them.
 
     Of all of them together the device is read once: that is what a step waits for.

@@ -9,7 +9,7 @@ from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
 from model_adapters.backend import BackendConversation
 from model_adapters.hf.batch import answer_together
-from model_adapters.hf.decoding import Writing, write
+from model_adapters.hf.decoding import ReplyState, write
 from model_adapters.hf.description import capabilities, identity
 from model_adapters.hf.embedding import Embedder
 from model_adapters.hf.features import FeatureCache
@@ -138,18 +138,18 @@ class TransformersModel:
             for reply, prompt, cached in zip(replies, prompts, n_cached, strict=True)
         ]
 
-    def _write(self, prompts: Sequence[Sequence[Piece]], replies: Sequence[Writing]) -> list[int]:
+    def _write(self, prompts: Sequence[Sequence[Piece]], replies: Sequence[ReplyState]) -> list[int]:
         """Write the replies; how many tokens of each prompt were there already."""
         return self._write_one(prompts[0], replies[0]) if len(prompts) == 1 else self._write_batch(prompts, replies)
 
-    def _write_one(self, prompt: Sequence[Piece], reply: Writing) -> list[int]:
+    def _write_one(self, prompt: Sequence[Piece], reply: ReplyState) -> list[int]:
         shared = self._prefix.rewind_to(prompt)
         cached = self._prefix.n_tokens
         logits = self._prefix.feed(prompt[shared:], reserve=reply.decoding.max_new_tokens)
         write(logits[None], lambda tokens: self._prefix.feed(tokens)[None], [reply])
         return [cached]
 
-    def _write_batch(self, prompts: Sequence[Sequence[Piece]], replies: Sequence[Writing]) -> list[int]:
+    def _write_batch(self, prompts: Sequence[Sequence[Piece]], replies: Sequence[ReplyState]) -> list[int]:
         common = n_common(prompts)
         shared = min(self._prefix.rewind_to(prompts[0]), common)
         self._prefix.cut(shared)

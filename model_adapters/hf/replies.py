@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from model_adapters.hf.choices import read_choices
-from model_adapters.hf.decoding import Writing
+from model_adapters.hf.decoding import ReplyState
 from model_adapters.hf.loaded import Loaded
 from model_adapters.protocols import Decoding, Reply
 from model_adapters.stopping import cut_at_stop
@@ -12,7 +12,7 @@ from model_adapters.stopping import cut_at_stop
 __all__ = ["begin_reply", "end_reply", "said", "stop_ids"]
 
 
-def begin_reply(loaded: Loaded, decoding: Decoding, context: Iterable[int]) -> Writing:
+def begin_reply(loaded: Loaded, decoding: Decoding, context: Iterable[int]) -> ReplyState:
     """A reply of no tokens yet.
 
     Args:
@@ -31,10 +31,10 @@ def begin_reply(loaded: Loaded, decoding: Decoding, context: Iterable[int]) -> W
         return ids[-1] in ends or cut_at_stop(_text(loaded.tokenizer, ids), decoding.stop) is not None
 
     choices = read_choices(loaded.tokenizer, decoding)
-    return Writing(loaded.generation, decoding, context=context, choices=choices, finished=stopped)
+    return ReplyState(loaded.generation, decoding, context=context, choices=choices, finished=stopped)
 
 
-def end_reply(loaded: Loaded, writing: Writing, n_context: int, n_cached: int) -> Reply:
+def end_reply(loaded: Loaded, writing: ReplyState, n_context: int, n_cached: int) -> Reply:
     """What was written.
 
     Args:

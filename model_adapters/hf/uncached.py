@@ -14,7 +14,7 @@ from transformers import LogitsProcessor, LogitsProcessorList, StoppingCriteria,
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
 from model_adapters.backend import BackendConversation
-from model_adapters.hf.decoding import Writing, extend
+from model_adapters.hf.decoding import ReplyState, extend_replies
 from model_adapters.hf.description import capabilities, identity
 from model_adapters.hf.limits import check_limit, naming_memory_errors, naming_model_errors
 from model_adapters.hf.loaded import Loaded
@@ -67,11 +67,11 @@ def expanded(processor: Any, image: Image.Image) -> list[int]:
 class _Dictate(LogitsProcessor):
     """Has `generate` take the tokens that a reply chooses."""
 
-    def __init__(self, reply: Writing) -> None:
+    def __init__(self, reply: ReplyState) -> None:
         self._reply = reply
 
     def __call__(self, input_ids: torch.LongTensor, scores: torch.FloatTensor) -> torch.FloatTensor:
-        extend([(self._reply, scores[0])])
+        extend_replies([(self._reply, scores[0])])
         if not self._reply.done:
             scores[0, self._reply.ids[-1]] = torch.inf
         return scores
@@ -80,7 +80,7 @@ class _Dictate(LogitsProcessor):
 class _Done(StoppingCriteria):
     """Ends `generate` with the reply."""
 
-    def __init__(self, reply: Writing) -> None:
+    def __init__(self, reply: ReplyState) -> None:
         self._reply = reply
 
     def __call__(self, input_ids: torch.Tensor, scores: torch.Tensor, **kwargs: Any) -> torch.Tensor:

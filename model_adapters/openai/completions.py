@@ -6,7 +6,7 @@ import msgspec
 
 from infthor_eval.errors import ModelError, in_one_line
 
-__all__ = ["Completion", "Usage", "read_completion"]
+__all__ = ["Completion", "TokenUsage", "read_completion"]
 
 # By finish_reason; another one is a stranger's text, and not told.
 _WHY = {
@@ -21,7 +21,7 @@ class _Details(msgspec.Struct, frozen=True):
     cached_tokens: _Count | None = None
 
 
-class Usage(msgspec.Struct, frozen=True):
+class TokenUsage(msgspec.Struct, frozen=True):
     """What a reply took.
 
     Attributes:
@@ -67,7 +67,7 @@ class Completion(msgspec.Struct, frozen=True):
     """
 
     choices: list[_Choice]
-    usage: Usage | None = None
+    usage: TokenUsage | None = None
 
     def text(self, where: str) -> str:
         """What was said; a refusal in words is a reply.

@@ -12,7 +12,7 @@ import openai
 
 from infthor_eval.errors import ModelError, in_one_line
 from model_adapters.openai.options import OpenAIOptions
-from model_adapters.openai.rate import Pace
+from model_adapters.openai.rate import RateLimiter
 from model_adapters.openai.secret import Secret
 from model_adapters.openai.wire import UnreadableError, Wire
 
@@ -69,7 +69,7 @@ class Endpoint:
         self._options = options
         self._secret = secret
         self._wire = Wire(options, secret)
-        self._requests = Pace(options.requests_per_minute)
+        self._requests = RateLimiter(options.requests_per_minute)
         self._given_up = Event()
 
     def ask(self, request: Mapping[str, Any]) -> tuple[bytes, tuple[str, ...]]:

@@ -7,11 +7,11 @@ from typing import Any
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
 from model_adapters.backend import BackendConversation
-from model_adapters.openai.completions import Completion, Usage, read_completion
+from model_adapters.openai.completions import Completion, TokenUsage, read_completion
 from model_adapters.openai.endpoint import Endpoint
 from model_adapters.openai.messages import EncodedFrames, messages_of
 from model_adapters.openai.options import OpenAIOptions
-from model_adapters.openai.rate import Pace
+from model_adapters.openai.rate import RateLimiter
 from model_adapters.openai.secret import Secret
 from model_adapters.openai.spend import Caps, Charge, Prices, Spend
 from model_adapters.protocols import Capabilities, Conversation, Decoding, Reply, Turn
@@ -40,7 +40,7 @@ class ServedModel:
         self._frames = EncodedFrames(options.image_format)
         self._spend = Spend(name, Caps(options.max_tokens_total, options.max_cost))
         self._prices = _prices(options)
-        self._tokens = Pace(options.tokens_per_minute)
+        self._tokens = RateLimiter(options.tokens_per_minute)
         self._usual_tokens = 0  # of a request and its reply: the last one's
 
     @property
@@ -128,7 +128,7 @@ class ServedModel:
             self._tokens.take(taken - expected)
         return completion, faults
 
-    def _cost(self, usage: Usage) -> float | None:
+    def _cost(self, usage: TokenUsage) -> float | None:
         if self._prices is None:
             return None
         return self._prices.cost(usage.prompt_tokens, usage.cached or 0, usage.completion_tokens)

@@ -3,10 +3,10 @@
 import time
 from threading import Lock
 
-__all__ = ["Pace"]
+__all__ = ["RateLimiter"]
 
 
-class Pace:
+class RateLimiter:
     """Hands out so many a minute, evenly: whoever takes some has those behind it wait until they are made up for.
 
     Servers count in windows of their own, often shorter than a minute, so nothing is saved up for a burst. Several

@@ -15,9 +15,17 @@ from infthor_eval.tables import Column, Row, Table
 from model_adapters.options.policies import VlaHttpOptions
 from model_adapters.policies.http.adapter import HttpPolicy
 from model_adapters.protocols import ArmDelta, Policy
-from model_adapters.registry import load, takes
+from model_adapters.registry import has_option, load
 
-__all__ = ["INSTRUCTIONS", "Comparison", "compare", "drawn_frames", "frames_in", "loaded", "reference"]
+__all__ = [
+    "INSTRUCTIONS",
+    "ParityReport",
+    "compare_policies",
+    "frames_in_folder",
+    "load_policy",
+    "reference_policy",
+    "synthetic_frames",
+]
 
 INSTRUCTIONS = ("pick up the mug", "pick up the apple", "Put the knife in the drawer")
 _PICTURES = (".png", ".jpg", ".jpeg")
@@ -25,7 +33,7 @@ _NOISE = 4
 
 
 @dataclass(frozen=True)
-class _Row:
+class _ParityRow:
     instruction: str
     n_frames: int
     n_steps: tuple[int, int]
@@ -39,7 +47,7 @@ class _Row:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class ParityReport:
     """How far two implementations are apart.
 
     Attributes:
@@ -49,7 +57,7 @@ class Comparison:
     """
 
     name: str
-    rows: tuple[_Row, ...]
+    rows: tuple[_ParityRow, ...]
     tolerance: float
 
     @property
@@ -67,14 +75,14 @@ class Comparison:
         return Table(title, tuple(Column(name, name != "instruction") for name in columns), rows, (note,))
 
 
-def loaded(name: str, options: Mapping[str, str]) -> Policy:
+def load_policy(name: str, options: Mapping[str, str]) -> Policy:
     """The policy to compare; its chunks are compared as they are, not averaged, unless the options say otherwise.
 
     Raises:
         UsageError: there is no such model, it is no policy, or the options do not fit.
         ModelError: it cannot be loaded.
     """
-    plain = {"ensemble": "none"} if takes(name, "ensemble") else {}
+    plain = {"ensemble": "none"} if has_option(name, "ensemble") else {}
     policy = load(name, {**plain, **options}, seed=0)
     if not isinstance(policy, Policy):
         policy.close()
@@ -82,7 +90,7 @@ def loaded(name: str, options: Mapping[str, str]) -> Policy:
     return policy
 
 
-def reference(url: str, unnorm_key: str | None) -> HttpPolicy:
+def reference_policy(url: str, unnorm_key: str | None) -> HttpPolicy:
     """The other implementation.
 
     Args:
@@ -98,9 +106,9 @@ def reference(url: str, unnorm_key: str | None) -> HttpPolicy:
         raise UsageError(f"--reference-url: {error}") from error
 
 
-def compare(
+def compare_policies(
     ours: Policy, theirs: Policy, frames: Sequence[FrameRef], instructions: Sequence[str], tolerance: float
-) -> Comparison:
+) -> ParityReport:
     """Have both act on the same frames and instructions, each frame as the first of an episode.
 
     Raises:
@@ -108,10 +116,10 @@ def compare(
         DataError: a frame cannot be read.
     """
     rows = tuple(_row(ours, theirs, frames, instruction) for instruction in instructions)
-    return Comparison(ours.name, rows, tolerance)
+    return ParityReport(ours.name, rows, tolerance)
 
 
-def frames_in(folder: Path) -> list[FrameRef]:
+def frames_in_folder(folder: Path) -> list[FrameRef]:
     """The pictures of a folder, by name.
 
     Raises:
@@ -124,7 +132,7 @@ def frames_in(folder: Path) -> list[FrameRef]:
 
 
 @contextmanager
-def drawn_frames() -> Iterator[list[FrameRef]]:
+def synthetic_frames() -> Iterator[list[FrameRef]]:
     """A black frame, a white one and some of noise, for as long as they are needed; the same every time."""
     draws = np.random.default_rng(0)
     noise = [draws.integers(0, 256, (240, 320, 3), dtype=np.uint8) for _ in range(_NOISE)]
@@ -132,10 +140,10 @@ def drawn_frames() -> Iterator[list[FrameRef]]:
         plain = [Image.new("RGB", (300, 300), colour) for colour in ("black", "white")]
         for number, picture in enumerate([*plain, *map(Image.fromarray, noise)]):
             picture.save(folder / f"{number}.png")
-        yield frames_in(folder)
+        yield frames_in_folder(folder)
 
 
-def _row(ours: Policy, theirs: Policy, frames: Sequence[FrameRef], instruction: str) -> _Row:
+def _row(ours: Policy, theirs: Policy, frames: Sequence[FrameRef], instruction: str) -> _ParityRow:
     differences, steps = [], (0, 0)
     for frame in frames:
         ours.reset()
@@ -144,7 +152,7 @@ def _row(ours: Policy, theirs: Policy, frames: Sequence[FrameRef], instruction: 
         steps = len(pair[0]), len(pair[1])
         differences.append(_difference(*pair))
     largest = np.max(differences, axis=0).tolist()
-    return _Row(instruction, len(frames), steps, *largest)
+    return _ParityRow(instruction, len(frames), steps, *largest)
 
 
 def _difference(ours: Sequence[ArmDelta], theirs: Sequence[ArmDelta]) -> list[float]:
@@ -159,7 +167,7 @@ def _numbers(steps: Sequence[ArmDelta]) -> np.ndarray:
     return np.array([(*step.translation, *step.rotation, step.gripper) for step in steps])
 
 
-def _cells(row: _Row) -> tuple[str, ...]:
+def _cells(row: _ParityRow) -> tuple[str, ...]:
     n_ours, n_theirs = row.n_steps
     steps = str(n_ours) if n_ours == n_theirs else f"{n_ours} and {n_theirs}"
     return (

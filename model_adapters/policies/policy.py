@@ -12,7 +12,7 @@ from model_adapters.options.policies import ActionOptions
 from model_adapters.policies.ensemble import ExponentialEnsemble
 from model_adapters.policies.statistics import ACTION_SIZE, Actions, ActionStatistics
 from model_adapters.protocols import ArmDelta, Capabilities
-from model_adapters.refusals import requesting
+from model_adapters.refusals import wrap_request_errors
 
 __all__ = ["Network", "VlaPolicy", "arm_deltas"]
 
@@ -103,7 +103,7 @@ class VlaPolicy:
 
     def act(self, frame: FrameRef, instruction: str) -> tuple[ArmDelta, ...]:
         """The next steps; see `Policy.act`."""
-        with requesting(self.name):
+        with wrap_request_errors(self.name):
             image = frame.load()
             chunk = self._network.predict(image, instruction, constrained=self._options.constrained)
             actions = self._statistics.unnormalise(chunk)

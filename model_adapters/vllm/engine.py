@@ -13,11 +13,11 @@ from PIL import Image
 
 from infthor_eval.errors import ModelError, wrap_errors
 
-__all__ = ["Engine", "Request", "Sampling", "Written", "import_vllm"]
+__all__ = ["Engine", "EngineOutput", "EngineRequest", "SamplingSettings", "import_vllm"]
 
 
 @dataclass(frozen=True)
-class Request:
+class EngineRequest:
     """What is to be continued.
 
     Attributes:
@@ -41,7 +41,7 @@ class Request:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Sampling:
+class SamplingSettings:
     """How a request is continued.
 
     Attributes:
@@ -54,7 +54,7 @@ class Sampling:
 
 
 @dataclass(frozen=True)
-class Written:
+class EngineOutput:
     """What vLLM wrote.
 
     Attributes:
@@ -113,7 +113,7 @@ class Engine:
         with self._naming("does not start", less):
             self._llm = self._vllm.LLM(**arguments)
 
-    def generate(self, requests: Sequence[Request], sampling: Sampling) -> list[Written]:
+    def generate(self, requests: Sequence[EngineRequest], sampling: SamplingSettings) -> list[EngineOutput]:
         """Continue all requests, each for itself.
 
         Raises:
@@ -132,7 +132,7 @@ class Engine:
         del self._llm
         gc.collect()
 
-    def _params(self, sampling: Sampling) -> Any:
+    def _params(self, sampling: SamplingSettings) -> Any:
         settings = dict(sampling.settings)
         if sampling.choices:
             params = importlib.import_module("vllm.sampling_params")
@@ -144,6 +144,6 @@ class Engine:
         return wrap_errors(f"{self._name}: vLLM {self.version} {what}", mend, catch=Exception, raise_as=ModelError)
 
 
-def _written(output: Any) -> Written:
+def _written(output: Any) -> EngineOutput:
     reply = output.outputs[0]
-    return Written(tuple(reply.token_ids), reply.text, len(output.prompt_token_ids), output.num_cached_tokens)
+    return EngineOutput(tuple(reply.token_ids), reply.text, len(output.prompt_token_ids), output.num_cached_tokens)

@@ -14,7 +14,7 @@ from model_adapters.hf.loaded import Loaded
 from model_adapters.hf.prompt import Frame, Piece, Prompter, n_common, n_tokens
 from model_adapters.hf.replies import said, stop_ids
 from model_adapters.protocols import Capabilities, Decoding, Reply, Turn
-from model_adapters.vllm.engine import Engine, Request, Sampling, Written
+from model_adapters.vllm.engine import Engine, EngineOutput, EngineRequest, SamplingSettings
 from model_adapters.vllm.options import VllmOptions
 
 __all__ = ["VllmModel"]
@@ -143,7 +143,7 @@ class VllmModel:
         if n_frames > self._max_frames:
             raise ModelError(f"{n_frames} frames are more than max_frames={self._max_frames} of {self.name}; raise it")
 
-    def _sampling(self, decoding: Decoding) -> Sampling:
+    def _sampling(self, decoding: Decoding) -> SamplingSettings:
         read_choices(self._loaded.tokenizer, decoding)  # refuses those that are longer than the reply may be
         settings: dict[str, Any] = {
             "max_tokens": decoding.max_new_tokens,
@@ -157,20 +157,20 @@ class VllmModel:
             # A special token is in no text that stop strings are looked for in, so it stops by its id.
             ends = self._ends | stop_ids(self._loaded.tokenizer, decoding)
             settings |= {"stop": list(decoding.stop), "stop_token_ids": sorted(ends)}
-        return Sampling(settings=settings, choices=decoding.choices)
+        return SamplingSettings(settings=settings, choices=decoding.choices)
 
-    def _requests(self, prompts: Sequence[Sequence[Piece]]) -> list[Request]:
+    def _requests(self, prompts: Sequence[Sequence[Piece]]) -> list[EngineRequest]:
         frames = {piece.digest: piece.ref for prompt in prompts for piece in prompt if isinstance(piece, Frame)}
         self._images = {digest: self._images.get(digest) or ref.load() for digest, ref in frames.items()}
         return [self._request(prompt) for prompt in prompts]
 
-    def _request(self, prompt: Sequence[Piece]) -> Request:
+    def _request(self, prompt: Sequence[Piece]) -> EngineRequest:
         placeholder = self._loaded.family.placeholder_id
         digests = [piece.digest for piece in prompt if isinstance(piece, Frame)]
         ids = [placeholder if isinstance(piece, Frame) else piece for piece in prompt]
-        return Request(ids, [self._images[digest] for digest in digests], digests)
+        return EngineRequest(ids, [self._images[digest] for digest in digests], digests)
 
-    def _reply(self, prompt: Sequence[Piece], written: Written, decoding: Decoding) -> Reply:
+    def _reply(self, prompt: Sequence[Piece], written: EngineOutput, decoding: Decoding) -> Reply:
         expected = n_tokens(prompt)
         if written.n_context != expected:
             raise ModelError(

@@ -14,7 +14,7 @@ from model_adapters.policies.policy import VlaPolicy
 from model_adapters.policies.statistics import ACTION_SIZE, Actions
 from model_adapters.protocols import Capabilities
 from model_adapters.vllm.arguments import engine_arguments
-from model_adapters.vllm.engine import Engine, Request, Sampling, import_vllm
+from model_adapters.vllm.engine import Engine, EngineRequest, SamplingSettings, import_vllm
 from model_adapters.vllm.options import OpenVLAOnVllmOptions, VllmPolicyOptions
 
 __all__ = ["OpenVLAOnVllm", "VllmPolicy"]
@@ -71,8 +71,8 @@ class _Network:
         settings: dict[str, Any] = {"max_tokens": ACTION_SIZE, "temperature": 0.0, "ignore_eos": True}
         if constrained:
             settings["allowed_token_ids"] = list(legal)
-        request = Request(prompt_ids(self._described.tokenizer, instruction), [image])
-        (written,) = self.engine.generate([request], Sampling(settings=settings))
+        request = EngineRequest(prompt_ids(self._described.tokenizer, instruction), [image])
+        (written,) = self.engine.generate([request], SamplingSettings(settings=settings))
         if len(written.ids) != ACTION_SIZE:
             raise ModelError(f"{self._name}: vLLM wrote {len(written.ids)} action tokens, not {ACTION_SIZE}; report it")
         return self._described.bins.decode(np.clip(written.ids, legal.start, legal.stop - 1).tolist())

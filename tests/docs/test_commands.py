@@ -12,7 +12,7 @@ import pytest
 from infthor_eval.cli.main import _infthor_eval
 from infthor_eval.runs import Catalog
 from infthor_eval.suites import baseline_names
-from model_adapters import is_known, names, on_engine, takes
+from model_adapters import has_option, is_known, name_on_engine, names
 
 from .blocks import ROOT, written_files
 from .commands import CANNOT_RUN, FLOOR_PLANS, SLOW, Command, command_blocks
@@ -98,8 +98,8 @@ def _check_names(given):
             continue
         assert is_known(model), f"{model}: there are {names()}"
         if model in names():
-            name = on_engine(model, engine) if engine else model
-            assert all(takes(name, option) for option in {**given["model_args"], **own}), name
+            name = name_on_engine(model, engine) if engine else model
+            assert all(has_option(name, option) for option in {**given["model_args"], **own}), name
     own = {"nieh_mini_last", "nieh_mini_start", "nieh_mini_words", "my_task"}
     catalog = Catalog.packaged()
     for task in set(given["tasks"].split(",")) - own:

@@ -22,7 +22,7 @@ from infthor_eval.household.sequence_text import plan_text
 from infthor_eval.nieh.records import RECORDS
 from infthor_eval.runs import read_run
 from infthor_eval.runs.journal import Journal
-from model_adapters.hf.decoding import Generation, Writing, extend
+from model_adapters.hf.decoding import Generation, ReplyState, extend_replies
 from model_adapters.hf.model import TransformersModel
 from model_adapters.protocols import Decoding
 
@@ -248,8 +248,8 @@ def test_a_disk_that_is_full_while_trajectories_are_made_keeps_those_that_are(tm
 @pytest.mark.parametrize("temperature", [0.0, 1.0])
 def test_scores_that_are_no_numbers_are_no_answer(scores, temperature):
     decoding = Decoding(max_new_tokens=2, temperature=temperature)
-    writing = Writing(Generation(frozenset()), decoding, context=(), choices=None, finished=lambda _: False)
-    refused(lambda: extend([(writing, torch.tensor(scores))]), "no token has a score")
+    writing = ReplyState(Generation(frozenset()), decoding, context=(), choices=None, finished=lambda _: False)
+    refused(lambda: extend_replies([(writing, torch.tensor(scores))]), "no token has a score")
 
 
 def _trajectory(**changes):

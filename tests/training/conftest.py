@@ -6,7 +6,7 @@ import pytest
 
 from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.training.encoding import Encoder
-from infthor_eval.training.starting_point import starting_point
+from infthor_eval.training.starting_model import load_starting_model
 from model_adapters.hf.loaded import Loaded
 
 
@@ -17,7 +17,7 @@ def bundled_set() -> Path:
 
 @pytest.fixture(scope="session")
 def plain_tiny() -> Loaded:
-    return starting_point("qwen2.5-vl-tiny", {}, "plain", seed=0)
+    return load_starting_model("qwen2.5-vl-tiny", {}, "plain", seed=0)
 
 
 @pytest.fixture(scope="session")

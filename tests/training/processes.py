@@ -21,7 +21,7 @@ from infthor_eval.training.export import whole_weights
 from infthor_eval.training.gradients import sum_gradients
 from infthor_eval.training.loop import Loop, LoopSettings, Progress
 from infthor_eval.training.network import SequenceModel, freeze
-from infthor_eval.training.ranks import Ranks, lay_out
+from infthor_eval.training.ranks import Ranks, assign_ranks
 from model_adapters.hf.loaded import Loaded
 
 from .twins import PAD, everywhere, loaded, sequence
@@ -123,7 +123,7 @@ def work(rank: int, folder: Path, frames: list[FrameRef]) -> None:
         "gloo", f"file://{folder / 'meeting'}", timedelta(seconds=120), world_size=N_RANKS, rank=rank
     )
     results: dict[Any, Any] = {}
-    grids = {n_context: lay_out(n_context) for n_context in (2, 4)}
+    grids = {n_context: assign_ranks(n_context) for n_context in (2, 4)}
     for case in CASES:
         for n_context, ranks in grids.items():
             results[case, n_context] = _run(case, frames, ranks)
@@ -172,7 +172,7 @@ def _refusals(frames: list[FrameRef], ranks: Ranks) -> dict[str, str]:
         except InfthorError as error:
             found["sliding"] = str(error)
     try:
-        lay_out(3)
+        assign_ranks(3)
     except InfthorError as error:
         found["three"] = str(error)
     return found

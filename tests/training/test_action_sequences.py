@@ -15,7 +15,7 @@ from infthor_eval.formats.trajectory import iter_trajectories
 from infthor_eval.household.sequence_text import ACT
 from infthor_eval.plans.history import Chapter, chapter_parts
 from infthor_eval.training.action_sequences import recorded_chapters, single_plans, windows
-from infthor_eval.training.encoding import Encoded, LeftOut
+from infthor_eval.training.encoding import SkippedItem, TrainingSequence
 from model_adapters.hf.prompt import Frame
 
 _ACTION = re.compile(r"<\|act\|>(.*?)<\|act\|>")
@@ -102,8 +102,8 @@ def test_a_plan_that_is_too_long_is_left_out_and_told(bundled_set, encoder):
     least = min(len(chapter.steps) for chapter in history)
     limit = 150 + least * 130
     made = list(windows(encoder, name, history, limit))
-    left = [item for item in made if isinstance(item, LeftOut)]
-    kept = [item for item in made if isinstance(item, Encoded)]
+    left = [item for item in made if isinstance(item, SkippedItem)]
+    kept = [item for item in made if isinstance(item, TrainingSequence)]
     assert left
     assert {item.reason for item in left} == {f"longer than {limit} tokens by itself"}
     assert len(left) + sum(map(window_plans, kept)) == len(history)
@@ -162,7 +162,7 @@ def test_windows_of_any_history(lengths, limit, encoder, bundled_set):
         for number, length in enumerate(lengths)
     ]
     made = list(windows(encoder, "any", history, limit))
-    kept = [item for item in made if isinstance(item, Encoded)]
+    kept = [item for item in made if isinstance(item, TrainingSequence)]
     assert all(window.n_tokens <= limit for window in kept)
     assert sum(map(window_plans, kept)) + len(made) - len(kept) == len(history)
 

@@ -4,17 +4,17 @@ import pytest
 from torch.utils.flop_counter import FlopCounterMode
 
 from infthor_eval.training.batches import collate
+from infthor_eval.training.cost import estimate_cost
 from infthor_eval.training.data import TrainingData, read_training_data
 from infthor_eval.training.encoding import Encoder
-from infthor_eval.training.estimate import estimate
 from infthor_eval.training.network import SequenceModel, freeze
 from infthor_eval.training.recipe import read_recipe
-from infthor_eval.training.starting_point import starting_point
+from infthor_eval.training.starting_model import load_starting_model
 
 
 @pytest.fixture
 def made(bundled_set):
-    loaded = starting_point("qwen2.5-vl-tiny", {"attn_implementation": "eager"}, "plain", seed=0)
+    loaded = load_starting_model("qwen2.5-vl-tiny", {"attn_implementation": "eager"}, "plain", seed=0)
     recipe = read_recipe("infthor_32k", {"max_tokens": 5000, "epochs": 1, "parallel.shard": False})
     data = read_training_data(recipe, Encoder(loaded), [bundled_set])
     network = SequenceModel(loaded)
@@ -29,19 +29,19 @@ def test_work_is_what_is_counted(made):
     with counter:
         network(**batch)["loss"].backward()
     kept = read_recipe("infthor_32k", {"epochs": 1, "gradient_checkpointing": False})
-    told = estimate(kept, network, data, 1).flop
+    told = estimate_cost(kept, network, data, 1).flop
     # This attention computes all pairs, and a causal one half of them; they are most of it here.
     assert 0.5 < told / counter.get_total_flops() < 0.7
-    assert estimate(recipe, network, data, 1).flop > told
+    assert estimate_cost(recipe, network, data, 1).flop > told
 
 
 def test_memory_falls_with_those_who_share_it(made):
     _, recipe, data, network = made
-    alone = estimate(recipe, network, data, 1)
+    alone = estimate_cost(recipe, network, data, 1)
     assert alone.weights == sum(parameter.nbytes for parameter in network.parameters())
     assert alone.optimizer == 2 * alone.gradients
-    shared = estimate(read_recipe("infthor_32k", {"parallel.shard": True}), network, data, 4)
+    shared = estimate_cost(read_recipe("infthor_32k", {"parallel.shard": True}), network, data, 4)
     assert (shared.weights, shared.optimizer) == (alone.weights / 4, alone.optimizer / 4)
-    cut = estimate(read_recipe("infthor_64k"), network, data, 8)
+    cut = estimate_cost(read_recipe("infthor_64k"), network, data, 8)
     assert cut.activations == pytest.approx(alone.activations / 8)
     assert cut.weights == alone.weights

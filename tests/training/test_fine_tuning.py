@@ -13,7 +13,7 @@ from safetensors.torch import load_file
 from infthor_eval.errors import InfthorError
 from infthor_eval.nieh.docs import doc_target
 from infthor_eval.nieh.samples import find_samples
-from infthor_eval.training.fine_tuning import fine_tune, prepared
+from infthor_eval.training.fine_tuning import fine_tune, prepare_run
 from infthor_eval.training.recipe import read_recipe
 from model_adapters import Decoding, load
 
@@ -46,7 +46,7 @@ def recipe(tmp_path):
 
 def train(recipe, data, out, **changes):
     told = []
-    run = prepared(read_recipe(recipe, changes), [data])
+    run = prepare_run(read_recipe(recipe, changes), [data])
     return fine_tune(run, out, told.append), told
 
 
@@ -131,7 +131,7 @@ def test_a_folder_is_one_runs(recipe, data, tmp_path, run):
 def test_adapters_are_trained_and_merged(recipe, data, tmp_path):
     pytest.importorskip("peft", reason="peft is an extra: pip install 'infthor-eval[train]'")
     lora = {"lora": {"rank": 4}, "freeze": ["vision", "embeddings", "head"], "max_steps": 3}
-    run = prepared(read_recipe(recipe, lora), [data])
+    run = prepare_run(read_recipe(recipe, lora), [data])
     before = {name: tensor.clone() for name, tensor in run.loaded.model.state_dict().items()}
     fine_tune(run, tmp_path / "out", lambda done: None)
     after = run.loaded.model.state_dict()

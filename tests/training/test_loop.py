@@ -10,7 +10,7 @@ from safetensors.torch import load_file
 
 from infthor_eval.errors import DataError, ModelError, UsageError
 from infthor_eval.formats.frames import FrameRef
-from infthor_eval.training.encoding import Encoded
+from infthor_eval.training.encoding import TrainingSequence
 from infthor_eval.training.loop import Loop, LoopSettings, Progress
 from infthor_eval.training.network import SequenceModel, freeze
 
@@ -25,7 +25,7 @@ def frames(tmp_path_factory: pytest.TempPathFactory) -> list[FrameRef]:
 
 
 @pytest.fixture(scope="module")
-def sequences(frames: list[FrameRef]) -> list[Encoded]:
+def sequences(frames: list[FrameRef]) -> list[TrainingSequence]:
     checkpoint = loaded("qwen2.5-vl")
     return [sequence(checkpoint, [frame], answer, answer) for frame, answer in zip(frames, ANSWERS, strict=True)]
 
@@ -46,7 +46,7 @@ Report = Callable[[Progress], None]
 
 
 def _run(
-    model: SequenceModel, sequences: list[Encoded], folder: Path, report: Report | None = None, **changed: Any
+    model: SequenceModel, sequences: list[TrainingSequence], folder: Path, report: Report | None = None, **changed: Any
 ) -> None:
     Loop(model, PAD, sequences, _settings(**changed), folder, report=report).run()
 
@@ -59,7 +59,7 @@ def _dying_after(step: int) -> Report:
     return report
 
 
-def test_the_loss_falls(model: SequenceModel, sequences: list[Encoded], tmp_path: Path) -> None:
+def test_the_loss_falls(model: SequenceModel, sequences: list[TrainingSequence], tmp_path: Path) -> None:
     told: list[Progress] = []
     _run(model, sequences, tmp_path, told.append, max_steps=20, sequences_per_step=5)
     assert [progress.step for progress in told] == list(range(1, 21))
@@ -71,7 +71,7 @@ def test_the_loss_falls(model: SequenceModel, sequences: list[Encoded], tmp_path
 
 
 def test_a_run_that_was_killed_goes_on_to_the_same_weights(
-    model: SequenceModel, sequences: list[Encoded], tmp_path: Path
+    model: SequenceModel, sequences: list[TrainingSequence], tmp_path: Path
 ) -> None:
     _run(model, sequences, tmp_path / "whole")
     killed = SequenceModel(loaded("qwen2.5-vl"))
@@ -96,12 +96,14 @@ def test_a_run_that_was_killed_goes_on_to_the_same_weights(
         assert torch.equal(one["exp_avg_sq"], moments[1][number]["exp_avg_sq"])
 
 
-def test_the_last_checkpoint_alone_is_kept(model: SequenceModel, sequences: list[Encoded], tmp_path: Path) -> None:
+def test_the_last_checkpoint_alone_is_kept(
+    model: SequenceModel, sequences: list[TrainingSequence], tmp_path: Path
+) -> None:
     _run(model, sequences, tmp_path, save_every=2)
     assert [place.name for place in tmp_path.iterdir()] == ["step-000005"]
 
 
-def test_a_run_at_its_end_does_nothing(model: SequenceModel, sequences: list[Encoded], tmp_path: Path) -> None:
+def test_a_run_at_its_end_does_nothing(model: SequenceModel, sequences: list[TrainingSequence], tmp_path: Path) -> None:
     _run(model, sequences, tmp_path)
     told: list[Progress] = []
     _run(model, sequences, tmp_path, told.append)
@@ -109,7 +111,7 @@ def test_a_run_at_its_end_does_nothing(model: SequenceModel, sequences: list[Enc
 
 
 def test_accumulated_sequences_weigh_by_their_tokens(
-    model: SequenceModel, sequences: list[Encoded], tmp_path: Path
+    model: SequenceModel, sequences: list[TrainingSequence], tmp_path: Path
 ) -> None:
     from infthor_eval.training.batches import collate
 
@@ -120,14 +122,16 @@ def test_accumulated_sequences_weigh_by_their_tokens(
     assert told[0].loss == pytest.approx(expected.item(), rel=1e-5)
 
 
-def test_frozen_parts_stay_as_they_are(model: SequenceModel, sequences: list[Encoded], tmp_path: Path) -> None:
+def test_frozen_parts_stay_as_they_are(model: SequenceModel, sequences: list[TrainingSequence], tmp_path: Path) -> None:
     before = {name: one.detach().clone() for name, one in model.named_parameters()}
     _run(model, sequences, tmp_path)
     for name, one in model.named_parameters():
         assert torch.equal(before[name], one) != one.requires_grad, name
 
 
-def test_another_runs_checkpoint_is_refused(model: SequenceModel, sequences: list[Encoded], tmp_path: Path) -> None:
+def test_another_runs_checkpoint_is_refused(
+    model: SequenceModel, sequences: list[TrainingSequence], tmp_path: Path
+) -> None:
     _run(model, sequences, tmp_path, max_steps=1)
     with pytest.raises(UsageError, match=r"is of a run with learning_rate=0\.003, not 0\.001"):
         _run(model, sequences, tmp_path, max_steps=1, learning_rate=1e-3)
@@ -140,7 +144,7 @@ def test_another_runs_checkpoint_is_refused(model: SequenceModel, sequences: lis
 
 @pytest.mark.parametrize("name", ["model.safetensors", "optimizer.pt", "state.json"])
 def test_a_damaged_checkpoint_is_one_line(
-    model: SequenceModel, sequences: list[Encoded], tmp_path: Path, name: str
+    model: SequenceModel, sequences: list[TrainingSequence], tmp_path: Path, name: str
 ) -> None:
     _run(model, sequences, tmp_path, max_steps=1)
     (tmp_path / "step-000001" / name).write_bytes(b"broken")
@@ -150,7 +154,7 @@ def test_a_damaged_checkpoint_is_one_line(
 
 
 def test_a_gradient_that_is_not_finite_ends_the_run(
-    model: SequenceModel, sequences: list[Encoded], tmp_path: Path
+    model: SequenceModel, sequences: list[TrainingSequence], tmp_path: Path
 ) -> None:
     with torch.no_grad():
         model.model.get_output_embeddings().weight.fill_(float("inf"))

@@ -15,13 +15,13 @@ from infthor_eval.formats.qa_csv import write_questions
 from infthor_eval.formats.step_log import ObjectInFrame, read_steps
 from infthor_eval.training.encoding import Encoder
 from infthor_eval.training.export import export
-from infthor_eval.training.nano.album import _covered, _type, read_album
-from infthor_eval.training.nano.architecture import TOKENS, image_processor, untrained
-from infthor_eval.training.nano.lessons import Lessons, opening, texts
-from infthor_eval.training.nano.network import NanoNetwork, ways_of_writing
-from infthor_eval.training.nano.orders import Orders
-from infthor_eval.training.nano.school import teach
+from infthor_eval.training.nano.architecture import TOKENS, build_untrained, image_processor
+from infthor_eval.training.nano.frame_dataset import _cell_coverage, _type, read_frame_dataset
+from infthor_eval.training.nano.network import NanoNetwork, spellings
+from infthor_eval.training.nano.sampler import SequenceSampler, corpus_texts, question_intro
 from infthor_eval.training.nano.settings import NanoRecipe
+from infthor_eval.training.nano.stages import train_small_model
+from infthor_eval.training.nano.synthetic_plans import SyntheticPlans
 from model_adapters import check_adapter, load
 
 SMALL = NanoRecipe(
@@ -54,30 +54,30 @@ def small_set(bundled_set, tmp_path_factory):
 @pytest.fixture(scope="module")
 def blank(small_set):
     """The model before it learned anything, and its album."""
-    album = read_album([small_set], image_processor())
-    return untrained(SMALL, texts([small_set], album.types), [opening()]), album
+    dataset = read_frame_dataset([small_set], image_processor())
+    return build_untrained(SMALL, corpus_texts([small_set], dataset.types), [question_intro()]), dataset
 
 
 def test_an_album_shows_what_the_logs_say(small_set, blank):
-    _, album = blank
+    _, dataset = blank
     data = NiehSet(small_set)
-    at = album.places()
+    at = dataset.places()
     for folder in sorted((small_set / "metadata").iterdir()):
         for frame, step in list(zip(data.frames(folder.name), read_steps(folder), strict=True))[::20]:
             place = at[frame.digest]
-            present = {name for name, there in zip(album.types, album.present[place], strict=True) if there}
-            shown = {name for name, there in zip(album.types, album.shown[place], strict=True) if there}
+            present = {name for name, there in zip(dataset.types, dataset.present[place], strict=True) if there}
+            shown = {name for name, there in zip(dataset.types, dataset.shown[place], strict=True) if there}
             assert present == {_type(key) for key in step.seen}
             assert shown <= set(step.object_log.visible) | present
 
 
 def test_frames_are_what_the_familys_own_features_are_made_of(blank):
-    loaded, album = blank
-    network = NanoNetwork(loaded, album)
-    frames = [FrameRef(frame.path) for frame in album.frames[:5]]
+    loaded, dataset = blank
+    network = NanoNetwork(loaded, dataset)
+    frames = [FrameRef(frame.path) for frame in dataset.frames[:5]]
     with torch.no_grad():
         theirs = torch.stack(loaded.family.features([frame.load() for frame in frames]))
-        ours = network.see(range(5))
+        ours = network.frame_features(range(5))
     assert ours.shape == (5, TOKENS, 64)
     assert torch.allclose(ours, theirs, atol=5e-3)  # pixels are kept in half precision
 
@@ -93,7 +93,7 @@ def test_frames_are_what_the_familys_own_features_are_made_of(blank):
     ],
 )
 def test_where_a_box_lies(box, cells):
-    found = {at for at, there in enumerate(_covered(torch.tensor([box]), (300, 300))[0]) if there}
+    found = {at for at, there in enumerate(_cell_coverage(torch.tensor([box]), (300, 300))[0]) if there}
     assert found <= cells
     assert found
 
@@ -105,30 +105,30 @@ def test_types_are_those_of_parts_and_slices():
 
 
 def test_words_are_tokens(blank):
-    loaded, album = blank
-    asked = loaded.tokenizer.tokenize(f"{opening()} Have you seen a mug?")
+    loaded, dataset = blank
+    asked = loaded.tokenizer.tokenize(f"{question_intro()} Have you seen a mug?")
     assert len(asked) == 1 + 6
-    names = [way for name in album.types for way in ways_of_writing(name)]
+    names = [way for name in dataset.types for way in spellings(name)]
     lengths = [len(loaded.tokenizer.tokenize(name)) for name in names]
     assert sum(lengths) / len(lengths) < 1.6
 
 
 def test_made_up_questions_are_true_and_their_names_tell_nothing(small_set, blank):
-    loaded, album = blank
-    lessons = Lessons(Encoder(loaded), [small_set], album, window_tokens=2048, seed=0)
-    places, counts = album.places(), {"yes": 0, "no": 0}
+    loaded, dataset = blank
+    sampler = SequenceSampler(Encoder(loaded), [small_set], dataset, window_tokens=2048, seed=0)
+    places, counts = dataset.places(), {"yes": 0, "no": 0}
     from infthor_eval.household.wording import noun
 
-    words = {noun(name): at for at, name in enumerate(album.types)}
-    for sequence in lessons.questions(200, made_up=1.0):
+    words = {noun(name): at for at, name in enumerate(dataset.types)}
+    for sequence in sampler.questions(200, made_up=1.0):
         (frame,) = sequence.frames
         text = loaded.tokenizer.decode([piece for piece in sequence.pieces if isinstance(piece, int)])
         answer = text.rpartition("?")[2].removesuffix("<|im_end|>")
         about = max((name for name in words if f" {name}" in text), key=len)
         counts[answer] += 1
         here = places[frame.digest]
-        assert bool(album.shown[here, words[about]]) == (answer == "yes")
-        assert answer == "yes" or not album.present[here, words[about]]
+        assert bool(dataset.shown[here, words[about]]) == (answer == "yes")
+        assert answer == "yes" or not dataset.present[here, words[about]]
     assert min(counts.values()) > 70
 
 
@@ -141,7 +141,7 @@ def test_orders_are_about_objects_that_stood_there_and_are_carried_out_by_name()
         ("put the egg in the sinkbasin", ["PutObject Egg SinkBasin"]),
         ("go to the fridge", ["MoveAhead", "RotateLeft"]),
     ]
-    draw, orders = random.Random(0), Orders(carried_out)
+    draw, orders = random.Random(0), SyntheticPlans(carried_out)
     assert {(plan, *actions) for plan, actions in (orders.drawn(draw) for _ in range(200))} == {
         ("pick up the mug", "PickupObject Mug"),
         ("pick up the butterknife", "PickupObject ButterKnife"),
@@ -151,13 +151,13 @@ def test_orders_are_about_objects_that_stood_there_and_are_carried_out_by_name()
         ("put the egg in the microwave", "OpenObject Microwave", "PutObject Egg Microwave", "CloseObject Microwave"),
         ("put the egg in the sinkbasin", "PutObject Egg SinkBasin"),
     }
-    assert not Orders(carried_out[-1:])
+    assert not SyntheticPlans(carried_out[-1:])
 
 
 def test_orders_have_no_frame_and_loss_is_taken_on_their_actions(small_set, blank):
-    loaded, album = blank
-    lessons = Lessons(Encoder(loaded), [small_set], album, window_tokens=600, seed=0)
-    for order in lessons.orders(20):
+    loaded, dataset = blank
+    sampler = SequenceSampler(Encoder(loaded), [small_set], dataset, window_tokens=600, seed=0)
+    for order in sampler.orders(20):
         assert not order.frames
         ends = [
             at for at, piece in enumerate(order.pieces) if piece == loaded.tokenizer.convert_tokens_to_ids("<|plan|>")
@@ -166,10 +166,10 @@ def test_orders_have_no_frame_and_loss_is_taken_on_their_actions(small_set, blan
 
 
 def test_histories_are_windows_or_single_plans(small_set, blank):
-    loaded, album = blank
-    lessons = Lessons(Encoder(loaded), [small_set], album, window_tokens=600, seed=0)
-    assert len(lessons.histories(2, 5, alone=0.0)) == 2
-    plans = lessons.histories(2, 5, alone=1.0)
+    loaded, dataset = blank
+    sampler = SequenceSampler(Encoder(loaded), [small_set], dataset, window_tokens=600, seed=0)
+    assert len(sampler.histories(2, 5, alone=0.0)) == 2
+    plans = sampler.histories(2, 5, alone=1.0)
     assert len(plans) == 5
     mark = loaded.tokenizer.convert_tokens_to_ids("<|plan|>")
     assert all(plan.pieces.count(mark) == 2 for plan in plans)
@@ -179,7 +179,7 @@ def test_what_cannot_be_read_is_left_out_and_told(small_set, tmp_path):
     shutil.copytree(small_set, tmp_path / "set")
     (tmp_path / "set/metadata/kitchen-1-seed7/traj_data.json").unlink()
     told = []
-    teach(
+    train_small_model(
         msgspec.structs.replace(SMALL, seeing_steps=1, reading_steps=1, telling_steps=1),
         [tmp_path / "set"],
         lambda _: None,
@@ -193,14 +193,14 @@ def test_a_set_without_questions_is_refused(small_set, tmp_path):
     (tmp_path / "set/qa_set_small.csv").unlink()
     write_questions(tmp_path / "set/qa_set_none.csv", [])
     with pytest.raises(DataError, match="no question"):
-        teach(SMALL, [tmp_path / "set"], lambda _: None)
+        train_small_model(SMALL, [tmp_path / "set"], lambda _: None)
 
 
 def test_the_course_is_the_same_for_a_seed_and_lowers_the_loss(small_set, tmp_path):
     losses = []
     for name in ("a", "b"):
         told = []
-        export(teach(SMALL, [small_set], told.append), tmp_path / name)
+        export(train_small_model(SMALL, [small_set], told.append), tmp_path / name)
         losses.append([lesson.loss for lesson in told])
         assert [lesson.part for lesson in told] == ["see"] * 20 + ["read"] * 3 + ["tell"] * 6
     assert losses[0] == losses[1]

@@ -9,7 +9,7 @@ from torch import Tensor
 
 from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.training.batches import Batch, collate, n_labels
-from infthor_eval.training.encoding import Encoded
+from infthor_eval.training.encoding import TrainingSequence
 from infthor_eval.training.network import PARTS, SequenceModel, freeze, parameters_by_part
 from model_adapters.hf.loaded import Loaded
 
@@ -26,7 +26,7 @@ def qwen() -> Loaded:
     return loaded("qwen2.5-vl")
 
 
-def _two(checkpoint: Loaded, folder: Path) -> list[Encoded]:
+def _two(checkpoint: Loaded, folder: Path) -> list[TrainingSequence]:
     frames = write_frames(folder, 2)
     return [sequence(checkpoint, frames[:1], "a mug"), everywhere(sequence(checkpoint, frames[1:], "two forks"))]
 

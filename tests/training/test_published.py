@@ -5,13 +5,13 @@ import torch
 import torch.distributed.checkpoint as dcp
 
 from infthor_eval.errors import DataError
-from infthor_eval.training.published import take_over
-from infthor_eval.training.starting_point import starting_point
+from infthor_eval.training.published import import_weights
+from infthor_eval.training.starting_model import load_starting_model
 from model_adapters import load
 
 
 def tiny(seed):
-    return starting_point("llava-onevision-tiny", {}, "plain", seed)
+    return load_starting_model("llava-onevision-tiny", {}, "plain", seed)
 
 
 def saved(loaded, folder, prefix, *, without=(), more=None):
@@ -25,7 +25,7 @@ def saved(loaded, folder, prefix, *, without=(), more=None):
 def test_weights_are_taken_over_whatever_stands_before_their_names(tmp_path, prefix):
     trained, other = tiny(1), tiny(0)
     moments = {f"optim.state.{name}.exp_avg": tensor for name, tensor in list(trained.model.state_dict().items())[:5]}
-    found = take_over(other, saved(trained, tmp_path / "dcp", prefix, without=("vision_tower",), more=moments))
+    found = import_weights(other, saved(trained, tmp_path / "dcp", prefix, without=("vision_tower",), more=moments))
     assert found.n_ignored == 5
     assert found.n_kept > 0
     begun = tiny(0).model.state_dict()
@@ -48,11 +48,11 @@ def test_the_command_writes_what_the_adapter_loads(tmp_path, run):
 
 def test_what_is_none_or_anothers_is_one_line(tmp_path):
     with pytest.raises(DataError, match="not a distributed checkpoint"):
-        take_over(tiny(0), tmp_path)
+        import_weights(tiny(0), tmp_path)
     dcp.save({"wheels": torch.zeros(2)}, checkpoint_id=tmp_path / "a", no_dist=True)
     with pytest.raises(DataError, match="no weight of this model"):
-        take_over(tiny(0), tmp_path / "a")
+        import_weights(tiny(0), tmp_path / "a")
     name = next(iter(tiny(0).model.state_dict()))
     dcp.save({name: torch.zeros(3)}, checkpoint_id=tmp_path / "b", no_dist=True)
     with pytest.raises(DataError, match=r"is \(3,\), the model's"):
-        take_over(tiny(0), tmp_path / "b")
+        import_weights(tiny(0), tmp_path / "b")

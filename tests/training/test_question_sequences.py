@@ -5,9 +5,9 @@ import pytest
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.question import Question
 from infthor_eval.nieh.samples import find_samples
-from infthor_eval.training.encoding import Encoded, Encoder, LeftOut
+from infthor_eval.training.encoding import Encoder, SkippedItem, TrainingSequence
 from infthor_eval.training.question_sequences import question_sequences
-from infthor_eval.training.starting_point import starting_point
+from infthor_eval.training.starting_model import load_starting_model
 from model_adapters import Turn
 
 
@@ -17,7 +17,7 @@ def made(encoder, root, context="clues", limit=100_000):
 
 @pytest.fixture(scope="session")
 def chat_tiny():
-    return starting_point("qwen2.5-vl-tiny", {}, "chat", seed=0)
+    return load_starting_model("qwen2.5-vl-tiny", {}, "chat", seed=0)
 
 
 def test_questions_are_asked_as_the_evaluation_asks_them(bundled_set, chat_tiny, plain_tiny):
@@ -38,8 +38,8 @@ def test_questions_are_asked_as_the_evaluation_asks_them(bundled_set, chat_tiny,
 
 def test_what_cannot_be_asked_is_told(make_nieh_set, encoder):
     root = make_nieh_set([Question("traj_a", "Is it?", (1,), ("yes",)), Question("traj_a", "Is it?", (77,), ("no",))])
-    sequence, left = sorted(made(encoder, root), key=lambda item: isinstance(item, LeftOut))
-    assert isinstance(sequence, Encoded)
+    sequence, left = sorted(made(encoder, root), key=lambda item: isinstance(item, SkippedItem))
+    assert isinstance(sequence, TrainingSequence)
     assert "clue 77 is outside" in left.reason
     (short, *_) = made(encoder, root, "trajectory", limit=100)
     assert "longer than 100 tokens" in {short.reason, *(item.reason for item in made(encoder, root, limit=100))}

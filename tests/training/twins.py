@@ -9,7 +9,7 @@ import numpy as np
 from PIL import Image
 
 from infthor_eval.formats.frames import FrameRef
-from infthor_eval.training.encoding import Encoded, Encoder
+from infthor_eval.training.encoding import Encoder, TrainingSequence
 from model_adapters import load
 from model_adapters.hf.loaded import Loaded
 
@@ -38,12 +38,12 @@ def write_frames(folder: Path, count: int) -> list[FrameRef]:
     return refs
 
 
-def sequence(model: Loaded, frames: Sequence[FrameRef], answer: str = "a mug", name: str = "one") -> Encoded:
+def sequence(model: Loaded, frames: Sequence[FrameRef], answer: str = "a mug", name: str = "one") -> TrainingSequence:
     """Frames with a text behind each, a question, and the answer, on which loss is taken."""
     parts = [part for number, frame in enumerate(frames) for part in (frame, f"\nRotateLeft {number}\n")]
     return Encoder(model).answer(name, ["What happens?\n", *parts, "What do you see now?"], answer)
 
 
-def everywhere(encoded: Encoded) -> Encoded:
+def everywhere(encoded: TrainingSequence) -> TrainingSequence:
     """The same sequence with loss on every token of text."""
     return replace(encoded, trained=tuple(isinstance(piece, int) for piece in encoded.pieces))

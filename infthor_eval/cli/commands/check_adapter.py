@@ -17,12 +17,12 @@ def command(model: str, model_args: str) -> int:
     (docs/own-models.md has what each asks). Exits with 0 where all hold, with 1 where one is broken.
     """
     from infthor_eval.terminal import print_line
-    from model_adapters import findings, load
+    from model_adapters import load, run_checks
 
     n_broken = 0
     adapter = load(model, model_options_in(model_args), seed=0)
     try:
-        for finding in findings(adapter):
+        for finding in run_checks(adapter):
             found = "holds" if finding.broken is None else "broken"
             print_line(f"{found:8}{finding.about:16}{finding.broken or ''}".rstrip())
             n_broken += finding.broken is not None

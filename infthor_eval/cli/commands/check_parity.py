@@ -32,14 +32,21 @@ def command(
     Exits with 0 where all agree, with 1 where one does not.
     """
     from infthor_eval.report.terminal import print_table, table_console
-    from model_adapters.policies.parity import INSTRUCTIONS, compare, drawn_frames, frames_in, loaded, reference
+    from model_adapters.policies.parity import (
+        INSTRUCTIONS,
+        compare_policies,
+        frames_in_folder,
+        load_policy,
+        reference_policy,
+        synthetic_frames,
+    )
 
     options = model_options_in(model_args)
-    theirs = reference(reference_url, options.get("unnorm_key"))
-    with nullcontext(frames_in(frames)) if frames else drawn_frames() as shown:
-        ours = loaded(model, options)
+    theirs = reference_policy(reference_url, options.get("unnorm_key"))
+    with nullcontext(frames_in_folder(frames)) if frames else synthetic_frames() as shown:
+        ours = load_policy(model, options)
         try:
-            found = compare(ours, theirs, shown, instruction or INSTRUCTIONS, tolerance)
+            found = compare_policies(ours, theirs, shown, instruction or INSTRUCTIONS, tolerance)
         finally:
             ours.close()
     print_table(found.table(), table_console())

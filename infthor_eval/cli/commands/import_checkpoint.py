@@ -24,12 +24,12 @@ def command(folder: Path, model: str, model_args: str, out: Path) -> int:
     from infthor_eval.formats.files import prepare_folder
     from infthor_eval.terminal import print_line
     from infthor_eval.training.export import export
-    from infthor_eval.training.published import take_over
-    from infthor_eval.training.starting_point import starting_point
+    from infthor_eval.training.published import import_weights
+    from infthor_eval.training.starting_model import load_starting_model
 
     prepare_folder(out)
-    loaded = starting_point(model, model_options_in(model_args), "plain", seed=0)
-    found = take_over(loaded, folder)
+    loaded = load_starting_model(model, model_options_in(model_args), "plain", seed=0)
+    found = import_weights(loaded, folder)
     export(loaded, out)
     print_line(
         f"{found.n_taken} weights taken over, {found.n_kept} kept, {found.n_ignored} other tensors ignored: {out}"

@@ -18,10 +18,10 @@ from infthor_eval.errors import DataError
 from infthor_eval.terminal import console, progress_bar
 
 if TYPE_CHECKING:
-    from infthor_eval.training.fine_tuning import Prepared
+    from infthor_eval.training.fine_tuning import TrainingRun
     from infthor_eval.training.loop import Progress
-    from infthor_eval.training.nano.school import Lesson
     from infthor_eval.training.nano.settings import NanoRecipe, Scenes
+    from infthor_eval.training.nano.stages import NanoProgress
     from infthor_eval.training.recipe import Recipe
     from infthor_eval.workers import WorkerSettings
 
@@ -131,9 +131,9 @@ def train(recipe: Recipe, folders: Sequence[Path], out: Path, only_for: Machine 
     Returns:
         Exit code: 0.
     """
-    from infthor_eval.training.fine_tuning import fine_tune, prepared
+    from infthor_eval.training.fine_tuning import fine_tune, prepare_run
 
-    run = prepared(recipe, folders)
+    run = prepare_run(recipe, folders)
     speaks = os.environ.get("RANK", "0") == "0"
     if speaks:
         _tell(run)
@@ -157,7 +157,7 @@ def train(recipe: Recipe, folders: Sequence[Path], out: Path, only_for: Machine 
     return 0
 
 
-def _tell(run: Prepared) -> None:
+def _tell(run: TrainingRun) -> None:
     """The sequences, and what none could be made of."""
     data = run.data
     longest = max(item.n_tokens for item in data.sequences)
@@ -169,14 +169,14 @@ def _tell(run: Prepared) -> None:
         say(f"{n} left out: {reason}", "yellow")
 
 
-def _tell_estimate(run: Prepared, machine: Machine) -> None:
+def _tell_estimate(run: TrainingRun, machine: Machine) -> None:
     """Work, time and memory."""
-    from infthor_eval.training.estimate import estimate
+    from infthor_eval.training.cost import estimate_cost
     from infthor_eval.training.network import SequenceModel, freeze
 
     network = SequenceModel(run.loaded)
     freeze(network, run.recipe.freeze)
-    found = estimate(run.recipe, network, run.data, machine.n_gpus)
+    found = estimate_cost(run.recipe, network, run.data, machine.n_gpus)
     hours = found.hours(machine.n_gpus * machine.tflops)
     console().print(
         f"work: {found.flop:.2e} FLOP, {hours:,.1f} hours of {machine.n_gpus} GPUs at {machine.tflops:g} TFLOP/s each"
@@ -208,17 +208,17 @@ def train_nano(recipe: NanoRecipe, folders: Sequence[Path], out: Path, worker_se
     """
     from infthor_eval.formats.files import prepare_folder
     from infthor_eval.training.export import export
-    from infthor_eval.training.nano.school import teach
+    from infthor_eval.training.nano.stages import train_small_model
 
     prepare_folder(out)
     sets = list(folders) or [make_data(recipe.scenes, recipe.seed, out / "data", worker_settings)]
     with progress_bar(NOTES) as progress:
         bars = StepBars(progress)
 
-        def watch(done: Lesson) -> None:
+        def watch(done: NanoProgress) -> None:
             bars.advance(_PARTS[done.part], done.step, done.n_steps, f"loss {done.loss:.3f}")
 
-        loaded = teach(recipe, sets, watch, say)
+        loaded = train_small_model(recipe, sets, watch, say)
     export(loaded, out / "checkpoint")
     console().print(f"{out / 'checkpoint'}")
     return 0

@@ -121,7 +121,7 @@ def _requests(
     **suites: Any,
 ) -> "list[tuple[RunRequest, Suite]]":
     from infthor_eval.cli.options.requests import Asked, requests_for
-    from model_adapters import on_engine
+    from model_adapters import name_on_engine
 
     of_all = _with_short_ones(model_args, {"rope": rope, "max_tokens_total": max_tokens_total, "max_cost": max_cost})
     options = {model: {**of_all, **own} for model, own in models.items()}
@@ -141,7 +141,7 @@ def _requests(
     if name is not None and len(options) > 1:
         raise click.UsageError(f"--name {name}: names one run, and {len(options)} models are asked")
     if engine is not None:
-        options = {on_engine(model, engine): given for model, given in options.items()}
+        options = {name_on_engine(model, engine): given for model, given in options.items()}
     return [request for model, given in options.items() for request in requests_for(asked, model, given, name)]
 
 

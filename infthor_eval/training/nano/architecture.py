@@ -21,7 +21,7 @@ from model_adapters.hf.templates import plain_template
 from model_adapters.tiny.qwen2_5_vl import SPECIAL
 from model_adapters.tiny.tokenizer import train_tokenizer
 
-__all__ = ["GRID", "PATCHES", "TOKENS", "image_processor", "untrained"]
+__all__ = ["GRID", "PATCHES", "TOKENS", "build_untrained", "image_processor"]
 
 GRID = 4  # tokens of a frame, along each side
 TOKENS = GRID**2
@@ -38,7 +38,7 @@ def image_processor() -> Any:
     return Qwen2VLImageProcessorPil(min_pixels=_PIXELS, max_pixels=_PIXELS)
 
 
-def untrained(recipe: NanoRecipe, corpus: Iterable[str], sentences: Iterable[str]) -> Loaded:
+def build_untrained(recipe: NanoRecipe, corpus: Iterable[str], sentences: Iterable[str]) -> Loaded:
     """The model with random weights of the recipe's seed, on the CPU in float32.
 
     Args:
@@ -101,7 +101,11 @@ def _config(recipe: NanoRecipe, ids: dict[str, int], vocab_size: int) -> Any:
             "eos_token_id": ids["<|im_end|>"],
             "pad_token_id": ids["<|endoftext|>"],
             "tie_word_embeddings": True,
-            "rope_parameters": {"rope_type": "default", "rope_theta": 1e4, "mrope_section": _axes(width // _HEADS)},
+            "rope_parameters": {
+                "rope_type": "default",
+                "rope_theta": 1e4,
+                "mrope_section": _rope_sections(width // _HEADS),
+            },
         },
         vision_config={
             "depth": layers,
@@ -116,7 +120,7 @@ def _config(recipe: NanoRecipe, ids: dict[str, int], vocab_size: int) -> Any:
     )
 
 
-def _axes(head_width: int) -> list[int]:
+def _rope_sections(head_width: int) -> list[int]:
     """How many of a head's frequencies tell time, height and width, in about the family's proportion."""
     frequencies = head_width // 2
     space = 3 * frequencies // 8

@@ -55,7 +55,7 @@ class _Vision(nn.Module):
         return torch.cat(features, dim=2)
 
 
-class _Projector(nn.Module):
+class _OpenVLAProjector(nn.Module):
     def __init__(self, inputs: int, outputs: int) -> None:
         super().__init__()
         self.fc1 = nn.Linear(inputs, 4 * inputs)
@@ -78,7 +78,7 @@ class OpenVLAWeights(nn.Module):
     def __init__(self, towers: tuple[TowerShape, TowerShape], image_size: int, language: LlamaConfig) -> None:
         super().__init__()
         self.vision_backbone = _Vision(towers, image_size)
-        self.projector = _Projector(sum(tower.width for tower in towers), language.hidden_size)
+        self.projector = _OpenVLAProjector(sum(tower.width for tower in towers), language.hidden_size)
         self.language_model = LlamaForCausalLM(language)
 
 

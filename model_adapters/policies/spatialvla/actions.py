@@ -43,7 +43,7 @@ class _ActionConfig(msgspec.Struct, frozen=True):
     use_spherical: bool
 
 
-class Camera(msgspec.Struct, frozen=True):
+class CameraIntrinsics(msgspec.Struct, frozen=True):
     """Intrinsics of a camera at a size in pixels."""
 
     width: int
@@ -65,7 +65,7 @@ class ProcessorConfig(msgspec.Struct, frozen=True):
     action_chunk_size: int
     action_config: _ActionConfig
     bin_policy: _BinPolicy
-    intrinsic_config: dict[str, Camera]
+    intrinsic_config: dict[str, CameraIntrinsics]
     statistics: dict[str, dict[str, object]]
 
 

@@ -7,13 +7,13 @@ import torch
 
 from infthor_eval.errors import ModelError
 from model_adapters.options.policies import DEFAULT_INTRINSICS
-from model_adapters.policies.spatialvla.actions import Camera
+from model_adapters.policies.spatialvla.actions import CameraIntrinsics
 
 __all__ = ["published_intrinsics", "thor_intrinsics"]
 
 
 def published_intrinsics(
-    cameras: Mapping[str, Camera], unnorm_key: str, image_size: int, pretrained: str
+    cameras: Mapping[str, CameraIntrinsics], unnorm_key: str, image_size: int, pretrained: str
 ) -> torch.Tensor:
     """Intrinsics, (3, 3), in pixels of the squashed image: the dataset's camera, or the checkpoint's default.
 

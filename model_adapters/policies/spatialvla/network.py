@@ -32,7 +32,7 @@ def prompt(instruction: str) -> str:
     return f"What action should the robot take to {instruction}?"
 
 
-class _Projector(nn.Module):
+class _SpatialVLAProjector(nn.Module):
     def __init__(self, inputs: int, outputs: int) -> None:
         super().__init__()
         self.linear = nn.Linear(inputs, outputs)
@@ -55,7 +55,7 @@ class SpatialVLAWeights(nn.Module):
         self.vision_tower = SiglipVisionModel(vision)
         self.vision_zoe_model = ZoeDepthForDepthEstimation(zoe)
         self.position_embedding_3d = Ego3DEmbedding(config.ego3d_patch_reso**2, config.n_freqs, vision.hidden_size)
-        self.multi_modal_projector = _Projector(vision.hidden_size, config.projection_dim)
+        self.multi_modal_projector = _SpatialVLAProjector(vision.hidden_size, config.projection_dim)
         self.language_model = Gemma2ForCausalLM(text)
         self.spatial_embed_tokens = nn.Embedding(config.spatial_token_num, text.hidden_size)
 

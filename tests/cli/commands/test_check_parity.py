@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from model_adapters.policies.parity import loaded
+from model_adapters.policies.parity import load_policy
 
 from ...model_adapters.policies.servers import policy_answers, serving
 
@@ -20,7 +20,7 @@ def no_proxy(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(scope="module")
 def url() -> Iterator[str]:
-    with serving(policy_answers(loaded("openvla-tiny", {}))) as address:
+    with serving(policy_answers(load_policy("openvla-tiny", {}))) as address:
         yield address
 
 
@@ -35,7 +35,7 @@ def test_equal_policies_end_with_0(run: Run, url: str) -> None:
 def test_different_policies_end_with_1(run: Run, tmp_path: Path) -> None:
     Image.new("RGB", (64, 64), "red").save(tmp_path / "red.png")
     words = ("--frames", tmp_path, "--instruction", "open the drawer")
-    with serving(policy_answers(loaded("openvla-tiny", {}), change=0.125)) as other:
+    with serving(policy_answers(load_policy("openvla-tiny", {}), change=0.125)) as other:
         code, out, _ = run("check-parity", "openvla-tiny", "--reference-url", other, *words)
         tolerated, _, _ = run("check-parity", "openvla-tiny", "--reference-url", other, *words, "--tolerance", "0.2")
     assert (code, tolerated) == (1, 0)

@@ -8,7 +8,7 @@ from transformers import GenerationConfig, TemperatureLogitsWarper, TopPLogitsWa
 from infthor_eval.errors import ModelError
 from model_adapters import Decoding
 from model_adapters.hf.choices import Choices
-from model_adapters.hf.decoding import Generation, Writing, read_generation, write
+from model_adapters.hf.decoding import Generation, ReplyState, read_generation, write
 from model_adapters.stopping import cut_at_stop
 
 from ..asking import up_to
@@ -33,12 +33,12 @@ def _writing(
     context: Sequence[int] = (0,),
     choices: Sequence[tuple[int, ...]] = (),
     finished: Callable[[list[int]], bool] = lambda ids: False,
-) -> Writing:
+) -> ReplyState:
     held = Choices({ids: str(ids) for ids in choices}) if choices else None
-    return Writing(generation, decoding, context=context, choices=held, finished=finished)
+    return ReplyState(generation, decoding, context=context, choices=held, finished=finished)
 
 
-def _written(reply: Writing, logits: torch.Tensor, step: Feed = _counting) -> list[int]:
+def _written(reply: ReplyState, logits: torch.Tensor, step: Feed = _counting) -> list[int]:
     write(logits[None], lambda tokens: torch.stack([step(token) for token in tokens]), [reply])
     return reply.ids
 

@@ -8,7 +8,7 @@ import pytest
 import torch
 
 from model_adapters import Decoding, Reply
-from model_adapters.hf.decoding import Generation, extend
+from model_adapters.hf.decoding import Generation, extend_replies
 from model_adapters.hf.replies import begin_reply, end_reply
 from model_adapters.tiny.tokenizer import train_tokenizer
 
@@ -28,7 +28,7 @@ def _written(loaded: Any, text: str, decoding: Decoding) -> Reply:
     reply = begin_reply(loaded, decoding, ())
     for token in tokenizer(text, add_special_tokens=False)["input_ids"]:
         if not reply.done:
-            extend([(reply, torch.nn.functional.one_hot(torch.tensor(token), len(tokenizer)))])
+            extend_replies([(reply, torch.nn.functional.one_hot(torch.tensor(token), len(tokenizer)))])
     return end_reply(loaded, reply, 0, 0)
 
 

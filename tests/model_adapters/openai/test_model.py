@@ -153,7 +153,7 @@ def test_as_many_requests_are_in_flight_as_there_are_threads_and_conversations_a
 @pytest.fixture
 def waits(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[float]]:
     found: list[float] = []
-    monkeypatch.setattr(served.Pace, "wait", lambda pace, amount=1.0: found.append(amount))
+    monkeypatch.setattr(served.RateLimiter, "wait", lambda pace, amount=1.0: found.append(amount))
     return found
 
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from infthor_eval.errors import ModelError
 from model_adapters.openai import rate
-from model_adapters.openai.rate import Pace
+from model_adapters.openai.rate import RateLimiter
 from model_adapters.openai.spend import Caps, Prices, Spend
 
 
@@ -101,7 +101,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> list[float]:
 
 
 def test_a_pace_is_even(clock: list[float]) -> None:
-    pace, begun = Pace(30), []
+    pace, begun = RateLimiter(30), []
     for _ in range(4):
         pace.wait()
         begun.append(clock[0] - 100)
@@ -109,7 +109,7 @@ def test_a_pace_is_even(clock: list[float]) -> None:
 
 
 def test_what_was_taken_is_made_up_for_and_what_was_given_back_is_not_waited_for(clock: list[float]) -> None:
-    pace = Pace(60)
+    pace = RateLimiter(60)
     pace.wait(10)
     pace.take(20)  # it was 30
     pace.wait(10)
@@ -120,7 +120,7 @@ def test_what_was_taken_is_made_up_for_and_what_was_given_back_is_not_waited_for
 
 
 def test_without_a_limit_nothing_is_waited_for(clock: list[float]) -> None:
-    pace = Pace(None)
+    pace = RateLimiter(None)
     for _ in range(5):
         pace.wait(1e9)
         pace.take(1e9)

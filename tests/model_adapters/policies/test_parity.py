@@ -10,7 +10,14 @@ from PIL import Image
 from infthor_eval.errors import DataError, UsageError
 from infthor_eval.formats.frames import FrameRef
 from model_adapters import ArmDelta
-from model_adapters.policies.parity import INSTRUCTIONS, compare, drawn_frames, frames_in, loaded, reference
+from model_adapters.policies.parity import (
+    INSTRUCTIONS,
+    compare_policies,
+    frames_in_folder,
+    load_policy,
+    reference_policy,
+    synthetic_frames,
+)
 from model_adapters.policies.policy import VlaPolicy
 
 from .servers import policy_answers, serving
@@ -40,10 +47,10 @@ def test_the_same_policy_behind_a_server_is_equal(
     family: str, policy_checkpoints: dict[str, Path], policies: dict[str, VlaPolicy]
 ) -> None:
     given = {"pretrained": str(policy_checkpoints[family]), "device": "cpu"}
-    theirs = loaded(family, given)
-    with drawn_frames() as frames, serving(policy_answers(theirs)) as url:
-        found = compare(loaded(family, given), reference(url, None), frames, INSTRUCTIONS, 1e-6)
-        apart = compare(policies["openvla"], reference(url, None), frames[:1], INSTRUCTIONS[:1], 1e-6)
+    theirs = load_policy(family, given)
+    with synthetic_frames() as frames, serving(policy_answers(theirs)) as url:
+        found = compare_policies(load_policy(family, given), reference_policy(url, None), frames, INSTRUCTIONS, 1e-6)
+        apart = compare_policies(policies["openvla"], reference_policy(url, None), frames[:1], INSTRUCTIONS[:1], 1e-6)
     assert found.equal
     assert [row.cells[1] for row in found.table().rows] == ["6"] * 3
     assert {row.cells[2] for row in found.table().rows} == {"1" if family == "openvla" else "4"}
@@ -53,17 +60,17 @@ def test_the_same_policy_behind_a_server_is_equal(
 def test_differences_are_told_by_kind(plain_frames: tuple[FrameRef, FrameRef]) -> None:
     ours: Any = Still(STEP)
     theirs: Any = Still(OTHER)
-    found = compare(ours, theirs, plain_frames, ["pick up the mug"], 0.4)
+    found = compare_policies(ours, theirs, plain_frames, ["pick up the mug"], 0.4)
     assert not found.equal
     assert found.table().rows[0].cells == ("pick up the mug", "2", "1", "0.25", "0.5", "1")
     assert "they differ" in found.table().notes[0]
-    assert compare(ours, theirs, plain_frames, ["x"], 1.0).equal
+    assert compare_policies(ours, theirs, plain_frames, ["x"], 1.0).equal
 
 
 def test_more_steps_than_the_other_gives_is_a_difference(plain_frames: tuple[FrameRef, FrameRef]) -> None:
     ours: Any = Still(STEP, STEP)
     theirs: Any = Still(STEP)
-    found = compare(ours, theirs, plain_frames, ["x"], 1e9)
+    found = compare_policies(ours, theirs, plain_frames, ["x"], 1e9)
     assert not found.equal
     assert found.rows[0].largest == math.inf
     assert found.table().rows[0].cells[2] == "2 and 1"
@@ -73,17 +80,17 @@ def test_pictures_of_a_folder_are_taken_by_name(tmp_path: Path) -> None:
     for name in ("b.png", "a.jpg"):
         Image.new("RGB", (8, 8)).save(tmp_path / name)
     (tmp_path / "notes.txt").write_text("x")
-    assert [frame.path.name for frame in frames_in(tmp_path)] == ["a.jpg", "b.png"]
+    assert [frame.path.name for frame in frames_in_folder(tmp_path)] == ["a.jpg", "b.png"]
 
 
 def test_a_folder_without_pictures_is_refused(tmp_path: Path) -> None:
     for folder in (tmp_path, tmp_path / "none"):
         with pytest.raises(DataError, match="holds no pictures"):
-            frames_in(folder)
+            frames_in_folder(folder)
 
 
 def test_misuse_is_refused() -> None:
     with pytest.raises(UsageError, match=r"--reference-url: url is no address"):
-        reference("host", None)
+        reference_policy("host", None)
     with pytest.raises(UsageError, match=r"qwen2\.5-vl-tiny is no policy; compare openvla or spatialvla"):
-        loaded("qwen2.5-vl-tiny", {})
+        load_policy("qwen2.5-vl-tiny", {})

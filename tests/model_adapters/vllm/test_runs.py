@@ -11,7 +11,7 @@ from infthor_eval.errors import UsageError
 from infthor_eval.nieh.records import RECORDS
 from infthor_eval.plans.records import RECORDS as PLAN_RECORDS
 from infthor_eval.runs import read_run
-from model_adapters import on_engine
+from model_adapters import name_on_engine
 from tests.plans.cut import MUG, cut, write
 
 from .double import Double
@@ -111,10 +111,10 @@ def test_engines_that_do_not_run_a_model_are_refused_in_one_line(run: Any, tmp_p
 
 
 def test_the_name_of_a_model_may_say_its_engine() -> None:
-    assert on_engine("qwen2.5-vl", "vllm") == on_engine("qwen2.5-vl@vllm", "vllm") == "qwen2.5-vl@vllm"
-    assert on_engine("deepseek-vl", "transformers") == "deepseek-vl"
+    assert name_on_engine("qwen2.5-vl", "vllm") == name_on_engine("qwen2.5-vl@vllm", "vllm") == "qwen2.5-vl@vllm"
+    assert name_on_engine("deepseek-vl", "transformers") == "deepseek-vl"
     with pytest.raises(UsageError, match="pixtral@vllm names its engine, and it is not transformers; leave one"):
-        on_engine("pixtral@vllm", "transformers")
+        name_on_engine("pixtral@vllm", "transformers")
 
 
 def test_a_run_without_vllm_ends_with_one_line(ask: Any, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,11 +6,11 @@ import pytest
 
 from infthor_eval.errors import ModelError
 from model_adapters.options.policies import parse_field_of_view
-from model_adapters.policies.spatialvla.actions import Camera
+from model_adapters.policies.spatialvla.actions import CameraIntrinsics
 from model_adapters.policies.spatialvla.camera import published_intrinsics, thor_intrinsics
 
-DEFAULT = Camera(640, 480, [[623.588, 0, 319.501], [0, 623.588, 239.545], [0, 0, 1]])
-OTHER = Camera(224, 224, [[100, 0, 112], [0, 100, 112], [0, 0, 1]])
+DEFAULT = CameraIntrinsics(640, 480, [[623.588, 0, 319.501], [0, 623.588, 239.545], [0, 0, 1]])
+OTHER = CameraIntrinsics(224, 224, [[100, 0, 112], [0, 100, 112], [0, 0, 1]])
 
 
 def test_the_published_camera_is_squashed_with_the_frame() -> None:
@@ -52,8 +52,9 @@ def test_another_form_is_refused(text: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "cameras", [{}, {"default": Camera(0, 480, DEFAULT.intrinsic)}, {"default": Camera(9, 9, [[1]])}]
+    "cameras",
+    [{}, {"default": CameraIntrinsics(0, 480, DEFAULT.intrinsic)}, {"default": CameraIntrinsics(9, 9, [[1]])}],
 )
-def test_a_checkpoint_without_a_camera_is_refused(cameras: dict[str, Camera]) -> None:
+def test_a_checkpoint_without_a_camera_is_refused(cameras: dict[str, CameraIntrinsics]) -> None:
     with pytest.raises(ModelError, match=r"mine has no intrinsics for bridge and no default; give intrinsics=thor:"):
         published_intrinsics(cameras, "bridge", 224, "mine")

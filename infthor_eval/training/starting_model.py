@@ -7,14 +7,14 @@ import torch
 
 from infthor_eval.errors import UsageError
 from infthor_eval.household.sequence_text import MARKS
-from model_adapters import load, takes
+from model_adapters import has_option, load
 from model_adapters.hf.loaded import Loaded
 from model_adapters.hf.model import TransformersModel
 
-__all__ = ["add_marks", "starting_point"]
+__all__ = ["add_marks", "load_starting_model"]
 
 
-def starting_point(model: str, options: Mapping[str, str], prompt: str, seed: int) -> Loaded:
+def load_starting_model(model: str, options: Mapping[str, str], prompt: str, seed: int) -> Loaded:
     """Load a checkpoint and give it the marks of sequences as tokens.
 
     Args:
@@ -27,7 +27,7 @@ def starting_point(model: str, options: Mapping[str, str], prompt: str, seed: in
         UsageError: an unknown name or option, or a model that cannot be trained here.
         ModelError: it cannot be loaded.
     """
-    found = load(model, {**options, "prompt": prompt}, seed) if takes(model, "prompt") else None
+    found = load(model, {**options, "prompt": prompt}, seed) if has_option(model, "prompt") else None
     if not isinstance(found, TransformersModel):
         raise UsageError(f"{model} is nothing that can be trained here; take a model of a transformers family")
     add_marks(found.loaded)

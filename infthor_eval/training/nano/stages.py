@@ -10,16 +10,16 @@ from torch import Tensor
 
 from infthor_eval.reasons import count_reasons
 from infthor_eval.training.batches import collate
-from infthor_eval.training.encoding import Encoded, Encoder
-from infthor_eval.training.nano.album import read_album
-from infthor_eval.training.nano.architecture import image_processor, untrained
-from infthor_eval.training.nano.lessons import Lessons, opening, texts
+from infthor_eval.training.encoding import Encoder, TrainingSequence
+from infthor_eval.training.nano.architecture import build_untrained, image_processor
+from infthor_eval.training.nano.frame_dataset import read_frame_dataset
 from infthor_eval.training.nano.network import NanoNetwork
+from infthor_eval.training.nano.sampler import SequenceSampler, corpus_texts, question_intro
 from infthor_eval.training.nano.settings import NanoRecipe
 from infthor_eval.training.network import decay_groups
 from model_adapters.hf.loaded import Loaded
 
-__all__ = ["Lesson", "teach"]
+__all__ = ["NanoProgress", "train_small_model"]
 
 _WARM_UP = 50  # steps
 _LOWEST = 0.05  # of the learning rate, in the end
@@ -29,7 +29,7 @@ _FRAMES_BESIDE = 16  # of which it is asked what is to be seen, while it reads
 
 
 @dataclass(frozen=True)
-class Lesson:
+class NanoProgress:
     """A step that is done.
 
     Attributes:
@@ -46,10 +46,10 @@ class Lesson:
     loss: float
 
 
-def teach(
+def train_small_model(
     recipe: NanoRecipe,
     folders: Sequence[Path],
-    watcher: Callable[[Lesson], None],
+    watcher: Callable[[NanoProgress], None],
     say: Callable[[str], None] = lambda _: None,
 ) -> Loaded:
     """Train the small model on replayed sets.
@@ -68,36 +68,40 @@ def teach(
     """
     torch.set_num_threads(recipe.threads)
     torch.manual_seed(recipe.seed)
-    album = read_album(folders, image_processor())
-    loaded = untrained(recipe, texts(folders, album.types), [opening()])
-    network = NanoNetwork(loaded, album)
-    lessons = Lessons(Encoder(loaded), folders, album, window_tokens=recipe.window_tokens, seed=recipe.seed)
-    for _, reason, n in count_reasons(("", item.reason) for item in lessons.left_out):
+    dataset = read_frame_dataset(folders, image_processor())
+    loaded = build_untrained(recipe, corpus_texts(folders, dataset.types), [question_intro()])
+    network = NanoNetwork(loaded, dataset)
+    sampler = SequenceSampler(Encoder(loaded), folders, dataset, window_tokens=recipe.window_tokens, seed=recipe.seed)
+    for _, reason, n in count_reasons(("", item.reason) for item in sampler.left_out):
         say(f"{n} left out: {reason}")
-    course = _Course(recipe, network, lessons)
+    trainer = _StageTrainer(recipe, network, sampler)
     network.train()
-    course.run("see", recipe.seeing_steps, course.see, watcher)
-    network.remember()
-    course.run("read", recipe.reading_steps, course.read, watcher)
-    course.run("tell", recipe.telling_steps, course.tell, watcher)
+    trainer.run("see", recipe.seeing_steps, trainer.see, watcher)
+    network.cache_features()
+    trainer.run("read", recipe.reading_steps, trainer.read, watcher)
+    trainer.run("tell", recipe.telling_steps, trainer.tell, watcher)
     network.eval()
     loaded.model.to(torch.bfloat16)  # half the file, and no answer hangs on what is rounded off
     return loaded
 
 
-class _Course:
+class _StageTrainer:
     """The steps of all parts."""
 
-    def __init__(self, recipe: NanoRecipe, network: NanoNetwork, lessons: Lessons) -> None:
+    def __init__(self, recipe: NanoRecipe, network: NanoNetwork, sampler: SequenceSampler) -> None:
         self._recipe = recipe
         self._network = network
-        self._lessons = lessons
+        self._lessons = sampler
         self._trained = list(network.parameters())
         groups = decay_groups(self._trained, recipe.weight_decay)
         self._optimizer = torch.optim.AdamW(groups, lr=recipe.lr, betas=_BETAS)
 
     def run(
-        self, part: str, n_steps: int, step: Callable[[], tuple[Tensor, Tensor]], watcher: Callable[[Lesson], None]
+        self,
+        part: str,
+        n_steps: int,
+        step: Callable[[], tuple[Tensor, Tensor]],
+        watcher: Callable[[NanoProgress], None],
     ) -> None:
         """Make the steps of one part, at a learning rate that rises, and falls along a cosine."""
         for number in range(n_steps):
@@ -110,19 +114,19 @@ class _Course:
             loss.backward()
             torch.nn.utils.clip_grad_norm_(self._trained, _CLIP)
             self._optimizer.step()
-            watcher(Lesson(part, number + 1, n_steps, told.item()))
+            watcher(NanoProgress(part, number + 1, n_steps, told.item()))
 
     def see(self) -> tuple[Tensor, Tensor]:
         """What is in some frames."""
         places = self._lessons.frames(self._recipe.frames_per_step)
-        loss = self._seen(self._network.see(places), places)
+        loss = self._seen(self._network.frame_features(places), places)
         return loss, loss.detach()
 
     def read(self) -> tuple[Tensor, Tensor]:
         """Orders; and some frames, as the names' embeddings learn here and are not to leave what they look like."""
         recipe, places = self._recipe, self._lessons.frames(_FRAMES_BESIDE)
         loss = self._told(self._lessons.orders(recipe.orders_read))
-        return loss + recipe.seeing_weight * self._seen(self._network.see(places), places), loss.detach()
+        return loss + recipe.seeing_weight * self._seen(self._network.frame_features(places), places), loss.detach()
 
     def tell(self) -> tuple[Tensor, Tensor]:
         """Answers and actions, which count alike, though histories have most of the tokens; and orders beside them.
@@ -131,16 +135,16 @@ class _Course:
         """
         recipe = self._recipe
         answered = self._told(self._lessons.questions(recipe.questions_per_step, recipe.made_up))
-        places, features = self._network.last_seen
+        places, features = self._network.last_frames
         acted = self._told(self._lessons.histories(recipe.windows_per_step, recipe.plans_per_step, recipe.alone))
         ordered = self._told(self._lessons.orders(recipe.orders_per_step))
         loss = answered + acted + recipe.orders_weight * ordered
         return loss + recipe.seeing_weight * self._seen(features, places), loss.detach()
 
     def _seen(self, features: Tensor, places: Sequence[int]) -> Tensor:
-        return self._network.seeing_loss(features, places, self._lessons.way(self._network.n_ways))
+        return self._network.vision_loss(features, places, self._lessons.way(self._network.n_spellings))
 
-    def _told(self, sequences: Sequence[Encoded]) -> Tensor:
+    def _told(self, sequences: Sequence[TrainingSequence]) -> Tensor:
         """Loss of some sequences, by token."""
         batch = collate(sequences, self._network.family, pad_id=0)
         loss: Tensor = self._network(**batch)["loss"]

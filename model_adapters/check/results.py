@@ -10,13 +10,13 @@ from model_adapters.check.model import model_checks
 from model_adapters.check.policy import policy_checks
 from model_adapters.protocols import Model, Policy
 
-__all__ = ["Finding", "findings"]
+__all__ = ["CheckResult", "run_checks"]
 
 _FIRST = "members"  # without them nothing else can be asked
 
 
 @dataclass(frozen=True)
-class Finding:
+class CheckResult:
     """What came of one check.
 
     Attributes:
@@ -28,7 +28,7 @@ class Finding:
     broken: str | None
 
 
-def findings(adapter: Model | Policy, frame_size: tuple[int, int] = (300, 300)) -> Iterator[Finding]:
+def run_checks(adapter: Model | Policy, frame_size: tuple[int, int] = (300, 300)) -> Iterator[CheckResult]:
     """Check an adapter as `check_adapter` and `check_policy` do, going on behind a broken clause.
 
     What acts is taken for a policy, anything else for a model. Where a member is missing nothing else is checked.
@@ -44,7 +44,7 @@ def findings(adapter: Model | Policy, frame_size: tuple[int, int] = (300, 300)) 
             checks = model_checks(adapter, black, white)
         for about, check in checks.items():
             broken = _broken(check)
-            yield Finding(about, broken)
+            yield CheckResult(about, broken)
             if broken is not None and about == _FIRST:
                 return
 

@@ -13,10 +13,10 @@ from infthor_eval.errors import DataError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.step_log import ObjectInFrame, Step, read_steps
-from infthor_eval.training.data import recorded_names
+from infthor_eval.training.data import trajectory_names
 from infthor_eval.training.nano.architecture import GRID, PATCHES, TOKENS
 
-__all__ = ["Album", "read_album"]
+__all__ = ["FrameDataset", "read_frame_dataset"]
 
 _READERS = 2  # threads
 _LEAST_PIXELS = 90  # of an object that counts as shown: a thousandth of a frame of 300 x 300, as in the questions
@@ -24,7 +24,7 @@ _OF_CELL, _OF_OBJECT = 0.4, 0.5  # shares of a cell, or of an object, that lie w
 
 
 @dataclass(frozen=True)
-class Album:
+class FrameDataset:
     """Frames and what they show.
 
     Attributes:
@@ -47,13 +47,13 @@ class Album:
         """Digest of a frame's file to its place in the album."""
         return {frame.digest: at for at, frame in enumerate(self.frames)}
 
-    def for_tower(self, places: Sequence[int]) -> Tensor:
+    def tower_inputs(self, places: Sequence[int]) -> Tensor:
         """What the vision tower is fed for some frames, (frames x patches, values)."""
         chosen = self.pixels[list(places)].float().reshape(len(places) * PATCHES, 3, 1, -1)
         return chosen.expand(-1, -1, 2, -1).reshape(len(places) * PATCHES, -1)
 
 
-def read_album(folders: Iterable[Path], image_processor: Any) -> Album:
+def read_frame_dataset(folders: Iterable[Path], image_processor: Any) -> FrameDataset:
     """Read all frames of replayed sets.
 
     Args:
@@ -66,7 +66,7 @@ def read_album(folders: Iterable[Path], image_processor: Any) -> Album:
     frames: dict[str, tuple[FrameRef, Step]] = {}
     for folder in folders:
         data = NiehSet(folder)
-        for name in recorded_names(data):
+        for name in trajectory_names(data):
             place = data.folder(name)
             steps = sorted(read_steps(place), key=lambda step: step.img_idx)
             if any(step.seen is None for step in steps):
@@ -79,7 +79,7 @@ def read_album(folders: Iterable[Path], image_processor: Any) -> Album:
     cells, shown, present = (torch.stack(parts) for parts in zip(*labels, strict=True))
     with ThreadPoolExecutor(_READERS) as readers:  # decoding and resizing let go of the interpreter
         pixels = torch.stack(list(readers.map(lambda one: _patches(one[0], image_processor), found)))
-    return Album(tuple(frame for frame, _ in found), tuple(types), pixels, cells, shown, present)
+    return FrameDataset(tuple(frame for frame, _ in found), tuple(types), pixels, cells, shown, present)
 
 
 def _patches(frame: FrameRef, image_processor: Any) -> Tensor:
@@ -101,7 +101,7 @@ def _labels(
 ) -> tuple[Tensor, Tensor, Tensor]:
     cells = torch.zeros(TOKENS, len(types))
     shown, present = torch.zeros(len(types)), torch.zeros(len(types))
-    covered = _covered(torch.tensor([item.box for item in seen.values()]).reshape(-1, 4), size)
+    covered = _cell_coverage(torch.tensor([item.box for item in seen.values()]).reshape(-1, 4), size)
     for (key, item), within in zip(seen.items(), covered, strict=True):
         at = types.index(_type(key))
         present[at] = 1
@@ -111,7 +111,7 @@ def _labels(
     return cells, shown, present
 
 
-def _covered(boxes: Tensor, size: tuple[int, int]) -> Tensor:
+def _cell_coverage(boxes: Tensor, size: tuple[int, int]) -> Tensor:
     """In which cells of a frame boxes lie, (boxes, tokens), row by row."""
     left, top, right, bottom = boxes.T
     spans = []

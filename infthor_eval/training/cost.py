@@ -11,7 +11,7 @@ from infthor_eval.training.data import TrainingData
 from infthor_eval.training.network import SequenceModel, parameters_by_part
 from infthor_eval.training.recipe import Recipe
 
-__all__ = ["Estimate", "estimate"]
+__all__ = ["TrainingCost", "estimate_cost"]
 
 _SAMPLE = (300, 300)  # a frame's width and height in the published data
 _MOMENTS = 2  # of AdamW
@@ -19,7 +19,7 @@ _LORA_SHARE = 0.02  # of the decoder's weights, about: adapters of rank 16
 
 
 @dataclass(frozen=True)
-class Estimate:
+class TrainingCost:
     """Of one run.
 
     Attributes:
@@ -46,7 +46,7 @@ class Estimate:
         return self.flop / (tflops * 1e12) / 3600
 
 
-def estimate(recipe: Recipe, network: SequenceModel, data: TrainingData, n_processes: int) -> Estimate:
+def estimate_cost(recipe: Recipe, network: SequenceModel, data: TrainingData, n_processes: int) -> TrainingCost:
     """Reckon what a run takes.
 
     Args:
@@ -65,7 +65,7 @@ def estimate(recipe: Recipe, network: SequenceModel, data: TrainingData, n_proce
     passes = float(recipe.epochs)
     if recipe.max_steps is not None:
         passes = min(passes, recipe.max_steps * recipe.sequences_per_step / len(data.sequences))
-    return Estimate(
+    return TrainingCost(
         flop=passes * _flop(recipe, network, data, parts),
         weights=held / shards,
         gradients=trained / shards,

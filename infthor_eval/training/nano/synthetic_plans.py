@@ -7,10 +7,10 @@ from collections.abc import Iterable, Sequence
 from infthor_eval.plans.habits import fill_action, open_action
 from infthor_eval.plans.script import about, read_plan
 
-__all__ = ["Orders"]
+__all__ = ["SyntheticPlans"]
 
 
-class Orders:
+class SyntheticPlans:
     """What experts did, about other objects: each stood in the same place of a plan that was carried out alike."""
 
     def __init__(self, carried_out: Iterable[tuple[str, Sequence[str]]]) -> None:
