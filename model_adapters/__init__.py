@@ -1,6 +1,6 @@
-"""Models for infthor-eval: what a model is to the harness, and one module per model family.
+"""Models for infthor-eval: the protocols that a model implements, and one module per model family.
 
-Importing this package imports neither torch nor transformers; they come with the first model that needs them.
+Importing this package imports neither torch nor transformers; the first model that needs them does.
 """
 
 from model_adapters.backend import Backend, BackendConversation

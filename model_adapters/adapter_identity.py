@@ -1,4 +1,4 @@
-"""What identifies the code of an adapter, or a suite, that came with another package."""
+"""Identity of an adapter's or suite's code that comes with another package."""
 
 from collections.abc import Iterator
 from importlib.metadata import EntryPoint
@@ -13,17 +13,17 @@ __all__ = ["package_identity"]
 
 
 def package_identity(point: EntryPoint) -> dict[str, Any]:
-    """The package behind an entry point, its version and its source, as JSON values.
+    """Return the package behind an entry point, its version and a digest of its source, as JSON values.
 
-    An adapter that is edited without a new version is another one: so the source itself counts, of all modules of its
-    top-level package. Nothing is imported.
+    The digest covers all modules of the top-level package, because an adapter may be edited without a new version.
+    Nothing is imported.
 
     Raises:
-        ModelError: there is no such module, or its source cannot be read.
+        ModelError: the module does not exist, or its source cannot be read.
     """
     package = point.module.partition(".")[0]
     try:
-        source = fingerprint({name: digest_of_file(path) for name, path in _sources(package)})
+        source = fingerprint({name: digest_of_file(path) for name, path in _source_files(package)})
     except (OSError, ValueError) as error:
         raise ModelError(f"{point.name}: the source of {package} cannot be read ({error})") from error
     return {
@@ -33,8 +33,8 @@ def package_identity(point: EntryPoint) -> dict[str, Any]:
     }
 
 
-def _sources(package: str) -> Iterator[tuple[str, Path]]:
-    """All Python files of a top-level package or module, by their place in it."""
+def _source_files(package: str) -> Iterator[tuple[str, Path]]:
+    """Yield all Python files of a top-level package or module, with their paths inside it."""
     spec = find_spec(package)
     if spec is None:
         raise ModelError(f"there is no module {package}; install the package that has it")

@@ -1,46 +1,46 @@
-"""Addresses of servers: what one may hold, and which of them lie on this machine."""
+"""Checks on the addresses of servers."""
 
 from ipaddress import ip_address
 from urllib.parse import SplitResult, urlsplit
 
-__all__ = ["act_url", "is_here", "server_address"]
+__all__ = ["act_url", "is_local", "server_address"]
 
 
 def server_address(option: str, url: str) -> SplitResult:
-    """The parts of a server's address.
+    """Return the parts of a server's address.
 
     Args:
-        option: that gives it, for the message.
-        url: as typed.
+        option: name of the option that gives the address, for the message.
+        url: the address as typed.
 
     Raises:
-        ValueError: it is none of http or https, or holds what must not stand in records: a password or a query.
+        ValueError: the address is neither http nor https, or holds a password or a query, which would be recorded.
     """
     try:
         parts = urlsplit(url)
-        known = parts.scheme in ("http", "https") and bool(parts.hostname) and (parts.port is None or parts.port > 0)
-    except ValueError:  # its text would tell what may be a password
-        known = False
-    if not known:
-        raise ValueError(f"{option} is no address of a server; write http://HOST:PORT")
+        is_valid = parts.scheme in ("http", "https") and bool(parts.hostname) and (parts.port is None or parts.port > 0)
+    except ValueError:  # not chained: its text would repeat what may be a password
+        is_valid = False
+    if not is_valid:
+        raise ValueError(f"{option} is not the address of a server; write http://HOST:PORT")
     if parts.username is not None or parts.password is not None or parts.query or parts.fragment:
         raise ValueError(
-            f"{option} holds a password, a query or a fragment, which would stand in every record; leave it out"
+            f"{option} holds a password, a query or a fragment, which would be written to every record; leave it out"
         )
     return parts
 
 
-def is_here(address: SplitResult) -> bool:
-    """Whether what is sent there cannot leave this machine."""
+def is_local(address: SplitResult) -> bool:
+    """Return whether requests to this address stay on this machine."""
     host = address.hostname or ""
     try:
         return host == "localhost" or ip_address(host).is_loopback
-    except ValueError:  # a name, which may mean any machine
+    except ValueError:  # any other name may resolve to another machine
         return False
 
 
 def act_url(url: str) -> str:
-    """The address that actions are asked of: a server's own with `/act` behind it, if it is not there.
+    """Return the address that actions are requested from: the server's own, ending in `/act`.
 
     Raises:
         ValueError: see `server_address`.

@@ -1,4 +1,4 @@
-"""A conversation on top of whatever answers a whole conversation at a time."""
+"""A conversation on top of a back end that answers a whole conversation at a time."""
 
 from collections.abc import Sequence
 from typing import Protocol
@@ -11,23 +11,23 @@ __all__ = ["Backend", "BackendConversation"]
 
 
 class Backend(Protocol):
-    """What answers: it gets all turns every time and finds out by itself what it has seen before.
+    """A stateless answering model: it gets all turns with every request and does its own caching.
 
-    The last turn is always the user's, and nothing is asked that the capabilities rule out.
+    The last turn is always the user's, and no request exceeds the capabilities.
     """
 
     @property
     def name(self) -> str:
-        """Its name, for messages."""
+        """Name of the model, for messages."""
         ...
 
     @property
     def capabilities(self) -> Capabilities:
-        """What it can do."""
+        """Capabilities of the model."""
         ...
 
     def count(self, turns: Sequence[Turn]) -> int | None:
-        """Tokens that a reply to these turns would be made from; None where it counts none."""
+        """Return the context size of a reply to these turns, in tokens, or None if the model does not count them."""
         ...
 
     def answer(self, turns: Sequence[Turn], decoding: Decoding) -> Reply:
@@ -35,12 +35,12 @@ class Backend(Protocol):
         ...
 
     def answer_each(self, conversations: Sequence[Sequence[Turn]], decoding: Decoding) -> list[Reply]:
-        """Answer several conversations, each for itself; see `Conversation.replies`."""
+        """Answer several conversations independently; see `Conversation.replies`."""
         ...
 
 
 class BackendConversation(Transcript):
-    """A conversation that keeps the turns and leaves the rest to a back end."""
+    """A conversation that keeps the turns and delegates counting and answering to a back end."""
 
     def __init__(self, backend: Backend) -> None:
         super().__init__()
@@ -48,25 +48,25 @@ class BackendConversation(Transcript):
 
     @property
     def n_tokens(self) -> int | None:
-        """Tokens that `reply` would give the model now.
+        """Tokens that the model would be given by `reply` now, or None if the model does not count them.
 
         Raises:
             DataError: a frame cannot be read.
-            ModelError: there is nothing to reply to, or the model cannot take the turns as they stand.
+            ModelError: there is nothing to reply to, or the model does not support these turns.
         """
-        return self._backend.count(self._asked())
+        return self._backend.count(self._checked_turns())
 
     def reply(self, decoding: Decoding) -> Reply:
-        """The assistant's next turn; see `Conversation.reply`."""
+        """Return the assistant's next turn; see `Conversation.reply`."""
         check_decoding(self._backend.name, self._backend.capabilities, decoding)
-        return self._backend.answer(self._asked(), decoding)
+        return self._backend.answer(self._checked_turns(), decoding)
 
     def replies(self, continuations: Sequence[Sequence[Part]], decoding: Decoding) -> list[Reply]:
-        """The replies to several continuations; see `Conversation.replies`."""
+        """Return the replies to several continuations; see `Conversation.replies`."""
         check_decoding(self._backend.name, self._backend.capabilities, decoding)
-        return self._backend.answer_each([self._asked(parts) for parts in continuations], decoding)
+        return self._backend.answer_each([self._checked_turns(parts) for parts in continuations], decoding)
 
-    def _asked(self, continuation: Sequence[Part] = ()) -> tuple[Turn, ...]:
+    def _checked_turns(self, continuation: Sequence[Part] = ()) -> tuple[Turn, ...]:
         turns = self.turns_with(continuation)
         check_turns(self._backend.name, turns)
         return turns

@@ -1,4 +1,4 @@
-"""What a model refuses to be asked, in the same words whichever model it is."""
+"""Checks of requests, with the same messages for every model."""
 
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
@@ -12,37 +12,37 @@ _FAILURES = (RuntimeError, ValueError, TypeError, LookupError, AttributeError, A
 
 
 def check_decoding(name: str, capabilities: Capabilities, decoding: Decoding) -> None:
-    """Refuse what the model cannot do.
+    """Check that the model supports this way of decoding.
 
     Args:
-        name: of the model.
-        capabilities: its own.
-        decoding: what is asked for.
+        name: name of the model, for the message.
+        capabilities: capabilities of the model.
+        decoding: the requested decoding.
 
     Raises:
-        ModelError: the model does not draw, or cannot be held to choices.
+        ModelError: the model does not sample, or cannot be restricted to choices.
     """
     if not (decoding.greedy or capabilities.sampling):
         raise ModelError(
             f"{name} decodes greedily only, not at temperature {decoding.temperature}; ask at temperature 0"
         )
     if decoding.choices and not capabilities.choices:
-        raise ModelError(f"{name} cannot be held to {len(decoding.choices)} choices; ask without choices")
+        raise ModelError(f"{name} does not support choices ({len(decoding.choices)} given); ask without choices")
 
 
 def check_turns(name: str, turns: Sequence[Turn]) -> None:
-    """Refuse a conversation in which it is not the model's turn.
+    """Check that it is the model's turn.
 
     Args:
-        name: of the model.
-        turns: the conversation.
+        name: name of the model, for the message.
+        turns: turns of the conversation.
 
     Raises:
-        ModelError: it is empty, or its last turn is not the user's.
+        ModelError: the conversation is empty, or its last turn is not the user's.
     """
     if not turns or turns[-1].role != "user":
-        found = f"the last turn is the {turns[-1].role}'s" if turns else "the conversation is empty"
-        raise ModelError(f"{name} has nothing to reply to: {found}; append a user turn")
+        state = f"the last turn is the {turns[-1].role}'s" if turns else "the conversation is empty"
+        raise ModelError(f"{name} has nothing to reply to: {state}; append a user turn")
 
 
 def wrap_request_errors(name: str) -> AbstractContextManager[None]:

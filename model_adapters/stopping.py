@@ -1,4 +1,4 @@
-"""Where a stop string ends a reply."""
+"""Cutting of replies at stop strings."""
 
 from collections.abc import Sequence
 
@@ -6,6 +6,6 @@ __all__ = ["cut_at_stop"]
 
 
 def cut_at_stop(text: str, stop: Sequence[str]) -> str | None:
-    """The text before the first stop string in it, or None where there is none."""
-    found = [text.index(string) for string in stop if string in text]
-    return text[: min(found)] if found else None
+    """Return the text before its first stop string, or None if it holds none."""
+    positions = [text.index(string) for string in stop if string in text]
+    return text[: min(positions)] if positions else None

@@ -1,4 +1,4 @@
-"""The turns of a conversation and its marks: what every back end's conversation keeps."""
+"""Turns and marks of a conversation, shared by all back ends."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import groupby
@@ -12,8 +12,8 @@ __all__ = ["Transcript"]
 class Transcript:
     """An append-only list of turns with marks to rewind to.
 
-    Adapters inherit from it and add `reply` and `n_tokens`; who can answer several continuations faster than one by
-    one overrides `replies`.
+    Adapters inherit from it and add `reply` and `n_tokens`. An adapter that answers several continuations faster than
+    one by one overrides `replies`.
     """
 
     def __init__(self) -> None:
@@ -22,40 +22,41 @@ class Transcript:
 
     @property
     def turns(self) -> tuple[Turn, ...]:
-        """All turns: texts that touch are one, empty texts are left out, and so is a turn of nothing else."""
+        """All turns; adjacent texts are joined, and empty texts and turns are dropped."""
         return self.turns_with(())
 
     def turns_with(self, continuation: Sequence[Part]) -> tuple[Turn, ...]:
-        """The turns as they would be with these parts appended; the conversation stays as it was.
+        """Return the turns as if these parts had been appended by the user; the conversation is unchanged.
 
         Raises:
             TypeError: a part is neither text nor a frame reference.
         """
-        said = [item for item in (*self._items, *_items(continuation, "user")) if item[1] != ""]
+        items = [item for item in (*self._items, *_items(continuation, "user")) if item[1] != ""]
         return tuple(
-            Turn(role, tuple(_joined(part for _, part in items))) for role, items in groupby(said, lambda item: item[0])
+            Turn(role, tuple(_join_texts(part for _, part in run)))
+            for role, run in groupby(items, lambda item: item[0])
         )
 
     def append(self, *parts: Part, role: Role = "user") -> None:
-        """Add parts at the end; all or, where one of them is no part, none.
+        """Add parts at the end: all of them, or none if one is invalid.
 
         Raises:
             TypeError: a part is neither text nor a frame reference.
-            ValueError: there is no such role.
+            ValueError: the role is unknown.
         """
         self._items.extend(_items(parts, role))
 
     def mark(self) -> Mark:
-        """The present end, to come back to."""
+        """Return a mark at the current end of the conversation."""
         mark = Mark(len(self._items))
         self._marks.append(mark)
         return mark
 
     def rewind(self, mark: Mark) -> None:
-        """Forget all that was appended after the mark, and the marks set after it.
+        """Drop everything that was appended after the mark, and the marks set after it.
 
         Raises:
-            ValueError: the mark is another conversation's, or lies after a point that was rewound to.
+            ValueError: the mark belongs to another conversation, or to a part that was dropped by a rewind.
         """
         if mark not in self._marks:
             raise ValueError("the mark belongs to another conversation or to a part that was rewound")
@@ -65,14 +66,14 @@ class Transcript:
     def replies(self: Conversation, continuations: Sequence[Sequence[Part]], decoding: Decoding) -> list[Reply]:
         """Append, reply and rewind, one continuation after the other; see `Conversation.replies`."""
         here = self.mark()
-        found = []
+        replies = []
         for parts in continuations:
             try:
                 self.append(*parts)
-                found.append(self.reply(decoding))
+                replies.append(self.reply(decoding))
             finally:
                 self.rewind(here)
-        return found
+        return replies
 
 
 def _items(parts: Sequence[Part], role: Role) -> list[tuple[Role, Part]]:
@@ -84,8 +85,8 @@ def _items(parts: Sequence[Part], role: Role) -> list[tuple[Role, Part]]:
     return [(role, part) for part in parts]
 
 
-def _joined(parts: Iterable[Part]) -> Iterator[Part]:
-    """The parts, each run of texts as one."""
+def _join_texts(parts: Iterable[Part]) -> Iterator[Part]:
+    """Yield the parts, with adjacent texts joined."""
     for is_text, run in groupby(parts, lambda part: isinstance(part, str)):
         if is_text:
             yield "".join(map(str, run))

@@ -4,7 +4,7 @@ import re
 from dataclasses import dataclass
 from typing import Any
 
-from model_adapters.addresses import is_here, server_address
+from model_adapters.addresses import is_local, server_address
 
 __all__ = ["OpenAIOptions"]
 
@@ -105,7 +105,7 @@ class OpenAIOptions:
 
     def _check_address(self) -> None:
         address = server_address("base_url", self.base_url)
-        if address.scheme == "http" and not (is_here(address) or self.insecure):
+        if address.scheme == "http" and not (is_local(address) or self.insecure):
             raise ValueError(
                 f"base_url leads to {address.hostname} without encryption, for all on the way to read; "
                 "use https, or say insecure=true"

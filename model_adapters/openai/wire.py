@@ -11,7 +11,7 @@ from urllib.parse import urlsplit
 import httpx2
 import openai
 
-from model_adapters.addresses import is_here
+from model_adapters.addresses import is_local
 from model_adapters.openai.options import OpenAIOptions
 from model_adapters.openai.secret import Secret
 
@@ -102,7 +102,7 @@ def _client(options: OpenAIOptions, secret: Secret) -> openai.AsyncOpenAI:
         timeout=httpx2.Timeout(None, connect=min(_CONNECT_S, options.timeout_s)),
         limits=httpx2.Limits(max_connections=None, max_keepalive_connections=options.max_in_flight),
         follow_redirects=False,
-        trust_env=not is_here(urlsplit(options.url)),
+        trust_env=not is_local(urlsplit(options.url)),
         event_hooks={"response": [_limit]},
     )
     return openai.AsyncOpenAI(

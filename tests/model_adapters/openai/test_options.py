@@ -13,8 +13,8 @@ ASKED = {"model": "m"}
     ("given", "said"),
     [
         ({"model": ""}, "it needs model="),
-        ({"base_url": "localhost:8000"}, "base_url is no address of a server"),
-        ({"base_url": "ftp://host/v1"}, "base_url is no address of a server"),
+        ({"base_url": "localhost:8000"}, "base_url is not the address of a server"),
+        ({"base_url": "ftp://host/v1"}, "base_url is not the address of a server"),
         ({"base_url": f"https://me:{SECRET}@host/v1"}, "base_url holds a password"),
         ({"base_url": f"https://host/v1?key={SECRET}"}, "base_url holds a password, a query"),
         ({"base_url": "http://10.0.0.7:8000/v1"}, "base_url leads to 10.0.0.7 without encryption"),

@@ -199,10 +199,10 @@ def test_a_frame_that_is_not_there_is_a_fault_of_the_data(plain_frames: Frames) 
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        ({"url": "localhost:8000"}, "url is no address of a server"),
-        ({"url": "file:///etc/passwd"}, "url is no address of a server"),
-        ({"url": "http://me:secret"}, "url is no address of a server"),
-        ({"url": "http://[::1"}, "url is no address of a server"),
+        ({"url": "localhost:8000"}, "url is not the address of a server"),
+        ({"url": "file:///etc/passwd"}, "url is not the address of a server"),
+        ({"url": "http://me:secret"}, "url is not the address of a server"),
+        ({"url": "http://[::1"}, "url is not the address of a server"),
         ({"url": "http://me:secret@host"}, "url holds a password"),
         ({"url": "http://host/?token=secret"}, "url holds a password, a query"),
         ({"image": "png"}, "image=png is not json_numpy or list"),
