@@ -25,7 +25,11 @@ def test_what_a_model_can_do_is_let_through(able: dict[str, Any], asked: dict[st
     ("able", "asked", "complaint"),
     [
         ({"choices": True}, {"temperature": 0.5}, "m decodes greedily only, not at temperature 0.5; ask at"),
-        ({"sampling": True}, {"choices": ("yes", "no")}, "m does not support choices \(2 given\); ask without choices"),
+        (
+            {"sampling": True},
+            {"choices": ("yes", "no")},
+            r"m does not support choices \(2 given\); ask without choices",
+        ),
     ],
 )
 def test_what_it_cannot_do_is_refused(able: dict[str, Any], asked: dict[str, Any], complaint: str) -> None:
