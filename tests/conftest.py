@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from fnmatch import fnmatchcase
 from pathlib import Path
 
+import hypothesis
 import pytest
 from PIL import Image
 
@@ -19,6 +20,12 @@ from infthor_eval.runs import Catalog
 # Before torch is imported, here and in processes that tests start: on a busy machine two threads that wait for each
 # other take ten times as long as one.
 os.environ["OMP_NUM_THREADS"] = "1"
+
+# No property fails because the machine is busy: no deadline for an example, no complaint that making one takes long.
+hypothesis.settings.register_profile(
+    "unhurried", deadline=None, suppress_health_check=[hypothesis.HealthCheck.too_slow]
+)
+hypothesis.settings.load_profile("unhurried")
 
 QUESTIONS = (
     Question("traj_a", "Is there a mug?", (1,), ("yes",), "object_presence"),

@@ -154,7 +154,6 @@ DAMAGES = {
 }
 
 
-@pytest.mark.timeout(120)
 @pytest.mark.parametrize("name", DAMAGES)
 def test_a_damaged_checkpoint(whole, tmp_path, monkeypatch, name):
     from PIL import Image

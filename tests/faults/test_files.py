@@ -62,14 +62,12 @@ def place(tmp_path):
     return place
 
 
-@pytest.mark.timeout(20)
 @pytest.mark.parametrize("reader", READERS)
 def test_a_pipe_is_not_waited_for(place, tmp_path, reader):
     os.mkfifo(place(reader))
     refused(lambda: READERS[reader][1](tmp_path), "is a pipe or a device, not a file")
 
 
-@pytest.mark.timeout(20)
 @pytest.mark.parametrize("reader", READERS)
 def test_a_device_is_no_file(place, tmp_path, reader):
     place(reader).symlink_to("/dev/null")

@@ -63,7 +63,6 @@ FILES = [
 ]
 
 
-@pytest.mark.timeout(60)
 @pytest.mark.parametrize(("content", "said"), FILES, ids=[f"{n}: {said}" for n, (_, said) in enumerate(FILES)])
 def test_a_task_file_that_is_not_what_it_should_be(make_nieh_set, tmp_path, run, task_files, content, said):
     (task_files / "nieh" / "own.yaml").write_text(content)

@@ -16,7 +16,6 @@ def files(folder):
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(300)
 def test_the_files_are_the_same_whoever_makes_them(run, tmp_path):
     for workers in (1, 2):
         out = tmp_path / str(workers)

@@ -5,7 +5,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import msgspec
@@ -20,6 +19,7 @@ from infthor_eval.thor.controller import SafeController
 from model_adapters import Capabilities
 
 from ..plans.cut import CANDLE, MUG, cut, write
+from ..waiting import PATIENCE_S, wait_until
 
 OURS = "from infthor_eval.cli import main; main()"
 
@@ -44,7 +44,7 @@ def start(data, output):
 
 
 def finish(process):
-    _, said = process.communicate(timeout=120)
+    _, said = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 0, said
 
 
@@ -60,10 +60,7 @@ def test_a_run_that_is_killed_ends_as_one_that_is_not(prepared, tmp_path):
     whole, killed = tmp_path / "whole", tmp_path / "killed"
     execute(prepared("random-arm", data=data, output=whole))
     process = start(data, killed)
-    deadline = time.monotonic() + 120
-    while not any(lines(killed)):
-        assert process.poll() is None and time.monotonic() < deadline
-        time.sleep(0.002)
+    wait_until(lambda: any(lines(killed)), process)
     os.kill(process.pid, signal.SIGKILL)
     process.communicate()
     done = len(list(lines(killed)))

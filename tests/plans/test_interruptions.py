@@ -18,6 +18,7 @@ from infthor_eval.plans.records import RECORDS
 from infthor_eval.runs import execute, read_run
 from infthor_eval.thor.controller import SafeController
 
+from ..waiting import PATIENCE_S, wait_until
 from .cut import FORK, MUG, cut, write
 
 OURS = "from infthor_eval.cli import main; main()"
@@ -49,16 +50,13 @@ def n_lines(output):
 
 
 def finish(process):
-    _, said = process.communicate(timeout=120)
+    _, said = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 0, said
 
 
 def wait_for(n, output, process):
     """Until so many lines are in the journal, or the process has ended."""
-    deadline = time.monotonic() + 120
-    while n_lines(output) < n and process.poll() is None:
-        assert time.monotonic() < deadline
-        time.sleep(0.005)
+    wait_until(lambda: n_lines(output) >= n or process.poll() is not None)
 
 
 def kill_and_go_on(data, output, n_kills, draw):
@@ -77,7 +75,6 @@ def kill_and_go_on(data, output, n_kills, draw):
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(300)
 def test_a_run_that_is_killed_again_and_again_ends_as_one_that_is_not(tmp_path):
     data = write(tmp_path / "data", cut(FORK, 4), cut(MUG, 3))
     finish(start(data, tmp_path / "whole"))
@@ -181,7 +178,4 @@ def test_no_simulator_outlives_a_run_that_is_killed(tmp_path):
     os.kill(process.pid, signal.SIGKILL)
     process.communicate()
     assert children
-    deadline = time.monotonic() + 20
-    while any(Path(f"/proc/{pid}").exists() for pid in children):
-        assert time.monotonic() < deadline
-        time.sleep(0.05)
+    wait_until(lambda: not any(Path(f"/proc/{pid}").exists() for pid in children))

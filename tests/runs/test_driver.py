@@ -20,6 +20,8 @@ from model_adapters import Capabilities
 from tests.runs.toy import Adder, Sum, Sums, ToySuite
 from tests.runs.toy_command import request
 
+from ..waiting import PATIENCE_S, wait_until
+
 TOY = Path(__file__).with_name("toy_command.py")
 
 
@@ -198,16 +200,15 @@ def test_records_of_units_that_the_run_does_not_ask_are_not_counted(tmp_path):
 
 
 def test_a_killed_command_goes_on_and_shows_progress_table_results_and_export(tmp_path):
-    killed = start(tmp_path, "0.3")
-    deadline = time.monotonic() + 60
-    while not any(path.read_bytes().count(b"\n") > 1 for path in tmp_path.rglob("worker-0.jsonl")):
-        assert killed.poll() is None, killed.stderr.read()
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
+    gate = tmp_path / "gate"
+    gate.mkdir()
+    (gate / "open-0").touch()
+    killed = start(tmp_path, gate)
+    wait_until((gate / "waiting-1").exists, killed)
     os.kill(killed.pid, signal.SIGKILL)
     killed.communicate()
     again = start(tmp_path)
-    shown, said = again.communicate(timeout=60)
+    shown, said = again.communicate(timeout=PATIENCE_S)
     assert again.returncode == 1, said  # a group failed
     assert "adder: 3 answered now, 1 found in the journal" in said
     assert "sums: 1 sample(s) skipped: nothing to add" in said
@@ -268,7 +269,6 @@ def test_groups_in_flight_are_done_at_the_same_time_and_each_in_its_order():
         assert [r.id for r in records if r.id.startswith(f"{number}.")] == [f"{number}.{u}" for u in range(3)]
 
 
-@pytest.mark.timeout(20)
 def test_a_thread_that_finds_the_last_group_taken_ends(monkeypatch):
     class Slow(SimpleQueue):
         def empty(self):

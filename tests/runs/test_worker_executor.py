@@ -19,6 +19,7 @@ from infthor_eval.runs.journal import Journal
 from infthor_eval.workers import WorkerSettings
 
 from ..clusters import two_nodes
+from ..waiting import wait_until
 from .toy import Adder, Sum, Sums, ToySuite
 from .toy_command import request
 
@@ -93,7 +94,6 @@ def plain(records):
     return [msgspec.structs.replace(record, attempt=1, seconds=0.0) for record in records]
 
 
-@pytest.mark.timeout(120)
 def test_several_workers_find_what_one_process_finds_and_each_writes_a_shard(tmp_path):
     suite = DeadlySuite(tmp_path, {})
     alone, _ = run(request(tmp_path / "1"), suite)
@@ -109,7 +109,6 @@ def test_several_workers_find_what_one_process_finds_and_each_writes_a_shard(tmp
     assert all(resumed for _, resumed in run(request(tmp_path / "1", worker_settings=TWO), suite)[1].seen)
 
 
-@pytest.mark.timeout(120)
 def test_workers_that_are_killed_lose_nothing_that_was_finished(tmp_path):
     alone, _ = run(request(tmp_path / "1"), DeadlySuite(tmp_path, {}))
     killing = DeadlySuite(tmp_path, {"0+2": 1, "3+0": 2, "5+3": 1})
@@ -120,7 +119,6 @@ def test_workers_that_are_killed_lose_nothing_that_was_finished(tmp_path):
     assert "died (exit status -9); what it had not finished goes to another" in watching.notes[0]
 
 
-@pytest.mark.timeout(120)
 def test_a_unit_that_kills_every_worker_fails_and_the_others_have_results(tmp_path):
     shared, _ = run(request(tmp_path, worker_settings=TWO), DeadlySuite(tmp_path, {"2+1": 99}))
     failed = {record.id: record.failure for record in shared.records if record.failure is not None}
@@ -131,7 +129,6 @@ def test_a_unit_that_kills_every_worker_fails_and_the_others_have_results(tmp_pa
     assert sum(not resumed for _, resumed in watching.seen) == 1
 
 
-@pytest.mark.timeout(120)
 @pytest.mark.parametrize("worker_settings", [WorkerSettings(), TWO])
 def test_a_run_that_is_stopped_has_the_results_of_what_is_there_and_goes_on(tmp_path, worker_settings):
     suite, watching = DeadlySuite(tmp_path, {}), Watching()
@@ -159,7 +156,6 @@ class _Losing(Watching):
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(200)
 def test_a_cluster_that_loses_a_node_finds_what_one_process_finds(tmp_path):
     suite = DeadlySuite(tmp_path, {"4+1": 1})
     with two_nodes() as (cluster, node):
@@ -188,13 +184,11 @@ class OtherSuite(DeadlySuite):
     baselines = {"adder": OtherElsewhere}  # noqa: RUF012
 
 
-@pytest.mark.timeout(120)
 def test_workers_that_would_evaluate_something_else_are_refused(tmp_path):
     with pytest.raises(UsageError, match="the workers differ in model"):
         run(request(tmp_path, worker_settings=WorkerSettings(3)), OtherSuite(tmp_path, {}))
 
 
-@pytest.mark.timeout(120)
 def test_a_second_run_in_one_folder_is_refused_whatever_its_workers(tmp_path):
     outcome, _ = run(request(tmp_path), DeadlySuite(tmp_path, {}))
     with Journal(outcome.folder, outcome.summary.header, ToySuite.records):
@@ -203,7 +197,6 @@ def test_a_second_run_in_one_folder_is_refused_whatever_its_workers(tmp_path):
                 run(request(tmp_path, worker_settings=worker_settings), DeadlySuite(tmp_path, {}))
 
 
-@pytest.mark.timeout(120)
 def test_what_a_worker_cannot_write_ends_the_run_and_what_is_written_counts(tmp_path):
     suite = DeadlySuite(tmp_path, {})
     outcome, _ = run(request(tmp_path, worker_settings=TWO), suite)
@@ -235,24 +228,24 @@ def test_a_result_from_other_inputs_is_named_in_the_record_that_takes_its_place(
     assert [record.faults for record in records] == [(changed,), (changed,), (), ()]  # the others had failed
 
 
-@pytest.mark.timeout(60)
 @pytest.mark.parametrize("again", [False, True])
 def test_ctrl_c_finishes_the_unit_in_hand_and_shows_what_is_there_and_again_stops_at_once(tmp_path, again):
-    toy = Path(__file__).with_name("toy_command.py")
+    toy, gate, output = Path(__file__).with_name("toy_command.py"), tmp_path / "gate", tmp_path / "out"
+    gate.mkdir()
+    (gate / "open-0").touch()
     environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
-    process = subprocess.Popen([sys.executable, toy, tmp_path, "2"], stdout=-1, stderr=-1, text=True, env=environment)
-    while not any(path.read_bytes().count(b"\n") > 1 for path in tmp_path.rglob("worker-0.jsonl")):
-        time.sleep(0.01)
-        assert process.poll() is None, process.stderr.read()
-    time.sleep(0.3)  # it is at the second unit by now
+    process = subprocess.Popen([sys.executable, toy, output, gate], stdout=-1, stderr=-1, text=True, env=environment)
+    wait_until((gate / "waiting-1").exists, process)
     process.send_signal(signal.SIGINT)
+    stopping = "stopping after the unit in hand; press Ctrl-C again to stop at once"
+    assert any(stopping in line for line in process.stderr)
     if again:
-        time.sleep(0.3)
         process.send_signal(signal.SIGINT)
+    else:
+        (gate / "open-1").touch()
     shown, said = process.communicate()
-    assert "stopping after the unit in hand; press Ctrl-C again to stop at once" in said
     assert process.returncode == (-signal.SIGINT if again else 130)
-    (folder,) = (tmp_path / "adder").iterdir()
+    (folder,) = (output / "adder").iterdir()
     results = json.loads((folder / "results.json").read_text())
     assert results["n_missing"] == (3 if again else 2)
     if not again:

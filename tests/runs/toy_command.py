@@ -1,5 +1,6 @@
-"""The toy suite as a command: OUTPUT [SECONDS PER UNIT]."""
+"""The toy suite as a command: OUTPUT [GATE]; unit N waits until the folder GATE holds the file open-N."""
 
+import itertools
 import sys
 import time
 from pathlib import Path
@@ -14,15 +15,21 @@ def request(output, **changes):
     return RunRequest(**{**fields, **changes})
 
 
-class SlowSuite(ToySuite):
+class GatedSuite(ToySuite):
     def prepare(self, request):
-        return Slow()
+        return Gated()
 
 
-class Slow(Sums):
+class Gated(Sums):
+    numbers = itertools.count()
+
     def run(self, group, session):
+        gate = Path(sys.argv[2])
         for record in super().run(group, session):
-            time.sleep(float(sys.argv[2]))
+            number = next(self.numbers)
+            (gate / f"waiting-{number}").touch()
+            while not (gate / f"open-{number}").exists():
+                time.sleep(0.01)
             yield record
 
 
@@ -30,4 +37,4 @@ if __name__ == "__main__":
     from infthor_eval.cli.commands.run import evaluate
     from infthor_eval.cli.showing import Showing
 
-    sys.exit(evaluate([(request(Path(sys.argv[1])), SlowSuite() if len(sys.argv) > 2 else ToySuite())], Showing()))
+    sys.exit(evaluate([(request(Path(sys.argv[1])), GatedSuite() if len(sys.argv) > 2 else ToySuite())], Showing()))

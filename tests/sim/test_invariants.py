@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from infthor_eval.sim.fifo import FieldType
@@ -22,7 +22,7 @@ STEP = st.one_of(
     st.tuples(st.just("InitialRandomSpawn"), st.integers(0, 5), st.just(False)),
 )
 SCENES = st.sampled_from(["kitchen-1", "kitchen-4", "living-room-1", "bedroom-1", "bathroom-1"])
-PROPERTY = settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+PROPERTY = settings(max_examples=12)
 
 
 def play(bench: Bench, step: tuple[str, int, bool]) -> dict[str, Any]:

@@ -7,7 +7,6 @@ from collections import Counter
 from typing import Any
 
 import numpy as np
-import pytest
 
 from infthor_eval.sim.scenes.catalogue import Catalogue
 from infthor_eval.thor.axes import modern_rotation
@@ -102,7 +101,6 @@ def start(bench: Bench, scene: dict[str, Any]) -> None:
         assert not outcome.error, outcome.error
 
 
-@pytest.mark.timeout(120)
 def test_expert_trajectories_replay(tmp_path):
     listed = trajectories()
     path = tmp_path / "supplement.json"

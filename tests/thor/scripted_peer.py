@@ -38,10 +38,10 @@ class Peer:
             sys.stderr.flush()
             os._exit(3)
         elif fault == "hang":
-            time.sleep(60)
+            time.sleep(3600)
         elif fault == "close":
             os.close(self.out)
-            time.sleep(60)
+            time.sleep(3600)
         elif fault == "type":
             self.frame(77, b"x")
             self.frame(255, b"")

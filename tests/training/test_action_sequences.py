@@ -151,7 +151,7 @@ def test_a_text_that_holds_a_mark_is_refused(encoder, bundled_set):
         encoder.actions("bad", [Chapter(f"go {ACT}", "goal", first, (("MoveAhead", second),))])
 
 
-@settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=20, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(lengths=st.lists(st.integers(1, 12), min_size=1, max_size=12), limit=st.integers(200, 4000))
 def test_windows_of_any_history(lengths, limit, encoder, bundled_set):
     frame = NiehSet(bundled_set).frames(names_in(bundled_set)[0])[0]

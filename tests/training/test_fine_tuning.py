@@ -5,7 +5,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 
 import pytest
 from safetensors.torch import load_file
@@ -18,6 +17,7 @@ from infthor_eval.training.recipe import read_recipe
 from model_adapters import Decoding, load
 
 from ..conftest import QUESTIONS
+from ..waiting import wait_until
 
 RECIPE = """
 title: a small one
@@ -98,11 +98,7 @@ def test_a_run_that_is_killed_ends_with_the_weights_of_one_that_is_not(recipe, d
     whole = start("whole")
     assert whole.communicate()[0].split() == ["1", "12"]
     killed = start("killed")
-    deadline = time.monotonic() + 120
-    while not list((tmp_path / "killed").glob("states/checkpoint-*/trainer_state.json")):
-        assert killed.poll() is None
-        assert time.monotonic() < deadline
-        time.sleep(0.005)
+    wait_until(lambda: list((tmp_path / "killed").glob("states/checkpoint-*/trainer_state.json")), killed)
     killed.send_signal(signal.SIGKILL)
     killed.communicate()
     assert not (tmp_path / "killed" / "checkpoint").exists()

@@ -4,7 +4,6 @@ import os
 import socket
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import msgspec
@@ -15,6 +14,8 @@ import yaml
 from safetensors.torch import load_file
 
 from infthor_eval.training.recipe import Parallel, Recipe, read_recipe
+
+from ..waiting import PATIENCE_S, wait_until
 
 SCALE = 16
 PROGRAM = Path(sys.executable).with_name("infthor-eval")
@@ -70,7 +71,7 @@ def weights_of(out: Path) -> dict[str, torch.Tensor]:
 def test_it_trains(bundled_set: Path, tmp_path: Path, name: str, n_processes: int) -> None:
     recipe = scaled(name, n_processes)
     training = started(recipe, n_processes, bundled_set, tmp_path / "out")
-    said, _ = training.communicate(timeout=580)
+    said, _ = training.communicate(timeout=PATIENCE_S)
     assert training.returncode == 0, said[-2000:]
     about = msgspec.json.decode((tmp_path / "out" / "training.json").read_bytes())
     assert about["recipe"]["max_tokens"] == recipe.max_tokens
@@ -84,20 +85,16 @@ def test_processes_that_share_sequences_and_are_killed_end_with_the_weights_of_o
 ) -> None:
     recipe = msgspec.structs.replace(scaled("infthor_64k", 2), max_tokens=1024, max_steps=6, save_every=2)
     whole = started(recipe, 2, bundled_set, tmp_path / "whole")
-    assert whole.communicate(timeout=300)[0]
+    assert whole.communicate(timeout=PATIENCE_S)[0]
     killed = started(recipe, 2, bundled_set, tmp_path / "killed")
-    deadline = time.monotonic() + 120
-    while not list((tmp_path / "killed" / "states").glob("step-00000?")):
-        assert killed.poll() is None
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
+    wait_until(lambda: list((tmp_path / "killed" / "states").glob("step-00000?")), killed)
     launching = psutil.Process(killed.pid)
     for process in (*launching.children(recursive=True), launching):  # each worker has a session of its own
         process.kill()
     killed.communicate()
     assert not (tmp_path / "killed" / "checkpoint").exists()
     again = started(recipe, 2, bundled_set, tmp_path / "killed")
-    said, _ = again.communicate(timeout=300)
+    said, _ = again.communicate(timeout=PATIENCE_S)
     assert again.returncode == 0, said[-2000:]
     assert "step 6 of 6" in said
     first, second = weights_of(tmp_path / "whole"), weights_of(tmp_path / "killed")

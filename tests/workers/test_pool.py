@@ -47,7 +47,6 @@ def of(events, kind):
     return [event for event in events if isinstance(event, kind)]
 
 
-@pytest.mark.timeout(120)
 def test_every_job_is_done_once_and_in_its_order_by_all_workers(pool):
     shared = pool()
     shared.open()
@@ -57,7 +56,6 @@ def test_every_job_is_done_once_and_in_its_order_by_all_workers(pool):
     assert {event.worker for event in events} == {1, 2}
 
 
-@pytest.mark.timeout(120)
 def test_a_job_whose_worker_dies_goes_to_another_and_loses_only_what_had_not_come(pool, tmp_path):
     shared = pool()
     shared.open()
@@ -69,7 +67,6 @@ def test_a_job_whose_worker_dies_goes_to_another_and_loses_only_what_had_not_com
     assert (counts(events, 0), counts(events, 2)) == ([0, 1, 2], [0, 1])
 
 
-@pytest.mark.timeout(120)
 def test_a_job_that_kills_one_worker_after_the_other_is_given_up_and_the_others_are_done(pool):
     shared = pool()
     shared.open()
@@ -80,7 +77,6 @@ def test_a_job_that_kills_one_worker_after_the_other_is_given_up_and_the_others_
     assert (counts(events, 1), counts(events, 2)) == ([0, 1], [0, 1])
 
 
-@pytest.mark.timeout(120)
 @pytest.mark.parametrize(
     ("error", "kind", "said"),
     [
@@ -97,7 +93,6 @@ def test_what_a_worker_raises_is_raised(pool, error, kind, said):
         list(shared.run(1, lambda _: Job(1, raises=error)))
 
 
-@pytest.mark.timeout(120)
 @pytest.mark.parametrize("opening", [OpenCounter(refusing=(2,)), OpenCounter(dying=(2,))])
 def test_a_worker_that_cannot_be_made_is_told_and_the_others_do_the_work(pool, opening):
     shared = pool(opening)
@@ -112,13 +107,11 @@ def test_a_worker_that_cannot_be_made_is_told_and_the_others_do_the_work(pool, o
     assert {event.worker for event in of(events, Made)} == {1}
 
 
-@pytest.mark.timeout(120)
 def test_where_no_worker_can_be_made_the_reason_is_raised(pool):
     with pytest.raises(ModelError, match="no room for worker"):
         pool(OpenCounter(refusing=(1, 2))).open()
 
 
-@pytest.mark.timeout(120)
 def test_a_worker_that_is_not_accepted_ends_the_pool(pool):
     def refuse(greeting):
         raise UsageError(f"worker {greeting['number']} is of another version")
@@ -127,7 +120,6 @@ def test_a_worker_that_is_not_accepted_ends_the_pool(pool):
         pool(accept=refuse).open()
 
 
-@pytest.mark.timeout(120)
 def test_once_it_is_to_stop_the_results_in_hand_are_the_last_and_further_jobs_can_be_done(pool):
     shared = pool(count=1)
     shared.open()
@@ -147,7 +139,6 @@ def test_processes_share_the_processors_of_the_machine(monkeypatch):
     shared.close()
 
 
-@pytest.mark.timeout(60)
 def test_a_driver_that_is_killed_takes_its_workers_with_it(tmp_path):
     script = (
         "import sys; sys.path.insert(0, sys.argv[1])\n"
@@ -189,7 +180,6 @@ def test_jobs_of_one_result_come_with_their_numbers_and_what_is_given_up_is_an_e
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(120)
 def test_a_worker_for_which_there_is_no_room_yet_joins_when_its_node_comes():
     with two_nodes() as (cluster, second):
         cluster.remove_node(second)

@@ -3,11 +3,12 @@ import os
 import signal
 import subprocess
 import sys
-import time
 
 import pytest
 
 from infthor_eval.formats.question import Question
+
+from ..waiting import PATIENCE_S, wait_until
 
 MANY = [
     Question(traj_id, f"Is there a {name}?", (index,), ("yes",), "object_presence")
@@ -149,25 +150,19 @@ def test_a_killed_run_goes_on_and_ends_as_an_undisturbed_one(make_nieh_set, tmp_
         return subprocess.Popen([sys.executable, "-c", code, *map(str, arguments)], stderr=subprocess.PIPE, text=True)
 
     killed = start(tmp_path / "killed")
-    deadline = time.monotonic() + 120
-    while True:  # until some answers, not all, are on disk
-        journals = list((tmp_path / "killed").rglob("worker-0.jsonl"))
-        if journals and journals[0].read_bytes().count(b"\n") > 3:
-            break
-        assert killed.poll() is None, killed.stderr.read()
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
+    shards = (tmp_path / "killed").rglob  # until some answers, not all, are on disk
+    wait_until(lambda: any(path.read_bytes().count(b"\n") > 3 for path in shards("worker-0.jsonl")), killed)
     os.kill(killed.pid, signal.SIGKILL)
     killed.communicate()
-    n_before = journals[0].read_bytes().count(b"\n") - 1
+    n_before = only(tmp_path / "killed", "worker-0.jsonl").read_bytes().count(b"\n") - 1
     assert 0 < n_before < 2 * len(MANY)
 
     again = start(tmp_path / "killed")
-    _, said = again.communicate(timeout=120)
+    _, said = again.communicate(timeout=PATIENCE_S)
     assert again.returncode == 0, said
     assert f"{2 * len(MANY) - n_before} answered now, {n_before} found" in said
     whole = start(tmp_path / "whole")
-    assert whole.communicate(timeout=120) and whole.returncode == 0
+    assert whole.communicate(timeout=PATIENCE_S) and whole.returncode == 0
 
     results = [only(tmp_path / name, "results.json") for name in ("killed", "whole")]
     assert results[0].read_bytes() == results[1].read_bytes()

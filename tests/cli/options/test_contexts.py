@@ -5,13 +5,14 @@ import os
 import signal
 import subprocess
 import sys
-import time
 
 import pytest
 
 from infthor_eval.formats.question import Question
 from infthor_eval.nieh.records import RECORDS
 from infthor_eval.runs import read_header, read_run
+
+from ..waiting import PATIENCE_S, wait_until
 
 QUESTIONS = [
     Question(traj_id, f"Is there a {name}?", (index,), ("yes",), "object_presence")
@@ -124,11 +125,9 @@ def test_a_run_killed_while_it_takes_notes_ends_as_an_undisturbed_one(data, tmp_
         code = "from infthor_eval.cli import main; main()"
         return subprocess.Popen([sys.executable, "-c", code, *map(str, arguments)], stderr=subprocess.PIPE, text=True)
 
-    killed, deadline = start(tmp_path / "killed"), time.monotonic() + 120
-    while not any(path.read_bytes().count(b"\n") > 2 for path in (tmp_path / "killed").rglob("worker-0.jsonl")):
-        assert killed.poll() is None, killed.stderr.read()
-        assert time.monotonic() < deadline
-        time.sleep(0.005)
+    killed = start(tmp_path / "killed")
+    shards = (tmp_path / "killed").rglob
+    wait_until(lambda: any(path.read_bytes().count(b"\n") > 2 for path in shards("worker-0.jsonl")), killed)
     os.kill(killed.pid, signal.SIGKILL)
     killed.communicate()
     journal = only(tmp_path / "killed", "worker-0.jsonl")
@@ -137,7 +136,7 @@ def test_a_run_killed_while_it_takes_notes_ends_as_an_undisturbed_one(data, tmp_
 
     for name in ("killed", "whole"):
         process = start(tmp_path / name)
-        _, said = process.communicate(timeout=120)
+        _, said = process.communicate(timeout=PATIENCE_S)
         assert process.returncode == 0, said
     assert journal.read_bytes().count(b'\n{"type":"memo"') == 6
     results = [only(tmp_path / name, "results.json").read_bytes() for name in ("killed", "whole")]

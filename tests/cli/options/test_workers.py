@@ -15,7 +15,6 @@ def exported(folder):
     return {path.name.rpartition("_")[0]: path.read_bytes() for path in folder.rglob("samples_*.jsonl")}
 
 
-@pytest.mark.timeout(300)
 @pytest.mark.parametrize(
     ("model", "task"),
     [

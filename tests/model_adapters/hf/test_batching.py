@@ -29,7 +29,7 @@ def _parts(continuation: list[Any], frames: list[FrameRef]) -> list[Part]:
     return [frames[part] if isinstance(part, int) else part for part in continuation]
 
 
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     start=CONTINUATION.filter(len),
     continuations=st.lists(CONTINUATION, min_size=1, max_size=7),

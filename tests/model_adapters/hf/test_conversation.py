@@ -119,7 +119,7 @@ STEPS = st.lists(
 )
 
 
-@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(steps=STEPS)
 def test_sharing_changes_no_reply(tiny: Any, plain: Any, frames: list[FrameRef], steps: list[Any]) -> None:
     def play(model: Any) -> list[Any]:

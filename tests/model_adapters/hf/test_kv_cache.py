@@ -1,5 +1,5 @@
 import torch
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from transformers import DynamicCache
 
@@ -15,7 +15,6 @@ def _states(n_tokens: int, generator: torch.Generator) -> tuple[torch.Tensor, to
     return keys, values
 
 
-@settings(deadline=None)
 @given(OPERATIONS)
 def test_holds_what_a_dynamic_cache_holds(operations: list[int]) -> None:
     generator = torch.Generator().manual_seed(0)

@@ -333,13 +333,11 @@ def test_a_server_that_takes_too_long_is_given_up_in_the_end(slow: str) -> None:
         with suppress(OSError):  # it was given up
             drip(request, handler)
 
-    began = time.monotonic()
     try:
         said = _refused(answer, timeout_s=0.3, retries=1)
     finally:
         done.set()
     assert "does not answer within 0.3 s, in 2 attempts; raise timeout_s if it is slow" in said
-    assert time.monotonic() - began < 5
 
 
 @pytest.mark.parametrize("status", [200, 400, 500])

@@ -132,7 +132,7 @@ def test_a_server_that_does_not_hold_to_choices_is_found_out() -> None:
 
 def test_as_many_requests_are_in_flight_as_there_are_threads_and_conversations_are_independent() -> None:
     together, most, lock = 0, 0, threading.Lock()
-    all_there = threading.Barrier(4, timeout=10)
+    all_there = threading.Barrier(4, timeout=600)
 
     def answer(request: dict[str, Any], handler: Any) -> Any:
         nonlocal together, most

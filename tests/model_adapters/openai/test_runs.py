@@ -64,7 +64,7 @@ def test_a_run_that_reaches_its_cap_goes_on_with_a_higher_one(ask: Any, tmp_path
         assert code == 1
         assert "2 sample(s) failed, counted as wrong: not asked: 300 tokens reach max_tokens_total=250; raise" in err
         assert len(asked) == 3
-        code, _, err = ask(url, "--max-tokens-total", 10_000, max_in_flight=1, timeout_s=9)
+        code, _, err = ask(url, "--max-tokens-total", 10_000, max_in_flight=1, timeout_s=90)
         assert code == 0, err
         assert "2 answered now, 3 found in the journal" in err
         assert len(asked) == 5
@@ -187,7 +187,7 @@ def test_a_run_interrupted_twice_ends_at_once_in_one_line(make_nieh_set: Any, tm
 
     def answer(_request: Any, _handler: Any) -> None:
         asked.set()
-        done.wait(60)
+        done.wait(600)
 
     data = make_nieh_set(size=56)
     with chatting(answer) as url:
@@ -198,11 +198,11 @@ def test_a_run_interrupted_twice_ends_at_once_in_one_line(make_nieh_set: Any, tm
             [*command, "--output", tmp_path / "out"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
         )
         try:
-            assert asked.wait(60)
+            assert asked.wait(600)
             stopped.send_signal(signal.SIGINT)  # to end after the unit in hand, for which it waits
             time.sleep(0.5)
             stopped.send_signal(signal.SIGINT)
-            out, err = stopped.communicate(timeout=30)
+            out, err = stopped.communicate(timeout=600)
         finally:
             stopped.kill()
             done.set()
@@ -233,7 +233,7 @@ def test_in_process_models_and_baselines_tell_what_they_read(make_nieh_set: Any,
 
 
 def test_several_trajectories_are_asked_about_at_once(make_nieh_set: Any, tmp_path: Path, run: Any) -> None:
-    both = threading.Barrier(2, timeout=10)
+    both = threading.Barrier(2, timeout=600)
     seen: set[int] = set()
 
     def answer(request: Any, handler: Any) -> Any:

@@ -29,7 +29,7 @@ for package in ("openai", "fastapi", "uvicorn", "multipart"):
     pytest.importorskip(package, reason="what `transformers serve` needs is not installed (pip install -e '.[dev]')")
 
 SERVE = "from transformers.cli.transformers import main; main()"
-START_S = 120
+START_S = 600
 WITHOUT_STOP = {"send_stop": "false"}  # this server fails on stop strings for models with images
 
 
@@ -72,7 +72,7 @@ def _wait_for(url: str, server: "subprocess.Popen[bytes]", log: Path) -> None:
     end = time.monotonic() + START_S
     while time.monotonic() < end and server.poll() is None:
         try:
-            with urllib.request.urlopen(url, timeout=5):
+            with urllib.request.urlopen(url, timeout=60):
                 return
         except (urllib.error.URLError, ConnectionError):
             time.sleep(0.2)

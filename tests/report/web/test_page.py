@@ -59,7 +59,7 @@ def written(tmp_path_factory):
     return written
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(TEXT)
 def test_no_text_becomes_an_element_and_the_data_come_out_as_they_went_in(written, text):
     plain, hostile = (Elements(written(page_of(it))) for it in ("text", text))

@@ -3,7 +3,7 @@
 from typing import Any
 
 import numpy as np
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from infthor_eval.sim.geometry import euler_matrix
@@ -40,7 +40,7 @@ STEP = st.one_of(
     call("ReleaseObject"),
 )
 SCENES = st.sampled_from(["kitchen-1", "kitchen-4", "living-room-1", "bedroom-1", "bathroom-1"])
-PROPERTY = settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+PROPERTY = settings(max_examples=15)
 
 
 def deepest(bench: Bench, thing: int) -> tuple[float, str]:
