@@ -15,7 +15,6 @@ __all__ = ["on_files", "on_page_markdown"]
 
 _DOCS = "docs/"
 _OUTSIDE = {  # where a file lies in the repository: where its page stands in the site
-    "README.md": "index.md",
     "CHANGELOG.md": "CHANGELOG.md",
     "CONTRIBUTING.md": "CONTRIBUTING.md",
     "benchmarks/README.md": "benchmarks/README.md",
