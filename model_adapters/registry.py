@@ -148,8 +148,11 @@ def label(name: str, options: Mapping[str, str]) -> str:
 
 
 def _last_component(pretrained: str) -> str:
-    name = Path(pretrained).name
-    return Path(pretrained).resolve().name if name in ("", "..") else name
+    path = Path(pretrained)
+    if path.name in ("", ".."):
+        path = path.resolve()
+    # Every training run writes a folder of this name; the one above it says which run it was.
+    return path.absolute().parent.name if path.name == "checkpoint" else path.name
 
 
 def _as_component(text: str) -> str:

@@ -190,6 +190,8 @@ def test_the_source_of_an_adapter_that_is_not_there_is_one_line(installed: Path)
         ({"pretrained": "/data/my models/step 10/"}, "step-10"),
         ({"pretrained": "~/.hidden"}, "hidden"),
         ({"pretrained": ""}, "qwen2.5-vl"),
+        ({"pretrained": "runs/my nano/checkpoint"}, "my-nano"),
+        ({"pretrained": "runs/nano/checkpoint-500"}, "checkpoint-500"),
     ],
 )
 def test_a_run_is_called_by_its_checkpoint(given: dict[str, str], expected: str) -> None:

@@ -12,6 +12,7 @@ from infthor_eval.cli.options.values import floor_plans_option, include_option
 from infthor_eval.cli.progress.progress import say
 from infthor_eval.errors import ModelError
 from infthor_eval.report.terminal import print_table, table_console
+from infthor_eval.runs.run_labels import label_runs
 from infthor_eval.runs.run_search import BrokenRun, StoredRun, find_runs
 from infthor_eval.tables import Column, Row, Table
 from infthor_eval.terminal import console, print_line
@@ -131,7 +132,8 @@ def runs(folder: Path) -> None:
     if whole:
         columns = (Column("run", False), Column("suite", False), *map(Column, _NUMBERS))
         more = (Column("tasks, %", False), Column("age"), Column("folder", False))
-        rows = tuple(Row(tuple(_cells(item))) for item in whole)
+        labels = label_runs([(item.folder, item.header) for item in whole])
+        rows = tuple(Row((label, *_cells(item))) for label, item in zip(labels, whole, strict=True))
         print_table(Table("", (*columns, *more), rows), table_console())
     for item in found:
         if isinstance(item, BrokenRun):
@@ -139,7 +141,6 @@ def runs(folder: Path) -> None:
 
 
 def _cells(run: StoredRun) -> Iterator[str]:
-    yield run.header.name
     yield run.header.suite
     yield from (str(run.n_done), "?" if run.n_missing is None else str(run.n_missing), str(run.n_failed))
     yield _numbers(run)
