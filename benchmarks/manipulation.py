@@ -17,14 +17,14 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from infthor_eval.formats.trajectory import TrajectorySource, iter_sources
-from infthor_eval.manipulation.history import ErrandKind, errands_of
+from infthor_eval.manipulation.history import ManipulationKind, errands_of
 from infthor_eval.manipulation.records import ArmRecord
 from infthor_eval.manipulation.suite import ManipulationSuite
 from infthor_eval.rates import format_percent
 from infthor_eval.runs import UnitRecord, read_run
 
 _BASELINES = ("planner-arm", "still", "random-arm")
-_TASKS = {ErrandKind.PICKUP: "manipulathor_pickup", ErrandKind.PUT: "manipulathor_put"}
+_TASKS = {ManipulationKind.PICKUP: "manipulathor_pickup", ManipulationKind.PUT: "manipulathor_put"}
 _NAME = re.compile(r"'(\w+?)_\w+'")  # of what an arm met: its type
 
 
@@ -55,13 +55,13 @@ def _arguments() -> argparse.Namespace:
 def chosen(options: argparse.Namespace) -> Iterator[TrajectorySource]:
     """Trajectories, evenly out of all, until they have enough episodes of both kinds."""
     every = list(iter_sources(options.trajectories))
-    counts: Counter[ErrandKind] = Counter()
+    counts: Counter[ManipulationKind] = Counter()
     step = max(1, round(len(every) * 0.618))  # goes through them without favouring a scene
     for number in range(len(every)):
         source = every[number * step % len(every)]
         counts.update(errand.kind for errand in errands_of(source.read()))
         yield source
-        if min(counts[kind] for kind in ErrandKind) >= options.episodes:
+        if min(counts[kind] for kind in ManipulationKind) >= options.episodes:
             return
 
 

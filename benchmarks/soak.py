@@ -30,7 +30,7 @@ from threading import Lock, Thread
 from typing import Any
 
 from infthor_eval.formats.trajectory import iter_sources
-from infthor_eval.manipulation.history import ErrandKind, errands_of
+from infthor_eval.manipulation.history import ManipulationKind, errands_of
 
 _STALL_S = 4.0  # longer than the model's timeout_s
 _SERVER_FAULTS = ("500", "stall", "429", "reset")
@@ -72,7 +72,7 @@ def _with_pick_ups(folder: Path, n: int) -> Iterator[bytes]:
     for source in iter_sources(folder):
         if found >= n:
             return
-        found += sum(errand.kind is ErrandKind.PICKUP for errand in errands_of(source.read()))
+        found += sum(errand.kind is ManipulationKind.PICKUP for errand in errands_of(source.read()))
         yield source.raw.replace(b"\n", b" ").strip() + b"\n"
 
 

@@ -1,16 +1,18 @@
-"""Which units several runs have in common, so that their rewards can be held against each other."""
+"""The episodes that several runs have in common, so that their rewards can be compared."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
-from infthor_eval.errors import UsageError, unknown_name
+from infthor_eval.episodes.recorded_runs import EpisodePayload, RecordedRun, TaskConfig
+from infthor_eval.errors import DataError, UsageError, unknown_name
 from infthor_eval.runs.records import UnitRecord
 
-__all__ = ["SharedUnits", "differing", "one_of", "shared_units", "sharing_notes"]
+__all__ = ["SharedUnits", "difference_notes", "only_name", "shared_tasks", "shared_units"]
 
-P = TypeVar("P")
-Units = Mapping[str, Mapping[Any, UnitRecord[P]]]  # by trajectory, then by what orders them in time
+P = TypeVar("P", bound=EpisodePayload)
+T = TypeVar("T", bound=TaskConfig)
+Units = Mapping[str, Mapping[Any, UnitRecord[P]]]  # by trajectory, then by their order in time
 
 
 @dataclass(frozen=True)
@@ -18,72 +20,97 @@ class SharedUnits(Generic[P]):
     """What runs have in common.
 
     Attributes:
-        trajectories: names of those that all runs have in full.
-        records: by run, then by trajectory: those of the units that count in every run, in time order.
-        n_every: how many trajectories some run has.
-        n_excluded: units of shared trajectories that are left out, as some run excludes them.
+        tasks: names of the tasks.
+        trajectories: names of the trajectories that all runs have in full.
+        records: by run, then by trajectory: records of the episodes that count in every run, in time order.
+        notes: what was left out, and how the runs differ, a line each.
     """
 
+    tasks: tuple[str, ...]
     trajectories: tuple[str, ...]
     records: tuple[tuple[tuple[UnitRecord[P], ...], ...], ...]
-    n_every: int
-    n_excluded: int
+    notes: tuple[str, ...]
 
 
-def shared_units(units: Sequence[Units[P]], digests: Sequence[Mapping[str, str]]) -> SharedUnits[P]:
-    """Find the units of trajectories that all runs have in full.
-
-    Args:
-        units: of each run.
-        digests: of each run: those of its trajectories, by name.
-    """
-    every = sorted({*(key for known in digests for key in known), *(key for item in units for key in item)})
-    excluded = {key: _excluded(item[key] for item in units if key in item) for key in every}
-    shared = [key for key in every if _is_shared(key, digests, units) and units[0][key].keys() - excluded[key]]
-    records = tuple(
-        tuple(tuple(item[key][place] for place in sorted(item[key].keys() - excluded[key])) for key in shared)
-        for item in units
-    )
-    return SharedUnits(tuple(shared), records, len(every), sum(len(excluded[key]) for key in shared))
-
-
-def sharing_notes(found: SharedUnits[P], excluded: str) -> list[str]:
-    """What must be said of the choice, a line each.
+def shared_tasks(runs: Sequence[RecordedRun[Any, Any]], chosen: Sequence[str] | None) -> list[str]:
+    """Return the names of the tasks that all runs have, or the chosen ones of them.
 
     Args:
-        found: what the runs share.
-        excluded: what is left out where some run excludes it, in words.
-    """
-    notes = []
-    n_shared = len(found.trajectories)
-    if n_shared < found.n_every:
-        notes.append(f"{n_shared} of {found.n_every} trajectories are drawn: those that all of these runs have in full")
-    if n_shared == 1:
-        notes.append("of one trajectory there is no interval")
-    if found.n_excluded:
-        notes.append(f"{excluded}: {found.n_excluded}")
-    return notes
-
-
-def differing(what: str, labels: Sequence[str], values: Sequence[object]) -> list[str]:
-    """A line where runs differ in something, each with its own; nothing where they do not."""
-    if len({str(value) for value in values}) < 2:
-        return []
-    told = ", ".join(f"{value} ({label})" for value, label in zip(values, labels, strict=True))
-    return [f"the runs differ in the {what}: {told}"]
-
-
-def one_of(what: str, option: str, name: str | None, known: Sequence[str]) -> str:
-    """The one that is named, or the only one that a run has.
-
-    Args:
-        what: what it is ("trajectory").
-        option: that names it.
-        name: as typed; None where it was not.
-        known: what the run has.
+        runs: at least one run.
+        chosen: task names as typed; None for all shared tasks, in the order of the first run.
 
     Raises:
-        UsageError: the run has none of that name, or none is given and there are several.
+        UsageError: there is no shared task, or a chosen one is not shared.
+    """
+    first = runs[0]
+    shared = [name for name in first.config.tasks if all(name in run.config.tasks for run in runs)]
+    if not shared:
+        other = next((run for run in runs if not run.config.tasks.keys() & first.config.tasks.keys()), runs[-1])
+        raise UsageError(f"{first.label} and {other.label} share no task; draw runs of the same task")
+    for name in chosen or ():
+        if name not in shared:
+            raise unknown_name("task of all these runs", name, shared)
+    return shared if chosen is None else list(chosen)
+
+
+def shared_units(
+    runs: Sequence[RecordedRun[P, T]], tasks: Sequence[str], excluded: str, differences: Iterable[str] = ()
+) -> SharedUnits[P]:
+    """Find the episodes of trajectories that all runs have in full.
+
+    Args:
+        runs: at least one run.
+        tasks: names of tasks that all runs have.
+        excluded: description of episodes that some run excludes, for a note.
+        differences: notes on how the runs differ; whether the simulators do is added.
+
+    Raises:
+        DataError: the runs share no trajectory.
+    """
+    units = [run.by_trajectory(tasks) for run in runs]
+    digests = [run.digests(tasks) for run in runs]
+    names = sorted({*(name for known in digests for name in known), *(name for item in units for name in item)})
+    left_out = {name: _excluded_places(item[name] for item in units if name in item) for name in names}
+    shared = [name for name in names if _is_shared(name, digests, units) and units[0][name].keys() - left_out[name]]
+    if not shared:
+        which = " and ".join(tasks)
+        raise DataError(
+            f"the runs share no trajectory of {which} that all of them have in full; draw runs on the same data"
+        )
+    records = tuple(
+        tuple(tuple(item[name][place] for place in sorted(item[name].keys() - left_out[name])) for name in shared)
+        for item in units
+    )
+    notes = []
+    if len(shared) < len(names):
+        notes.append(f"{len(shared)} of {len(names)} trajectories are drawn: those that all of these runs have in full")
+    if len(shared) == 1:
+        notes.append("a mean over one trajectory has no interval")
+    if n_excluded := sum(len(left_out[name]) for name in shared):
+        notes.append(f"{excluded}: {n_excluded}")
+    notes += difference_notes("simulator", runs, [run.config.simulator for run in runs])
+    return SharedUnits(tuple(tasks), tuple(shared), records, (*notes, *differences))
+
+
+def difference_notes(setting: str, runs: Sequence[RecordedRun[Any, Any]], values: Sequence[object]) -> list[str]:
+    """Return a line with each run's value of a setting if they differ; else nothing."""
+    if len({str(value) for value in values}) < 2:
+        return []
+    by_run = ", ".join(f"{value} ({run.label})" for run, value in zip(runs, values, strict=True))
+    return [f"the runs differ in the {setting}: {by_run}"]
+
+
+def only_name(what: str, option: str, name: str | None, known: Sequence[str]) -> str:
+    """Return the given name, or the only one that a run has.
+
+    Args:
+        what: kind of thing that is named ("trajectory").
+        option: command-line option that names it.
+        name: the name as typed; None if it was not given.
+        known: names that the run has.
+
+    Raises:
+        UsageError: the run has nothing of that name, or no name is given and there are several.
     """
     if name is None and len(known) > 1:
         raise UsageError(f"the run has more than one {what}; give one of them with {option}: {', '.join(known)}")
@@ -92,13 +119,16 @@ def one_of(what: str, option: str, name: str | None, known: Sequence[str]) -> st
     return name or known[0]
 
 
-def _excluded(trajectory: Iterable[Mapping[Any, UnitRecord[P]]]) -> set[Any]:
-    """Units of a trajectory that some run excludes."""
+def _excluded_places(trajectory: Iterable[Mapping[Any, UnitRecord[P]]]) -> set[Any]:
+    """Return the places in a trajectory of the episodes that some run excludes."""
     return {place for units in trajectory for place, record in units.items() if record.excluded is not None}
 
 
-def _is_shared(key: str, digests: Sequence[Mapping[str, str]], units: Sequence[Units[P]]) -> bool:
-    """Whether all runs have the same trajectory of that name, with the same units: none stopped amid it."""
-    if any(key not in item for item in units) or len({known.get(key) for known in digests}) > 1:
+def _is_shared(name: str, digests: Sequence[Mapping[str, str]], units: Sequence[Units[P]]) -> bool:
+    """Return whether all runs have the same trajectory of that name with the same episodes.
+
+    A run that was stopped in the middle of a trajectory lacks episodes there.
+    """
+    if any(name not in item for item in units) or len({known.get(name) for known in digests}) > 1:
         return False
-    return all(item[key].keys() == units[0][key].keys() for item in units)
+    return all(item[name].keys() == units[0][name].keys() for item in units)

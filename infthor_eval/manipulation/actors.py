@@ -11,7 +11,7 @@ from infthor_eval.formats.blank import blank_like
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.manipulation.conversion import Call
 from infthor_eval.manipulation.environment import ArmEnvironment
-from infthor_eval.manipulation.history import ErrandKind
+from infthor_eval.manipulation.history import ManipulationKind
 from infthor_eval.manipulation.reaching import plan
 from infthor_eval.runs.baseline import BaselineSubject
 from model_adapters import ArmDelta, Capabilities, Policy, Subject
@@ -118,7 +118,7 @@ class _Baseline(BaselineSubject):
 class _StillActor:
     def begin(self, situation: ArmSituation) -> None:
         environment = situation.environment
-        pickup = environment.errand.kind == ErrandKind.PICKUP
+        pickup = environment.errand.kind == ManipulationKind.PICKUP
         take: Call = {"action": "PickupObject", "objectIdCandidates": [environment.moment.object_id]}
         self._left: list[Step] = [[take if pickup else {"action": "ReleaseObject"}]]
 

@@ -10,7 +10,7 @@ from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.household.containment import is_in
 from infthor_eval.manipulation.conversion import Call, Conversion
 from infthor_eval.manipulation.geometry import along, away, gap, middle_of, point_of, size_of, xyz
-from infthor_eval.manipulation.history import Errand, ErrandKind, Moment, UnfitEpisodeError
+from infthor_eval.manipulation.history import Errand, ManipulationKind, Moment, UnfitEpisodeError
 from infthor_eval.manipulation.records import ArmEnded
 from infthor_eval.thor.frames import FrameKeeper
 from infthor_eval.thor.restore import restore
@@ -122,7 +122,7 @@ class ArmEnvironment:
         pose = moment.view.agent
         stand = Vector(pose.position.x, view.agent.position.y, pose.position.z)
         self._must(teleport_call(AgentPose(stand, pose.rotation, pose.horizon, view.agent.standing)))
-        if errand.kind == ErrandKind.PUT:
+        if errand.kind == ManipulationKind.PUT:
             self._take_in_hand(moment.object_id, moment.view)
         view = self._must({"action": "SetHandSphereRadius", "radius": grasp.radius})
         self.inside = moment.object_id in arm_of(view).pickupable
@@ -183,7 +183,7 @@ class ArmEnvironment:
 
     def _ended(self, released: bool) -> ArmEnded | None:
         target = self.moment.object_id
-        if self.errand.kind == ErrandKind.PICKUP:
+        if self.errand.kind == ManipulationKind.PICKUP:
             return ArmEnded.DONE if target in arm_of(self._simulator.view).held else None
         if not released or target in arm_of(self._simulator.view).held:
             return None

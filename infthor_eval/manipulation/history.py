@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from infthor_eval.errors import DataError
 from infthor_eval.formats.trajectory import LowAction, Trajectory
-from infthor_eval.manipulation.kinds import ErrandKind
+from infthor_eval.manipulation.kinds import ManipulationKind
 from infthor_eval.thor.actions import object_type_of
 from infthor_eval.thor.grounding import Grounding
 from infthor_eval.thor.recorded import MissingObjectError, translate
@@ -12,14 +12,14 @@ from infthor_eval.thor.restore import restore
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import View
 
-__all__ = ["Errand", "ErrandKind", "History", "Moment", "UnfitEpisodeError", "errands_of", "history_of"]
+__all__ = ["Errand", "History", "ManipulationKind", "Moment", "UnfitEpisodeError", "errands_of", "history_of"]
 
 
 class UnfitEpisodeError(DataError):
     """Nobody can act in an episode here, so it counts for nobody."""
 
 
-_KINDS = {"PickupObject": ErrandKind.PICKUP, "PutObject": ErrandKind.PUT}
+_KINDS = {"PickupObject": ManipulationKind.PICKUP, "PutObject": ManipulationKind.PUT}
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Errand:
     """
 
     index: int
-    kind: ErrandKind
+    kind: ManipulationKind
     object_type: str
     receptacle_type: str | None = None
 
@@ -90,7 +90,7 @@ def _errand(number: int, low: LowAction) -> Errand:
         raise DataError(f"action {number} ({recorded.action}) names no object; restore the file")
     receptacle = None if recorded.receptacle_id is None else object_type_of(recorded.receptacle_id)
     kind = _KINDS[recorded.action]
-    where = receptacle if kind == ErrandKind.PUT else None
+    where = receptacle if kind == ManipulationKind.PUT else None
     return Errand(number, kind, object_type_of(recorded.object_id), where)
 
 

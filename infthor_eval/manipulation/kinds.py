@@ -2,14 +2,14 @@
 
 from enum import StrEnum
 
-__all__ = ["SHORT", "ErrandKind"]
+__all__ = ["KIND_NAMES", "ManipulationKind"]
 
 
-class ErrandKind(StrEnum):
+class ManipulationKind(StrEnum):
     """What an episode is about."""
 
     PICKUP = "pickup"
     PUT = "put"
 
 
-SHORT = {ErrandKind.PICKUP: "Pick-up", ErrandKind.PUT: "Put"}  # as the paper calls them
+KIND_NAMES = {ManipulationKind.PICKUP: "Pick-up", ManipulationKind.PUT: "Put"}  # as the paper calls them

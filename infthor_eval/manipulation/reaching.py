@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from infthor_eval.manipulation.conversion import Call
 from infthor_eval.manipulation.environment import ArmEnvironment, arm_of
 from infthor_eval.manipulation.geometry import Point, along, away, middle_of, point_of, xyz
-from infthor_eval.manipulation.history import ErrandKind
+from infthor_eval.manipulation.history import ManipulationKind
 from infthor_eval.manipulation.putting import put
 from infthor_eval.manipulation.stand import Stand
 from infthor_eval.thor.view import View
@@ -20,7 +20,7 @@ Steps = Iterator[Sequence[Call]]
 
 def plan(environment: ArmEnvironment) -> Steps:
     """Steps to the end of the present episode: each after the one before was carried out."""
-    return _pick_up(environment) if environment.errand.kind == ErrandKind.PICKUP else put(environment)
+    return _pick_up(environment) if environment.errand.kind == ManipulationKind.PICKUP else put(environment)
 
 
 def _pick_up(environment: ArmEnvironment) -> Steps:

@@ -78,6 +78,11 @@ class ArmRecord(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, t
     ended: str = ""
 
     @property
+    def attempted(self) -> bool:
+        """Whether the arm acted in the episode; an actor that gives up at once has taken no step."""
+        return bool(self.ended)
+
+    @property
     def done(self) -> bool:
         """Whether the episode was a success."""
         return self.ended == ArmEnded.DONE

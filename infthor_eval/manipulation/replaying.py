@@ -15,19 +15,19 @@ from typing import Any
 
 import msgspec
 
-from infthor_eval.episodes.shared_units import one_of
+from infthor_eval.episodes.shared_units import only_name
 from infthor_eval.episodes.simulators import Simulators
 from infthor_eval.episodes.trajectory_sets import find_again
 from infthor_eval.errors import DataError, UsageError, wrap_errors
 from infthor_eval.formats.digests import digest
 from infthor_eval.formats.trajectory import TrajectorySource
 from infthor_eval.manipulation.conversion import Conversion
-from infthor_eval.manipulation.curve_runs import ArmRun
 from infthor_eval.manipulation.environment import ArmEnvironment, ArmOutcome, Grasp, arm_of
 from infthor_eval.manipulation.geometry import point_of
 from infthor_eval.manipulation.history import History, errands_of, history_of
-from infthor_eval.manipulation.kinds import SHORT, ErrandKind
+from infthor_eval.manipulation.kinds import KIND_NAMES, ManipulationKind
 from infthor_eval.manipulation.moments import ArmMoment, ArmSight, EpisodeTitle
+from infthor_eval.manipulation.recorded_runs import ArmRun
 from infthor_eval.manipulation.records import ArmEnded, ArmRecord, ArmStep
 from infthor_eval.manipulation.seeing import Onlooker
 from infthor_eval.manipulation.task import ArmCourse, TaskSettings
@@ -84,17 +84,17 @@ def recorded_episodes(run: ArmRun, task: str | None, trajectory: str | None) -> 
         UsageError: there is no such task or trajectory, or none is given where it must be.
         DataError: the identity is not that of a run of manipulation, or it has no record yet.
     """
-    tasks = list(run.about.tasks)
-    kinds = [about.kind for about in run.about.tasks.values()]
+    tasks = list(run.config.tasks)
+    kinds = [about.kind for about in run.config.tasks.values()]
     if task is not None or len(set(kinds)) < len(kinds):
-        tasks = [one_of("task", "--task", task, tasks)]
+        tasks = [only_name("task", "--task", task, tasks)]
     found: dict[str, list[Record]] = {}
     for record in run.records:
         if record.task in tasks:
             found.setdefault(record.cluster, []).append(record)
     if not found:
         raise DataError(f"{run.label}: the run has no record of an episode yet; let it go on first")
-    name = one_of("trajectory", "--trajectory", trajectory, sorted(found))
+    name = only_name("trajectory", "--trajectory", trajectory, sorted(found))
     return RecordedEpisodes(run, name, tuple(sorted(found[name], key=lambda record: record.payload.index)))
 
 
@@ -113,7 +113,7 @@ def replay_episodes(recorded: RecordedEpisodes, data: str | None, scenes: Path |
         SimulatorError: the simulator has no such scene or fails.
     """
     task = recorded.episodes[0].task
-    about = recorded.run.about.tasks[task]
+    about = recorded.run.config.tasks[task]
     told = about.trajectories.get(recorded.trajectory)
     courses, course = find_again(task, recorded.trajectory, told, data, about.settings.get("bundled"), _course)
     with ExitStack() as stack:
@@ -121,7 +121,7 @@ def replay_episodes(recorded: RecordedEpisodes, data: str | None, scenes: Path |
         def opened(**options: Any) -> Simulator:
             # All trajectories, as in the run: the embedded simulator learns of floor plans from each.
             trajectories = [item.trajectory for item in courses.found]
-            simulators = Simulators(recorded.run.about.simulator, scenes, trajectories, instances=False, **options)
+            simulators = Simulators(recorded.run.config.simulator, scenes, trajectories, instances=False, **options)
             stack.callback(simulators.close)
             return stack.enter_context(simulators.one())
 
@@ -182,14 +182,14 @@ class ArmReplay:
             number=self._recorded.episodes.index(record) + 1,
             n_episodes=len(self._recorded.episodes),
             action=payload.index,
-            kind=SHORT[ErrandKind(payload.kind)],
+            kind=KIND_NAMES[ManipulationKind(payload.kind)],
             instruction=payload.instruction,
             n_steps=len(payload.steps),
-            radius=self._recorded.run.about.tasks[record.task].radius,
+            radius=self._recorded.run.config.tasks[record.task].radius,
         )
 
     def _settings(self, record: Record) -> TaskSettings:
-        about, label = self._recorded.run.about.tasks[record.task], self._recorded.run.label
+        about, label = self._recorded.run.config.tasks[record.task], self._recorded.run.label
         problem = f"{label}: settings of {record.task} that this version does not know"
         with wrap_errors(problem, "run the evaluation again", catch=msgspec.ValidationError):
             return replace(msgspec.convert(about.settings, TaskSettings), radius=about.radius)

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from itertools import zip_longest
 
 from infthor_eval.formats.published import published_tables
-from infthor_eval.manipulation.history import ErrandKind
+from infthor_eval.manipulation.history import ManipulationKind
 from infthor_eval.manipulation.summary import ManipulationSummary, TaskSummary
 from infthor_eval.rates import Rate, format_percent
 from infthor_eval.runs import RunSummary
@@ -40,7 +40,7 @@ def _success_table(runs: Sequence[RunSummary]) -> Table:
     """Success by kind; a row for each radius of a run's tasks."""
     rows = []
     for name, summary in _named(runs):
-        by_kind = {kind: [task for task in summary.tasks.values() if task.kind == kind] for kind in ErrandKind}
+        by_kind = {kind: [task for task in summary.tasks.values() if task.kind == kind] for kind in ManipulationKind}
         for pair in zip_longest(*by_kind.values()):
             rows.append(Row((name, _radii(pair), *_cells(pair))))
     for table in published_tables("manipulation"):
@@ -73,8 +73,7 @@ def _size(rate: Rate | None) -> int:
 def _episodes_table(runs: Sequence[RunSummary]) -> Table:
     rows = [
         Row((
-            name, task_name, f"{task.radius:g}",
-            format_percent(task.inside if task.kind == ErrandKind.PICKUP else None),
+            name, task_name, f"{task.radius:g}", format_percent(task.inside if task.kind == ManipulationKind.PICKUP else None),
             _number(task.closest, 2), _number(task.steps), _number(task.collisions),
         ))
         for name, summary in _named(runs)

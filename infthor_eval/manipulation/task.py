@@ -13,16 +13,16 @@ from infthor_eval.household.wording import canonical, noun
 from infthor_eval.manipulation.conversion import Conversion
 from infthor_eval.manipulation.environment import Grasp
 from infthor_eval.manipulation.history import Errand, errands_of
-from infthor_eval.manipulation.kinds import SHORT, ErrandKind
+from infthor_eval.manipulation.kinds import KIND_NAMES, ManipulationKind
 from infthor_eval.manipulation.options import RADII, ManipulationOptions
 from infthor_eval.runs import TaskFile, TaskRequest
 from infthor_eval.runs.limiting import limited
 
 __all__ = ["ArmCourse", "ManipulationTask", "TaskSettings"]
 
-_WORDS = {ErrandKind.PICKUP: "pick up the {object}", ErrandKind.PUT: "put the {object} in the {receptacle}"}
+_WORDS = {ManipulationKind.PICKUP: "pick up the {object}", ManipulationKind.PUT: "put the {object} in the {receptacle}"}
 _HALF_TURN = 180.0  # degrees
-_CHOICES = {"kind": tuple(ErrandKind), "grasps": ("target", "all"), "hold": ("middle", "palm")}
+_CHOICES = {"kind": tuple(ManipulationKind), "grasps": ("target", "all"), "hold": ("middle", "palm")}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,7 +47,7 @@ class TaskSettings:
         reward: of a success.
     """
 
-    kind: str = ErrandKind.PICKUP
+    kind: str = ManipulationKind.PICKUP
     bundled: str | None = None
     instruction: str | None = None
     radius: float = 0.5
@@ -100,7 +100,7 @@ class ManipulationTask:
         options: ManipulationOptions = request.options
         told = {"radius": options.radius_metres, "instruction": options.instruction}
         self.settings = task_settings(file, TaskSettings, told, _CHOICES)
-        self.kind = ErrandKind(self.settings.kind)
+        self.kind = ManipulationKind(self.settings.kind)
         self._check()
         self.conversion = Conversion(
             self.settings.translation_scale,
@@ -121,13 +121,13 @@ class ManipulationTask:
         of_kind = [(course, errand) for course, errand in every if errand.kind == self.kind]
         self.episodes = limited(of_kind, lambda episode: episode[0].traj_id, request.seed, request.limit)
         if not self.episodes:
-            raise UsageError(f"{self.name}: no trajectory there has a {SHORT[self.kind]}")
+            raise UsageError(f"{self.name}: no trajectory there has a {KIND_NAMES[self.kind]}")
 
     def instruction(self, errand: Errand) -> str:
         """What a policy is told."""
         template = self._template
         if template == "short":
-            return SHORT[self.kind]
+            return KIND_NAMES[self.kind]
         names = {"object": errand.object_type, "receptacle": errand.receptacle_type}
         return template.format(**{key: noun(canonical(name)) for key, name in names.items() if name is not None})
 
@@ -162,7 +162,7 @@ class ManipulationTask:
                 f"{self.name}: radius {self.settings.radius} is not within {RADII[0]} to {RADII[1]} metres"
             )
         template = self._template
-        known = {"object", "receptacle"} if self.kind == ErrandKind.PUT else {"object"}
+        known = {"object", "receptacle"} if self.kind == ManipulationKind.PUT else {"object"}
         try:
             fields = {name for _, name, form, turn in string.Formatter().parse(template) if name is not None}
             plain = all(not form and not turn for _, _, form, turn in string.Formatter().parse(template))
@@ -172,7 +172,7 @@ class ManipulationTask:
             raise UsageError(
                 f"{self.name}: the instruction {template!r:.60} must have {{object}}"
                 f"{' and may have {receptacle}' if len(known) > 1 else ''}, and nothing else in braces; "
-                f'or be "short" for {SHORT[self.kind]!r} alone'
+                f'or be "short" for {KIND_NAMES[self.kind]!r} alone'
             )
 
 

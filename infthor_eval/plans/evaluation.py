@@ -14,7 +14,7 @@ from infthor_eval.formats.floor_plans import floor_plans_digest
 from infthor_eval.plans.cast import Cast, cast_of
 from infthor_eval.plans.episodes import Episode, described, episode
 from infthor_eval.plans.plan import Plan, UnfitPlanError
-from infthor_eval.plans.records import NOT_COME_TO, PlanRecord
+from infthor_eval.plans.records import NOT_ATTEMPTED, PlanRecord
 from infthor_eval.plans.task import PlansTask
 from infthor_eval.plans.trajectories import Course
 from infthor_eval.runs import (
@@ -129,7 +129,7 @@ class PlansEvaluation:
             over = False
             for unit in units:
                 record = known[unit.key]
-                if record is None or (record.payload.ended == NOT_COME_TO and not over):
+                if record is None or (record.payload.ended == NOT_ATTEMPTED and not over):
                     record = _recorded(unit, prints[unit.key], stage, over)
                 yield record
                 failed = record.excluded is None and not record.payload.done
@@ -181,7 +181,7 @@ def _recorded(unit: PlanUnit, inputs: str, stage: Episode, over: bool) -> UnitRe
     try:
         if over:
             stage.pass_over(unit.plan)
-            return unit.record(inputs, msgspec.structs.replace(unit.payload, ended=NOT_COME_TO))
+            return unit.record(inputs, msgspec.structs.replace(unit.payload, ended=NOT_ATTEMPTED))
         played = stage.play(unit.plan)
     except (UnfitPlanError, SceneError) as error:
         return unit.excluded(str(error), inputs)

@@ -4,9 +4,9 @@ import msgspec
 
 from infthor_eval.runs.records import RecordTypes
 
-__all__ = ["DONE", "NOT_COME_TO", "RECORDS", "PlanRecord", "StepRecord"]
+__all__ = ["DONE", "NOT_ATTEMPTED", "RECORDS", "PlanRecord", "StepRecord"]
 
-DONE, NOT_COME_TO = "done", "not come to"  # how a plan can end; see `environment.Ended`
+DONE, NOT_ATTEMPTED = "done", "not attempted"  # how a plan can end; see `environment.Ended`
 
 
 class StepRecord(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
@@ -63,8 +63,13 @@ class PlanRecord(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, 
     goal_reached: bool = False
 
     @property
+    def attempted(self) -> bool:
+        """Whether the agent acted in the plan."""
+        return bool(self.steps)
+
+    @property
     def done(self) -> bool:
-        """Whether the plan was carried out."""
+        """Whether the plan was completed."""
         return self.ended == DONE
 
 

@@ -11,15 +11,15 @@ from pathlib import Path
 
 import msgspec
 
-from infthor_eval.episodes.shared_units import one_of
+from infthor_eval.episodes.shared_units import only_name
 from infthor_eval.episodes.simulators import Simulators
 from infthor_eval.episodes.trajectory_sets import find_again
 from infthor_eval.errors import DataError, UsageError, wrap_errors
 from infthor_eval.household.scout import reachable
-from infthor_eval.plans.curve_runs import PlansRun
 from infthor_eval.plans.environment import MAX_STEPS, PlanEnvironment, StepOutcome
 from infthor_eval.plans.moments import Moment, PlanTitle, Point, Pose, Rewards, Room, Sight, Thing
 from infthor_eval.plans.plan import PlanKind
+from infthor_eval.plans.recorded_runs import PlansRun
 from infthor_eval.plans.records import PlanRecord, StepRecord
 from infthor_eval.plans.rewards import RewardRules
 from infthor_eval.plans.trajectories import Course, read_course
@@ -91,14 +91,14 @@ def recorded_plans(run: PlansRun, task: str | None, trajectory: str | None) -> R
         UsageError: there is no such task or trajectory, or none is given and there are several.
         DataError: the identity is not that of a run of plans.
     """
-    task = one_of("task", "--task", task, list(run.about.tasks))
+    task = only_name("task", "--task", task, list(run.config.tasks))
     plans: dict[str, list[Record]] = {}
     for record in run.records:
         if record.task == task:
             plans.setdefault(record.cluster, []).append(record)
     if not plans:
         raise DataError(f"{run.label}: the run has no record of a plan yet; let it go on first")
-    name = one_of("trajectory", "--trajectory", trajectory, sorted(plans))
+    name = only_name("trajectory", "--trajectory", trajectory, sorted(plans))
     return Recorded(run, task, name, tuple(sorted(plans[name], key=lambda record: record.payload.index)))
 
 
@@ -116,10 +116,10 @@ def replay(recorded: Recorded, data: str | None, scenes: Path | None) -> Iterato
         DataError: the trajectory is not among them, or is another than the run's.
         SimulatorError: the simulator has no such scene or fails.
     """
-    digest = recorded.run.about.tasks[recorded.task].trajectories.get(recorded.trajectory)
+    digest = recorded.run.config.tasks[recorded.task].trajectories.get(recorded.trajectory)
     bundled = _settings(recorded).get("bundled")
     courses, course = find_again(recorded.task, recorded.trajectory, digest, data, bundled, read_course)
-    name = recorded.run.about.simulator
+    name = recorded.run.config.simulator
     # All of them, as in the run: the embedded simulator learns of floor plans from each.
     simulators = Simulators(name, scenes, [item.trajectory for item in courses.found], instances=False)
     with closing(simulators), simulators.one() as simulator:
@@ -127,7 +127,7 @@ def replay(recorded: Recorded, data: str | None, scenes: Path | None) -> Iterato
 
 
 def _settings(recorded: Recorded) -> Mapping[str, object]:
-    found = recorded.run.about.tasks[recorded.task].config.get("dataset_kwargs")
+    found = recorded.run.config.tasks[recorded.task].config.get("dataset_kwargs")
     return found if isinstance(found, Mapping) else {}
 
 
@@ -202,7 +202,7 @@ class Replay:
 
     def _entered(self) -> PlanEnvironment:
         if self._environment is None:
-            about = self._recorded.run.about.tasks[self._recorded.task]
+            about = self._recorded.run.config.tasks[self._recorded.task]
             problem = f"{self._recorded.run.label}: rewards that this version does not know"
             with wrap_errors(problem, "run the evaluation again", catch=msgspec.ValidationError):
                 rules = msgspec.convert(about.rewards, RewardRules)

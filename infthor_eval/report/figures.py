@@ -75,7 +75,7 @@ def _draw_panel(place: Axes, name: str, facet: Facet, runs: Sequence[RunCurves],
         if name in run.curves:
             _draw_curve(place, run.curves[name], looks[run.label], order)
     if not any(name in run.curves for run in runs):
-        place.text(0.5, 0.5, facet.untold, transform=place.transAxes, ha="center", color="gray")
+        place.text(0.5, 0.5, facet.missing, transform=place.transAxes, ha="center", color="gray")
     place.xaxis.set_major_locator(MaxNLocator(6, integer=True))
     place.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.0f}"))
     place.tick_params(labelbottom=True)

@@ -6,7 +6,7 @@ from pathlib import Path
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from infthor_eval.manipulation.kinds import SHORT, ErrandKind
+from infthor_eval.manipulation.kinds import KIND_NAMES, ManipulationKind
 from infthor_eval.manipulation.radii import RadiusLine, SuccessByRadius
 from infthor_eval.rates import Rate, format_percent
 from infthor_eval.report.curves import embedded_note, trajectories_told
@@ -43,21 +43,25 @@ def radii_table(found: SuccessByRadius) -> Table:
     radii = sorted({radius for points in (found.floor, *(line.points for line in found.lines)) for radius, _ in points})
     rows = [_row(line.label, line.kind, line.points, radii, str(line.n_failed)) for line in found.lines]
     if found.floor:
-        rows.append(_row(f"({_FLOOR})", ErrandKind.PICKUP, found.floor, radii, "-"))
+        rows.append(_row(f"({_FLOOR})", ManipulationKind.PICKUP, found.floor, radii, "-"))
     names = (*(f"{radius:g} m" for radius in radii), "episodes", "failed")
     columns = (Column("model", False), Column("kind", False), *map(Column, names))
     told = trajectories_told(found.n_trajectories)
     return Table(f"{found.task}: success by radius, %, of {told}", columns, tuple(rows), (*_label(found), *found.notes))
 
 
-def _row(label: str, kind: ErrandKind, points: Sequence[tuple[float, Rate]], radii: Sequence[float], end: str) -> Row:
+def _row(
+    label: str, kind: ManipulationKind, points: Sequence[tuple[float, Rate]], radii: Sequence[float], end: str
+) -> Row:
     rates = dict(points)
-    return Row((label, SHORT[kind], *(format_percent(rates.get(radius)) for radius in radii), str(points[0][1].n), end))
+    return Row(
+        (label, KIND_NAMES[kind], *(format_percent(rates.get(radius)) for radius in radii), str(points[0][1].n), end)
+    )
 
 
 def radii_figure(found: SuccessByRadius) -> Figure:
     """The figure that `draw_radii` writes."""
-    kinds = [kind for kind in ErrandKind if any(line.kind == kind for line in found.lines)]
+    kinds = [kind for kind in ManipulationKind if any(line.kind == kind for line in found.lines)]
     labels = list(dict.fromkeys(line.label for line in found.lines if not line.is_bound))
     looks = looks_of(labels) | {line.label: BOUND for line in found.lines if line.is_bound}
     width = len(kinds) * _PANEL[0] + LEGEND
@@ -65,10 +69,10 @@ def radii_figure(found: SuccessByRadius) -> Figure:
     figure = Figure(figsize=(width, height), layout="constrained")
     panels = figure.subplots(1, len(kinds), sharex=True, sharey=True, squeeze=False)[0]
     for place, kind in zip(panels, kinds, strict=True):
-        if kind == ErrandKind.PICKUP:
+        if kind == ManipulationKind.PICKUP:
             _draw_floor(place, found.floor)
         _draw_panel(place, [line for line in found.lines if line.kind == kind], looks)
-        place.set_title(SHORT[kind])
+        place.set_title(KIND_NAMES[kind])
         place.set_xlabel("radius of the hand's sphere (m)")
     panels[0].set_ylabel("success (%)")
     panels[0].set_ylim(-3, 103)

@@ -9,7 +9,7 @@ from infthor_eval.manipulation.actors import ArmActor, ArmSituation, Step
 from infthor_eval.manipulation.conversion import Conversion
 from infthor_eval.manipulation.environment import ArmEnvironment, ArmOutcome, Grasp
 from infthor_eval.manipulation.episodes import ArmStage, Played
-from infthor_eval.manipulation.history import Errand, ErrandKind, errands_of, history_of
+from infthor_eval.manipulation.history import Errand, ManipulationKind, errands_of, history_of
 from infthor_eval.manipulation.options import ManipulationOptions
 from infthor_eval.manipulation.task import ManipulationTask
 from infthor_eval.runs import TaskFile, TaskRequest
@@ -52,7 +52,7 @@ class Arena:
         self._stages: dict[int, ArmStage] = {}
         self._environment: ArmEnvironment | None = None
 
-    def of(self, kind: ErrandKind) -> list[Errand]:
+    def of(self, kind: ManipulationKind) -> list[Errand]:
         return [errand for errand in self.errands.values() if errand.kind == kind]
 
     def play(self, actor: ArmActor, index: int, seed: int = 0, **settings: Any) -> Played:

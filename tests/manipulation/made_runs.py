@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from infthor_eval.manipulation.curve_runs import ArmRun
-from infthor_eval.manipulation.kinds import ErrandKind
+from infthor_eval.manipulation.kinds import ManipulationKind
+from infthor_eval.manipulation.recorded_runs import ArmRun
 from infthor_eval.manipulation.records import RECORDS, ArmRecord
 from infthor_eval.runs import RunHeader, UnitRecord
 from infthor_eval.runs.journal import Journal
@@ -17,7 +17,7 @@ REWARD = 2.0
 def episode(
     trajectory: str,
     index: int,
-    kind: str = ErrandKind.PICKUP,
+    kind: str = ManipulationKind.PICKUP,
     *,
     done: bool = True,
     inside: bool = False,

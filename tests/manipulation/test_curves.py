@@ -4,8 +4,8 @@ import pytest
 
 from infthor_eval.episodes.curves import AT_MOST
 from infthor_eval.errors import DataError, UsageError
-from infthor_eval.manipulation.curve_runs import with_radii
 from infthor_eval.manipulation.curves import ALL, arm_curves
+from infthor_eval.manipulation.recorded_runs import label_by_radius
 
 from .made_runs import episode, made_run, planner_run
 
@@ -82,7 +82,7 @@ def test_an_excluded_episode_is_left_out_of_all_runs_and_a_failed_one_earns_noth
         {"episodes": 2, "failed": 1},
         {"episodes": 2, "failed": 0},
     ]
-    assert any(note.endswith("lets nobody act: 1") for note in curves.notes)
+    assert any(note.endswith("cannot restore their start: 1") for note in curves.notes)
 
 
 def test_a_run_that_was_stopped_amid_a_trajectory_does_not_draw_it():
@@ -99,14 +99,14 @@ def test_the_planner_is_the_bound_and_comes_last():
 
 def test_of_several_planners_none_is_the_bound():
     planners = [planner_run(EPISODES, "p", radius=0.5), planner_run(FAILED_PUT, "p", radius=0.06)]
-    curves = arm_curves(with_radii(planners))
+    curves = arm_curves(label_by_radius(planners))
     assert [(run.label, run.is_bound) for run in curves.runs] == [
         ("p, 0.5 m", False),
         ("p, 0.06 m", False),
         (AT_MOST, True),
     ]
-    assert "the radius of the hand's sphere is not one: 0.06, 0.5 m" in curves.notes
-    assert [run.label for run in with_radii(planners[:1])] == ["p"]
+    assert "the runs differ in the radius of the hand's sphere: 0.06, 0.5 m" in curves.notes
+    assert [run.label for run in label_by_radius(planners[:1])] == ["p"]
 
 
 def test_runs_differ_in_simulator_and_settings_in_a_note():
@@ -141,5 +141,5 @@ def test_what_cannot_be_drawn_together_is_refused(case):
 def test_an_identity_of_another_form_is_refused():
     run = made_run("m", EPISODES)
     run.header.identity["tasks"] = []
-    with pytest.raises(DataError, match="m: not the identity of a run of manipulation"):
+    with pytest.raises(DataError, match="m: not the config of a run of manipulation"):
         arm_curves([run])

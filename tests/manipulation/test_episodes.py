@@ -10,7 +10,7 @@ from infthor_eval.manipulation.actors import BASELINES
 from infthor_eval.manipulation.conversion import Conversion
 from infthor_eval.manipulation.environment import ArmEnvironment, Grasp
 from infthor_eval.manipulation.geometry import gap, middle_of, point_of
-from infthor_eval.manipulation.history import ErrandKind, UnfitEpisodeError
+from infthor_eval.manipulation.history import ManipulationKind, UnfitEpisodeError
 from infthor_eval.manipulation.records import ArmEnded
 from infthor_eval.thor.frames import NoFrames
 from model_adapters import ArmDelta
@@ -37,7 +37,7 @@ def gripper(value):
 
 
 def test_who_stands_still_gets_just_what_lies_in_the_sphere_at_the_start(room):
-    played = [room.play(actor("still"), errand.index).record for errand in room.of(ErrandKind.PICKUP)]
+    played = [room.play(actor("still"), errand.index).record for errand in room.of(ManipulationKind.PICKUP)]
     assert [record.done for record in played] == [record.starts_inside for record in played]
     assert [record.starts_inside for record in played] == [record.start_distance <= 0.5 for record in played]
     assert [record.index for record in played if record.done] == [28, 33]  # alarm clocks on the dresser before it
@@ -48,16 +48,16 @@ def test_who_stands_still_gets_just_what_lies_in_the_sphere_at_the_start(room):
 
 
 def test_the_planner_picks_up_all_and_puts_nearly_all(room):
-    picked = [room.play(actor("planner-arm"), errand.index).record for errand in room.of(ErrandKind.PICKUP)]
+    picked = [room.play(actor("planner-arm"), errand.index).record for errand in room.of(ManipulationKind.PICKUP)]
     assert [record.ended for record in picked] == ["done"] * 7
     assert all(record.reward == record.max_reward == 2 for record in picked)
-    put = [room.play(actor("planner-arm"), errand.index).record for errand in room.of(ErrandKind.PUT)]
+    put = [room.play(actor("planner-arm"), errand.index).record for errand in room.of(ManipulationKind.PUT)]
     assert [record.index for record in put if not record.done] == [79]  # the cloth into a bowl that is too far off
 
 
 def test_the_planner_puts_into_open_drawers(arena):
     kitchen = arena("kitchen-2-seed4", 99)
-    put = [kitchen.play(actor("planner-arm"), errand.index).record for errand in kitchen.of(ErrandKind.PUT)]
+    put = [kitchen.play(actor("planner-arm"), errand.index).record for errand in kitchen.of(ManipulationKind.PUT)]
     assert [record.ended for record in put] == ["done"] * 3
     assert all(len(record.steps) < 10 for record in put)
 
@@ -66,7 +66,7 @@ def test_a_larger_sphere_takes_no_success_from_the_planner(room):
     radii = (0.06, 0.1, 0.2, 0.35, 0.5)
     found = {
         radius: [room.play(actor("planner-arm"), errand.index, radius=radius).record.done
-                 for errand in room.of(ErrandKind.PICKUP)]
+                 for errand in room.of(ManipulationKind.PICKUP)]
         for radius in radii
     }  # fmt: skip
     rates = [sum(found[radius]) for radius in radii]
@@ -200,7 +200,7 @@ def test_a_hand_takes_the_target_alone_or_all_that_is_in_the_sphere(room):
 def test_other_things_in_the_hand_are_no_success(room):
     """The sphere holds something, but not the target."""
     found = 0
-    for errand in room.of(ErrandKind.PICKUP):
+    for errand in room.of(ManipulationKind.PICKUP):
         environment, begun = room.begin(errand.index, Grasp(takes_all=True))
         if environment.inside or not begun.view.arm.pickupable:
             continue

@@ -4,13 +4,13 @@ import pytest
 
 from infthor_eval.errors import DataError, UsageError
 from infthor_eval.manipulation.environment import Grasp
-from infthor_eval.manipulation.history import Errand, ErrandKind
+from infthor_eval.manipulation.history import Errand, ManipulationKind
 from infthor_eval.manipulation.options import ManipulationOptions
 
 from .arena import task_of
 
-PICK = Errand(4, ErrandKind.PICKUP, "AppleSliced")
-PUT = Errand(9, ErrandKind.PUT, "ButterKnife", "SinkBasin")
+PICK = Errand(4, ManipulationKind.PICKUP, "AppleSliced")
+PUT = Errand(9, ManipulationKind.PUT, "ButterKnife", "SinkBasin")
 
 
 def one_line(caught):

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from infthor_eval.plans.curve_runs import PlansRun
+from infthor_eval.plans.recorded_runs import PlansRun
 from infthor_eval.plans.records import DONE, RECORDS, PlanRecord, StepRecord
 from infthor_eval.runs import RunHeader, Tokens, UnitRecord
 from infthor_eval.runs.journal import Journal
@@ -78,8 +78,8 @@ def made_run(label: str, records: Sequence[UnitRecord[PlanRecord]], **about: Any
     return PlansRun(label, header, records)
 
 
-def planner_run(records: Sequence[UnitRecord[PlanRecord]], **about: Any) -> PlansRun:
-    return made_run("planner", records, model={"name": "planner", "baseline": "planner"}, **about)
+def planner_run(records: Sequence[UnitRecord[PlanRecord]], label: str = "planner", **about: Any) -> PlansRun:
+    return made_run(label, records, model={"name": "planner", "baseline": "planner"}, **about)
 
 
 def write_run(run: PlansRun, output: Path, name: str = "infthor_plans-0123") -> Path:

@@ -8,7 +8,7 @@ import pytest
 
 from infthor_eval.errors import DataError, UsageError
 from infthor_eval.formats.packaged import packaged_folder
-from infthor_eval.plans.curve_runs import PlansRun
+from infthor_eval.plans.recorded_runs import PlansRun
 from infthor_eval.plans.records import RECORDS, StepRecord
 from infthor_eval.plans.replaying import recorded_plans, replay
 from infthor_eval.runs import read_run

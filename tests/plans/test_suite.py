@@ -8,7 +8,7 @@ import pytest
 
 from infthor_eval.errors import DataError, UsageError
 from infthor_eval.formats.published import PublishedRow, PublishedTable
-from infthor_eval.plans.records import NOT_COME_TO
+from infthor_eval.plans.records import NOT_ATTEMPTED
 from infthor_eval.runs import execute
 
 from .cut import CANDLE, FORK, MUG, cut, write
@@ -316,14 +316,14 @@ def test_where_a_failure_ends_the_episode_later_plans_are_not_come_to_and_earn_n
     outcome = execute(prepared("scripted", after_failure="stop"))
     first, *others = outcome.records
     assert first.payload.ended == "refused by the simulator"  # it walks on and on
-    assert {record.payload.ended for record in others} == {NOT_COME_TO}
+    assert {record.payload.ended for record in others} == {NOT_ATTEMPTED}
     assert all((plan.steps, plan.reward, plan.max_reward) == ((), 0, None) for plan in payloads(outcome)[1:])
     task = summary(outcome)
-    assert (task.n_plans, task.endings) == (4, {NOT_COME_TO: 3, "refused by the simulator": 1})
+    assert (task.n_plans, task.endings) == (4, {NOT_ATTEMPTED: 3, "refused by the simulator": 1})
     assert task.success["total"].mean == 0
     assert outcome.run.suite.scores(others[0]) == {}
     going_on = execute(prepared("scripted"))
-    assert [plan.ended for plan in payloads(going_on)][1:] != [NOT_COME_TO] * 3
+    assert [plan.ended for plan in payloads(going_on)][1:] != [NOT_ATTEMPTED] * 3
     assert execute(prepared(after_failure="stop")).records[-1].payload.done
 
 
@@ -344,12 +344,12 @@ def test_a_failure_of_the_subject_that_is_mended_lets_a_stopped_episode_go_on(pr
     assert [(record.failure, record.payload.ended) for record in broken.records] == [
         (None, "done"),
         ("out of memory", ""),
-        (None, NOT_COME_TO),
-        (None, NOT_COME_TO),
+        (None, NOT_ATTEMPTED),
+        (None, NOT_ATTEMPTED),
     ]
     assert broken.records[1].payload.max_reward == 2
     task = summary(broken)
-    assert (task.n_failed, task.endings) == (1, {"done": 1, "failed": 1, NOT_COME_TO: 2})
+    assert (task.n_failed, task.endings) == (1, {"done": 1, "failed": 1, NOT_ATTEMPTED: 2})
     mended = execute(prepared(after_failure="stop"))
     assert [record.payload.ended for record in mended.records] == ["done"] * 4
     assert [record.attempt for record in mended.records] == [1, 2, 2, 2]

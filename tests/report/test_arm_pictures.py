@@ -61,7 +61,7 @@ def test_figure_6_has_a_panel_for_both_kinds_and_for_each(tmp_path):
         "run 0",
         "Cumulative reward on arm_pickup and arm_put: mean over 2 trajectories, 95 % intervals shaded",
         "embedded simulator: not comparable with the paper's curves",
-        "the radius of the hand's sphere is not one: 0.1, 0.5 m",
+        "the runs differ in the radius of the hand's sphere: 0.1, 0.5 m",
     ):
         assert words in said
     assert said.count("the expert's step (low-level action)") == 3

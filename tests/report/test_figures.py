@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 from infthor_eval.errors import DataError
-from infthor_eval.plans.curves import reward_curves
+from infthor_eval.plans.curves import plan_curves
 from infthor_eval.report.curves import curves_table, embedded_label, one_panel, read_panels
 from infthor_eval.report.figures import draw_curves
 
@@ -37,7 +37,7 @@ def texts(svg: Path) -> list[str]:
 
 
 def test_the_picture_is_there_in_both_forms_with_its_words(tmp_path):
-    curves = reward_curves(runs())
+    curves = plan_curves(runs())
     png, svg = draw_curves(curves, one_panel(curves), tmp_path, "figure7")
     with Image.open(png) as picture:
         assert min(picture.size) > 300
@@ -52,14 +52,14 @@ def test_the_picture_is_there_in_both_forms_with_its_words(tmp_path):
         "context of the plan's last request (tokens)",
         "Cumulative reward on infthor_plans: mean over 3 trajectories, 95 % intervals shaded",
         "embedded simulator: not comparable with the paper's curves",
-        "no curve over context tokens, which are not told: _random, planner",
+        "context tokens are not reported: _random, planner",
     ):
         assert words in said
     assert sorted(path.name for path in tmp_path.iterdir()) == ["figure7.png", "figure7.svg"]
 
 
 def test_a_name_in_letters_that_the_font_lacks_is_no_warning(tmp_path, recwarn):
-    curves = reward_curves([made_run("模型", records(1.0))])
+    curves = plan_curves([made_run("模型", records(1.0))])
     _, svg = draw_curves(curves, one_panel(curves), tmp_path, "figure7")
     assert "模型" in texts(svg)
     assert not recwarn.list
@@ -68,26 +68,26 @@ def test_a_name_in_letters_that_the_font_lacks_is_no_warning(tmp_path, recwarn):
 def test_the_same_curves_give_the_same_bytes(tmp_path):
     first, second = (
         draw_curves(curves, one_panel(curves), tmp_path, name)[1].read_bytes()
-        for name, curves in (("one", reward_curves(runs())), ("two", reward_curves(runs())))
+        for name, curves in (("one", plan_curves(runs())), ("two", plan_curves(runs())))
     )
     assert first == second
 
 
 def test_a_bound_without_tokens_leaves_one_column(tmp_path):
-    curves = reward_curves([made_run("m", records(1.0, tokens=False))])
+    curves = plan_curves([made_run("m", records(1.0, tokens=False))])
     _, svg = draw_curves(curves, one_panel(curves), tmp_path, "figure7")
     assert "at most" in texts(svg)
     assert not any("(tokens)" in words for words in texts(svg))
 
 
 def test_the_label_names_the_embedded_runs_where_not_all_are():
-    assert embedded_label(reward_curves(runs(simulator="unity"))) is None
-    mixed = reward_curves([made_run("m", records(1.0)), made_run("n", records(1.0), simulator="unity")])
+    assert embedded_label(plan_curves(runs(simulator="unity"))) is None
+    mixed = plan_curves([made_run("m", records(1.0)), made_run("n", records(1.0), simulator="unity")])
     assert embedded_label(mixed) == "embedded simulator (m): not comparable with the paper's curves"
 
 
 def test_the_table_has_the_ends():
-    table = curves_table(reward_curves(runs()))
+    table = curves_table(plan_curves(runs()))
     # Of the first run, 4 plans in each of three trajectories: 4, 8 and 12 points; 8, 12 and 16 of the planner.
     assert table.rows[0].cells == ("model $x$ & <y>", "8.00", "[-1.94, 17.94]", "66.7", "40", "300", "12", "0", "0")
     assert table.rows[-1].cells[:4] == ("planner", "12.00", "[2.06, 21.94]", "100.0")
@@ -95,13 +95,13 @@ def test_the_table_has_the_ends():
 
 
 def test_panels_have_their_runs_and_the_bound(tmp_path):
-    curves = reward_curves(runs())
+    curves = plan_curves(runs())
     file = tmp_path / "panels.yaml"
     file.write_text("First: ['model $x$ & <y>']\nSecond: [_random]\n")
     _, svg = draw_curves(curves, read_panels(file, curves), tmp_path, "figure7")
     said = texts(svg)
     assert [said.count(words) for words in ("First", "Second", "planner", "_random")] == [1, 1, 2, 1]
-    assert "context tokens are not told" in said
+    assert "context tokens are not reported" in said
 
 
 BAD_PANELS = {
@@ -120,12 +120,12 @@ def test_panels_of_another_form_are_refused(tmp_path, content):
     file = tmp_path / "panels.yaml"
     file.write_text(content)
     with pytest.raises(DataError, match=re.escape(BAD_PANELS[content])):
-        read_panels(file, reward_curves(runs()))
+        read_panels(file, plan_curves(runs()))
 
 
 def test_the_example_names_five_panels_for_runs_of_its_names():
     names = ["qwen", "qwen-yarn2", "qwen-yarn4", "qwen-linear2", "qwen-dynamic2", "qwen-ft32k", "qwen-ft64k"]
-    curves = reward_curves([made_run(name, records(1.0)) for name in [*names, "qwen-ft64k-yarn2"]])
+    curves = plan_curves([made_run(name, records(1.0)) for name in [*names, "qwen-ft64k-yarn2"]])
     panels = read_panels(EXAMPLE, curves)
     assert len(panels) == 5
     assert {label for panel in panels for label in panel.labels} == {*names, "qwen-ft64k-yarn2"}

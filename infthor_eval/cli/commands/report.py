@@ -192,36 +192,33 @@ def _headers(folders: tuple[Path, ...], figure: str) -> list[RunHeader]:
 
 
 def _plans(asked: _Asked) -> _Made:
-    from infthor_eval.plans.curve_runs import PlansRun
-    from infthor_eval.plans.curves import reward_curves
-    from infthor_eval.plans.records import RECORDS
+    from infthor_eval.plans.curves import plan_curves
+    from infthor_eval.plans.recorded_runs import PlansRun
     from infthor_eval.report.curves import model_names, run_labels
-    from infthor_eval.runs import read_run
 
-    found = [read_run(folder, RECORDS) for folder in asked.folders]
     labels = run_labels(asked.folders, model_names(asked.headers))
-    runs = [PlansRun(label, *run) for label, run in zip(labels, found, strict=True)]
-    return _curves(reward_curves(runs, asked.task), asked.panels)
+    runs = [PlansRun.read(folder, label) for folder, label in zip(asked.folders, labels, strict=True)]
+    return _curves(plan_curves(runs, asked.task), asked.panels)
 
 
 def _arms(asked: _Asked) -> _Made:
-    from infthor_eval.manipulation.curve_runs import arm_runs, with_radii
     from infthor_eval.manipulation.curves import arm_curves
+    from infthor_eval.manipulation.recorded_runs import ArmRun, label_by_radius
     from infthor_eval.report.curves import model_names, run_labels
 
-    named = with_radii(arm_runs(asked.folders, model_names(asked.headers)))
+    named = label_by_radius(list(map(ArmRun.read, asked.folders, model_names(asked.headers))))
     labels = run_labels(asked.folders, [run.label for run in named])
     runs = [replace(run, label=label) for run, label in zip(named, labels, strict=True)]
     return _curves(arm_curves(runs, asked.task), asked.panels)
 
 
 def _radii(asked: _Asked) -> _Made:
-    from infthor_eval.manipulation.curve_runs import arm_runs
     from infthor_eval.manipulation.radii import success_by_radius
+    from infthor_eval.manipulation.recorded_runs import ArmRun
     from infthor_eval.report.curves import model_names
     from infthor_eval.report.radius_figure import draw_radii, radii_table
 
-    found = success_by_radius(arm_runs(asked.folders, model_names(asked.headers)), asked.task)
+    found = success_by_radius(list(map(ArmRun.read, asked.folders, model_names(asked.headers))), asked.task)
     return _Made(radii_table(found), lambda folder, name: draw_radii(found, folder, name))
 
 

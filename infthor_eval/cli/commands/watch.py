@@ -138,19 +138,18 @@ def watch_arms(wanted: Wanted) -> None:
     from infthor_eval.cli.progress.bar import PacedBar
     from infthor_eval.errors import UsageError
     from infthor_eval.formats.files import prepare_file
-    from infthor_eval.manipulation.curve_runs import arm_runs
+    from infthor_eval.manipulation.recorded_runs import ArmRun
     from infthor_eval.manipulation.replaying import recorded_episodes, replay_episodes
-    from infthor_eval.runs import read_header
     from infthor_eval.terminal import error_console, print_line, progress_bar
 
     refuse_options(wanted, "manipulation", {"--plans": wanted.plans})
     if wanted.sheet is not None and wanted.out is not None:
         raise UsageError("--sheet and --out: one picture or a recording; give one of the two")
-    (run,) = arm_runs([wanted.run], [read_header(wanted.run).name])
+    run = ArmRun.read(wanted.run)
     recorded = recorded_episodes(run, wanted.task, wanted.trajectory)
     chosen = _chosen_episodes(recorded, wanted)
     path = prepare_file(wanted.sheet or wanted.out or _arm_place(recorded, wanted))
-    above = heading([run.label, *sorted({record.task for record in chosen}), recorded.trajectory], run.about.simulator)
+    above = heading([run.label, *sorted({record.task for record in chosen}), recorded.trajectory], run.config.simulator)
     notes = error_console()
     with replay_episodes(recorded, wanted.data, wanted.scenes) as stage, progress_bar(notes) as progress:
         bar = PacedBar(progress, recorded.trajectory, sum(len(record.payload.steps) + 1 for record in chosen))
@@ -224,21 +223,18 @@ def watch_plans(wanted: Wanted) -> None:
     from infthor_eval.cli.progress.bar import PacedBar
     from infthor_eval.formats.animations import write_animation
     from infthor_eval.formats.files import prepare_file
-    from infthor_eval.plans.curve_runs import PlansRun
-    from infthor_eval.plans.records import RECORDS
+    from infthor_eval.plans.recorded_runs import PlansRun
     from infthor_eval.plans.replaying import recorded_plans, replay
     from infthor_eval.report.recording import pictures
-    from infthor_eval.runs import read_run
     from infthor_eval.terminal import error_console, print_line, progress_bar
 
     refuse_options(wanted, "plans", {"--episode": wanted.episode, "--sheet": wanted.sheet})
-    header, records = read_run(wanted.run, RECORDS)
-    recorded = recorded_plans(PlansRun(header.name, header, records), wanted.task, wanted.trajectory)
+    recorded = recorded_plans(PlansRun.read(wanted.run), wanted.task, wanted.trajectory)
     chosen = _chosen_plans(recorded, wanted.plans)
     label, parts = recorded.run.label, [recorded.task, recorded.trajectory]
     choice = [] if wanted.plans is None else [wanted.plans.strip()]
     path = prepare_file(wanted.out or place_of([label, *parts, *choice]))
-    above = heading([label, *parts], recorded.run.about.simulator)
+    above = heading([label, *parts], recorded.run.config.simulator)
     notes = error_console()
     with replay(recorded, wanted.data, wanted.scenes) as stage, progress_bar(notes) as progress:
         bar = PacedBar(progress, recorded.trajectory, sum(len(plan.payload.steps) + 1 for plan in chosen))

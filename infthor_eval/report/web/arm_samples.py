@@ -2,8 +2,8 @@
 
 from PIL import Image
 
-from infthor_eval.manipulation.curve_runs import ArmRun
 from infthor_eval.manipulation.moments import ArmSight
+from infthor_eval.manipulation.recorded_runs import ArmRun
 from infthor_eval.manipulation.records import ArmRecord
 from infthor_eval.report.reach_view import draw_reach
 from infthor_eval.report.web.episode_samples import EpisodeKind, Head

@@ -8,11 +8,11 @@ from matplotlib.figure import Figure
 
 from infthor_eval.episodes.curves import RewardCurves
 from infthor_eval.errors import InfthorError
-from infthor_eval.manipulation.curve_runs import ArmRun, with_radii
 from infthor_eval.manipulation.curves import arm_curves
 from infthor_eval.manipulation.radii import success_by_radius
-from infthor_eval.plans.curve_runs import PlansRun
-from infthor_eval.plans.curves import reward_curves
+from infthor_eval.manipulation.recorded_runs import ArmRun, label_by_radius
+from infthor_eval.plans.curves import plan_curves
+from infthor_eval.plans.recorded_runs import PlansRun
 from infthor_eval.report.curves import curves_table, one_panel
 from infthor_eval.report.drawing import inline_svg
 from infthor_eval.report.figures import curves_figure
@@ -37,8 +37,8 @@ def plan_sections(runs: Sequence[ReportRun]) -> Iterator[Section]:
 def arm_sections(runs: Sequence[ReportRun]) -> Iterator[Section]:
     """Reward of arms along trajectories, and success by radius where there are several."""
     drawn = [arm_run(run) for run in runs]
-    yield _section("arm-rewards", "Reward of pick-ups and puts", lambda: _curves(arm_curves(with_radii(drawn))))
-    if len({task.radius for run in drawn for task in run.about.tasks.values()}) < 2:
+    yield _section("arm-rewards", "Reward of pick-ups and puts", lambda: _curves(arm_curves(label_by_radius(drawn))))
+    if len({task.radius for run in drawn for task in run.config.tasks.values()}) < 2:
         return  # one radius is no curve
     models = [replace(it, label=run.model) for it, run in zip(drawn, runs, strict=True)]
     yield _section("arm-radius", "Success by the hand's radius", lambda: _radii(models))
@@ -58,7 +58,7 @@ def _section(key: str, title: str, make: Callable[[], tuple[Callable[[], Figure]
 
 
 def _plan_curves(runs: Sequence[PlansRun], task: str) -> tuple[Callable[[], Figure], Table, str]:
-    return _curves(reward_curves(runs, task))
+    return _curves(plan_curves(runs, task))
 
 
 def _curves(curves: RewardCurves) -> tuple[Callable[[], Figure], Table, str]:

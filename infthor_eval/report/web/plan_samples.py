@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from infthor_eval.plans.curve_runs import PlansRun
+from infthor_eval.plans.recorded_runs import PlansRun
 from infthor_eval.plans.records import PlanRecord
 from infthor_eval.report.room_map import draw_map
 from infthor_eval.report.web.episode_samples import EpisodeKind, Head

@@ -1,0 +1,155 @@
+"""Runs of episodes as their journals have them: for curves over several runs, and for replays."""
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, ClassVar, Generic, Protocol, Self, TypeVar
+
+import msgspec
+
+from infthor_eval.errors import wrap_errors
+from infthor_eval.runs import RecordTypes, RunHeader, UnitRecord, read_run
+
+__all__ = ["EpisodePayload", "RecordedRun", "RunConfig", "TaskConfig"]
+
+_EMBEDDED = "embedded"  # as the option --simulator names it
+
+
+class EpisodePayload(Protocol):
+    """What the records of plans and of arms have in common."""
+
+    @property
+    def index(self) -> int:
+        """Place in the trajectory."""
+        ...
+
+    @property
+    def steps(self) -> Sequence[Any]:
+        """Steps that the subject took."""
+        ...
+
+    @property
+    def reward(self) -> float:
+        """Reward of all steps."""
+        ...
+
+    @property
+    def max_reward(self) -> float | None:
+        """The highest possible reward; None if it is not known."""
+        ...
+
+    @property
+    def ended(self) -> str:
+        """How the episode ended; empty if it failed or was excluded."""
+        ...
+
+    @property
+    def attempted(self) -> bool:
+        """Whether the subject acted in it."""
+        ...
+
+    @property
+    def done(self) -> bool:
+        """Whether it is a success."""
+        ...
+
+
+class TaskConfig(msgspec.Struct, frozen=True, kw_only=True):
+    """The part of a task's run config that curves and replays need.
+
+    Attributes:
+        trajectories: digests of the trajectories, by name.
+        config: settings of the task file.
+    """
+
+    trajectories: dict[str, str]
+    config: dict[str, Any] = {}
+
+    @property
+    def settings(self) -> Mapping[str, Any]:
+        """`dataset_kwargs` of the task file."""
+        settings = self.config.get("dataset_kwargs")
+        return settings if isinstance(settings, Mapping) else {}
+
+
+P = TypeVar("P", bound=EpisodePayload)
+T = TypeVar("T", bound=TaskConfig)
+
+
+class RunConfig(msgspec.Struct, Generic[T], frozen=True):
+    """The part of a run's config that curves and replays need.
+
+    Attributes:
+        model: name and options of the subject.
+        simulator: simulator that it acted in.
+        tasks: configs of the tasks, by name.
+    """
+
+    model: dict[str, Any]
+    simulator: str
+    tasks: dict[str, T]
+
+
+@dataclass(frozen=True)
+class RecordedRun(Generic[P, T]):
+    """The journal of a run of episodes.
+
+    Attributes:
+        label: name of the run beside others.
+        header: header of the journal.
+        records: records of all episodes.
+    """
+
+    label: str
+    header: RunHeader
+    records: Sequence[UnitRecord[P]]
+
+    suite: ClassVar[str]
+    record_types: ClassVar[RecordTypes]
+    task_config: ClassVar[type[TaskConfig]]
+    planner: ClassVar[str]  # the baseline that is an upper bound; its own module would import the simulator
+
+    @classmethod
+    def read(cls, folder: Path, label: str | None = None) -> Self:
+        """Read the run in a folder; its own name is the label if none is given.
+
+        Raises:
+            DataError: the journal is missing or damaged.
+        """
+        header, records = read_run(folder, cls.record_types)
+        return cls(label or header.name, header, records)
+
+    @cached_property
+    def config(self) -> RunConfig[T]:
+        """The run's config.
+
+        Raises:
+            DataError: it is not the config of a run of this suite.
+        """
+        problem = f"{self.label}: not the config of a run of {self.suite}"
+        with wrap_errors(problem, "start the run again with --fresh", catch=msgspec.ValidationError):
+            config: RunConfig[T] = msgspec.convert(self.header.identity, RunConfig[self.task_config])  # type: ignore[name-defined]
+        return config
+
+    @property
+    def is_planner(self) -> bool:
+        """Whether the subject is the baseline that knows the solution."""
+        return bool(self.config.model.get("baseline") == self.planner)
+
+    @property
+    def is_embedded(self) -> bool:
+        """Whether the run used the embedded simulator."""
+        return self.config.simulator == _EMBEDDED
+
+    def by_trajectory(self, tasks: Collection[str]) -> dict[str, dict[tuple[int, str], UnitRecord[P]]]:
+        """Return the records of some tasks by trajectory, then by place in it and task."""
+        records: dict[str, dict[tuple[int, str], UnitRecord[P]]] = {}
+        for record in self.records:
+            if record.task in tasks:
+                records.setdefault(record.cluster, {})[record.payload.index, record.task] = record
+        return records
+
+    def digests(self, tasks: Sequence[str]) -> dict[str, str]:
+        """Return the digests of some tasks' trajectories, by name."""
+        return {name: digest for task in tasks for name, digest in self.config.tasks[task].trajectories.items()}
