@@ -73,7 +73,8 @@ def _size(rate: Rate | None) -> int:
 def _episodes_table(runs: Sequence[RunSummary]) -> Table:
     rows = [
         Row((
-            name, task_name, f"{task.radius:g}", format_percent(task.inside if task.kind == ManipulationKind.PICKUP else None),
+            name, task_name, f"{task.radius:g}",
+            format_percent(task.inside if task.kind == ManipulationKind.PICKUP else None),
             _number(task.closest, 2), _number(task.steps), _number(task.collisions),
         ))
         for name, summary in _named(runs)
