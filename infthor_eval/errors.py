@@ -33,7 +33,7 @@ class InfthorError(Exception):
 
 
 class UsageError(InfthorError):
-    """The command was misused: an unknown name, an option that does not fit."""
+    """The command was misused: an unknown name, or options that do not fit together."""
 
 
 class DataError(InfthorError):
@@ -41,26 +41,26 @@ class DataError(InfthorError):
 
 
 class ModelError(InfthorError):
-    """A model cannot be loaded, or cannot do what is asked of it."""
+    """A model cannot be loaded, or cannot do what is required of it."""
 
 
 class SimulatorError(InfthorError):
-    """The simulator cannot be started, died, hung, or answered with something that is not its protocol."""
+    """The simulator cannot be started, died, hung, or sent something that is not its protocol."""
 
     exit_code = 1
 
 
 class SceneError(SimulatorError):
-    """The simulator has no such scene, or refuses it; another try would end the same way."""
+    """The simulator has no such scene or refuses it; a retry would end the same way."""
 
 
 def unknown_name(what: str, name: str, known: Iterable[str]) -> UsageError:
-    """The error of a name that there is not: with the nearest known one, or all of them.
+    """Return the error for an unknown name; it suggests the closest known name, or lists them all.
 
     Args:
-        what: what it should name ("task").
-        name: as typed.
-        known: the names that there are.
+        what: kind of thing that the name should stand for ("task").
+        name: the name as typed.
+        known: the known names.
     """
     names = sorted(known)
     near = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
@@ -69,16 +69,16 @@ def unknown_name(what: str, name: str, known: Iterable[str]) -> UsageError:
 
 
 def in_one_line(error: BaseException) -> str:
-    """What an error of another library says, short enough to stand within a message of ours."""
-    reason = error.strerror if isinstance(error, OSError) else None
-    said = " ".join((reason or str(error)).split()) or type(error).__name__
-    if isinstance(error, KeyError):  # whose text is the key alone
-        said = f"no {said}"
-    return said if len(said) <= _LONGEST else said[: _LONGEST - 3] + "..."
+    """Return the message of another library's error as one line, short enough to be part of our message."""
+    reason = error.strerror if isinstance(error, OSError) else None  # `str` would repeat the path
+    text = " ".join((reason or str(error)).split()) or type(error).__name__
+    if isinstance(error, KeyError):  # its text is only the key
+        text = f"no {text}"
+    return text if len(text) <= _LONGEST else text[: _LONGEST - 3] + "..."
 
 
 def describe_exception(error: Exception) -> str:
-    """What a programming error is, where, and what it says."""
+    """Return type, place and message of an unexpected exception, in one line."""
     place = traceback.extract_tb(error.__traceback__)[-1]
     where = f"{Path(place.filename).name}:{place.lineno} ({place.name})"
     return f"{type(error).__name__} in {where}: {in_one_line(error)}"
@@ -92,13 +92,13 @@ def wrap_errors(
     catch: type[BaseException] | tuple[type[BaseException], ...] = OSError,
     raise_as: type[InfthorError] = DataError,
 ) -> Iterator[None]:
-    """Turn errors of another library, or of the system, into a one-line error for people; ours pass unchanged.
+    """Turn errors of another library or of the system into a one-line error for people; our own pass unchanged.
 
     Args:
-        problem: what is wrong, and where ("set.json: not JSON").
-        hint: how to fix it.
-        catch: the errors to convert.
-        raise_as: the class to convert them to.
+        problem: the problem and its place ("set.json: not JSON").
+        hint: the way to fix it.
+        catch: error classes to convert.
+        raise_as: class to convert them to.
 
     Raises:
         InfthorError: an instance of `raise_as`, with the message "PROBLEM (REASON); HINT".

@@ -1,6 +1,6 @@
-"""Means with their intervals, as summaries keep them and tables show them.
+"""Means with their intervals, as summaries store them and tables show them.
 
-What reckons them is imported where it is needed: runs are listed without it.
+`statistics` is imported where it is needed: it loads scipy, and listing runs does without.
 """
 
 from collections.abc import Hashable, Sequence
@@ -19,9 +19,9 @@ class Rate(msgspec.Struct, frozen=True):
 
     Attributes:
         mean: the mean.
-        low: lower end; None with fewer than two trajectories.
-        high: upper end.
-        n: how many it is over.
+        low: lower end of the interval; None with fewer than two trajectories.
+        high: upper end of the interval; None with fewer than two trajectories.
+        n: number of values.
     """
 
     mean: float
@@ -31,34 +31,36 @@ class Rate(msgspec.Struct, frozen=True):
 
 
 def clustered_rate(values: Sequence[float], clusters: Sequence[Hashable]) -> Rate | None:
-    """The mean of values of units, see `clustered_mean`; None of nothing."""
+    """Return the mean of the values of units (see `clustered_mean`), or None if there are none."""
     from infthor_eval.statistics import clustered_mean
 
     return _rate(clustered_mean(values, clusters)) if values else None
 
 
 def rate_over_clusters(values: Sequence[float]) -> Rate | None:
-    """The mean of numbers of which each cluster has one, see `mean_over_clusters`; None of nothing."""
+    """Return the mean of one value per cluster (see `mean_over_clusters`), or None if there are none."""
     from infthor_eval.statistics import mean_over_clusters
 
     return _rate(mean_over_clusters(values)) if values else None
 
 
 def format_percent(rate: Rate | None) -> str:
-    """A share in a table's cell, in percent."""
-    return "-" if rate is None else _written(rate, 100.0)
+    """Return a share as a table cell, in percent."""
+    return _format(rate, 100.0)
 
 
 def format_number(rate: Rate | None) -> str:
-    """A number in a table's cell."""
-    return "-" if rate is None else _written(rate, 1.0)
+    """Return a number as a table cell."""
+    return _format(rate, 1.0)
 
 
 def _rate(estimate: "MeanEstimate") -> Rate:
     return Rate(estimate.mean, estimate.low, estimate.high, estimate.n)
 
 
-def _written(rate: Rate, factor: float) -> str:
+def _format(rate: Rate | None, factor: float) -> str:
+    if rate is None:
+        return "-"
     mean = f"{factor * rate.mean:.1f}"
     if rate.low is None or rate.high is None:
         return mean

@@ -1,4 +1,4 @@
-"""Reasons for people: those that differ in their numbers alone are one."""
+"""Counting reasons for people; reasons that differ only in their numbers are counted as one."""
 
 import re
 from collections import defaultdict
@@ -7,26 +7,26 @@ from typing import TypeVar
 
 __all__ = ["count_reasons"]
 
-_Where = TypeVar("_Where", str, tuple[str, str])  # a task, or a task and what became of its units
+_Where = TypeVar("_Where", str, tuple[str, str])  # a task, or a task and the outcome of its units
 
-# A number that stands alone: those in paths, names and ids tell things apart.
+# A number that is a word of its own. Numbers in paths, names and ids are not merged: they tell things apart.
 _NUMBER = re.compile(r"(?<![\w/.,-])\d+(?:,\d{3})*(?:\.\d+)?(?![\w/]|[.,-]\w)")
 
 
 def count_reasons(reasons: Iterable[tuple[_Where, str]]) -> list[tuple[_Where, str, int]]:
-    """Task, reason and how often, in the order of the alphabet; numbers that differ are told as a range.
+    """Return task, reason and count in alphabetical order; numbers that differ are given as a range.
 
     Args:
-        reasons: task (or task and what became of it) and reason of each case.
+        reasons: task (or task and outcome) and reason of each case.
     """
-    alike: dict[tuple[_Where, str], list[str]] = defaultdict(list)
+    groups: dict[tuple[_Where, str], list[str]] = defaultdict(list)
     for where, reason in reasons:
-        alike[where, _NUMBER.sub("#", reason)].append(reason)
-    return [(where, _in_ranges(found), len(found)) for (where, _), found in sorted(alike.items())]
+        groups[where, _NUMBER.sub("#", reason)].append(reason)
+    return [(where, _merge(group), len(group)) for (where, _), group in sorted(groups.items())]
 
 
-def _in_ranges(reasons: list[str]) -> str:
-    """One reason for all: they differ in their numbers alone."""
+def _merge(reasons: list[str]) -> str:
+    """Return one text for reasons that differ only in their numbers."""
     columns = zip(*(_NUMBER.findall(reason) for reason in reasons), strict=True)
     ranges = iter([_range(column) for column in columns])
     return _NUMBER.sub(lambda _: next(ranges), reasons[0])

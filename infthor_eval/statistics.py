@@ -1,7 +1,7 @@
-"""How sure a mean score is, when questions on one trajectory are not independent.
+"""Means of scores with 95 % intervals that are clustered by trajectory.
 
-Questions share their trajectory's frames, scene and objects, so they are right or wrong together; the unit that
-repeats is the trajectory. Every interval here resamples or sums over trajectories, through one partition.
+Questions on one trajectory share its frames, scene and objects, so their scores are correlated. The independent unit
+is the trajectory. Every interval here sums or resamples over trajectories, through one partition (`_partition`).
 """
 
 import math
@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
-from scipy import special  # not stats, which takes a second to import and comes to the same
+from scipy import special  # not scipy.stats, which takes a second to import and gives the same quantiles
 
 from infthor_eval.errors import DataError
 
@@ -28,13 +28,13 @@ _LEVEL = 0.95
 
 @dataclass(frozen=True)
 class MeanEstimate:
-    """A mean and how sure it is.
+    """A mean with its uncertainty.
 
     Attributes:
-        mean: the mean score.
-        stderr: its standard error, clustered; None with fewer than two clusters.
-        low: lower end of the 95 % interval, which need not be symmetric; None as above.
-        high: upper end.
+        mean: mean score.
+        stderr: clustered standard error; None with fewer than two clusters.
+        low: lower end of the 95 % interval, which need not be symmetric; None with fewer than two clusters.
+        high: upper end of the interval; None with fewer than two clusters.
         n: number of scores.
         n_clusters: number of clusters.
     """
@@ -49,11 +49,11 @@ class MeanEstimate:
 
 @dataclass(frozen=True)
 class Difference:
-    """The mean difference of two runs on the same questions, and the probability of one so large by chance.
+    """The mean difference of two runs on the same questions, with its p-value.
 
     Attributes:
-        estimate: of the differences, second minus first.
-        p: two-sided, from the clustered t statistic; None with fewer than two clusters.
+        estimate: mean of the differences, second run minus first.
+        p: two-sided p-value of the clustered t statistic; None with fewer than two clusters.
     """
 
     estimate: MeanEstimate
@@ -61,17 +61,18 @@ class Difference:
 
 
 def clustered_mean(scores: Sequence[float], clusters: Sequence[Hashable]) -> MeanEstimate:
-    """The mean with a cluster-robust standard error, and an interval that stays honest near all right and all wrong.
+    """Return the mean with a cluster-robust standard error and a 95 % interval.
 
-    Scores from 0 to 1 get Wilson's interval on the effective sample size, which is not zero wide where all are equal;
-    others (the reference scorer can exceed 1) and differences a t interval, of clusters minus one degrees of freedom.
+    If all scores lie between 0 and 1, the interval is of Wilson's type on the effective sample size, so it stays valid
+    near 0 and 1 and is not empty where all scores are equal. Other scores (the reference scorer can exceed 1) get a t
+    interval with `n_clusters - 1` degrees of freedom.
 
     Args:
-        scores: one per question.
-        clusters: the trajectory of each.
+        scores: one score per question.
+        clusters: trajectory of each question.
 
     Raises:
-        DataError: there is no score, or a score without its cluster.
+        DataError: there is no score, or a score has no cluster.
     """
     totals, sizes = _partition(scores, clusters)
     estimate = _with_t_interval(totals, sizes)
@@ -82,16 +83,16 @@ def clustered_mean(scores: Sequence[float], clusters: Sequence[Hashable]) -> Mea
 
 
 def mean_over_clusters(values: Sequence[float]) -> MeanEstimate:
-    """The mean of numbers of which each cluster has one (a trajectory's reward), with a t interval.
+    """Return the mean and t interval of values with one per cluster (such as the rewards of trajectories).
 
-    Unlike `clustered_mean` it takes no number for a share: points of a curve that happen to lie between 0 and 1 get the
-    same kind of interval as those that do not.
+    Unlike `clustered_mean`, this never takes values for shares: the points of a reward curve that happen to lie between
+    0 and 1 get the same kind of interval as all others.
 
     Args:
-        values: one per cluster.
+        values: one value per cluster.
 
     Raises:
-        DataError: there is none.
+        DataError: there is no value.
     """
     return _with_t_interval(*_partition(values, range(len(values))))
 
@@ -101,15 +102,16 @@ def _with_t_interval(totals: np.ndarray, sizes: np.ndarray) -> MeanEstimate:
     mean = float(totals.sum() / n)
     if n_clusters < 2:
         return MeanEstimate(mean, None, None, None, n, n_clusters)
-    # Residual of each cluster's total: the ratio estimator's linearisation, as clusters differ in size.
+    # Clusters differ in size, so the mean is a ratio of two random sums. This linearises the ratio (Taylor): the
+    # residual of a cluster is its total minus what the mean predicts for its size.
     residuals = totals - mean * sizes
     stderr = math.sqrt(n_clusters / (n_clusters - 1) * float(residuals @ residuals)) / n
-    reach = _quantile(n_clusters) * stderr
-    return MeanEstimate(mean, stderr, mean - reach, mean + reach, n, n_clusters)
+    margin = _t_quantile(n_clusters) * stderr
+    return MeanEstimate(mean, stderr, mean - margin, mean + margin, n, n_clusters)
 
 
 @cache
-def _quantile(n_clusters: int) -> float:
+def _t_quantile(n_clusters: int) -> float:
     return float(special.stdtrit(n_clusters - 1, 0.5 + _LEVEL / 2))
 
 
@@ -117,35 +119,43 @@ _NORMAL_QUANTILE = float(special.ndtri(0.5 + _LEVEL / 2))
 
 
 def _effective_size(estimate: MeanEstimate) -> float:
-    """How many independent questions tell as much.
+    """Return the number of independent questions that would give as much information.
 
-    The design effect says how much clustering inflates the variance; it is measured on few clusters, which counts
-    against it as in a t interval. It shows in the questions that are not like the others: the fewer there are, the more
-    weight its worst value gets, that of clusters which are right or wrong as a whole. What comes of it is shown by
-    `benchmarks/interval_coverage.py`.
+    It is the number of questions over the design effect, the factor by which clustering inflates the variance. The
+    coverage of the resulting interval is measured by `benchmarks/interval_coverage.py`.
     """
+    # If each cluster is right or wrong as a whole, a cluster counts as one question.
     worst = estimate.n / estimate.n_clusters
     variance, stderr = estimate.mean * (1 - estimate.mean), estimate.stderr or 0.0
+    # At least 1: clusters that happen to be more alike than chance are no evidence for more than `n` questions.
     measured = max(1.0, stderr**2 * estimate.n / variance) if variance > 0 else worst
-    measured *= (_quantile(estimate.n_clusters) / _NORMAL_QUANTILE) ** 2
-    n_unlike = estimate.n * min(estimate.mean, 1 - estimate.mean)
-    return estimate.n / ((n_unlike * measured + worst) / (n_unlike + 1))
+    # The effect is itself estimated on few clusters, which widens the interval as in a t interval.
+    measured *= (_t_quantile(estimate.n_clusters) / _NORMAL_QUANTILE) ** 2
+    # Only the rarer outcome tells how strongly clusters agree. Where it is rare, the measured effect is unreliable and
+    # the worst case gets more weight: that of one question beside `n_rare` observed ones.
+    n_rare = estimate.n * min(estimate.mean, 1 - estimate.mean)
+    return estimate.n / ((n_rare * measured + worst) / (n_rare + 1))
 
 
 def _wilson(mean: float, n: float) -> tuple[float, float]:
-    """Wilson's score interval of a share among `n` questions."""
+    """Return Wilson's score interval of a share among `n` questions (Wilson 1927, with z the normal quantile).
+
+    centre = (mean + z²/2n) / (1 + z²/n), margin = z / (1 + z²/n) * sqrt(mean (1 - mean) / n + z²/4n²)
+    """
     spread = _NORMAL_QUANTILE**2 / n
     centre = (mean + spread / 2) / (1 + spread)
-    reach = _NORMAL_QUANTILE / (1 + spread) * math.sqrt(mean * (1 - mean) / n + spread / (4 * n))
-    return max(0.0, min(mean, centre - reach)), min(1.0, max(mean, centre + reach))
+    margin = _NORMAL_QUANTILE / (1 + spread) * math.sqrt(mean * (1 - mean) / n + spread / (4 * n))
+    # The interval holds the mean and lies within [0, 1] exactly; rounding alone could break both at 0 and 1.
+    return max(0.0, min(mean, centre - margin)), min(1.0, max(mean, centre + margin))
 
 
 def bootstrap_interval(
     scores: Sequence[float], clusters: Sequence[Hashable], seed: int = 0, n_resamples: int = 2000
 ) -> tuple[float, float] | None:
-    """The 95 % percentile interval of the mean over resampled clusters.
+    """Return the 95 % percentile interval of the mean over resampled clusters.
 
-    None where resampling tells nothing: of fewer than two clusters, or scores that are all alike.
+    It is None where resampling has nothing to vary: with fewer than two clusters, or if all scores are equal. The same
+    seed and the same order of clusters give the same interval.
 
     Raises:
         DataError: as in `clustered_mean`.
@@ -160,15 +170,15 @@ def bootstrap_interval(
 
 
 def paired_difference(first: Sequence[float], second: Sequence[float], clusters: Sequence[Hashable]) -> Difference:
-    """How much better the second run is on the same questions.
+    """Return the mean difference of two runs on the same questions, second minus first.
 
     Args:
         first: scores of the first run.
         second: scores of the second run, in the same order.
-        clusters: the trajectory of each question.
+        clusters: trajectory of each question.
 
     Raises:
-        DataError: the runs differ in length, and as in `clustered_mean`.
+        DataError: the runs differ in length, or as in `clustered_mean`.
     """
     if len(first) != len(second):
         raise DataError(f"{len(first)} and {len(second)} scores cannot be paired; compare runs on the same questions")
@@ -176,14 +186,14 @@ def paired_difference(first: Sequence[float], second: Sequence[float], clusters:
     estimate = _with_t_interval(totals, sizes)
     if estimate.stderr is None:
         return Difference(estimate, None)
-    if estimate.stderr == 0:
+    if estimate.stderr == 0:  # every question differs by the same amount: either by nothing, or never by chance
         return Difference(estimate, 1.0 if estimate.mean == 0 else 0.0)
     t = abs(estimate.mean / estimate.stderr)
     return Difference(estimate, float(2 * special.stdtr(estimate.n_clusters - 1, -t)))
 
 
 def _partition(scores: Sequence[float], clusters: Sequence[Hashable]) -> tuple[np.ndarray, np.ndarray]:
-    """Sum of scores and number of questions per cluster; everything above is computed from these alone."""
+    """Return the sum of scores and the number of questions per cluster, from which all else here is computed."""
     if not scores:
         raise DataError("there is no score to take the mean of")
     if len(scores) != len(clusters):
@@ -191,6 +201,6 @@ def _partition(scores: Sequence[float], clusters: Sequence[Hashable]) -> tuple[n
     for index, cluster in enumerate(clusters):
         if cluster is None or cluster == "":
             raise DataError(f"score {index} has no trajectory; intervals cluster by it")
-    numbers = {cluster: number for number, cluster in enumerate(dict.fromkeys(clusters))}
-    of = np.array([numbers[cluster] for cluster in clusters])
-    return np.bincount(of, weights=np.asarray(scores, dtype=float)), np.bincount(of).astype(float)
+    indices = {cluster: index for index, cluster in enumerate(dict.fromkeys(clusters))}
+    cluster_of = np.array([indices[cluster] for cluster in clusters])
+    return np.bincount(cluster_of, weights=np.asarray(scores, dtype=float)), np.bincount(cluster_of).astype(float)

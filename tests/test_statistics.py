@@ -40,6 +40,22 @@ def test_scores_that_are_all_alike_leave_doubt_that_shrinks_with_the_trajectorie
     assert many.high - many.low < few.high - few.low
 
 
+def test_no_right_answer_on_eight_trajectories_gives_wilsons_textbook_interval():
+    z = 1.959964
+    for per_trajectory in (1, 5):  # questions that are all right or all wrong together count as one
+        estimate = clustered_mean([0.0] * 8 * per_trajectory, list(range(8)) * per_trajectory)
+        assert (estimate.low, estimate.high) == (0.0, pytest.approx(z**2 / (8 + z**2), abs=1e-6))
+
+
+def test_the_ends_of_an_interval_of_shares_solve_wilsons_equation():
+    z, t = 1.959964, 2.262157  # t of 9 degrees of freedom
+    estimate = clustered_mean([1.0] * 3 + [0.0] * 7, list(range(10)))
+    design_effect = (3 * 10 / 9 * (t / z) ** 2 + 1) / (3 + 1)
+    for end in (estimate.low, estimate.high):
+        assert (end - 0.3) ** 2 == pytest.approx(z**2 * end * (1 - end) * design_effect / 10, rel=1e-5)
+    assert estimate.low < 0.3 < estimate.high
+
+
 @given(scores)
 def test_intervals_of_shares_hold_the_mean_and_stay_among_shares(pairs):
     estimate = clustered_mean([value for value, _ in pairs], [cluster for _, cluster in pairs])
@@ -106,9 +122,9 @@ def test_the_interval_covers_the_truth_as_often_as_it_says():
 
 
 def test_a_mean_over_clusters_takes_no_number_for_a_share():
-    found = mean_over_clusters([0.0, 1.0])
-    assert (found.mean, found.stderr, found.n_clusters) == (0.5, 0.5, 2)
-    assert (found.low, found.high) == (pytest.approx(0.5 - 6.3531, abs=1e-4), pytest.approx(0.5 + 6.3531, abs=1e-4))
+    estimate = mean_over_clusters([0.0, 1.0])
+    assert (estimate.mean, estimate.stderr, estimate.n_clusters) == (0.5, 0.5, 2)
+    assert (estimate.low, estimate.high) == (pytest.approx(-5.8531, abs=1e-4), pytest.approx(6.8531, abs=1e-4))
     assert mean_over_clusters([3.0]).low is None
     with pytest.raises(DataError):
         mean_over_clusters([])
