@@ -1,4 +1,4 @@
-"""Which frames show what each low-level action did (`expert_log.json`): one each in our sets, several in others."""
+"""The frames of each low-level action (`expert_log.json`): one each in our sets, possibly several in others."""
 
 import json
 from collections.abc import Mapping
@@ -10,19 +10,19 @@ __all__ = ["read_action_log"]
 
 
 def read_action_log(path: Path, places: Mapping[str, int]) -> dict[int, tuple[int, ...]]:
-    """The frames of each low-level action that has some.
+    """Return the frames of each low-level action that has any.
 
     Args:
         path: the file.
-        places: a frame's name without its suffix to its place in the trajectory.
+        places: position in the trajectory of each frame, by the frame's file name without suffix.
 
     Raises:
-        DataError: it is missing, of another form, or names other frames.
+        DataError: the file is missing, has another form, or names frames that are not in `places`.
     """
-    found: dict[int, list[int]] = {}
+    frames: dict[int, list[int]] = {}
     try:
         for image in json.loads(path.read_text(encoding="utf-8"))["images"]:
-            found.setdefault(int(image["low_idx"]), []).append(places[Path(image["image_name"]).stem])
+            frames.setdefault(int(image["low_idx"]), []).append(places[Path(image["image_name"]).stem])
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise DataError(f"{path}: not a log of actions and their frames ({error}); replay it again") from error
-    return {action: tuple(found[action]) for action in sorted(found)}
+    return {action: tuple(frames[action]) for action in sorted(frames)}

@@ -1,4 +1,4 @@
-"""Pictures one after the other as a file that moves: MP4 or GIF; the same pictures give the same bytes."""
+"""Writing pictures as an MP4 or GIF file; the same pictures give the same bytes."""
 
 import tempfile
 from collections.abc import Iterable, Iterator
@@ -14,35 +14,37 @@ from infthor_eval.formats.files import write_atomically
 __all__ = ["ANIMATION_FORMATS", "require_animation_name", "write_animation"]
 
 ANIMATION_FORMATS = (".mp4", ".gif")
-# VP9, which browsers play, and MPEG-4 where an OpenCV lacks it. None of its wheels can encode H.264.
+# VP9, which browsers play, or MPEG-4 where an OpenCV lacks VP9. No OpenCV wheel encodes H.264.
 _CODECS = ("vp09", "mp4v")
-_COLOURS = 128  # of a picture in a GIF
+_COLOURS = 128  # colours of a picture in a GIF
 _HINT = "make room, or give another place with --out"
 
 
 def require_animation_name(path: Path) -> None:
-    """See that a file's name says in which format it is to be written.
+    """Check that a file name has the suffix of a known format.
 
     Raises:
-        UsageError: it does not.
+        UsageError: it has another suffix.
     """
     if path.suffix.lower() not in ANIMATION_FORMATS:
-        raise UsageError(f"--out {path}: a recording is {' or '.join(ANIMATION_FORMATS)}; give a file of such a name")
+        raise UsageError(
+            f"--out {path}: unknown format; give a file name that ends in {' or '.join(ANIMATION_FORMATS)}"
+        )
 
 
 def write_animation(path: Path, pictures: Iterable[Image.Image], per_second: float) -> int:
-    """Write pictures; they are asked for one at a time. The file is there whole or not at all.
+    """Write pictures as an animation, atomically; only one picture at a time is in memory.
 
     Args:
-        path: ends in one of `ANIMATION_FORMATS`.
-        pictures: RGB, all of one even size; at least one.
-        per_second: how many of them are shown in a second.
+        path: the file; its suffix is one of `ANIMATION_FORMATS`.
+        pictures: one or more RGB pictures, all of one size with even sides.
+        per_second: frame rate, pictures per second.
 
     Returns:
-        How many there were.
+        The number of pictures.
 
     Raises:
-        UsageError: the file's name has another ending.
+        UsageError: the file name has another suffix.
         DataError: the file cannot be written.
     """
     require_animation_name(path)
@@ -52,43 +54,44 @@ def write_animation(path: Path, pictures: Iterable[Image.Image], per_second: flo
         write_atomically(path) as partial,
         tempfile.TemporaryDirectory(dir=path.parent, prefix=".recording-") as folder,
     ):
-        made = Path(folder) / f"made{path.suffix.lower()}"  # OpenCV goes by the ending, which `partial` has not
-        n_pictures = write(made, pictures, per_second)
-        made.replace(partial)
+        file = Path(folder) / f"animation{path.suffix.lower()}"  # OpenCV chooses by the suffix, which `partial` lacks
+        n_pictures = write(file, pictures, per_second)
+        file.replace(partial)
     return n_pictures
 
 
 def _write_gif(path: Path, pictures: Iterable[Image.Image], per_second: float) -> int:
-    counted = _Counted(pictures)
-    reduced = (picture.quantize(_COLOURS, dither=Image.Dither.NONE) for picture in counted)
-    first = next(reduced)
-    duration = max(20, round(100 / per_second) * 10)  # a GIF counts in hundredths of a second
-    first.save(path, save_all=True, append_images=reduced, duration=duration, loop=0, optimize=False)
-    return counted.n
+    counter = _Counter(pictures)
+    # No dithering: its noise would make the file larger.
+    quantized = (picture.quantize(_COLOURS, dither=Image.Dither.NONE) for picture in counter)
+    first = next(quantized)
+    duration = max(20, round(100 / per_second) * 10)  # GIF has hundredths of a second; viewers take 10 ms for 100 ms
+    first.save(path, save_all=True, append_images=quantized, duration=duration, loop=0, optimize=False)
+    return counter.n
 
 
 def _write_mp4(path: Path, pictures: Iterable[Image.Image], per_second: float) -> int:
     import cv2
 
-    before = cv2.utils.logging.getLogLevel()
-    cv2.utils.logging.setLogLevel(0)  # what it says of a codec that is not there, we say
-    counted = _Counted(pictures)
-    rest = iter(counted)
+    level = cv2.utils.logging.getLogLevel()
+    cv2.utils.logging.setLogLevel(0)  # it would print a warning for each missing codec
+    counter = _Counter(pictures)
+    rest = iter(counter)
     first = next(rest)
     try:
-        video = _opened(path, first.size, per_second)
+        video = _open_writer(path, first.size, per_second)
         for picture in chain([first], rest):
-            video.write(np.asarray(picture)[:, :, ::-1])
+            video.write(np.asarray(picture)[:, :, ::-1])  # OpenCV takes BGR
         video.release()
-        kept = int(cv2.VideoCapture(str(path)).get(cv2.CAP_PROP_FRAME_COUNT))
+        n_written = int(cv2.VideoCapture(str(path)).get(cv2.CAP_PROP_FRAME_COUNT))
     finally:
-        cv2.utils.logging.setLogLevel(before)
-    if kept != counted.n:  # OpenCV does not say when a disk is full
-        raise DataError(f"{path.parent}: only {kept} of {counted.n} pictures could be written; {_HINT}")
-    return counted.n
+        cv2.utils.logging.setLogLevel(level)
+    if n_written != counter.n:  # OpenCV does not report a full disk
+        raise DataError(f"{path.parent}: only {n_written} of {counter.n} pictures could be written; {_HINT}")
+    return counter.n
 
 
-def _opened(path: Path, size: tuple[int, int], per_second: float):  # type: ignore[no-untyped-def]  # cv2 has no types
+def _open_writer(path: Path, size: tuple[int, int], per_second: float):  # type: ignore[no-untyped-def]  # cv2 untyped
     import cv2
 
     for codec in _CODECS:
@@ -98,8 +101,8 @@ def _opened(path: Path, size: tuple[int, int], per_second: float):  # type: igno
     raise DataError("this OpenCV cannot write MP4; give --out a name that ends in .gif")
 
 
-class _Counted:
-    """Counts what is taken from it."""
+class _Counter:
+    """An iterable that counts the pictures taken from it."""
 
     def __init__(self, pictures: Iterable[Image.Image]) -> None:
         self._pictures = pictures

@@ -1,7 +1,7 @@
-"""Unpacking archives that come from elsewhere.
+"""Unpacking downloaded archives.
 
 An archive is untrusted: its members may point outside the folder, be links or devices, or unpack to more than the
-disk holds. Nothing is unpacked where any member is not a plain file or folder below the target.
+disk holds. Nothing is unpacked unless every member is a plain file or a folder below the target.
 """
 
 import shutil
@@ -19,15 +19,15 @@ _MAX_FILE_BYTES = 2 * 2**30
 
 
 def unpack_tar(archive: Path, target: Path, max_bytes: int = 500 * 2**30) -> None:
-    """Unpack a tar file's one top folder as `target`, whole or not at all.
+    """Unpack the one top folder of a tar file as `target`, completely or not at all.
 
     Args:
         archive: the tar file, compressed or not.
-        target: the folder to make; its name must be that of the archive's top folder.
-        max_bytes: most bytes that the archive may unpack to.
+        target: the folder to create; it has the name of the archive's top folder.
+        max_bytes: maximum size of the unpacked content, in bytes.
 
     Raises:
-        DataError: the archive is damaged, has a member that is refused, or does not fit on the disk.
+        DataError: the archive is damaged, has an unsafe member, or does not fit on the disk.
     """
     require_file(archive, "fetch it again")
     try:
@@ -36,7 +36,7 @@ def unpack_tar(archive: Path, target: Path, max_bytes: int = 500 * 2**30) -> Non
             tarfile.open(archive) as tar,
             tempfile.TemporaryDirectory(dir=target.parent, prefix=".unpacking-") as scratch,
         ):
-            members = _checked(tar, archive, target.name, min(max_bytes, shutil.disk_usage(target.parent).free))
+            members = _check_members(tar, archive, target.name, min(max_bytes, shutil.disk_usage(target.parent).free))
             tar.extractall(scratch, members=members, filter="data")
             (Path(scratch) / target.name).rename(target)
     except (tarfile.TarError, *DAMAGED) as error:
@@ -47,13 +47,14 @@ def unpack_tar(archive: Path, target: Path, max_bytes: int = 500 * 2**30) -> Non
         ) from error
 
 
-def _checked(tar: tarfile.TarFile, archive: Path, top: str, max_bytes: int) -> list[tarfile.TarInfo]:
+def _check_members(tar: tarfile.TarFile, archive: Path, top: str, max_bytes: int) -> list[tarfile.TarInfo]:
+    """Return the members of an archive, all of which are safe to unpack."""
     members, total = [], 0
     seen: set[PurePosixPath] = set()
     for member in tar:
         path = PurePosixPath(member.name)
         if path in seen and not member.isdir():
-            raise DataError(f"{archive}: {member.name!r} is in it twice; do not use this archive")
+            raise DataError(f"{archive}: contains {member.name!r} twice; do not use this archive")
         seen.add(path)
         if path.is_absolute() or ".." in path.parts:
             raise DataError(f"{archive}: {member.name!r} points outside the folder; do not use this archive")
@@ -66,5 +67,5 @@ def _checked(tar: tarfile.TarFile, archive: Path, top: str, max_bytes: int) -> l
         if member.size > _MAX_FILE_BYTES or total > max_bytes or len(members) > _MAX_FILES:
             raise DataError(f"{archive}: unpacks to more than the limit or the free disk; make room or check the file")
     if not members:
-        raise DataError(f"{archive}: is empty; delete it and fetch it again")
+        raise DataError(f"{archive}: empty archive; delete it and fetch it again")
     return members

@@ -1,4 +1,4 @@
-"""Frames that show nothing, of the size of those that they stand for."""
+"""Blank frames for the frame ablation: plain grey, of the size of the frames that they replace."""
 
 import tempfile
 from functools import cache
@@ -16,10 +16,10 @@ _GREY = (128, 128, 128)
 
 
 def blank_like(frame: FrameRef) -> FrameRef:
-    """A plain grey frame of the same size, so that it costs a model as many tokens.
+    """Return a plain grey frame of the same size, which costs a model as many tokens.
 
-    One file per size is kept in the user's cache. A frame that cannot be read stands for itself: whoever wants its
-    pixels is told what is wrong with it.
+    One file per size is kept in the user's cache. A frame that cannot be read is returned as it is: reading its pixels
+    then raises the error that says what is wrong with it.
 
     Raises:
         DataError: the file cannot be written.
@@ -41,16 +41,17 @@ def blank_like(frame: FrameRef) -> FrameRef:
 @cache
 def _size(frame: FrameRef) -> tuple[int, int] | None:
     try:
-        with Image.open(frame.path) as image:  # reads the head of the file alone
+        with Image.open(frame.path) as image:  # reads only the header
             return image.size
     except (OSError, SyntaxError):
         return None
 
 
 def _write(path: Path, size: tuple[int, int]) -> None:
-    """Put the file there whole; another process may do the same."""
+    """Write the file atomically."""
     path.parent.mkdir(parents=True, exist_ok=True)
+    # A folder with a random name, not `write_atomically`: workers may write the same file at the same time.
     with tempfile.TemporaryDirectory(dir=path.parent, prefix="partial-") as partial:
-        made = Path(partial) / path.name
-        Image.new("RGB", size, _GREY).save(made)
-        made.replace(path)
+        file = Path(partial) / path.name
+        Image.new("RGB", size, _GREY).save(file)
+        file.replace(path)

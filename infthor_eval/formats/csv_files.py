@@ -1,4 +1,4 @@
-"""CSV files: read strictly, so that no row is lost in another's cell, and written so that no cell is a formula."""
+"""CSV files: read strictly, so that a missing quote cannot swallow rows, and written so that no cell is a formula."""
 
 import csv
 import io
@@ -11,24 +11,24 @@ from infthor_eval.formats.reading import read_text
 
 __all__ = ["read_rows", "unshield", "write_sheet"]
 
-_FORMULA = ("=", "+", "-", "@", "\t", "\r")  # how spreadsheets recognise one
-_SHIELD = "'"  # how they recognise a text all the same
+_FORMULA = ("=", "+", "-", "@", "\t", "\r")  # a cell that begins so is a formula to a spreadsheet
+_SHIELD = "'"  # a cell that begins so is text to a spreadsheet
 
 
 def read_rows(
     path: Path, columns: Sequence[str], hint: str, *, line_breaks: bool = False
 ) -> Iterator[tuple[str, dict[str, str]]]:
-    """The rows of a CSV file: each with its place, for messages, and its cells by column.
+    """Yield the rows of a CSV file: the place of each (for messages) and its cells by column.
 
     Args:
-        path: of the file.
-        columns: those that it must have.
-        mend: what to do where it is not what it should be, for the message.
-        line_breaks: whether a cell may have several lines; where not, one that has is a quote that was not closed.
+        path: the file.
+        columns: columns that the file must have.
+        hint: the way to fix a bad file, for the message.
+        line_breaks: True if a cell may have several lines; otherwise a line break means an unclosed quote.
 
     Raises:
-        DataError: it cannot be read, lacks a column or has it twice, has a row of more cells than columns, or a quote
-            that is not closed.
+        DataError: the file cannot be read, lacks a column or has it twice, has a row with more cells than columns, or
+            an unclosed quote.
     """
     text = read_text(path, hint)
     reader = csv.reader(io.StringIO(text, newline=""), strict=True)
@@ -44,7 +44,7 @@ def read_rows(
             row = dict.fromkeys(header, "") | dict(zip(header, cells, strict=False))
             broken = next((name for name, cell in row.items() if "\n" in cell or "\r" in cell), None)
             if broken is not None and not line_breaks:
-                raise DataError(f"{place}: {broken} goes on over several lines; close its quote before the line's end")
+                raise DataError(f"{place}: {broken} has several lines; close its quote before the end of the line")
             yield place, row
 
 
@@ -54,25 +54,25 @@ def _check_header(path: Path, header: Sequence[str], columns: Sequence[str], hin
         raise DataError(f"{path}: no column {', '.join(missing)}; {hint}")
     twice = next((name for name in header if name and header.count(name) > 1), None)
     if twice is not None:
-        raise DataError(f"{path}: column {twice!r} stands twice; take one out")
+        raise DataError(f"{path}: column {twice!r} is there twice; remove one")
 
 
 def write_sheet(path: Path, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
-    """Write a CSV file that people open as a sheet, whole or not at all.
+    """Write a CSV file for people who open it in a spreadsheet, atomically.
 
     Raises:
-        OSError: it cannot be written.
+        OSError: the file cannot be written.
     """
     with write_atomically(path) as partial, partial.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(columns)
-        writer.writerows([_shielded(str(cell)) for cell in row] for row in rows)
+        writer.writerows([_shield(str(cell)) for cell in row] for row in rows)
 
 
 def unshield(cell: str) -> str:
-    """What `write_sheet` was given for a cell."""
+    """Return the text that `write_sheet` was given for a cell."""
     return cell[1:] if cell.startswith(_SHIELD) and cell[1:].startswith((*_FORMULA, _SHIELD)) else cell
 
 
-def _shielded(cell: str) -> str:
+def _shield(cell: str) -> str:
     return _SHIELD + cell if cell.startswith((*_FORMULA, _SHIELD)) else cell

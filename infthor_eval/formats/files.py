@@ -1,4 +1,4 @@
-"""Files and folders that are there whole or not at all, and the places where they are to go."""
+"""Writing files and folders atomically, and checking the output paths before the work starts."""
 
 import os
 import shutil
@@ -20,18 +20,18 @@ __all__ = [
 
 OVERWRITE_HINT = "give another --out, or --overwrite if nobody edited it"
 _HINT = "make room, or give another place with"
-_PROBE = b"x" * 4096  # a full disk may still take a name
+_PROBE = b"x" * 4096  # a full disk still creates an empty file, so content is written too
 
 
 def prepare_folder(path: Path, option: str = "--out") -> Path:
-    """Make a folder, and see that it can be written to; called before the work, which would be lost after it.
+    """Create a folder and check that it can be written to, before work whose results would be lost otherwise.
 
     Args:
-        path: of the folder.
-        option: how users name it, for the message.
+        path: the folder.
+        option: the command-line option that names the folder, for the message.
 
     Raises:
-        DataError: it is a file, or cannot be made or written to.
+        DataError: the path is a file, or the folder cannot be created or written to.
     """
     require_writable(path, option)
     with wrap_errors(f"{path}: cannot be written to", f"{_HINT} {option}"):
@@ -40,27 +40,26 @@ def prepare_folder(path: Path, option: str = "--out") -> Path:
 
 
 def require_writable(path: Path, option: str = "--out") -> None:
-    """See that a folder can be written to, or made where it is not there; nothing is left behind.
+    """Check that a folder can be written to, or created; nothing is left behind.
 
     Args:
-        path: of the folder.
-        option: how users name it, for the message.
+        path: the folder.
+        option: the command-line option that names the folder, for the message.
 
     Raises:
-        DataError: it cannot.
+        DataError: the folder cannot be written to or created.
     """
-    with wrap_errors(
-        f"{path}: cannot be written to", f"{_HINT} {option}", catch=(OSError, ValueError)
-    ):  # ValueError: a null
-        there = next(folder for folder in (path, *path.absolute().parents) if _is_there(folder))
-        with tempfile.TemporaryFile(dir=there) as probe:
+    catch = (OSError, ValueError)  # ValueError: a null character in the name
+    with wrap_errors(f"{path}: cannot be written to", f"{_HINT} {option}", catch=catch):
+        nearest = next(folder for folder in (path, *path.absolute().parents) if _is_there(folder))
+        with tempfile.TemporaryFile(dir=nearest) as probe:
             probe.write(_PROBE)
             probe.flush()
             os.fsync(probe.fileno())
 
 
 def _is_there(path: Path) -> bool:
-    """Whether there is anything; not `exists`, which takes a name that cannot be for one that is not there."""
+    # Not `Path.exists`, which returns False for names that the system refuses (too long, no permission).
     try:
         path.lstat()
     except (FileNotFoundError, NotADirectoryError):
@@ -69,55 +68,57 @@ def _is_there(path: Path) -> bool:
 
 
 def prepare_file(path: Path, option: str = "--out") -> Path:
-    """See that a file can be written, or replaced; called before the work.
+    """Check that a file can be written or replaced, and create its folder.
 
     Args:
-        path: of the file.
-        option: how users name it, for the message.
+        path: the file.
+        option: the command-line option that names the file, for the message.
 
     Raises:
-        DataError: it is a folder, a pipe or a device, or its folder cannot be written to.
+        DataError: the path is a folder, a pipe or a device, or its folder cannot be written to.
     """
     prepare_folder(path.parent, option)
     with wrap_errors(f"{path}: cannot be written to", f"{_HINT} {option}"):
         if path.exists() and not path.is_file():
-            raise DataError(f"{path}: is not a file; give another place with {option}")
+            raise DataError(f"{path}: not a file; give another place with {option}")
     return path
 
 
 def refuse_overwrite(path: Path, content: bytes) -> None:
-    """Refuse to replace a file by another content: somebody may have edited it.
+    """Refuse to replace a file by different content: somebody may have edited it.
 
     Args:
-        path: of the file.
-        content: what would be written.
+        path: the file.
+        content: the content to be written.
 
     Raises:
-        DataError: the file holds something else.
+        DataError: the file exists and its content differs.
     """
     with wrap_errors(f"{path}: cannot be read", OVERWRITE_HINT):
         if path.is_file() and path.read_bytes() != content:
-            raise DataError(f"{path}: is there already and holds something else; {OVERWRITE_HINT}")
+            raise DataError(f"{path}: exists already with different content; {OVERWRITE_HINT}")
 
 
 @contextmanager
 def write_atomically(path: Path) -> Iterator[Path]:
-    """Write a file or a folder beside its place, and put it there when all of it is written.
+    """Write a file or a folder under a temporary name beside `path`, and rename it when it is complete.
 
     Args:
-        path: the place; a file that is there is replaced, a folder must not be there.
+        path: the final path; an existing file is replaced, a folder must not exist.
 
     Yields:
-        Where to write. What an earlier, killed process left there is gone; on an error nothing stays behind.
+        The temporary path, at which nothing exists. After an error nothing remains there.
 
     Raises:
-        OSError: it cannot be put in its place.
+        OSError: the temporary path cannot be renamed.
     """
+    # The name is fixed, so that what a killed process left is found and removed by the next one. A second process
+    # that writes the same path at the same time is not provided for.
     partial = path.with_name(f".{path.name}.partial")
     _remove(partial)
     try:
         yield partial
-        partial.replace(path)
+        partial.replace(path)  # atomic, as both are on one file system
     finally:
         _remove(partial)
 

@@ -1,8 +1,7 @@
-"""Writing floor plans into a folder of recorded ones (`--data`).
+"""Folders of recorded floor plans (`--data`).
 
-The folder has `thor_scenes/objects.jsonl.gz`, one `{"scene", "objects"}` a line with every object's metadata as
-AI2-THOR 5.x reports it (boxes without corner points), and `alfred/layouts/FloorPlan<N>-layout.npy`, reachable (x, z)
-in metres.
+`thor_scenes/objects.jsonl.gz` has one `{"scene", "objects"}` per line: the metadata of every object as AI2-THOR 5.x
+reports it (boxes without corner points). `alfred/layouts/FloorPlan<N>-layout.npy` has the reachable (x, z), in metres.
 """
 
 import gzip
@@ -25,22 +24,22 @@ _OBJECTS = Path("thor_scenes") / "objects.jsonl.gz"
 
 
 def floor_plan_names(root: Path) -> list[str]:
-    """The floor plans that a folder of recorded ones has.
+    """Return the names of the recorded floor plans in a folder.
 
     Raises:
-        DataError: the folder's file of objects is missing or not what it should be.
+        DataError: the folder's `objects.jsonl.gz` is missing or malformed.
     """
-    return [scene for scene, _ in _recorded(root / _OBJECTS)]
+    return [scene for scene, _ in _read_scenes(root / _OBJECTS)]
 
 
 def floor_plans_digest(root: Path) -> str:
-    """Hash of all that a folder of recorded floor plans has.
+    """Return the hash of a folder of recorded floor plans.
 
     Raises:
-        DataError: the folder's file of objects is not there, or a file cannot be read.
+        DataError: the folder's `objects.jsonl.gz` is missing, or a file cannot be read.
     """
     if not (root / _OBJECTS).is_file():
-        raise DataError(f"{root}: no {_OBJECTS} in it; give the folder of recorded floor plans")
+        raise DataError(f"{root}: has no {_OBJECTS}; give the folder of recorded floor plans")
     with wrap_errors(f"{root}: cannot be read", "restore it, or give another folder"):
         return digest_of_files([root / _OBJECTS, *sorted(root.glob("alfred/layouts/*.npy"))])
 
@@ -55,25 +54,25 @@ def write_floor_plan(
     """Add a floor plan to a folder of recorded ones.
 
     Args:
-        root: the folder; made where it does not exist.
+        root: the folder; created if it does not exist.
         scene: name of the floor plan.
         objects: metadata of every object, as AI2-THOR reports it.
         cells: reachable (x, z), metres.
-        overwrite: whether it may take the place of another recording of that name.
+        overwrite: True to replace a different recording of the same name.
 
     Raises:
-        DataError: the folder has another recording of it, or its file of objects cannot be read or written.
+        DataError: the folder has a different recording of the scene, or `objects.jsonl.gz` cannot be read or written.
     """
     path = root / _OBJECTS
     line = json.dumps({"scene": scene, "objects": [_without_corners(item) for item in objects]})
-    recorded = dict(_recorded(path)) if path.exists() else {}
-    layout = _layout(root, scene, objects, cells)
+    recorded = dict(_read_scenes(path)) if path.exists() else {}
+    layout = _layout_files(root, scene, objects, cells)
     if not overwrite:
         if recorded.get(scene, line) != line:
-            raise DataError(f"{path}: has {scene} already and holds something else of it; {OVERWRITE_HINT}")
+            raise DataError(f"{path}: has a different recording of {scene} already; {OVERWRITE_HINT}")
         for file, content in layout.items():
             refuse_overwrite(file, content)
-    kept = [other for name, other in recorded.items() if name != scene]
+    others = [other for name, other in recorded.items() if name != scene]
     with wrap_errors(f"{path}: {scene} cannot be added", "give another folder"):
         for file, content in layout.items():
             file.parent.mkdir(parents=True, exist_ok=True)
@@ -81,13 +80,13 @@ def write_floor_plan(
                 partial.write_bytes(content)
         path.parent.mkdir(parents=True, exist_ok=True)
         with write_atomically(path) as partial, gzip.open(partial, "wt", encoding="utf-8") as packed:
-            packed.writelines(f"{text}\n" for text in [*kept, line])
+            packed.writelines(f"{text}\n" for text in [*others, line])
 
 
-def _layout(
+def _layout_files(
     root: Path, scene: str, objects: Sequence[dict[str, Any]], cells: Sequence[tuple[float, float]]
 ) -> dict[Path, bytes]:
-    """The small files of a floor plan: the cells, and the types that there are."""
+    """Return the content of a floor plan's small files: its reachable cells, and its object types."""
     array = io.BytesIO()
     np.save(array, np.array(cells, dtype=np.float64).reshape(-1, 2))
     types = sorted({item["objectType"] for item in objects})
@@ -98,12 +97,12 @@ def _layout(
     }
 
 
-def _recorded(path: Path) -> Iterator[tuple[str, str]]:
-    """The scenes in a file of objects, each with its line."""
+def _read_scenes(path: Path) -> Iterator[tuple[str, str]]:
+    """Yield the name and the line of each scene in a file of objects."""
     for entry in json_lines_of(path, "give a folder of recorded floor plans with --data"):
         scene = entry.get("scene")
         if not isinstance(scene, str):
-            raise DataError(f"{path}: a line has no scene's name; give a folder of recorded floor plans with --data")
+            raise DataError(f"{path}: a line has no scene name; give a folder of recorded floor plans with --data")
         yield scene, json.dumps(entry)
 
 

@@ -1,7 +1,7 @@
-"""References to frames, decoded only where pixels are needed.
+"""References to frames, which are decoded only where pixels are needed.
 
 A trajectory has thousands of frames and a question refers to many of them, so requests carry references and the
-model's adapter decodes. A reference knows the digest of its file's content, by which caches recognise a frame.
+model's adapter decodes. Caches recognise a frame by the digest of its file's content.
 """
 
 import struct
@@ -21,13 +21,13 @@ from infthor_eval.formats.reading import file_problem, require_file
 
 __all__ = ["FrameRef"]
 
-Image.MAX_IMAGE_PIXELS = None  # how large an image may be is judged here, and can be set
+Image.MAX_IMAGE_PIXELS = None  # `_wrong_size` has the limit, which users can raise
 
 _PNG = b"\x89PNG\r\n\x1a\n"
 _SIGNATURES = (_PNG, b"\xff\xd8\xff")  # PNG, JPEG
-_HEAD = 24  # bytes, of a PNG to behind its size
+_HEAD = 24  # bytes of a PNG up to the end of its width and height
 _HINT = "restore the frame"
-# What Pillow's decoders raise on headers and content that somebody damaged or made up.
+# All that Pillow's decoders have raised on damaged or forged images.
 _DAMAGED = (
     OSError,
     SyntaxError,
@@ -46,7 +46,7 @@ _DAMAGED = (
 
 @dataclass(frozen=True)
 class FrameRef:
-    """One frame of a trajectory, by the path of its image file (PNG or JPEG, 300x300 in the published data)."""
+    """One frame of a trajectory: the path of its image file (PNG or JPEG, 300x300 in the published data)."""
 
     path: Path
 
@@ -66,13 +66,13 @@ class FrameRef:
         """Width and height from the file's header; no pixel is decoded.
 
         Raises:
-            DataError: as `load`, as far as the header tells.
+            DataError: as `load`, for errors that show in the header.
         """
-        with self._opened() as image:
+        with self._open() as image:
             return image.size
 
     def problem(self) -> str | None:
-        """Why this cannot be a frame, judged by the first bytes alone; None where nothing speaks against it."""
+        """Return why this cannot be a frame, judged by its first bytes, or None if nothing is wrong with those."""
         reason = file_problem(self.path)
         if reason is not None:
             return f"{self.path}: {reason}"
@@ -86,16 +86,16 @@ class FrameRef:
         return self._wrong_size(*struct.unpack(">II", head[16:])) if _is_whole_png_head(head) else None
 
     def load(self) -> Image.Image:
-        """The frame as an RGB image.
+        """Return the frame as an RGB image.
 
         Raises:
-            DataError: the file is missing, no image of a frame, or cut off.
+            DataError: the file is missing, truncated, or no image of a valid size.
         """
-        with self._opened() as image:
+        with self._open() as image:
             return image.convert("RGB")
 
     @contextmanager
-    def _opened(self) -> Iterator[Image.Image]:
+    def _open(self) -> Iterator[Image.Image]:
         require_file(self.path, _HINT)
         with (
             wrap_errors(f"{self.path}: not a readable image", _HINT, catch=_DAMAGED),
@@ -107,7 +107,7 @@ class FrameRef:
             yield image
 
     def _wrong_size(self, width: int, height: int) -> str | None:
-        """Why an image of this size is no frame: it would take all memory, or no model can take it."""
+        """Return why an image of this size is refused: it would fill the memory, or no image processor accepts it."""
         if min(width, height) < 1:
             return f"{self.path}: an image of {width}x{height} pixels"
         if width * height > IMAGE_MEGAPIXELS.value * 1_000_000:

@@ -1,4 +1,4 @@
-"""The published NIEH data: fetching it from the Hugging Face hub, and where it lies afterwards."""
+"""The published NIEH data: downloading it from the Hugging Face hub, and the folder where it is kept."""
 
 from pathlib import Path
 
@@ -14,22 +14,22 @@ _FILES = ["qa_set_nieh_single_clue.csv", "qa_set_nieh_multi_clue.csv", "metadata
 
 
 def default_folder() -> Path:
-    """Where the published data is kept unless the user says otherwise (the user's cache folder)."""
+    """Return the default folder of the published data, in the user's cache."""
     return user_cache("nieh")
 
 
 def fetch_nieh(folder: Path, token: str | None = None, endpoint: str | None = None) -> NiehSet:
-    """Download, unpack and check the published NIEH data; what is there already is not fetched again.
+    """Download, unpack and check the published NIEH data; files that exist are not downloaded again.
 
-    An interrupted download goes on where it was. The archive is deleted once it is unpacked and the set is sound.
+    An interrupted download is resumed. The archive is deleted once it is unpacked and the set is checked.
 
     Args:
-        folder: where the set goes.
-        token: of the Hugging Face account; None takes the one that `hf auth login` stored.
-        endpoint: another hub; None is the public one.
+        folder: folder of the set.
+        token: access token of the Hugging Face account, or None for the one that `hf auth login` stored.
+        endpoint: URL of another hub, or None for the public one.
 
     Raises:
-        DataError: no network, no access, or data that is not what it should be.
+        DataError: there is no network or no access, or the data are malformed.
     """
     if not (folder / "metadata").is_dir():
         _download(folder, token, endpoint)
@@ -37,7 +37,7 @@ def fetch_nieh(folder: Path, token: str | None = None, endpoint: str | None = No
     data = NiehSet(folder)
     if not data.questions:
         reasons = "; ".join(reason for reason, _ in data.reasons().most_common(3))
-        raise DataError(f"{folder}: no question of it can be asked ({reasons}); delete the folder and fetch again")
+        raise DataError(f"{folder}: none of its questions can be asked ({reasons}); delete the folder and fetch again")
     (folder / "metadata.tar").unlink(missing_ok=True)
     return data
 
@@ -57,13 +57,13 @@ def _download(folder: Path, token: str | None, endpoint: str | None) -> None:
         )
     except (GatedRepoError, RepositoryNotFoundError) as error:
         raise DataError(
-            f"{NIEH_REPOSITORY}: no access; ask for it on the hub's page, then log in with `hf auth login`"
+            f"{NIEH_REPOSITORY}: no access; request it on the hub's page, then log in with `hf auth login`"
         ) from error
     except (LocalEntryNotFoundError, HfHubHTTPError, OSError) as error:
         cause = " ".join(str(error).split())[:120]
         raise DataError(
-            f"{NIEH_REPOSITORY}: cannot be fetched ({cause}); go online, or copy the set from a machine that has it "
-            f"to {folder}"
+            f"{NIEH_REPOSITORY}: cannot be fetched ({cause}); go online, or copy the set to {folder} "
+            "from a machine that has it"
         ) from error
     missing = [name for name in _FILES if not (folder / name).is_file()]
     if missing:

@@ -1,7 +1,7 @@
-"""How large, deep or long what is read may be.
+"""Limits on the size of files that are read.
 
-All of it comes from elsewhere, and a small file can ask for all memory, or for ever. The limits are far above what real
-data need; each can be raised by an environment variable, which the message names.
+Input is untrusted: a small file can unpack to more than the memory, or keep a template engine busy for ever. The limits
+are far above what real data need. Each can be raised by an environment variable, which the error message names.
 """
 
 import os
@@ -28,8 +28,8 @@ class Limit:
     """One limit.
 
     Attributes:
-        name: of the environment variable that raises it.
-        default: the limit where that is not set.
+        name: the environment variable that changes it.
+        default: the limit if that variable is not set.
     """
 
     name: str
@@ -40,7 +40,7 @@ class Limit:
         """The limit in force.
 
         Raises:
-            UsageError: the variable is no whole number above 0.
+            UsageError: the variable is not a whole number above 0.
         """
         given = os.environ.get(self.name)
         if given is None:
@@ -51,16 +51,16 @@ class Limit:
 
     @property
     def hint(self) -> str:
-        """How to raise it."""
-        return f"if it is meant, set {self.name} to more than {self.value}"
+        """The way to raise it, for messages."""
+        return f"if this is intended, set {self.name} to more than {self.value}"
 
 
-FILE_MB = Limit("INFTHOR_EVAL_MAX_FILE_MB", 2048)  # of a file that is read as a whole; unpacked, where it is packed
-LINE_MB = Limit("INFTHOR_EVAL_MAX_LINE_MB", 256)  # of a line of a file that is read by lines
+FILE_MB = Limit("INFTHOR_EVAL_MAX_FILE_MB", 2048)  # size of a file, unpacked
+LINE_MB = Limit("INFTHOR_EVAL_MAX_LINE_MB", 256)  # size of one line in files that are read line by line
 IMAGE_MEGAPIXELS = Limit("INFTHOR_EVAL_MAX_IMAGE_MEGAPIXELS", 50)
 IMAGE_ASPECT = Limit("INFTHOR_EVAL_MAX_IMAGE_ASPECT", 100)  # longer side over shorter; image processors refuse 200
-ALIAS_NODES = Limit("INFTHOR_EVAL_MAX_YAML_NODES", 100_000)  # of a YAML document with its aliases written out
-TRAJECTORIES = Limit("INFTHOR_EVAL_MAX_TRAJECTORIES", 1_000_000)  # that one command is to make
-TEMPLATE_SECONDS = Limit("INFTHOR_EVAL_MAX_TEMPLATE_SECONDS", 60)  # of computing, for one text from a chat template
-TEMPLATE_MB = Limit("INFTHOR_EVAL_MAX_TEMPLATE_MB", 2048)  # of memory, likewise
-TEMPLATE_CHARACTERS = Limit("INFTHOR_EVAL_MAX_TEMPLATE_CHARACTERS", 16_000_000)  # of that text
+ALIAS_NODES = Limit("INFTHOR_EVAL_MAX_YAML_NODES", 100_000)  # values of a YAML document with all aliases expanded
+TRAJECTORIES = Limit("INFTHOR_EVAL_MAX_TRAJECTORIES", 1_000_000)  # trajectories that one command may generate
+TEMPLATE_SECONDS = Limit("INFTHOR_EVAL_MAX_TEMPLATE_SECONDS", 60)  # processor time of a chat template, per text
+TEMPLATE_MB = Limit("INFTHOR_EVAL_MAX_TEMPLATE_MB", 2048)  # memory of a chat template, per text
+TEMPLATE_CHARACTERS = Limit("INFTHOR_EVAL_MAX_TEMPLATE_CHARACTERS", 16_000_000)  # length of the text it produces

@@ -1,8 +1,8 @@
-"""An NIEH set: questions about long egocentric trajectories, and the frames they are asked on.
+"""An NIEH set: questions about long egocentric trajectories, and the frames of these.
 
-The folder form is that of the published data (hub dataset `PEARLS-Lab/infini-thor-nieh`): `qa_set*.csv` beside
+The folder has the layout of the published data (hub dataset `PEARLS-Lab/infini-thor-nieh`): `qa_set*.csv` beside
 `metadata/<traj_id>/` with `img/` (or `img_768/`), `metadata.json`, `expert_log.json` and, in some sets,
-`<traj_id>_10fps.mp4`. Trajectories themselves lie in a folder beside the set, or in ours inside it.
+`<traj_id>_10fps.mp4`. The trajectory files are in a separate folder (published data) or inside the set (ours).
 """
 
 import hashlib
@@ -28,19 +28,19 @@ __all__ = ["NiehSet", "SkippedQuestion"]
 T = TypeVar("T")
 _LONGEST = 40  # characters of a name in a message
 _HINT = "unpack the trajectory again"
-_GIVE_A_SET = "give the folder of an NIEH set, or fetch the published one: fetch nieh"  # wherever it was to be given
+_GIVE_A_SET = "give the folder of an NIEH set, or download the published one with `infthor-eval fetch nieh`"
 _IMAGE_FOLDERS = ("img", "img_768")
 _IMAGE_SUFFIXES = {".png", ".jpg", ".jpeg"}
 
 
 @dataclass(frozen=True)
 class SkippedQuestion:
-    """A question that cannot be asked, and why.
+    """A question that cannot be asked, with the reason.
 
     Attributes:
         question: the question.
-        reason: why not.
-        variant: of several ways of asking it, the one that is meant; empty where all are, or there is one.
+        reason: reason why it cannot be asked.
+        variant: the variant of the task that cannot be asked; empty if that is all of them, or there is only one.
     """
 
     question: Question
@@ -49,50 +49,51 @@ class SkippedQuestion:
 
 
 class NiehSet:
-    """Questions and frames of one folder. Trajectories are read when first asked for, and then kept.
+    """Questions and frames of one folder. A trajectory is read when it is first needed, and cached.
 
     Attributes:
-        root: the folder.
-        trajectories: the folder of its trajectories (`<traj_id>.json` or `.txt`); None where they lie in the set.
-        simulator: what rendered the frames ("embedded", "unity"); None where the set does not say.
+        root: folder of the set.
+        trajectories: folder of its trajectories (`<traj_id>.json` or `.txt`), or None if they are inside the set.
+        simulator: simulator that rendered the frames ("embedded", "unity"), or None if the set does not say.
     """
 
     def __init__(self, root: Path, trajectories: Path | None = None) -> None:
         """Read the questions of the set in `root`.
 
         Raises:
-            DataError: there is no such set or folder, it is of another version, or a question file is not what the
-                format says.
+            DataError: a folder or file is missing, the set has another format version, or a question file is
+                malformed.
         """
         if not root.is_dir():
             raise DataError(f"{root}: no such folder; {_GIVE_A_SET}")
         self.root = root
         self._files = sorted(root.glob("qa_set*.csv"))
         if not self._files:
-            raise DataError(f"{root}: no qa_set*.csv in it, which a set has beside metadata/; {_GIVE_A_SET}")
+            raise DataError(f"{root}: has no qa_set*.csv, as an NIEH set has beside metadata/; {_GIVE_A_SET}")
         if not (root / "metadata").is_dir():
-            raise DataError(f"{root}: no metadata/ in it; unpack the set's metadata.tar there")
+            raise DataError(f"{root}: has no metadata/; unpack the set's metadata.tar there")
         if trajectories is not None and not trajectories.is_dir():
-            raise DataError(f"{trajectories}: no such folder; give the trajectories' folder with --trajectories")
+            raise DataError(f"{trajectories}: no such folder; give the folder of the trajectories with --trajectories")
         self.trajectories = trajectories
         self.simulator = simulator_of(root)
         self._read = tuple(question for file in self._files for question in read_questions(file))
         self._frames: dict[str, dict[int, FrameRef] | DataError] = {}
-        self._all_frames: dict[str, tuple[FrameRef, ...]] = {}  # shared by all questions on the whole trajectory
+        # One tuple per trajectory, shared by all its questions: a copy each would be thousands of references.
+        self._all_frames: dict[str, tuple[FrameRef, ...]] = {}
         self._videos: dict[str, tuple[FrameRef, ...] | DataError] = {}
         self._outlines: dict[str, Outline] = {}
         self._action_frames: dict[str, dict[int, tuple[int, ...]]] = {}
 
     @cached_property
     def rows(self) -> tuple[Question | SkippedQuestion, ...]:
-        """Every question, in the order of the files; one that cannot be asked with the reason."""
-        found: list[Question | SkippedQuestion] = []
+        """All questions in the order of the files, as `SkippedQuestion` where they cannot be asked."""
+        rows: list[Question | SkippedQuestion] = []
         seen = set()
         for question in self._read:
-            reason = "stands in the files twice" if question.id in seen else self._problem(question)
+            reason = "is in the files twice" if question.id in seen else self._problem(question)
             seen.add(question.id)
-            found.append(SkippedQuestion(question, reason) if reason else question)
-        return tuple(found)
+            rows.append(SkippedQuestion(question, reason) if reason else question)
+        return tuple(rows)
 
     @cached_property
     def skipped(self) -> tuple[SkippedQuestion, ...]:
@@ -106,10 +107,8 @@ class NiehSet:
 
     @cached_property
     def fingerprint(self) -> str:
-        """Hash of the questions, the step logs, and the names and sizes of the frames (hex, 32 characters).
-
-        The content of frames is not read here: each answered unit records the digests of the frames it used.
-        """
+        """Hash of the questions, the step logs, and the names and sizes of the frames (hex, 32 characters)."""
+        # Not the content of frames, which would mean reading all of it: a record has the digests of its own frames.
         digest = hashlib.blake2b(digest_size=16)
         for file in self._files:
             digest.update(file.read_bytes())
@@ -120,40 +119,40 @@ class NiehSet:
         return digest.hexdigest()
 
     def reasons(self) -> Counter[str]:
-        """How many questions were skipped, by reason."""
+        """Return the number of skipped questions by reason."""
         return Counter(item.reason for item in self.skipped)
 
     def folder(self, traj_id: str) -> Path:
-        """Where the trajectory's frames and metadata lie."""
+        """Return the folder of a trajectory's frames and metadata."""
         return self.root / "metadata" / traj_id
 
     def frames(self, traj_id: str) -> tuple[FrameRef, ...]:
-        """Every frame of a trajectory in time order.
+        """Return all frames of a trajectory in time order.
 
         Raises:
-            DataError: the trajectory is not in the set, or its frames do not fit its metadata.
+            DataError: the trajectory is not in the set, or its frames do not match its metadata.
         """
         if traj_id not in self._all_frames:
             self._all_frames[traj_id] = tuple(self._trajectory(traj_id).values())
         return self._all_frames[traj_id]
 
     def clue_frames(self, question: Question) -> tuple[FrameRef, ...]:
-        """The frames that hold a question's evidence, in the order of its clues."""
+        """Return the frames with a question's evidence, in the order of its clues."""
         frames = self._trajectory(question.traj_id)
         return tuple(frames[index] for index in question.clues)
 
     def outline_file(self, traj_id: str) -> Path | None:
-        """Where the trajectory itself lies; None where it is not there."""
+        """Return the file of the trajectory itself, or None if there is none."""
         if self.trajectories is not None:
             return find_outline(self.trajectories, traj_id)
         path = self.folder(traj_id) / "traj_data.json"
         return path if path.is_file() else None
 
     def outline(self, traj_id: str) -> Outline | None:
-        """What the trajectory's own file tells; None where it is not there.
+        """Return goals, actions and states from the trajectory's file, or None if there is none.
 
         Raises:
-            DataError: it is no trajectory.
+            DataError: the file is not a trajectory.
         """
         path = self.outline_file(traj_id)
         if path is None:
@@ -164,12 +163,12 @@ class NiehSet:
 
     @property
     def missing_outline(self) -> str:
-        """Why a trajectory's own file is not there."""
+        """The reason for a question whose trajectory file is missing."""
         place = "metadata/" if self.trajectories is None else f"{self.trajectories}"
-        return f"the trajectory's JSON is not in {place}; name its folder with --trajectories"
+        return f"the trajectory's JSON is not in {place}; give its folder with --trajectories"
 
     def action_frames(self, traj_id: str) -> dict[int, tuple[int, ...]]:
-        """Positions, in time order, of the frames of each low-level action that has some.
+        """Return the positions in time order of the frames of each low-level action that has any.
 
         Raises:
             DataError: `expert_log.json` is missing, or names frames that the trajectory does not have.
@@ -180,30 +179,34 @@ class NiehSet:
         return self._action_frames[traj_id]
 
     def states(self, traj_id: str) -> dict[int, str]:
-        """The states of a trajectory in words, by low-level action: the trajectory's own, else those beside its frames.
+        """Return the states of a trajectory in words, by low-level action.
+
+        They come from the trajectory's file, or else from `state_summary.json` beside its frames.
 
         Raises:
-            DataError: they are not what the format says.
+            DataError: the file is malformed.
         """
         outline = self.outline(traj_id)
         return (outline and outline.state_summary) or read_states(self.folder(traj_id) / "state_summary.json")
 
     def video(self, traj_id: str) -> Path | None:
-        """The trajectory's video; None where it has none."""
-        path = self.folder(traj_id) / f"{traj_id}_10fps.mp4"
+        """Return the trajectory's video, or None if it has none."""
+        path = self._video_path(traj_id)
         return path if path.is_file() else None
 
     def video_frames(self, traj_id: str) -> tuple[FrameRef, ...]:
-        """One frame per second of the trajectory's video, which there must be; decoded when first asked for.
+        """Return one frame per second of the trajectory's video.
 
         Raises:
-            DataError: the video cannot be decoded.
+            DataError: the video is missing or cannot be decoded.
         """
-        video = self.folder(traj_id) / f"{traj_id}_10fps.mp4"
-        return _once(self._videos, traj_id, lambda: frames_per_second(video))
+        return _read_once(self._videos, traj_id, lambda: frames_per_second(self._video_path(traj_id)))
+
+    def _video_path(self, traj_id: str) -> Path:
+        return self.folder(traj_id) / f"{traj_id}_10fps.mp4"
 
     def _problem(self, question: Question) -> str | None:
-        """Why a question cannot be asked; None where it can."""
+        """Return why a question cannot be asked, or None if it can."""
         if not question.answers:
             return "no gold answer"
         if not question.clues:
@@ -220,24 +223,25 @@ class NiehSet:
     def _trajectory(self, traj_id: str) -> dict[int, FrameRef]:
         if Path(traj_id).name != traj_id or traj_id in {"", ".", ".."}:
             raise DataError(f"trajectory {traj_id!r} is not a plain folder name")
-        return _once(self._frames, traj_id, lambda: _read_frames(self.folder(traj_id)))
+        return _read_once(self._frames, traj_id, lambda: _read_frames(self.folder(traj_id)))
 
 
-def _once(known: dict[str, T | DataError], traj_id: str, read: Callable[[], T]) -> T:
-    """What was read for a trajectory, or the error it ended in: the broken is not read again for every question."""
-    if traj_id not in known:
+def _read_once(cache: dict[str, T | DataError], traj_id: str, read: Callable[[], T]) -> T:
+    """Read something of a trajectory, or repeat the earlier result or error."""
+    # Errors are cached too, or a broken trajectory would be read again for each of its questions.
+    if traj_id not in cache:
         try:
-            known[traj_id] = read()
+            cache[traj_id] = read()
         except DataError as error:
-            known[traj_id] = error
-    found = known[traj_id]
-    if isinstance(found, DataError):
-        raise found
-    return found
+            cache[traj_id] = error
+    result = cache[traj_id]
+    if isinstance(result, DataError):
+        raise result
+    return result
 
 
 def _read_frames(folder: Path) -> dict[int, FrameRef]:
-    """Frames by their number (`img_idx`), in time order."""
+    """Return the frames by their number (`img_idx`), in time order."""
     with wrap_errors(f"trajectory {folder.name[:_LONGEST]}: its folder cannot be read", _HINT):
         if not folder.is_dir():
             raise DataError(f"trajectory {folder.name} is not in metadata/")
@@ -245,19 +249,19 @@ def _read_frames(folder: Path) -> dict[int, FrameRef]:
     home = _image_folder(folder)
     # By stem: published sets of other sizes (img_768) keep the names and change the suffix.
     names = [Path(step.img_filename).stem for step in steps]
-    for alike, what in ((_twice(names), "img_filename"), (_twice([step.img_idx for step in steps]), "img_idx")):
-        if alike is not None:
-            raise DataError(
-                f"trajectory {folder.name}: metadata.json numbers two frames alike ({what} {alike}); {_HINT}"
-            )
+    numbers = [step.img_idx for step in steps]
+    for duplicate, what in ((_first_duplicate(names), "img_filename"), (_first_duplicate(numbers), "img_idx")):
+        if duplicate is not None:
+            raise DataError(f"trajectory {folder.name}: two entries of metadata.json have {what} {duplicate}; {_HINT}")
     by_stem = _images(home)
     unknown = sorted(by_stem.keys() - set(names))
-    if len(unknown) > len(set(names) - by_stem.keys()):  # a frame under another name is one that is missing
+    # Only a surplus of files is an error of the trajectory. A renamed frame is one unknown and one missing file.
+    if len(unknown) > len(set(names) - by_stem.keys()):
         raise DataError(
             f"trajectory {folder.name}: {len(by_stem)} frames but {len(steps)} entries in metadata.json "
             f"(none for {unknown[0]}); {_HINT}"
         )
-    # A file that is missing spoils the questions that show it, and no other: whoever asks for it is told.
+    # A missing file affects only the questions that show it, so it raises an error only when it is read.
     return {
         step.img_idx: FrameRef(by_stem.get(name, home / Path(step.img_filename).name))
         for step, name in zip(steps, names, strict=True)
@@ -273,19 +277,18 @@ def _image_folder(folder: Path) -> Path:
 
 def _images(folder: Path) -> dict[str, Path]:
     images = sorted(path for path in folder.iterdir() if path.suffix.lower() in _IMAGE_SUFFIXES)
-    twice = _twice([path.stem for path in images])
-    if twice is not None:
-        raise DataError(f"{folder}: two frames of the name {twice} (.png, .jpg); take one of them out")
+    duplicate = _first_duplicate([path.stem for path in images])
+    if duplicate is not None:
+        raise DataError(f"{folder}: two frames have the name {duplicate} (.png, .jpg); remove one of them")
     return {path.stem: path for path in images}
 
 
-def _twice(values: Sequence[T]) -> T | None:
-    """The first value that stands twice."""
+def _first_duplicate(values: Sequence[T]) -> T | None:
     return next((value for value, count in Counter(values).items() if count > 1), None)
 
 
 def _size(path: Path) -> int | None:
-    """Of a file, in bytes; None where there is none."""
+    """Return the size of a file in bytes, or None if it is missing."""
     try:
         return path.stat().st_size
     except OSError:

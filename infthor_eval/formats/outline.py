@@ -1,6 +1,6 @@
-"""What contexts tell of a trajectory beside its frames: goals, actions and states, out of its JSON.
+"""Goals, actions and states of a trajectory, which some contexts show beside its frames; read from its JSON.
 
-Only the fields looked at here need to be there: the published evaluation reads files that hold little else.
+Only these fields are required, so that the reduced files of the published evaluation can be read.
 """
 
 from pathlib import Path
@@ -11,7 +11,7 @@ from infthor_eval.errors import DataError
 
 __all__ = ["Outline", "find_outline", "read_outline", "read_states"]
 
-_SUFFIXES = (".json", ".txt")  # both hold JSON; the published scripts know either
+_SUFFIXES = (".json", ".txt")  # both hold JSON; the published scripts accept either
 
 
 class _Call(msgspec.Struct):
@@ -21,7 +21,7 @@ class _Call(msgspec.Struct):
 
     @property
     def words(self) -> str:
-        """The action with the types of what it is done to: "PutObject Mug Fridge"."""
+        """The action with its object types: "PutObject Mug Fridge"."""
         ids = [item for item in (self.object_id, self.receptacle_id) if item]
         return " ".join([self.action, *(item.partition("|")[0] for item in ids)])
 
@@ -43,14 +43,14 @@ class _Range(msgspec.Struct):
 
 
 class Outline(msgspec.Struct):
-    """A trajectory, as far as contexts tell of it.
+    """The part of a trajectory that contexts show.
 
     Attributes:
-        plan: its low-level actions.
-        sub_tasks: its goals.
-        sub_trajs: which low-level actions, [first, end), belong to each goal.
+        plan: low-level actions.
+        sub_tasks: goals.
+        sub_trajs: range [first, end) of the low-level actions of each goal.
         long_horizon_task: the final task.
-        state_summary: low-level action to the state after it, in words.
+        state_summary: state in words after each low-level action.
     """
 
     plan: _Plan
@@ -66,10 +66,8 @@ class Outline(msgspec.Struct):
 
     @property
     def tasks(self) -> list[tuple[str, range]]:
-        """Goals with the actions towards them, paired one to one as published.
-
-        Published files repeat the final task as the last of the sub-tasks. Ours keep it apart; it is the last then.
-        """
+        """Goals with the ranges of their actions, paired one to one as in the published code."""
+        # Published files repeat the final task as the last sub-task. Ours do not, so it is appended here.
         goals = [item.task_desc for item in self.sub_tasks]
         if len(self.sub_trajs) == len(goals) + 1 and self.long_horizon_task is not None:
             goals.append(self.long_horizon_task.task_desc)
@@ -78,7 +76,7 @@ class Outline(msgspec.Struct):
 
 
 def find_outline(folder: Path, traj_id: str) -> Path | None:
-    """The file of a trajectory in a folder of trajectories; None where there is none."""
+    """Return the file of a trajectory in a folder of trajectories, or None if there is none."""
     paths = (folder / f"{traj_id}{suffix}" for suffix in _SUFFIXES)
     return next((path for path in paths if path.is_file()), None)
 
@@ -87,24 +85,25 @@ def read_outline(path: Path) -> Outline:
     """Read a trajectory's file.
 
     Raises:
-        DataError: it cannot be read, or is no trajectory.
+        DataError: the file cannot be read, or is not a trajectory.
     """
     try:
-        found = msgspec.json.decode(path.read_bytes(), type=Outline, strict=False)
+        outline = msgspec.json.decode(path.read_bytes(), type=Outline, strict=False)
     except OSError as error:
         raise DataError(f"{path}: cannot be read ({error.strerror}); restore it") from error
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
         raise DataError(f"{path}: not a trajectory ({error}); restore it") from error
-    if any(not 0 <= first <= end <= len(found.plan.low_actions) for first, end in _ends(found)):
+    ranges = [item.low_pddl_idx for item in outline.sub_trajs]
+    if any(not 0 <= first <= end <= len(outline.plan.low_actions) for first, end in ranges):
         raise DataError(f"{path}: sub_trajs reach outside the low-level actions; restore it")
-    return found
+    return outline
 
 
 def read_states(path: Path) -> dict[int, str]:
-    """States by low-level action, out of a file of nothing else; empty where there is no such file.
+    """Read a `state_summary.json`: states by low-level action; empty if there is no such file.
 
     Raises:
-        DataError: it is of another form.
+        DataError: the file cannot be read, or has another form.
     """
     try:
         return msgspec.json.decode(path.read_bytes(), type=dict[int, str], strict=False)
@@ -112,7 +111,3 @@ def read_states(path: Path) -> dict[int, str]:
         return {}
     except (OSError, msgspec.DecodeError, UnicodeDecodeError) as error:
         raise DataError(f"{path}: not a mapping of low-level actions to states ({error}); replay it again") from error
-
-
-def _ends(found: Outline) -> list[tuple[int, int]]:
-    return [item.low_pddl_idx for item in found.sub_trajs]

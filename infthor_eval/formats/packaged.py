@@ -1,7 +1,6 @@
-"""Data files that come with the package: `tasks/`, `results/` and the bundled question sets.
+"""Data files of the installed package: `tasks/`, `results/` and the bundled question sets.
 
-In a wheel they lie inside `infthor_eval`; in a checkout (and an editable install of one) `tasks/` and `results/`
-lie beside it. Both are found from the package itself.
+In a wheel they are inside `infthor_eval`. In a checkout `tasks/` and `results/` are beside it.
 """
 
 from importlib import resources
@@ -13,10 +12,10 @@ __all__ = ["packaged_folder"]
 
 
 def packaged_folder(name: str) -> Path:
-    """The folder `name` ("tasks", "results", "sets/nieh_mini") as the installed package carries it.
+    """Return the package's data folder of this name ("tasks", "results", "sets/nieh_mini").
 
     Raises:
-        DataError: the installation lacks it.
+        DataError: the installation lacks the folder.
     """
     package = resources.files("infthor_eval")
     for place in (package.joinpath(name), package.joinpath("..", name)):

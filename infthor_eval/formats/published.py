@@ -1,7 +1,7 @@
-"""Numbers that the paper reports, as data: `results/published/*.yaml`. A new table is a new file.
+"""Numbers reported in the paper, as data: `results/published/*.yaml`. A new table is a new file.
 
-A row belongs to a run if the run's checkpoint has one of the row's names and about as many parameters: an adapter can
-run a 3B and a 7B checkpoint, and a folder can have any name.
+A row is compared with a run if the run's checkpoint has one of the row's names and about as many parameters. The name
+alone is not enough: one adapter runs a 3B and a 7B checkpoint, and a local folder can have any name.
 """
 
 from collections.abc import Mapping
@@ -17,17 +17,17 @@ from infthor_eval.formats.yaml_files import read_yaml
 
 __all__ = ["PublishedRow", "PublishedTable", "published_tables"]
 
-_SAME_SIZE = 0.1  # relative difference; checkpoints of one architecture differ by heads and tied embeddings
+_SAME_SIZE = 0.1  # relative tolerance: counts of one model differ with its heads and tied embeddings
 
 
 class PublishedRow(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """One model's row.
 
     Attributes:
-        name: the paper's name of the model.
-        checkpoints: hub ids that the numbers are of.
-        parameters: how many the checkpoint has, in billions.
-        values: a number per column, percent.
+        name: name of the model in the paper.
+        checkpoints: hub ids of the evaluated checkpoints.
+        parameters: number of parameters of the checkpoint, in billions.
+        values: one number per column, in percent.
     """
 
     name: str
@@ -36,7 +36,7 @@ class PublishedRow(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     values: tuple[float, ...]
 
     def matches(self, model: Mapping[str, Any]) -> bool:
-        """Whether a run's model, by its identity, is the one that this row is about."""
+        """Return True if this row is about the model that a run's config describes."""
         checkpoint = str(model.get("checkpoint", "")).rstrip("/").rpartition("/")[2].lower()
         if checkpoint not in {name.rpartition("/")[2].lower() for name in self.checkpoints}:
             return False
@@ -48,13 +48,13 @@ class PublishedTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A table of the paper.
 
     Attributes:
-        title: what people call it ("Table 4").
-        source: where it stands.
-        suite: the suite whose results it can be compared with.
-        context: the way of evaluating that it is about (of NIEH: the context).
-        metric: how its numbers were scored.
-        columns: names of the columns, as the suite's summary names them.
-        rows: in the paper's order.
+        title: short name ("Table 4").
+        source: paper and table that the numbers are from.
+        suite: suite whose results can be compared with the table.
+        context: evaluated setting (for NIEH: the context).
+        metric: metric of the numbers.
+        columns: names of the columns, as in the suite's summary.
+        rows: rows in the paper's order.
     """
 
     title: str
@@ -68,10 +68,10 @@ class PublishedTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 @cache
 def published_tables(suite: str) -> tuple[PublishedTable, ...]:
-    """The published tables of a suite, in the order of their files' names.
+    """Return the published tables of a suite, in the order of their file names.
 
     Raises:
-        DataError: a file is not what it should be.
+        DataError: a file is malformed.
     """
     folder = packaged_folder("results") / "published"
     tables = [_read(path) for path in sorted(folder.glob("*.yaml"))]
@@ -79,10 +79,9 @@ def published_tables(suite: str) -> tuple[PublishedTable, ...]:
 
 
 def _read(path: Path) -> PublishedTable:
-    with wrap_errors(
-        f"{path}: not a table of published numbers", "install infthor-eval again", catch=msgspec.ValidationError
-    ):
-        table = msgspec.convert(read_yaml(path, "install infthor-eval again"), PublishedTable)
+    hint = "install infthor-eval again"
+    with wrap_errors(f"{path}: not a table of published numbers", hint, catch=msgspec.ValidationError):
+        table = msgspec.convert(read_yaml(path, hint), PublishedTable)
     for row in table.rows:
         if len(row.values) != len(table.columns):
             raise DataError(f"{path}: {row.name} has {len(row.values)} values for {len(table.columns)} columns")

@@ -1,8 +1,8 @@
 """Question files: `qa_set*.csv` of an NIEH set.
 
 Columns `traj_id`, `question`, `gt_img_idx`, `answer`; the last two are Python-literal lists (`[12, 13]`, `['yes']`).
-`question_type` and `absence` (`yes` where the answer is that something is nowhere, so that the frames are a sample and
-no evidence) are ours and optional; other columns are left unread.
+`question_type` and `absence` are ours and optional. `absence` is `yes` for questions whose answer is that something is
+nowhere: no frame is evidence for that, and `gt_img_idx` is a sample. Other columns are ignored.
 """
 
 import ast
@@ -23,27 +23,27 @@ __all__ = ["encode_questions", "read_questions", "write_questions"]
 _COLUMNS = ("traj_id", "question", "gt_img_idx", "answer")
 _TYPE = "question_type"
 _ABSENCE = "absence"
-_LARGEST = 2**63  # of the numbers that JSON readers take
+_LARGEST = 2**63  # JSON readers refuse larger numbers
 
 
 def read_questions(path: Path) -> list[Question]:
     """Read a question file.
 
     Raises:
-        DataError: the file cannot be read, is no CSV file of that form, or a cell is not what the column holds.
+        DataError: the file cannot be read, is not a CSV file of this form, or a cell is malformed.
     """
     hint = f"a question file is a UTF-8 CSV file with the columns {', '.join(_COLUMNS)}"
     return [_question(row, place) for place, row in read_rows(path, _COLUMNS, hint)]
 
 
 def write_questions(path: Path, questions: Iterable[Question]) -> None:
-    """Write a question file, whole or not at all."""
+    """Write a question file, atomically."""
     with write_atomically(path) as partial:
         partial.write_bytes(encode_questions(questions))
 
 
 def encode_questions(questions: Iterable[Question]) -> bytes:
-    """The content of a question file."""
+    """Return the content of a question file."""
     text = io.StringIO(newline="")
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow([*_COLUMNS, _TYPE, _ABSENCE])
@@ -58,14 +58,14 @@ def encode_questions(questions: Iterable[Question]) -> bytes:
 def _question(row: dict[str, str], place: str) -> Question:
     for name in _COLUMNS:
         if not row[name].strip():
-            raise DataError(f"{place}: {name} is empty; fill it or take the row out")
+            raise DataError(f"{place}: {name} is empty; fill it or remove the row")
     absence = row.get(_ABSENCE, "").strip().lower()
     if absence not in {"", "yes", "no"}:
-        raise DataError(f"{place}: {_ABSENCE} is {_short(absence)}; it is yes, no or empty")
+        raise DataError(f"{place}: {_ABSENCE} is {_short(absence)}; write yes, no or nothing")
     clues = _literal_list(row["gt_img_idx"], f"{place}: gt_img_idx", int)
     answers = _literal_list(row["answer"], f"{place}: answer", (str, int, float))
-    if not all(map(_can_be_given, answers)):
-        raise DataError(f"{place}: answer has an entry that nobody can give: {_short(row['answer'])}; write it out")
+    if not all(map(_is_answerable, answers)):
+        raise DataError(f"{place}: answer has an entry that no reply can match: {_short(row['answer'])}; write it out")
     return Question(
         traj_id=row["traj_id"].strip(),
         text=row["question"].strip(),
@@ -88,10 +88,11 @@ def _literal_list(cell: str, place: str, types: type | tuple[type, ...]) -> list
     return value
 
 
-def _can_be_given(answer: str | int | float) -> bool:
-    """Whether an answer is a text with something in it, or a number that a file of ours can hold."""
+def _is_answerable(answer: str | int | float) -> bool:
+    """Return True for a text that is not blank, or a number that JSON can hold."""
     if not isinstance(answer, str):
         return math.isfinite(answer) and abs(answer) < _LARGEST
+    # Lone surrogates cannot be encoded, so no file of results could hold them.
     return bool(answer.strip()) and not any("\ud800" <= letter <= "\udfff" for letter in answer)
 
 

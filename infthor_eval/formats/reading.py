@@ -1,8 +1,7 @@
-"""The one place where a file is opened and judged: what it is, how large, and whether it holds what it should.
+"""Reading files of users safely; every such file is read by one of these functions.
 
-Whatever reads a file of somebody else's reads it by one of these. A named pipe or a device would be waited for without
-end, a packed file can hold a thousand times its size, a nested one is deeper than any decoder goes: each is one
-`DataError` here, with the file, the reason and the mend.
+Opening a named pipe or a device would block for ever, a packed file can hold a thousand times its size, and a nested
+one can exceed any decoder's recursion limit. Each of these is a `DataError` here, with the file, the reason and a hint.
 """
 
 import gzip
@@ -11,7 +10,6 @@ import lzma
 import stat
 import zlib
 from collections.abc import Iterator
-from io import BufferedIOBase
 from pathlib import Path
 from typing import Any, TypeVar, overload
 
@@ -34,16 +32,16 @@ __all__ = [
 
 T = TypeVar("T")
 
-# What damaged content is told by, beside OSError: by the decoders of gzip, xz and zip.
+# What the decoders of gzip, xz and zip raise on damaged content, beside OSError.
 DAMAGED = (EOFError, zlib.error, lzma.LZMAError)
 _MB = 2**20
 
 
 def file_problem(path: Path) -> str | None:
-    """Why a file cannot be opened without waiting, or is none; None where it can."""
+    """Return why a path is not a file that can be opened without blocking, or None if it is one."""
     try:
         mode = path.stat().st_mode
-    except (OSError, ValueError) as error:  # ValueError: a name with a null in it
+    except (OSError, ValueError) as error:  # ValueError: a null character in the name
         return f"cannot be read ({in_one_line(error)})"
     if stat.S_ISREG(mode):
         return None
@@ -51,15 +49,15 @@ def file_problem(path: Path) -> str | None:
 
 
 def require_file(path: Path, hint: str, max_mb: int | None = None) -> None:
-    """Refuse what is no file that can be read.
+    """Check that a path is a file that can be read.
 
     Args:
-        path: of the file.
-        mend: what to do, for the message.
-        max_mb: refuse it where it is larger, MiB.
+        path: the file.
+        hint: the way to fix it, for the message.
+        max_mb: maximum size in MiB.
 
     Raises:
-        DataError: it is not there, a folder, a pipe or a device, or too large.
+        DataError: it is missing, a folder, a pipe or a device, or too large.
     """
     reason = file_problem(path)
     if reason is not None:
@@ -69,10 +67,10 @@ def require_file(path: Path, hint: str, max_mb: int | None = None) -> None:
 
 
 def require_plain_files(folder: Path, hint: str) -> None:
-    """Refuse a folder with pipes or devices in it, for what another library reads of it.
+    """Check that a folder has no pipes or devices in it, before another library reads its files.
 
     Raises:
-        DataError: it has one, or a link that leads nowhere.
+        DataError: it has one, or a broken link.
     """
     with wrap_errors(f"{folder}: cannot be read", hint):
         for path in sorted(folder.iterdir()):
@@ -81,14 +79,14 @@ def require_plain_files(folder: Path, hint: str) -> None:
 
 
 def read_bytes(path: Path, hint: str) -> bytes:
-    """The content of a file.
+    """Return the content of a file.
 
     Args:
-        path: of the file.
-        mend: what to do where it cannot be read, for the message.
+        path: the file.
+        hint: the way to fix it, for the message.
 
     Raises:
-        DataError: no file, too large, or it cannot be read.
+        DataError: it is not a file, too large, or cannot be read.
     """
     require_file(path, hint, FILE_MB.value)
     with wrap_errors(f"{path}: cannot be read", hint):
@@ -96,10 +94,10 @@ def read_bytes(path: Path, hint: str) -> bytes:
 
 
 def read_text(path: Path, hint: str) -> str:
-    """The content of a UTF-8 file, without a byte order mark, its line ends as they are.
+    """Return the content of a UTF-8 file without byte order mark; line ends are not converted.
 
     Raises:
-        DataError: as `read_bytes`, or it is not UTF-8.
+        DataError: as `read_bytes`, or the content is not UTF-8.
     """
     with wrap_errors(f"{path}: not UTF-8 text", hint, catch=UnicodeDecodeError):
         return read_bytes(path, hint).decode("utf-8-sig")
@@ -110,32 +108,32 @@ def read_json(path: Path, hint: str) -> Any: ...
 @overload
 def read_json(path: Path, hint: str, form: type[T]) -> T: ...
 def read_json(path: Path, hint: str, form: Any = Any) -> Any:
-    """What a JSON file holds, in the form of a type.
+    """Return the content of a JSON file as a type.
 
     Args:
-        path: of the file.
-        mend: what to do where it is not what it should be, for the message.
-        form: what `msgspec` converts it to.
+        path: the file.
+        hint: the way to fix a bad file, for the message.
+        form: the type that `msgspec` decodes to.
 
     Raises:
-        DataError: as `read_bytes`; not JSON, nested too deep, or of another form.
+        DataError: as `read_bytes`, or the content is not JSON, nested too deep, or does not match the type.
     """
     content = read_bytes(path, hint)
-    wanted = "valid JSON" if form is Any else "in its documented form"
-    with wrap_errors(f"{path}: not {wanted}", hint, catch=(msgspec.DecodeError, UnicodeDecodeError, RecursionError)):
+    expected = "valid JSON" if form is Any else "in its documented form"
+    with wrap_errors(f"{path}: not {expected}", hint, catch=(msgspec.DecodeError, UnicodeDecodeError, RecursionError)):
         return msgspec.json.decode(content, type=form)
 
 
 def lines_of(path: Path, hint: str) -> Iterator[tuple[int, bytes]]:
-    """The lines of a file, packed by gzip if it is called `.gz`, that are not empty, with their numbers from 1.
+    """Yield number (from 1) and content of the lines of a file that are not empty; a `.gz` file is unpacked.
 
     Raises:
-        DataError: no file, damaged, or a line or the whole is longer than the limits.
+        DataError: it is not a file, damaged, or a line or the whole file exceeds its limit.
     """
     require_file(path, hint)
     number = 0
     try:
-        with _opened(path) as file:
+        with gzip.open(path) if path.suffix == ".gz" else path.open("rb") as file:
             left = FILE_MB.value * _MB
             while line := file.readline(LINE_MB.value * _MB + 1):
                 number, left = number + 1, left - len(line)
@@ -150,18 +148,14 @@ def lines_of(path: Path, hint: str) -> Iterator[tuple[int, bytes]]:
 
 
 def json_lines_of(path: Path, hint: str) -> Iterator[dict[str, Any]]:
-    """The JSON objects of a file with one a line.
+    """Yield the JSON objects of a file that has one per line.
 
     Raises:
-        DataError: as `lines_of`, or a line is no JSON object.
+        DataError: as `lines_of`, or a line is not a JSON object.
     """
     for number, line in lines_of(path, hint):
         with wrap_errors(f"{path}, line {number}: not JSON", hint, catch=(ValueError, RecursionError)):
-            found = json.loads(line)
-        if not isinstance(found, dict):
+            entry = json.loads(line)
+        if not isinstance(entry, dict):
             raise DataError(f"{path}, line {number}: not a JSON object; {hint}")
-        yield found
-
-
-def _opened(path: Path) -> BufferedIOBase:
-    return gzip.open(path) if path.suffix == ".gz" else path.open("rb")
+        yield entry

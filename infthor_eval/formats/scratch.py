@@ -1,4 +1,4 @@
-"""Temporary folders that do not outlast the process that made them for long, however it ended."""
+"""Temporary folders that are removed even if the process that created them is killed."""
 
 import fcntl
 import shutil
@@ -14,29 +14,30 @@ _LOCK = ".lock"
 
 
 class ScratchFolder:
-    """A temporary folder, locked for as long as it is used; as a context manager it gives its path.
+    """A temporary folder, locked as long as it is in use; as a context manager it returns its path.
 
-    A process that is killed cannot remove its folders: the first folder that another one makes removes those that
-    nobody holds any more. The system lets go of a lock with the process, whatever its number or container.
+    A killed process cannot remove its folders. The first scratch folder of another process removes all folders whose
+    lock nobody holds any more. The system releases a lock when its process ends, in whatever way; a process id in a
+    file would not do, as containers that share the folder have the same ids.
 
     Attributes:
-        path: the folder, empty at first.
+        path: the folder, initially empty.
     """
 
     def __init__(self) -> None:
-        """Make it.
+        """Create the folder.
 
         Raises:
             OSError: there is no room, or no place for temporary files.
         """
         _remove_abandoned(Path(tempfile.gettempdir()))
-        self._around = tempfile.TemporaryDirectory(prefix=_PREFIX, ignore_cleanup_errors=True)
-        around = Path(self._around.name)
-        # Locked before it has its name: a lock file that nobody holds means that the folder is abandoned.
-        self._lock = (around / "new").open("wb")
+        self._outer = tempfile.TemporaryDirectory(prefix=_PREFIX, ignore_cleanup_errors=True)
+        outer = Path(self._outer.name)
+        # The file is locked before it gets the name of a lock: an unlocked one means that the folder is abandoned.
+        self._lock = (outer / "new").open("wb")
         fcntl.flock(self._lock, fcntl.LOCK_EX)
-        (around / "new").rename(around / _LOCK)
-        self.path = around / "files"
+        (outer / "new").rename(outer / _LOCK)
+        self.path = outer / "files"
         self.path.mkdir()
 
     def __enter__(self) -> Path:
@@ -48,8 +49,8 @@ class ScratchFolder:
         self.cleanup()
 
     def cleanup(self) -> None:
-        """Remove it. Safe to call again."""
-        self._around.cleanup()
+        """Remove the folder. Calling it again does nothing."""
+        self._outer.cleanup()
         self._lock.close()
 
 
@@ -60,5 +61,5 @@ def _remove_abandoned(place: Path) -> None:
             with lock.open("rb") as file:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 shutil.rmtree(lock.parent, ignore_errors=True)
-        except OSError:  # somebody works there, or it is another user's, or just gone
+        except OSError:  # in use, another user's, or removed by another process just now
             continue

@@ -1,4 +1,4 @@
-"""`set.json` of an NIEH set: the format of its files, and what rendered its frames."""
+"""`set.json` of an NIEH set: the format of its files, and the simulator that rendered its frames."""
 
 import json
 from pathlib import Path
@@ -10,15 +10,17 @@ from infthor_eval.formats.reading import read_json
 
 __all__ = ["FORMAT", "claim_for_simulator", "simulator_of"]
 
-FORMAT = 1  # rises when files of a set that we write change their meaning
+FORMAT = 1  # increased when the files of a set that we write change their meaning
 _FILE = "set.json"
 
 
 def simulator_of(root: Path) -> str | None:
-    """What rendered the frames of the set ("embedded", "unity"); None where it does not say, as published sets.
+    """Return the simulator that rendered the set's frames ("embedded", "unity"), or None if it is not recorded.
+
+    Published sets do not record it.
 
     Raises:
-        DataError: `set.json` is not a JSON object, or is of another version than this one reads.
+        DataError: `set.json` is not a JSON object, or has another format version.
     """
     path = root / _FILE
     simulator = _read(path).get("simulator") if path.exists() else None
@@ -28,10 +30,10 @@ def simulator_of(root: Path) -> str | None:
 
 
 def claim_for_simulator(root: Path, simulator: str) -> None:
-    """Say what renders the frames of a set that is about to be written or continued.
+    """Record the simulator of a set that is about to be written or continued.
 
     Raises:
-        DataError: another simulator, or another version of this one, has rendered the frames that are there.
+        DataError: another simulator, or another version of this package, has rendered the existing frames.
     """
     path, version = root / _FILE, infthor_eval.__version__
     if not path.exists():
@@ -47,7 +49,7 @@ def claim_for_simulator(root: Path, simulator: str) -> None:
         )
     if known.get("infthor_eval") != version:
         raise DataError(
-            f"{root}: its frames were made by version {known.get('infthor_eval')}, this is {version}; "
+            f"{root}: its frames were rendered by version {known.get('infthor_eval')}, this is {version}; "
             "give another folder"
         )
 
@@ -58,7 +60,7 @@ def _read(path: Path) -> dict[str, Any]:
         raise DataError(f"{path}: not a JSON object; write the set again")
     if info.get("format", FORMAT) != FORMAT:
         raise DataError(
-            f"{path}: the set is of format {info['format']}, this version reads {FORMAT}; "
-            "use the version that made it, or make the set again"
+            f"{path}: the set has format {info['format']}, this version reads {FORMAT}; "
+            "use the version that wrote it, or create the set again"
         )
     return info

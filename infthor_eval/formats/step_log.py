@@ -1,13 +1,11 @@
 """The log of a replayed trajectory: `metadata/<traj_id>/metadata.json`, one entry per frame.
 
-Three layouts are in circulation and all are read: a list of entries, a single entry, and a dict of columns.
-Entries as published hold `img_idx`, `img_filename`, `step` and `object_log`; ours add what question rules
-and their checker need. The added fields are optional, so published logs read as well, and readers that
-know only the published fields can read ours.
+Published data have three layouts, and all are read: a list of entries, a single entry, and a dict of columns. Published
+entries have `img_idx`, `img_filename`, `step` and `object_log`. Ours add optional fields for the question rules and
+their checker, so that either kind of log can be read by either kind of reader.
 
-Frames and actions: frame 0 shows the scene before the first action, frame k + 1 the outcome of low-level
-action k. `step` is that action's index; frame 0 carries step 0, as in the published logs, and `action`
-None.
+Frame 0 shows the scene before the first action, frame k + 1 the outcome of low-level action k. `step` is the index of
+that action. Frame 0 has step 0, as in the published logs, and no `action`.
 """
 
 from collections.abc import Iterator, Sequence
@@ -35,15 +33,15 @@ _HINT = "replay the trajectory again or restore the published file"
 
 
 class ObjectLog(msgspec.Struct, omit_defaults=False):
-    """What the simulator reports of the objects at one frame, by object type (the published fields).
+    """What the simulator reports about the objects at one frame, by object type (the published fields).
 
     Attributes:
         visible: types of the visible objects (within the simulator's visibility distance).
-        pickupable: those of them that can be picked up.
-        is_open: those of them that are open.
+        pickupable: types of the visible objects that can be picked up.
+        is_open: types of the visible objects that are open.
         inven_obj: types of the objects in the agent's hand.
         receptacles: types of the visible receptacles.
-        recep_objs: receptacle type to the types of the visible objects in it.
+        recep_objs: types of the visible objects in each visible receptacle, by the receptacle's type.
     """
 
     visible: list[str] = msgspec.field(default_factory=list)
@@ -55,7 +53,7 @@ class ObjectLog(msgspec.Struct, omit_defaults=False):
 
 
 class LoggedPose(msgspec.Struct):
-    """Where the agent is: position in metres, rotation about the vertical and camera horizon in degrees."""
+    """The agent's pose: position in metres, rotation about the vertical and camera horizon in degrees."""
 
     x: float
     y: float
@@ -70,7 +68,7 @@ class ObjectInFrame(msgspec.Struct, omit_defaults=True):
     Attributes:
         pixels: number of the frame's pixels that show it.
         box: [xmin, ymin, xmax, ymax] of these pixels, both ends inclusive.
-        visible: whether the simulator calls it visible, that is in sight and within its visibility distance.
+        visible: the simulator's flag, True if the object is in view and within the visibility distance.
     """
 
     pixels: int
@@ -79,17 +77,19 @@ class ObjectInFrame(msgspec.Struct, omit_defaults=True):
 
 
 class ObjectState(msgspec.Struct, omit_defaults=True):
-    """The true state of one object, seen or not.
+    """The true state of one object, whether it is in view or not.
 
     Attributes:
         type: AI2-THOR object type.
-        parents: ids of the receptacles it is in or on, innermost first where nested.
+        parents: ids of the receptacles it is in or on; if they are nested, the innermost first.
         position: x, y, z in metres.
-        held: whether it is in the agent's hand.
-        exists: False from the step on at which it left the scene (an egg that was cracked, a loaf that was
-            sliced).
-        is_open, is_on: None where it cannot be opened or switched.
-        is_sliced, is_dirty, is_cooked: False where it cannot be.
+        held: True if it is in the agent's hand.
+        exists: False after it left the scene (an egg that was cracked, a loaf that was sliced).
+        is_open: True if it is open, None if it cannot be opened.
+        is_on: True if it is switched on, None if it cannot be switched.
+        is_sliced: True if it is sliced.
+        is_dirty: True if it is dirty.
+        is_cooked: True if it is cooked.
         temperature: "RoomTemp", "Hot" or "Cold".
     """
 
@@ -107,23 +107,22 @@ class ObjectState(msgspec.Struct, omit_defaults=True):
 
 
 class Step(msgspec.Struct, omit_defaults=True):
-    """One frame and what holds at it.
+    """One frame and its metadata.
 
     Attributes:
         img_idx: number of the frame.
         img_filename: name of the frame's file.
-        step: index of the low-level action that led to it (see the module's text).
+        step: index of the low-level action before the frame (see the module's docstring).
         object_log: the published fields.
         action: text of that action ("PickupObject Mug"); None at the first frame and in published logs.
-        success: whether the simulator carried it out.
-        error: the simulator's message where it did not.
+        success: True if the simulator accepted the action.
+        error: the simulator's message if it refused the action.
         high_idx: index of the sub-goal that the action belongs to.
-        pose: where the agent stands; None in published logs.
+        pose: the agent's pose; None in published logs.
         target: id of the object acted on.
         receptacle: id of the receptacle acted on.
-        seen: the object instances in the frame by id; None in published logs.
-        changes: the state of every object that changed since the frame before, by id; of all objects at the
-            first.
+        seen: object instances in the frame by id; None in published logs.
+        changes: states, by id, of the objects that changed since the frame before; of all objects at the first frame.
     """
 
     img_idx: int
@@ -151,7 +150,7 @@ def read_steps(folder: Path) -> list[Step]:
         One entry per frame, in the order of the file.
 
     Raises:
-        DataError: the file is missing, not JSON, or not in one of the known layouts.
+        DataError: the file is missing, not JSON, or has none of the known layouts.
     """
     path = Path(folder) / _FILE
     document = read_json(path, _HINT)
@@ -159,7 +158,7 @@ def read_steps(folder: Path) -> list[Step]:
 
 
 def write_steps(folder: Path, steps: Sequence[Step]) -> None:
-    """Write the log of one trajectory as a list of entries, one a line.
+    """Write the log of one trajectory as a list of entries, one per line.
 
     Args:
         folder: the trajectory's folder, which must exist.
@@ -170,19 +169,18 @@ def write_steps(folder: Path, steps: Sequence[Step]) -> None:
 
 
 def iter_object_states(steps: Sequence[Step]) -> Iterator[dict[str, ObjectState]]:
-    """The state of all objects at each step, from the changes that the log holds.
+    """Yield the states of all objects, by id, at each step, from the changes in the log.
 
-    Yields:
-        Per step one dict by object id. It is updated in place: copy what must outlive the next step.
+    It is one dict, updated in place: copy what must outlive the next step.
     """
-    world: dict[str, ObjectState] = {}
+    states: dict[str, ObjectState] = {}
     for step in steps:
-        world.update(step.changes)
-        yield world
+        states.update(step.changes)
+        yield states
 
 
 def _entries(path: Path, document: object) -> list[dict[str, Any]]:
-    """The entries of any of the three layouts as a list of dicts."""
+    """Return the entries of any of the three layouts as a list of dicts."""
     if isinstance(document, list):
         return document
     if not isinstance(document, dict) or "img_idx" not in document:
@@ -193,18 +191,18 @@ def _entries(path: Path, document: object) -> list[dict[str, Any]]:
 
 
 def _rows(path: Path, columns: dict[str, Any]) -> list[dict[str, Any]]:
-    """Columns to rows; columns that are no lists (free remarks) are not per frame and stay out."""
+    """Return the rows of a dict of columns, without the columns that are not lists (remarks, not per frame)."""
     lists = {name: column for name, column in columns.items() if isinstance(column, list)}
-    wanted = len(columns["img_idx"])
+    n_rows = len(columns["img_idx"])
     for name, column in lists.items():
-        if len(column) != wanted:
-            raise DataError(f"{path}: column '{name}' has {len(column)} entries, 'img_idx' has {wanted}; {_HINT}")
+        if len(column) != n_rows:
+            raise DataError(f"{path}: column '{name}' has {len(column)} entries, 'img_idx' has {n_rows}; {_HINT}")
     return [dict(zip(lists, row, strict=True)) for row in zip(*lists.values(), strict=True)]
 
 
 def _step(path: Path, index: int, entry: object) -> Step:
     if isinstance(entry, dict) and "img_filename" not in entry and isinstance(entry.get("img_idx"), int):
-        # Columnar files may hold img_idx alone; frame files are always named by their number.
+        # Files of columns may lack the names; frame files are always named by their number.
         entry = {**entry, "img_filename": f"{entry['img_idx']:09d}.png"}
     try:
         return msgspec.convert(entry, Step)

@@ -1,8 +1,8 @@
-"""Trajectory JSON: ∞-THOR's, ours, and its single-task ancestor, ALFRED's `traj_data.json`.
+"""Trajectory JSON: ∞-THOR's, ours, and that of their single-task predecessor, ALFRED's `traj_data.json`.
 
-One typed form serves all three; `_regular` levels what the published saver writes otherwise. What a file adds beyond
-the known fields is tolerated and left out, so whoever passes a trajectory on keeps `Source.raw`. Coordinates are metres
-but for `PlannerAction.location`, whose x and z are grid cells of 0.25 m; angles are degrees.
+One set of types serves all three; `_normalize` converts what the published saver writes differently. Unknown fields are
+ignored, so code that passes a trajectory on keeps `TrajectorySource.raw`. Coordinates are metres, except x and z of
+`PlannerAction.location`, which are grid cells of 0.25 m. Angles are degrees.
 """
 
 import re
@@ -41,14 +41,14 @@ __all__ = [
 ]
 
 _SUFFIXES = (".json", ".jsonl", ".jsonl.gz")
-# What a replayed set holds beside its trajectories.
+# Other JSON files of a replayed set.
 _NOT_TRAJECTORIES = {"metadata.json", "expert_log.json", "state_summary.json"}
 _HINT = "restore the file or leave it out"
 _ALWAYS: dict[str, Callable[[], Any]] = {"long_horizon_task": dict, "sub_tasks": list, "sub_trajs": list}
 
 
 class _Fields(msgspec.Struct, omit_defaults=True):
-    """Base of the parts; defaults are left out in writing."""
+    """Base class of the parts; default values are not written."""
 
 
 class InitAction(_Fields, omit_defaults=False):
@@ -69,7 +69,7 @@ class InitAction(_Fields, omit_defaults=False):
 
 
 class ObjectPose(_Fields):
-    """Where the initial scene has one object; the name is that of the Unity object, without "(Clone)"."""
+    """The pose of one object in the initial scene; `name` is that of the Unity object, without "(Clone)"."""
 
     name: str = msgspec.field(name="objectName")
     position: dict[str, float]
@@ -77,15 +77,14 @@ class ObjectPose(_Fields):
 
 
 class Toggle(_Fields, omit_defaults=False):
-    """Switches all objects of a type on or off in the initial scene."""
+    """The on/off state of all objects of a type in the initial scene."""
 
     object_type: str = msgspec.field(name="objectType")
     is_on: bool = msgspec.field(name="isOn")
 
 
 class Scene(_Fields, omit_defaults=False):
-    """What makes the initial state of a trajectory: the scene, the objects' poses and states, the agent's
-    pose."""
+    """The initial state of a trajectory: scene, poses and states of objects, pose of the agent."""
 
     floor_plan: str
     init_action: InitAction
@@ -97,7 +96,7 @@ class Scene(_Fields, omit_defaults=False):
 
 
 class ApiAction(_Fields):
-    """One call of the simulator as recorded. Ids are those of the AI2-THOR version that recorded it."""
+    """One recorded call of the simulator, with object ids of the AI2-THOR version that recorded it."""
 
     action: str
     object_id: str | None = msgspec.field(name="objectId", default=None)
@@ -109,14 +108,14 @@ class ApiAction(_Fields):
 
 
 class DiscreteAction(_Fields, omit_defaults=False):
-    """The action in words: `args` is a list of names at the upper level, a dict at the lower."""
+    """The action in words; `args` is a list of names in sub-goals, a dict in low-level actions."""
 
     action: str
     args: dict[str, Any] | list[Any] = msgspec.field(default_factory=list)
 
     @property
     def box(self) -> tuple[int, int, int, int] | None:
-        """The recorded box [xmin, ymin, xmax, ymax] of the object acted on, in the 300x300 frame."""
+        """Recorded box [xmin, ymin, xmax, ymax] of the object acted on, in pixels of the 300x300 frame."""
         box = self.args.get("bbox") if isinstance(self.args, dict) else None
         return tuple(box) if isinstance(box, list) and len(box) == 4 else None
 
@@ -131,7 +130,7 @@ class LowAction(_Fields, omit_defaults=False):
 
 
 class PlannerAction(_Fields):
-    """One sub-goal as the planner made it; `location` is "loc|x|z|rotation|horizon"."""
+    """One sub-goal in the planner's form; `location` is "loc|x|z|rotation|horizon"."""
 
     action: str
     location: str | None = None
@@ -149,14 +148,14 @@ class HighAction(_Fields, omit_defaults=False):
 
 
 class ExpertPlan(_Fields, omit_defaults=False):
-    """The expert's plan at both levels."""
+    """The expert's plan: sub-goals and low-level actions."""
 
     low_actions: list[LowAction]
     high_pddl: list[HighAction] = msgspec.field(default_factory=list)
 
 
 class TaskInfo(_Fields, omit_defaults=False):
-    """What a task is about: its type (`goal`) and the object types that fill it."""
+    """A task's type (`goal`) and its object types."""
 
     goal: str
     pickup: str | None = None
@@ -174,7 +173,7 @@ class SubTask(_Fields, omit_defaults=False):
 
 
 class SubTrajectory(_Fields, omit_defaults=False):
-    """Which sub-goals and low-level actions belong to one sub-task; both ranges are [first, end)."""
+    """Ranges [first, end) of the sub-goals and low-level actions of one sub-task."""
 
     sub_traj_idx: int
     high_pddl_idx: tuple[int, int]
@@ -183,8 +182,7 @@ class SubTrajectory(_Fields, omit_defaults=False):
 
 
 class Trajectory(_Fields):
-    """One trajectory. The fields below `plan` are absent where the format has none (see the module's
-    text)."""
+    """One trajectory; the fields below `plan` are not in all of the formats (see the module's docstring)."""
 
     scene: Scene
     plan: ExpertPlan
@@ -204,12 +202,12 @@ class Trajectory(_Fields):
 
 @dataclass(frozen=True)
 class TrajectorySource:
-    """One trajectory where it lies, not yet decoded, so that a malformed one does not hide the others.
+    """One trajectory in a file, not yet decoded, so that a malformed one does not prevent reading the others.
 
     Attributes:
         path: the file.
-        line: its line there, from 1; None where the file holds nothing else.
-        raw: the JSON text.
+        line: line in the file, from 1; None if the file holds only this trajectory.
+        raw: JSON text of the trajectory.
     """
 
     path: Path
@@ -222,13 +220,13 @@ class TrajectorySource:
         return str(self.path) if self.line is None else f"{self.path}:{self.line}"
 
     def read(self) -> Trajectory:
-        """Decode and check it; `traj_id` falls back to the task's id, then to the file's name.
+        """Decode and check the trajectory; a missing `traj_id` becomes the task's id, else the file's name.
 
         Raises:
-            DataError: not JSON, or not the documented form.
+            DataError: the text is not JSON, or not of the documented form.
         """
         try:
-            trajectory = msgspec.convert(_regular(msgspec.json.decode(self.raw)), type=Trajectory)
+            trajectory = msgspec.convert(_normalize(msgspec.json.decode(self.raw)), type=Trajectory)
         except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
             raise DataError(f"{self.place}: not a trajectory ({error}); {_HINT}") from error
         trajectory.traj_id = trajectory.traj_id or trajectory.task_id or self._stem()
@@ -240,13 +238,12 @@ class TrajectorySource:
 
 
 def iter_sources(path: Path) -> Iterator[TrajectorySource]:
-    """Find the trajectories in a file (`.json`, `.jsonl`, `.jsonl.gz`) or a directory of such files.
+    """Yield the trajectories of a file (`.json`, `.jsonl`, `.jsonl.gz`) or a folder of such files, not decoded.
 
-    Yields:
-        The trajectories, undecoded, in the order of file names and lines.
+    They come in the order of file names and lines.
 
     Raises:
-        DataError: nothing there, of another kind, or unreadable.
+        DataError: a file is missing, unreadable or of another kind, or the folder has no such file.
     """
     path = Path(path)
     if path.is_dir():
@@ -257,62 +254,61 @@ def iter_sources(path: Path) -> Iterator[TrajectorySource]:
     elif path.name.endswith((".jsonl", ".jsonl.gz")):
         yield from (TrajectorySource(path, line, raw) for line, raw in lines_of(path, _HINT))
     else:
-        raise DataError(f"{path}: no trajectory file; name a {', '.join(_SUFFIXES)} file or a directory")
+        raise DataError(f"{path}: not a trajectory file; give a {', '.join(_SUFFIXES)} file or a folder")
 
 
 def trajectory_files(path: Path) -> list[Path]:
-    """The files of trajectories in a directory, sorted; of a file, itself.
+    """Return the sorted trajectory files of a folder, or the path itself if it is a file.
 
     Raises:
-        DataError: a directory without any.
+        DataError: the folder has no such file.
     """
     if not path.is_dir():
         return [path]
     files = [file for file in sorted(path.rglob("*")) if _is_trajectory_file(file)]
     if not files:
-        raise DataError(f"{path}: no {', '.join(_SUFFIXES)} file in this directory; name another path")
+        raise DataError(f"{path}: no {', '.join(_SUFFIXES)} file in this folder; give another path")
     return files
 
 
 def iter_trajectories(path: Path) -> Iterator[Trajectory]:
-    """Read the trajectories of a file or directory one after the other.
+    """Yield the decoded trajectories of a file or folder, see `iter_sources`.
 
     Raises:
-        DataError: as `iter_sources` and `Source.read`; the message names file and line.
+        DataError: as `iter_sources` and `TrajectorySource.read`; the message names file and line.
     """
     for source in iter_sources(path):
         yield source.read()
 
 
 def encode_trajectory(trajectory: Trajectory) -> bytes:
-    """The trajectory as indented JSON, with the keys that the published saver always writes."""
+    """Return the trajectory as indented JSON, with the keys that the published saver always writes."""
     document = {name: empty() for name, empty in _ALWAYS.items()} | msgspec.to_builtins(trajectory)
     return msgspec.json.format(msgspec.json.encode(document), indent=1) + b"\n"
 
 
-def _regular(document: Any) -> Any:
-    """A decoded file in the form that `Trajectory` describes.
+def _normalize(document: Any) -> Any:
+    """Return a decoded file in the form of `Trajectory`.
 
-    The published saver leaves `floor_plan` empty (`scene_num` names it), `dirty_and_empty` null, and
-    `long_horizon_task` without a key where there is no final task.
+    The published saver leaves `floor_plan` empty (`scene_num` has the number), writes null for `dirty_and_empty`, and
+    an empty `long_horizon_task` if there is no final task.
     """
     if not isinstance(document, dict):
-        return document  # which the typed form refuses, in its own words
-    regular = {name: value for name, value in document.items() if (name, value) != ("long_horizon_task", {})}
-    scene = regular.get("scene")
+        return document  # `msgspec.convert` refuses it and says what it is
+    normalized = {name: value for name, value in document.items() if (name, value) != ("long_horizon_task", {})}
+    scene = normalized.get("scene")
     if isinstance(scene, dict):
         scene = {name: value for name, value in scene.items() if (name, value) != ("dirty_and_empty", None)}
         if not scene.get("floor_plan") and "scene_num" in scene:
             scene["floor_plan"] = f"FloorPlan{str(scene['scene_num']).removeprefix('FloorPlan')}"
-        regular["scene"] = scene
-    return regular
+        normalized["scene"] = scene
+    return normalized
 
 
 def folder_name(traj_id: str) -> str:
-    """The name of a trajectory's folder: its id, made safe as one path component.
+    """Return the name of a trajectory's folder: its id, with other characters than `A-Za-z0-9_.-` replaced.
 
-    An id with other characters than letters, digits, `_`, `.`, `-` (ALFRED's have a slash) gets them replaced
-    and a hash appended, so that two ids never share a folder.
+    A hash is appended if any is replaced (the ids of ALFRED have a slash), so that two ids never share a folder.
     """
     name = re.sub(r"[^A-Za-z0-9_.-]+", "_", traj_id).lstrip(".")[:150]
     if name == traj_id and name:
@@ -321,5 +317,5 @@ def folder_name(traj_id: str) -> str:
 
 
 def _is_trajectory_file(path: Path) -> bool:
-    # Pipes and devices too: whoever reads them is told what they are.
+    # Not only plain files: reading a pipe or device then raises the error that says what it is.
     return not path.is_dir() and path.name.endswith(_SUFFIXES) and path.name not in _NOT_TRAJECTORIES

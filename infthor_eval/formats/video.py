@@ -1,7 +1,7 @@
-"""Frames of videos, as references like any other frame.
+"""Frames of videos, as references like other frames.
 
-A model wants single frames, some of them again and again, and a video can only be decoded from its start. So the
-frames that are sampled from it are decoded in one pass and kept in the user's cache under the video's digest.
+Models need single frames, some repeatedly, but a video can only be decoded from its start. So the sampled frames are
+decoded in one pass and stored in the user's cache under the video's digest.
 """
 
 import os
@@ -19,22 +19,22 @@ from infthor_eval.formats.user_cache import user_cache
 
 __all__ = ["frames_per_second"]
 
-# FFmpeg would say on standard error what is wrong with a video, in lines of its own; ours says it in one. OpenCV reads
-# the level when it first uses FFmpeg, so it is set before anything here can.
+# Silences FFmpeg, which prints errors of its own beside our one-line error. OpenCV reads the level when it first uses
+# FFmpeg, so it is set on import.
 os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
 
-_COUNT = "n_frames"  # the file with the number of frames beside them
-_HINT = "make the video again, or delete it to show the frames instead"
+_COUNT = "n_frames"  # file with the number of frames
+_HINT = "create the video again, or delete it to show the frames instead"
 
 
 def frames_per_second(path: Path) -> tuple[FrameRef, ...]:
-    """One frame per second of a video, from its first on: the nearest to each second.
+    """Return one frame per second of a video: the frames nearest to 0 s, 1 s, 2 s, ...
 
-    Decoded by OpenCV on the first call for a video's content; the name of the folder that the frames are in tells
-    content and decoder apart.
+    OpenCV decodes the video at the first call for its content. The name of the cache folder has the digest of the
+    content and the version of the decoder.
 
     Raises:
-        DataError: the video cannot be decoded to its end, or its frames cannot be kept.
+        DataError: the video cannot be decoded to its end, or its frames cannot be stored.
     """
     import cv2
 
@@ -53,23 +53,23 @@ def frames_per_second(path: Path) -> tuple[FrameRef, ...]:
 
 
 def _is_complete(folder: Path) -> bool:
-    """Whether no frame was taken away since; caches are cleaned by all sorts of programs."""
+    """Return False also if frames were deleted later, as programs that clean caches do."""
     count = folder / _COUNT
     return count.is_file() and count.read_text() == str(len(list(folder.glob("*.png"))))
 
 
 def _extract(path: Path, folder: Path) -> None:
-    """Decode into a folder that appears only when it is whole."""
+    """Decode the frames into a temporary folder and rename it when it is complete."""
     shutil.rmtree(folder, ignore_errors=True)
     folder.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=folder.parent, prefix="partial-") as partial:
-        made = Path(partial) / "frames"
-        made.mkdir()
-        _decode(path, made)
+        frames = Path(partial) / "frames"
+        frames.mkdir()
+        _decode(path, frames)
         try:
-            made.rename(folder)
+            frames.rename(folder)
         except OSError:
-            if not _is_complete(folder):  # another process was faster
+            if not _is_complete(folder):  # otherwise another process was faster
                 raise
 
 
@@ -83,7 +83,7 @@ def _decode(path: Path, folder: Path) -> None:
             raise DataError(f"{path}: not a video that OpenCV can decode; {_HINT}")
         n_frames = n_sampled = 0
         while video.grab():
-            if n_frames >= n_sampled * fps - 0.5:
+            if n_frames >= n_sampled * fps - 0.5:  # the frame nearest to second `n_sampled`
                 decoded, pixels = video.retrieve()
                 if not decoded:
                     raise DataError(f"{path}: frame {n_frames} cannot be decoded; {_HINT}")
@@ -92,6 +92,7 @@ def _decode(path: Path, folder: Path) -> None:
             n_frames += 1
     finally:
         video.release()
+    # The number in the header can be an estimate, so a second less is no error.
     if not n_sampled or n_frames < promised - fps:
         raise DataError(f"{path}: only {n_frames} of its {promised} frames can be decoded; {_HINT}")
     (folder / _COUNT).write_text(str(n_sampled))

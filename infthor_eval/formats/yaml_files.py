@@ -1,4 +1,4 @@
-"""YAML files: plain ones, with nothing in them that grows, turns in circles, or stands twice."""
+"""Reading YAML files safely: no alias bombs, no recursive aliases, no duplicate keys."""
 
 from pathlib import Path
 from typing import Any
@@ -13,19 +13,20 @@ __all__ = ["PlainLoader", "read_yaml"]
 
 
 class PlainLoader(yaml.SafeLoader):
-    """Plain YAML; what it is derived for are tags of a file's own."""
+    """Loader of plain YAML; subclasses add the custom tags of a file format."""
 
 
 def read_yaml(path: Path, hint: str, loader: type[PlainLoader] = PlainLoader) -> Any:
-    """What a YAML file holds.
+    """Return the content of a YAML file.
 
     Args:
-        path: of the file.
-        mend: what to do where it is not what it should be, for the message.
-        loader: knows what tags mean.
+        path: the file.
+        hint: the way to fix a bad file, for the message.
+        loader: loader that knows the custom tags.
 
     Raises:
-        DataError: it cannot be read, is no YAML, holds itself, or more than the limit once its aliases are written out.
+        DataError: the file cannot be read, is not YAML, has duplicate keys or a recursive alias, or exceeds the limit
+            of values once its aliases are expanded.
     """
     text = read_text(path, hint)
     with wrap_errors(f"{path}: not YAML", hint, catch=(yaml.YAMLError, RecursionError, ValueError, TypeError)):
@@ -34,20 +35,21 @@ def read_yaml(path: Path, hint: str, loader: type[PlainLoader] = PlainLoader) ->
             node = reader.get_single_node()
             if node is None:
                 return None
-            _judge(node, path)
+            _check(node, path)
             return reader.construct_document(node)
         finally:
             reader.dispose()
 
 
-def _judge(root: yaml.Node, path: Path) -> None:
-    """Refuse a document by its nodes, before anything is made of them."""
+def _check(root: yaml.Node, path: Path) -> None:
+    """Check the nodes of a document before values are built of them."""
+    # Aliases make it a graph: each node is counted once, yet a few nodes can stand for billions of values.
     sizes: dict[int, int] = {}
     above: set[int] = set()
 
     def size(node: yaml.Node) -> int:
         if id(node) in above:
-            raise DataError(f"{path}: a part of it holds itself; write it out without aliases")
+            raise DataError(f"{path}: an alias refers to a node that contains it; write it out without aliases")
         if id(node) not in sizes:
             above.add(id(node))
             sizes[id(node)] = 1 + sum(map(size, _children(node, path)))
@@ -55,7 +57,7 @@ def _judge(root: yaml.Node, path: Path) -> None:
         return sizes[id(node)]
 
     if size(root) > ALIAS_NODES.value:
-        raise DataError(f"{path}: holds more than {ALIAS_NODES.value} values; {ALIAS_NODES.hint}")
+        raise DataError(f"{path}: has more than {ALIAS_NODES.value} values; {ALIAS_NODES.hint}")
 
 
 def _children(node: yaml.Node, path: Path) -> list[yaml.Node]:
@@ -64,7 +66,7 @@ def _children(node: yaml.Node, path: Path) -> list[yaml.Node]:
     if not isinstance(node, yaml.MappingNode):
         return []
     names = [key.value for key, _ in node.value if isinstance(key, yaml.ScalarNode)]
-    twice = next((name for name in names if names.count(name) > 1), None)
-    if twice is not None:
-        raise DataError(f"{path}: the key {twice!r} stands twice in one mapping; take one out")
+    duplicate = next((name for name in names if names.count(name) > 1), None)
+    if duplicate is not None:
+        raise DataError(f"{path}: the key {duplicate!r} is there twice in one mapping; remove one")
     return [child for pair in node.value for child in pair]

@@ -129,13 +129,14 @@ TYPED = [
     (["bundle", "file", "--out", "OUT"], "not in its documented form"),
     (
         ["validate", "nowhere", "--models", "oracle", "--out", "OUT"],
-        "nowhere: no such folder; give the folder of an NIEH set, or fetch the published one: fetch nieh",
+        "nowhere: no such folder; give the folder of an NIEH set, "
+        "or download the published one with `infthor-eval fetch nieh`",
     ),
     (
         ["validate", ".", "--models", "oracle", "--out", "OUT"],
-        "no qa_set*.csv in it, which a set has beside metadata/; give the folder of an NIEH set, or fetch",
+        "has no qa_set*.csv, as an NIEH set has beside metadata/; give the folder of an NIEH set, or download",
     ),
-    ([*RUN[:-1], "nowhere", "--output", "OUT"], "nowhere: no such folder; give the folder of an NIEH set, or fetch"),
+    ([*RUN[:-1], "nowhere", "--output", "OUT"], "nowhere: no such folder; give the folder of an NIEH set, or download"),
 ]
 
 
@@ -175,7 +176,7 @@ def test_questions_do_not_replace_what_somebody_edited(tmp_path, run, monkeypatc
     assert run(*arguments)[0] == 0
     made = (tmp_path / "qa.csv").read_bytes()
     (tmp_path / "qa.csv").write_bytes(made.replace(b"mug", b"cup"))
-    said_in_one_line(run(*arguments), "is there already and holds something else")
+    said_in_one_line(run(*arguments), "exists already with different content")
     assert b"cup" in (tmp_path / "qa.csv").read_bytes()
     assert run(*arguments, "--overwrite")[0] == 0
     assert (tmp_path / "qa.csv").read_bytes() == made
@@ -198,7 +199,7 @@ def test_a_scene_does_not_replace_what_somebody_edited(typed, tmp_path, name):
     made = (tmp_path / edited).read_bytes()
     (tmp_path / edited).write_text("of somebody's")
     said_in_one_line(
-        typed(*arguments), f"{edited}: is there already and holds something else; give another --out, or --overwrite"
+        typed(*arguments), f"{edited}: exists already with different content; give another --out, or --overwrite"
     )
     assert (tmp_path / edited).read_text() == "of somebody's"
     assert typed(*arguments, "--overwrite")[0] == 0
@@ -211,7 +212,7 @@ def test_a_dump_does_not_replace_another_recording_of_its_scene(typed, tmp_path)
     others = '{"scene": "bedroom-1", "objects": []}\n'
     path.write_bytes(gzip.compress(f'{{"scene": "kitchen-1", "objects": []}}\n{others}'.encode()))
     arguments = [*OUTPUTS["scenes dump"], "d"]
-    said_in_one_line(typed(*arguments), "has kitchen-1 already and holds something else of it; give another --out")
+    said_in_one_line(typed(*arguments), "has a different recording of kitchen-1 already; give another --out")
     assert not (tmp_path / "d" / "alfred").exists()
     assert typed(*arguments, "--overwrite")[0] == 0
     assert gzip.decompress(path.read_bytes()).decode().startswith(others)

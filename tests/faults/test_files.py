@@ -124,18 +124,18 @@ CONTENTS = [
     (
         "questions",
         (ONE_ROW + ",note\nt,q,[1],['a'],\"open\nt,q,[2],['b'],closed\"\n").encode(),
-        "note goes on over several lines",
+        "note has several lines",
     ),
-    ("questions", (ONE_ROW + ",answer\nt,q,[1],['a'],['b']\n").encode(), "column 'answer' stands twice"),
+    ("questions", (ONE_ROW + ",answer\nt,q,[1],['a'],['b']\n").encode(), "column 'answer' is there twice"),
     ("questions", (ONE_ROW + "\nt,q,[1],['a'],more\n").encode(), "has 5 cells for 4 columns"),
-    ("questions", (ONE_ROW + "\nt,q,[1],['']\n").encode(), "an entry that nobody can give"),
-    ("questions", (ONE_ROW + "\nt,q,[1],[' ']\n").encode(), "an entry that nobody can give"),
-    ("questions", (ONE_ROW + "\nt,q,[1],[1e999]\n").encode(), "an entry that nobody can give"),
-    ("questions", (ONE_ROW + f"\nt,q,[1],[{10**30}]\n").encode(), "an entry that nobody can give"),
-    ("questions", (ONE_ROW + "\nt,q,[1],['\\ud800']\n").encode(), "an entry that nobody can give"),
+    ("questions", (ONE_ROW + "\nt,q,[1],['']\n").encode(), "an entry that no reply can match"),
+    ("questions", (ONE_ROW + "\nt,q,[1],[' ']\n").encode(), "an entry that no reply can match"),
+    ("questions", (ONE_ROW + "\nt,q,[1],[1e999]\n").encode(), "an entry that no reply can match"),
+    ("questions", (ONE_ROW + f"\nt,q,[1],[{10**30}]\n").encode(), "an entry that no reply can match"),
+    ("questions", (ONE_ROW + "\nt,q,[1],['\\ud800']\n").encode(), "an entry that no reply can match"),
     ("questions", (ONE_ROW + "\nt,\"q\"x,[1],['a']\n").encode(), "not a UTF-8 CSV file"),
     ("decisions", b"question_id,decision\na,keep\na,drop\n", "is decided otherwise above"),
-    ("decisions", b"question_id,decision,decision\na,keep,drop\n", "stands twice"),
+    ("decisions", b"question_id,decision,decision\na,keep,drop\n", "is there twice"),
     ("decisions", b"question_id,decision\na,keep,drop\n", "has 3 cells for 2 columns"),
     ("decisions", b'question_id,decision\n"a,keep\n', "not a UTF-8 CSV file"),
     ("manifest", b'{"name": "../x", "trajectories": [{"scene": "a", "seed": 0, "min_steps": 1}]}', "documented form"),
@@ -185,9 +185,9 @@ def _cut(path: Path) -> None:
 
 
 IMAGES = {
-    "bomb": (_png(30_000, 30_000), "is too large; if it is meant, set INFTHOR_EVAL_MAX_IMAGE_MEGAPIXELS"),
+    "bomb": (_png(30_000, 30_000), "is too large; if this is intended, set INFTHOR_EVAL_MAX_IMAGE_MEGAPIXELS"),
     "larger than Pillow warns of": (_png(10_000, 10_000), "is too large"),
-    "sliver": (_png(60_000, 1), "is too narrow; if it is meant, set INFTHOR_EVAL_MAX_IMAGE_ASPECT"),
+    "sliver": (_png(60_000, 1), "is too narrow; if this is intended, set INFTHOR_EVAL_MAX_IMAGE_ASPECT"),
     "upright sliver": (_png(2, 700), "is too narrow"),
     "no width": (_png(0, 7), "not a readable image"),
     "header cut": (_png(8, 8)[:20], "not a readable image"),
@@ -222,7 +222,7 @@ def test_archive_members_that_stand_twice_are_refused(tmp_path):
             info = tarfile.TarInfo("metadata/x")
             info.size = len(content)
             tar.addfile(info, io.BytesIO(content))
-    refused(lambda: unpack_tar(tmp_path / "a.tar", tmp_path / "metadata"), "is in it twice")
+    refused(lambda: unpack_tar(tmp_path / "a.tar", tmp_path / "metadata"), "contains 'metadata/x' twice")
     assert not (tmp_path / "metadata").exists()
 
 

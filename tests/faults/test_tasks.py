@@ -37,10 +37,10 @@ FILES = [
     (CLUES + "}\ndescription: !!binary aGk=", "holds what JSON cannot"),
     (CLUES + "}\ndescription: !!set {a, b}", "holds what JSON cannot"),
     (CLUES + "}\ndescription: !!python/object/apply:os.system [ls]", "not YAML"),
-    (CLUES + "}\ntask: again", "the key 'task' stands twice"),
+    (CLUES + "}\ntask: again", "the key 'task' is there twice"),
     (CLUES + "}\n" + BOMB, "set INFTHOR_EVAL_MAX_YAML_NODES to more than"),
-    (CLUES + "}\na: &a [*a]", "a part of it holds itself"),
-    (CLUES + "}\na: &a {b: *a}", "a part of it holds itself"),
+    (CLUES + "}\na: &a [*a]", "an alias refers to a node that contains it"),
+    (CLUES + "}\na: &a {b: *a}", "an alias refers to a node that contains it"),
     (CLUES + "}\na: *nothing", "not YAML"),
     (CLUES + "}\na: " + "[" * 5000, "not YAML"),
     (CLUES + "}\n\x07: 1", "not YAML"),
@@ -81,6 +81,6 @@ def test_a_larger_document_is_read_where_the_limit_is_raised(make_nieh_set, tmp_
     (task_files / "nieh" / "own.yaml").write_text(CLUES + "}\na: &a [1, 1, 1, 1]\nb: [*a, *a]\n")
     arguments = ["--model", "oracle", "--tasks", "own", "--data", make_nieh_set(size=56), "--output", tmp_path / "out"]
     monkeypatch.setenv("INFTHOR_EVAL_MAX_YAML_NODES", "10")
-    said_in_one_line(run(*arguments), "holds more than 10 values")
+    said_in_one_line(run(*arguments), "has more than 10 values")
     monkeypatch.delenv("INFTHOR_EVAL_MAX_YAML_NODES")
     assert run(*arguments)[0] == 0

@@ -63,7 +63,7 @@ def test_nothing_is_left_where_a_picture_fails(tmp_path, name):
 
 def test_other_names_are_refused(tmp_path):
     for name in ("a.avi", "a", ".mp4"):
-        with pytest.raises(UsageError, match=r"a recording is \.mp4 or \.gif"):
+        with pytest.raises(UsageError, match=r"ends in \.mp4 or \.gif"):
             require_animation_name(tmp_path / name)
     with pytest.raises(DataError, match="cannot be written"):
         write_animation(tmp_path / "none" / "a.mp4", shades(), 2.0)

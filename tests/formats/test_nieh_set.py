@@ -58,7 +58,7 @@ def test_a_question_that_cannot_be_asked_is_left_out_with_its_reason(make_nieh_s
 def test_a_trajectory_without_folder_and_a_repeated_question_are_left_out(make_nieh_set):
     root = make_nieh_set([SOUND, SOUND])
     (root / "qa_set_x.csv").write_text("traj_id,question,gt_img_idx,answer\nother,q,[1],['a']\n")
-    assert reasons(root) == ["stands in the files twice", "trajectory other is not in metadata/"]
+    assert reasons(root) == ["is in the files twice", "trajectory other is not in metadata/"]
 
 
 def test_a_clue_that_is_no_image_is_left_out_by_name(make_nieh_set):
@@ -97,7 +97,7 @@ def test_two_frames_with_one_number_are_refused(make_nieh_set):
     root = make_nieh_set([SOUND])
     metadata = root / "metadata" / "t" / "metadata.json"
     metadata.write_text(json.dumps([{**entry, "img_idx": 0} for entry in json.loads(metadata.read_text())]))
-    assert "numbers two frames alike (img_idx 0)" in reasons(root)[0]
+    assert "two entries of metadata.json have img_idx 0" in reasons(root)[0]
 
 
 def test_missing_parts_of_a_set_are_named(make_nieh_set, tmp_path):

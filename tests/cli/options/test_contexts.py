@@ -89,10 +89,14 @@ def test_trajectories_are_read_from_the_folder_that_is_named(data, tmp_path, run
     assert [doc["frames"] for doc in docs(out, "nieh_text_state")] == [[44]] * 6
     code, _, err = run(*arguments, "--output", tmp_path / "none")
     assert code == 2
-    assert "can be asked (the trajectory's JSON is not in metadata/; name its folder with --trajectories)" in err
+    assert "can be asked (the trajectory's JSON is not in metadata/; give its folder with --trajectories)" in err
     for tasks, given, said in (
         ("nieh_gt", folder, "--trajectories: no context of nieh_gt tells of the trajectory"),
-        ("nieh_interleaved", tmp_path / "no", "no such folder; give the trajectories' folder with --trajectories"),
+        (
+            "nieh_interleaved",
+            tmp_path / "no",
+            "no such folder; give the folder of the trajectories with --traj",
+        ),
     ):
         code, shown, err = run("--model", "oracle", "--tasks", tasks, "--data", data, "--trajectories", given)
         assert (code, shown, len(err.strip().splitlines())) == (2, "", 1)

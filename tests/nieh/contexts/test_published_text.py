@@ -96,7 +96,7 @@ def test_contexts_equal_the_published_ones_part_for_part(make_set, tmp_path):
 def test_the_trajectory_in_the_set_is_read_where_no_folder_is_named(make_set):
     data = make_set(5, LOG, TRAJECTORY)
     inside = NiehSet(data.root)
-    said = "the trajectory's JSON is not in metadata/; name its folder with --trajectories"
+    said = "the trajectory's JSON is not in metadata/; give its folder with --trajectories"
     assert parts("interleaved", inside) == parts("text_state", inside) == said
     (data.folder("t") / "traj_data.json").write_text(json.dumps(TRAJECTORY))
     assert parts("interleaved", inside) == parts("interleaved", data)
@@ -122,7 +122,7 @@ def test_a_file_that_is_no_trajectory_is_named(make_set):
     data = make_set(5, LOG, far)
     with pytest.raises(DataError, match=r"t\.json: sub_trajs reach outside"):
         parts("interleaved", data)
-    with pytest.raises(DataError, match="no such folder; give the trajectories' folder"):
+    with pytest.raises(DataError, match="no such folder; give the folder of the trajectories"):
         NiehSet(data.root, Path("nowhere"))
 
 
