@@ -115,7 +115,7 @@ CONTENTS = [
     ("floor plans", gzip.compress(b'{"scene": "x"}\n' * 5000)[:60], "cannot be read after line"),
     ("floor plans", NO_DEFLATE, "cannot be read after line"),
     ("floor plans", gzip.compress(b"5\n"), "not a JSON object"),
-    ("floor plans", gzip.compress(b'{"scene": 5}\n'), "no scene's name"),
+    ("floor plans", gzip.compress(b'{"scene": 5}\n'), "no scene name"),
     ("archive", lzma.compress(b"x" * 100_000)[:80], "damaged archive"),
     ("archive", gzip.compress(os.urandom(9000))[:-600], "damaged archive"),
     ("archive", gzip.compress(os.urandom(9000))[:4000] + b"\x55" * 4000, "damaged archive"),

@@ -132,7 +132,7 @@ def test_the_simulator_is_what_the_set_says(make_nieh_set):
 def test_a_set_of_another_version_is_refused(make_nieh_set):
     root = make_nieh_set([SOUND])
     (root / "set.json").write_text('{"format": 99, "simulator": "embedded"}')
-    with pytest.raises(DataError, match=r"set\.json: the set is of format 99, this version reads 1; use the version"):
+    with pytest.raises(DataError, match=r"set\.json: the set has format 99, this version reads 1; use the version"):
         NiehSet(root)
 
 
@@ -143,5 +143,5 @@ def test_a_set_is_continued_by_the_same_simulator_of_the_same_version_alone(tmp_
         claim_for_simulator(tmp_path, "unity")
     info = json.loads((tmp_path / "set.json").read_text())
     (tmp_path / "set.json").write_text(json.dumps(info | {"infthor_eval": "0.0.1"}))
-    with pytest.raises(DataError, match=r"made by version 0\.0\.1, this is"):
+    with pytest.raises(DataError, match=r"rendered by version 0\.0\.1, this is"):
         claim_for_simulator(tmp_path, "embedded")

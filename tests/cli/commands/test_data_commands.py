@@ -115,7 +115,7 @@ def test_a_set_of_another_version_is_neither_continued_nor_asked_about(made, tmp
         code, _, err = run(*arguments)
         assert code == 2
         (line,) = err.strip().splitlines()
-        assert "set.json: the set is of format 2, this version reads 1" in line
+        assert "set.json: the set has format 2, this version reads 1" in line
     assert sorted((tmp_path / "set").rglob("*")) == before
     assert not (tmp_path / "runs").exists()
 
