@@ -23,4 +23,4 @@ def wait_until(condition: Callable[[], object], process: "subprocess.Popen[Any] 
             output = process.stderr.read() if process.stderr is not None else ""
             raise AssertionError(f"the process ended with {process.returncode}: {output}")
         assert time.monotonic() < deadline
-        time.sleep(0.005)
+        time.sleep(0.01)

@@ -4,7 +4,7 @@ import os
 import struct
 import subprocess
 import sys
-import time
+from collections import deque
 from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
@@ -71,9 +71,10 @@ def test_it_goes_when_its_parent_dies_before_the_handshake(pipes):
     parent = subprocess.Popen([sys.executable, "-c", script], env=os.environ | pipes, stdout=subprocess.PIPE, text=True)
     assert parent.stdout is not None
     child = int(parent.stdout.readline())
-    time.sleep(1.5)
+    status = Path(f"/proc/{child}/status")
+    looks = deque(maxlen=20)  # it waits once it sleeps in so many looks in a row; while it imports it works
+    wait_until(lambda: looks.append("(sleeping)" in status.read_text()) or sum(looks) == looks.maxlen)
     parent.kill()
     parent.wait()
     parent.stdout.close()
-    status = Path(f"/proc/{child}/status")
     wait_until(lambda: not status.exists() or "(zombie)" in status.read_text())  # it waits for no dead controller

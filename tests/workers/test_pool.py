@@ -4,7 +4,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -13,6 +12,7 @@ from infthor_eval.errors import DataError, InfthorError, ModelError, UsageError
 from infthor_eval.workers import GivenUp, Lost, Made, Pool, Withdrawn, WorkerLostError, WorkerSettings, shared_out
 
 from ..clusters import two_nodes
+from ..waiting import wait_until
 from .toys import Job, OpenCounter, broken
 
 
@@ -142,10 +142,10 @@ def test_processes_share_the_processors_of_the_machine(monkeypatch):
 def test_a_driver_that_is_killed_takes_its_workers_with_it(tmp_path):
     script = (
         "import sys; sys.path.insert(0, sys.argv[1])\n"
-        "from infthor_eval.workers import Pool, Staffing\n"
+        "from infthor_eval.workers import Pool, WorkerSettings\n"
         "from tests.workers.toys import Job, OpenCounter\n"
         "if __name__ == '__main__':\n"
-        "    pool = Pool(Staffing(1).connect(OpenCounter()), 1)\n"
+        "    pool = Pool(WorkerSettings(1).connect(OpenCounter()), 1)\n"
         "    print(pool.open()['pid'], flush=True)\n"
         "    list(pool.run(1, lambda _: Job(1000, slow=0.5)))\n"
     )
@@ -155,10 +155,7 @@ def test_a_driver_that_is_killed_takes_its_workers_with_it(tmp_path):
     worker = int(driver.stdout.readline())
     os.kill(driver.pid, signal.SIGKILL)
     driver.communicate()
-    deadline = time.monotonic() + 20
-    while is_running(worker):
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
+    wait_until(lambda: not is_running(worker))
 
 
 def is_running(pid):
