@@ -66,7 +66,7 @@ def test_a_suite_of_another_package_runs_with_its_task_and_its_options(package):
     assert done.returncode == 1, done.stderr  # two of its sums cannot be done
     assert "the abacus is broken" in done.stderr
     (results,) = (package / "out").rglob("results.json")
-    identity = json.loads(results.read_text())["identity"]
+    identity = json.loads(results.read_text())["config"]
     assert identity["suite"] == "sums"
     assert identity["suite_code"].keys() == {"package", "version", "source"}
     helped = command(package, "run", "--help").stdout

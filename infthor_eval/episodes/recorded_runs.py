@@ -129,7 +129,7 @@ class RecordedRun(Generic[P, T]):
         """
         problem = f"{self.label}: not the config of a run of {self.suite}"
         with wrap_errors(problem, "start the run again with --fresh", catch=msgspec.ValidationError):
-            config: RunConfig[T] = msgspec.convert(self.header.identity, RunConfig[self.task_config])  # type: ignore[name-defined]
+            config: RunConfig[T] = msgspec.convert(self.header.config, RunConfig[self.task_config])  # type: ignore[name-defined]
         return config
 
     @property

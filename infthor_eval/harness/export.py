@@ -3,7 +3,7 @@
 import json
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import datetime
 from functools import cached_property
 from importlib.metadata import version
@@ -40,7 +40,7 @@ class Exported:
 def exported(outcome: RunOutcome) -> Exported:
     """All of a run that lm-eval's files have."""
     tasks = _tasks(outcome)
-    samples = {task.name: _rows(outcome, task) for task in tasks}
+    samples = {task.name: _scored_rows(task) for task in tasks}
     hashes = {
         name: _hash("".join(row["doc_hash"] + row["prompt_hash"] + row["target_hash"] for row in rows))
         for name, rows in samples.items()
@@ -78,13 +78,15 @@ class _Scored:
 
     Attributes:
         file: the task.
-        records: of its units; at least one.
-        scores: of each, by metric; a failed one has none.
+        records: the records of its units; at least one.
+        scores: the scores of each, by metric; empty for a failed one.
+        rows: the line of each in lm-eval's file, without its scores.
     """
 
     file: TaskFile
-    records: Sequence[UnitRecord[Any]]
-    scores: Sequence[Mapping[str, float]]
+    records: list[UnitRecord[Any]] = field(default_factory=list)
+    scores: list[Mapping[str, float]] = field(default_factory=list)
+    rows: list[dict[str, Any]] = field(default_factory=list)
 
     @property
     def name(self) -> str:
@@ -96,40 +98,38 @@ class _Scored:
         return list(dict.fromkeys(name for scores in self.scores for name in scores))
 
 
-def _tasks(outcome: RunOutcome) -> list[_Scored]:
+def _tasks(outcome: RunOutcome[Any, Any]) -> list[_Scored]:
     """The tasks of which there are records that count."""
-    by_task: dict[str, list[UnitRecord[Any]]] = {}
-    for record in outcome.records:
+    tasks = {file.name: _Scored(file) for file in outcome.run.request.tasks.tasks}
+    for record, sample in zip(outcome.records, outcome.samples, strict=True):
         if record.excluded is None:
-            by_task.setdefault(record.task, []).append(record)
-    return [
-        _Scored(file, by_task[file.name], [outcome.run.suite.scores(record) for record in by_task[file.name]])
-        for file in outcome.run.request.tasks.tasks
-        if file.name in by_task
-    ]
+            tasks[record.task].records.append(record)
+            tasks[record.task].scores.append(outcome.run.suite.scores(record))
+            tasks[record.task].rows.append(_row(sample))
+    return [task for task in tasks.values() if task.records]
 
 
-def _rows(outcome: RunOutcome, task: _Scored) -> list[dict[str, Any]]:
+def _scored_rows(task: _Scored) -> list[dict[str, Any]]:
     """A sample per line, in the task's order."""
     rows = [
-        _row(outcome.view(record)) | {"metrics": task.metrics} | {name: scores.get(name, 0.0) for name in task.metrics}
-        for record, scores in zip(task.records, task.scores, strict=True)
+        row | {"metrics": task.metrics} | {name: scores.get(name, 0.0) for name in task.metrics}
+        for row, scores in zip(task.rows, task.scores, strict=True)
     ]
     return sorted(rows, key=lambda row: row["doc_id"])
 
 
-def _row(view: UnitSample) -> dict[str, Any]:
+def _row(sample: UnitSample) -> dict[str, Any]:
     return {
-        "doc_id": view.number,
-        "doc": dict(view.doc),
-        "target": view.target,
-        "arguments": {"gen_args_0": {"arg_0": view.prompt, "arg_1": dict(view.settings), "arg_2": {"visual": []}}},
-        "resps": [[view.reply]],
-        "filtered_resps": [view.reply],
+        "doc_id": sample.number,
+        "doc": dict(sample.doc),
+        "target": sample.target,
+        "arguments": {"gen_args_0": {"arg_0": sample.prompt, "arg_1": dict(sample.settings), "arg_2": {"visual": []}}},
+        "resps": [[sample.reply]],
+        "filtered_resps": [sample.reply],
         "filter": _FILTER,
-        "doc_hash": _hash(json.dumps(view.doc, indent=2, ensure_ascii=False)),
-        "prompt_hash": _hash(view.prompt),
-        "target_hash": _hash(view.target),
+        "doc_hash": _hash(json.dumps(sample.doc, indent=2, ensure_ascii=False)),
+        "prompt_hash": _hash(sample.prompt),
+        "target_hash": _hash(sample.target),
     }
 
 

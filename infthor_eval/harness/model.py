@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from itertools import groupby
 from pathlib import Path
+from typing import Any
 
 from lm_eval.api.instance import Instance
 from lm_eval.api.model import LM
@@ -13,19 +14,19 @@ from infthor_eval.harness.manipulation_task import arm_evaluation, arm_response
 from infthor_eval.harness.plans_task import episode_response, evaluation_around
 from infthor_eval.harness.registration import NAME, say_model_takes_references
 from infthor_eval.manipulation import records as arm_records
-from infthor_eval.manipulation.evaluation import ManipulationEvaluation
+from infthor_eval.manipulation.evaluation import ArmUnit, BoundManipulation
 from infthor_eval.nieh import records as nieh_records
 from infthor_eval.nieh.answering import ModelAnswerer, NiehUnit, answered
 from infthor_eval.nieh.baselines import BASELINES
 from infthor_eval.nieh.docs import sample_of, samples_around
 from infthor_eval.nieh.task import PreparedTask
 from infthor_eval.plans import records as plan_records
-from infthor_eval.plans.evaluation import PlansEvaluation
+from infthor_eval.plans.evaluation import BoundPlans, PlanUnit
 from infthor_eval.runs import Group, RunHeader
 from infthor_eval.runs.generation_kwargs import decoding_of
-from infthor_eval.runs.identity import identity_of
 from infthor_eval.runs.journal import Journal
 from infthor_eval.runs.records import UnitKey
+from infthor_eval.runs.run_config import run_config
 from infthor_eval.runs.session import JournalSession
 from model_adapters import Model, Policy, adapter_identity, has_option, label, load
 
@@ -82,10 +83,10 @@ class InfthorLM(LM):
         self._name, self._code = label(adapter, given), adapter_identity(adapter)
         self._scratch = ScratchFolder()
         self._folder = Path(journal) if journal else self._scratch.path
-        self._sessions: dict[str, JournalSession] = {}
-        self._plans: dict[str, PlansEvaluation] = {}
-        self._groups: dict[str, dict[str, Group]] = {}
-        self._arms: dict[str, ManipulationEvaluation] = {}
+        self._sessions: dict[str, JournalSession[Any]] = {}
+        self._plans: dict[str, BoundPlans] = {}
+        self._groups: dict[str, dict[str, Group[PlanUnit]]] = {}
+        self._arms: dict[str, tuple[BoundManipulation, list[ArmUnit]]] = {}
 
     @property
     def tokenizer_name(self) -> str:
@@ -129,21 +130,19 @@ class InfthorLM(LM):
         """Replies to the requests of one task on one trajectory."""
         unit, request = group[0]
         decoding = decoding_of(request.args[1], self._seed, unit.key.task)
-        prepared = PreparedTask(samples_around(request.doc), decoding)
+        prepared = PreparedTask(samples_around(request.doc), decoding, request.args[1])
         session = self._session("nieh")
         records = answered([unit for unit, _ in group], prepared, ModelAnswerer(model, session), session)
-        return {record.key: session.recorded(record)[0].payload.reply or "" for record in records}
+        return {record.key: session.append_new(record)[0].payload.reply or "" for record in records}
 
     def _episode(self, request: Instance) -> str:
         """What came of a trajectory."""
         doc, task, session = request.doc, str(request.task_name), self._session("plans")
         if task not in self._plans:
-            self._plans[task] = evaluation_around(doc, task, request.args[1], self._seed)
-            self._groups[task] = {
-                group.units[0].cluster: group for group in self._plans[task].workload(self._model).groups
-            }
+            self._plans[task] = evaluation_around(doc, task, request.args[1], self._seed).bind(self._model)
+            self._groups[task] = {group.units[0].cluster: group for group in self._plans[task].workload.groups}
         records = self._plans[task].run(self._groups[task][doc["traj_id"]], session)
-        return episode_response(session.recorded(record)[0] for record in records)
+        return episode_response(session.append_new(record)[0] for record in records)
 
     def _arm_episodes(self, requests: Sequence[Instance]) -> list[str]:
         """What came of episodes of an arm; those of one trajectory are played together."""
@@ -154,23 +153,24 @@ class InfthorLM(LM):
         session, responses = self._session("manipulation"), {}
         for task, same in _by_task(requests).items():
             if task not in self._arms:
-                self._arms[task] = arm_evaluation(same[0].doc, task, self._seed)
-                self._arms[task].workload(self._model)
+                evaluation = arm_evaluation(same[0].doc, task, self._seed)
+                self._arms[task] = evaluation.bind(self._model), evaluation.units
             asked = {request.doc["arm_episode"] for request in same}
-            units = [unit for unit in self._arms[task].units if unit.key.id in asked]
+            bound, every = self._arms[task]
+            units = [unit for unit in every if unit.key.id in asked]
             for _, group in groupby(units, key=lambda unit: unit.cluster):
-                for record in self._arms[task].run(Group(list(group)), session):
-                    responses[task, record.id] = arm_response(session.recorded(record)[0])
+                for record in bound.run(Group(list(group)), session):
+                    responses[task, record.id] = arm_response(session.append_new(record)[0])
         return [responses[str(request.task_name), request.doc["arm_episode"]] for request in requests]
 
-    def _session(self, suite: str) -> JournalSession:
+    def _session(self, suite: str) -> JournalSession[Any]:
         """Where the records of a suite go: those of NIEH into the folder itself, others into one of theirs."""
         if suite not in self._sessions:
-            identity = identity_of(suite, self._model, self._code, {"host": "lm-eval"}, None, self._seed)
-            header = RunHeader(suite=suite, name=self._name, identity=identity)
+            config = run_config(suite, self._model, self._code, {"host": "lm-eval"}, None, self._seed)
+            header = RunHeader(suite=suite, name=self._name, config=config)
             folder = self._folder if suite == "nieh" else self._folder / suite
             journal = Journal(folder, header, _RECORDS[suite])
-            self._sessions[suite] = JournalSession(self._model, journal)
+            self._sessions[suite] = JournalSession(journal)
         return self._sessions[suite]
 
 

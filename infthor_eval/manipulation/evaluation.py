@@ -1,13 +1,12 @@
 """Manipulation set up for a run: which episodes of which trajectories, and the doing of them."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
-from functools import cached_property
+from functools import partial
 from importlib.metadata import version
 from itertools import groupby
 from pathlib import Path
-from typing import Any
 
 import msgspec
 
@@ -32,10 +31,10 @@ from infthor_eval.runs import (
     UnitSample,
     Workload,
 )
-from infthor_eval.runs.identity import episode_fingerprint
+from infthor_eval.runs.run_config import episode_fingerprint
 from model_adapters import Policy, Subject
 
-__all__ = ["ArmUnit", "ManipulationEvaluation"]
+__all__ = ["ArmUnit", "BoundManipulation", "ManipulationEvaluation"]
 
 _Camera = tuple[int, float]  # pixels of its frames, degrees of its view
 
@@ -60,9 +59,9 @@ class ArmUnit(Unit[ArmRecord]):
 
 
 class ManipulationEvaluation:
-    """See `infthor_eval.runs.Evaluation`."""
+    """Manipulation set up for a run; see `infthor_eval.runs.Evaluation`."""
 
-    def __init__(self, request: TaskRequest) -> None:
+    def __init__(self, request: TaskRequest[ManipulationOptions]) -> None:
         """Read the tasks and their trajectories.
 
         Raises:
@@ -70,57 +69,115 @@ class ManipulationEvaluation:
             DataError: a task file or all of its trajectories are not what they should be.
         """
         self._seed = request.seed
-        self._options: ManipulationOptions = request.options
+        self._options = request.options
         self._tasks = {file.name: ManipulationTask(file, request) for file in request.tasks}
         self._scenes = Path(self._options.scenes) if self._options.scenes is not None else None
         self._floor_plans = floor_plans_digest(self._scenes) if self._scenes is not None else None
-        self._subject: Subject | None = None
-        self._open = ExitStack()
 
     @property
     def units(self) -> list[ArmUnit]:
         """The episodes of all tasks, task by task, in the order of trajectories and time."""
         return [ArmUnit.of(task, course, errand) for task in self._tasks.values() for course, errand in task.episodes]
 
-    def workload(self, subject: Subject) -> Workload:
-        """See `infthor_eval.runs.Evaluation.workload`."""
-        self._subject = subject
-        self._experts, self._arms = self._described_simulators(isinstance(subject, Policy))
-        self._identity: dict[str, Any] = {
-            "tasks": {name: task.identity() for name, task in self._tasks.items()},
-            "simulator": self._options.simulator,
-            "ai2thor": version("ai2thor"),
-            "floor_plans": self._floor_plans,
-            "frames": self._options.frames,
-        }
-        return Workload(
+    def bind(self, subject: Subject) -> "BoundManipulation":
+        """See `infthor_eval.runs.Evaluation.bind`.
+
+        Raises:
+            TypeError: the subject is neither a policy nor a baseline of manipulation; runs refuse it before.
+        """
+        blank = self._options.frames == "blank"
+        if isinstance(subject, ArmBaseline):
+            new_actor: Callable[[], ArmActor] = subject.arm_actor
+        elif isinstance(subject, Policy):
+            new_actor = partial(PolicyActor, subject, blank=blank)
+        else:
+            raise TypeError(f"{subject} is neither a policy nor a baseline of manipulation")
+        units = self.units
+        workload = Workload(
             groups=[
-                Group(units, frames=len(units[0].course.trajectory.plan.low_actions))
-                for units in self._by_trajectory().values()
+                Group(same, frames=len(same[0].course.trajectory.plan.low_actions))
+                for same in _by_trajectory(units).values()
             ],
             skipped=[
                 Skipped(UnitKey(task.name, place), reason)
                 for task in self._tasks.values()
                 for place, reason in task.courses.broken
             ],
-            identity=self._identity,
+            config={
+                "tasks": {name: task.identity() for name, task in self._tasks.items()},
+                "simulator": self._options.simulator,
+                "ai2thor": version("ai2thor"),
+                "floor_plans": self._floor_plans,
+                "frames": self._options.frames,
+            },
         )
+        sees = isinstance(subject, Policy)
+        cameras = {task.camera for task in self._tasks.values()}
+        simulators = _ArmSimulators(self._options.simulator, self._scenes, units, cameras, sees=sees)
+        return BoundManipulation(workload, self._tasks, _positions(units), new_actor, simulators, self._seed)
 
-    def run(self, group: Group, session: Session) -> Iterator[UnitRecord[ArmRecord]]:
-        """See `infthor_eval.runs.Evaluation.run`."""
-        units: list[ArmUnit] = list(group.units)  # type: ignore[arg-type]  # its own groups
-        prints = {unit.key: self._fingerprint(unit) for unit in units}
-        known = {unit.key: session.known(unit, prints[unit.key]) for unit in units}
-        yield from (record for record in known.values() if record is not None)
-        left = [unit for unit in units if known[unit.key] is None]
+
+class _ArmSimulators:
+    """The simulators of experts, whose frames are not rendered, and those of arms, by camera."""
+
+    def __init__(
+        self, name: str, scenes: Path | None, units: Sequence[ArmUnit], cameras: Iterable[_Camera], *, sees: bool
+    ) -> None:
+        every = {unit.cluster: unit.course.trajectory for unit in units}
+        create = partial(Simulators, name, scenes, list(every.values()), instances=False)
+        self.sees = sees
+        self.arms = {
+            (size, angle): create(image=sees, agentMode="arm", width=size, height=size, fieldOfView=angle)
+            for size, angle in cameras
+        }
+        self.experts = create(image=False)
+
+    def close(self) -> None:
+        with ExitStack() as stack:
+            for simulators in (*self.arms.values(), self.experts):
+                stack.callback(simulators.close)
+
+
+class BoundManipulation:
+    """Manipulation for one subject; see `infthor_eval.runs.BoundEvaluation`."""
+
+    def __init__(
+        self,
+        workload: Workload[ArmUnit],
+        tasks: Mapping[str, ManipulationTask],
+        numbers: Mapping[UnitKey, int],
+        new_actor: Callable[[], ArmActor],
+        simulators: _ArmSimulators,
+        seed: int,
+    ) -> None:
+        """Take up what was prepared for the subject.
+
+        Args:
+            workload: all the work.
+            tasks: the tasks by name.
+            numbers: positions of the episodes in their tasks.
+            new_actor: creates what drives an arm on one trajectory.
+            simulators: the simulators of experts and arms; closed with this.
+            seed: seed of the run.
+        """
+        self.workload = workload
+        self._tasks, self._numbers, self._new_actor = tasks, numbers, new_actor
+        self._simulators, self._seed = simulators, seed
+
+    def run(self, group: Group[ArmUnit], session: Session[ArmRecord]) -> Iterator[UnitRecord[ArmRecord]]:
+        """See `infthor_eval.runs.BoundEvaluation.run`."""
+        prints = {unit.key: self._fingerprint(unit) for unit in group.units}
+        earlier = {unit.key: session.find_record(unit, prints[unit.key]) for unit in group.units}
+        yield from (record for record in earlier.values() if record is not None)
         by_camera: dict[_Camera, list[ArmUnit]] = {}
-        for unit in left:
-            by_camera.setdefault(self._tasks[unit.key.task].camera, []).append(unit)
+        for unit in group.units:
+            if earlier[unit.key] is None:
+                by_camera.setdefault(self._tasks[unit.key.task].camera, []).append(unit)
         for camera, same in by_camera.items():
             yield from self._played(same, prints, camera)
 
-    def view(self, record: UnitRecord[ArmRecord]) -> UnitSample:
-        """See `infthor_eval.runs.Evaluation.view`."""
+    def to_sample(self, record: UnitRecord[ArmRecord]) -> UnitSample:
+        """See `infthor_eval.runs.BoundEvaluation.to_sample`."""
         payload, task = record.payload, self._tasks[record.task]
         return UnitSample(
             number=self._numbers[record.key],
@@ -132,71 +189,49 @@ class ManipulationEvaluation:
         )
 
     def close(self) -> None:
-        """See `infthor_eval.runs.Evaluation.close`."""
-        self._open.close()
-
-    @cached_property
-    def _numbers(self) -> dict[UnitKey, int]:
-        """Places of the episodes in their tasks."""
-        by_task = groupby(self.units, key=lambda unit: unit.key.task)
-        return {unit.key: number for _, same in by_task for number, unit in enumerate(same)}
-
-    def _by_trajectory(self) -> dict[str, list[ArmUnit]]:
-        """The episodes of all tasks by trajectory, in time order: they share its history."""
-        found: dict[str, list[ArmUnit]] = {}
-        for unit in self.units:
-            found.setdefault(unit.cluster, []).append(unit)
-        return {name: sorted(units, key=lambda unit: (unit.errand.index, unit.key)) for name, units in found.items()}
+        """See `infthor_eval.runs.BoundEvaluation.close`."""
+        self._simulators.close()
 
     def _played(
         self, units: list[ArmUnit], prints: dict[UnitKey, str], camera: _Camera
     ) -> Iterator[UnitRecord[ArmRecord]]:
         trajectory = units[0].course.trajectory
         try:
-            with self._experts.one() as expert:
+            with self._simulators.experts.one() as expert:
                 history, faults = with_retries(expert, lambda: history_of(trajectory, expert), lambda: None)
         except SceneError as error:
             yield from (unit.excluded(str(error), prints[unit.key]) for unit in units)
             return
-        sees = isinstance(self._subject, Policy)
-        with self._arms[camera].one() as simulator:
-            stage = ArmStage(trajectory, history, simulator, self._actor(), sees=sees, seed=self._seed)
+        with self._simulators.arms[camera].one() as simulator:
+            sees, actor = self._simulators.sees, self._new_actor()
+            stage = ArmStage(trajectory, history, simulator, actor, sees=sees, seed=self._seed)
             for unit in units:
                 record = _recorded(unit, prints[unit.key], stage, self._tasks[unit.key.task])
                 yield msgspec.structs.replace(record, faults=(*faults, *record.faults))
                 faults = ()  # the expert's are told once
 
-    def _actor(self) -> ArmActor:
-        if isinstance(self._subject, ArmBaseline):
-            return self._subject.arm_actor()
-        if isinstance(self._subject, Policy):
-            return PolicyActor(self._subject, blank=self._options.frames == "blank")
-        raise TypeError(f"{self._subject} is neither a policy nor a baseline of manipulation")  # the run sees to that
-
-    def _described_simulators(self, seen: bool) -> tuple[Simulators, dict[_Camera, Simulators]]:
-        """Those of experts, which draw nothing, and those of arms by camera, which draw what somebody looks at."""
-        every = {course.traj_id: course for task in self._tasks.values() for course, _ in task.episodes}
-        trajectories = [course.trajectory for course in every.values()]
-
-        def simulators(**options: Any) -> Simulators:
-            made = Simulators(self._options.simulator, self._scenes, trajectories, instances=False, **options)
-            self._open.callback(made.close)
-            return made
-
-        arms = {
-            (size, angle): simulators(image=seen, agentMode="arm", width=size, height=size, fieldOfView=angle)
-            for size, angle in {task.camera for task in self._tasks.values()}
-        }
-        return simulators(image=False), arms
-
     def _fingerprint(self, unit: ArmUnit) -> str:
         return episode_fingerprint(
-            self._identity,
+            self.workload.config,
             unit.key.task,
             trajectory=unit.course.digest,
             action=unit.errand.index,
             seed=self._seed,
         )
+
+
+def _positions(units: Iterable[ArmUnit]) -> dict[UnitKey, int]:
+    """Return the positions of units in their tasks, given task by task."""
+    by_task = groupby(units, key=lambda unit: unit.key.task)
+    return {unit.key: number for _, same in by_task for number, unit in enumerate(same)}
+
+
+def _by_trajectory(units: Iterable[ArmUnit]) -> dict[str, list[ArmUnit]]:
+    """Return the episodes of all tasks by trajectory, in time order: they share its history."""
+    by_name: dict[str, list[ArmUnit]] = {}
+    for unit in units:
+        by_name.setdefault(unit.cluster, []).append(unit)
+    return {name: sorted(same, key=lambda unit: (unit.errand.index, unit.key)) for name, same in by_name.items()}
 
 
 def _recorded(unit: ArmUnit, inputs: str, stage: ArmStage, task: ManipulationTask) -> UnitRecord[ArmRecord]:

@@ -1,6 +1,6 @@
 """Manipulation as a suite: an arm picks up and puts what the experts of long trajectories did."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import ClassVar
 
 from infthor_eval.manipulation.actors import BASELINES
@@ -13,6 +13,7 @@ from infthor_eval.rates import Rate
 from infthor_eval.runs import RecordTypes, RunHeader, RunSummary, TaskRequest, UnitRecord
 from infthor_eval.runs.suite import Need
 from infthor_eval.tables import Table
+from model_adapters import Subject
 
 __all__ = ["ManipulationSuite"]
 
@@ -23,16 +24,16 @@ class ManipulationSuite:
     name: ClassVar[str] = "manipulation"
     needs: ClassVar[Need] = "policy"
     options: ClassVar[type] = ManipulationOptions
-    baselines = BASELINES
-    records: ClassVar[RecordTypes] = RECORDS
+    baselines: ClassVar[Mapping[str, Callable[[int], Subject]]] = BASELINES
+    records: ClassVar[RecordTypes[ArmRecord]] = RECORDS
 
-    def prepare(self, request: TaskRequest) -> ManipulationEvaluation:
+    def prepare(self, request: TaskRequest[ManipulationOptions]) -> ManipulationEvaluation:
         """See `Suite.prepare`."""
         return ManipulationEvaluation(request)
 
     def summarise(self, header: RunHeader, records: Sequence[UnitRecord[ArmRecord]]) -> ManipulationSummary:
         """See `Suite.summarise`."""
-        return summarise(header.identity, records)
+        return summarise(header.config, records)
 
     def scores(self, record: UnitRecord[ArmRecord]) -> Mapping[str, float]:
         """See `Suite.scores`: whether the episode was a success, and what it earned."""

@@ -32,7 +32,7 @@ def tables(runs: Sequence[RunSummary]) -> list[Table]:
 def _named(runs: Sequence[RunSummary]) -> Iterator[tuple[str, ManipulationSummary]]:
     for run in runs:
         assert isinstance(run.summary, ManipulationSummary)
-        frames = run.header.identity["frames"]
+        frames = run.header.config["frames"]
         yield run.header.name if frames == "shown" else f"{run.header.name}, {frames} frames", run.summary
 
 

@@ -87,7 +87,7 @@ class ArmCourse:
 class ManipulationTask:
     """A task file, read."""
 
-    def __init__(self, file: TaskFile, request: TaskRequest) -> None:
+    def __init__(self, file: TaskFile, request: TaskRequest[ManipulationOptions]) -> None:
         """Check the file and find its trajectories.
 
         Raises:
@@ -97,7 +97,7 @@ class ManipulationTask:
         file.require("dataset_kwargs")
         self.file = file
         self.name = file.name
-        options: ManipulationOptions = request.options
+        options = request.options
         told = {"radius": options.radius_metres, "instruction": options.instruction}
         self.settings = task_settings(file, TaskSettings, told, _CHOICES)
         self.kind = ManipulationKind(self.settings.kind)

@@ -139,7 +139,7 @@ class Answerer(Protocol):
 class ModelAnswerer:
     """Keeps one conversation, so that units in the same context share what the model has encoded of it."""
 
-    def __init__(self, model: Model, session: Session) -> None:
+    def __init__(self, model: Model, session: Session[NiehAnswer]) -> None:
         self.batch_size = model.capabilities.batch_size
         self._name = model.name
         self._notebook = Notebook(model, session)
@@ -192,7 +192,7 @@ class BaselineAnswerer:
 
 
 def answered(
-    units: Sequence[NiehUnit], prepared: PreparedTask, answerer: Answerer, session: Session
+    units: Sequence[NiehUnit], prepared: PreparedTask, answerer: Answerer, session: Session[NiehAnswer]
 ) -> Iterator[UnitRecord[NiehAnswer]]:
     """The records of units on one trajectory: those in the same context together, several at a time where that pays.
 
@@ -219,7 +219,9 @@ def _names_in(part: ContextPart) -> list[str]:
     return [part.path.name if isinstance(part, FrameRef) else part]
 
 
-def _in_context(asked: Sequence[_Asked], answerer: Answerer, session: Session) -> Iterator[UnitRecord[NiehAnswer]]:
+def _in_context(
+    asked: Sequence[_Asked], answerer: Answerer, session: Session[NiehAnswer]
+) -> Iterator[UnitRecord[NiehAnswer]]:
     try:
         context = answerer.read(asked[0].context)
     except (DataError, ModelError) as error:
@@ -236,10 +238,10 @@ def _in_context(asked: Sequence[_Asked], answerer: Answerer, session: Session) -
         yield from _made(waiting[at : at + answerer.batch_size], answerer)
 
 
-def _known(asked: _Asked, session: Session) -> UnitRecord[NiehAnswer] | None:
+def _known(asked: _Asked, session: Session[NiehAnswer]) -> UnitRecord[NiehAnswer] | None:
     """The record of a unit that needs no answering: an earlier run's, or that of a frame that cannot be read."""
     try:
-        return session.known(asked.unit, asked.fingerprint)
+        return session.find_record(asked.unit, asked.fingerprint)
     except DataError as error:
         return asked.unit.failed(str(error))
 

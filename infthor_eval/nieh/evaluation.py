@@ -1,17 +1,16 @@
-"""NIEH set up for a run: what its tasks ask, and the doing of it, a trajectory at a time."""
+"""NIEH set up for a run: the questions of its tasks, answered a trajectory at a time."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property, partial
 from itertools import groupby
-from typing import cast
 
 from infthor_eval.errors import DataError, InfthorError, ModelError, UsageError
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.nieh.answering import NiehUnit, answered
+from infthor_eval.nieh.answering_models import AnsweringModel, OpenAnswerer, answering_model
 from infthor_eval.nieh.docs import doc_of, doc_target, prompt_of
 from infthor_eval.nieh.options import NiehOptions
 from infthor_eval.nieh.records import NiehAnswer
-from infthor_eval.nieh.respondents import respondent
 from infthor_eval.nieh.samples import TaskSamples, open_set
 from infthor_eval.nieh.task import NiehTask, PreparedTask
 from infthor_eval.runs import (
@@ -27,104 +26,57 @@ from infthor_eval.runs import (
 )
 from model_adapters import Subject
 
-__all__ = ["NiehEvaluation"]
+__all__ = ["BoundNieh", "NiehEvaluation", "nieh_groups"]
 
 
 class NiehEvaluation:
     """NIEH set up for a run; see `infthor_eval.runs.Evaluation`."""
 
-    def __init__(self, request: TaskRequest) -> None:
+    def __init__(self, request: TaskRequest[NiehOptions]) -> None:
         """Read the tasks and their sets.
 
         Raises:
             UsageError: a task without its data or with nothing that can be asked, a retriever that cannot be loaded,
-                or an option that none of the tasks looks at.
-            DataError: a task file or a set is not what it should be.
+                or an option that has no effect on any of the tasks.
+            DataError: a task file or a set is not valid.
         """
         open_set.cache_clear()  # its files may have changed since an earlier run of this process
-        self._options: NiehOptions = request.options
+        self._options = request.options
         self._tasks = [NiehTask(file, request) for file in request.tasks]
-        self._prepared: dict[str, PreparedTask] = {}
         _refuse_nothing([task.found for task in self._tasks], self._tasks)
         self._refuse_unused()
 
-    def workload(self, subject: Subject) -> Workload:
-        """See `infthor_eval.runs.Evaluation.workload`."""
-        self._respondent = respondent(subject)
-        tokens = self._tokens_per_frame()
-        self._prepared = {task.name: task.prepared(tokens) for task in self._tasks}
-        _refuse_nothing([prepared.found for prepared in self._prepared.values()], self._tasks)
-        self._respondent.read_keys({task.name: partial(task.key, tokens) for task in self._tasks})
-        tasks = {task.name: task.identity(self._prepared[task.name]) for task in self._tasks}
-        costs = {name: self._respondent.cost(prepared) for name, prepared in self._prepared.items()}
-        return Workload(
-            groups=[group for name, prepared in self._prepared.items() for group in _groups(name, prepared)],
-            skipped=[
-                skipped for name, prepared in self._prepared.items() for skipped in _skipped(name, prepared.found)
-            ],
-            identity={
-                "tasks": tasks,
+    def bind(self, subject: Subject) -> "BoundNieh":
+        """See `infthor_eval.runs.Evaluation.bind`."""
+        model = answering_model(subject)
+        tokens = self._tokens_per_frame(model)
+        tasks = {task.name: task for task in self._tasks}
+        prepared = {name: task.prepared(tokens) for name, task in tasks.items()}
+        _refuse_nothing([item.found for item in prepared.values()], self._tasks)
+        open_answerer = model.fit({name: partial(task.key, prepared[name], tokens) for name, task in tasks.items()})
+        costs = {name: model.cost(item) for name, item in prepared.items()}
+        workload = Workload(
+            groups=[group for name, item in prepared.items() for group in nieh_groups(name, item)],
+            skipped=[skipped for name, item in prepared.items() for skipped in _skipped(name, item.found)],
+            config={
+                "tasks": {name: task.identity(prepared[name]) for name, task in tasks.items()},
                 "k_tokens": self._options.k_tokens,
                 "tokens_per_frame": tokens,
                 "frames": self._options.frames,
             },
             costs=[Cost(name, cost) for name, cost in costs.items() if cost is not None],
         )
+        return BoundNieh(workload, prepared, open_answerer)
 
-    def run(self, group: Group, session: Session) -> Iterator[UnitRecord[NiehAnswer]]:
-        """See `infthor_eval.runs.Evaluation.run`."""
-        units = cast(Sequence[NiehUnit], group.units)  # its own groups
-        task = units[0].key.task
-        yield from answered(units, self._prepared[task], self._respondent.answerer(task, session), session)
-
-    def view(self, record: UnitRecord[NiehAnswer]) -> UnitSample:
-        """See `infthor_eval.runs.Evaluation.view`."""
-        prepared = self._prepared[record.task]
-        number = self._numbers[record.key]
-        sample = prepared.found.samples[number]
-        settings = next(task.settings for task in self._tasks if task.name == record.task)
-        return UnitSample(
-            number=number,
-            doc=doc_of(prepared.found, sample),
-            target=doc_target(sample.question),
-            prompt=prompt_of(prepared.found, sample),
-            settings=settings["generation_kwargs"],
-            reply=record.payload.reply or "",
-        )
-
-    def close(self) -> None:
-        """Nothing is held."""
-
-    @cached_property
-    def _numbers(self) -> dict[UnitKey, int]:
-        """Places of the samples in their tasks."""
-        return {
-            UnitKey(name, sample.question.id, sample.variant): number
-            for name, prepared in self._prepared.items()
-            for number, sample in enumerate(prepared.found.samples)
-        }
-
-    def _tokens_per_frame(self) -> int | None:
-        """The size of a frame where a context is measured in it: as told, or the subject's own."""
+    def _tokens_per_frame(self, model: AnsweringModel) -> int | None:
+        """Return the size of a frame where a context is measured in it: the option's value, or the subject's own."""
         measured = next((task for task in self._tasks if task.needs_size), None)
         if measured is None or self._options.tokens_per_frame is not None:
             return self._options.tokens_per_frame
-        return self._measured(measured.data)
-
-    def _measured(self, data: NiehSet) -> int:
-        """The subject's size of a frame, by the first frame of the questions that can be read."""
-        problems: list[InfthorError] = []
-        for question in data.questions:
-            for frame in data.clue_frames(question):
-                try:
-                    return self._respondent.tokens_per_frame(frame)
-                except (DataError, ModelError) as error:
-                    problems.append(error)
-        reasons = [str(problem) for problem in problems] or sorted(data.reasons()) or ["its files are empty"]
-        raise UsageError(f"no question of {data.root} can be asked ({reasons[0]}); mend the set, or give another")
+        return _measure_frame(measured.data, model)
 
     def _refuse_unused(self) -> None:
-        """A kilo-token that no context is measured in would only give the run another identity; others mislead."""
+        """Refuse options without effect: they would only change the run's config, or mislead."""
         asked = ", ".join(task.name for task in self._tasks)
         measured = any(task.needs_size for task in self._tasks)
         for name in ("k_tokens", "tokens_per_frame"):
@@ -145,21 +97,61 @@ class NiehEvaluation:
             )
 
     def _depends_on(self, source: str) -> bool:
-        """Whether a context of the tasks looks at a source beside the set."""
+        """Return whether a context of the tasks reads a source beside the set."""
         return any(task.found is not None and source in task.found.sources for task in self._tasks)
 
 
-def _refuse_nothing(found: Sequence[TaskSamples | None], tasks: Sequence[NiehTask]) -> None:
-    """A task of several may have nothing to ask (no window so large fits); all of them may not."""
-    if any(samples is None or samples.samples for samples in found):
-        return
-    reasons = {item.reason for samples in found if samples is not None for item in samples.skipped}
-    said = "; ".join(sorted(reasons)[:3]) or "its files are empty"
-    raise UsageError(f"no question of {tasks[0].data.root} can be asked ({said}); mend the set, or give another")
+class BoundNieh:
+    """NIEH for one subject; see `infthor_eval.runs.BoundEvaluation`."""
+
+    def __init__(
+        self, workload: Workload[NiehUnit], prepared: Mapping[str, PreparedTask], open_answerer: OpenAnswerer
+    ) -> None:
+        """Take up what was prepared for the subject.
+
+        Args:
+            workload: all the work.
+            prepared: the tasks by name.
+            open_answerer: opens what answers the questions of one task on one trajectory.
+        """
+        self.workload = workload
+        self._prepared = prepared
+        self._open_answerer = open_answerer
+
+    def run(self, group: Group[NiehUnit], session: Session[NiehAnswer]) -> Iterator[UnitRecord[NiehAnswer]]:
+        """See `infthor_eval.runs.BoundEvaluation.run`."""
+        task = group.units[0].key.task
+        yield from answered(group.units, self._prepared[task], self._open_answerer(task, session), session)
+
+    def to_sample(self, record: UnitRecord[NiehAnswer]) -> UnitSample:
+        """See `infthor_eval.runs.BoundEvaluation.to_sample`."""
+        prepared = self._prepared[record.task]
+        number = self._numbers[record.key]
+        sample = prepared.found.samples[number]
+        return UnitSample(
+            number=number,
+            doc=doc_of(prepared.found, sample),
+            target=doc_target(sample.question),
+            prompt=prompt_of(prepared.found, sample),
+            settings=prepared.generation_kwargs,
+            reply=record.payload.reply or "",
+        )
+
+    def close(self) -> None:
+        """Nothing is held."""
+
+    @cached_property
+    def _numbers(self) -> dict[UnitKey, int]:
+        """Positions of the samples in their tasks."""
+        return {
+            UnitKey(name, sample.question.id, sample.variant): number
+            for name, prepared in self._prepared.items()
+            for number, sample in enumerate(prepared.found.samples)
+        }
 
 
-def _groups(task: str, prepared: PreparedTask) -> Iterator[Group]:
-    """The samples of one trajectory are a group: they share what is encoded of it."""
+def nieh_groups(task: str, prepared: PreparedTask) -> Iterator[Group[NiehUnit]]:
+    """Yield the samples of each trajectory as a group: they share what is encoded of it."""
     ordered = sorted(prepared.found.samples, key=lambda sample: sample.question.traj_id)
     for _, samples in groupby(ordered, key=lambda sample: sample.question.traj_id):
         same = list(samples)
@@ -170,3 +162,25 @@ def _groups(task: str, prepared: PreparedTask) -> Iterator[Group]:
 def _skipped(task: str, found: TaskSamples) -> Iterator[Skipped]:
     for item in found.skipped:
         yield Skipped(UnitKey(task, item.question.id, item.variant), item.reason)
+
+
+def _measure_frame(data: NiehSet, model: AnsweringModel) -> int:
+    """Return the subject's size of a frame, by the first frame of the questions that can be read."""
+    problems: list[InfthorError] = []
+    for question in data.questions:
+        for frame in data.clue_frames(question):
+            try:
+                return model.tokens_per_frame(frame)
+            except (DataError, ModelError) as error:
+                problems.append(error)
+    reasons = [str(problem) for problem in problems] or sorted(data.reasons()) or ["its files are empty"]
+    raise UsageError(f"no question of {data.root} can be asked ({reasons[0]}); mend the set, or give another")
+
+
+def _refuse_nothing(found: Sequence[TaskSamples | None], tasks: Sequence[NiehTask]) -> None:
+    """Refuse tasks of which none has a question to ask; some may have none, where no window of their size fits."""
+    if any(samples is None or samples.samples for samples in found):
+        return
+    reasons = {item.reason for samples in found if samples is not None for item in samples.skipped}
+    said = "; ".join(sorted(reasons)[:3]) or "its files are empty"
+    raise UsageError(f"no question of {tasks[0].data.root} can be asked ({said}); mend the set, or give another")

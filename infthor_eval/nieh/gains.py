@@ -70,7 +70,7 @@ def _gains(run: RunSummary, blind: RunSummary) -> Iterator[Gain]:
 
 def frames_of(run: RunSummary) -> str:
     """What was shown in the frames' places."""
-    return str(run.header.identity["frames"])
+    return str(run.header.config["frames"])
 
 
 def name_of(run: RunSummary) -> str:
@@ -84,4 +84,4 @@ def _same_but_for_frames(run: RunSummary, blind: RunSummary) -> bool:
 
 
 def _without_frames(run: RunSummary) -> dict[str, Any]:
-    return {name: value for name, value in run.header.identity.items() if name != "frames"}
+    return {name: value for name, value in run.header.config.items() if name != "frames"}

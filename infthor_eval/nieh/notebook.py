@@ -4,7 +4,7 @@ import time
 
 from infthor_eval.formats.digests import fingerprint
 from infthor_eval.nieh.notes import Notes, Window
-from infthor_eval.nieh.records import NiehNote
+from infthor_eval.nieh.records import NiehAnswer, NiehNote
 from infthor_eval.runs import Session, Usage
 from model_adapters import Decoding, Model
 
@@ -14,7 +14,7 @@ __all__ = ["Notebook"]
 class Notebook:
     """A model's notes, kept in the run's journal: a stopped run goes on with the same ones."""
 
-    def __init__(self, model: Model, session: Session) -> None:
+    def __init__(self, model: Model, session: Session[NiehAnswer]) -> None:
         self._conversation = model.conversation()
         self._start = self._conversation.mark()
         self._session = session
@@ -32,11 +32,11 @@ class Notebook:
         decoding = Decoding(max_new_tokens=notes.taking.max_new_tokens)
         digests = [frame.digest for frame in window.frames]
         inputs = fingerprint({"frames": digests, "text": window.request[-1], "decoding": decoding.document()})
-        note = self._session.memo(inputs)
+        note = self._session.find_artifact(inputs, NiehNote)
         if note is None:
             note, usage = self._taken(notes, window, decoding)
-            self._session.keep(inputs, note, usage)
-        return str(note.note)
+            self._session.cache_artifact(inputs, note, usage)
+        return note.note
 
     def _taken(self, notes: Notes, window: Window, decoding: Decoding) -> tuple[NiehNote, Usage]:
         began = time.perf_counter()

@@ -62,4 +62,4 @@ class NiehNote(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag=
     seconds: float
 
 
-RECORDS: RecordTypes = RecordTypes(unit=NiehAnswer, memo=NiehNote)
+RECORDS: RecordTypes[NiehAnswer] = RecordTypes(unit=NiehAnswer, artifact=NiehNote)

@@ -1,6 +1,6 @@
 """NIEH as a suite: questions about needles in an embodied haystack."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import ClassVar
 
 from infthor_eval.nieh.baselines import BASELINES
@@ -13,6 +13,7 @@ from infthor_eval.rates import Rate
 from infthor_eval.runs import RecordTypes, RunHeader, RunSummary, TaskRequest, UnitRecord
 from infthor_eval.runs.suite import Need
 from infthor_eval.tables import Table
+from model_adapters import Subject
 
 __all__ = ["NiehSuite"]
 
@@ -23,16 +24,16 @@ class NiehSuite:
     name: ClassVar[str] = "nieh"
     needs: ClassVar[Need] = "conversation"
     options: ClassVar[type] = NiehOptions
-    baselines = BASELINES
-    records: ClassVar[RecordTypes] = RECORDS
+    baselines: ClassVar[Mapping[str, Callable[[int], Subject]]] = BASELINES
+    records: ClassVar[RecordTypes[NiehAnswer]] = RECORDS
 
-    def prepare(self, request: TaskRequest) -> "NiehEvaluation":
+    def prepare(self, request: TaskRequest[NiehOptions]) -> "NiehEvaluation":
         """See `Suite.prepare`."""
         return NiehEvaluation(request)
 
     def summarise(self, header: RunHeader, records: Sequence[UnitRecord[NiehAnswer]]) -> NiehSummary:
         """See `Suite.summarise`."""
-        return summarise(header.identity, records)
+        return summarise(header.config, records)
 
     def scores(self, record: UnitRecord[NiehAnswer]) -> Mapping[str, float]:
         """See `Suite.scores`."""

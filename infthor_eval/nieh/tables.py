@@ -165,7 +165,7 @@ def _published_rows(table: PublishedTable, runs: Sequence[RunSummary]) -> Iterat
 
 def _differences(run: RunSummary, row: PublishedRow, table: PublishedTable) -> Iterator[Row]:
     """How far a run of the published model is from its row, and whether its interval (=) holds the published value."""
-    if not row.matches(run.header.identity["model"]) or frames_of(run) != SHOWN:
+    if not row.matches(run.header.config["model"]) or frames_of(run) != SHOWN:
         return
     for _, name, task in _tasks([run]):
         # Frames that a simulator of ours rendered are another data set.

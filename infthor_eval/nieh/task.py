@@ -9,6 +9,7 @@ from infthor_eval.errors import DataError
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.nieh.contexts import ContextSettings, Sample, context_named
 from infthor_eval.nieh.metrics import PUBLISHED, Metrics, metrics_of
+from infthor_eval.nieh.options import NiehOptions
 from infthor_eval.nieh.samples import TaskSamples, find_samples, find_set
 from infthor_eval.runs import TaskFile, TaskRequest
 from infthor_eval.runs.generation_kwargs import decoding_of
@@ -27,18 +28,20 @@ class PreparedTask:
     Attributes:
         found: what it asks.
         decoding: how replies are decoded.
+        generation_kwargs: the same in lm-eval's words, as given.
         metrics: what is made of them.
     """
 
     found: TaskSamples
     decoding: Decoding
+    generation_kwargs: Mapping[str, Any]
     metrics: Metrics = PUBLISHED
 
 
 class NiehTask:
     """A task file, read: what is known of a task before the model is there."""
 
-    def __init__(self, file: TaskFile, request: TaskRequest) -> None:
+    def __init__(self, file: TaskFile, request: TaskRequest[NiehOptions]) -> None:
         """Check the file and find what it asks, unless that depends on the model.
 
         Raises:
@@ -59,14 +62,16 @@ class NiehTask:
 
     def prepared(self, tokens_per_frame: int | None) -> PreparedTask:
         """How its samples become records, now that the size of a frame is known where it matters."""
-        if self.found is None:
-            self.found = find_samples(self._config | {"tokens_per_frame": tokens_per_frame}, self._limit)
-        return PreparedTask(self.found, self.decoding, self.metrics)
+        samples = self.found
+        if samples is None:
+            samples = find_samples(self._config | {"tokens_per_frame": tokens_per_frame}, self._limit)
+        return PreparedTask(samples, self.decoding, self.settings["generation_kwargs"], self.metrics)
 
-    def key(self, tokens_per_frame: int | None) -> Sequence[Sample]:
+    def key(self, prepared: PreparedTask, tokens_per_frame: int | None) -> Sequence[Sample]:
         """All that it would ask without a limit: the answer key that a baseline is fitted to."""
-        config = self._config | {"tokens_per_frame": tokens_per_frame}
-        return self.prepared(tokens_per_frame).found.samples if self._limit is None else find_samples(config).samples
+        if self._limit is None:
+            return prepared.found.samples
+        return find_samples(self._config | {"tokens_per_frame": tokens_per_frame}).samples
 
     def identity(self, prepared: PreparedTask) -> dict[str, Any]:
         """What its numbers depend on, as JSON values."""
@@ -100,7 +105,7 @@ def _check(file: TaskFile) -> None:
             raise DataError(f"{file.path}: dataset_kwargs: {key} is {given[key]!r:.60}; it is a name")
 
 
-def _told(request: TaskRequest) -> dict[str, Any]:
+def _told(request: TaskRequest[NiehOptions]) -> dict[str, Any]:
     """What a run tells its tasks beside their files' own settings."""
     ours = {"data": str(request.data) if request.data else None, **asdict(request.options)}
     return {"seed": request.seed} | {key: value for key, value in ours.items() if value is not None}

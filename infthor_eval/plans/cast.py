@@ -21,10 +21,6 @@ class Cast(Protocol):
 
     sees: bool
 
-    def prepare(self, trajectories: Sequence[Trajectory]) -> None:
-        """All trajectories of the run; once, before the first plan."""
-        ...
-
     def actor(self, task: PlansTask, trajectory: Trajectory) -> Actor:
         """What carries out the plans of a trajectory."""
         ...
@@ -36,9 +32,6 @@ class _Models:
     def __init__(self, model: Model) -> None:
         self._model = model
 
-    def prepare(self, trajectories: Sequence[Trajectory]) -> None:
-        """A model learns nothing beforehand."""
-
     def actor(self, task: PlansTask, trajectory: Trajectory) -> Actor:
         return ModelActor(self._model, task.manner())
 
@@ -49,20 +42,22 @@ class _Baselines:
     def __init__(self, baseline: Baseline) -> None:
         self._baseline = baseline
 
-    def prepare(self, trajectories: Sequence[Trajectory]) -> None:
-        self._baseline.fit(trajectories)
-
     def actor(self, task: PlansTask, trajectory: Trajectory) -> Actor:
         return self._baseline.actor(trajectory)
 
 
-def cast_of(subject: Subject) -> Cast:
+def cast_of(subject: Subject, trajectories: Sequence[Trajectory]) -> Cast:
     """The cast of a subject.
+
+    Args:
+        subject: a model or a baseline; a baseline is fitted to the trajectories.
+        trajectories: all trajectories of the run.
 
     Raises:
         TypeError: it is neither a model nor a baseline; the run sees to that before.
     """
     if isinstance(subject, Baseline):
+        subject.fit(trajectories)
         return _Baselines(subject)
     if isinstance(subject, Model):
         return _Models(subject)

@@ -1,9 +1,10 @@
 """Plans set up for a run: which plans of which trajectories, and the doing of it, a trajectory at a time."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib.metadata import version
+from itertools import groupby
 from pathlib import Path
 
 import msgspec
@@ -13,6 +14,7 @@ from infthor_eval.errors import InfthorError, SceneError, UsageError
 from infthor_eval.formats.floor_plans import floor_plans_digest
 from infthor_eval.plans.cast import Cast, cast_of
 from infthor_eval.plans.episodes import Episode, described, episode
+from infthor_eval.plans.options import PlansOptions
 from infthor_eval.plans.plan import Plan, UnfitPlanError
 from infthor_eval.plans.records import NOT_ATTEMPTED, PlanRecord
 from infthor_eval.plans.task import PlansTask
@@ -28,10 +30,10 @@ from infthor_eval.runs import (
     UnitSample,
     Workload,
 )
-from infthor_eval.runs.identity import episode_fingerprint
+from infthor_eval.runs.run_config import episode_fingerprint
 from model_adapters import Subject
 
-__all__ = ["PlanUnit", "PlansEvaluation"]
+__all__ = ["BoundPlans", "PlanUnit", "PlansEvaluation"]
 
 
 @dataclass(frozen=True)
@@ -56,7 +58,7 @@ class PlanUnit(Unit[PlanRecord]):
 class PlansEvaluation:
     """Plans set up for a run; see `infthor_eval.runs.Evaluation`."""
 
-    def __init__(self, request: TaskRequest) -> None:
+    def __init__(self, request: TaskRequest[PlansOptions]) -> None:
         """Read the tasks and their trajectories.
 
         Raises:
@@ -73,8 +75,6 @@ class PlansEvaluation:
         self._floor_plans = floor_plans_digest(self._scenes) if self._scenes is not None else None
         every = {course.traj_id: course for task in self._tasks.values() for course in task.courses.found}
         self._trajectories = [course.trajectory for course in every.values()]
-        self._cast: Cast | None = None
-        self._simulators: Simulators | None = None
 
     def outline(self) -> list[tuple[str, list[str]]]:
         """The trajectories that are gone through, by name, each with the texts of its plans."""
@@ -84,20 +84,10 @@ class PlansEvaluation:
             for course in task.limited
         ]
 
-    def workload(self, subject: Subject) -> Workload:
-        """See `infthor_eval.runs.Evaluation.workload`."""
-        self._cast = cast_of(subject)
-        self._cast.prepare(self._trajectories)
-        self._simulators = self._described_simulators(self._cast.sees)
-        self._identity = {
-            "tasks": {name: task.identity() for name, task in self._tasks.items()},
-            "simulator": self._options.simulator,
-            "ai2thor": version("ai2thor"),
-            "floor_plans": self._floor_plans,
-            "constrained": self._options.constrained,
-            "frames": self._options.frames,
-        }
-        return Workload(
+    def bind(self, subject: Subject) -> "BoundPlans":
+        """See `infthor_eval.runs.Evaluation.bind`."""
+        cast = cast_of(subject, self._trajectories)
+        workload = Workload(
             groups=[
                 Group(
                     [PlanUnit.of(task.name, course, plan) for plan in task.plans(course)],
@@ -111,32 +101,67 @@ class PlansEvaluation:
                 for task in self._tasks.values()
                 for place, reason in task.courses.broken
             ],
-            identity=self._identity,
+            config={
+                "tasks": {name: task.identity() for name, task in self._tasks.items()},
+                "simulator": self._options.simulator,
+                "ai2thor": version("ai2thor"),
+                "floor_plans": self._floor_plans,
+                "constrained": self._options.constrained,
+                "frames": self._options.frames,
+            },
         )
+        return BoundPlans(workload, self._tasks, cast, self._simulators(cast.sees), self._seed)
 
-    def run(self, group: Group, session: Session) -> Iterator[UnitRecord[PlanRecord]]:
-        """See `infthor_eval.runs.Evaluation.run`."""
-        units: list[PlanUnit] = list(group.units)  # type: ignore[arg-type]  # its own groups
-        prints = {unit.key: self._fingerprint(unit) for unit in units}
-        known = {unit.key: session.known(unit, prints[unit.key]) for unit in units}
-        first = units[0]
-        if all(record is not None for record in known.values()):
-            yield from (record for record in known.values() if record is not None)
+    def _simulators(self, seen: bool) -> Simulators:
+        """The simulators of episodes; frames that nobody looks at are not rendered."""
+        in_words = seen and any(task.memory.needs_state for task in self._tasks.values())
+        return Simulators(self._options.simulator, self._scenes, self._trajectories, image=seen, instances=in_words)
+
+
+class BoundPlans:
+    """Plans for one subject; see `infthor_eval.runs.BoundEvaluation`."""
+
+    def __init__(
+        self,
+        workload: Workload[PlanUnit],
+        tasks: Mapping[str, PlansTask],
+        cast: Cast,
+        simulators: Simulators,
+        seed: int,
+    ) -> None:
+        """Take up what was prepared for the subject.
+
+        Args:
+            workload: all the work.
+            tasks: the tasks by name.
+            cast: gives the subject's actors.
+            simulators: the simulators of its episodes; closed with this.
+            seed: seed of the run.
+        """
+        self.workload = workload
+        self._tasks, self._cast, self._simulators, self._seed = tasks, cast, simulators, seed
+
+    def run(self, group: Group[PlanUnit], session: Session[PlanRecord]) -> Iterator[UnitRecord[PlanRecord]]:
+        """See `infthor_eval.runs.BoundEvaluation.run`."""
+        prints = {unit.key: self._fingerprint(unit) for unit in group.units}
+        earlier = {unit.key: session.find_record(unit, prints[unit.key]) for unit in group.units}
+        if all(record is not None for record in earlier.values()):
+            yield from (record for record in earlier.values() if record is not None)
             return
+        first = group.units[0]
         task = self._tasks[first.key.task]
-        assert self._cast is not None and self._simulators is not None  # the workload comes first
         with episode(task, first.course, self._cast, self._simulators, self._seed) as stage:
             over = False
-            for unit in units:
-                record = known[unit.key]
+            for unit in group.units:
+                record = earlier[unit.key]
                 if record is None or (record.payload.ended == NOT_ATTEMPTED and not over):
                     record = _recorded(unit, prints[unit.key], stage, over)
                 yield record
                 failed = record.excluded is None and not record.payload.done
                 over = over or (failed and task.settings.after_failure == "stop")
 
-    def view(self, record: UnitRecord[PlanRecord]) -> UnitSample:
-        """See `infthor_eval.runs.Evaluation.view`."""
+    def to_sample(self, record: UnitRecord[PlanRecord]) -> UnitSample:
+        """See `infthor_eval.runs.BoundEvaluation.to_sample`."""
         payload, task = record.payload, self._tasks[record.task]
         return UnitSample(
             number=self._numbers[record.key],
@@ -148,27 +173,19 @@ class PlansEvaluation:
         )
 
     def close(self) -> None:
-        """See `infthor_eval.runs.Evaluation.close`."""
-        if self._simulators is not None:
-            self._simulators.close()
-
-    def _described_simulators(self, seen: bool) -> Simulators:
-        """What episodes run in; it draws nothing that nobody looks at."""
-        in_words = seen and any(task.memory.needs_state for task in self._tasks.values())
-        return Simulators(self._options.simulator, self._scenes, self._trajectories, image=seen, instances=in_words)
+        """See `infthor_eval.runs.BoundEvaluation.close`."""
+        self._simulators.close()
 
     @cached_property
     def _numbers(self) -> dict[UnitKey, int]:
-        """Places of the plans in their tasks."""
-        found: dict[UnitKey, int] = {}
-        for name, task in self._tasks.items():
-            plans = [(course, plan) for course in task.limited for plan in task.plans(course)]
-            found |= {PlanUnit.of(name, *plan).key: number for number, plan in enumerate(plans)}
-        return found
+        """Positions of the plans in their tasks."""
+        units = [unit for group in self.workload.groups for unit in group.units]  # task by task
+        by_task = groupby(units, key=lambda unit: unit.key.task)
+        return {unit.key: number for _, same in by_task for number, unit in enumerate(same)}
 
     def _fingerprint(self, unit: PlanUnit) -> str:
         return episode_fingerprint(
-            self._identity,
+            self.workload.config,
             unit.key.task,
             trajectory=unit.course.digest,
             plan=unit.plan.index,

@@ -1,6 +1,6 @@
 """Plans as a suite: an agent carries out a long trajectory plan by plan."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import ClassVar
 
 from infthor_eval.plans.baselines import BASELINES
@@ -13,6 +13,7 @@ from infthor_eval.rates import Rate
 from infthor_eval.runs import RecordTypes, RunHeader, RunSummary, TaskRequest, UnitRecord
 from infthor_eval.runs.suite import Need
 from infthor_eval.tables import Table
+from model_adapters import Subject
 
 __all__ = ["PlansSuite"]
 
@@ -23,16 +24,16 @@ class PlansSuite:
     name: ClassVar[str] = "plans"
     needs: ClassVar[Need] = "conversation"
     options: ClassVar[type] = PlansOptions
-    baselines = BASELINES
-    records: ClassVar[RecordTypes] = RECORDS
+    baselines: ClassVar[Mapping[str, Callable[[int], Subject]]] = BASELINES
+    records: ClassVar[RecordTypes[PlanRecord]] = RECORDS
 
-    def prepare(self, request: TaskRequest) -> "PlansEvaluation":
+    def prepare(self, request: TaskRequest[PlansOptions]) -> "PlansEvaluation":
         """See `Suite.prepare`."""
         return PlansEvaluation(request)
 
     def summarise(self, header: RunHeader, records: Sequence[UnitRecord[PlanRecord]]) -> PlansSummary:
         """See `Suite.summarise`."""
-        return summarise(header.identity, records)
+        return summarise(header.config, records)
 
     def scores(self, record: UnitRecord[PlanRecord]) -> Mapping[str, float]:
         """See `Suite.scores`: whether the plan was carried out, and what it earned."""

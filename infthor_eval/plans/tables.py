@@ -43,7 +43,7 @@ def _tasks(runs: Sequence[RunSummary]) -> Iterator[tuple[str, str, TaskSummary]]
     """Run's name, task's name and the task, of all runs."""
     for run in runs:
         assert isinstance(run.summary, PlansSummary)
-        frames = run.header.identity["frames"]
+        frames = run.header.config["frames"]
         name = run.header.name if frames == "shown" else f"{run.header.name}, {frames} frames"
         for task_name, task in run.summary.tasks.items():
             yield name, task_name, task
@@ -96,5 +96,5 @@ def _notes(runs: Sequence[RunSummary]) -> list[str]:
 
 
 def _is_final(run: RunSummary) -> bool:
-    tasks = run.header.identity["tasks"].values()
+    tasks = run.header.config["tasks"].values()
     return any(task["config"]["dataset_kwargs"].get("plans") == "final" for task in tasks)

@@ -49,7 +49,7 @@ _CHOICES = {"plans": ("all", "final"), "after_failure": ("continue", "stop")}
 class PlansTask:
     """A task file, read."""
 
-    def __init__(self, file: TaskFile, request: TaskRequest) -> None:
+    def __init__(self, file: TaskFile, request: TaskRequest[PlansOptions]) -> None:
         """Check the file and find its trajectories.
 
         Raises:
@@ -59,7 +59,7 @@ class PlansTask:
         file.require("dataset_kwargs", "generation_kwargs")
         self.file = file
         self.name = file.name
-        self._options: PlansOptions = request.options
+        self._options = request.options
         told = {name: getattr(self._options, name) for name in ("rewards", "history", "after_failure")}
         self.settings = task_settings(file, TaskSettings, told, _CHOICES)
         self.rules: RewardRules = reward_rules(self.settings.rewards)

@@ -52,7 +52,7 @@ def model_names(headers: Sequence[RunHeader]) -> list[str]:
 
 
 def _name(header: RunHeader) -> str:
-    frames = header.identity.get("frames", "shown")
+    frames = header.config.get("frames", "shown")
     return header.name if frames == "shown" else f"{header.name}, {frames} frames"
 
 

@@ -1,4 +1,4 @@
-"""One run of any suite: its identity, its journal, and the order of its work."""
+"""One run of any suite: its config, its journal, and the order of its work."""
 
 from infthor_eval.runs.catalog import Catalog, TaskFile
 from infthor_eval.runs.configuration import Configuration, read_configuration
@@ -8,6 +8,7 @@ from infthor_eval.runs.records import RecordTypes, RunHeader, Tokens, Unit, Unit
 from infthor_eval.runs.request import PreparedRun, RunRequest, prepare
 from infthor_eval.runs.shards import read_header, read_run
 from infthor_eval.runs.suite import (
+    BoundEvaluation,
     Cost,
     Evaluation,
     Group,
@@ -23,6 +24,7 @@ from infthor_eval.runs.usage import NOTHING, Usage
 
 __all__ = [
     "NOTHING",
+    "BoundEvaluation",
     "Catalog",
     "Configuration",
     "Cost",

@@ -1,44 +1,49 @@
 """One run of any suite: its journal, and the order of its work."""
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable
+from contextlib import closing
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Generic, Protocol, TypeVar
 
 from infthor_eval.runs import journal as journals
 from infthor_eval.runs.configuration import write_configuration
-from infthor_eval.runs.executor import LocalExecutor, View
+from infthor_eval.runs.executor import Executor, LocalExecutor
 from infthor_eval.runs.journal import Journal
-from infthor_eval.runs.records import RunHeader, UnitRecord
+from infthor_eval.runs.records import Unit, UnitRecord
 from infthor_eval.runs.request import PreparedRun
 from infthor_eval.runs.results import results_document, write_results, write_scores, write_usage
-from infthor_eval.runs.suite import RunSummary, Workload
+from infthor_eval.runs.samples import StoredSamples
+from infthor_eval.runs.suite import RunSummary, UnitSample, Workload
 from infthor_eval.runs.usage import Usage
 from infthor_eval.runs.worker_executor import WorkerPoolExecutor
 
 __all__ = ["Observer", "RunOutcome", "Silent", "execute"]
 
+P = TypeVar("P")
+U = TypeVar("U", bound=Unit[Any])
+
 
 class Observer(Protocol):
-    """Is told how a run goes."""
+    """Follows a run."""
 
-    def begin(self, workload: Workload, n_recovered: int) -> None:
-        """All that will be done, before the first unit; and how many bad lines were taken out of the journal."""
+    def begin(self, workload: Workload[Unit[Any]], n_recovered: int) -> None:
+        """Called before the first unit, with all the work and the number of bad lines taken out of the journal."""
         ...
 
     def done(self, record: UnitRecord[Any], resumed: bool) -> None:
-        """A unit is done; or was found in the journal of an earlier, stopped run."""
+        """Called for each unit; `resumed` if its record is that of an earlier, stopped run."""
         ...
 
     def note(self, text: str) -> None:
-        """What became of a worker, in words."""
+        """Called with a line when a worker is lost or cannot be started."""
         ...
 
 
 class Silent:
-    """An observer that says nothing."""
+    """An observer that does nothing."""
 
-    def begin(self, workload: Workload, n_recovered: int) -> None:
+    def begin(self, workload: Workload[Unit[Any]], n_recovered: int) -> None:
         """Nothing."""
 
     def done(self, record: UnitRecord[Any], resumed: bool) -> None:
@@ -49,41 +54,41 @@ class Silent:
 
 
 @dataclass(frozen=True)
-class RunOutcome:
+class RunOutcome(Generic[U, P]):
     """A run that has ended.
 
     Attributes:
-        folder: the run's own.
-        run: what it was made from.
-        summary: who it was, and what it found.
-        records: of every unit that was come to.
-        n_missing: how many units were not come to, as the run was stopped.
-        usage: what all its requests took, those for memos with them.
-        view: how other readers see its records.
+        folder: the run's folder.
+        run: what it was executed from.
+        summary: header and summary of the run.
+        records: the records of all units that were attempted.
+        n_missing: number of units that were not attempted, as the run was stopped.
+        usage: what all its requests took, those for cached artifacts included.
+        samples: the records in their order, converted for other readers.
     """
 
     folder: Path
-    run: PreparedRun
+    run: PreparedRun[U, P]
     summary: RunSummary
-    records: list[UnitRecord[Any]]
+    records: list[UnitRecord[P]]
     n_missing: int
     usage: Usage
-    view: View
+    samples: Iterable[UnitSample]
 
 
 def execute(
-    run: PreparedRun, observer: Observer | None = None, should_stop: Callable[[], bool] = lambda: False
-) -> RunOutcome:
+    run: PreparedRun[U, P], observer: Observer | None = None, should_stop: Callable[[], bool] = lambda: False
+) -> RunOutcome[U, P]:
     """Load the model, do what the journal does not hold yet, and write the results.
 
-    The folder `<output>/<name>/<tasks>-<identity>/` holds the journal, `run.yaml` (how it was asked for),
-    `results.json` (what it found) and `scores.jsonl` (of every unit), equal for equal runs, and `usage.json` (what it
-    took).
+    The folder `<output>/<name>/<tasks>-<config hash>/` holds the journal, `run.yaml` (the options of the command),
+    `results.json` (the summary) and `scores.jsonl` (of every unit), equal for equal runs, and `usage.json`.
 
     Args:
-        run: what `prepare` found.
-        observer: is told how it goes.
-        should_stop: once it says so, the units in hand are finished, and the results of what is there are written.
+        run: the prepared run.
+        observer: follows the run; None for nobody.
+        should_stop: asked after each unit; once it returns True, the units in hand are finished, and the results of
+            what is there are written.
 
     Raises:
         UsageError: another process at the same run, a subject that the suite cannot evaluate, or nothing to do.
@@ -91,11 +96,12 @@ def execute(
         DataError: the journal has a bad line, or the results cannot be written.
     """
     observer = observer or Silent()
-    executor = LocalExecutor(run) if run.request.worker_settings.is_local else WorkerPoolExecutor(run, observer.note)
-    try:
-        header, workload = executor.begin()
+    with closing(_start_executor(run, observer.note)) as executor:
+        header, workload = executor.header, executor.workload
         folder = run.request.folder(header)
-        n_recovered = _open_anew(run, folder, header)
+        if run.request.fresh:
+            journals.set_aside(folder)
+        n_recovered = journals.recover(folder, header, run.suite.records) if run.request.recover else 0
         with Journal(folder, header, run.suite.records) as journal:
             write_configuration(folder, run.request)
             observer.begin(workload, n_recovered)
@@ -104,36 +110,31 @@ def execute(
                     observer.done(record, resumed)
             except Exception:
                 raise
-            except BaseException:  # stopped at once: what is there by then has its results all the same
-                _found(run, folder, header, workload, journal)
+            except BaseException:  # stopped at once: the units that are done have their results all the same
+                _write_results(run, folder, workload, journal)
                 raise
-            outcome = _found(run, folder, header, workload, journal)
-        return replace(outcome, view=executor.view(outcome.records))
-    finally:
-        executor.close()
+            summary, records, usage = _write_results(run, folder, workload, journal)
+        samples = StoredSamples(executor.samples(records))
+        return RunOutcome(folder, run, summary, records, workload.n_units - len(records), usage, samples)
 
 
-def _found(run: PreparedRun, folder: Path, header: RunHeader, workload: Workload, journal: Journal) -> RunOutcome:
-    """What the journal holds of a run by now, with its results written."""
-    records = _asked(workload, journal)
+def _start_executor(run: PreparedRun[U, P], report: Callable[[str], None]) -> Executor[P]:
+    if run.request.worker_settings.is_local:
+        return LocalExecutor(run)
+    return WorkerPoolExecutor(run, report)
+
+
+def _write_results(
+    run: PreparedRun[U, P], folder: Path, workload: Workload[Unit[Any]], journal: Journal[P]
+) -> tuple[RunSummary, list[UnitRecord[P]], Usage]:
+    """Write the results of the units that the journal has by now; return summary, records and usage."""
+    asked = {unit.key for group in workload.groups for unit in group.units}  # the journal may hold more
+    records = [record for record in journal.records if record.key in asked]
     journal.require_there()
-    summary = RunSummary(header, run.suite.summarise(header, records))
+    summary = RunSummary(journal.header, run.suite.summarise(journal.header, records))
     n_missing = workload.n_units - len(records)
-    usage = Usage.total([record.usage for record in records] + [memo.usage for memo in journal.memos])
+    usage = Usage.total([record.usage for record in records] + [artifact.usage for artifact in journal.artifacts])
     write_results(folder, results_document(summary, run.suite, n_missing, usage))
     write_scores(folder, run.suite, records)
     write_usage(folder, records, usage)
-    return RunOutcome(folder, run, summary, records, n_missing, usage, run.evaluation.view)
-
-
-def _open_anew(run: PreparedRun, folder: Path, header: RunHeader) -> int:
-    """What --fresh and --recover do to an earlier journal; how many bad lines were taken out of it."""
-    if run.request.fresh:
-        journals.set_aside(folder)
-    return journals.recover(folder, header, run.suite.records) if run.request.recover else 0
-
-
-def _asked(workload: Workload, journal: Journal) -> list[UnitRecord[Any]]:
-    """The records of what this run asks; the journal may know more."""
-    asked = {unit.key for group in workload.groups for unit in group.units}
-    return [record for record in journal.records if record.key in asked]
+    return summary, records, usage

@@ -11,18 +11,22 @@ of each quantity: seconds, requests, tokens, money.
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass, fields, replace
-from typing import Any
+from typing import Any, TypeVar
 
-from infthor_eval.runs.executor import LocalExecutor
+from infthor_eval.runs.binding import bind_run
 from infthor_eval.runs.groups import group_records
 from infthor_eval.runs.records import Unit, UnitRecord
 from infthor_eval.runs.request import RunRequest, prepare
-from infthor_eval.runs.suite import Group, Suite, Workload
+from infthor_eval.runs.suite import BoundEvaluation, Group, Suite, Workload
 from infthor_eval.runs.usage import NOTHING, Usage
-from model_adapters import Subject
 
 __all__ = ["Estimate", "Quantities", "TaskEstimate", "estimate_run", "estimated"]
+
+A = TypeVar("A")
+P = TypeVar("P")
+U = TypeVar("U", bound=Unit[Any])
 
 _UNITS_OF_A_GROUP = 3  # that are measured: the first, one amid it, the last
 
@@ -112,26 +116,25 @@ class Estimate:
     failures: Sequence[tuple[str, str]]
 
 
-class _Scratch:
-    """A `Session` that knows nothing and keeps notes for itself."""
+class _MeasuringSession:
+    """A `Session` without records, as every unit is to be measured; artifacts are cached in memory."""
 
-    def __init__(self, subject: Subject) -> None:
-        self.subject = subject
-        self._memos: dict[str, Any] = {}
+    def __init__(self) -> None:
+        self._artifacts: dict[str, Any] = {}
 
-    def known(self, unit: Unit[Any], fingerprint: str) -> None:
-        """Nothing is known: it is to be measured."""
+    def find_record(self, unit: Unit[Any], fingerprint: str) -> None:
+        """Return None: there are no records."""
 
-    def memo(self, fingerprint: str) -> Any | None:
+    def find_artifact(self, fingerprint: str, kind: type[A]) -> A | None:
         """See `Session`."""
-        return self._memos.get(fingerprint)
+        return self._artifacts.get(fingerprint)
 
-    def keep(self, fingerprint: str, payload: Any, usage: Usage = NOTHING) -> None:
+    def cache_artifact(self, fingerprint: str, artifact: Any, usage: Usage = NOTHING) -> None:
         """See `Session`."""
-        self._memos[fingerprint] = payload
+        self._artifacts[fingerprint] = artifact
 
 
-def estimate_run(request: RunRequest, suite: Suite, n_units: int, progress: Callable[[], None]) -> Estimate:
+def estimate_run(request: RunRequest, suite: Suite[U, P], n_units: int, progress: Callable[[], None]) -> Estimate:
     """Load the subject, do a few units of each task, and reckon what all of them take; nothing is written.
 
     Args:
@@ -145,29 +148,26 @@ def estimate_run(request: RunRequest, suite: Suite, n_units: int, progress: Call
         DataError: as `execute`.
         ModelError: as `execute`.
     """
-    executor = LocalExecutor(prepare(request, suite))
-    try:
-        _, workload = executor.begin()
+    with closing(bind_run(prepare(request, suite))) as bound:
+        workload = bound.evaluation.workload
         done = []
-        for item in _measured(executor, workload, n_units):
+        for item in _measured(bound.evaluation, n_units):
             done.append(item)
             progress()
-    finally:
-        executor.close()
     failures = [failure for item in done for failure in item.failures]
     return Estimate(workload, estimated(workload, done) if any(item.took for item in done) else (), failures)
 
 
-def _measured(executor: LocalExecutor, workload: Workload, n_units: int) -> Iterator[_Measured]:
+def _measured(evaluation: BoundEvaluation[U, P], n_units: int) -> Iterator[_Measured]:
     """Do a few units of each task: of groups of all sizes, of each the first, one amid it and the last."""
-    session = _Scratch(executor.subject)
-    for group in _chosen(workload.groups, max(1, round(n_units / _UNITS_OF_A_GROUP))):
+    session = _MeasuringSession()
+    for group in _chosen(evaluation.workload.groups, max(1, round(n_units / _UNITS_OF_A_GROUP))):
         units = list(group.units)
         part = list(dict.fromkeys((0, len(units) // 2, len(units) - 1)))
         took, failures = [], []
         few = replace(group, units=[units[n] for n in part])
         began = time.perf_counter()
-        for record in group_records(executor.evaluation, few, session):
+        for record in group_records(evaluation, few, session):
             now = time.perf_counter()
             if record.failure is None:
                 took.append((record.task, Quantities.of(record, now - began)))
@@ -177,9 +177,9 @@ def _measured(executor: LocalExecutor, workload: Workload, n_units: int) -> Iter
         yield _Measured(group.frames, took, failures)
 
 
-def _chosen(groups: Sequence[Group], n: int) -> Iterator[Group]:
+def _chosen(groups: Sequence[Group[U]], n: int) -> Iterator[Group[U]]:
     """So many groups of each task, evenly from the smallest to the largest."""
-    by_task: dict[str, list[Group]] = {}
+    by_task: dict[str, list[Group[U]]] = {}
     for group in groups:
         by_task.setdefault(group.units[0].key.task, []).append(group)
     for same in by_task.values():

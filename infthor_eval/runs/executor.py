@@ -2,85 +2,89 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Generic, Protocol, TypeVar
 
+from infthor_eval.runs.binding import bind_run
 from infthor_eval.runs.groups import group_records
-from infthor_eval.runs.identity import header_of
 from infthor_eval.runs.journal import Journal
-from infthor_eval.runs.records import RunHeader, UnitRecord
+from infthor_eval.runs.records import RunHeader, Unit, UnitRecord
 from infthor_eval.runs.request import PreparedRun
 from infthor_eval.runs.scheduling import run_groups
 from infthor_eval.runs.session import JournalSession
-from infthor_eval.runs.subjects import subject_of
 from infthor_eval.runs.suite import UnitSample, Workload
 
-__all__ = ["Executor", "LocalExecutor", "Recorded", "View"]
+__all__ = ["Executor", "LocalExecutor", "Recorded"]
 
-Recorded = tuple[UnitRecord[Any], bool]  # one that is on disk; and whether an earlier run had put it there
-View = Callable[[UnitRecord[Any]], UnitSample]
+P = TypeVar("P")
+U = TypeVar("U", bound=Unit[Any])
+
+Recorded = tuple[UnitRecord[P], bool]  # a record that is on disk; True if an earlier run had put it there
 
 
-class Executor(Protocol):
-    """Who does the work."""
+class Executor(Protocol[P]):
+    """Does the work of a run. It is ready as soon as it is created."""
 
-    def begin(self) -> tuple[RunHeader, Workload]:
-        """Get ready: who the run is, and all that there is to do."""
+    @property
+    def header(self) -> RunHeader:
+        """Header of the run's journal."""
         ...
 
-    def evaluate(self, folder: Path, journal: Journal, should_stop: Callable[[], bool]) -> Iterator[Recorded]:
-        """Do all groups; every record as soon as it is on disk.
+    @property
+    def workload(self) -> Workload[Unit[Any]]:
+        """All the work."""
+        ...
+
+    def evaluate(
+        self, folder: Path, journal: Journal[P], should_stop: Callable[[], bool]
+    ) -> Iterator[tuple[UnitRecord[P], bool]]:
+        """Do all groups; yield every record as soon as it is on disk.
 
         Args:
-            folder: the run's.
+            folder: the run's folder.
             journal: the driver's shard.
-            should_stop: once it says so, the units in hand are the last.
+            should_stop: returns True once the units in hand are to be the last.
         """
         ...
 
-    def view(self, records: Sequence[UnitRecord[Any]]) -> View:
-        """How other readers see these records; it may be called after `close`."""
+    def samples(self, records: Sequence[UnitRecord[P]]) -> Iterator[UnitSample]:
+        """Convert records for other readers, in their order; not after `close`."""
         ...
 
     def close(self) -> None:
-        """Let go of everything, whatever was reached."""
+        """Release everything, in whatever state it is."""
         ...
 
 
-class LocalExecutor:
-    """This process."""
+class LocalExecutor(Generic[U, P]):
+    """The executor of this process."""
 
-    def __init__(self, run: PreparedRun) -> None:
-        """Load the subject.
+    def __init__(self, run: PreparedRun[U, P]) -> None:
+        """Load the subject and find the work.
 
         Raises:
-            UsageError: the suite cannot evaluate it.
-            ModelError: it cannot be loaded.
+            InfthorError: see `bind_run`.
         """
-        self._run = run
-        self.evaluation = run.evaluation
-        self.subject = subject_of(run)
+        self._bound = bind_run(run)
+        self.header = self._bound.header
+        self.workload = self._bound.evaluation.workload
 
-    def begin(self) -> tuple[RunHeader, Workload]:
+    def evaluate(
+        self, folder: Path, journal: Journal[P], should_stop: Callable[[], bool]
+    ) -> Iterator[tuple[UnitRecord[P], bool]]:
         """See `Executor`."""
-        self._workload = self.evaluation.workload(self.subject)
-        return header_of(self._run, self.subject, self._workload), self._workload
-
-    def evaluate(self, folder: Path, journal: Journal, should_stop: Callable[[], bool]) -> Iterator[Recorded]:
-        """See `Executor`."""
-        session = JournalSession(self.subject, journal)
-        evaluation, in_flight = self.evaluation, self.subject.capabilities.max_in_flight
+        session, evaluation = JournalSession(journal), self._bound.evaluation
+        in_flight = self._bound.subject.capabilities.max_in_flight
         for record in run_groups(
-            self._workload.groups, lambda group: group_records(evaluation, group, session), in_flight
+            self.workload.groups, lambda group: group_records(evaluation, group, session), in_flight
         ):
-            yield session.recorded(record)
+            yield session.append_new(record)
             if should_stop():
                 return
 
-    def view(self, records: Sequence[UnitRecord[Any]]) -> View:
+    def samples(self, records: Sequence[UnitRecord[P]]) -> Iterator[UnitSample]:
         """See `Executor`."""
-        return self.evaluation.view
+        return map(self._bound.evaluation.to_sample, records)
 
     def close(self) -> None:
         """See `Executor`."""
-        self.evaluation.close()
-        self.subject.close()
+        self._bound.close()

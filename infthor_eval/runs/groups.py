@@ -1,18 +1,21 @@
 """The records of a group, whatever its suite does: what fails is recorded, and no other group with it."""
 
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, TypeVar
 
 import msgspec
 
 from infthor_eval.errors import InfthorError, describe_exception
-from infthor_eval.runs.records import UnitRecord
-from infthor_eval.runs.suite import Evaluation, Group, Session
+from infthor_eval.runs.records import Unit, UnitRecord
+from infthor_eval.runs.suite import BoundEvaluation, Group, Session
 
 __all__ = ["group_records"]
 
+P = TypeVar("P")
+U = TypeVar("U", bound=Unit[Any])
 
-def group_records(evaluation: Evaluation, group: Group, session: Session) -> Iterator[UnitRecord[Any]]:
+
+def group_records(evaluation: BoundEvaluation[U, P], group: Group[U], session: Session[P]) -> Iterator[UnitRecord[P]]:
     """The records of a group; units that it came to no record of have failed, and no other group with them.
 
     Raises:
@@ -29,6 +32,6 @@ def group_records(evaluation: Evaluation, group: Group, session: Session) -> Ite
         reason = str(error)
     except MemoryError:  # of the machine, and not of the group alone
         raise
-    except Exception as error:  # noqa: BLE001 - a suite is anybody's code, and its fault is recorded whatever it is
+    except Exception as error:  # noqa: BLE001 - a suite is anybody's code, and may raise anything
         reason = f"{describe_exception(error)}; mend the suite and run the same command again"
     yield from (unit.failed(reason) for unit in waiting.values())

@@ -16,7 +16,7 @@ from io import FileIO
 from pathlib import Path
 from threading import Lock
 from types import TracebackType
-from typing import Any, BinaryIO, Self
+from typing import Any, BinaryIO, Generic, Self, TypeVar
 
 import msgspec
 
@@ -24,22 +24,28 @@ from infthor_eval.errors import DataError, UsageError, in_one_line, wrap_errors
 from infthor_eval.formats.digests import canonical_json
 from infthor_eval.formats.files import write_atomically
 from infthor_eval.formats.reading import require_file
-from infthor_eval.runs.records import MemoRecord, RecordTypes, RunHeader, UnitKey, UnitRecord
+from infthor_eval.runs.records import ArtifactRecord, RecordTypes, RunHeader, UnitKey, UnitRecord
 from infthor_eval.runs.shards import BAD, FOLDER, Decoder, lines_in, read_shard, read_shards, shards_of
 from infthor_eval.runs.usage import NOTHING, Usage
 
 __all__ = ["Journal", "recover", "set_aside"]
+
+P = TypeVar("P")
 
 _SHARD = "worker-{:d}.jsonl"
 _GLANCE_S = 0.1  # between two tries to lock
 _BAD_LINES = "bad_lines.txt"
 
 
-class Journal:
-    """Append-only record of one run; this process holds one shard of it."""
+class Journal(Generic[P]):
+    """Append-only record of one run; this process holds one shard of it.
+
+    Attributes:
+        header: header of the run.
+    """
 
     def __init__(
-        self, run: Path, header: RunHeader, types: RecordTypes, worker: int = 0, patience_s: float = 0.0
+        self, run: Path, header: RunHeader, types: RecordTypes[P], worker: int = 0, wait_s: float = 0.0
     ) -> None:
         """Open this worker's shard, or begin it, and read all others.
 
@@ -48,7 +54,7 @@ class Journal:
             header: who the run is.
             types: payloads of the suite.
             worker: number of the shard.
-            patience_s: for another process to let go of the shard.
+            wait_s: seconds to wait for another process to release the shard.
 
         Raises:
             UsageError: another process is writing the shard, or it cannot be written.
@@ -64,12 +70,13 @@ class Journal:
         except OSError as error:
             raise UsageError(f"{path}: cannot be written ({in_one_line(error)}); give another --output") from error
         self._path = path
+        self.header = header
         self._writing = Lock()
         try:
-            _lock(self._file, path, patience_s)
+            _lock(self._file, path, wait_s)
             self._decoder = types.decoder()
             self._log = read_shards(run, self._decoder)
-            self._begin(path, header)
+            self._begin(path)
         except (DataError, UsageError):
             self._file.close()
             raise
@@ -83,51 +90,51 @@ class Journal:
         self._file.close()
 
     @property
-    def records(self) -> list[UnitRecord[Any]]:
+    def records(self) -> list[UnitRecord[P]]:
         """The latest record of each unit, of all shards."""
         return self._log.records
 
-    def known(self, key: UnitKey, fingerprint: str) -> UnitRecord[Any] | None:
-        """The record of a unit with a result from these inputs; a failed one is tried again by the next run."""
+    def find_record(self, key: UnitKey, fingerprint: str) -> UnitRecord[P] | None:
+        """Return the record of a unit with a result from these inputs; a failed unit is tried again by the next run."""
         record = self._log.units.get(key)
         if record is None or record.failure is not None or record.fingerprint != fingerprint:
             return None
         return record
 
-    def known_of(self, keys: Iterable[UnitKey]) -> tuple[UnitRecord[Any], ...]:
-        """The latest records of these units, whatever became of them; those that have one."""
+    def latest_records(self, keys: Iterable[UnitKey]) -> tuple[UnitRecord[P], ...]:
+        """Return the latest records of these units, failed ones included; units without a record are left out."""
         return tuple(self._log.units[key] for key in keys if key in self._log.units)
 
-    def result_of(self, key: UnitKey) -> UnitRecord[Any] | None:
-        """The latest record of a unit, if it has a result, from whatever inputs."""
+    def result_of(self, key: UnitKey) -> UnitRecord[P] | None:
+        """Return the latest record of a unit if it has a result, from whatever inputs, else None."""
         record = self._log.units.get(key)
         return None if record is None or record.failure is not None else record
 
-    def take(self, record: UnitRecord[Any]) -> None:
-        """Know a record that stands in another shard."""
+    def add(self, record: UnitRecord[P]) -> None:
+        """Add a record that is in another shard to what this process knows."""
         self._log.add(record)
 
-    def take_from(self, worker: int, record: UnitRecord[Any]) -> None:
-        """Know what a worker has put on disk; where its shard is not to be seen from here, it is put into this one.
+    def add_from(self, worker: int, record: UnitRecord[P]) -> None:
+        """Add a record that a worker has put on disk; where its shard is not visible here, write it into this one.
 
         Raises:
             DataError: it cannot be written.
         """
         if not (self._path.parent / _SHARD.format(worker)).exists():
             self._write(record)
-        self.take(record)
+        self.add(record)
 
     def reread(self, worker: int) -> None:
-        """Know all that stands in the shard of a worker that was lost, what it could not tell any more included."""
+        """Read the shard of another worker, for records that it wrote but did not send."""
         path = self._path.parent / _SHARD.format(worker)
         if path.exists():
             read_shard(path, self._decoder, self._log)
 
-    def holds(self, record: UnitRecord[Any]) -> bool:
+    def holds(self, record: UnitRecord[P]) -> bool:
         """Whether this very record is in it already."""
         return self._log.units.get(record.key) is record
 
-    def append(self, record: UnitRecord[Any]) -> UnitRecord[Any]:
+    def append(self, record: UnitRecord[P]) -> UnitRecord[P]:
         """Record a unit; the record is on disk when this returns, numbered as the attempt that it is.
 
         Raises:
@@ -141,25 +148,25 @@ class Journal:
         self._log.add(record)
         return record
 
-    def memo(self, fingerprint: str) -> Any | None:
-        """The payload that was kept under these inputs, if one was."""
-        record = self._log.memos.get(fingerprint)
+    def find_artifact(self, fingerprint: str) -> Any | None:
+        """Return the cached artifact of these inputs, or None."""
+        record = self._log.artifacts.get(fingerprint)
         return None if record is None else record.payload
 
     @property
-    def memos(self) -> list[MemoRecord[Any]]:
-        """All that was kept, of all shards, in the order of its inputs."""
-        return [self._log.memos[key] for key in sorted(self._log.memos)]
+    def artifacts(self) -> list[ArtifactRecord[Any]]:
+        """The cached artifacts of all shards, in the order of their fingerprints."""
+        return [self._log.artifacts[key] for key in sorted(self._log.artifacts)]
 
-    def keep(self, fingerprint: str, payload: Any, usage: Usage = NOTHING) -> None:
-        """Keep a payload; it is on disk when this returns."""
-        record: MemoRecord[Any] = MemoRecord(fingerprint=fingerprint, payload=payload, usage=usage)
+    def cache_artifact(self, fingerprint: str, artifact: Any, usage: Usage = NOTHING) -> None:
+        """Cache an artifact; it is on disk when this returns."""
+        record: ArtifactRecord[Any] = ArtifactRecord(fingerprint=fingerprint, payload=artifact, usage=usage)
         self._write(record)
         self._log.add(record)
 
-    def _begin(self, path: Path, header: RunHeader) -> None:
-        if self._log.header is not None and canonical_json(self._log.header.identity) != canonical_json(
-            header.identity
+    def _begin(self, path: Path) -> None:
+        if self._log.header is not None and canonical_json(self._log.header.config) != canonical_json(
+            self.header.config
         ):
             raise DataError(f"{path.parent}: is the journal of another run; give another --output")
         content = path.read_bytes()
@@ -167,7 +174,7 @@ class Journal:
         if whole < len(content):
             self._file.truncate(whole)
         if not whole:
-            self._write(header)
+            self._write(self.header)
 
     def _write(self, record: msgspec.Struct) -> None:
         line = memoryview(msgspec.json.encode(record) + b"\n")
@@ -191,8 +198,8 @@ class Journal:
             raise DataError(f"{self._path}: was deleted or replaced while the run wrote it; run the same command again")
 
 
-def _lock(file: BinaryIO | FileIO, path: Path, patience_s: float = 0.0) -> None:
-    end = time.monotonic() + patience_s
+def _lock(file: BinaryIO | FileIO, path: Path, wait_s: float = 0.0) -> None:
+    end = time.monotonic() + wait_s
     while True:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -203,7 +210,7 @@ def _lock(file: BinaryIO | FileIO, path: Path, patience_s: float = 0.0) -> None:
         time.sleep(_GLANCE_S)
 
 
-def recover(run: Path, header: RunHeader, types: RecordTypes) -> int:
+def recover(run: Path, header: RunHeader, types: RecordTypes[Any]) -> int:
     """Take the bad lines out of a run's shards and keep them beside; the units that they told of are tried again.
 
     Args:
@@ -221,7 +228,7 @@ def recover(run: Path, header: RunHeader, types: RecordTypes) -> int:
     return sum(_recover_shard(path, header, types) for path in shards_of(run))
 
 
-def _recover_shard(path: Path, header: RunHeader, types: RecordTypes) -> int:
+def _recover_shard(path: Path, header: RunHeader, types: RecordTypes[Any]) -> int:
     with path.open("rb") as file:
         _lock(file, path)
         decoder = types.decoder()

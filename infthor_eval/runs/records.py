@@ -11,11 +11,12 @@ import msgspec
 
 from infthor_eval.runs.usage import NOTHING, Usage
 
-__all__ = ["FORMAT", "MemoRecord", "RecordTypes", "RunHeader", "Tokens", "Unit", "UnitKey", "UnitRecord"]
+__all__ = ["FORMAT", "ArtifactRecord", "RecordTypes", "RunHeader", "Tokens", "Unit", "UnitKey", "UnitRecord"]
 
-FORMAT = 2
+FORMAT = 3
 
 P = TypeVar("P")
+P_co = TypeVar("P_co", covariant=True)
 
 
 class UnitKey(NamedTuple):
@@ -55,13 +56,13 @@ class RunHeader(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag
     Attributes:
         suite: the kind of evaluation, which knows the payloads.
         name: what the run is called in tables and folders.
-        identity: everything that can change a number, as JSON values.
+        config: everything that can change a number, as JSON values.
         format: of the journal.
     """
 
     suite: str
     name: str
-    identity: dict[str, Any]
+    config: dict[str, Any]
     format: int = FORMAT
 
 
@@ -106,14 +107,14 @@ class UnitRecord(
         return UnitKey(self.task, self.id, self.variant)
 
 
-class MemoRecord(
-    msgspec.Struct, Generic[P], frozen=True, kw_only=True, omit_defaults=True, tag_field="type", tag="memo"
+class ArtifactRecord(
+    msgspec.Struct, Generic[P], frozen=True, kw_only=True, omit_defaults=True, tag_field="type", tag="artifact"
 ):
-    """What a suite found on the way to its units and would not compute again when the run is resumed.
+    """A cached artifact: an intermediate result of a suite that a resumed run does not compute again.
 
     Attributes:
-        fingerprint: of all its inputs; it is found again by it.
-        payload: the suite's own.
+        fingerprint: hash of all its inputs, by which it is looked up.
+        payload: the suite's own struct.
         usage: what the requests behind it took.
     """
 
@@ -123,20 +124,20 @@ class MemoRecord(
 
 
 @dataclass(frozen=True)
-class RecordTypes:
+class RecordTypes(Generic[P_co]):
     """The payloads of a suite's records: msgspec structs with a tag.
 
     Attributes:
-        unit: of its units.
-        memo: of its memos; None where it keeps none.
+        unit: payload of its units.
+        artifact: payload of its cached artifacts; None where it caches none.
     """
 
-    unit: type[Any]
-    memo: type[Any] | None = None
+    unit: type[P_co]
+    artifact: type[Any] | None = None
 
     def decoder(self) -> msgspec.json.Decoder[Any]:
         """The decoder of a journal's lines."""
-        lines: Any = RunHeader | UnitRecord[self.unit] | MemoRecord[self.memo]  # type: ignore[name-defined]
+        lines: Any = RunHeader | UnitRecord[self.unit] | ArtifactRecord[self.artifact]  # type: ignore[name-defined]
         return msgspec.json.Decoder(lines)
 
 

@@ -3,17 +3,20 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 from infthor_eval.errors import UsageError, unknown_name
 from infthor_eval.formats.digests import fingerprint
 from infthor_eval.formats.files import require_writable
-from infthor_eval.runs.records import RunHeader
+from infthor_eval.runs.records import RunHeader, Unit
 from infthor_eval.runs.suite import Evaluation, Suite, TaskRequest
 from infthor_eval.workers import WorkerSettings
 from model_adapters import check_options, is_known, label, names
 
 __all__ = ["PreparedRun", "RunRequest", "prepare"]
+
+P = TypeVar("P")
+U = TypeVar("U", bound=Unit[Any])
 
 
 @dataclass(frozen=True)
@@ -35,7 +38,7 @@ class RunRequest:
     """
 
     model: str
-    tasks: TaskRequest
+    tasks: TaskRequest[Any]
     asked: tuple[str, ...]
     output: Path
     model_options: Mapping[str, str] = field(default_factory=dict)
@@ -53,19 +56,25 @@ class RunRequest:
 
     def folder(self, header: RunHeader) -> Path:
         """The run's own folder, `<output>/<name>/<tasks>-<identity>`."""
-        return self.output / header.name / f"{'+'.join(self.asked)[:80]}-{fingerprint(header.identity)}"
+        return self.output / header.name / f"{'+'.join(self.asked)[:80]}-{fingerprint(header.config)}"
 
 
 @dataclass(frozen=True)
-class PreparedRun:
-    """A request whose names, files and data have been found to be in order; it is sent to workers as it is."""
+class PreparedRun(Generic[U, P]):
+    """A request whose names, files and data are in order; it is pickled and sent to workers.
+
+    Attributes:
+        request: the request.
+        suite: its suite.
+        evaluation: the suite set up for it.
+    """
 
     request: RunRequest
-    suite: Suite
-    evaluation: Evaluation
+    suite: Suite[U, P]
+    evaluation: Evaluation[U, P]
 
 
-def prepare(request: RunRequest, suite: Suite) -> PreparedRun:
+def prepare(request: RunRequest, suite: Suite[U, P]) -> PreparedRun[U, P]:
     """Check a request before anything expensive is loaded.
 
     Raises:

@@ -21,7 +21,7 @@ _SCORES = "scores.jsonl"
 _TOOK = "usage.json"
 
 
-def results_document(found: RunSummary, suite: Suite, n_missing: int | None, usage: Usage) -> dict[str, Any]:
+def results_document(found: RunSummary, suite: Suite[Any, Any], n_missing: int | None, usage: Usage) -> dict[str, Any]:
     """What a run found, as it is written; docs/formats.md describes it.
 
     Args:
@@ -34,7 +34,7 @@ def results_document(found: RunSummary, suite: Suite, n_missing: int | None, usa
     return {
         "suite": header.suite,
         "name": header.name,
-        "identity": header.identity,
+        "config": header.config,
         "n_missing": n_missing,
         "primary_metrics": suite.primary_metrics(found.summary),
         "summary": found.summary,
@@ -56,7 +56,7 @@ def write_results(folder: Path, document: dict[str, Any]) -> None:
     _write(folder / RESULTS, document)
 
 
-def write_scores(folder: Path, suite: Suite, records: Sequence[UnitRecord[Any]]) -> None:
+def write_scores(folder: Path, suite: Suite[Any, Any], records: Sequence[UnitRecord[Any]]) -> None:
     """Write the scores of every unit, a JSON object a line; equal runs give equal bytes.
 
     Args:

@@ -44,7 +44,7 @@ def _label_alike(runs: Sequence[tuple[Path, RunHeader]], ignore: Collection[str]
     values = {name: [given.get(name) for given in options] for name in names}
     shown = {name: _shorten(given) for name, given in values.items() if len(set(given)) > 1}
     # A run that differs in nothing but ignored options is another row of the same label.
-    keys = [(given, sorted(header.identity.get("tasks", {}))) for given, (_, header) in zip(options, runs, strict=True)]
+    keys = [(given, sorted(header.config.get("tasks", {}))) for given, (_, header) in zip(options, runs, strict=True)]
     for given, key, (folder, header) in zip(options, keys, runs, strict=True):
         differing = ", ".join(f"{name}={texts[given[name]]}" for name, texts in shown.items() if name in given)
         told_apart = [*([differing] if differing else []), *([folder.name] if keys.count(key) > 1 else [])]

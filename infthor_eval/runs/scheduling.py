@@ -3,18 +3,20 @@
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from queue import Empty, SimpleQueue
 from threading import Event, Thread
-from typing import TypeVar
+from typing import Any, TypeVar
 
-from infthor_eval.runs.records import UnitRecord
+from infthor_eval.runs.records import Unit, UnitRecord
 from infthor_eval.runs.suite import Group
 
 __all__ = ["run_groups"]
 
-T = TypeVar("T")
-Do = Callable[[Group], Iterable[UnitRecord]]
+P = TypeVar("P")
+U = TypeVar("U", bound=Unit[Any])
 
 
-def run_groups(groups: Sequence[Group], do: Do, max_in_flight: int) -> Iterator[UnitRecord]:
+def run_groups(
+    groups: Sequence[Group[U]], do: Callable[[Group[U]], Iterable[UnitRecord[P]]], max_in_flight: int
+) -> Iterator[UnitRecord[P]]:
     """The records of all groups, as they come.
 
     Args:
@@ -29,11 +31,13 @@ def run_groups(groups: Sequence[Group], do: Do, max_in_flight: int) -> Iterator[
         yield from _in_threads(groups, do, min(max_in_flight, len(groups)))
 
 
-def _in_threads(groups: Sequence[Group], do: Do, n_threads: int) -> Iterator[UnitRecord]:
-    waiting: SimpleQueue[Group] = SimpleQueue()
+def _in_threads(
+    groups: Sequence[Group[U]], do: Callable[[Group[U]], Iterable[UnitRecord[P]]], n_threads: int
+) -> Iterator[UnitRecord[P]]:
+    waiting: SimpleQueue[Group[U]] = SimpleQueue()
     for group in groups:
         waiting.put(group)
-    made: SimpleQueue[UnitRecord | BaseException | None] = SimpleQueue()  # None: a thread has ended
+    made: SimpleQueue[UnitRecord[P] | BaseException | None] = SimpleQueue()  # None: a thread has ended
     stop = Event()
     threads = [Thread(target=_work, args=(waiting, do, made, stop), daemon=True) for _ in range(n_threads)]
     for thread in threads:
@@ -53,7 +57,10 @@ def _in_threads(groups: Sequence[Group], do: Do, n_threads: int) -> Iterator[Uni
 
 
 def _work(
-    waiting: "SimpleQueue[Group]", do: Do, made: "SimpleQueue[UnitRecord | BaseException | None]", stop: Event
+    waiting: "SimpleQueue[Group[U]]",
+    do: Callable[[Group[U]], Iterable[UnitRecord[P]]],
+    made: "SimpleQueue[UnitRecord[P] | BaseException | None]",
+    stop: Event,
 ) -> None:
     try:
         while (group := _next(waiting)) is not None and not stop.is_set():
@@ -67,7 +74,7 @@ def _work(
         made.put(None)
 
 
-def _next(waiting: SimpleQueue[Group]) -> Group | None:
+def _next(waiting: "SimpleQueue[Group[U]]") -> Group[U] | None:
     """The next group; None where there is none. Not by asking first: another thread may take the last one meanwhile."""
     try:
         return waiting.get_nowait()

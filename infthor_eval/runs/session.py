@@ -1,44 +1,46 @@
-"""A subject at work, and the journal that its results go to."""
+"""A suite's view of the journal that its results go to."""
 
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import msgspec
 
 from infthor_eval.runs.journal import Journal
 from infthor_eval.runs.records import Unit, UnitRecord
 from infthor_eval.runs.usage import NOTHING, Usage
-from model_adapters import Subject
 
 __all__ = ["JournalSession"]
 
+A = TypeVar("A")
+P = TypeVar("P")
 
-class JournalSession:
+
+class JournalSession(Generic[P]):
     """The `Session` of a run with a journal."""
 
-    def __init__(self, subject: Subject, journal: Journal) -> None:
-        self.subject = subject
+    def __init__(self, journal: Journal[P]) -> None:
         self.journal = journal
 
-    def known(self, unit: Unit[Any], fingerprint: str) -> UnitRecord[Any] | None:
+    def find_record(self, unit: Unit[P], fingerprint: str) -> UnitRecord[P] | None:
         """See `Session`."""
-        return self.journal.known(unit.key, fingerprint)
+        return self.journal.find_record(unit.key, fingerprint)
 
-    def memo(self, fingerprint: str) -> Any | None:
+    def find_artifact(self, fingerprint: str, kind: type[A]) -> A | None:
         """See `Session`."""
-        return self.journal.memo(fingerprint)
+        artifact = self.journal.find_artifact(fingerprint)
+        return artifact if isinstance(artifact, kind) else None
 
-    def keep(self, fingerprint: str, payload: Any, usage: Usage = NOTHING) -> None:
+    def cache_artifact(self, fingerprint: str, artifact: Any, usage: Usage = NOTHING) -> None:
         """See `Session`."""
-        self.journal.keep(fingerprint, payload, usage)
+        self.journal.cache_artifact(fingerprint, artifact, usage)
 
-    def recorded(self, record: UnitRecord[Any]) -> tuple[UnitRecord[Any], bool]:
-        """A record that a suite gave, on disk; and whether it was there already."""
+    def append_new(self, record: UnitRecord[P]) -> tuple[UnitRecord[P], bool]:
+        """Put a suite's record on disk unless it is there already; return it, and True if it was there."""
         if self.journal.holds(record):
             return record, True
-        return self.journal.append(self._naming_changes(record)), False
+        return self.journal.append(self._note_changed_inputs(record)), False
 
-    def _naming_changes(self, record: UnitRecord[Any]) -> UnitRecord[Any]:
-        """A record that says so where there was a result already, from other inputs."""
+    def _note_changed_inputs(self, record: UnitRecord[P]) -> UnitRecord[P]:
+        """Add a fault to a record whose unit already has a result from other inputs."""
         earlier = self.journal.result_of(record.key)
         if earlier is None or not record.fingerprint or earlier.fingerprint == record.fingerprint:
             return record

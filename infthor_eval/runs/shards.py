@@ -9,7 +9,7 @@ import msgspec
 from infthor_eval.errors import DataError
 from infthor_eval.formats.digests import canonical_json
 from infthor_eval.formats.reading import read_bytes, require_file
-from infthor_eval.runs.records import FORMAT, MemoRecord, RecordTypes, RunHeader, UnitKey, UnitRecord
+from infthor_eval.runs.records import FORMAT, ArtifactRecord, RecordTypes, RunHeader, UnitKey, UnitRecord
 from infthor_eval.runs.usage import Usage
 
 __all__ = [
@@ -40,17 +40,17 @@ class RunLog:
     Attributes:
         header: who the run is; None where there is no shard yet.
         units: the latest record of each unit.
-        memos: by fingerprint.
+        artifacts: cached artifacts by fingerprint.
     """
 
     header: RunHeader | None = None
     units: dict[UnitKey, UnitRecord[Any]] = field(default_factory=dict)
-    memos: dict[str, MemoRecord[Any]] = field(default_factory=dict)
+    artifacts: dict[str, ArtifactRecord[Any]] = field(default_factory=dict)
 
-    def add(self, record: UnitRecord[Any] | MemoRecord[Any]) -> None:
+    def add(self, record: UnitRecord[Any] | ArtifactRecord[Any]) -> None:
         """Take up a record; of a unit that was tried several times the last try counts, and of two the successful."""
-        if isinstance(record, MemoRecord):
-            self.memos[record.fingerprint] = record
+        if isinstance(record, ArtifactRecord):
+            self.artifacts[record.fingerprint] = record
             return
         known = self.units.get(record.key)
         if known is None or _rank(record) >= _rank(known):
@@ -63,9 +63,9 @@ class RunLog:
 
     @property
     def usage(self) -> Usage:
-        """What all requests took, those behind memos with them."""
+        """What all requests took, those for cached artifacts included."""
         return Usage.total(
-            [*(unit.usage for unit in self.units.values()), *(memo.usage for memo in self.memos.values())]
+            [*(unit.usage for unit in self.units.values()), *(artifact.usage for artifact in self.artifacts.values())]
         )
 
 
@@ -105,7 +105,7 @@ class _Outcome(msgspec.Struct, tag_field="type", tag="unit"):
     failure: str | None = None
 
 
-class _Memo(msgspec.Struct, tag_field="type", tag="memo"):
+class _Artifact(msgspec.Struct, tag_field="type", tag="artifact"):
     """Nothing is looked at."""
 
 
@@ -115,7 +115,7 @@ def latest_outcomes(run: Path) -> dict[UnitKey, bool]:
     Raises:
         DataError: a line is bad.
     """
-    decoder = msgspec.json.Decoder(_Outcome | _Memo | RunHeader)
+    decoder = msgspec.json.Decoder(_Outcome | _Artifact | RunHeader)
     found: dict[UnitKey, tuple[int, bool]] = {}
     for path in shards_of(run):
         for number, line in enumerate(lines_in(path), 1):
@@ -165,7 +165,7 @@ def read_shard(path: Path, decoder: Decoder, log: RunLog) -> None:
     if not lines:
         return  # begun by a worker that was killed before it said who it is
     header = _header(path, lines)
-    if log.header is not None and canonical_json(header.identity) != canonical_json(log.header.identity):
+    if log.header is not None and canonical_json(header.config) != canonical_json(log.header.config):
         raise DataError(f"{path}: belongs to another run than the shards beside it; take it out of the folder")
     log.header = header
     for number, line in enumerate(lines[1:], 2):
@@ -195,7 +195,9 @@ def _header(path: Path, lines: list[bytes]) -> RunHeader:
     except BAD as error:
         raise DataError(f"{path}, line 1: not the first line of a journal ({error}); {_MEND}") from error
     if version != FORMAT:
-        raise DataError(f"{path}: a journal of format {version}, this version reads {FORMAT}; start anew with --fresh")
+        raise DataError(
+            f"{path}: a journal of format {version}, this version reads {FORMAT}; run the command again with --fresh"
+        )
     try:
         return msgspec.json.decode(first, type=RunHeader)
     except BAD as error:

@@ -1,13 +1,19 @@
-"""What a kind of evaluation is to the run that drives it.
+"""The protocol between a kind of evaluation and the run that drives it.
 
-A `Suite` is the kind: it knows its options, its baselines and its records, and makes summaries and tables of them. An
-`Evaluation` is a suite set up for one run: it finds the work, in groups that share what is expensive, and does a group.
+A `Suite` is the kind: it knows its options, baselines and records, and turns records into summaries and tables. Each
+further object exists only once all that it needs is known:
+
+    Suite.prepare(request) -> Evaluation            what is read from files, before the subject is loaded
+    Evaluation.bind(subject) -> BoundEvaluation     the work, in groups that share what is expensive; owns simulators
+    BoundEvaluation.run(group, session)             a record per unit
+
+`U` is the suite's unit, `P` the payload of its records.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar, Literal, Protocol
+from typing import Any, ClassVar, Generic, Literal, Protocol, TypeVar
 
 import msgspec
 
@@ -19,6 +25,7 @@ from infthor_eval.tables import Table
 from model_adapters import Subject
 
 __all__ = [
+    "BoundEvaluation",
     "Cost",
     "Evaluation",
     "Group",
@@ -34,38 +41,42 @@ __all__ = [
 
 Need = Literal["conversation", "policy"]
 
+A = TypeVar("A")
+O_co = TypeVar("O_co", covariant=True)
+P = TypeVar("P")
+U = TypeVar("U", bound=Unit[Any])
+U_co = TypeVar("U_co", bound=Unit[Any], covariant=True)
+
 
 @dataclass(frozen=True)
-class TaskRequest:
+class TaskRequest(Generic[O_co]):
     """What a run asks of a suite.
 
     Attributes:
         tasks: the task files, all of this suite.
         options: an instance of the suite's `Options`.
         data: folder of the data set for tasks that do not bring their own.
-        limit: evaluate only so many items of each task; which, `infthor_eval.runs.limiting` says.
-        seed: for whatever is random.
+        limit: number of items to evaluate of each task, chosen by `infthor_eval.runs.limiting`; None for all.
+        seed: seed of everything random.
     """
 
     tasks: Sequence[TaskFile]
-    options: Any
+    options: O_co
     data: Path | None = None
     limit: int | None = None
     seed: int = 0
 
 
 @dataclass(frozen=True)
-class Group:
+class Group(Generic[U_co]):
     """Units that share work, done one after the other in one place.
 
     Attributes:
-        units: at least one.
-        context: what the suite itself wants to know when it does them.
-        frames: that the units look at, each counted once; what they share grows with it.
+        units: at least one unit.
+        frames: number of distinct frames that the units look at; the cost of what they share grows with it.
     """
 
-    units: Sequence[Unit[Any]]
-    context: Any = None
+    units: Sequence[U_co]
     frames: int = 1
 
 
@@ -79,11 +90,11 @@ class Skipped:
 
 @dataclass(frozen=True)
 class Cost:
-    """What a task will cost, told before the first unit.
+    """The cost of a task, known before its first unit.
 
     Attributes:
-        task: which task.
-        description: in words, for people.
+        task: name of the task.
+        description: the cost in words, for people.
     """
 
     task: str
@@ -91,45 +102,40 @@ class Cost:
 
 
 @dataclass(frozen=True)
-class Workload:
-    """All that a run has to do.
+class Workload(Generic[U_co]):
+    """All the work of a run.
 
     Attributes:
-        groups: in the order of work, which depends on the request alone.
-        skipped: what cannot be evaluated.
-        identity: what the numbers depend on besides the subject and the seed, as JSON values.
-        costs: of the tasks.
+        groups: the groups in the order of work, which depends on the request alone.
+        skipped: units that cannot be evaluated.
+        config: everything beside subject and seed that the numbers depend on, as JSON values.
+        costs: costs of the tasks, where they are known.
     """
 
-    groups: Sequence[Group]
+    groups: Sequence[Group[U_co]]
     skipped: Sequence[Skipped] = ()
-    identity: Mapping[str, Any] = field(default_factory=dict)
+    config: Mapping[str, Any] = field(default_factory=dict)
     costs: Sequence[Cost] = ()
 
     @property
     def n_units(self) -> int:
-        """How many units there are."""
+        """Number of units in all groups."""
         return sum(len(group.units) for group in self.groups)
 
 
-class Session(Protocol):
-    """What a suite works with while it does a group; several threads may use it at once."""
+class Session(Protocol[P]):
+    """The results of a run so far, as a suite sees them while it does a group; several threads may use it at once."""
 
-    @property
-    def subject(self) -> Subject:
-        """What is evaluated."""
+    def find_record(self, unit: Unit[P], fingerprint: str) -> UnitRecord[P] | None:
+        """Return the record of a unit that already has a result from these very inputs, or None."""
         ...
 
-    def known(self, unit: Unit[Any], fingerprint: str) -> UnitRecord[Any] | None:
-        """The record of an earlier run, if the unit has a result from these very inputs."""
+    def find_artifact(self, fingerprint: str, kind: type[A]) -> A | None:
+        """Return the cached artifact of these inputs, or None."""
         ...
 
-    def memo(self, fingerprint: str) -> Any | None:
-        """The payload that was kept under these inputs, if one was."""
-        ...
-
-    def keep(self, fingerprint: str, payload: Any, usage: Usage = NOTHING) -> None:
-        """Keep a payload for when the run is resumed, with what its requests took; nothing if not given."""
+    def cache_artifact(self, fingerprint: str, artifact: Any, usage: Usage = NOTHING) -> None:
+        """Cache an artifact for when the run is resumed, with what its requests took."""
         ...
 
 
@@ -138,12 +144,12 @@ class UnitSample:
     """A unit and its result, for readers that know no suites (lm-eval's format).
 
     Attributes:
-        number: its place among those of its task.
-        doc: what it is, as JSON values.
-        target: what was wanted, in words.
-        prompt: what was asked, in words, with a placeholder for each frame.
-        settings: how the reply was decoded, in lm-eval's words.
-        reply: what was said or done; empty where it failed.
+        number: position among the samples of its task.
+        doc: the sample as JSON values.
+        target: the expected result in words.
+        prompt: the request in words, with a placeholder for each frame.
+        settings: decoding settings in lm-eval's words.
+        reply: the reply or the actions; empty where the unit failed.
     """
 
     number: int
@@ -154,88 +160,104 @@ class UnitSample:
     reply: str
 
 
-class Evaluation(Protocol):
-    """A suite set up for one run."""
+class BoundEvaluation(Protocol[U, P]):
+    """An evaluation of one subject. It owns whatever depends on the subject, its simulators among it."""
 
-    def workload(self, subject: Subject) -> Workload:
-        """Find all that is to be done; called once, before the first unit.
+    @property
+    def workload(self) -> Workload[U]:
+        """All the work; the same object every time."""
+        ...
+
+    def run(self, group: Group[U], session: Session[P]) -> Iterator[UnitRecord[P]]:
+        """Do a group: yield a record per unit as soon as it is there; records found in the session as they are.
+
+        Raises:
+            InfthorError: the units without a record cannot be done. The run records them as failed and goes on. So it
+                does with any other exception, which is a fault of the suite; only MemoryError ends the run.
+        """
+        ...
+
+    def to_sample(self, record: UnitRecord[P]) -> UnitSample:
+        """Convert a record of this workload for other readers; not after `close`."""
+        ...
+
+    def close(self) -> None:
+        """Release what the work needed (simulators); called once, whether the work was finished or not."""
+        ...
+
+
+class Evaluation(Protocol[U, P]):
+    """A suite set up for one run. It holds only what was read from files, and may be bound more than once."""
+
+    def bind(self, subject: Subject) -> BoundEvaluation[U, P]:
+        """Find all the work for a subject.
 
         Raises:
             UsageError: nothing can be evaluated, or not with this subject.
-            DataError: the data are not what their format says.
+            DataError: the data do not match their format.
             ModelError: the model can take none of the units.
         """
         ...
 
-    def run(self, group: Group, session: Session) -> Iterator[UnitRecord[Any]]:
-        """Do a group: a record per unit, as soon as it is there, the known ones as they are.
 
-        Raises:
-            InfthorError: the units that have no record yet cannot be done; the run records them as failed, and goes on.
-                So it does where anything else is raised, which is a fault of the suite and recorded with its place;
-                MemoryError alone ends the run.
-        """
-        ...
-
-    def view(self, record: UnitRecord[Any]) -> UnitSample:
-        """A record for other readers; called after the work was found."""
-        ...
-
-    def close(self) -> None:
-        """Let go of what the work needed (simulators); called once all of it is done, or given up."""
-        ...
-
-
-class Suite(Protocol):
+class Suite(Protocol[U, P]):
     """A kind of evaluation.
 
     Attributes:
-        name: as task files write it (`metadata: {suite: NAME}`).
-        needs: what a subject that is no baseline must be able to do.
-        options: a dataclass of what the suite can be told beside its task files, with defaults.
-        baselines: the suite's own yardsticks: name to a function of the seed.
-        records: payloads of its records.
+        name: name in task files (`metadata: {suite: NAME}`).
+        needs: what a subject must be able to do, unless it is a baseline of the suite.
+        options: dataclass of the suite's options beside its task files, with defaults.
+        baselines: the suite's baselines: name to a function of the seed.
     """
 
     name: ClassVar[str]
     needs: ClassVar[Need]
     options: ClassVar[type]
     baselines: ClassVar[Mapping[str, Callable[[int], Subject]]]
-    records: ClassVar[RecordTypes]
 
-    def prepare(self, request: TaskRequest) -> Evaluation:
-        """Set up a run; whatever can be refused without the subject is refused here, before it is loaded.
+    @property
+    def records(self) -> RecordTypes[P]:
+        """Payloads of the suite's records."""
+        ...
+
+    def prepare(self, request: TaskRequest[Any]) -> Evaluation[U, P]:
+        """Set up a run. Whatever can be refused without the subject is refused here, before it is loaded.
 
         Raises:
             UsageError: a task or an option that does not fit.
-            DataError: the data are not what their format says.
+            DataError: the data do not match their format.
         """
         ...
 
-    def summarise(self, header: RunHeader, records: Sequence[UnitRecord[Any]]) -> msgspec.Struct:
-        """Everything that a run found: a pure function of its journal, without times, equal for equal records."""
+    def summarise(self, header: RunHeader, records: Sequence[UnitRecord[P]]) -> msgspec.Struct:
+        """Summarise a run: a pure function of its journal, without times, equal for equal records."""
         ...
 
-    def scores(self, record: UnitRecord[Any]) -> Mapping[str, float]:
-        """The metrics of one unit by name; one that is missing, as all are where it failed, counts as 0."""
+    def scores(self, record: UnitRecord[P]) -> Mapping[str, float]:
+        """Return the metrics of one unit by name; a missing one counts as 0, as all do where the unit failed."""
         ...
 
     def primary_metrics(self, summary: Any) -> Mapping[str, Rate]:
-        """The number that each task is known by, a share from 0 to 1; a task of which nothing counts has none."""
+        """Return the primary metric of each task, a share from 0 to 1; none for a task of which no unit counts."""
         ...
 
     def overview(self, runs: Sequence["RunSummary"]) -> Sequence[Table]:
-        """What people are shown first of runs of this suite, side by side: what fits a screen of 100 columns."""
+        """Return what people see first of runs of this suite, side by side, at most 100 columns wide."""
         ...
 
     def tables(self, runs: Sequence["RunSummary"]) -> Sequence[Table]:
-        """All that there is to be shown of them, and the published numbers beside it."""
+        """Return all results of runs of this suite, with the published numbers beside them."""
         ...
 
 
 @dataclass(frozen=True)
 class RunSummary:
-    """A run, summed up: who it is, and what its suite says that it found."""
+    """A run, summed up.
+
+    Attributes:
+        header: header of the run's journal.
+        summary: what the suite makes of the records (`Suite.summarise`).
+    """
 
     header: RunHeader
     summary: Any

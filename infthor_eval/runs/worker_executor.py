@@ -1,40 +1,44 @@
 """A run by several workers: each loads the subject, does groups, and writes a shard of the journal.
 
-The driver loads nothing. A worker tells it who the run is and what there is to do; it hands out groups, each with the
-records that earlier runs, or a worker that was lost, left of it.
+The driver loads no model. It learns the run's header and workload from the first worker, and hands out groups by
+number, each with the records that earlier runs or a lost worker left of it. So nothing travels but numbers and records.
 """
 
 from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.digests import canonical_json
-from infthor_eval.runs.executor import Recorded, View
+from infthor_eval.runs.binding import bind_run
 from infthor_eval.runs.groups import group_records
-from infthor_eval.runs.identity import header_of
 from infthor_eval.runs.journal import Journal
 from infthor_eval.runs.records import RunHeader, Unit, UnitKey, UnitRecord
 from infthor_eval.runs.request import PreparedRun
 from infthor_eval.runs.session import JournalSession
-from infthor_eval.runs.subjects import subject_of
 from infthor_eval.runs.suite import Group, UnitSample, Workload
-from infthor_eval.workers import Event, GivenUp, Lost, Made, Pool, Withdrawn
+from infthor_eval.workers import Event, GivenUp, Lost, Made, Pool, Withdrawn, WorkerLostError
 
 __all__ = ["WorkerPoolExecutor"]
 
-_PARTING_S = 20.0
-_PATIENCE = 3  # losses in a row at a group before its units are tried one by one
-_PATIENCE_ALONE = 2  # and at one of these before it has failed
+P = TypeVar("P")
+U = TypeVar("U", bound=Unit[Any])
+
+_SHARD_WAIT_S = 20.0
+# A unit that kills its worker (out of memory, say) must not fail the others of its group: after so many losses in a
+# row the group is split, and each of its units gets so many tries alone.
+_GROUP_TRIES = 3
+_UNIT_TRIES = 2
+_BATCH = 256  # records that a worker converts at a time
 
 
 @dataclass(frozen=True)
 class _Greeting:
-    """What a worker finds: who the run is, and what there is to do, without what only the suite needs of it."""
+    """What the driver learns from a worker before it hands out work: units without what only the suite needs."""
 
     header: RunHeader
-    workload: Workload
+    workload: Workload[Unit[Any]]
 
 
 @dataclass(frozen=True)
@@ -42,205 +46,218 @@ class _Portion:
     """A group, or one unit of it.
 
     Attributes:
-        group: its number, in the order of the workload.
-        unit: its number in the group; None for all of them.
+        group: number of the group in the order of the workload.
+        unit: number of the unit in the group; None for all of them.
     """
 
     group: int
     unit: int | None = None
 
-    def of(self, workload: Workload) -> Group:
-        """What is to be done."""
-        group = workload.groups[self.group]
+    def select(self, groups: Sequence[Group[U]]) -> Group[U]:
+        """Return the group, or the part of it, out of all groups."""
+        group = groups[self.group]
         return group if self.unit is None else replace(group, units=[group.units[self.unit]])
 
 
 @dataclass(frozen=True)
-class _GroupOrder:
-    """One group to be done, or a unit of it alone.
+class _GroupJob(Generic[P]):
+    """A portion for a worker to do.
 
     Attributes:
-        portion: which.
-        folder: the run's.
-        known: the latest records of its units.
+        portion: the portion.
+        folder: the run's folder.
+        earlier: the latest records of its units.
     """
 
-    portion: "_Portion"
+    portion: _Portion
     folder: Path
-    known: tuple[UnitRecord[Any], ...]
+    earlier: tuple[UnitRecord[P], ...]
 
 
 @dataclass(frozen=True)
-class _ViewOrder:
-    """Records to be seen by other readers."""
+class _SampleJob(Generic[P]):
+    """Records for a worker to convert to samples."""
 
-    records: tuple[UnitRecord[Any], ...]
+    records: tuple[UnitRecord[P], ...]
 
 
 @dataclass(frozen=True)
-class _OpenEvaluator:
-    """Makes the worker where it is to work."""
+class _OpenEvaluator(Generic[U, P]):
+    """Creates a worker in the process where it works; pickled and sent there."""
 
-    run: PreparedRun
+    run: PreparedRun[U, P]
 
-    def __call__(self, number: int) -> "_Evaluator":
+    def __call__(self, number: int) -> "_Evaluator[U, P]":
         return _Evaluator(self.run, number)
 
 
-class _Evaluator:
+class _Evaluator(Generic[U, P]):
     """A worker of a run; see `infthor_eval.workers.Worker`."""
 
-    def __init__(self, run: PreparedRun, number: int) -> None:
-        self._run = run
+    def __init__(self, run: PreparedRun[U, P], number: int) -> None:
+        self._records = run.suite.records
         self._number = number
-        self._subject = subject_of(run)
-        self._workload = run.evaluation.workload(self._subject)
-        self._header = header_of(run, self._subject, self._workload)
-        self._session: JournalSession | None = None
+        self._bound = bind_run(run)
+        self._session: JournalSession[P] | None = None
 
     @property
     def greeting(self) -> _Greeting:
-        groups = [replace(group, units=list(map(_plain, group.units)), context=None) for group in self._workload.groups]
-        return _Greeting(self._header, replace(self._workload, groups=groups))
+        workload = self._bound.evaluation.workload
+        groups = [Group([_without_inputs(unit) for unit in group.units], group.frames) for group in workload.groups]
+        return _Greeting(self._bound.header, Workload(groups, workload.skipped, workload.config, workload.costs))
 
-    def do(self, job: _GroupOrder | _ViewOrder) -> Iterator[Recorded | UnitSample]:
-        if isinstance(job, _ViewOrder):
-            yield from map(self._run.evaluation.view, job.records)
+    def do(self, job: _GroupJob[P] | _SampleJob[P]) -> Iterator[tuple[UnitRecord[P], bool] | UnitSample]:
+        evaluation = self._bound.evaluation
+        if isinstance(job, _SampleJob):
+            yield from map(evaluation.to_sample, job.records)
             return
-        session = self._session_in(job.folder)
-        for record in job.known:
-            session.journal.take(record)
-        for record in group_records(self._run.evaluation, job.portion.of(self._workload), session):
-            yield session.recorded(record)
+        session = self._open_session(job.folder)
+        for record in job.earlier:
+            session.journal.add(record)
+        for record in group_records(evaluation, job.portion.select(evaluation.workload.groups), session):
+            yield session.append_new(record)
 
     def close(self) -> None:
-        self._run.evaluation.close()
-        self._subject.close()
+        self._bound.close()
 
-    def _session_in(self, folder: Path) -> JournalSession:
+    def _open_session(self, folder: Path) -> JournalSession[P]:
         if self._session is None:
-            # A worker of a driver that was killed may still be ending.
-            types = self._run.suite.records
-            journal = Journal(folder, self._header, types, worker=self._number, patience_s=_PARTING_S)
-            self._session = JournalSession(self._subject, journal)
+            # A worker of a driver that was killed may still be ending, and holds the lock of the shard until then.
+            journal = Journal(folder, self._bound.header, self._records, worker=self._number, wait_s=_SHARD_WAIT_S)
+            self._session = JournalSession(journal)
         return self._session
 
 
 @dataclass(frozen=True)
-class _Sharing:
-    """What is the same for all portions of a run.
+class _Progress(Generic[P]):
+    """The state of a run that all its portions share.
 
     Attributes:
-        folder: the run's.
+        folder: the run's folder.
         journal: the driver's shard.
         should_stop: see `Executor.evaluate`.
-        done: the units whose records were given.
+        done: units whose records were yielded.
     """
 
     folder: Path
-    journal: Journal
+    journal: Journal[P]
     should_stop: Callable[[], bool]
     done: set[UnitKey] = field(default_factory=set)
 
 
-def _plain(unit: Unit[Any]) -> Unit[Any]:
+def _without_inputs(unit: Unit[P]) -> Unit[P]:
     return Unit(unit.key, unit.cluster, unit.payload)
 
 
-class WorkerPoolExecutor:
-    """Several workers; see `infthor_eval.runs.executor.Executor`."""
+class WorkerPoolExecutor(Generic[U, P]):
+    """The executor of several workers; see `infthor_eval.runs.executor.Executor`."""
 
-    def __init__(self, run: PreparedRun, say: Callable[[str], None]) -> None:
-        """Find where the workers are to be; none is started yet.
+    def __init__(self, run: PreparedRun[U, P], report: Callable[[str], None]) -> None:
+        """Start the workers and wait for the first of them.
 
         Args:
-            run: what they evaluate; it is sent to each of them.
-            say: is told what becomes of workers, a line each.
+            run: the run; pickled and sent to each worker.
+            report: called with a line when a worker is lost or cannot be started.
 
         Raises:
             UsageError: there is no such cluster.
+            InfthorError: no worker can be started; the reason of the last one.
         """
-        worker_settings = run.request.worker_settings
-        self._first: _Greeting | None = None
-        self._say = say
-        self._n_workers = worker_settings.workers
-        self._pool = Pool(worker_settings.connect(_OpenEvaluator(run)), worker_settings.workers, self._accept)
+        self._report = report
+        self._expected: dict[str, Any] | None = None
+        settings = run.request.worker_settings
+        self._n_workers = settings.workers
+        self._pool = Pool(settings.connect(_OpenEvaluator(run)), settings.workers, self._check_config)
+        try:
+            greeting: _Greeting = self._pool.open()
+        except BaseException:
+            self._pool.close()
+            raise
+        self.header = greeting.header
+        self.workload = greeting.workload
 
-    def begin(self) -> tuple[RunHeader, Workload]:
+    def evaluate(
+        self, folder: Path, journal: Journal[P], should_stop: Callable[[], bool]
+    ) -> Iterator[tuple[UnitRecord[P], bool]]:
         """See `Executor`."""
-        self._first = self._pool.open()
-        return self._first.header, self._first.workload
-
-    def evaluate(self, folder: Path, journal: Journal, should_stop: Callable[[], bool]) -> Iterator[Recorded]:
-        """See `Executor`."""
-        assert self._first is not None  # begun
-        work = self._first.workload
-        sharing = _Sharing(folder, journal, should_stop)
-        given_up = yield from self._shared([_Portion(n) for n in range(len(work.groups))], sharing, _PATIENCE)
-        # Some unit in them is to blame; the others are not to fail with it.
+        groups = self.workload.groups
+        progress = _Progress(folder, journal, should_stop)
+        given_up = yield from self._do_portions([_Portion(n) for n in range(len(groups))], progress, _GROUP_TRIES)
+        # Some unit in them is to blame; the others must not fail with it.
         alone = [
             _Portion(portion.group, number)
             for portion in given_up
-            for number, unit in enumerate(portion.of(work).units)
-            if unit.key not in sharing.done
+            for number, unit in enumerate(portion.select(groups).units)
+            if unit.key not in progress.done
         ]
-        for portion, reason in (yield from self._shared(alone, sharing, _PATIENCE_ALONE)).items():
-            (unit,) = portion.of(work).units
-            told = f"worker after worker was lost at it ({reason}); give it more memory, or leave it out"
-            yield journal.append(unit.failed(told)), False
+        for portion, reason in (yield from self._do_portions(alone, progress, _UNIT_TRIES)).items():
+            (unit,) = portion.select(groups).units
+            failure = f"worker after worker was lost at it ({reason}); give it more memory, or leave it out"
+            yield journal.append(unit.failed(failure)), False
         for worker in range(1, self._n_workers + 1):
-            journal.reread(worker)  # memos, which are not told
+            journal.reread(worker)  # for cached artifacts, which workers do not send
 
-    def _shared(
-        self, portions: Sequence[_Portion], sharing: "_Sharing", patience: int
-    ) -> Generator[Recorded, None, dict[_Portion, str]]:
-        """Have portions done; gives the records, and in the end the portions that were given up, with the reason."""
-        assert self._first is not None
-        work, journal = self._first.workload, sharing.journal
+    def _do_portions(
+        self, portions: Sequence[_Portion], progress: _Progress[P], max_losses: int
+    ) -> Generator[tuple[UnitRecord[P], bool], None, dict[_Portion, str]]:
+        """Have portions done; yield the records, and return the portions that were given up, with the reason."""
+        journal = progress.journal
         given_up: dict[_Portion, str] = {}
 
-        def order(number: int) -> _GroupOrder:
-            keys = [unit.key for unit in portions[number].of(work).units]
-            return _GroupOrder(portions[number], sharing.folder, journal.known_of(keys))
+        def job(number: int) -> _GroupJob[P]:
+            keys = [unit.key for unit in portions[number].select(self.workload.groups).units]
+            return _GroupJob(portions[number], progress.folder, journal.latest_records(keys))
 
-        for event in self._pool.run(len(portions), order, sharing.should_stop, patience):
-            self._tell(event)
+        for event in self._pool.run(len(portions), job, progress.should_stop, max_losses):
+            self._report_loss(event)
             if isinstance(event, Made):
                 record, resumed = event.result
                 if not resumed:
-                    journal.take_from(event.worker, record)
-                if record.key not in sharing.done:
-                    sharing.done.add(record.key)
+                    journal.add_from(event.worker, record)
+                if record.key not in progress.done:
+                    progress.done.add(record.key)
                     yield record, resumed
             elif isinstance(event, Lost | GivenUp):
-                journal.reread(event.worker)  # it may have written what it could not send any more
+                journal.reread(event.worker)  # it may have written records that it could no longer send
             if isinstance(event, GivenUp):
                 given_up[portions[event.job]] = event.reason
         return given_up
 
-    def view(self, records: Sequence[UnitRecord[Any]]) -> View:
-        """See `Executor`."""
-        order = _ViewOrder(tuple(records))
-        views = [event.result for event in self._pool.run(1, lambda _: order) if isinstance(event, Made)]
-        found = dict(zip((record.key for record in records), views, strict=True))
-        return lambda record: found[record.key]
+    def samples(self, records: Sequence[UnitRecord[P]]) -> Iterator[UnitSample]:
+        """See `Executor`.
+
+        Raises:
+            WorkerLostError: worker after worker was lost.
+        """
+        # In batches, as a worker is sent all records of a job at once.
+        jobs = [_SampleJob(tuple(records[at : at + _BATCH])) for at in range(0, len(records), _BATCH)]
+        for job in jobs:
+            converted: list[UnitSample] = []
+            for event in self._pool.run(1, lambda _, job=job: job):  # type: ignore[misc]
+                if isinstance(event, Made):
+                    converted.append(event.result)
+                elif isinstance(event, Lost):
+                    converted.clear()  # another worker begins the job again
+                elif isinstance(event, GivenUp):
+                    raise WorkerLostError(f"worker after worker was lost at it ({event.reason}); run it again")
+            yield from converted
 
     def close(self) -> None:
         """See `Executor`."""
         self._pool.close()
 
-    def _accept(self, greeting: _Greeting) -> None:
-        """Refuse a worker that would evaluate something else: another version, a model that has moved on."""
-        if self._first is None:
-            self._first = greeting
-            return
-        ours, theirs = self._first.header.identity, greeting.header.identity
-        if canonical_json(ours) != canonical_json(theirs):
-            differing = sorted(name for name in {*ours, *theirs} if ours.get(name) != theirs.get(name))
+    def _check_config(self, greeting: _Greeting) -> None:
+        """Refuse a worker that would evaluate something else: another version, a model that has changed."""
+        theirs = greeting.header.config
+        if self._expected is None:
+            self._expected = theirs
+        elif canonical_json(self._expected) != canonical_json(theirs):
+            names = {*self._expected, *theirs}
+            differing = sorted(name for name in names if self._expected.get(name) != theirs.get(name))
             raise UsageError(f"the workers differ in {', '.join(differing)}; give all nodes the same versions and data")
 
-    def _tell(self, event: Event) -> None:
+    def _report_loss(self, event: Event) -> None:
         if isinstance(event, Lost):
-            self._say(f"{event.reason}; what it had not finished goes to another")
+            self._report(f"{event.reason}; what it had not finished goes to another")
         elif isinstance(event, Withdrawn):
-            self._say(f"worker {event.worker} cannot be started, the others go on: {event.reason}")
+            self._report(f"worker {event.worker} cannot be started, the others go on: {event.reason}")

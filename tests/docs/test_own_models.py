@@ -45,7 +45,7 @@ def test_it_is_evaluated_and_a_run_of_its_own_when_it_is_edited(folder, run):
     source.write_text(source.read_text().replace('"yes" if', '"maybe" if'))
     assert run(*asked)[0] == 0
     assert len(list((folder / "results" / "Brightness").iterdir())) == 2
-    identities = [json.loads(path.read_text())["identity"] for path in folder.rglob("results.json")]
+    identities = [json.loads(path.read_text())["config"] for path in folder.rglob("results.json")]
     assert {identity["adapter"]["file"] for identity in identities} == {"my_adapter.py"}
     assert {identity["model"]["name"] for identity in identities} == {"Brightness"}
 

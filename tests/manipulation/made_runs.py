@@ -77,7 +77,7 @@ def made_run(
         "frames": "shown",
         "tasks": tasks,
     }
-    return ArmRun(label, RunHeader(suite="manipulation", name=label, identity=identity), records)
+    return ArmRun(label, RunHeader(suite="manipulation", name=label, config=identity), records)
 
 
 def planner_run(records: Sequence[UnitRecord[ArmRecord]], label: str = "planner-arm", **about: Any) -> ArmRun:

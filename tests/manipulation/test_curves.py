@@ -118,7 +118,7 @@ def test_runs_differ_in_simulator_and_settings_in_a_note():
 
 def other_digest():
     run = made_run("n", EPISODES)
-    for about in run.header.identity["tasks"].values():
+    for about in run.header.config["tasks"].values():
         about["trajectories"] = dict.fromkeys(about["trajectories"], "other")
     return run
 
@@ -140,6 +140,6 @@ def test_what_cannot_be_drawn_together_is_refused(case):
 
 def test_an_identity_of_another_form_is_refused():
     run = made_run("m", EPISODES)
-    run.header.identity["tasks"] = []
+    run.header.config["tasks"] = []
     with pytest.raises(DataError, match="m: not the config of a run of manipulation"):
         arm_curves([run])

@@ -58,7 +58,8 @@ def test_the_planner_does_what_the_expert_did(prepared, data):
     }
     assert all(record.payload.done and record.payload.reward == 2 for record in outcome.records)
     assert not any(record.failure or record.excluded or record.faults for record in outcome.records)
-    assert outcome.run.evaluation.view(found[PUT, MUG, 21]).number == 0
+    numbers = {record.key: sample.number for record, sample in zip(outcome.records, outcome.samples, strict=True)}
+    assert numbers[found[PUT, MUG, 21].key] == 0
     (table, *_) = outcome.run.suite.tables([outcome.summary])
     (row,) = [row for row in table.rows if not row.is_published]
     assert [cell.partition(" ")[0] for cell in row.cells] == [
@@ -79,7 +80,7 @@ def test_the_journal_reads_back(prepared):
 def test_the_limit_is_of_episodes(prepared):
     outcome = execute(prepared("still", limit=1))
     assert sorted(by_key(outcome)) == [(PICK, MUG, 9), (PUT, MUG, 21)]
-    assert outcome.summary.header.identity["limit"] == 1
+    assert outcome.summary.header.config["limit"] == 1
 
 
 def test_equal_seeds_act_alike_and_other_seeds_do_not(prepared, task_file, tmp_path):
@@ -106,9 +107,9 @@ def test_several_radii_are_runs_of_their_own(data, tmp_path):
 def test_all_that_changes_a_number_is_part_of_a_runs_identity(prepared, task_file, data):
     def prints(**changes):
         run = prepared("still", **changes)
-        units = run.evaluation.workload(run.suite.baselines["still"](0)).groups[0].units
-        run.evaluation.close()
-        return [run.evaluation._fingerprint(unit) for unit in units]
+        bound = run.evaluation.bind(run.suite.baselines["still"](0))
+        bound.close()
+        return [bound._fingerprint(unit) for unit in bound.workload.groups[0].units]
 
     task_file("radius: 0.5")
     plain = prints()

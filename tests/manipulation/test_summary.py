@@ -50,7 +50,7 @@ def summed(records=RECORDS, **changes):
 
 
 def run(name="a policy", records=RECORDS, **changes):
-    header = RunHeader(suite="manipulation", name=name, identity=identity(**changes))
+    header = RunHeader(suite="manipulation", name=name, config=identity(**changes))
     return RunSummary(header, ManipulationSuite().summarise(header, records))
 
 

@@ -61,4 +61,4 @@ def identity(
 def run_of(about: dict[str, Any], records: list[UnitRecord[NiehAnswer]], name: str = "a run") -> RunSummary:
     """The run with these records, summed up."""
     found: NiehSummary = summarise(about, records)
-    return RunSummary(RunHeader(suite="nieh", name=name, identity=about), found)
+    return RunSummary(RunHeader(suite="nieh", name=name, config=about), found)

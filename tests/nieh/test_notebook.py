@@ -48,7 +48,7 @@ def taking_notes(prepared):
 
 def notes_of(outcome):
     lines = (outcome.folder / "journal" / "worker-0.jsonl").read_bytes().splitlines()[1:]
-    return [line["payload"] for line in map(msgspec.json.decode, lines) if line["type"] == "memo"]
+    return [line["payload"] for line in map(msgspec.json.decode, lines) if line["type"] == "artifact"]
 
 
 def told(outcome):

@@ -50,9 +50,9 @@ def test_the_results_file_says_what_the_summary_says(prepared):
     outcome = execute(prepared(name="mine"))
     document = json.loads((outcome.folder / "results.json").read_text())
     assert outcome.folder.parent.name == "mine"
-    assert document.keys() == {"suite", "name", "identity", "n_missing", "primary_metrics", "summary", "usage"}
+    assert document.keys() == {"suite", "name", "config", "n_missing", "primary_metrics", "summary", "usage"}
     assert (document["suite"], document["name"]) == ("nieh", "mine")
-    assert document["identity"] == outcome.summary.header.identity
+    assert document["config"] == outcome.summary.header.config
     strict = document["summary"]["tasks"]["nieh_gt"]["by_clues"]["total"]["scores"]["strict"]
     assert strict.keys() == {"mean", "stderr", "low", "high", "bootstrap", "n_trajectories"}
     assert strict["mean"] == outcome.summary.summary.tasks["nieh_gt"].by_clues["total"].scores["strict"].mean == 1.0

@@ -74,7 +74,7 @@ def plan(
 
 def made_run(label: str, records: Sequence[UnitRecord[PlanRecord]], **about: Any) -> PlansRun:
     names = list(dict.fromkeys(record.cluster for record in records))
-    header = RunHeader(suite="plans", name=label, identity=identity(names, **about))
+    header = RunHeader(suite="plans", name=label, config=identity(names, **about))
     return PlansRun(label, header, records)
 
 

@@ -159,7 +159,7 @@ def test_what_cannot_be_drawn_together_is_refused(case):
 
 def test_of_several_shared_tasks_one_is_to_be_named():
     run = made_run("m", PLANS)
-    run.header.identity["tasks"]["other"] = run.header.identity["tasks"][TASK]
+    run.header.config["tasks"]["other"] = run.header.config["tasks"][TASK]
     with pytest.raises(UsageError, match=f"--task: {TASK}, other"):
         plan_curves([run])
     assert plan_curves([run], TASK).task == TASK
@@ -169,6 +169,6 @@ def test_of_several_shared_tasks_one_is_to_be_named():
 
 def test_an_identity_of_another_form_is_refused():
     run = made_run("m", PLANS)
-    run.header.identity["tasks"] = []
+    run.header.config["tasks"] = []
     with pytest.raises(DataError, match="m: not the config of a run of plans"):
         plan_curves([run])

@@ -35,9 +35,9 @@ def changed(record, **fields):
 
 def with_identity(recorded, change):
     """The same recording of a run with another identity."""
-    identity = msgspec.json.decode(msgspec.json.encode(recorded.run.header.identity))
+    identity = msgspec.json.decode(msgspec.json.encode(recorded.run.header.config))
     change(identity)
-    header = msgspec.structs.replace(recorded.run.header, identity=identity)
+    header = msgspec.structs.replace(recorded.run.header, config=identity)
     return replace(recorded, run=PlansRun("scripted", header, recorded.run.records))
 
 

@@ -91,7 +91,7 @@ def test_what_is_exported_has_a_sample_for_each_plan(prepared):
         (2, "go to the drawer", 1.0),
         (3, "put the fork in the drawer", 1.0),
     ]
-    assert outcome.run.evaluation.view(outcome.records[1]).prompt == "put a fork in the drawer\npick up the fork"
+    assert list(outcome.samples)[1].prompt == "put a fork in the drawer\npick up the fork"
 
 
 def test_the_published_rules_have_the_published_faults(prepared):
@@ -109,7 +109,7 @@ def test_the_limit_is_of_trajectories(prepared, tmp_path):
     data = write(tmp_path / "two", cut(FORK, 1), cut(MUG, 1))
     outcome = execute(prepared("scripted", data=data, limit=1))
     assert [record.cluster for record in outcome.records] == [MUG]  # the first by name
-    assert outcome.summary.header.identity["limit"] == 1
+    assert outcome.summary.header.config["limit"] == 1
 
 
 def test_equal_seeds_act_alike_and_other_seeds_do_not(prepared, tmp_path):
@@ -230,7 +230,7 @@ def test_a_broken_trajectory_is_skipped_named_and_counted(prepared, data, name):
         damage(document)
         (data / "broken.json").write_text(json.dumps(document))
     run = prepared("scripted")
-    (skipped,) = run.evaluation.workload(run.suite.baselines["scripted"](0)).skipped
+    (skipped,) = run.evaluation.bind(run.suite.baselines["scripted"](0)).workload.skipped
     assert skipped.key.id == "broken.json"
     assert said in skipped.reason
     assert "\n" not in skipped.reason
@@ -421,7 +421,7 @@ def test_what_is_wrong_beside_the_settings_is_refused_too(prepared, task_files, 
 def test_another_setting_is_another_run(prepared, data):
     def identity(**changes):
         run = prepared(**changes)
-        return run.evaluation.workload(run.suite.baselines["planner"](0)).identity
+        return run.evaluation.bind(run.suite.baselines["planner"](0)).workload.config
 
     plain = identity()
     for changes in (

@@ -17,7 +17,7 @@ from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.runs import Group, RunRequest, Unit, UnitKey, execute, prepare, read_header, read_run
 from infthor_eval.runs.scheduling import run_groups
 from model_adapters import Capabilities
-from tests.runs.toy import Adder, Sum, Sums, ToySuite
+from tests.runs.toy import Adder, Sum, Sums, ToySuite, is_broken, suite_of
 from tests.runs.toy_command import request
 
 from ..waiting import PATIENCE_S, wait_until
@@ -55,7 +55,13 @@ def start(output, *arguments):
 
 
 def test_a_group_that_fails_takes_no_other_with_it_and_its_units_are_named(tmp_path):
-    outcome, watching = run(request(tmp_path))
+    closed = []
+
+    class Closing(Sums):
+        def close(self):
+            closed.append(self)
+
+    outcome, watching = run(request(tmp_path), suite_of(Closing))
     assert watching.begun == (4, 1, 0)
     broken = "the abacus is broken"
     assert watching.seen == [
@@ -67,7 +73,9 @@ def test_a_group_that_fails_takes_no_other_with_it_and_its_units_are_named(tmp_p
     assert outcome.summary.summary.numbers == (2, 2)
     assert [record.payload.answer for record in outcome.records] == [4, 5, None, None]
     assert read_run(outcome.folder, ToySuite.records) == (outcome.summary.header, outcome.records)
-    assert outcome.run.evaluation.closed
+    assert len(closed) == 1
+    assert [sample.reply for sample in outcome.samples] == ["4", "5", "None", "None"]
+    assert [sample.number for sample in outcome.samples] == [13, 14, 23, 24]  # they can be read again
 
 
 def broken_by(error, answered=0):
@@ -75,7 +83,7 @@ def broken_by(error, answered=0):
 
     class Broken(Sums):
         def run(self, group, session):
-            if group.context != "broken":
+            if not is_broken(group):
                 yield from super().run(group, session)
                 return
             for unit in group.units[:answered]:
@@ -83,7 +91,7 @@ def broken_by(error, answered=0):
             if error is not None:
                 raise error
 
-    return type("BrokenSuite", (ToySuite,), {"prepare": lambda self, request: Broken()})()
+    return suite_of(Broken)
 
 
 FAULTS = {
@@ -114,9 +122,9 @@ def test_a_record_that_cannot_be_written_fails_alone(tmp_path):
     class Odd(Sums):
         def run(self, group, session):
             for unit in group.units:
-                yield unit.record("f", Sum((object(), 0)) if group.context else unit.payload)
+                yield unit.record("f", Sum((object(), 0)) if is_broken(group) else unit.payload)
 
-    outcome, _ = run(request(tmp_path), type("OddSuite", (ToySuite,), {"prepare": lambda self, asked: Odd()})())
+    outcome, _ = run(request(tmp_path), suite_of(Odd))
     assert outcome.summary.summary.numbers == (2, 2)
     assert outcome.records[3].failure.startswith("TypeError in ")
     assert "Encoding objects of type object is unsupported" in outcome.records[3].failure
@@ -232,7 +240,7 @@ def test_a_subject_that_cannot_do_what_the_suite_needs_is_refused(tmp_path, monk
 
     monkeypatch.setattr("infthor_eval.runs.request.is_known", lambda name: name == "arm")
     monkeypatch.setattr("infthor_eval.runs.request.check_options", lambda *_: None)
-    monkeypatch.setattr("infthor_eval.runs.subjects.load", lambda *_: Policy())
+    monkeypatch.setattr("infthor_eval.runs.binding.load", lambda *_: Policy())
     with pytest.raises(UsageError, match="arm cannot be evaluated on toy, which needs a conversation"):
         run(request(tmp_path, model="arm"))
 
@@ -302,11 +310,19 @@ def test_a_subject_with_several_in_flight_gives_the_same_records(tmp_path):
 
 
 def test_a_suite_that_refuses_its_work_ends_before_a_journal_is_begun(tmp_path):
-    class Refusing(Sums):
-        def workload(self, subject):
-            raise ModelError("no")
+    def refuse():
+        raise ModelError("no")
 
-    suite = type("RefusingSuite", (ToySuite,), {"prepare": lambda self, request: Refusing()})()
+    closed = []
+
+    class Held(Adder):
+        def __init__(self, seed):
+            super().__init__(seed)
+            self.close = lambda: closed.append(self)
+
+    suite = suite_of(refuse)
+    suite.baselines = {"adder": Held}
     with pytest.raises(ModelError, match="no"):
         run(request(tmp_path), suite)
+    assert len(closed) == 1
     assert not list(tmp_path.iterdir())

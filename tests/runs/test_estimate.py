@@ -9,7 +9,7 @@ from infthor_eval.errors import ModelError
 from infthor_eval.runs import Group, Unit, UnitKey, Usage, Workload, estimate_run
 from infthor_eval.runs.estimate import Quantities, _Measured, estimated
 
-from .toy import Sum, Sums, ToySuite
+from .toy import Sum, Sums, ToySuite, suite_of
 from .toy_command import request
 
 
@@ -46,18 +46,14 @@ def test_groups_of_several_tasks_share_their_frames_by_units():
 class Costly(Sums):
     """Six groups; the first unit of each takes longer, the others as long as they say."""
 
-    def workload(self, subject):
-        return Workload([group("sums", f"{a}.", 5, 10 * a) for a in range(1, 7)], (), {"tasks": {}})
+    def __init__(self):
+        self.workload = Workload([group("sums", f"{a}.", 5, 10 * a) for a in range(1, 7)], (), {"tasks": {}})
 
     def run(self, asked, session):
         time.sleep(0.002 * asked.frames)
         for unit in asked.units:
             time.sleep(0.01)
             yield unit.record("f", unit.payload, usage=Usage(requests=2, context=100, cached=40, reply=3))
-
-
-def suite_of(evaluation):
-    return type("CostlySuite", (ToySuite,), {"prepare": lambda self, asked: evaluation()})()
 
 
 def test_a_few_units_tell_what_all_take_and_nothing_is_written(tmp_path):

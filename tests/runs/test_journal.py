@@ -17,7 +17,7 @@ class Note(msgspec.Struct, frozen=True, tag_field="type", tag="note"):
 
 
 TYPES = RecordTypes(Answer, Note)
-HEADER = RunHeader(suite="toy", name="m", identity={"model": {"name": "m"}, "seed": 0})
+HEADER = RunHeader(suite="toy", name="m", config={"model": {"name": "m"}, "seed": 0})
 KEY = UnitKey("t", "q1")
 
 
@@ -38,13 +38,13 @@ def shard(run, worker=0):
 def test_what_was_recorded_is_there_when_the_run_goes_on(tmp_path):
     with opened(tmp_path) as journal:
         journal.append(record())
-        journal.keep("inputs", Note("a mug"))
+        journal.cache_artifact("inputs", Note("a mug"))
     with opened(tmp_path) as journal:
-        assert journal.known(KEY, "f") == record()
-        assert journal.known(KEY, "other inputs") is None
-        assert journal.known(UnitKey("other task", "q1"), "f") is None
-        assert journal.memo("inputs") == Note("a mug")
-        assert journal.memo("others") is None
+        assert journal.find_record(KEY, "f") == record()
+        assert journal.find_record(KEY, "other inputs") is None
+        assert journal.find_record(UnitKey("other task", "q1"), "f") is None
+        assert journal.find_artifact("inputs") == Note("a mug")
+        assert journal.find_artifact("others") is None
     assert read_run(tmp_path, TYPES) == (HEADER, [record()])
     assert read_header(tmp_path) == HEADER
 
@@ -68,7 +68,7 @@ def test_wherever_a_kill_cuts_the_file_whole_records_survive(tmp_path_factory, c
 def test_a_failed_unit_is_tried_again_and_its_later_result_counts(tmp_path):
     with opened(tmp_path) as journal:
         journal.append(record(reply=None, failure="too long", fingerprint=""))
-        assert journal.known(KEY, "") is None
+        assert journal.find_record(KEY, "") is None
         journal.append(record())
         assert journal.records == [record(attempt=2)]
     assert read_run(tmp_path, TYPES)[1] == [record(attempt=2)]
@@ -79,7 +79,7 @@ def test_shards_of_several_workers_are_read_together_and_the_last_attempt_counts
         journal.append(record("q1", reply=None, failure="lost"))
         journal.append(record("q2"))
     with opened(tmp_path, worker=1) as other:
-        assert other.known(UnitKey("t", "q2"), "f") == record("q2")
+        assert other.find_record(UnitKey("t", "q2"), "f") == record("q2")
         other.append(record("q1"))
         other.append(record("q3"))
     with opened(tmp_path, worker=0) as journal:  # read again in the other order
@@ -101,7 +101,7 @@ def test_two_processes_cannot_write_one_shard(tmp_path):
 
 def test_the_journal_of_another_run_is_refused(tmp_path):
     opened(tmp_path).__exit__(None, None, None)
-    other = RunHeader(suite="toy", name="m", identity={"seed": 1})
+    other = RunHeader(suite="toy", name="m", config={"seed": 1})
     for worker in (0, 1):
         with pytest.raises(DataError, match="journal of another run"):
             opened(tmp_path, other, worker)
@@ -115,7 +115,7 @@ def test_a_bad_line_is_named_with_its_number_and_a_way_on_and_costs_its_own_unit
     with opened(tmp_path) as journal:
         journal.append(record("q1"))
         journal.append(record("q2"))
-        journal.keep("inputs", Note("a mug"))
+        journal.cache_artifact("inputs", Note("a mug"))
     lines = shard(tmp_path).read_bytes().splitlines()
     lines[1] = line
     shard(tmp_path).write_bytes(b"\n".join(lines) + b"\n")
@@ -125,7 +125,7 @@ def test_a_bad_line_is_named_with_its_number_and_a_way_on_and_costs_its_own_unit
     assert recover(tmp_path, HEADER, TYPES) == 1
     with opened(tmp_path) as journal:
         assert journal.records == [record("q2")]
-        assert journal.memo("inputs") == Note("a mug")
+        assert journal.find_artifact("inputs") == Note("a mug")
     assert (tmp_path / "journal" / "bad_lines.txt").read_bytes() == line + b"\n"
     assert recover(tmp_path, HEADER, TYPES) == 0
 
@@ -151,15 +151,18 @@ def test_a_file_that_is_no_journal_is_left_as_it_is(tmp_path):
 
 def test_journals_of_other_formats_are_refused_in_one_line(tmp_path):
     (tmp_path / "journal.jsonl").write_text('{"format":1,"identity":{}}\n')
-    with pytest.raises(DataError, match="journal is of format 1, this version reads 2") as caught:
+    with pytest.raises(DataError, match="journal is of format 1, this version reads 3") as caught:
         read_header(tmp_path)
     assert "\n" not in str(caught.value)
     with pytest.raises(DataError, match="no journal in it"):
         read_header(tmp_path / "nowhere")
     shard(tmp_path).parent.mkdir()
-    shard(tmp_path).write_text('{"type":"run","format":99}\n')
-    with pytest.raises(DataError, match="format 99, this version reads 2"):
-        opened(tmp_path)
+    for version in (2, 99):
+        shard(tmp_path).write_text(f'{{"type":"run","format":{version}}}\n')
+        with pytest.raises(
+            DataError, match=f"format {version}, this version reads 3; run the command again with --fresh"
+        ):
+            opened(tmp_path)
 
 
 def test_an_earlier_journal_is_kept_under_another_name(tmp_path):

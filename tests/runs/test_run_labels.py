@@ -15,7 +15,7 @@ def stored(tmp_path):
         place = tmp_path / folder
         place.mkdir()
         (place / "run.yaml").write_text(yaml.safe_dump({"model": "m", "output": folder, "workers": 1, **options}))
-        return place, RunHeader(suite=suite, name=name, identity={"tasks": {task: {} for task in tasks}})
+        return place, RunHeader(suite=suite, name=name, config={"tasks": {task: {} for task in tasks}})
 
     return stored
 

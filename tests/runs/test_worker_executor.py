@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import msgspec
@@ -20,7 +21,7 @@ from infthor_eval.workers import WorkerSettings
 
 from ..clusters import two_nodes
 from ..waiting import wait_until
-from .toy import Adder, Sum, Sums, ToySuite
+from .toy import Adder, Prepared, Sum, Sums, ToySuite, suite_of
 from .toy_command import request
 
 TWO = WorkerSettings(2)
@@ -55,7 +56,8 @@ class Deadly(Sums):
     folder: Path
     kills: dict
 
-    def workload(self, subject):
+    @property
+    def workload(self):
         groups = [
             runs.Group([runs.Unit(runs.UnitKey("sums", f"{a}+{b}"), f"from {a}", Sum((a, b))) for b in range(4)])
             for a in range(6)
@@ -64,7 +66,7 @@ class Deadly(Sums):
 
     def run(self, group, session):
         for unit in group.units:
-            known = session.known(unit, "f")
+            known = session.find_record(unit, "f")
             if known is None and self.kills.get(unit.key.id, 0):
                 counted = self.folder / f"{unit.key.id}-{os.getpid()}"
                 if len(list(self.folder.glob(f"{unit.key.id}-*"))) < self.kills[unit.key.id]:
@@ -82,7 +84,7 @@ class DeadlySuite(ToySuite):
     kills: dict
 
     def prepare(self, asked):
-        return Deadly(self.folder, self.kills)
+        return Prepared(partial(Deadly, self.folder, self.kills))
 
 
 def run(asked, suite, should_stop=lambda: False):
@@ -104,7 +106,8 @@ def test_several_workers_find_what_one_process_finds_and_each_writes_a_shard(tmp
     assert (len(watching.seen), watching.n_units, watching.notes) == (24, 24, [])
     shards = [path.read_bytes().count(b"\n") for path in sorted((shared.folder / "journal").glob("*.jsonl"))]
     assert (len(shards), shards[0], sum(shards)) == (3, 1, 3 + 24)
-    assert [shared.view(record) for record in shared.records] == [alone.view(record) for record in alone.records]
+    assert list(shared.samples) == list(alone.samples)
+    assert len(list(shared.samples)) == 24
     assert all(resumed for _, resumed in run(request(tmp_path / "2"), suite)[1].seen)
     assert all(resumed for _, resumed in run(request(tmp_path / "1", worker_settings=TWO), suite)[1].seen)
 
@@ -211,7 +214,7 @@ def test_records_whose_shard_is_on_another_disk_are_put_into_the_drivers(tmp_pat
     outcome, _ = run(request(tmp_path), ToySuite())
     (tmp_path / "other").mkdir()
     with Journal(tmp_path / "other", outcome.summary.header, ToySuite.records) as journal:
-        journal.take_from(7, outcome.records[0])
+        journal.add_from(7, outcome.records[0])
     assert read_run(tmp_path / "other", ToySuite.records)[1] == outcome.records[:1]
 
 
@@ -219,11 +222,10 @@ def test_a_result_from_other_inputs_is_named_in_the_record_that_takes_its_place(
     class Changed(Sums):
         def run(self, group, session):
             for unit in group.units:
-                yield session.known(unit, "g") or unit.record("g", unit.payload)
+                yield session.find_record(unit, "g") or unit.record("g", unit.payload)
 
     run(request(tmp_path), ToySuite())
-    suite = type("ChangedSuite", (ToySuite,), {"prepare": lambda self, asked: Changed()})()
-    records = run(request(tmp_path), suite)[0].records
+    records = run(request(tmp_path), suite_of(Changed))[0].records
     changed = "its inputs changed since attempt 1: a frame, a text or a trajectory is another now"
     assert [record.faults for record in records] == [(changed,), (changed,), (), ()]  # the others had failed
 

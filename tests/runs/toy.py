@@ -1,5 +1,8 @@
 """The smallest suite: sums, in two groups, one of which cannot be done."""
 
+from collections.abc import Callable
+from dataclasses import dataclass
+
 import msgspec
 
 from infthor_eval import runs
@@ -22,23 +25,47 @@ class Adder:
 
 
 class Sums:
-    def workload(self, subject):
+    """The bound evaluation."""
+
+    def __init__(self):
         units = [runs.Unit(runs.UnitKey("sums", f"{a}+{b}"), f"from {a}", Sum((a, b))) for a in (1, 2) for b in (3, 4)]
         skipped = [runs.Skipped(runs.UnitKey("sums", "0+0"), "nothing to add")]
-        return runs.Workload([runs.Group(units[:2]), runs.Group(units[2:], "broken")], skipped, {"tasks": {"sums": {}}})
+        groups = [runs.Group(units[:2]), runs.Group(units[2:])]
+        self.workload = runs.Workload(groups, skipped, {"tasks": {"sums": {}}})
 
     def run(self, group, session):
         for unit in group.units:
-            if group.context == "broken":
+            if is_broken(group):
                 raise DataError("the abacus is broken")
-            yield session.known(unit, "f") or unit.record("f", Sum(unit.payload.numbers, sum(unit.payload.numbers)))
+            yield session.find_record(unit, "f") or unit.record(
+                "f", Sum(unit.payload.numbers, sum(unit.payload.numbers))
+            )
 
-    def view(self, record):
+    def to_sample(self, record):
         a, b = record.payload.numbers
         return runs.UnitSample(a * 10 + b, {"numbers": [a, b]}, str(a + b), f"{a}+{b}", {}, str(record.payload.answer))
 
     def close(self):
-        self.closed = True
+        pass
+
+
+def is_broken(group):
+    return group.units[0].cluster == "from 2"
+
+
+@dataclass
+class Prepared:
+    """The evaluation: creates a bound one for every subject."""
+
+    create: Callable
+
+    def bind(self, subject):
+        return self.create()
+
+
+def suite_of(create):
+    """A toy suite with another bound evaluation."""
+    return type("OtherToySuite", (ToySuite,), {"prepare": lambda self, request: Prepared(create)})()
 
 
 class ToySuite:
@@ -46,7 +73,7 @@ class ToySuite:
     baselines = {"adder": Adder}  # noqa: RUF012
 
     def prepare(self, request):
-        return Sums()
+        return Prepared(Sums)
 
     def summarise(self, header, records):
         return Sum((sum(r.failure is None for r in records), sum(r.failure is not None for r in records)))

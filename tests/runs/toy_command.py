@@ -6,18 +6,13 @@ import time
 from pathlib import Path
 
 from infthor_eval.runs import RunRequest, TaskFile, TaskRequest
-from tests.runs.toy import Sums, ToySuite
+from tests.runs.toy import Sums, ToySuite, suite_of
 
 
 def request(output, **changes):
     task = TaskFile("sums", "toy", Path("sums.yaml"), {"task": "sums", "metadata": {"version": 1}})
     fields = {"model": "adder", "tasks": TaskRequest([task], None), "asked": ("sums",), "output": output}
     return RunRequest(**{**fields, **changes})
-
-
-class GatedSuite(ToySuite):
-    def prepare(self, request):
-        return Gated()
 
 
 class Gated(Sums):
@@ -37,4 +32,4 @@ if __name__ == "__main__":
     from infthor_eval.cli.commands.run import evaluate
     from infthor_eval.cli.showing import Showing
 
-    sys.exit(evaluate([(request(Path(sys.argv[1])), GatedSuite() if len(sys.argv) > 2 else ToySuite())], Showing()))
+    sys.exit(evaluate([(request(Path(sys.argv[1])), suite_of(Gated) if len(sys.argv) > 2 else ToySuite())], Showing()))

@@ -150,7 +150,7 @@ def _cells(run: StoredRun) -> Iterator[str]:
 
 def _numbers(run: StoredRun) -> str:
     """The tasks, each with the number that it is known by, as far as a row has room."""
-    tasks = list(run.header.identity.get("tasks", {}))
+    tasks = list(run.header.config.get("tasks", {}))
     told = [
         f"{task} {100 * run.primary_metrics[task].mean:.1f}" if task in run.primary_metrics else task
         for task in tasks[:_MOST]

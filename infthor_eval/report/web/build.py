@@ -145,7 +145,7 @@ def _metrics(samples: Sequence[Sample]) -> list[str]:
 
 
 def _about(run: ReportRun) -> About:
-    identity = run.header.identity
+    identity = run.header.config
     simulators = {about.get("simulator") for about in run.tasks.values() if isinstance(about, dict)}
     facts = {
         "suite": run.suite.name,

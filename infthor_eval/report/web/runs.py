@@ -54,7 +54,7 @@ class ReportRun:
     @property
     def tasks(self) -> Mapping[str, Any]:
         """What its identity says of its tasks, by name."""
-        found: Mapping[str, Any] = self.header.identity["tasks"]
+        found: Mapping[str, Any] = self.header.config["tasks"]
         return found
 
     def dataset(self, task: str) -> Mapping[str, Any]:

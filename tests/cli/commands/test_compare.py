@@ -41,7 +41,7 @@ def test_a_run_of_an_earlier_version_is_refused_in_one_line(make_nieh_set, tmp_p
     for folders in ((old, ours), (ours, old)):
         code, out, err = run("compare", *folders)
         assert (code, out, len(err.splitlines())) == (2, "", 1)
-        assert f"{old}: its journal is of format 1, this version reads 2; run the evaluation again" in err
+        assert f"{old}: its journal is of format 1, this version reads 3; run the evaluation again" in err
 
 
 def test_runs_of_one_name_are_told_apart_by_their_folders(make_nieh_set, tmp_path, run):

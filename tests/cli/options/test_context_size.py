@@ -60,7 +60,7 @@ def test_the_tokens_of_a_frame_can_be_told(make_nieh_set, tmp_path, run, model):
     assert code == 0, err
     assert [set(n_frames(out, task)) for task in tasks] == [{8000 // 390}, {8192 // 390}]
     (folder,) = (path.parent for path in out.rglob("journal"))
-    assert read_header(folder).identity["tokens_per_frame"] == 390
+    assert read_header(folder).config["tokens_per_frame"] == 390
 
 
 def test_the_kilo_token_and_the_extension_are_part_of_the_runs_identity(make_nieh_set, tmp_path, run):
@@ -68,7 +68,7 @@ def test_the_kilo_token_and_the_extension_are_part_of_the_runs_identity(make_nie
     tasks, out = "nieh_gt,nieh_haystack_8k", tmp_path / "out"
     for options in ((), ("--k-tokens", 1024), ("--rope", "yarn:2")):
         assert run("--model", "qwen2.5-vl-tiny", "--tasks", tasks, "--data", data, "--output", out, *options)[0] == 0
-    identities = [read_header(path.parent).identity for path in sorted(out.rglob("journal"))]
+    identities = [read_header(path.parent).config for path in sorted(out.rglob("journal"))]
     found = {(each["k_tokens"], each["model"]["rope"]["rope_type"], each["model"]["max_tokens"]) for each in identities}
     assert found == {(None, "default", 128_000), (1024, "default", 128_000), (None, "yarn", 256_000)}
 

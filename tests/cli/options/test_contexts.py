@@ -49,7 +49,7 @@ def test_retrieval_runs_through_and_the_retriever_is_part_of_the_run(data, make_
     assert "0 answered now, 12 found" in err
     assert only(out, "results.json").read_bytes() == results
     assert run(*arguments, "--retriever", second)[0] == 0
-    identities = [read_header(path.parent).identity for path in out.rglob("journal")]
+    identities = [read_header(path.parent).config for path in out.rglob("journal")]
     retrievers = {
         each["tasks"][task]["sources"]["retriever"]["fingerprint"] for each in identities for task in each["tasks"]
     }
@@ -135,14 +135,14 @@ def test_a_run_killed_while_it_takes_notes_ends_as_an_undisturbed_one(data, tmp_
     os.kill(killed.pid, signal.SIGKILL)
     killed.communicate()
     journal = only(tmp_path / "killed", "worker-0.jsonl")
-    before = journal.read_bytes().count(b'\n{"type":"memo"')
+    before = journal.read_bytes().count(b'\n{"type":"artifact"')
     assert 0 < before < 6  # three windows of twenty frames in each of two trajectories
 
     for name in ("killed", "whole"):
         process = start(tmp_path / name)
         _, said = process.communicate(timeout=PATIENCE_S)
         assert process.returncode == 0, said
-    assert journal.read_bytes().count(b'\n{"type":"memo"') == 6
+    assert journal.read_bytes().count(b'\n{"type":"artifact"') == 6
     results = [only(tmp_path / name, "results.json").read_bytes() for name in ("killed", "whole")]
     assert results[0] == results[1]
     records = [read_run(only(tmp_path / name, "journal").parent, RECORDS)[1] for name in ("killed", "whole")]

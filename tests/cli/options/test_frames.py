@@ -9,7 +9,7 @@ TINY = "qwen2.5-vl-tiny"
 
 def results(folder):
     documents = [json.loads(path.read_text()) for path in folder.rglob("results.json")]
-    return {document["identity"]["frames"]: document for document in documents}
+    return {document["config"]["frames"]: document for document in documents}
 
 
 def tokens(folder, records_in):

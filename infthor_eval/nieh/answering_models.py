@@ -1,4 +1,4 @@
-"""Who answers the questions of a run: a model through its conversation, or a baseline from the answer key."""
+"""What answers the questions of a run: a model through its conversation, or a baseline from the answer key."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
@@ -6,44 +6,44 @@ from typing import Protocol
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.nieh.answering import Answerer, BaselineAnswerer, ModelAnswerer
-from infthor_eval.nieh.baselines import Baseline, Predict
+from infthor_eval.nieh.baselines import Baseline
 from infthor_eval.nieh.budget import budget_of
 from infthor_eval.nieh.contexts import Sample
+from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.nieh.task import PreparedTask
 from infthor_eval.runs import Session
 from model_adapters import Model, Subject
 
-__all__ = ["Respondent", "respondent"]
+__all__ = ["AnsweringModel", "OpenAnswerer", "answering_model"]
+
+# Opens what answers the questions of one task on one trajectory, given the task's name.
+OpenAnswerer = Callable[[str, Session[NiehAnswer]], Answerer]
 
 # Baselines read no frames; contexts that are measured in tokens are cut for them as for Qwen2.5-VL (published count).
 _BASELINE_TOKENS_PER_FRAME = 121
 
 
-class Respondent(Protocol):
-    """What NIEH wants of a subject."""
+class AnsweringModel(Protocol):
+    """A subject that answers questions: a model or a baseline."""
 
     def tokens_per_frame(self, frame: FrameRef) -> int:
-        """The size of a frame in contexts that are measured in tokens.
+        """Return the size of a frame in contexts that are measured in tokens.
 
         Raises:
             UsageError: the subject counts no tokens.
         """
         ...
 
-    def read_keys(self, keys: Mapping[str, Callable[[], Sequence[Sample]]]) -> None:
-        """How to find all that each task asks, with the answers; once, before the first question."""
-        ...
-
     def cost(self, prepared: PreparedTask) -> str | None:
-        """What a task costs, in words; None where that is not known."""
+        """Return the cost of a task in words, or None where it is not known."""
         ...
 
-    def answerer(self, task: str, session: Session) -> Answerer:
-        """Who answers the questions of one task on one trajectory."""
+    def fit(self, keys: Mapping[str, Callable[[], Sequence[Sample]]]) -> OpenAnswerer:
+        """Fit the subject to the answer key of each task, given a function that finds the key; models need no key."""
         ...
 
 
-class _ModelRespondent:
+class _ConversationModel:
     def __init__(self, model: Model) -> None:
         self._model = model
 
@@ -55,43 +55,37 @@ class _ModelRespondent:
             )
         return tokens
 
-    def read_keys(self, keys: Mapping[str, Callable[[], Sequence[Sample]]]) -> None:
-        """A model learns nothing beforehand."""
-
     def cost(self, prepared: PreparedTask) -> str | None:
         return budget_of(prepared, self._model).description if self._model.capabilities.counts_tokens else None
 
-    def answerer(self, task: str, session: Session) -> Answerer:
-        return ModelAnswerer(self._model, session)
+    def fit(self, keys: Mapping[str, Callable[[], Sequence[Sample]]]) -> OpenAnswerer:
+        return lambda _, session: ModelAnswerer(self._model, session)
 
 
-class _BaselineRespondent:
+class _BaselineModel:
     def __init__(self, baseline: Baseline) -> None:
         self._baseline = baseline
-        self._predictions: dict[str, Predict] = {}
 
     def tokens_per_frame(self, frame: FrameRef) -> int:
         return _BASELINE_TOKENS_PER_FRAME
 
-    def read_keys(self, keys: Mapping[str, Callable[[], Sequence[Sample]]]) -> None:
-        """Fitted to each task apart: what one task asks is no clue to another."""
-        self._predictions = {task: self._baseline.fit(find()) for task, find in keys.items()}
-
     def cost(self, prepared: PreparedTask) -> str | None:
         return None
 
-    def answerer(self, task: str, session: Session) -> Answerer:
-        return BaselineAnswerer(self._predictions[task])
+    def fit(self, keys: Mapping[str, Callable[[], Sequence[Sample]]]) -> OpenAnswerer:
+        # Each task on its own: the questions of one task must be no clue to another.
+        predictions = {task: self._baseline.fit(find_key()) for task, find_key in keys.items()}
+        return lambda task, _: BaselineAnswerer(predictions[task])
 
 
-def respondent(subject: Subject) -> Respondent:
-    """The respondent that a subject makes.
+def answering_model(subject: Subject) -> AnsweringModel:
+    """Return the answering model of a subject.
 
     Raises:
-        TypeError: it is neither a model nor a baseline; the run sees to that before.
+        TypeError: the subject is neither a model nor a baseline; runs refuse it before.
     """
     if isinstance(subject, Baseline):
-        return _BaselineRespondent(subject)
+        return _BaselineModel(subject)
     if isinstance(subject, Model):
-        return _ModelRespondent(subject)
+        return _ConversationModel(subject)
     raise TypeError(f"{subject.name} is neither a model nor a baseline of NIEH")

@@ -1,0 +1,68 @@
+"""The config of a run: everything that can change a number. Its hash names the run's folder."""
+
+import json
+from collections.abc import Mapping
+from typing import Any, TypeVar
+
+import infthor_eval
+from infthor_eval.formats.digests import fingerprint
+from infthor_eval.runs.records import RunHeader, Unit
+from infthor_eval.runs.request import PreparedRun
+from infthor_eval.runs.suite import Workload
+from model_adapters import Subject, adapter_identity
+
+__all__ = ["episode_fingerprint", "header_of", "run_config"]
+
+P = TypeVar("P")
+U = TypeVar("U", bound=Unit[Any])
+
+_OF_ALL_TRAJECTORIES = ("trajectories", "broken")
+
+
+def header_of(run: PreparedRun[U, P], subject: Subject, workload: Workload[U]) -> RunHeader:
+    """Return the header of a run's journal."""
+    request, suite = run.request, run.suite
+    code = {} if request.model in suite.baselines else adapter_identity(request.model)
+    tasks = request.tasks
+    ours = {"suite_code": dict(request.suite_code)} if request.suite_code else {}
+    config = run_config(suite.name, subject, code, {**ours, **workload.config}, tasks.limit, tasks.seed)
+    return RunHeader(suite=suite.name, name=request.label, config=config)
+
+
+def run_config(
+    suite: str, subject: Subject, code: Mapping[str, Any], workload: Mapping[str, Any], limit: int | None, seed: int
+) -> dict[str, Any]:
+    """Return the config of a run as JSON values.
+
+    Args:
+        suite: name of the suite.
+        subject: what is evaluated.
+        code: identity of a model adapter that is not this package's (`model_adapters.adapter_identity`).
+        workload: config of the workload.
+        limit: number of items of each task; None for all.
+        seed: seed of the run.
+    """
+    config = {
+        "infthor_eval": infthor_eval.__version__,
+        "suite": suite,
+        "model": {"name": subject.name, **subject.identity()},
+        "adapter": dict(code),
+        "limit": limit,
+        "seed": seed,
+        **workload,
+    }
+    # Round trip, so that it equals the one that is read back from a journal: tuples become lists, keys strings.
+    return dict(json.loads(json.dumps(config)))
+
+
+def episode_fingerprint(config: Mapping[str, Any], task: str, **inputs: Any) -> str:
+    """Hash everything that an episode in a simulator depends on.
+
+    Args:
+        config: config of the workload; what its tasks list of all trajectories is left out.
+        task: name of the episode's task.
+        inputs: inputs of the episode itself: its trajectory, its place there, the seed.
+    """
+    shared = {name: value for name, value in config.items() if name != "tasks"}
+    settings = {name: value for name, value in config["tasks"][task].items() if name not in _OF_ALL_TRAJECTORIES}
+    return fingerprint({"task": settings, **shared, **inputs})
