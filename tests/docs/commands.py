@@ -73,7 +73,7 @@ def command_blocks(page: str) -> list[list[Command]]:
 
 
 def _commands(text: str) -> list[Command]:
-    found = [command for line in text.splitlines() for part in line.split(" ; ") if (command := _command(part))]
+    found = [command for line in text.replace("\\\n", " ").splitlines() for part in line.split(" ; ") if (command := _command(part))]
     return found if found and text.lstrip().startswith(found[0].text.split(maxsplit=1)[0]) else []
 
 
