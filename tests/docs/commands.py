@@ -73,8 +73,9 @@ def command_blocks(page: str) -> list[list[Command]]:
 
 
 def _commands(text: str) -> list[Command]:
-    found = [command for line in text.replace("\\\n", " ").splitlines() for part in line.split(" ; ") if (command := _command(part))]
-    return found if found and text.lstrip().startswith(found[0].text.split(maxsplit=1)[0]) else []
+    lines = text.replace("\\\n", " ").splitlines()
+    commands = [command for line in lines for part in line.split(" ; ") if (command := _command(part))]
+    return commands if commands and text.lstrip().startswith(commands[0].text.split(maxsplit=1)[0]) else []
 
 
 def _command(line: str) -> Command | None:
