@@ -21,7 +21,8 @@ from typing import Any
 import torch
 from noise_set import write_set
 
-from infthor_eval.cli.options.requests import Asked, requests_for
+from infthor_eval.cli.options.run import RunOptions
+from infthor_eval.cli.options.values import ModelSpec
 from infthor_eval.runs import UnitRecord, execute, prepare
 from model_adapters.tiny.qwen2_5_vl import Qwen25VLTiny
 
@@ -68,8 +69,8 @@ def answer(folder: Path, data: str) -> list[UnitRecord]:
         RuntimeError: a question failed, so that the numbers would be those of something else.
     """
     options = {"pretrained": str(folder / "checkpoint"), "device": "cpu", "max_tokens": "0"}
-    asked = Asked(tasks=("nieh_full",), data=folder / data, output=folder / "out")
-    ((request, suite),) = requests_for(asked, "qwen2.5-vl", options)
+    models = (ModelSpec("qwen2.5-vl", options),)
+    ((request, suite),) = RunOptions(models, ("nieh_full",), folder / data, folder / "out").requests()
     records = execute(prepare(request, suite)).records
     failures = [record.failure for record in records if record.failure]
     if failures:

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from infthor_eval.cli.options.values import model_options_in
+from infthor_eval.cli.options.values import parse_model_args
 from infthor_eval.formats.blank import blank_like
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
@@ -39,7 +39,7 @@ def main() -> None:
         "most frequent": [float(hit) for hit in most_frequent(found)],
         "history": [float(hit) for hit in habitual(found)],
     }
-    model: Any = load(options.model, model_options_in(options.model_args), seed=0)
+    model: Any = load(options.model, parse_model_args(options.model_args), seed=0)
     for way in options.frames.split(","):
         rows[f"{options.model}, frames {way}"] = [
             float(hit) for _, chapters in found for hit in said(model, chapters, _SHOWN[way])

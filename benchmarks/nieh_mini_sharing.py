@@ -10,14 +10,15 @@ import tempfile
 from collections import defaultdict
 from pathlib import Path
 
-from infthor_eval.cli.options.requests import Asked, requests_for
+from infthor_eval.cli.options.run import RunOptions
+from infthor_eval.cli.options.values import ModelSpec
 from infthor_eval.runs import UnitKey, UnitRecord, execute, prepare
 
 
 def answer(model: str, tasks: str, shared: bool, output: Path) -> list[UnitRecord]:
     """Every record of a run with sharing on or off."""
-    asked = Asked(tasks=(tasks,), data=None, output=output)
-    ((request, suite),) = requests_for(asked, model, {"share_prefix": str(shared).lower()})
+    models = (ModelSpec(model, {"share_prefix": str(shared).lower()}),)
+    ((request, suite),) = RunOptions(models, (tasks,), None, output).requests()
     return execute(prepare(request, suite)).records
 
 

@@ -115,9 +115,9 @@ def main(args: list[str] | None = None) -> None:
     except InfthorError as error:
         _fail(str(error), error.exit_code)
     except _Terminated:
-        _fail("stopped; the same command goes on where it was", 143)
+        _fail("stopped; run the same command to continue", 143)
     except (click.Abort, KeyboardInterrupt):
-        _fail("stopped; the same command goes on where it was", 130)
+        _fail("stopped; run the same command to continue", 130)
     except OSError as error:  # no command's own: a disk that is full, a file that was taken away in mid-work
         _discard_output()
         place = error.filename if error.filename is not None else "standard output or a file"

@@ -93,7 +93,7 @@ def test_the_options_of_every_command_are_known(command, monkeypatch):
 def _check_names(given):
     """Models, their options and tasks are known, but for those of the example package and of files beside a page."""
     engine = given["engine"]
-    for model, own in given["models"].items():
+    for model, own in given["models"]:
         if model == "thumbnails" or model in baseline_names():
             continue
         assert is_known(model), f"{model}: there are {names()}"

@@ -102,7 +102,7 @@ def test_what_is_damaged_in_a_set_costs_its_own_questions(make_nieh_set, tmp_pat
     arguments = ["--model", "oracle", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out"]
     code, _, err = run(*arguments)
     assert code == 0, err
-    assert f"{n_answered} answered now" in err
+    assert f"{n_answered} evaluated now" in err
     skipped = [line for line in err.splitlines() if "sample(s) skipped: " in line]
     assert sum(int(line.split()[1]) for line in skipped) == n_skipped
 
@@ -127,7 +127,7 @@ def test_a_frame_that_no_model_can_take_fails_alone(make_nieh_set, tmp_path, run
     arguments = ["--model", "qwen2.5-vl-tiny", "--model-args", f"batch_size={batch_size}", "--tasks", "nieh_gt"]
     code, _, err = run(*arguments, "--data", data, "--output", tmp_path / "out")
     assert code == 1
-    assert "5 answered now" in err
+    assert "5 evaluated now" in err
     assert "nieh_gt: 1 sample(s) failed, counted as wrong: " in err
     assert "Traceback" not in err
 
@@ -321,5 +321,5 @@ def test_sigterm_leaves_no_temporary_folder(tmp_path):
     process.send_signal(signal.SIGTERM)
     _, err = process.communicate(timeout=600)
     assert process.returncode == 143
-    assert "stopped; the same command goes on where it was" in err
+    assert "stopped; run the same command to continue" in err
     assert list(tmp_path.iterdir()) == []

@@ -7,7 +7,8 @@ from typing import Any
 
 import pytest
 
-from infthor_eval.cli.options.requests import Asked, requests_for
+from infthor_eval.cli.options.run import RunOptions
+from infthor_eval.cli.options.values import ModelSpec
 from infthor_eval.runs import PreparedRun, prepare
 from infthor_eval.thor.launch import embedded
 from infthor_eval.thor.simulator import Simulator
@@ -59,12 +60,13 @@ def data(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def prepared(data: Path, tmp_path: Path) -> Callable[..., PreparedRun]:
-    """A run on that, ready to be executed; keyword arguments are the model's, those of `Asked`, and the suite's."""
+    """A prepared run; keyword arguments are the model, its options, those of `RunOptions` and those of the suite."""
 
     def make(model: str = "planner-arm", model_options: dict[str, str] | None = None, **changes: Any) -> PreparedRun:
         settings = {name: changes.pop(name) for name in ASKED if name in changes}
         settings = {"tasks": ("manipulathor",), "data": data, "output": tmp_path / "out", **settings}
-        ((request, suite),) = requests_for(Asked(**settings, suite_options=changes), model, model_options or {})
+        models = (ModelSpec(model, model_options or {}),)
+        ((request, suite),) = RunOptions(models, **settings, suite_options=changes).requests()
         return prepare(request, suite)
 
     return make

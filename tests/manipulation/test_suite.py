@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from infthor_eval.cli.options.requests import Asked, requests_for
+from infthor_eval.cli.options.run import RunOptions
+from infthor_eval.cli.options.values import ModelSpec
 from infthor_eval.errors import DataError, UsageError
 from infthor_eval.manipulation.records import RECORDS
 from infthor_eval.runs import execute, prepare, read_run
@@ -96,8 +97,9 @@ def test_equal_seeds_act_alike_and_other_seeds_do_not(prepared, task_file, tmp_p
 
 
 def test_several_radii_are_runs_of_their_own(data, tmp_path):
-    asked = Asked((PICK,), data, tmp_path / "out", suite_options={"radius": "0.06,0.5"})
-    outcomes = [execute(prepare(*request)) for request in requests_for(asked, "still", {})]
+    models = (ModelSpec("still"),)
+    options = RunOptions(models, (PICK,), data, tmp_path / "out", suite_options={"radius": "0.06,0.5"})
+    outcomes = [execute(prepare(*request)) for request in options.requests()]
     assert [outcome.summary.summary.tasks[PICK].radius for outcome in outcomes] == [0.06, 0.5]
     assert len({outcome.folder for outcome in outcomes}) == 2
     (table, *_) = outcomes[0].run.suite.tables([outcome.summary for outcome in outcomes])

@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from infthor_eval.cli.options.requests import Asked, requests_for
+from infthor_eval.cli.options.run import RunOptions
+from infthor_eval.cli.options.values import ModelSpec
 from infthor_eval.runs import PreparedRun, prepare
 
 
@@ -17,12 +18,11 @@ def data(make_nieh_set: Callable[..., Path]) -> Path:
 
 @pytest.fixture
 def prepared(data: Path, tmp_path: Path) -> Callable[..., PreparedRun]:
-    """A run on that set, ready to be executed; keyword arguments are the model's and those of `Asked`."""
+    """A run on that set, ready to be executed; keyword arguments are the model's and those of `RunOptions`."""
 
     def make(model: str = "oracle", model_options: dict[str, str] | None = None, **changes: object) -> PreparedRun:
-        name = changes.pop("name", None)
         settings = {"tasks": ("nieh",), "data": data, "output": tmp_path / "out", **changes}
-        ((request, suite),) = requests_for(Asked(**settings), model, model_options or {}, name)
+        ((request, suite),) = RunOptions((ModelSpec(model, model_options or {}),), **settings).requests()
         return prepare(request, suite)
 
     return make

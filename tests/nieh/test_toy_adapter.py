@@ -21,13 +21,13 @@ def test_it_keeps_the_contract():
 def test_it_runs_the_bundled_set(tmp_path, run):
     code, out, err = run("--model", "toy", "--tasks", "nieh_mini", "--output", tmp_path)
     assert code == 0, err
-    assert "toy: 294 answered now" in err
+    assert "toy: 294 evaluated now" in err
     (results,) = tmp_path.rglob("results.json")
     tasks = json.loads(results.read_text())["summary"]["tasks"]
     assert {name: task["n"] for name, task in tasks.items()} == {"nieh_mini_gt": 147, "nieh_mini_full": 147}
     row = next(line.split() for line in out.splitlines() if line.split()[:1] == ["toy"])
     assert row[-1] == "147"
-    assert "0 answered now, 294 found" in run("--model", "toy", "--tasks", "nieh_mini", "--output", tmp_path)[2]
+    assert "0 evaluated now, 294 resumed" in run("--model", "toy", "--tasks", "nieh_mini", "--output", tmp_path)[2]
 
 
 def test_a_context_that_is_measured_in_tokens_wants_their_number(make_nieh_set, tmp_path, run):

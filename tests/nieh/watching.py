@@ -26,7 +26,7 @@ class Watcher:
 
     @property
     def made(self) -> list[UnitRecord]:
-        """What was answered now."""
+        """What was evaluated now."""
         return [record for record, resumed in self.done_units if not resumed]
 
     @property

@@ -145,9 +145,9 @@ def test_what_is_no_fault_of_the_suite_ends_the_run_and_keeps_what_is_done(tmp_p
 
 def test_a_programming_error_is_counted_and_told_at_the_end(tmp_path, capfd):
     from infthor_eval.cli.commands.run import evaluate
-    from infthor_eval.cli.showing import Showing
+    from infthor_eval.cli.options.show import ShowOptions
 
-    assert evaluate([(request(tmp_path), broken_by(ZeroDivisionError("of its own")))], Showing()) == 1
+    assert evaluate([(request(tmp_path), broken_by(ZeroDivisionError("of its own")))], ShowOptions()) == 1
     shown, said = capfd.readouterr()
     assert ["adder", "2"] in [line.split() for line in shown.splitlines()]
     assert "sums: 2 sample(s) failed, counted as wrong: ZeroDivisionError in test_driver.py:" in said
@@ -218,7 +218,7 @@ def test_a_killed_command_goes_on_and_shows_progress_table_results_and_export(tm
     again = start(tmp_path)
     shown, said = again.communicate(timeout=PATIENCE_S)
     assert again.returncode == 1, said  # a group failed
-    assert "adder: 3 answered now, 1 found in the journal" in said
+    assert "adder: 3 evaluated now, 1 resumed from the journal" in said
     assert "sums: 1 sample(s) skipped: nothing to add" in said
     assert "sums: 2 sample(s) failed, counted as wrong: the abacus is broken" in said
     assert ["adder", "2"] in [line.split() for line in shown.splitlines()]

@@ -239,7 +239,7 @@ def test_ctrl_c_finishes_the_unit_in_hand_and_shows_what_is_there_and_again_stop
     process = subprocess.Popen([sys.executable, toy, output, gate], stdout=-1, stderr=-1, text=True, env=environment)
     wait_until((gate / "waiting-1").exists, process)
     process.send_signal(signal.SIGINT)
-    stopping = "stopping after the unit in hand; press Ctrl-C again to stop at once"
+    stopping = "stopping after the present unit; press Ctrl-C again to stop at once"
     assert any(stopping in line for line in process.stderr)
     if again:
         process.send_signal(signal.SIGINT)

@@ -30,6 +30,7 @@ class Gated(Sums):
 
 if __name__ == "__main__":
     from infthor_eval.cli.commands.run import evaluate
-    from infthor_eval.cli.showing import Showing
+    from infthor_eval.cli.options.show import ShowOptions
 
-    sys.exit(evaluate([(request(Path(sys.argv[1])), suite_of(Gated) if len(sys.argv) > 2 else ToySuite())], Showing()))
+    suite = suite_of(Gated) if len(sys.argv) > 2 else ToySuite()
+    sys.exit(evaluate([(request(Path(sys.argv[1])), suite)], ShowOptions()))

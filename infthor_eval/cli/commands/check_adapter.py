@@ -2,7 +2,7 @@
 
 import click
 
-from infthor_eval.cli.options.values import model_options_in
+from infthor_eval.cli.options.values import parse_model_args
 
 __all__ = ["command"]
 
@@ -20,7 +20,7 @@ def command(model: str, model_args: str) -> int:
     from model_adapters import load, run_checks
 
     n_broken = 0
-    adapter = load(model, model_options_in(model_args), seed=0)
+    adapter = load(model, parse_model_args(model_args), seed=0)
     try:
         for finding in run_checks(adapter):
             found = "holds" if finding.broken is None else "broken"

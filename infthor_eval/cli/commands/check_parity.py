@@ -5,7 +5,7 @@ from pathlib import Path
 
 import click
 
-from infthor_eval.cli.options.values import FiniteRange, model_options_in
+from infthor_eval.cli.options.values import FiniteFloat, parse_model_args
 
 __all__ = ["command"]
 
@@ -18,7 +18,7 @@ __all__ = ["command"]
 @click.option(
     "--model-args", default="", metavar="K=V,...", help="Options of MODEL; unnorm_key goes to the server too."
 )
-@click.option("--tolerance", type=FiniteRange(min=0), default=1e-6, show_default=True, help="Taken for equal.")
+@click.option("--tolerance", type=FiniteFloat(min=0), default=1e-6, show_default=True, help="Taken for equal.")
 def command(
     model: str,
     reference_url: str,
@@ -41,7 +41,7 @@ def command(
         synthetic_frames,
     )
 
-    options = model_options_in(model_args)
+    options = parse_model_args(model_args)
     theirs = reference_policy(reference_url, options.get("unnorm_key"))
     with nullcontext(frames_in_folder(frames)) if frames else synthetic_frames() as shown:
         ours = load_policy(model, options)

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from infthor_eval.cli.options.values import Whole, floor_plans_option
-from infthor_eval.cli.options.workers import worker_options
+from infthor_eval.cli.options.values import WholeNumber, floor_plans_option
+from infthor_eval.cli.options.workers import parse_worker_settings, worker_options
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from infthor_eval.generation.generate_set import GenerationSummary
-    from infthor_eval.workers import WorkerSettings
 
 __all__ = ["command"]
 
@@ -26,7 +25,7 @@ _PATH = click.Path(path_type=Path)
 @click.option("--min-steps", type=click.IntRange(1), default=300, show_default=True, help="Low-level actions at least.")
 @click.option("--min-subgoals", type=click.IntRange(1), default=10, show_default=True, help="Tasks at least.")
 @click.option("--max-fail", type=click.IntRange(1), default=20, show_default=True, help="Tasks that may fail, at most.")
-@click.option("--seed", type=Whole(0), default=0, show_default=True, help="Of the first trajectory.")
+@click.option("--seed", type=WholeNumber(0), default=0, show_default=True, help="Of the first trajectory.")
 @click.option("--count", type=click.IntRange(1), default=1, show_default=True, help="Trajectories for each scene.")
 @click.option("--final-task", is_flag=True, help="End with a task on what was seen at both ends of the trajectory.")
 @click.option("--test-set", is_flag=True, help="As the published test sets: with a final task, without bathrooms.")
@@ -47,8 +46,8 @@ def command(
     test_set: bool,
     out: Path,
     data: Path | None,
-    worker_settings: WorkerSettings,
     as_json: bool,
+    **workers: Any,
 ) -> None:
     """Generate trajectories: tasks are sampled, planned, and carried out in the embedded simulator.
 
@@ -61,6 +60,7 @@ def command(
     from infthor_eval.terminal import console, error_console, progress_bar
     from infthor_eval.thor.launch import embedded
 
+    worker_settings = parse_worker_settings(**workers)
     notes = error_console()
     chosen, skipped = without_bathrooms(scenes) if test_set else (scenes, [])
     if skipped:

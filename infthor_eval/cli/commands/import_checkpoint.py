@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from infthor_eval.cli.options.values import model_options_in
+from infthor_eval.cli.options.values import parse_model_args
 
 __all__ = ["command"]
 
@@ -28,7 +28,7 @@ def command(folder: Path, model: str, model_args: str, out: Path) -> int:
     from infthor_eval.training.starting_model import load_starting_model
 
     prepare_folder(out)
-    loaded = load_starting_model(model, model_options_in(model_args), "plain", seed=0)
+    loaded = load_starting_model(model, parse_model_args(model_args), "plain", seed=0)
     found = import_weights(loaded, folder)
     export(loaded, out)
     print_line(

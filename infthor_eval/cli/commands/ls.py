@@ -9,7 +9,7 @@ from rich import box
 from rich.table import Table as RichTable
 
 from infthor_eval.cli.options.values import floor_plans_option, include_option
-from infthor_eval.cli.progress.progress import say
+from infthor_eval.cli.progress.notes import print_note
 from infthor_eval.errors import ModelError
 from infthor_eval.report.terminal import print_table, table_console
 from infthor_eval.runs.run_labels import label_runs
@@ -137,7 +137,7 @@ def runs(folder: Path) -> None:
         print_table(Table("", (*columns, *more), rows), table_console())
     for item in found:
         if isinstance(item, BrokenRun):
-            say(f"{item.folder}: cannot be read: {item.reason}", "red")
+            print_note(f"{item.folder}: cannot be read: {item.reason}", "red")
 
 
 def _cells(run: StoredRun) -> Iterator[str]:

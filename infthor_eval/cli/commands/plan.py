@@ -3,17 +3,19 @@
 import resource
 import sys
 from collections.abc import Sequence
+from typing import Any
 
 import click
 
-from infthor_eval.cli.options.run import run_options
-from infthor_eval.cli.options.values import FiniteRange, Whole
-from infthor_eval.cli.progress.pace import duration
-from infthor_eval.cli.progress.progress import NOTES, say
+from infthor_eval.cli.options.run import RunOptions, run_options
+from infthor_eval.cli.options.values import FiniteFloat, WholeNumber
+from infthor_eval.cli.progress.notes import NOTES, print_note
+from infthor_eval.cli.progress.pace import format_duration
+from infthor_eval.cli.progress.runs import print_workload
 from infthor_eval.errors import ModelError
 from infthor_eval.reasons import count_reasons
 from infthor_eval.report.terminal import print_table, table_console
-from infthor_eval.runs import RunRequest, Suite, TaskEstimate, Workload, estimate_run
+from infthor_eval.runs import RunRequest, Suite, TaskEstimate, estimate_run
 from infthor_eval.tables import Column, Row, Table
 from infthor_eval.terminal import progress_bar
 
@@ -23,17 +25,17 @@ _COLUMNS = ("units", "measured", "frames", "requests", "tokens read", "encoded",
 
 
 @click.command("plan")
-@click.option("--measure", type=Whole(1), default=6, show_default=True, help="Units of each task.")
+@click.option("--measure", type=WholeNumber(1), default=6, show_default=True, help="Units of each task.")
 @click.option(
-    "--price-per-hour", type=FiniteRange(min=0), metavar="USD", help="Of the machine that a worker has, for its cost."
+    "--price-per-hour", type=FiniteFloat(min=0), metavar="USD", help="Of the machine that a worker has, for its cost."
 )
-@run_options("measure", "price_per_hour")
-def command(requests: list[tuple[RunRequest, Suite]], measure: int, price_per_hour: float | None) -> int:
+@run_options
+def command(measure: int, price_per_hour: float | None, **given: Any) -> int:
     """Estimate what a run would take: requests, tokens, frames, memory, time and money.
 
     Takes the options of `run`. A few units of each task are done to tell, and nothing of them is kept.
     """
-    return max([plan(*request, measure, price_per_hour) for request in requests], default=0)
+    return max([plan(*request, measure, price_per_hour) for request in RunOptions.from_click(given).requests()])
 
 
 def plan(request: RunRequest, suite: Suite, measure: int, price_per_hour: float | None) -> int:
@@ -54,9 +56,9 @@ def plan(request: RunRequest, suite: Suite, measure: int, price_per_hour: float 
     with progress_bar(NOTES) as progress:
         bar = progress.add_task(f"{request.label}: measuring", total=None)
         found = estimate_run(request, suite, measure, lambda: progress.advance(bar))
-    _say_beforehand(found.workload)
+    print_workload(found.workload)
     for task, reason, n in count_reasons(found.failures):
-        say(f"{task}: {n} measured unit(s) failed: {reason}", "red")
+        print_note(f"{task}: {n} measured unit(s) failed: {reason}", "red")
     if not found.tasks:
         raise ModelError(f"{request.label}: every unit that was measured failed; mend what is told above")
     console = table_console()
@@ -64,13 +66,6 @@ def plan(request: RunRequest, suite: Suite, measure: int, price_per_hour: float 
     for line in _totals(request, found.tasks, price_per_hour):
         console.print(line)
     return int(bool(found.failures))
-
-
-def _say_beforehand(workload: Workload) -> None:
-    for task, reason, n in count_reasons((item.key.task, item.reason) for item in workload.skipped):
-        say(f"{task}: {n} sample(s) skipped: {reason}", "yellow")
-    for cost in workload.costs:
-        say(f"{cost.task}: {cost.description}")
 
 
 def _table(request: RunRequest, tasks: Sequence[TaskEstimate]) -> Table:
@@ -82,13 +77,13 @@ def _table(request: RunRequest, tasks: Sequence[TaskEstimate]) -> Table:
 def _row(item: TaskEstimate) -> Row:
     total = item.total
     counts = (item.n_units, item.n_measured, item.frames, total.requests, total.read, total.encoded, total.written)
-    return Row((item.task, *(f"{round(count):,}" for count in counts), duration(total.seconds)))
+    return Row((item.task, *(f"{round(count):,}" for count in counts), format_duration(total.seconds)))
 
 
 def _totals(request: RunRequest, tasks: Sequence[TaskEstimate], price_per_hour: float | None) -> list[str]:
     seconds, workers = sum(item.total.seconds for item in tasks), request.worker_settings.workers
-    shared = f", {duration(seconds / workers)} by {workers} workers" if workers > 1 else ""
-    lines = [f"time: {duration(seconds)} of one worker{shared}, loading not counted"]
+    shared = f", {format_duration(seconds / workers)} by {workers} workers" if workers > 1 else ""
+    lines = [f"time: {format_duration(seconds)} of one worker{shared}, loading not counted"]
     lines.append(f"memory: {_peak_megabytes():,} MB at most while it was measured{_gpu_memory()}")
     cost = sum(item.total.cost for item in tasks)
     if cost:

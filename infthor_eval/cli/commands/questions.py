@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
-from infthor_eval.cli.options.values import FiniteRange, Whole
-from infthor_eval.cli.options.workers import worker_options
-from infthor_eval.workers import WorkerSettings
+from infthor_eval.cli.options.values import FiniteFloat, WholeNumber
+from infthor_eval.cli.options.workers import parse_worker_settings, worker_options
 
 __all__ = ["command"]
 
@@ -18,11 +18,11 @@ _PATH = click.Path(path_type=Path)
 @click.command("questions")
 @click.argument("folder", metavar="SET", type=_PATH)
 @click.option("--out", required=True, type=_PATH, help="The CSV file to write.")
-@click.option("--seed", type=Whole(0), default=0, show_default=True, help="Makes every choice.")
+@click.option("--seed", type=WholeNumber(0), default=0, show_default=True, help="Makes every choice.")
 @click.option("--per-trajectory", type=click.IntRange(1), default=25, show_default=True, help="Questions at most.")
 @click.option(
     "--min-share",
-    type=FiniteRange(0, 1),
+    type=FiniteFloat(0, 1),
     default=0.001,
     show_default=True,
     help="Of a frame's pixels that an object must fill to count as shown.",
@@ -40,7 +40,7 @@ def command(
     min_share: float,
     further: bool,
     overwrite: bool,
-    worker_settings: WorkerSettings,
+    **workers: Any,
 ) -> None:
     """Make questions on a replayed set, in the words of the paper's Table 3.
 
@@ -60,7 +60,7 @@ def command(
         per_trajectory=per_trajectory,
         share=min_share,
         further=further,
-        worker_settings=worker_settings,
+        worker_settings=parse_worker_settings(**workers),
         say=notes.print,
     )
     content = encode_questions(made.questions)

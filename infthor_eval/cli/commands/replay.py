@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from infthor_eval.cli.options.values import floor_plans_option
-from infthor_eval.cli.options.workers import worker_options
+from infthor_eval.cli.options.workers import parse_worker_settings, worker_options
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from infthor_eval.generation.replay_summary import ReplaySummary
-    from infthor_eval.workers import WorkerSettings
 
 __all__ = ["command"]
 
@@ -42,8 +41,8 @@ def command(
     per_floor_plan: int | None,
     frames: int,
     unity: bool,
-    worker_settings: WorkerSettings,
     as_json: bool,
+    **workers: Any,
 ) -> None:
     """Replay trajectories (.json, .jsonl, .jsonl.gz, directories) into an NIEH set.
 
@@ -59,6 +58,7 @@ def command(
     from infthor_eval.thor import launch
     from infthor_eval.thor.supplement import supplement_file
 
+    worker_settings = parse_worker_settings(**workers)
     notes = error_console()
     prepare_folder(out)
     selection = select(trajectories, limit, per_floor_plan)

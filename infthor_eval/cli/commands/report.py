@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import click
 
-from infthor_eval.cli.options.values import Whole
+from infthor_eval.cli.options.values import WholeNumber
 
 if TYPE_CHECKING:
     from infthor_eval.episodes.curves import RewardCurves
@@ -59,7 +59,7 @@ class _Made(NamedTuple):
 @click.option("--scenes", type=_PATH, help="Folder with recorded floor plans (thor_scenes/), as for the run.")
 @click.option(
     "--episodes",
-    type=Whole(0),
+    type=WholeNumber(0),
     default=12,
     show_default=True,
     metavar="N",

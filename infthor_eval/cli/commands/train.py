@@ -6,14 +6,14 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from infthor_eval.cli.options.values import FiniteRange, model_options_in
-from infthor_eval.cli.options.workers import worker_options
+from infthor_eval.cli.options.values import FiniteFloat, parse_model_args
+from infthor_eval.cli.options.workers import parse_worker_settings, worker_options
 from infthor_eval.cli.progress.bar import PacedBar, StepBars
-from infthor_eval.cli.progress.progress import NOTES, say
+from infthor_eval.cli.progress.notes import NOTES, print_note
 from infthor_eval.errors import DataError
 from infthor_eval.terminal import console, progress_bar
 
@@ -65,7 +65,7 @@ class Machine:
 @click.option("--gpus", type=click.IntRange(1), metavar="N", help=f"Of the machine, for --dry-run.  [default: {_GPUS}]")
 @click.option(
     "--tflops",
-    type=FiniteRange(min=0, min_open=True),
+    type=FiniteFloat(min=0, min_open=True),
     help=f"That one of them reaches, for --dry-run (an H100 has 989 in bfloat16).  [default: {_TFLOPS:g}]",
 )
 @worker_options
@@ -79,7 +79,7 @@ def command(
     dry_run: bool,
     gpus: int | None,
     tflops: float | None,
-    worker_settings: WorkerSettings,
+    **workers: Any,
 ) -> int:
     """Fine-tune a model, and write a checkpoint that its family's adapter loads.
 
@@ -92,9 +92,10 @@ def command(
     from infthor_eval.training.nano.settings import NanoRecipe
     from infthor_eval.training.recipe import read_recipe
 
+    worker_settings = parse_worker_settings(**workers)
     told = dict(_setting(item) for item in changes)
     told |= {} if model is None else {"model": model}
-    told |= {f"model_args.{key}": value for key, value in model_options_in(model_args or "").items()}
+    told |= {f"model_args.{key}": value for key, value in parse_model_args(model_args or "").items()}
     recipe = read_recipe(name, told)
     if not dry_run and (gpus is not None or tflops is not None):
         raise click.UsageError("--gpus and --tflops are what --dry-run reckons with; give it, or leave them out")
@@ -161,12 +162,12 @@ def _tell(run: TrainingRun) -> None:
     """The sequences, and what none could be made of."""
     data = run.data
     longest = max(item.n_tokens for item in data.sequences)
-    say(
+    print_note(
         f"{run.recipe.title}: {len(data.sequences):,} sequences, {data.n_tokens:,} tokens (the longest {longest:,}), "
         f"loss on {data.n_trained:,}"
     )
     for reason, n in data.reasons().most_common(5):
-        say(f"{n} left out: {reason}", "yellow")
+        print_note(f"{n} left out: {reason}", "yellow")
 
 
 def _tell_estimate(run: TrainingRun, machine: Machine) -> None:
@@ -218,7 +219,7 @@ def train_nano(recipe: NanoRecipe, folders: Sequence[Path], out: Path, worker_se
         def watch(done: NanoProgress) -> None:
             bars.advance(_PARTS[done.part], done.step, done.n_steps, f"loss {done.loss:.3f}")
 
-        loaded = train_small_model(recipe, sets, watch, say)
+        loaded = train_small_model(recipe, sets, watch, print_note)
     export(loaded, out / "checkpoint")
     console().print(f"{out / 'checkpoint'}")
     return 0
@@ -255,16 +256,21 @@ def make_data(scenes: Scenes, seed: int, out: Path, worker_settings: WorkerSetti
     )
     with progress_bar(NOTES) as progress:
         made = PacedBar(progress, "trajectories", len(jobs))
-        generated = generate_with_workers(jobs, embedded(), trajectories, worker_settings, made.advance, say)
+        generated = generate_with_workers(jobs, embedded(), trajectories, worker_settings, made.advance, print_note)
         selection, shown = select([trajectories]), PacedBar(progress, "frames", len(jobs))
-        replayed = replay_with_workers(selection, embedded(), made_set, worker_settings, 1, shown.advance, say)
+        replayed = replay_with_workers(selection, embedded(), made_set, worker_settings, 1, shown.advance, print_note)
     failures = [str(item) for item in generated.failures]
     failures += [f"{item.place}: {item.message}" for item in replayed.failures]
     if failures:
         raise DataError(f"{out}: {failures[0]}; give other scenes")
     questions = make_questions(
-        made_set, seed=seed, per_trajectory=_PER_TRAJECTORY, further=True, worker_settings=worker_settings, say=say
+        made_set,
+        seed=seed,
+        per_trajectory=_PER_TRAJECTORY,
+        further=True,
+        worker_settings=worker_settings,
+        say=print_note,
     )
     write_questions(made_set / "qa_set_data.csv", questions.questions)
-    say(f"{len(jobs)} trajectories, {len(questions.questions):,} questions: {made_set}")
+    print_note(f"{len(jobs)} trajectories, {len(questions.questions):,} questions: {made_set}")
     return made_set

@@ -1,15 +1,16 @@
 """`infthor-eval validate`: keep the questions of a set that at least one of several models can answer."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import click
 
-from infthor_eval.cli.options.requests import Asked, requests_for
-from infthor_eval.cli.options.values import ModelsAsked, Whole
-from infthor_eval.cli.options.workers import worker_options
-from infthor_eval.cli.progress.progress import execute_with_progress, say
+from infthor_eval.cli.options.run import RunOptions
+from infthor_eval.cli.options.values import ModelList, ModelSpec, WholeNumber
+from infthor_eval.cli.options.workers import parse_worker_settings, worker_options
+from infthor_eval.cli.progress.notes import print_note
+from infthor_eval.cli.progress.runs import execute_with_progress
 from infthor_eval.nieh.samples import find_set
 from infthor_eval.nieh.scoring import Scorer
 from infthor_eval.nieh.tables import clues_table
@@ -18,7 +19,7 @@ from infthor_eval.nieh.validation import Verdicts, check_decisions, judge, read_
 from infthor_eval.report.inspection import write_inspection_page
 from infthor_eval.report.terminal import print_table, table_console
 from infthor_eval.runs import RunOutcome, RunRequest, RunSummary, Suite, prepare
-from infthor_eval.workers import WorkerSettings
+from infthor_eval.runs.run_labels import label_runs
 
 __all__ = ["command", "validate"]
 
@@ -27,7 +28,7 @@ __all__ = ["command", "validate"]
 @click.argument("set_folder", metavar="SET", type=click.Path(path_type=Path))
 @click.option(
     "--models",
-    type=ModelsAsked(),
+    type=ModelList(),
     required=True,
     metavar="MODEL,...",
     help="Model names with commas; the paper uses four. MODEL:K=V,... gives one options of its own.",
@@ -35,25 +36,31 @@ __all__ = ["command", "validate"]
 @click.option("--out", type=click.Path(path_type=Path), required=True, help="Folder of the validated set.")
 @click.option("--decisions", type=click.Path(path_type=Path), help="The inspection list with keep or drop filled in.")
 @click.option("--scorer", type=click.Choice(["strict", "reference"]), default="strict", show_default=True)
-@click.option("--seed", type=Whole(), default=0, show_default=True, help="For whatever is random.")
+@click.option("--seed", type=WholeNumber(), default=0, show_default=True, help="For whatever is random.")
 @worker_options
 def command(
     set_folder: Path,
-    models: Mapping[str, Mapping[str, str]],
+    models: tuple[ModelSpec, ...],
     out: Path,
     decisions: Path | None,
     scorer: Literal["strict", "reference"],
     seed: int,
-    worker_settings: WorkerSettings,
+    **workers: Any,
 ) -> int:
     """Ask every question of SET of each model, on its clue frames alone, and keep what one of them answers.
 
     Rejected questions go to rejected.jsonl with every reply. Those with several clues that no model answers go to
     inspection.csv and inspection.html; decide, and pass the decisions back. Stopped, the same command goes on.
     """
-    asked = Asked(tasks=("nieh_gt",), data=set_folder, output=out / "runs", seed=seed, worker_settings=worker_settings)
-    requests = [request for model, options in models.items() for request in requests_for(asked, model, options)]
-    return validate(requests, out, decisions, scorer)
+    options = RunOptions(
+        models=models,
+        tasks=("nieh_gt",),
+        data=set_folder,
+        output=out / "runs",
+        seed=seed,
+        worker_settings=parse_worker_settings(**workers),
+    )
+    return validate(options.requests(), out, decisions, scorer)
 
 
 def validate(
@@ -80,13 +87,13 @@ def validate(
         outcomes.append(execute_with_progress(run))
         if outcomes[-1].n_missing:
             return 130
-    asked = {record.id for record in outcomes[0].records}
-    questions = [question for question in data.questions if question.id in asked]
-    replies = {outcome.run.request.model: _replies(outcome) for outcome in outcomes}
-    verdicts = judge(questions, replies, decisions, scorer)
+    answered = {record.id for record in outcomes[0].records}
+    questions = [question for question in data.questions if question.id in answered]
+    replies = [{record.id: record.payload.reply for record in outcome.records} for outcome in outcomes]
+    verdicts = judge(questions, dict(zip(_model_names(outcomes), replies, strict=True)), decisions, scorer)
     earlier = write_validated_set(out, data, verdicts)
     if earlier is not None:
-        say(f"{earlier}: the earlier list, with decisions on questions that are not to be inspected any more")
+        print_note(f"{earlier}: the earlier list, with decisions on questions that are not to be inspected any more")
     write_inspection_page(out / "inspection.html", verdicts.to_inspect, data)
     console = table_console()
     print_table(clues_table([_on_kept(outcome, verdicts) for outcome in outcomes]), console)
@@ -97,8 +104,11 @@ def validate(
     return int(any(record.failure is not None for outcome in outcomes for record in outcome.records))
 
 
-def _replies(outcome: RunOutcome) -> dict[str, str | None]:
-    return {record.id: record.payload.reply for record in outcome.records}
+def _model_names(outcomes: Sequence[RunOutcome]) -> list[str]:
+    """The names of the models; labels where one is there with several options."""
+    models = [outcome.run.request.model for outcome in outcomes]
+    labels = label_runs([(outcome.folder, outcome.summary.header) for outcome in outcomes])
+    return [label if models.count(model) > 1 else model for model, label in zip(models, labels, strict=True)]
 
 
 def _on_kept(outcome: RunOutcome, verdicts: Verdicts) -> RunSummary:

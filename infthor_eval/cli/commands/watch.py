@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Protocol, TypeVar
 
 import click
 
-from infthor_eval.cli.options.values import FiniteRange
+from infthor_eval.cli.options.values import FiniteFloat
 
 if TYPE_CHECKING:
     from infthor_eval.manipulation.moments import ArmMoment
@@ -61,7 +61,7 @@ class Wanted:
 @click.option("--data", type=_PATH, help="File or folder of the trajectories, where they do not come with the package.")
 @click.option("--scenes", type=_PATH, help="Folder with recorded floor plans (thor_scenes/), as for the run.")
 @click.option(
-    "--fps", type=FiniteRange(0, 30, min_open=True), default=2.0, show_default=True, help="Actions shown in a second."
+    "--fps", type=FiniteFloat(0, 30, min_open=True), default=2.0, show_default=True, help="Actions shown in a second."
 )
 def command(
     run: Path,

@@ -1,43 +1,58 @@
-"""The options of a run, for every command that takes them: from what was typed to its requests."""
+"""The options of a run, for every command that takes them, and the runs that they ask for."""
 
-import functools
+import re
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from infthor_eval.cli.options.config import comes_from_file, config_option
-from infthor_eval.cli.options.suites import refuse_twins, suite_options
-from infthor_eval.cli.options.values import FiniteRange, ModelOptions, ModelsAsked, Whole, include_option, names_in
-from infthor_eval.cli.options.workers import worker_options
+from infthor_eval.cli.options.suites import (
+    expand_suite_options,
+    refuse_duplicate_options,
+    suite_options,
+    suite_values,
+)
+from infthor_eval.cli.options.values import (
+    FiniteFloat,
+    ModelArgs,
+    ModelList,
+    ModelSpec,
+    WholeNumber,
+    include_option,
+    split_names,
+)
+from infthor_eval.cli.options.workers import parse_worker_settings, worker_options
+from infthor_eval.errors import UsageError
+from infthor_eval.runs import Catalog, RunRequest, Suite, TaskRequest
+from infthor_eval.suites import split_by_suite, suite_identity, suite_named
 from infthor_eval.workers import WorkerSettings
+from model_adapters import name_on_engine
 
-if TYPE_CHECKING:
-    from infthor_eval.runs import RunRequest, Suite
-
-__all__ = ["run_options"]
+__all__ = ["RunOptions", "run_options"]
 
 _OPTIONS = (
     click.option(
         "--model",
         "models",
-        type=ModelsAsked(),
+        type=ModelList(),
         required=True,
         metavar="MODEL,...",
-        help="Model name, or several with commas (see `ls models`); MODEL:K=V,... gives one options of its own.",
+        help="Model name, or several with commas (see `ls models`); MODEL:K=V,... gives a model its own options.",
     ),
     click.option(
         "--engine",
         type=click.Choice(["transformers", "vllm"]),
-        help="What runs the model: transformers, unless its name says otherwise, or vLLM.",
+        help="Library that runs the model; default: transformers, unless its name says otherwise.",
     ),
     click.option("--tasks", required=True, help="Task or group names with commas (see `ls tasks`)."),
     include_option,
-    click.option("--data", type=click.Path(path_type=Path), help="Folder of the data set to ask about."),
+    click.option("--data", type=click.Path(path_type=Path), help="Folder of the data set."),
     click.option(
         "--model-args",
-        type=ModelOptions(),
+        type=ModelArgs(),
         default="",
         metavar="K=V,...",
         help="Options of the model, or of all of them (see `ls models`).",
@@ -49,23 +64,23 @@ _OPTIONS = (
     ),
     click.option(
         "--max-tokens-total",
-        type=Whole(1),
+        type=WholeNumber(1),
         metavar="N",
-        help="Ask a served model nothing more once a run has taken so many tokens.",
+        help="Stop sending requests to a served model after N tokens.",
     ),
     click.option(
         "--max-cost",
-        type=FiniteRange(min=0, min_open=True),
+        type=FiniteFloat(min=0, min_open=True),
         metavar="USD",
-        help="Nor once it has cost so much, by the prices in --model-args.",
+        help="Stop sending them at this cost, by the prices in --model-args.",
     ),
-    click.option("--name", help="What the run is called in tables and folders; else by its checkpoint, or its model."),
+    click.option("--name", help="Name of the run in tables and folders; default: its checkpoint, or its model."),
     click.option(
         "--limit",
-        type=Whole(1),
+        type=WholeNumber(1),
         metavar="N",
-        help="Ask only N of each task (questions, trajectories of plans, episodes of arms), evenly from all "
-        "trajectories, drawn by --seed; a larger N asks these too. lm-eval's own command takes the first N instead.",
+        help="Evaluate only N of each task (questions, trajectories of plans, episodes of arms), evenly from all "
+        "trajectories, drawn by --seed; a larger N includes these. lm-eval's own command takes the first N instead.",
     ),
     click.option(
         "--output",
@@ -74,92 +89,127 @@ _OPTIONS = (
         show_default=True,
         help="Results folder.",
     ),
-    click.option("--seed", type=Whole(), default=0, show_default=True, help="For whatever is random."),
-    click.option("--fresh", is_flag=True, help="Start anew; the journal of an earlier run is set aside."),
-    click.option("--recover", is_flag=True, help="Go on without the bad lines of a damaged journal."),
+    click.option("--seed", type=WholeNumber(), default=0, show_default=True, help="Seed of everything random."),
+    click.option("--fresh", is_flag=True, help="Restart; the journal of an earlier run is kept under another name."),
+    click.option("--recover", is_flag=True, help="Resume without the bad lines of a damaged journal."),
 )
+_MODEL_OPTIONS = ("rope", "max_tokens_total", "max_cost")  # options of the command that are options of the model
+_CAPS = ("max_tokens_total", "max_cost")
+_AS_GIVEN = ("data", "output", "limit", "seed", "name", "fresh", "recover", "include")
 
 
-def run_options(*own: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Add all options of a run to a command, which is given what they ask for as `requests`.
+def run_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add all options of a run to a command, which passes its parameters to `RunOptions.from_click`."""
+    for option in reversed((config_option, *_OPTIONS, worker_options, suite_options)):
+        command = option(command)
+    refuse_duplicate_options(command)
+    return command
 
-    Args:
-        own: names of the command's own parameters, which it is given as they are.
+
+@dataclass(frozen=True)
+class RunOptions:
+    """The options of a run.
+
+    Attributes:
+        models: models to evaluate.
+        tasks: names of tasks and groups.
+        data: folder of the data set; None for that of the tasks.
+        output: results folder.
+        limit: units of each task; None for all.
+        seed: seed of the runs.
+        name: name of the run; None for the checkpoint's or the model's.
+        fresh: whether to set an earlier journal aside.
+        recover: whether to resume without bad lines.
+        worker_settings: number and place of the workers.
+        include: folders with further task files.
+        suite_options: options of all suites by name; None where not given.
     """
 
-    def with_options(command: Callable[..., Any]) -> Callable[..., Any]:
-        @functools.wraps(command)
-        def with_requests(**given: Any) -> Any:
-            kept = {name: given.pop(name) for name in own}
-            return command(requests=_requests(**given), **kept)
+    models: tuple[ModelSpec, ...]
+    tasks: tuple[str, ...]
+    data: Path | None
+    output: Path
+    limit: int | None = None
+    seed: int = 0
+    name: str | None = None
+    fresh: bool = False
+    recover: bool = False
+    worker_settings: WorkerSettings = field(default_factory=WorkerSettings)
+    include: tuple[Path, ...] = ()
+    suite_options: Mapping[str, Any] = field(default_factory=dict)
 
-        options = (config_option, *_OPTIONS, worker_options, suite_options)
-        made = functools.reduce(lambda wrapped, option: option(wrapped), reversed(options), with_requests)
-        refuse_twins(made)
-        return made
+    @classmethod
+    def from_click(cls, given: Mapping[str, Any]) -> "RunOptions":
+        """Return the options among the parameters of a command.
 
-    return with_options
+        Raises:
+            click.UsageError: options that exclude each other.
+            UsageError: an engine that does not run the model.
+        """
+        for_all, engine = _options_of_all_models(given), given["engine"]
+        models = tuple(
+            ModelSpec(name_on_engine(name, engine) if engine else name, {**for_all, **options})
+            for name, options in given["models"]
+        )
+        workers = parse_worker_settings(given["workers"], given["ray_address"], given["gpus_per_worker"])
+        capped = next((cap for cap in _CAPS if any(cap in model.options for model in models)), None)
+        if capped and not workers.is_local:
+            raise click.UsageError(f"{capped} counts the requests of one process; leave out --workers, or the cap")
+        if given["name"] is not None and len(models) > 1:
+            raise click.UsageError(f"--name {given['name']}: names one run, but {len(models)} models are given")
+        return cls(
+            models=models,
+            tasks=split_names(given["tasks"], "--tasks"),
+            worker_settings=workers,
+            suite_options=suite_values(given),
+            **{
+                name: given[name] for name in ("data", "output", "limit", "seed", "name", "fresh", "recover", "include")
+            },
+        )
+
+    def requests(self) -> list[tuple[RunRequest, Suite]]:
+        """Return the runs, each with its suite: one for each model, suite, and value of an option that takes several.
+
+        Raises:
+            UsageError: an unknown task, a name that cannot be a folder's, or an option of a suite that is not used.
+            DataError: a task file is not what it should be.
+        """
+        if self.name is not None and not re.fullmatch(r"\w[\w.@+ -]*", self.name):
+            raise UsageError(
+                f"--name {self.name!r}: names a folder; use letters, digits, '.', '_', '-', '@', '+' and blanks"
+            )
+        by_suite = split_by_suite(Catalog.installed(self.include).expand(self.tasks))
+        requests = []
+        for model in self.models:
+            for suite, tasks in by_suite.items():
+                for options in expand_suite_options(suite, self.suite_options, by_suite.keys()):
+                    request = RunRequest(
+                        model=model.name,
+                        tasks=TaskRequest(tasks, options, self.data, self.limit, self.seed),
+                        # The folder of one suite's run has the tasks' names as typed; of several, each its own tasks.
+                        asked=self.tasks if len(by_suite) == 1 else tuple(task.name for task in tasks),
+                        output=self.output,
+                        model_options=model.options,
+                        name=self.name,
+                        fresh=self.fresh,
+                        recover=self.recover,
+                        worker_settings=self.worker_settings,
+                        include=self.include,
+                        suite_code=suite_identity(suite),
+                    )
+                    requests.append((request, suite_named(suite)))
+        return requests
 
 
-def _requests(
-    models: Mapping[str, Mapping[str, str]],
-    engine: str | None,
-    tasks: str,
-    include: tuple[Path, ...],
-    model_args: Mapping[str, str],
-    name: str | None,
-    data: Path | None,
-    limit: int | None,
-    seed: int,
-    output: Path,
-    fresh: bool,
-    recover: bool,
-    worker_settings: WorkerSettings,
-    rope: str | None,
-    max_tokens_total: int | None,
-    max_cost: float | None,
-    **suites: Any,
-) -> "list[tuple[RunRequest, Suite]]":
-    from infthor_eval.cli.options.requests import Asked, requests_for
-    from model_adapters import name_on_engine
-
-    of_all = _with_short_ones(model_args, {"rope": rope, "max_tokens_total": max_tokens_total, "max_cost": max_cost})
-    options = {model: {**of_all, **own} for model, own in models.items()}
-    _refuse_shared_caps(options, worker_settings)
-    asked = Asked(
-        tasks=names_in(tasks, "--tasks"),
-        include=include,
-        data=data,
-        limit=limit,
-        seed=seed,
-        output=output,
-        fresh=fresh,
-        recover=recover,
-        worker_settings=worker_settings,
-        suite_options=suites,
-    )
-    if name is not None and len(options) > 1:
-        raise click.UsageError(f"--name {name}: names one run, and {len(options)} models are asked")
-    if engine is not None:
-        options = {name_on_engine(model, engine): given for model, given in options.items()}
-    return [request for model, given in options.items() for request in requests_for(asked, model, given, name)]
-
-
-def _with_short_ones(model_args: Mapping[str, str], short: Mapping[str, Any]) -> dict[str, str]:
-    """The options of all models, with those that have an option of the command for themselves."""
-    options = dict(model_args)
-    for option, value in short.items():
-        if value is None:
+def _options_of_all_models(given: Mapping[str, Any]) -> dict[str, str]:
+    """The options in --model-args, with those that are options of the command as well."""
+    options = dict(given["model_args"])
+    for name in _MODEL_OPTIONS:
+        if given[name] is None:
             continue
-        if option in options and comes_from_file(option) == comes_from_file("model_args"):
-            typed = f"--{option.replace('_', '-')}"
-            raise click.UsageError(f"{typed} and {option}= in --model-args are the same option; give one of them")
-        if option not in options or not comes_from_file(option):
-            options[option] = str(value)
+        if name in options and comes_from_file(name) == comes_from_file("model_args"):
+            typed = f"--{name.replace('_', '-')}"
+            raise click.UsageError(f"{typed} and {name}= in --model-args are the same option; give one of them")
+        if name not in options or not comes_from_file(name):  # what is typed wins over the file
+            options[name] = str(given[name])
     return options
-
-
-def _refuse_shared_caps(options: Mapping[str, Mapping[str, str]], worker_settings: WorkerSettings) -> None:
-    capped = sorted({"max_tokens_total", "max_cost"} & {name for given in options.values() for name in given})
-    if capped and not worker_settings.is_local:
-        raise click.UsageError(f"{capped[0]} counts what one process asks for; leave out --workers, or the cap")

@@ -1,7 +1,7 @@
-"""Options of suites on the command line, made from their dataclasses."""
+"""Options of suites on the command line, built from their dataclasses."""
 
 import typing
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import Field, fields
 from itertools import product
 from types import NoneType
@@ -9,29 +9,25 @@ from typing import Any
 
 import click
 
-from infthor_eval.cli.options.values import Whole, names_in
+from infthor_eval.cli.options.values import WholeNumber, split_names
 from infthor_eval.errors import UsageError
 from infthor_eval.suites import options_of, suite_names
 
-__all__ = ["chosen_options", "refuse_twins", "suite_options"]
+__all__ = ["expand_suite_options", "refuse_duplicate_options", "suite_options", "suite_values"]
 
 
 def suite_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add every suite's options to a command; a value that is not given is None.
+    """Add the options of every suite to a command, which passes them to `suite_values`.
 
-    Suites share an option of one name, each with what it says of it.
+    Suites with an option of one name share it; its help has the text of each.
     """
-    found: dict[str, dict[str, Field[Any]]] = {}
-    for suite in suite_names():
-        for item in fields(options_of(suite)):
-            found.setdefault(item.name, {})[suite] = item
-    for name, by_suite in reversed(found.items()):
+    for name, by_suite in reversed(_options_by_name().items()):
         first, item = next(iter(by_suite.items()))
-        kind = _type(typing.get_type_hints(options_of(first))[name])
+        kind = _value_type(typing.get_type_hints(options_of(first))[name])
         choices = item.metadata.get("choices")
         command = click.option(
             f"--{name.replace('_', '-')}",
-            type=None if kind is bool else click.Choice(choices) if choices else _click_type(kind),
+            type=None if kind is bool else click.Choice(choices) if choices else WholeNumber() if kind is int else kind,
             is_flag=kind is bool,
             default=None,
             metavar=item.metadata.get("metavar"),
@@ -40,68 +36,76 @@ def suite_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return command
 
 
-def chosen_options(suite: str, given: Mapping[str, Any], asked: typing.Collection[str]) -> list[Any]:
-    """The options of one suite, of all that a command was given: for each run that they ask for.
+def suite_values(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the options of all suites among the parameters of a command."""
+    return {name: given[name] for name in _options_by_name()}
 
-    An option with `each` in its metadata takes several values with commas, and a run is asked for with each.
+
+def expand_suite_options(suite: str, given: Mapping[str, Any], used: Collection[str]) -> list[Any]:
+    """Return the options of a suite for each of its runs.
+
+    An option with `each` in its metadata takes several values with commas, and there is a run for each of them.
 
     Args:
-        suite: the suite.
-        given: option names to values, of all suites; None where not given.
-        asked: the suites that are asked.
+        suite: name of the suite.
+        given: options of all suites by name; None where not given.
+        used: names of the suites that the tasks belong to.
 
     Raises:
-        UsageError: an option belongs to a suite that is not asked.
+        UsageError: an option belongs to no suite that is used.
     """
-    _refuse_unasked(given, asked)
-    known = typing.get_type_hints(options_of(suite))
+    _refuse_unused(given, used)
+    kinds = typing.get_type_hints(options_of(suite))
     values: dict[str, list[Any]] = {}
     for item in fields(options_of(suite)):
         if given.get(item.name) is not None:
-            typed = names_in(given[item.name], f"--{item.name}") if item.metadata.get("each") else [given[item.name]]
-            values[item.name] = [_type(known[item.name])(value) for value in typed]
+            typed = split_names(given[item.name], f"--{item.name}") if item.metadata.get("each") else [given[item.name]]
+            values[item.name] = [_value_type(kinds[item.name])(value) for value in typed]
     return [options_of(suite)(**dict(zip(values, chosen, strict=True))) for chosen in product(*values.values())]
 
 
-def refuse_twins(command: Callable[..., Any]) -> None:
-    """Refuse options of another package's suite that are a command's own.
+def refuse_duplicate_options(command: Callable[..., Any]) -> None:
+    """Refuse options of another package's suite that the command has already.
 
     Args:
-        command: with its own options and those of all suites.
+        command: a command with its own options and those of all suites.
 
     Raises:
-        UsageError: names the option.
+        UsageError: an option is there twice.
     """
-    made: list[click.Parameter] = command.__click_params__  # type: ignore[attr-defined]
-    names = [option.name for option in made]
-    twins = sorted({str(name) for name in names if names.count(name) > 1})
-    if twins:
-        having = [suite for suite in suite_names() if twins[0] in {item.name for item in fields(options_of(suite))}]
-        raise UsageError(f"the option {twins[0]} of the suite {having[0]} is one of every run; give it another name")
+    options: list[click.Parameter] = command.__click_params__  # type: ignore[attr-defined]
+    names = [option.name for option in options]
+    duplicates = sorted({str(name) for name in names if names.count(name) > 1})
+    if duplicates:
+        suite = next(iter(_options_by_name()[duplicates[0]]))
+        raise UsageError(f"the option {duplicates[0]} of the suite {suite} is one of every run; give it another name")
 
 
-def _refuse_unasked(given: Mapping[str, Any], asked: typing.Collection[str]) -> None:
-    suites = suite_names()
-    for name, value in given.items():
-        having = [suite for suite in suites if name in {item.name for item in fields(options_of(suite))}]
-        if value is not None and having and not set(having) & set(asked):
+def _options_by_name() -> dict[str, dict[str, Field[Any]]]:
+    """The options of all suites by name, then by suite."""
+    options: dict[str, dict[str, Field[Any]]] = {}
+    for suite in suite_names():
+        for item in fields(options_of(suite)):
+            options.setdefault(item.name, {})[suite] = item
+    return options
+
+
+def _refuse_unused(given: Mapping[str, Any], used: Collection[str]) -> None:
+    for name, by_suite in _options_by_name().items():
+        if given.get(name) is not None and not set(by_suite) & set(used):
             raise UsageError(
-                f"--{name.replace('_', '-')} is for tasks of {' and '.join(having)}; none of them is asked"
+                f"--{name.replace('_', '-')} is for tasks of {' and '.join(by_suite)}; --tasks names none of these"
             )
 
 
 def _help(by_suite: Mapping[str, Field[Any]]) -> str:
-    """What each suite says of its option, and whose it is; what several say alike, once."""
-    saying: dict[str, list[str]] = {}
+    """The text of each suite with the suites' names; equal texts once."""
+    suites: dict[str, list[str]] = {}
     for suite, item in by_suite.items():
-        saying.setdefault(item.metadata.get("help", ""), []).append(suite)
-    return " ".join(f"{said} [{', '.join(suites)}]" for said, suites in saying.items())
+        suites.setdefault(item.metadata.get("help", ""), []).append(suite)
+    return " ".join(f"{text} [{', '.join(names)}]" for text, names in suites.items())
 
 
-def _click_type(kind: type) -> Any:
-    return Whole() if kind is int else kind
-
-
-def _type(hint: Any) -> type:
+def _value_type(hint: Any) -> type:
     """The type behind `int | None`."""
     return next(kept for kept in (typing.get_args(hint) or (hint,)) if kept is not NoneType)

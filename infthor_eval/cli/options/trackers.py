@@ -1,14 +1,13 @@
 """The options that send finished runs to trackers, named as lm-eval names them."""
 
-import functools
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import click
 
-from infthor_eval.cli.options.values import pairs_in
+from infthor_eval.cli.options.values import parse_pairs
 
-__all__ = ["TRACKERS", "tracker_options"]
+__all__ = ["parse_trackers", "tracker_options"]
 
 _HELP = {
     "wandb_args": "Send finished runs to Weights & Biases: arguments of wandb.init (project=NAME).",
@@ -17,21 +16,21 @@ _HELP = {
 }
 
 
-TRACKERS = tuple(_HELP)  # the parameters of the options
-
-
 def tracker_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add the trackers' options to a command, which is given what was typed, by option, as `trackers`."""
-
-    @functools.wraps(command)
-    def with_trackers(**given: Any) -> Any:
-        typed = {name: given.pop(name) for name in _HELP}
-        found = {name: pairs_in(text.split(","), _typed(name)) for name, text in typed.items() if text is not None}
-        return command(trackers=found, **given)
-
-    options = (click.option(_typed(name), metavar="K=V,...", help=told) for name, told in reversed(_HELP.items()))
-    return functools.reduce(lambda wrapped, option: option(wrapped), options, with_trackers)
+    """Add an option for each tracker to a command, which passes them to `parse_trackers`."""
+    for name, text in reversed(_HELP.items()):
+        command = click.option(_option(name), metavar="K=V,...", help=text)(command)
+    return command
 
 
-def _typed(name: str) -> str:
+def parse_trackers(given: Mapping[str, Any]) -> dict[str, dict[str, str]]:
+    """Return the arguments of each tracker that is used, by option.
+
+    Args:
+        given: parameters of the command.
+    """
+    return {name: parse_pairs(given[name].split(","), _option(name)) for name in _HELP if given[name] is not None}
+
+
+def _option(name: str) -> str:
     return f"--{name.replace('_', '-')}"

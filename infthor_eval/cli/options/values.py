@@ -1,25 +1,26 @@
-"""What several commands share: options, and how their values are written."""
+"""Types of option values, and options that several commands share."""
 
 import math
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import click
 
 __all__ = [
-    "FiniteRange",
-    "ModelOptions",
-    "ModelsAsked",
-    "Whole",
+    "FiniteFloat",
+    "ModelArgs",
+    "ModelList",
+    "ModelSpec",
+    "WholeNumber",
     "floor_plans_option",
     "include_option",
-    "model_options_in",
-    "names_in",
-    "pairs_in",
+    "parse_model_args",
+    "parse_pairs",
+    "split_names",
 ]
 
-_LARGEST = 2**63 - 1  # of the numbers that a run's identity can hold
+_LARGEST = 2**63 - 1  # the largest integer of a run's JSON
 
 floor_plans_option = click.option(
     "--data",
@@ -32,34 +33,46 @@ include_option = click.option(
     "include",
     type=click.Path(exists=True, file_okay=False, path_type=Path),
     multiple=True,
-    help="Folder with task files of your own; may be repeated.",
+    help="Folder with your own task files; may be repeated.",
 )
 
 
-class Whole(click.ParamType):
-    """A whole number that a run's identity can hold. An `IntRange` would print that limit into every help text.
+class ModelSpec(NamedTuple):
+    """A model to evaluate.
+
+    Attributes:
+        name: name of the model.
+        options: its options, as typed.
+    """
+
+    name: str
+    options: Mapping[str, str] = {}
+
+
+class WholeNumber(click.ParamType):
+    """A whole number that fits into a run's JSON. An `IntRange` would print that limit into every help text.
 
     Args:
-        least: that it may be.
+        minimum: the smallest number allowed.
     """
 
     name = "integer"
 
-    def __init__(self, least: int = -_LARGEST) -> None:
-        self._least = least
+    def __init__(self, minimum: int = -_LARGEST) -> None:
+        self._minimum = minimum
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
         """See `click.ParamType`."""
         number = int(click.INT.convert(value, param, ctx))
-        if number < self._least:
-            self.fail(f"{number} is less than {self._least}.", param, ctx)
+        if number < self._minimum:
+            self.fail(f"{number} is less than {self._minimum}.", param, ctx)
         if number > _LARGEST:
             self.fail(f"{number} is more than {_LARGEST}.", param, ctx)
         return number
 
 
-class FiniteRange(click.FloatRange):
-    """A number within a range; not the "nan" that is neither below nor above anything."""
+class FiniteFloat(click.FloatRange):
+    """A number within a range. `FloatRange` lets "nan" through, which is neither below nor above a bound."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
         """See `click.FloatRange`."""
@@ -69,48 +82,50 @@ class FiniteRange(click.FloatRange):
         return number
 
 
-class ModelOptions(click.ParamType):
+class ModelArgs(click.ParamType):
     """Options of a model: `k=v,k=v`, or a mapping where a file gives them."""
 
     name = "K=V,..."
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> dict[str, str]:
         """See `click.ParamType`."""
-        return dict(value) if isinstance(value, Mapping) else model_options_in(value)
+        return dict(value) if isinstance(value, Mapping) else parse_model_args(value)
 
 
-class ModelsAsked(click.ParamType):
-    """Models by name, each with options of its own where it has any: `A:k=v,k=v,B`."""
+class ModelList(click.ParamType):
+    """Models by name, each with options where it has any: `A:k=v,k=v,B`. Each `A:` begins another model."""
 
     name = "MODEL[:K=V,...],..."
 
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> dict[str, dict[str, str]]:
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[ModelSpec, ...]:
         """See `click.ParamType`."""
-        return value if isinstance(value, dict) else _models_in(value, param.opts[0] if param else "--model")
+        return value if isinstance(value, tuple) else _parse_models(value, param.opts[0] if param else "--model")
 
 
-def _models_in(text: str, option: str) -> dict[str, dict[str, str]]:
-    found: dict[str, list[str]] = {}
-    model = ""
+def _parse_models(text: str, option: str) -> tuple[ModelSpec, ...]:
+    models: list[tuple[str, list[str]]] = []
     for item in filter(None, (part.strip() for part in text.split(","))):
         before, equals, _ = item.partition("=")
-        named, _, _ = before.rpartition(":")  # a name may hold a colon, of a key none is known that does
-        model = named or model if equals else item
-        if not model:
-            raise click.UsageError(f"{option}: {item!r} stands before any model; write MODEL:{item}")
-        found.setdefault(model, []).extend([item.removeprefix(f"{named}:")] if equals else [])
-    if not found:
+        name, colon, _ = before.rpartition(":")  # the last colon: a name may hold one (FILE.py:CLASS), a key may not
+        if not equals:
+            models.append((item, []))
+        elif colon:
+            models.append((name, [item.removeprefix(f"{name}:")]))
+        elif models:
+            models[-1][1].append(item)
+        else:
+            raise click.UsageError(f"{option}: {item!r} comes before any model; write MODEL:{item}")
+    specs = [ModelSpec(name, parse_pairs(items, f"{option} {name}")) for name, items in models]
+    if not specs or not all(spec.name for spec in specs):
         raise click.UsageError(f"{option} is empty; give a name")
-    return {model: pairs_in(items, f"{option} {model}") for model, items in found.items()}
+    return tuple(spec for place, spec in enumerate(specs) if spec not in specs[:place])
 
 
-def names_in(text: str, option: str) -> tuple[str, ...]:
-    """Names written with commas, each once.
+def split_names(text: str, option: str) -> tuple[str, ...]:
+    """Return the names in a list with commas, each once.
 
     Raises:
-        click.UsageError: there is none.
+        click.UsageError: the list is empty.
     """
     names = tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
     if not names:
@@ -118,31 +133,31 @@ def names_in(text: str, option: str) -> tuple[str, ...]:
     return names
 
 
-def model_options_in(text: str) -> dict[str, str]:
-    """Options of a model written as lm-eval writes them: `k=v,k=v`.
+def parse_model_args(text: str) -> dict[str, str]:
+    """Return the options of a model, written as lm-eval writes them: `k=v,k=v`.
 
     Raises:
-        click.UsageError: an item is of another form, or a key stands twice.
+        click.UsageError: an item is not `k=v`, or a key is given twice.
     """
-    return pairs_in(text.split(","), "--model-args")
+    return parse_pairs(text.split(","), "--model-args")
 
 
-def pairs_in(items: Iterable[str], where: str) -> dict[str, str]:
-    """Keys and values written as `k=v`.
+def parse_pairs(items: Iterable[str], option: str) -> dict[str, str]:
+    """Return keys and values written as `k=v`.
 
     Args:
-        items: as typed.
-        where: they were typed, for the message.
+        items: the pairs, as typed.
+        option: the option that they belong to, for messages.
 
     Raises:
-        click.UsageError: an item is of another form, or a key stands twice.
+        click.UsageError: an item is not `k=v`, or a key is given twice.
     """
-    options: dict[str, str] = {}
+    pairs: dict[str, str] = {}
     for item in filter(None, (part.strip() for part in items)):
         key, equals, value = item.partition("=")
         if not equals or not key.strip():
-            raise click.UsageError(f"{where}: {item!r} is not of the form key=value")
-        if key.strip() in options:
-            raise click.UsageError(f"{where}: {key.strip()!r} is given twice")
-        options[key.strip()] = value.strip()
-    return options
+            raise click.UsageError(f"{option}: {item!r} is not of the form key=value")
+        if key.strip() in pairs:
+            raise click.UsageError(f"{option}: {key.strip()!r} is given twice")
+        pairs[key.strip()] = value.strip()
+    return pairs

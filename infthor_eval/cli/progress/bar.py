@@ -1,57 +1,57 @@
-"""A piece of work that takes its time: a bar on a terminal, elsewhere lines with its rate and the time left."""
+"""Progress of long work: a bar on a terminal, elsewhere lines with its rate and the time left."""
 
 import time
 
 from rich.progress import Progress
 
 from infthor_eval.cli.progress.pace import Pace
-from infthor_eval.runs import NOTHING, Usage
 
 __all__ = ["PacedBar", "StepBars"]
 
 
 class PacedBar:
-    """Tells how far a piece of work has come.
+    """Shows the progress of one piece of work.
 
     Attributes:
         pace: how fast it goes.
     """
 
-    def __init__(self, progress: Progress, name: str, total: int, n_found: int = 0) -> None:
-        """Begin.
+    def __init__(self, progress: Progress, name: str, total: int, n_resumed: int = 0) -> None:
+        """Start a bar.
 
         Args:
-            progress: draws the bar; its console is written to where it is no terminal.
-            name: what is told of it.
-            total: units.
-            n_found: of them, by an earlier run, which are not counted one by one.
+            progress: draws the bar; its console gets lines where it is no terminal.
+            name: name of the work.
+            total: units in all.
+            n_resumed: units that an earlier run had done and that `advance` is not called for.
         """
-        self.pace = Pace(total, time.monotonic(), n_found)
+        self.pace = Pace(total, time.monotonic(), n_resumed)
         self._name = name
         self._progress = progress
-        self._bar = progress.add_task(name, total=total, completed=n_found)
+        self._bar = progress.add_task(name, total=total, completed=n_resumed)
 
-    def advance(self, resumed: bool = False, *, usage: Usage = NOTHING, said: str = "") -> None:
-        """A unit is done.
+    def advance(self, resumed: bool = False, *, context: int = 0, cached: int = 0, detail: str = "") -> None:
+        """Count a unit.
 
         Args:
-            resumed: an earlier run had done it.
-            usage: of models.
-            said: what is told beside the pace.
+            resumed: whether an earlier run had done it.
+            context: tokens of its requests to a model.
+            cached: tokens of these that were not encoded again.
+            detail: text beside the pace.
         """
         now = time.monotonic()
-        self.pace.count(usage, resumed, now)
-        name = f"{self._name}: {said}" if said else self._name
+        self.pace.count(resumed, now, context, cached)
+        name = f"{self._name}: {detail}" if detail else self._name
         self._progress.update(self._bar, advance=1, description=f"{name}  {self.pace.speed(now)}")
         if not self._progress.console.is_terminal and self.pace.is_due(now):
-            self._progress.console.print(f"{self._name}: {self.pace.line(now)}{f'; {said}' if said else ''}")
+            self._progress.console.print(f"{self._name}: {self.pace.line(now)}{f'; {detail}' if detail else ''}")
 
 
 class StepBars:
-    """A bar for each part of a training, from its first step on: nobody knows before how many there will be."""
+    """A bar for each part of a training, started at its first step, when the number of steps is known."""
 
     def __init__(self, progress: Progress) -> None:
-        """Begin.
+        """Start without bars.
 
         Args:
             progress: draws the bars.
@@ -59,16 +59,16 @@ class StepBars:
         self._progress = progress
         self._bars: dict[str, PacedBar] = {}
 
-    def advance(self, part: str, step: int, n_steps: int, said: str) -> None:
-        """A step is done.
+    def advance(self, part: str, step: int, n_steps: int, detail: str) -> None:
+        """Count a step.
 
         Args:
-            part: of the training.
-            step: its number in the part, from 1 on; the first that is told of may be a later one.
-            n_steps: of the part.
-            said: what is told beside the pace.
+            part: part of the training.
+            step: number of the step in its part, from 1; a resumed training starts at a later one.
+            n_steps: steps of the part.
+            detail: text beside the pace.
         """
         if part in self._bars:
-            self._bars[part].advance(said=said)
-        else:  # when this one began is not known
-            self._bars[part] = PacedBar(self._progress, part, n_steps, n_found=step)
+            self._bars[part].advance(detail=detail)
+        else:  # the start of the first step is not known, so it does not count for the pace
+            self._bars[part] = PacedBar(self._progress, part, n_steps, n_resumed=step)

@@ -1,4 +1,4 @@
-"""Ctrl-C in the midst of a run: the first one lets the unit in hand end, the second stops at once."""
+"""Ctrl-C during a run: the first one finishes the present unit, the second stops at once."""
 
 import contextlib
 import signal
@@ -6,40 +6,45 @@ import threading
 from collections.abc import Callable, Iterator
 from types import FrameType
 
-__all__ = ["Stop", "stopped_by_sigint"]
+__all__ = ["Stop", "stop_on_sigint"]
 
 
 class Stop:
-    """Whether somebody asked a run to stop; what asks all the time calls it."""
+    """Whether a run is to stop; the driver calls it before each unit.
+
+    Attributes:
+        is_requested: whether Ctrl-C was pressed.
+        has_begun: whether units are being done; before that there is nothing to finish.
+    """
 
     def __init__(self) -> None:
-        self.asked = False
-        self.begun = False  # before the first unit there is nothing to finish
+        self.is_requested = False
+        self.has_begun = False
 
     def __call__(self) -> bool:
-        """Whether to stop."""
-        return self.asked
+        """Return whether to stop."""
+        return self.is_requested
 
 
 @contextlib.contextmanager
-def stopped_by_sigint(say: Callable[[str], None]) -> Iterator[Stop]:
-    """SIGINT asks to stop, where the run has begun; again, or before that, it stops at once.
+def stop_on_sigint(print_note: Callable[[str], None]) -> Iterator[Stop]:
+    """Request a stop at the first SIGINT of a run; raise KeyboardInterrupt at the second, or before the first unit.
 
     Args:
-        say: is told what happens, a line.
+        print_note: prints a line for the user.
     """
     stop = Stop()
 
-    def ask(_number: int, _frame: FrameType | None) -> None:
-        if stop.asked or not stop.begun:
+    def request_stop(_number: int, _frame: FrameType | None) -> None:
+        if stop.is_requested or not stop.has_begun:
             raise KeyboardInterrupt
-        stop.asked = True
-        say("stopping after the unit in hand; press Ctrl-C again to stop at once")
+        stop.is_requested = True
+        print_note("stopping after the present unit; press Ctrl-C again to stop at once")
 
-    if threading.current_thread() is not threading.main_thread():
+    if threading.current_thread() is not threading.main_thread():  # only the main thread may set signal handlers
         yield stop
         return
-    before = signal.signal(signal.SIGINT, ask)
+    before = signal.signal(signal.SIGINT, request_stop)
     try:
         yield stop
     finally:

@@ -38,7 +38,7 @@ def test_a_name_is_the_runs_in_its_folder_its_table_and_its_results(ask, tmp_pat
     assert results["name"] == "upper bound"
     assert any(line.split()[:3] == ["upper", "bound", "nieh_gt"] for line in out.splitlines())
     assert f"upper bound: {tmp_path / 'out' / 'upper bound'}" in out.replace("\n", "")
-    assert "upper bound: 5 answered now" in err
+    assert "upper bound: 5 evaluated now" in err
     # The name is no part of what the run is: it lies in a folder of the same digest.
     assert [path.name for path in sorted((tmp_path / "out").iterdir())] == ["oracle", "upper bound"]
     assert len({path.parent.name for path in (tmp_path / "out").rglob("results.json")}) == 1
@@ -55,7 +55,7 @@ def test_a_name_that_is_no_folders_is_refused(ask, tmp_path, name):
 def test_one_name_is_not_for_two_models(ask, tmp_path):
     code, out, err = ask("--name", "both", model="oracle,blind")
     assert (code, out, len(err.splitlines())) == (2, "", 1)
-    assert "--name both: names one run, and 2 models are asked" in err
+    assert "--name both: names one run, but 2 models are given" in err
     assert not (tmp_path / "out").exists()
 
 
@@ -66,19 +66,19 @@ def test_fresh_starts_anew_and_sets_every_earlier_journal_aside(ask, tmp_path):
     for number in (1, 2):
         code, _, err = ask("--fresh")
         assert code == 0
-        assert "5 answered now, 0 found in the journal" in err
+        assert "5 evaluated now, 0 resumed from the journal" in err
         assert sorted(path.name for path in folder.glob("journal*")) == [
             "journal",
             *(f"journal.{each}" for each in range(1, number + 1)),
         ]
     assert (folder / "journal.1" / "worker-0.jsonl").read_bytes() == first
-    assert "0 answered now, 5 found in the journal" in ask()[2]
+    assert "0 evaluated now, 5 resumed from the journal" in ask()[2]
 
 
 def test_fresh_is_no_matter_where_nothing_was(ask, tmp_path):
     code, _, err = ask("--fresh", "--recover", model="oracle")
     assert code == 0
-    assert "5 answered now, 0 found" in err
+    assert "5 evaluated now, 0 resumed" in err
     assert not list(tmp_path.rglob("journal.1"))
 
 
@@ -114,12 +114,12 @@ def test_a_bad_line_in_a_journal_is_named_and_recovered_from(ask, tmp_path):
     code, _, err = ask("--recover")
     assert code == 0
     assert "qwen2.5-vl-tiny: 2 bad line(s) of the journal set aside; those units are tried again" in err
-    assert "2 answered now, 3 found in the journal" in err
+    assert "2 evaluated now, 3 resumed from the journal" in err
     assert replies(path.parents[1]) == before
     assert (path.parent / "bad_lines.txt").read_bytes() == lines[2] + lines[4]
     code, _, err = ask("--recover")
     assert "bad line" not in err
-    assert "0 answered now, 5 found in the journal" in err
+    assert "0 evaluated now, 5 resumed from the journal" in err
 
 
 def test_a_journal_without_its_first_line_is_recovered_from(ask, tmp_path):
@@ -134,7 +134,7 @@ def test_a_journal_without_its_first_line_is_recovered_from(ask, tmp_path):
     code, _, err = ask("--recover")
     assert code == 0
     assert "1 bad line(s) of the journal set aside" in err
-    assert "0 answered now, 5 found in the journal" in err
+    assert "0 evaluated now, 5 resumed from the journal" in err
     assert replies(path.parents[1]) == before
 
 
@@ -150,4 +150,4 @@ def test_two_journals_in_one_file_are_named_and_recovered_from(ask, tmp_path):
     code, _, err = ask("--recover", model="oracle")
     assert code == 0
     assert "oracle: 1 bad line(s) of the journal set aside" in err
-    assert "0 answered now, 5 found in the journal" in err
+    assert "0 evaluated now, 5 resumed from the journal" in err

@@ -8,7 +8,7 @@ import pytest
 
 from infthor_eval.formats.question import Question
 
-from ..waiting import PATIENCE_S, wait_until
+from ...waiting import PATIENCE_S, wait_until
 
 MANY = [
     Question(traj_id, f"Is there a {name}?", (index,), ("yes",), "object_presence")
@@ -75,7 +75,7 @@ def test_a_context_beyond_the_models_limit_is_told_before_it_is_refused(make_nie
     )
     assert "(limit 1,200): fits" in told
     assert "2 of 2 contexts refused" in refused
-    assert err.index("2 of 2 contexts refused") < err.index("answered now")
+    assert err.index("2 of 2 contexts refused") < err.index("evaluated now")
     assert "is beyond the 1200 tokens of qwen2.5-vl-tiny" in err
 
 
@@ -160,7 +160,7 @@ def test_a_killed_run_goes_on_and_ends_as_an_undisturbed_one(make_nieh_set, tmp_
     again = start(tmp_path / "killed")
     _, said = again.communicate(timeout=PATIENCE_S)
     assert again.returncode == 0, said
-    assert f"{2 * len(MANY) - n_before} answered now, {n_before} found" in said
+    assert f"{2 * len(MANY) - n_before} evaluated now, {n_before} resumed" in said
     whole = start(tmp_path / "whole")
     assert whole.communicate(timeout=PATIENCE_S) and whole.returncode == 0
 

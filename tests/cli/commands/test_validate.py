@@ -122,7 +122,7 @@ def test_decisions_are_applied(data, tmp_path, run):
     assert code == 0
     assert kept(out) == ["Is there a mug?", "What is <b>it</b>?", "Was it there?"]
     assert "3 kept, 1 rejected, 1 to inspect" in printed
-    assert "0 answered now, 5 found" in err
+    assert "0 evaluated now, 5 resumed" in err
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 import json
 import shlex
 from pathlib import Path
+from typing import Any
 
 import click
 import pytest
@@ -10,8 +11,8 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from infthor_eval.cli.options.run import run_options
-from infthor_eval.cli.options.values import ModelsAsked
+from infthor_eval.cli.options.run import RunOptions, run_options
+from infthor_eval.cli.options.values import ModelList
 from infthor_eval.runs import RunRequest, Suite, read_configuration
 from tests.faults.told import said_in_one_line
 
@@ -41,9 +42,9 @@ def config(make_nieh_set, tmp_path):
 def test_a_run_by_a_file_and_what_is_typed_wins(config, tmp_path, run, words):
     code, _, err = run(*words, config(limit=2))
     assert code == 0, err
-    assert "oracle: 2 answered now" in err
+    assert "oracle: 2 evaluated now" in err
     code, _, err = run(*words, config(limit=2), "--limit", 3, "--model", "blind")
-    assert "blind: 3 answered now" in err
+    assert "blind: 3 evaluated now" in err
 
 
 def test_the_file_that_a_run_leaves_goes_on_with_that_very_run(config, tmp_path, run, monkeypatch):
@@ -56,7 +57,7 @@ def test_the_file_that_a_run_leaves_goes_on_with_that_very_run(config, tmp_path,
     for path in left:
         code, _, err = run("--config", path)
         assert code == 0
-        assert "mine: 0 answered now, 4 found" in err
+        assert "mine: 0 evaluated now, 4 resumed" in err
     assert sorted((tmp_path / "out" / "mine").rglob("run.yaml")) == left
     assert [(path.parent / "results.json").read_bytes() for path in left] == before
 
@@ -65,7 +66,7 @@ def test_the_command_that_it_stands_for_is_the_run(config, run):
     run("--config", config(limit=2, frames="blank"))
     found = read_configuration(only(config().parent / "out", "run.yaml").parent)
     _, _, err = run(*shlex.split(found.command)[1:])
-    assert "oracle: 0 answered now, 2 found" in err
+    assert "oracle: 0 evaluated now, 2 resumed" in err
 
 
 @pytest.mark.slow
@@ -115,15 +116,12 @@ def requests():
     """What a command with the options of a run is given."""
 
     def requests(*arguments: object) -> list[RunRequest]:
-        found: list[tuple[RunRequest, Suite]] = []
-
         @click.command()
-        @run_options()
-        def command(requests: list[tuple[RunRequest, Suite]]) -> None:
-            found.extend(requests)
+        @run_options
+        def command(**given: Any) -> list[tuple[RunRequest, Suite]]:
+            return RunOptions.from_click(given).requests()
 
-        command.main(list(map(str, arguments)), standalone_mode=False)
-        return [request for request, _ in found]
+        return [request for request, _ in command.main(list(map(str, arguments)), standalone_mode=False)]
 
     return requests
 
@@ -145,41 +143,44 @@ def test_each_model_has_its_own_options(config, requests):
         "qwen2.5-vl@vllm": {"dtype": "float32", "max_tokens": "1000", "seed": "1"},
         "pixtral@vllm": {"dtype": "bfloat16", "seed": "1"},
     }
-    with pytest.raises(click.UsageError, match="max_cost counts what one process asks for"):
+    with pytest.raises(click.UsageError, match="max_cost counts the requests of one process"):
         requests("--config", config(workers=2), "--model", "oracle,openai:max_cost=2")
 
 
 TYPED = {
-    "A": {"A": {}},
-    "A, B": {"A": {}, "B": {}},
-    "A:x=1,y=2,B,C:x=3": {"A": {"x": "1", "y": "2"}, "B": {}, "C": {"x": "3"}},
-    "A:url=http://h:1/v=2,B": {"A": {"url": "http://h:1/v=2"}, "B": {}},
-    "./a.py:Class,B": {"./a.py:Class": {}, "B": {}},
-    "./a.py:Class:x=1": {"./a.py:Class": {"x": "1"}},
-    "A:x=1,B:x=1,y=2,A:z=1,w=2": {"A": {"x": "1", "z": "1", "w": "2"}, "B": {"x": "1", "y": "2"}},
+    "A": [("A", {})],
+    "A, B": [("A", {}), ("B", {})],
+    "A:x=1,y=2,B,C:x=3": [("A", {"x": "1", "y": "2"}), ("B", {}), ("C", {"x": "3"})],
+    "A:url=http://h:1/v=2,B": [("A", {"url": "http://h:1/v=2"}), ("B", {})],
+    "./a.py:Class,B": [("./a.py:Class", {}), ("B", {})],
+    "./a.py:Class:x=1": [("./a.py:Class", {"x": "1"})],
+    "A:x=1,B:x=1,y=2,A:z=1,w=2": [("A", {"x": "1"}), ("B", {"x": "1", "y": "2"}), ("A", {"z": "1", "w": "2"})],
+    "A:x=1,A:x=2,A": [("A", {"x": "1"}), ("A", {"x": "2"}), ("A", {})],
+    "A,B,A,A:x=1,A:x=1": [("A", {}), ("B", {}), ("A", {"x": "1"})],
 }
 
 
 @pytest.mark.parametrize("typed", TYPED)
 def test_models_as_typed(typed):
-    assert ModelsAsked().convert(typed, None, None) == TYPED[typed]
+    assert ModelList().convert(typed, None, None) == tuple(TYPED[typed])
 
 
 NAMES = st.text("ab.5-", min_size=1)
 OPTIONS = st.dictionaries(st.text("xy_", min_size=1), st.text("/:=1 z", min_size=1).map(str.strip))
 
 
-@given(st.dictionaries(NAMES, OPTIONS, min_size=1))
+@given(st.lists(st.tuples(NAMES, OPTIONS), min_size=1))
 def test_models_as_typed_come_back(models):
     parts = [
-        ",".join([name if not given else ""] + [f"{name}:{k}={v}" for k, v in given.items()])
-        for name, given in models.items()
+        f"{name}:{','.join(f'{key}={value}' for key, value in given.items())}" if given else name
+        for name, given in models
     ]
-    assert ModelsAsked().convert(",".join(parts), None, None) == models
+    expected = [model for place, model in enumerate(models) if model not in models[:place]]
+    assert list(ModelList().convert(",".join(parts), None, None)) == expected
 
 
 @pytest.mark.parametrize(
-    ("typed", "said"), [("x=1,A", "stands before any model"), (",", "--model is empty"), ("A:x=1,x=2", "given twice")]
+    ("typed", "said"), [("x=1,A", "comes before any model"), (",", "--model is empty"), ("A:x=1,x=2", "given twice")]
 )
 def test_models_that_cannot_be_meant(run, typed, said):
     said_in_one_line(run("--model", typed, "--tasks", "nieh_gt"), said)

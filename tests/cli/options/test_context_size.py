@@ -78,7 +78,7 @@ def test_the_extension_is_the_same_run_whichever_way_it_is_given(make_nieh_set, 
     arguments = ["--model", "qwen2.5-vl-tiny", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out"]
     assert run(*arguments, "--rope", "linear:2")[0] == 0
     _, _, err = run(*arguments, "--model-args", "rope=linear:2")
-    assert "0 answered now, 5 found in the journal" in err
+    assert "0 evaluated now, 5 resumed from the journal" in err
 
 
 def test_what_fits_by_the_extension_alone_is_told_with_both_limits(make_nieh_set, tmp_path, short, run):

@@ -12,7 +12,7 @@ from infthor_eval.formats.question import Question
 from infthor_eval.nieh.records import RECORDS
 from infthor_eval.runs import read_header, read_run
 
-from ..waiting import PATIENCE_S, wait_until
+from ...waiting import PATIENCE_S, wait_until
 
 QUESTIONS = [
     Question(traj_id, f"Is there a {name}?", (index,), ("yes",), "object_presence")
@@ -46,7 +46,7 @@ def test_retrieval_runs_through_and_the_retriever_is_part_of_the_run(data, make_
     assert [(len(doc["frames"]), doc["frames"][-1]) for doc in docs(out, "nieh_memory_frames")] == [(21, 44)] * 6
     results = only(out, "results.json").read_bytes()
     code, _, err = run(*arguments, "--retriever", first)
-    assert "0 answered now, 12 found" in err
+    assert "0 evaluated now, 12 resumed" in err
     assert only(out, "results.json").read_bytes() == results
     assert run(*arguments, "--retriever", second)[0] == 0
     identities = [read_header(path.parent).config for path in out.rglob("journal")]

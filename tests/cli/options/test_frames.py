@@ -32,7 +32,7 @@ def test_a_run_with_each_and_the_gain_between_them(make_nieh_set, tmp_path, run,
     assert [TINY + ",", "blank", "frames", "nieh_full"] in [row[:4] for row in rows]
     assert "Gain over the same model's run on blank frames, in points" in shown
     _, shown, err = run(*arguments)
-    assert "0 answered now, 5 found" in err  # the run on true frames is the one without the option
+    assert "0 evaluated now, 5 resumed" in err  # the run on true frames is the one without the option
     assert "Gain over" not in shown
 
 

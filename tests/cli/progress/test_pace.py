@@ -6,25 +6,24 @@ import pytest
 from rich.console import Console
 
 from infthor_eval.cli.progress.bar import PacedBar, StepBars
-from infthor_eval.cli.progress.pace import Pace, duration
-from infthor_eval.runs import NOTHING, Usage
+from infthor_eval.cli.progress.pace import Pace, format_duration
 from infthor_eval.terminal import progress_bar
 
 
 def test_what_an_earlier_run_had_done_says_nothing_of_the_pace():
     pace = Pace(100, 0.0)
     for _ in range(40):
-        pace.count(NOTHING, True, 5.0)
+        pace.count(True, 5.0)
     assert pace.line(5.0) == "40 of 100 (40 %)"
     for number in range(10):
-        pace.count(Usage(1, 100, 80, 5), False, 6.0 + number)
+        pace.count(False, 6.0 + number, context=100, cached=80)
     assert pace.line(15.0) == "50 of 100 (50 %), 50.0 s left, 1.0 a second, 80 % of tokens cached"
-    assert (pace.n_found, pace.n_made) == (40, 10)
+    assert (pace.n_resumed, pace.n_new) == (40, 10)
 
 
 def test_a_slow_model_is_told_in_seconds_for_each():
     pace = Pace(3, 0.0)
-    pace.count(Usage(1), False, 60.0)
+    pace.count(False, 60.0)
     assert pace.speed(60.0) == "60.0 s each"
     assert pace.line(60.0) == "1 of 3 (33 %), 2 min left, 60.0 s each"
 
@@ -42,7 +41,7 @@ def test_lines_come_at_sensible_intervals(n_units, every_s, expected):
     pace, told = Pace(n_units, 0.0), []
     for number in range(1, n_units + 1):
         now = round(number * every_s, 6)
-        pace.count(NOTHING, False, now)
+        pace.count(False, now)
         if pace.is_due(now):
             told.append(now)
     assert told[: len(expected)] == expected
@@ -50,7 +49,7 @@ def test_lines_come_at_sensible_intervals(n_units, every_s, expected):
 
 
 def test_work_in_a_pipe_says_lines_with_what_an_earlier_run_had_done_left_out(monkeypatch):
-    monkeypatch.setattr("infthor_eval.cli.progress.pace._LEAST_S", 0.0)
+    monkeypatch.setattr("infthor_eval.cli.progress.pace._MIN_INTERVAL_S", 0.0)
     clock = iter(range(100))
     monkeypatch.setattr("infthor_eval.cli.progress.bar.time.monotonic", lambda: float(next(clock)))
     said = io.StringIO()
@@ -62,7 +61,7 @@ def test_work_in_a_pipe_says_lines_with_what_an_earlier_run_had_done_left_out(mo
 
 
 def test_a_training_that_goes_on_tells_its_own_pace(monkeypatch):
-    monkeypatch.setattr("infthor_eval.cli.progress.pace._LEAST_S", 0.0)
+    monkeypatch.setattr("infthor_eval.cli.progress.pace._MIN_INTERVAL_S", 0.0)
     clock = iter(range(0, 200, 2))
     monkeypatch.setattr("infthor_eval.cli.progress.bar.time.monotonic", lambda: float(next(clock)))
     said = io.StringIO()
@@ -85,12 +84,12 @@ def test_where_there_is_no_terminal_no_bar_is_left():
 
 
 def test_a_run_in_a_pipe_says_lines_without_colour(make_nieh_set, tmp_path, run, monkeypatch):
-    monkeypatch.setattr("infthor_eval.cli.progress.pace._LEAST_S", 0.0)
+    monkeypatch.setattr("infthor_eval.cli.progress.pace._MIN_INTERVAL_S", 0.0)
     arguments = ["--model", "oracle", "--tasks", "nieh_gt", "--data", make_nieh_set(size=56), "--output", tmp_path]
     _, out, err = run(*arguments)
     lines = err.splitlines()
     assert [line.partition(")")[0] for line in lines[:-1]] == [f"oracle: {n} of 5 ({20 * n} %" for n in range(1, 5)]
-    assert lines[-1] == "oracle: 5 answered now, 0 found in the journal of an earlier run"
+    assert lines[-1] == "oracle: 5 evaluated now, 0 resumed from the journal"
     assert "\x1b" not in out + err
 
 
@@ -105,4 +104,4 @@ def test_quiet_says_nothing_but_what_failed(make_nieh_set, tmp_path, run):
 
 
 def test_a_time_is_told_in_one_unit():
-    assert [duration(seconds) for seconds in (1.5, 119, 240, 7200)] == ["1.5 s", "119.0 s", "4 min", "2.0 h"]
+    assert [format_duration(seconds) for seconds in (1.5, 119, 240, 7200)] == ["1.5 s", "119.0 s", "4 min", "2.0 h"]

@@ -66,7 +66,7 @@ def test_a_run_that_reaches_its_cap_goes_on_with_a_higher_one(ask: Any, tmp_path
         assert len(asked) == 3
         code, _, err = ask(url, "--max-tokens-total", 10_000, max_in_flight=1, timeout_s=90)
         assert code == 0, err
-        assert "2 answered now, 3 found in the journal" in err
+        assert "2 evaluated now, 3 resumed from the journal" in err
         assert len(asked) == 5
     records, results = _run(tmp_path / "out")
     assert [record.failure for record in records] == [None] * 5
@@ -207,7 +207,7 @@ def test_a_run_interrupted_twice_ends_at_once_in_one_line(make_nieh_set: Any, tm
             stopped.kill()
             done.set()
     assert (stopped.returncode, out) == (130, "")
-    assert err.splitlines()[-1] == "infthor-eval: stopped; the same command goes on where it was"
+    assert err.splitlines()[-1] == "infthor-eval: stopped; run the same command to continue"
     assert "Traceback" not in err
     assert "never awaited" not in err
     assert "pending" not in err

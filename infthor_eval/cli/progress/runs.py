@@ -1,0 +1,62 @@
+"""Progress of a run, on standard error."""
+
+from typing import Any
+
+from rich.progress import Progress
+
+from infthor_eval.cli.progress.bar import PacedBar
+from infthor_eval.cli.progress.notes import NOTES, print_note
+from infthor_eval.cli.progress.stopping import Stop, stop_on_sigint
+from infthor_eval.reasons import count_reasons
+from infthor_eval.runs import PreparedRun, RunOutcome, UnitRecord, Workload, execute
+from infthor_eval.terminal import progress_bar
+
+__all__ = ["execute_with_progress", "print_workload"]
+
+
+class _ProgressObserver:
+    """Prints what is skipped and what the run costs, then how fast it goes."""
+
+    def __init__(self, name: str, progress: Progress, stop: Stop) -> None:
+        self._name = name
+        self._progress = progress
+        self._stop = stop
+
+    def begin(self, workload: Workload, n_recovered: int) -> None:
+        """See `Observer`."""
+        if n_recovered:
+            print_note(f"{self._name}: {n_recovered} bad line(s) of the journal set aside; those units are tried again")
+        print_workload(workload)
+        self.bar = PacedBar(self._progress, self._name, workload.n_units)
+        self._stop.has_begun = True
+
+    def done(self, record: UnitRecord[Any], resumed: bool) -> None:
+        """See `Observer`."""
+        self.bar.advance(resumed, context=record.usage.context, cached=record.usage.cached)
+
+    def note(self, text: str) -> None:
+        """See `Observer`."""
+        print_note(f"{self._name}: {text}", "yellow")
+
+
+def print_workload(workload: Workload) -> None:
+    """Print what is skipped, by reason, and what each task costs."""
+    for task, reason, n in count_reasons((item.key.task, item.reason) for item in workload.skipped):
+        print_note(f"{task}: {n} sample(s) skipped: {reason}", "yellow")
+    for cost in workload.costs:
+        print_note(f"{cost.task}: {cost.description}")
+
+
+def execute_with_progress(run: PreparedRun) -> RunOutcome:
+    """Execute a run, with a bar on a terminal and lines elsewhere."""
+    with progress_bar(NOTES) as progress, stop_on_sigint(print_note) as stop:
+        observer = _ProgressObserver(run.request.label, progress, stop)
+        outcome = execute(run, observer, stop)
+    pace = observer.bar.pace
+    print_note(f"{run.request.label}: {pace.n_new} evaluated now, {pace.n_resumed} resumed from the journal")
+    if outcome.n_missing:
+        print_note(
+            f"{run.request.label}: stopped, {outcome.n_missing} not attempted; run the same command to continue",
+            "yellow",
+        )
+    return outcome

@@ -1,0 +1,96 @@
+"""Results of runs on standard output: tables, or a form for another program."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import groupby
+from pathlib import Path
+
+import click
+import msgspec
+
+from infthor_eval.cli.options.show import ShowOptions
+from infthor_eval.report.exporting import exported
+from infthor_eval.report.terminal import print_table, table_console
+from infthor_eval.runs import RunSummary, Suite, Usage
+from infthor_eval.runs.results import results_document
+from infthor_eval.runs.run_labels import label_runs
+from infthor_eval.tables import Table
+from infthor_eval.terminal import print_line
+
+__all__ = ["RunResults", "print_results"]
+
+_SHOWN_BY_TABLES = {"frames"}  # the options that the suites' tables show beside a run's name
+
+
+@dataclass(frozen=True)
+class RunResults:
+    """The results of a run.
+
+    Attributes:
+        folder: folder of the run.
+        suite: suite of the run, which builds its tables.
+        summary: header and summary of the run.
+        usage: requests, tokens and cost.
+        n_missing: units that were not attempted; None where that is not known.
+    """
+
+    folder: Path
+    suite: Suite
+    summary: RunSummary
+    usage: Usage
+    n_missing: int | None
+
+
+def print_results(runs: Sequence[RunResults], options: ShowOptions) -> None:
+    """Print the results of runs, with one set of tables for each suite."""
+    if options.form == "json":
+        _print_json(runs)
+        return
+    labelled = _with_labels(runs)
+    if not options.quiet:
+        _print_tables(labelled, options)
+    if options.form is None:
+        _print_folders(labelled, options.quiet)
+
+
+def _print_json(runs: Sequence[RunResults]) -> None:
+    documents = [
+        {"folder": str(run.folder), **results_document(run.summary, run.suite, run.n_missing, run.usage)}
+        for run in runs
+    ]
+    click.echo(msgspec.json.format(msgspec.json.encode(documents, order="sorted"), indent=2))
+
+
+def _with_labels(runs: Sequence[RunResults]) -> list[RunResults]:
+    """The runs with labels for names, which tell those of one name apart."""
+    labels = label_runs([(run.folder, run.summary.header) for run in runs], _SHOWN_BY_TABLES)
+    return [
+        replace(run, summary=replace(run.summary, header=msgspec.structs.replace(run.summary.header, name=label)))
+        for run, label in zip(runs, labels, strict=True)
+    ]
+
+
+def _print_tables(runs: Sequence[RunResults], options: ShowOptions) -> None:
+    tables: list[Table] = []
+    for _, group in groupby(sorted(runs, key=_suite_name), key=_suite_name):
+        same_suite = list(group)
+        suite = same_suite[0].suite
+        tables += (suite.tables if options.full else suite.overview)([run.summary for run in same_suite])
+    if options.form is not None:
+        click.echo(exported(tables, options.form))
+        return
+    console = table_console()
+    for table in tables:
+        print_table(table, console)
+
+
+def _print_folders(runs: Sequence[RunResults], quiet: bool) -> None:
+    for run in runs:
+        name = run.summary.header.name
+        if not quiet and run.usage.requests:
+            print_line(f"{name}: {run.usage.description}")
+        print_line(str(run.folder) if quiet else f"{name}: {run.folder}")
+
+
+def _suite_name(run: RunResults) -> str:
+    return run.suite.name
