@@ -7,7 +7,7 @@ INSTALLED := $(VENV)/.installed
 # here. It must stay out of the environment itself, where transformers would find it and fail.
 PEERS := $(VENV)/test-peers
 
-.PHONY: demo test test-all lint docs clean
+.PHONY: demo test test-all test-times lint docs clean
 
 # A trajectory in a procedural kitchen, its frames and questions; then the bundled set, by the bounds and a small model.
 demo: $(INSTALLED)
@@ -23,6 +23,12 @@ test: $(INSTALLED) $(PEERS)
 # The slow ones too; half an hour on two cores.
 test-all: $(INSTALLED) $(PEERS)
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 3 --dist loadfile
+
+# Measures all tests, and lists those that are slow in tests/slow_tests.txt.
+test-times: $(INSTALLED) $(PEERS)
+	rm -rf build/processor_times
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadfile -p tests.processor_times
+	$(BIN)/python -m tests.processor_times
 
 lint: $(INSTALLED)
 	$(BIN)/ruff check .

@@ -4,7 +4,6 @@ import json
 import os
 import shutil
 from collections.abc import Callable, Sequence
-from fnmatch import fnmatchcase
 from pathlib import Path
 
 import hypothesis
@@ -16,6 +15,8 @@ from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.formats.qa_csv import write_questions
 from infthor_eval.formats.question import Question
 from infthor_eval.runs import Catalog
+
+from .processor_times import read_slow_tests
 
 # Before torch is imported, here and in processes that tests start: on a busy machine two threads that wait for each
 # other take ten times as long as one.
@@ -37,11 +38,10 @@ QUESTIONS = (
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Variants that take long are slow tests too."""
-    lines = (Path(__file__).parent / "slow_variants.txt").read_text().splitlines()
-    patterns = [line.replace("[", "[[]") for line in lines if line and not line.startswith("#")]
+    """Mark the tests that are slow by measurement."""
+    slow = read_slow_tests()
     for item in items:
-        if any(fnmatchcase(item.nodeid, pattern) for pattern in patterns):
+        if item.nodeid in slow:
             item.add_marker(pytest.mark.slow)
 
 

@@ -1,0 +1,81 @@
+"""Measures the processor time of tests, and decides by it which are slow.
+
+    make test-times        # all tests, with this plugin, then `python -m tests.processor_times`
+
+A pytest plugin (`-p tests.processor_times`) writes the processor seconds of each test, with its fixtures and child
+processes, into build/processor_times/. The command lists those above `LIMIT_S` in tests/slow_tests.txt, which
+`make test` leaves out and `make test-all` runs. Processor time changes little with other work on the machine.
+"""
+
+import json
+import os
+import resource
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+__all__ = ["LIMIT_S", "read_slow_tests"]
+
+LIMIT_S = 2.0
+# Slow ones that `make test` runs all the same, as no other test goes the same whole way.
+KEPT = (
+    "tests/nieh/test_suite.py::test_the_tiny_model_runs_through_and_shares_prefixes",
+    "tests/model_adapters/hf/test_conversation.py::test_sharing_changes_no_reply",
+    "tests/manipulation/test_episodes.py::test_the_planner_picks_up_all_and_puts_nearly_all",
+    "tests/runs/test_driver.py::test_a_killed_command_goes_on_and_shows_progress_table_results_and_export",
+    "tests/runs/test_worker_executor.py::test_workers_that_are_killed_lose_nothing_that_was_finished",
+)
+_ROOT = Path(__file__).parents[1]
+_LIST = Path(__file__).with_name("slow_tests.txt")
+_MEASURED = _ROOT / "build" / "processor_times"
+_HEAD = """\
+# Tests that take more than {limit} s of processor time: `make test` leaves them out, `make test-all` runs them.
+# Written by `make test-times` (tests/processor_times.py says how). A line: seconds, test.
+"""
+
+
+def read_slow_tests() -> set[str]:
+    """Return the ids of the slow tests."""
+    lines = _LIST.read_text().splitlines()
+    return {line.split(maxsplit=1)[1] for line in lines if line and not line.startswith("#")}
+
+
+def _processor_seconds() -> float:
+    used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(usage.ru_utime + usage.ru_stime for usage in used)
+
+
+@pytest.hookimpl(hookwrapper=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
+    """Write what a test takes."""
+    before = _processor_seconds()
+    yield
+    _MEASURED.mkdir(parents=True, exist_ok=True)
+    with (_MEASURED / f"{os.getpid()}.jsonl").open("a") as file:
+        file.write(json.dumps([item.nodeid, round(_processor_seconds() - before, 3)]) + "\n")
+
+
+def main() -> None:
+    """Write the list of slow tests from what was measured; tests that were not measured stay as they are listed."""
+    seconds: Counter[str] = Counter()
+    for path in _MEASURED.glob("*.jsonl"):
+        for line in path.read_text().splitlines():
+            test, taken = json.loads(line)
+            seconds[test] = max(seconds[test], taken)
+    for line in _LIST.read_text().splitlines():
+        if line and not line.startswith("#"):
+            taken, test = line.split(maxsplit=1)
+            seconds.setdefault(test, float(taken))
+    slow = sorted(test for test, taken in seconds.items() if taken > LIMIT_S and test not in KEPT)
+    lines = [f"{seconds[test]:7.1f} {test}" for test in slow]
+    _LIST.write_text(_HEAD.format(limit=LIMIT_S) + "\n".join(lines) + "\n")
+    slow_seconds = sum(seconds[test] for test in slow)
+    print(
+        f"{len(slow)} slow tests: {slow_seconds:.0f} s of processor time; others: {seconds.total() - slow_seconds:.0f} s"
+    )
+
+
+if __name__ == "__main__":
+    main()
