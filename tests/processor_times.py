@@ -71,10 +71,8 @@ def main() -> None:
     slow = sorted(test for test, taken in seconds.items() if taken > LIMIT_S and test not in KEPT)
     lines = [f"{seconds[test]:7.1f} {test}" for test in slow]
     _LIST.write_text(_HEAD.format(limit=LIMIT_S) + "\n".join(lines) + "\n")
-    slow_seconds = sum(seconds[test] for test in slow)
-    print(
-        f"{len(slow)} slow tests: {slow_seconds:.0f} s of processor time; others: {seconds.total() - slow_seconds:.0f} s"
-    )
+    of_slow = sum(seconds[test] for test in slow)
+    print(f"{len(slow)} slow tests: {of_slow:.0f} s of processor time; others: {seconds.total() - of_slow:.0f} s")
 
 
 if __name__ == "__main__":
