@@ -39,7 +39,7 @@ def policy(monkeypatch):
 
     def make(gives):
         made = ScriptedPolicy(gives)
-        monkeypatch.setattr("infthor_eval.runs.subjects.load", lambda *_: made)
+        monkeypatch.setattr("infthor_eval.runs.binding.load", lambda *_: made)
         return made
 
     return make
@@ -134,7 +134,7 @@ def twins():
 @pytest.mark.parametrize("name", ["openvla-tiny", "spatialvla-tiny"])
 def test_tiny_policies_run_both_tasks(prepared, task_file, twins, monkeypatch, name):
     task_file("max_steps: 5")
-    monkeypatch.setattr("infthor_eval.runs.subjects.load", lambda *_: twins[name])
+    monkeypatch.setattr("infthor_eval.runs.binding.load", lambda *_: twins[name])
     monkeypatch.setattr(twins[name], "close", lambda: None)
     outcome = execute(prepared(name))
     assert sorted(by_key(outcome)) == [(PICK, MUG, 9), (PUT, MUG, 21)]

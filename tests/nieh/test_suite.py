@@ -126,7 +126,7 @@ class Talk:
 def recorder(monkeypatch):
     """Takes the place of the tiny model."""
     model = Recorder()
-    monkeypatch.setattr("infthor_eval.runs.subjects.load", lambda *_: model)
+    monkeypatch.setattr("infthor_eval.runs.binding.load", lambda *_: model)
     return model
 
 

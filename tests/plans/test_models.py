@@ -46,7 +46,7 @@ def acting(prepared, monkeypatch):
 
     def acting(say, **changes):
         model = ScriptedModel(say)
-        monkeypatch.setattr("infthor_eval.runs.subjects.load", lambda *_: model)
+        monkeypatch.setattr("infthor_eval.runs.binding.load", lambda *_: model)
         return execute(prepared(QWEN, **changes)), model
 
     return acting
