@@ -18,7 +18,7 @@ from pathlib import Path
 from infthor_eval.generation.sampling import TaskPool
 from infthor_eval.household.pddl import DOMAIN, problem
 from infthor_eval.household.planner import plan
-from infthor_eval.household.symbolic import Room, room_of
+from infthor_eval.household.symbolic import SymbolicRoom, room_of
 from infthor_eval.household.tasks import Task, TaskType
 from infthor_eval.thor.launch import embedded
 from infthor_eval.thor.simulator import Simulator
@@ -42,7 +42,7 @@ def main() -> None:
     print(f"{equal} of {chosen.problems} plans have the cost that Fast Downward finds")
 
 
-def sampled(number: int, seed: int) -> Iterator[tuple[Task, Room]]:
+def sampled(number: int, seed: int) -> Iterator[tuple[Task, SymbolicRoom]]:
     """Tasks of all types in the rooms as they are at first, that have a plan and are not done yet."""
     rng = random.Random(seed)
     with Simulator(embedded()) as simulator:
@@ -54,7 +54,7 @@ def sampled(number: int, seed: int) -> Iterator[tuple[Task, Room]]:
     for index in range(number):
         room, types, pool = rooms[index % len(rooms)]
         task = next(task for task in pool.sample(room, types) if plan(task, room))
-        pool.used(task)
+        pool.note_use(task)
         yield task, room
 
 

@@ -14,8 +14,8 @@ from pathlib import Path
 
 from infthor_eval.formats.step_log import read_steps
 from infthor_eval.generation.questions.checker import Checker
-from infthor_eval.generation.questions.history import DEFAULT_SHARE, History
-from infthor_eval.generation.questions.make import candidates_of, further_candidates_of, make_questions
+from infthor_eval.generation.questions.generate import candidates_of, further_candidates_of, generate_questions
+from infthor_eval.generation.questions.history import DEFAULT_SHARE, TrajectoryHistory
 from infthor_eval.nieh.baselines import BASELINES, Predict
 from infthor_eval.nieh.contexts import Sample
 from infthor_eval.nieh.scoring import score
@@ -32,7 +32,9 @@ def main() -> None:
     parser.add_argument("--further", action="store_true", help="choose among the further forms too")
     chosen = parser.parse_args()
     check_all(chosen.set)
-    made = make_questions(chosen.set, seed=chosen.seed, per_trajectory=chosen.per_trajectory, further=chosen.further)
+    made = generate_questions(
+        chosen.set, seed=chosen.seed, per_trajectory=chosen.per_trajectory, further=chosen.further
+    )
     print(f"chosen: {len(made.questions)}, by number of clues {made.by_clues()}, by type {made.by_type()}")
     asked = [Sample(question, question.clues) for question in made.questions]
     yes_no = [item for item in asked if item.question.answers[0] in _YES_NO]
@@ -43,7 +45,7 @@ def main() -> None:
 
 def check_all(folder: Path) -> None:
     """Print how often the checker agrees with every candidate, and why not."""
-    histories = [History(path.name, read_steps(path)) for path in sorted((folder / "metadata").iterdir())]
+    histories = [TrajectoryHistory(path.name, read_steps(path)) for path in sorted((folder / "metadata").iterdir())]
     vocabulary = frozenset[str]().union(*(history.all_object_types for history in histories))
     found: Counter[str] = Counter()
     for history in histories:

@@ -18,12 +18,12 @@ from infthor_eval.formats.qa_csv import write_questions
 from infthor_eval.formats.reading import read_json
 from infthor_eval.formats.scratch import ScratchFolder
 from infthor_eval.generation.generate_set import generate_set
-from infthor_eval.generation.questions.make import MadeQuestions, make_questions
+from infthor_eval.generation.questions.generate import GeneratedQuestions, generate_questions
 from infthor_eval.generation.replay_set import replay_set, select
 from infthor_eval.generation.settings import TrajectorySettings
 from infthor_eval.thor.simulator import Simulator
 
-__all__ = ["MANIFEST", "Manifest", "TrajectoryRecipe", "differing_files", "make_bundle", "read_manifest"]
+__all__ = ["MANIFEST", "Manifest", "TrajectoryRecipe", "build_bundle", "differing_files", "read_manifest"]
 
 MANIFEST = "manifest.json"
 _NOT_SHIPPED = ("replay.json",)  # holds times
@@ -69,9 +69,9 @@ def read_manifest(path: Path) -> Manifest:
     return read_json(path, "give a manifest", Manifest)
 
 
-def make_bundle(
+def build_bundle(
     manifest: Manifest, simulator: Simulator, out: Path, progress: Callable[[bool], None] = lambda _: None
-) -> tuple[Manifest, MadeQuestions]:
+) -> tuple[Manifest, GeneratedQuestions]:
     """Make the set: generate, replay, ask, and store the frames small.
 
     Args:
@@ -93,7 +93,7 @@ def make_bundle(
         _refuse(generate_set(jobs, simulator, folder, progress).failures)
         replayed = replay_set(select([folder]), simulator, out, progress)
     _refuse([f"{item.place}: {item.message}" for item in replayed.failures])
-    made = make_questions(
+    made = generate_questions(
         out, seed=manifest.question_seed, per_trajectory=manifest.per_trajectory, further=manifest.further
     )
     write_questions(out / f"qa_set_{manifest.name}.csv", made.questions)

@@ -20,7 +20,7 @@ from infthor_eval.formats.trajectory import (
 from infthor_eval.generation.settings import TrajectorySettings
 from infthor_eval.generation.trace import Trace
 from infthor_eval.thor.recorder import object_log
-from infthor_eval.thor.view import Vector, View
+from infthor_eval.thor.view import SimulatorView, Vector
 
 __all__ = ["Draft", "Length", "initial_scene"]
 
@@ -32,7 +32,7 @@ class Length(NamedTuple):
     high: int
 
 
-def initial_scene(settings: TrajectorySettings, view: View, start: InitAction) -> Scene:
+def initial_scene(settings: TrajectorySettings, view: SimulatorView, start: InitAction) -> Scene:
     """The initial state as trajectories hold it.
 
     Args:
@@ -56,7 +56,7 @@ def initial_scene(settings: TrajectorySettings, view: View, start: InitAction) -
 class Draft:
     """The actions, sub-goals and tasks so far, and the log of every frame."""
 
-    def __init__(self, settings: TrajectorySettings, scene: Scene, view: View) -> None:
+    def __init__(self, settings: TrajectorySettings, scene: Scene, view: SimulatorView) -> None:
         """Begin with the first frame.
 
         Args:
@@ -86,10 +86,10 @@ class Draft:
 
     def add(self, trace: Trace) -> None:
         """Add what a rollout did."""
-        for acted in trace.acted:
-            acted.low.low_idx = len(self._low)
-            self._low.append(acted.low)
-            self._note(acted.view)
+        for action in trace.actions:
+            action.low.low_idx = len(self._low)
+            self._low.append(action.low)
+            self._note(action.view)
         self._high += trace.high
 
     def cut(self, length: Length) -> None:
@@ -141,7 +141,7 @@ class Draft:
             },
         )
 
-    def _note(self, view: View) -> None:
+    def _note(self, view: SimulatorView) -> None:
         entry = {"step": len(self._log), **msgspec.to_builtins(object_log(view))}
         self._log.append(msgspec.json.encode(entry))
 

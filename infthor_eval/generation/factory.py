@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.trajectory import InitAction, Trajectory
 from infthor_eval.generation.draft import Draft, Length, initial_scene
-from infthor_eval.generation.final_task import ends_of
+from infthor_eval.generation.final_task import end_types
+from infthor_eval.generation.known_failures import KnownFailures
 from infthor_eval.generation.rollout import Rollout
 from infthor_eval.generation.sampling import TaskPool
-from infthor_eval.generation.setbacks import Setbacks
 from infthor_eval.generation.settings import TrajectorySettings
 from infthor_eval.generation.trace import RolloutError
 from infthor_eval.household.affordances import MAX_PLAN_STEPS, goes_into
@@ -20,8 +20,8 @@ from infthor_eval.household.pddl import problem
 from infthor_eval.household.planner import plan
 from infthor_eval.household.possible_tasks import tasks_of
 from infthor_eval.household.scene_types import usual_tasks
-from infthor_eval.household.scout import reachable
-from infthor_eval.household.symbolic import Operator, Room, room_of
+from infthor_eval.household.scout import reachable_grid
+from infthor_eval.household.symbolic import Operator, SymbolicRoom, room_of
 from infthor_eval.household.tasks import Task, sub_task
 from infthor_eval.thor.restore import restore
 from infthor_eval.thor.simulator import Simulator, SimulatorMark
@@ -84,7 +84,7 @@ class _Factory:
         self._simulator = simulator
         self._rng = random.Random(f"{settings.scene}/{settings.seed}")
         self._pool = TaskPool(usual_tasks(settings.scene).intersection(settings.task_types), self._rng)
-        self._setbacks = Setbacks()
+        self._setbacks = KnownFailures()
         self._statistics = TaskStatistics()
         self._failures = 0
         self._problems: list[str] = []
@@ -92,7 +92,7 @@ class _Factory:
 
     def _begun(self) -> Draft:
         view = self._simulator.reset(self._settings.scene)
-        grid = reachable(self._simulator)
+        grid = reachable_grid(self._simulator)
         if not grid.cells:
             raise UsageError(f"scene {self._settings.scene}: the agent can stand nowhere; choose another scene")
         x, z = grid.position(self._rng.choice(sorted(grid.cells)))
@@ -128,11 +128,11 @@ class _Factory:
     def finish(self) -> None:
         """Add the final task; where none works, another ordinary one comes before it."""
         for _ in range(_LONGER):
-            ways = list(ends_of(self._draft.object_log()))
+            ways = list(end_types(self._draft.object_log()))
             self._rng.shuffle(ways)
             for ends in ways:
                 self._failures = 0
-                if self._first_that_works(ends.allow_task, is_last=True) is not None:
+                if self._first_that_works(ends.allows_task, is_last=True) is not None:
                     self._draft.make_last_task_final()
                     return
             self._failures = 0
@@ -172,7 +172,7 @@ class _Factory:
             possible = set(tasks_of(room, types))
         return None
 
-    def _try(self, task: Task, room: Room, operators: Sequence[Operator], is_last: bool) -> RolloutError | None:
+    def _try(self, task: Task, room: SymbolicRoom, operators: Sequence[Operator], is_last: bool) -> RolloutError | None:
         name = f"{task.task_type}{' sliced' if task.sliced else ''}"
         self._statistics.tried[name] += 1
         mark, start = self._simulator.mark(), self._draft.length
@@ -182,10 +182,10 @@ class _Factory:
             failure = self._put_down()
         if failure is not None:
             self._go_back(mark, start)
-            self._pool.failed(task)
+            self._pool.note_failure(task)
             return failure
         self._statistics.accepted[name] += 1
-        self._pool.used(task)
+        self._pool.note_use(task)
         self._setbacks.task_done()
         self._problems.append(problem(task, room, f"task-{len(self._problems):03d}"))
         self._draft.add_task(sub_task(task, self._settings.scene), start, end)
@@ -228,7 +228,7 @@ class _Factory:
         rollout = Rollout(self._simulator, self._draft.length.high)
         try:
             rollout.run(list(operators))
-            if len(rollout.trace.acted) > MAX_PLAN_STEPS:
+            if len(rollout.trace.actions) > MAX_PLAN_STEPS:
                 raise RolloutError(f"a plan of more than {MAX_PLAN_STEPS} steps")
         except RolloutError as error:
             self._statistics.reasons[str(error)] += 1

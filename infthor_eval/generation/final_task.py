@@ -12,13 +12,13 @@ from typing import Any
 from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.household.tasks import Task
 
-__all__ = ["SHARE", "Ends", "ends_of", "violation"]
+__all__ = ["SHARE", "EndTypes", "end_types", "violation"]
 
 SHARE = 0.2
 
 
 @dataclass(frozen=True)
-class Ends:
+class EndTypes:
     """The object types seen at the two ends of a trajectory: one end holds the object, the other the receptacle.
 
     Attributes:
@@ -31,17 +31,17 @@ class Ends:
     visible: frozenset[str]
     either: frozenset[str]
 
-    def allow(self, pickup: str, other: str | None, movable: str | None = None) -> bool:
+    def allows(self, pickup: str, other: str | None, movable: str | None = None) -> bool:
         """Whether a task on these types meets the rule; a carried receptacle may be from either end."""
         carried = movable is None or movable in self.either
         return carried and pickup in self.pickupable and other in self.visible
 
-    def allow_task(self, task: Task) -> bool:
+    def allows_task(self, task: Task) -> bool:
         """Whether a task meets the rule."""
-        return self.allow(task.pickup, task.receptacle or task.light, task.movable)
+        return self.allows(task.pickup, task.receptacle or task.light, task.movable)
 
 
-def ends_of(object_log: Sequence[dict[str, Any]]) -> tuple[Ends, Ends]:
+def end_types(object_log: Sequence[dict[str, Any]]) -> tuple[EndTypes, EndTypes]:
     """The ends of the trajectory that a log tells of: with the object early, and the other way round.
 
     Args:
@@ -51,8 +51,8 @@ def ends_of(object_log: Sequence[dict[str, Any]]) -> tuple[Ends, Ends]:
     first, last = object_log[:count], object_log[-count:]
     either = _types(first, "visible") | _types(last, "visible")
     return (
-        Ends(_types(first, "pickupable"), _types(last, "visible"), either),
-        Ends(_types(last, "pickupable"), _types(first, "visible"), either),
+        EndTypes(_types(first, "pickupable"), _types(last, "visible"), either),
+        EndTypes(_types(last, "pickupable"), _types(first, "visible"), either),
     )
 
 
@@ -64,8 +64,8 @@ def violation(trajectory: Trajectory) -> str | None:
     before = trajectory.sub_trajs[-1].low_pddl_idx[0]
     info = task.task_info
     other = info.receptacle or task.pddl_params.get("toggle_target")
-    either_way = ends_of(trajectory.object_log[: before + 1])
-    if info.pickup is not None and any(ends.allow(info.pickup, other, info.movable) for ends in either_way):
+    either_way = end_types(trajectory.object_log[: before + 1])
+    if info.pickup is not None and any(ends.allows(info.pickup, other, info.movable) for ends in either_way):
         return None
     return f"'{task.task_desc}' is not about types seen at both ends of the {before} steps before it"
 

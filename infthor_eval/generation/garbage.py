@@ -4,11 +4,11 @@ import gc
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-__all__ = ["libraries_set_aside"]
+__all__ = ["freeze_existing_objects"]
 
 
 @contextmanager
-def libraries_set_aside() -> Iterator[None]:
+def freeze_existing_objects() -> Iterator[None]:
     """Has the garbage collector pass over all that exists now, which is mainly what libraries hold.
 
     A reply of the simulator decodes to thousands of objects. They make the collector look through everything again

@@ -10,7 +10,7 @@ from infthor_eval.errors import InfthorError, UsageError, wrap_errors
 from infthor_eval.formats.files import write_atomically
 from infthor_eval.formats.trajectory import encode_trajectory, iter_sources
 from infthor_eval.generation.factory import GeneratedTrajectory, TaskStatistics, generate
-from infthor_eval.generation.garbage import libraries_set_aside
+from infthor_eval.generation.garbage import freeze_existing_objects
 from infthor_eval.generation.settings import TrajectorySettings
 from infthor_eval.household.pddl import DOMAIN
 from infthor_eval.thor.launch import Launch
@@ -79,7 +79,7 @@ class GeneratedSet:
 
 
 @dataclass(frozen=True)
-class _Outcome:
+class _GenerationOutcome:
     """What became of one job.
 
     Attributes:
@@ -161,7 +161,7 @@ class _Maker:
         self._simulator = Simulator(launch)
         self._out = out
 
-    def do(self, job: TrajectorySettings) -> Iterator[_Outcome]:
+    def do(self, job: TrajectorySettings) -> Iterator[_GenerationOutcome]:
         yield _outcome(job, self._simulator, self._out)
 
     def close(self) -> None:
@@ -169,13 +169,13 @@ class _Maker:
 
 
 def _collected(
-    outcomes: Iterable[tuple[int, _Outcome | InfthorError]], progress: Callable[[bool], None]
+    outcomes: Iterable[tuple[int, _GenerationOutcome | InfthorError]], progress: Callable[[bool], None]
 ) -> GeneratedSet:
     """What came of it, in the order of the jobs."""
-    found: dict[int, _Outcome] = {}
+    found: dict[int, _GenerationOutcome] = {}
     for number, outcome in outcomes:
         if isinstance(outcome, InfthorError):
-            outcome = _Outcome(failure=str(outcome))  # noqa: PLW2901
+            outcome = _GenerationOutcome(failure=str(outcome))  # noqa: PLW2901
         found[number] = outcome
         progress(outcome.path is not None and outcome.statistics is None)
     result = GeneratedSet()
@@ -192,20 +192,20 @@ def _collected(
     return result
 
 
-def _outcome(job: TrajectorySettings, simulator: Simulator, out: Path) -> _Outcome:
+def _outcome(job: TrajectorySettings, simulator: Simulator, out: Path) -> _GenerationOutcome:
     path = out / f"{job.traj_id}.json"
     try:
         if path.exists():
-            return _Outcome(path, _earlier(path, job))
+            return _GenerationOutcome(path, _earlier(path, job))
         made = _made(job, simulator)
     except InfthorError as error:
-        return _Outcome(failure=str(error))
+        return _GenerationOutcome(failure=str(error))
     _write(made, path)  # not a failure of this one: where it has no room, the others would be made in vain
-    return _Outcome(path, len(made.trajectory.plan.low_actions), made.statistics)
+    return _GenerationOutcome(path, len(made.trajectory.plan.low_actions), made.statistics)
 
 
 def _made(job: TrajectorySettings, simulator: Simulator) -> GeneratedTrajectory:
-    with libraries_set_aside():
+    with freeze_existing_objects():
         return generate(job, simulator)
 
 

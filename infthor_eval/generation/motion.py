@@ -4,12 +4,12 @@ from collections.abc import Iterator
 
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.teleport import teleport_call
-from infthor_eval.thor.view import AgentPose, Vector, View
+from infthor_eval.thor.view import AgentPose, SimulatorView, Vector
 
-__all__ = ["between"]
+__all__ = ["intermediate_views"]
 
 
-def between(simulator: Simulator, start: AgentPose, end: AgentPose, frames: int) -> Iterator[View]:
+def intermediate_views(simulator: Simulator, start: AgentPose, end: AgentPose, frames: int) -> Iterator[SimulatorView]:
     """Look from evenly spaced poses between two; the agent is back at the second one afterwards.
 
     Args:

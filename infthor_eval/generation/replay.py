@@ -11,7 +11,7 @@ import msgspec
 
 from infthor_eval.formats.step_log import write_steps
 from infthor_eval.formats.trajectory import LowAction, Trajectory
-from infthor_eval.generation.motion import between
+from infthor_eval.generation.motion import intermediate_views
 from infthor_eval.household.sequence_text import sequence_text
 from infthor_eval.household.state_summary import state_summaries
 from infthor_eval.thor.actions import text_of
@@ -20,7 +20,7 @@ from infthor_eval.thor.recorded import MissingObjectError, translate
 from infthor_eval.thor.recorder import Recorder
 from infthor_eval.thor.restore import restore
 from infthor_eval.thor.simulator import Simulator
-from infthor_eval.thor.view import View
+from infthor_eval.thor.view import SimulatorView
 
 __all__ = ["Overlap", "Refusal", "ReplayReport", "box_iou", "replay"]
 
@@ -141,7 +141,7 @@ class _Run:
             self.report.accepted[api.action] = self.report.accepted.get(api.action, 0) + 1
         else:
             self.report.refusals.append(Refusal(index, text, error))
-        for view in between(self._simulator, before.agent, self._simulator.view.agent, self.report.frames):
+        for view in intermediate_views(self._simulator, before.agent, self._simulator.view.agent, self.report.frames):
             self.recorder.record(view, step=index, high_idx=low.high_idx)
         putting = api.action == "PutObject"
         step = self.recorder.record(
@@ -155,7 +155,7 @@ class _Run:
         # An action that could not even be called has no reply of its own.
         step.success, step.error = error is None, error
 
-    def _call(self, index: int, low: LowAction, before: View) -> tuple[str | None, str | None]:
+    def _call(self, index: int, low: LowAction, before: SimulatorView) -> tuple[str | None, str | None]:
         """Run it; the id of the object it is about, and why it was refused."""
         try:
             call = translate(low, self._grounding, before)
@@ -166,7 +166,7 @@ class _Run:
         after = self._simulator.step(**call)
         return target, None if after.success else after.error or "refused without a message"
 
-    def _compare_box(self, index: int, low: LowAction, target: str | None, before: View) -> None:
+    def _compare_box(self, index: int, low: LowAction, target: str | None, before: SimulatorView) -> None:
         """Compare the recorded box of the object acted on with what the frame before the action shows of
         it."""
         recorded = low.discrete_action.box if low.discrete_action is not None else None

@@ -20,21 +20,21 @@ from infthor_eval.formats.files import write_atomically
 from infthor_eval.formats.reading import read_json
 from infthor_eval.formats.set_info import claim_for_simulator
 from infthor_eval.formats.trajectory import Trajectory, TrajectorySource, folder_name, iter_sources, trajectory_files
-from infthor_eval.generation.garbage import libraries_set_aside
+from infthor_eval.generation.garbage import freeze_existing_objects
 from infthor_eval.generation.replay import ReplayReport, replay
 from infthor_eval.thor.launch import Launch
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.supplement import agent_path
 from infthor_eval.workers import WorkerSettings, shared_out
 
-__all__ = ["Failure", "ReplayedSet", "Selection", "replay_set", "replay_with_workers", "select"]
+__all__ = ["ReplayFailure", "ReplayedSet", "Selection", "replay_set", "replay_with_workers", "select"]
 
 _REPORT = "replay.json"
 _TRAJECTORY = "traj_data.json"
 
 
 @dataclass(frozen=True)
-class Failure:
+class ReplayFailure:
     """A trajectory that could not be replayed at all."""
 
     place: str
@@ -46,7 +46,7 @@ class Selection:
     """The trajectories to replay, and those that could not even be read."""
 
     items: list[tuple[TrajectorySource, Trajectory]] = field(default_factory=list)
-    failures: list[Failure] = field(default_factory=list)
+    failures: list[ReplayFailure] = field(default_factory=list)
 
 
 @dataclass
@@ -62,7 +62,7 @@ class ReplayedSet:
 
     reports: list[ReplayReport] = field(default_factory=list)
     resumed: int = 0
-    failures: list[Failure] = field(default_factory=list)
+    failures: list[ReplayFailure] = field(default_factory=list)
     seconds: float = 0.0
 
 
@@ -87,7 +87,7 @@ def select(paths: Iterable[Path], limit: int | None = None, per_floor_plan: int 
             with _malformed(source):
                 agent_path(trajectory)  # what the scene is supplemented with, before the first replay
         except DataError as error:
-            selection.failures.append(Failure(source.place, str(error)))
+            selection.failures.append(ReplayFailure(source.place, str(error)))
             continue
         floor_plan = trajectory.scene.floor_plan
         if per_floor_plan is None or taken[floor_plan] < per_floor_plan:
@@ -100,7 +100,7 @@ Item = tuple[TrajectorySource, Trajectory]
 
 
 @dataclass(frozen=True)
-class _Outcome:
+class _ReplayOutcome:
     """What became of one trajectory.
 
     Attributes:
@@ -111,7 +111,7 @@ class _Outcome:
 
     report: ReplayReport | None = None
     new: bool = False
-    failure: Failure | None = None
+    failure: ReplayFailure | None = None
 
 
 def replay_set(
@@ -184,7 +184,7 @@ class _Replayer:
         self._settings = settings
         self._simulator = Simulator(settings.launch)
 
-    def do(self, job: Item) -> Iterator[_Outcome]:
+    def do(self, job: Item) -> Iterator[_ReplayOutcome]:
         yield _outcome(job, self._simulator, self._settings.metadata, self._settings.frames)
 
     def close(self) -> None:
@@ -200,11 +200,13 @@ def _prepared(out: Path, label: str) -> Path:
 
 
 def _collected(
-    outcomes: Iterable[tuple[int, _Outcome | InfthorError]], selection: Selection, progress: Callable[[bool], None]
+    outcomes: Iterable[tuple[int, _ReplayOutcome | InfthorError]],
+    selection: Selection,
+    progress: Callable[[bool], None],
 ) -> ReplayedSet:
     """What came of it, in the order of the selection."""
     started = time.monotonic()
-    found: dict[int, _Outcome] = {}
+    found: dict[int, _ReplayOutcome] = {}
     for number, outcome in outcomes:
         if isinstance(outcome, InfthorError):
             outcome = _failed(selection.items[number], outcome)  # noqa: PLW2901
@@ -220,21 +222,21 @@ def _collected(
     return result
 
 
-def _outcome(item: Item, simulator: Simulator, metadata: Path, frames: int) -> _Outcome:
+def _outcome(item: Item, simulator: Simulator, metadata: Path, frames: int) -> _ReplayOutcome:
     source, trajectory = item
     try:
-        with libraries_set_aside(), _malformed(source):
-            return _Outcome(*_one(source, trajectory, simulator, metadata, frames))
+        with freeze_existing_objects(), _malformed(source):
+            return _ReplayOutcome(*_one(source, trajectory, simulator, metadata, frames))
     except InfthorError as error:
         return _failed(item, error)
 
 
-def _failed(item: Item, error: InfthorError) -> _Outcome:
+def _failed(item: Item, error: InfthorError) -> _ReplayOutcome:
     source, trajectory = item
-    return _Outcome(failure=Failure(source.place, f"{trajectory.traj_id}: {error}"))
+    return _ReplayOutcome(failure=ReplayFailure(source.place, f"{trajectory.traj_id}: {error}"))
 
 
-def _all_sources(paths: Iterable[Path], failures: list[Failure]) -> Iterator[TrajectorySource]:
+def _all_sources(paths: Iterable[Path], failures: list[ReplayFailure]) -> Iterator[TrajectorySource]:
     """What is in the files; one of several that cannot be read to its end is a failure, and the others go on."""
     for path in paths:
         files = trajectory_files(path)
@@ -247,7 +249,7 @@ def _all_sources(paths: Iterable[Path], failures: list[Failure]) -> Iterator[Tra
             except DataError as error:
                 if not n_found and files == [path]:
                     raise
-                failures.append(Failure(str(file), str(error)))
+                failures.append(ReplayFailure(str(file), str(error)))
 
 
 def _malformed(source: TrajectorySource) -> AbstractContextManager[None]:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import msgspec
 
 from infthor_eval.generation.replay import Overlap, ReplayReport
-from infthor_eval.generation.replay_set import Failure, ReplayedSet
+from infthor_eval.generation.replay_set import ReplayedSet, ReplayFailure
 
 __all__ = ["ActionCounts", "Divergence", "OverlapStatistics", "ReplaySummary", "summarise"]
 
@@ -63,7 +63,7 @@ class ReplaySummary(msgspec.Struct):
     iou_by_action: dict[str, OverlapStatistics]
     seconds: float
     diverged: list[Divergence]
-    failures: list[Failure]
+    failures: list[ReplayFailure]
 
 
 def summarise(replayed: ReplayedSet) -> ReplaySummary:

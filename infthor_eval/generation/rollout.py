@@ -11,9 +11,9 @@ from infthor_eval.generation.trace import RolloutError, Trace
 from infthor_eval.generation.walking import Walker
 from infthor_eval.household.containment import direct_parent
 from infthor_eval.household.symbolic import Operator
-from infthor_eval.household.wording import compact
+from infthor_eval.household.wording import compact_name
 from infthor_eval.thor.simulator import Simulator
-from infthor_eval.thor.view import View
+from infthor_eval.thor.view import SimulatorView
 
 __all__ = ["Rollout"]
 
@@ -101,7 +101,7 @@ class Rollout:
 
     def _begin(self, name: str, item: str, receptacle: str | None = None) -> None:
         ids = [key for key in (item, receptacle) if key is not None]
-        words = [compact(self._view.objects[key].object_type) for key in ids]
+        words = [compact_name(self._view.objects[key].object_type) for key in ids]
         self.trace.begin(words, PlannerAction(name, object_id=item, receptacle_id=receptacle))
 
     def _inside(self, holder: str | None, act: Callable[[], None]) -> None:
@@ -127,7 +127,7 @@ class Rollout:
     # -- what is where
 
     @property
-    def _view(self) -> View:
+    def _view(self) -> SimulatorView:
         return self.trace.view
 
     def _resolve(self, item: str) -> str:

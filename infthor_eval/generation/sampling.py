@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 
 from infthor_eval.household.possible_tasks import tasks_of
-from infthor_eval.household.symbolic import Room
+from infthor_eval.household.symbolic import SymbolicRoom
 from infthor_eval.household.tasks import Task, TaskType
 
 __all__ = ["TaskPool"]
@@ -36,7 +36,7 @@ class TaskPool:
         self._together: Counter[tuple[str, ...]] = Counter()
         self._failed: Counter[Task] = Counter()
 
-    def sample(self, room: Room, extra_types: Iterable[str] = ()) -> Iterator[Task]:
+    def sample(self, room: SymbolicRoom, extra_types: Iterable[str] = ()) -> Iterator[Task]:
         """Tasks for a room as it is now, in random order, the fresher ones earlier.
 
         Args:
@@ -48,13 +48,13 @@ class TaskPool:
         waits = {task: self._rng.expovariate(chance) for task, chance in self._chances(found)}
         yield from sorted(found, key=lambda task: waits[task])
 
-    def used(self, task: Task) -> None:
+    def note_use(self, task: Task) -> None:
         """Note that a task became part of the trajectory."""
         values = _values(task)
         self._alone.update(enumerate(values))
         self._together.update(values[:length] for length in range(1, len(values) + 1))
 
-    def failed(self, task: Task) -> None:
+    def note_failure(self, task: Task) -> None:
         """Note that a task was tried and did not work."""
         self._failed[task] += 1
 

@@ -5,9 +5,9 @@ from typing import Any
 
 from infthor_eval.formats.trajectory import ApiAction, DiscreteAction, HighAction, LowAction, PlannerAction
 from infthor_eval.thor.simulator import Simulator
-from infthor_eval.thor.view import View
+from infthor_eval.thor.view import SimulatorView
 
-__all__ = ["Acted", "RolloutError", "Trace"]
+__all__ = ["ExecutedAction", "RolloutError", "Trace"]
 
 
 class RolloutError(Exception):
@@ -25,11 +25,11 @@ class RolloutError(Exception):
 
 
 @dataclass(frozen=True)
-class Acted:
+class ExecutedAction:
     """One action that was carried out: as it is stored, and the world after it."""
 
     low: LowAction
-    view: View
+    view: SimulatorView
 
 
 class Trace:
@@ -37,7 +37,7 @@ class Trace:
 
     Attributes:
         simulator: carries the actions out.
-        acted: the actions.
+        actions: executed actions.
         high: the sub-goals.
     """
 
@@ -49,12 +49,12 @@ class Trace:
             first_high: number of the first sub-goal.
         """
         self.simulator = simulator
-        self.acted: list[Acted] = []
+        self.actions: list[ExecutedAction] = []
         self.high: list[HighAction] = []
         self._first_high = first_high
 
     @property
-    def view(self) -> View:
+    def view(self) -> SimulatorView:
         """The world after the last action."""
         return self.simulator.view
 
@@ -85,10 +85,12 @@ class Trace:
             raise RolloutError(f"{api.action}: {after.error}", api.object_id, api.receptacle_id)
         name = f"{api.action}_{suffix}" if suffix else api.action
         number = self._first_high + len(self.high) - 1
-        self.acted.append(Acted(LowAction(api, number, DiscreteAction(name, _box(before, arguments))), after))
+        self.actions.append(
+            ExecutedAction(LowAction(api, number, DiscreteAction(name, _box(before, arguments))), after)
+        )
 
 
-def _box(view: View, arguments: dict[str, Any]) -> dict[str, Any]:
+def _box(view: SimulatorView, arguments: dict[str, Any]) -> dict[str, Any]:
     """The box of the object acted on, as trajectories store it with the action."""
     shown = (view.instances or {}).get(arguments.get("objectId", ""))
     return {} if shown is None else {"bbox": list(shown.box)}

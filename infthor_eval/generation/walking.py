@@ -3,8 +3,8 @@
 from infthor_eval.formats.trajectory import ApiAction, PlannerAction
 from infthor_eval.generation.trace import RolloutError, Trace
 from infthor_eval.household.navigation import GRID, Grid
-from infthor_eval.household.scout import HORIZON_STEP, Viewpoint, find_viewpoint, reachable, stand_of
-from infthor_eval.household.wording import compact
+from infthor_eval.household.scout import HORIZON_STEP, Viewpoint, find_viewpoint, grid_pose_of, reachable_grid
+from infthor_eval.household.wording import compact_name
 
 __all__ = ["Walker"]
 
@@ -33,10 +33,10 @@ class Walker:
         viewpoint = self._viewpoint(shown, inside)
         if self._moves(viewpoint) == []:
             return
-        (x, z), facing = viewpoint.stand.cell, viewpoint.stand.facing
+        (x, z), facing = viewpoint.pose.cell, viewpoint.pose.facing
         location = f"loc|{x}|{z}|{facing // _TURN}|{viewpoint.horizon}"
         action = PlannerAction("GotoLocation", location=location, object_id=target.object_id)
-        self._trace.begin([compact(target.object_type)], action)
+        self._trace.begin([compact_name(target.object_type)], action)
         self._walk(viewpoint, shown)
 
     def step_aside(self, item: str) -> None:
@@ -73,12 +73,12 @@ class Walker:
     def _moves(self, viewpoint: Viewpoint) -> list[str] | None:
         """The actions that lead to a viewpoint."""
         grid = self._cells()
-        path = grid.path(stand_of(self._trace.view.agent, grid), viewpoint.stand)
+        path = grid.path(grid_pose_of(self._trace.view.agent, grid), viewpoint.pose)
         return None if path is None else path + self._looks(viewpoint)
 
     def _cells(self) -> Grid:
         if self._grid is None:
-            self._grid = reachable(self._trace.simulator)
+            self._grid = reachable_grid(self._trace.simulator)
         return self._grid
 
     def _looks(self, viewpoint: Viewpoint) -> list[str]:
@@ -92,10 +92,10 @@ class Walker:
             self._trace.act(ApiAction(action), {"degrees": float(degrees)}, str(degrees))
             return True
         grid = self._cells()
-        stand = stand_of(self._trace.view.agent, grid)
+        stand = grid_pose_of(self._trace.view.agent, grid)
         try:
             self._trace.act(ApiAction(action, move_magnitude=GRID), {"moveMagnitude": GRID}, "25")
         except RolloutError:
-            self._grid = grid.without(stand.ahead)
+            self._grid = grid.without_cell(stand.ahead)
             return False
         return True

@@ -4,8 +4,8 @@ import math
 from collections.abc import Mapping
 
 from infthor_eval.formats.step_log import ObjectState
-from infthor_eval.household.wording import canonical
-from infthor_eval.thor.view import ThorObject, View
+from infthor_eval.household.wording import canonical_type
+from infthor_eval.thor.view import SimulatorView, ThorObject
 
 __all__ = ["contents_of", "direct_parent", "is_in", "logged_parent"]
 
@@ -22,7 +22,7 @@ def contents_of(holder: str, objects: Mapping[str, ThorObject]) -> frozenset[str
     return frozenset(found)
 
 
-def is_in(wanted: str, receptacle_id: str, view: View) -> bool:
+def is_in(wanted: str, receptacle_id: str, view: SimulatorView) -> bool:
     """Whether an object lies in or on a receptacle itself.
 
     In a bowl that stands in it is not in it; of furniture within furniture, each that the simulator names will do.
@@ -69,4 +69,4 @@ def _within(world: Mapping[str, ObjectState], inner: str, outer: str) -> bool:
     if outer in world[inner].parents:
         return True
     one, other = world[inner].type, world[outer].type
-    return canonical(one) == canonical(other) and one.endswith("Basin")
+    return canonical_type(one) == canonical_type(other) and one.endswith("Basin")

@@ -4,17 +4,17 @@ from collections import Counter
 from dataclasses import replace
 
 from infthor_eval.household.affordances import KNIVES
-from infthor_eval.household.symbolic import Room, State, room_of
+from infthor_eval.household.symbolic import State, SymbolicRoom, room_of
 from infthor_eval.household.tasks import Task, TaskType
 from infthor_eval.household.treatments import Treatments
-from infthor_eval.thor.view import View
+from infthor_eval.thor.view import SimulatorView
 
-__all__ = ["APPLIANCE", "achieved", "goal_holds", "least_remaining"]
+__all__ = ["APPLIANCE", "goal_holds", "is_achieved", "lower_bound"]
 
 APPLIANCE = {TaskType.CLEAN: "SinkBasin", TaskType.HEAT: "Microwave", TaskType.COOL: "Fridge"}
 
 
-def achieved(task: Task, room: Room, state: State) -> bool:
+def is_achieved(task: Task, room: SymbolicRoom, state: State) -> bool:
     """Whether the goal of a task holds."""
     if task.task_type == TaskType.EXAMINE:
         held = state.held is not None and room.types[state.held] == task.target
@@ -22,7 +22,7 @@ def achieved(task: Task, room: Room, state: State) -> bool:
     return _placed(task, room, state) >= _wanted(task)
 
 
-def goal_holds(task: Task, view: View, treatments: Treatments | None = None) -> bool:
+def goal_holds(task: Task, view: SimulatorView, treatments: Treatments | None = None) -> bool:
     """Whether the goal of a task holds in what the simulator reports.
 
     The conditions are ALFRED's, but for names: an `Apple` is no `AppleSliced`, which ALFRED's comparison of ids takes
@@ -40,12 +40,12 @@ def goal_holds(task: Task, view: View, treatments: Treatments | None = None) -> 
     lamps = [key for key in sorted(room.start.lit) if room.types[key] == task.light]
     seen = [key for key in lamps if treatments is None or view.objects[key].visible]
     state = replace(room.start, at=next(iter(seen), None), clean=known.clean, hot=known.hot, cold=known.cold)
-    return achieved(task, room, state)
+    return is_achieved(task, room, state)
 
 
-def least_remaining(task: Task, room: Room, state: State) -> int:
+def lower_bound(task: Task, room: SymbolicRoom, state: State) -> int:
     """A number of operators that no plan from this state can do without; 0 just where the goal holds."""
-    if achieved(task, room, state):
+    if is_achieved(task, room, state):
         return 0
     here = room.types.get(state.at or "")
     held = None if state.held is None else room.types[state.held]
@@ -56,7 +56,7 @@ def least_remaining(task: Task, room: Room, state: State) -> int:
     return max(1, needed + (here != task.receptacle) + _to_carry(task, room, state, held))
 
 
-def _to_slice(task: Task, room: Room, state: State, held: str | None) -> int:
+def _to_slice(task: Task, room: SymbolicRoom, state: State, held: str | None) -> int:
     """What slicing still needs: the knife in the hand and the cut."""
     if not task.sliced or any(parent for item, parent in state.where if room.types[item] == task.target):
         return 0
@@ -70,7 +70,7 @@ def _to_treat(task: Task, state: State, here: str | None) -> int:
     return 0 if treated is None or treated else 1 + (here != APPLIANCE[task.task_type])
 
 
-def _to_carry(task: Task, room: Room, state: State, held: str | None) -> int:
+def _to_carry(task: Task, room: SymbolicRoom, state: State, held: str | None) -> int:
     """The pick-ups and puts still needed; what is sliced where it shall be needs none."""
     if task.task_type == TaskType.STACK:
         where = dict(state.where)
@@ -89,7 +89,7 @@ def _wanted(task: Task) -> int:
     return 2 if task.task_type == TaskType.PLACE_TWO else 1
 
 
-def _placed(task: Task, room: Room, state: State) -> int:
+def _placed(task: Task, room: SymbolicRoom, state: State) -> int:
     """How many objects of the asked type, in the asked condition, are together where they shall be.
 
     Together is in one and the same receptacle: two objects on two side tables are not two on the side table.

@@ -9,7 +9,7 @@ from collections.abc import Iterable
 
 from infthor_eval.household.affordances import KNIVES, SLICEABLE, goes_into
 from infthor_eval.household.planner import relevant_items
-from infthor_eval.household.symbolic import ABSENT, FLOOR, Room, slice_item
+from infthor_eval.household.symbolic import ABSENT, FLOOR, SymbolicRoom, slice_item
 from infthor_eval.household.tasks import Task, TaskType
 
 __all__ = ["DOMAIN", "problem"]
@@ -100,7 +100,7 @@ def _domain() -> str:
 DOMAIN = _domain()
 
 
-def problem(task: Task, room: Room, name: str = "task") -> str:
+def problem(task: Task, room: SymbolicRoom, name: str = "task") -> str:
     """One task in one room as a PDDL problem for `DOMAIN`.
 
     Args:
@@ -132,7 +132,7 @@ def problem(task: Task, room: Room, name: str = "task") -> str:
     )
 
 
-def _state(room: Room, items: list[str], names: dict[str, str]) -> Iterable[str]:
+def _state(room: SymbolicRoom, items: list[str], names: dict[str, str]) -> Iterable[str]:
     start = room.start
     yield f"at {names[start.at]}" if start.at in names else "at nowhere"
     yield "handempty" if start.held is None else f"holding {names[start.held]}"
@@ -145,7 +145,7 @@ def _state(room: Room, items: list[str], names: dict[str, str]) -> Iterable[str]
     yield from (f"clean {names[item]}" for item in items if item in start.clean)
 
 
-def _rules(task: Task, room: Room, items: list[str], names: dict[str, str]) -> Iterable[str]:
+def _rules(task: Task, room: SymbolicRoom, items: list[str], names: dict[str, str]) -> Iterable[str]:
     holders = [key for key in sorted(names) if key in room.receptacles]
     for item in items:
         object_type = room.types[item]
@@ -165,7 +165,7 @@ def _rules(task: Task, room: Room, items: list[str], names: dict[str, str]) -> I
             yield f"lamp {names[place]}"
 
 
-def _goal(task: Task, room: Room, items: list[str], names: dict[str, str]) -> Iterable[str]:
+def _goal(task: Task, room: SymbolicRoom, items: list[str], names: dict[str, str]) -> Iterable[str]:
     yield f"asked-{task.task_type}"
     yield from (f"target {names[item]}" for item in items if room.types[item] == task.target)
     yield from (f"carrier {names[item]}" for item in items if room.types[item] == task.movable)

@@ -11,8 +11,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from infthor_eval.household.affordances import KNIVES, goes_into
-from infthor_eval.household.goals import APPLIANCE, least_remaining
-from infthor_eval.household.symbolic import ABSENT, FLOOR, Operator, Room, State, slice_item
+from infthor_eval.household.goals import APPLIANCE, lower_bound
+from infthor_eval.household.symbolic import ABSENT, FLOOR, Operator, State, SymbolicRoom, slice_item
 from infthor_eval.household.tasks import Task, TaskType
 
 __all__ = ["plan", "relevant_items"]
@@ -20,7 +20,7 @@ __all__ = ["plan", "relevant_items"]
 _LIMIT = 60_000  # states looked at; the hardest of the solvable problems tried took a quarter of it
 
 
-def plan(task: Task, room: Room) -> list[Operator] | None:
+def plan(task: Task, room: SymbolicRoom) -> list[Operator] | None:
     """The shortest plan for a task.
 
     Args:
@@ -35,7 +35,7 @@ def plan(task: Task, room: Room) -> list[Operator] | None:
     problem = _Problem(task, room)
     start = problem.start
     tie = itertools.count()
-    queue = [(least_remaining(task, room, start), next(tie), 0, start)]
+    queue = [(lower_bound(task, room, start), next(tie), 0, start)]
     came: dict[State, tuple[State, Operator] | None] = {start: None}
     cost = {start: 0}
     while queue and len(came) < _LIMIT:
@@ -48,12 +48,12 @@ def plan(task: Task, room: Room) -> list[Operator] | None:
             if spent + 1 < cost.get(following, _LIMIT):
                 cost[following] = spent + 1
                 came[following] = (state, operator)
-                rest = least_remaining(task, room, following)
+                rest = lower_bound(task, room, following)
                 heapq.heappush(queue, (spent + 1 + rest, next(tie), spent + 1, following))
     return None
 
 
-def _hopeless(task: Task, room: Room) -> bool:
+def _hopeless(task: Task, room: SymbolicRoom) -> bool:
     """Whether it is plain, without searching, that nothing can get to where the task wants it."""
     if task.receptacle is None:
         return False
@@ -63,7 +63,7 @@ def _hopeless(task: Task, room: Room) -> bool:
     return all((item, goal) in room.refused for item in items for goal in goals)
 
 
-def relevant_items(task: Task, room: Room) -> set[str]:
+def relevant_items(task: Task, room: SymbolicRoom) -> set[str]:
     """Ids of the items that can play a part: those of the task's types, knives to slice with, and what holds them."""
     types = {task.pickup, task.target, task.movable} | (set(KNIVES) if task.sliced else set())
     where = dict(room.start.where)
@@ -88,7 +88,7 @@ def _trace(came: dict[State, tuple[State, Operator] | None], state: State) -> li
 class _Problem:
     """One task in one room, cut down to what can matter."""
 
-    def __init__(self, task: Task, room: Room) -> None:
+    def __init__(self, task: Task, room: SymbolicRoom) -> None:
         self._task = task
         self._room = room
         where = dict(room.start.where)

@@ -14,7 +14,7 @@ from infthor_eval.household.affordances import (
     STOWABLE,
     goes_into,
 )
-from infthor_eval.household.symbolic import ABSENT, Room
+from infthor_eval.household.symbolic import ABSENT, SymbolicRoom
 from infthor_eval.household.tasks import Task, TaskType
 
 __all__ = ["tasks_of"]
@@ -23,7 +23,7 @@ _TREATED = {TaskType.CLEAN: CLEANABLE, TaskType.HEAT: HEATABLE, TaskType.COOL: C
 _APPLIANCES = {TaskType.CLEAN: {"SinkBasin", "Faucet"}, TaskType.HEAT: {"Microwave"}, TaskType.COOL: {"Fridge"}}
 
 
-def tasks_of(room: Room, extra_types: Iterable[str] = ()) -> list[Task]:
+def tasks_of(room: SymbolicRoom, extra_types: Iterable[str] = ()) -> list[Task]:
     """Every task that the room has the objects for, in a fixed order."""
     where = dict(room.start.where)
     here = {room.types[item] for item, parent in where.items() if parent != ABSENT or item == room.start.held}

@@ -10,12 +10,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from infthor_eval.errors import SimulatorError
-from infthor_eval.household.navigation import Grid, Stand
+from infthor_eval.household.navigation import Grid, GridPose
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.teleport import teleport_call
-from infthor_eval.thor.view import AgentPose, ThorObject, Vector, View
+from infthor_eval.thor.view import AgentPose, SimulatorView, ThorObject, Vector
 
-__all__ = ["CAMERA_HEIGHT", "HORIZON_STEP", "Viewpoint", "find_viewpoint", "reachable", "stand_of"]
+__all__ = ["CAMERA_HEIGHT", "HORIZON_STEP", "Viewpoint", "find_viewpoint", "grid_pose_of", "reachable_grid"]
 
 CAMERA_HEIGHT = 0.675  # of the camera above the agent's position, metres
 HORIZON_STEP = 30
@@ -33,7 +33,7 @@ _UNSEEN: dict[str, Any] = {"renderImage": False}  # the id image tells what is i
 class Viewpoint:
     """A stand and the camera's horizon (degrees downwards)."""
 
-    stand: Stand
+    pose: GridPose
     horizon: int
 
 
@@ -61,7 +61,7 @@ def find_viewpoint(
     """
     here = simulator.view
     focus = here.objects[inside or shown[0]]
-    distances = grid.distances(stand_of(here.agent, grid))
+    distances = grid.distances(grid_pose_of(here.agent, grid))
     found, patience = None, _PATIENCE
     for viewpoint in list(_candidates(here, grid, focus, distances))[:_TRIALS]:
         there = _teleport(simulator, grid, here, viewpoint)
@@ -78,25 +78,25 @@ def find_viewpoint(
     return found
 
 
-def reachable(simulator: Simulator) -> Grid:
+def reachable_grid(simulator: Simulator) -> Grid:
     """The cells that the agent can reach as things are now."""
     positions = simulator.query("GetReachablePositions", **_UNSEEN).result or ()
     return Grid((position["x"], position["z"]) for position in positions)
 
 
-def stand_of(pose: AgentPose, grid: Grid) -> Stand:
+def grid_pose_of(pose: AgentPose, grid: Grid) -> GridPose:
     """The stand of a pose."""
-    return Stand(grid.cell(pose.position.x, pose.position.z), round(pose.rotation / 90) * 90 % 360)
+    return GridPose(grid.cell(pose.position.x, pose.position.z), round(pose.rotation / 90) * 90 % 360)
 
 
-def _shows(view: View, shown: list[str], min_pixels: int) -> bool:
+def _shows(view: SimulatorView, shown: list[str], min_pixels: int) -> bool:
     if not all(key in view.objects and view.objects[key].visible for key in shown):
         return False
     instances = view.instances
     return instances is None or (shown[0] in instances and instances[shown[0]].pixels >= min_pixels)
 
 
-def _is_well_inside(view: View, item: str) -> bool:
+def _is_well_inside(view: SimulatorView, item: str) -> bool:
     """Whether the frame has an object off its edges."""
     shown = (view.instances or {}).get(item)
     return shown is None or all(_MARGIN <= edge < _SIDE - _MARGIN for edge in shown.box)
@@ -116,7 +116,9 @@ def _comes_into_view(simulator: Simulator, holder: str, inside: str, min_pixels:
     return False
 
 
-def _candidates(view: View, grid: Grid, focus: ThorObject, distances: dict[Stand, int]) -> Iterator[Viewpoint]:
+def _candidates(
+    view: SimulatorView, grid: Grid, focus: ThorObject, distances: dict[GridPose, int]
+) -> Iterator[Viewpoint]:
     """Viewpoints from which the object should be in the frame, the nearest to walk to first."""
     target = _middle(focus)
     eye = view.agent.position.y + CAMERA_HEIGHT
@@ -148,8 +150,8 @@ def _middle(item: ThorObject) -> Vector:
     return item.position if box is None else box.center
 
 
-def _teleport(simulator: Simulator, grid: Grid, here: View, viewpoint: Viewpoint) -> View:
-    x, z = grid.position(viewpoint.stand.cell)
+def _teleport(simulator: Simulator, grid: Grid, here: SimulatorView, viewpoint: Viewpoint) -> SimulatorView:
+    x, z = grid.position(viewpoint.pose.cell)
     position = Vector(x, here.agent.position.y, z)
-    pose = AgentPose(position, float(viewpoint.stand.facing), float(viewpoint.horizon), here.agent.standing)
+    pose = AgentPose(position, float(viewpoint.pose.facing), float(viewpoint.horizon), here.agent.standing)
     return simulator.query(**teleport_call(pose, force=False), **_UNSEEN)

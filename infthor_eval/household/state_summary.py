@@ -7,7 +7,7 @@ place where it was last seen, what is open or on, and what the agent holds.
 from infthor_eval.formats.step_log import ObjectState, Step, iter_object_states
 from infthor_eval.household.affordances import preposition
 from infthor_eval.household.containment import logged_parent
-from infthor_eval.household.wording import an, noun
+from infthor_eval.household.wording import noun, with_article
 
 __all__ = ["state_summaries"]
 
@@ -40,13 +40,15 @@ def state_summaries(steps: list[Step], at: set[int]) -> dict[int, str]:
 
 
 def _words(known: dict[str, tuple[ObjectState, str | None]], held: list[str]) -> str:
-    sentences = [f"You are holding {' and '.join(an(item) for item in held)}." if held else "Your hands are free."]
+    sentences = [
+        f"You are holding {' and '.join(with_article(item) for item in held)}." if held else "Your hands are free."
+    ]
     inside: dict[str, list[str]] = {}
     for state, place in known.values():
         if place is not None:
             inside.setdefault(place, []).append(noun(state.type))
     for place in sorted(inside):
-        items = ", ".join(an(item) for item in sorted(inside[place]))
+        items = ", ".join(with_article(item) for item in sorted(inside[place]))
         sentences.append(f"You saw {items} {preposition(place)} the {noun(place)}.")
     opened = sorted({noun(state.type) for state, _ in known.values() if state.is_open})
     lit = sorted({noun(state.type) for state, _ in known.values() if state.is_on and state.type.endswith("Lamp")})

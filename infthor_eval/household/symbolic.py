@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 from infthor_eval.household.affordances import SLICEABLE
 from infthor_eval.household.containment import direct_parent
-from infthor_eval.thor.view import ThorObject, View
+from infthor_eval.thor.view import SimulatorView, ThorObject
 
-__all__ = ["ABSENT", "FLOOR", "Operator", "Room", "State", "room_of", "slice_item"]
+__all__ = ["ABSENT", "FLOOR", "Operator", "State", "SymbolicRoom", "room_of", "slice_item"]
 
 ABSENT = ""  # where an item is that does not exist yet, or no longer
 FLOOR = "floor"
@@ -53,7 +53,7 @@ class State:
 
 
 @dataclass(frozen=True)
-class Room:
+class SymbolicRoom:
     """What operators do not change.
 
     Attributes:
@@ -84,7 +84,7 @@ class Room:
         return item
 
 
-def room_of(view: View, blocked: Container[str] = (), refused: Iterable[tuple[str, str]] = ()) -> Room:
+def room_of(view: SimulatorView, blocked: Container[str] = (), refused: Iterable[tuple[str, str]] = ()) -> SymbolicRoom:
     """Read a room from what the simulator reports. The agent counts as being at no place.
 
     Args:
@@ -103,7 +103,7 @@ def room_of(view: View, blocked: Container[str] = (), refused: Iterable[tuple[st
                 where[slice_item(key, number)] = ABSENT
                 types[slice_item(key, number)] = f"{item.object_type}Sliced"
     held = next((key for key in view.inventory if key in items), None)
-    return Room(
+    return SymbolicRoom(
         types=types,
         places=frozenset(places),
         receptacles=frozenset(

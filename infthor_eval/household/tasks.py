@@ -8,7 +8,7 @@ import msgspec
 from infthor_eval.errors import DataError
 from infthor_eval.formats.trajectory import SubTask, TaskInfo
 from infthor_eval.household.affordances import modern_type, preposition
-from infthor_eval.household.wording import an, noun, plural
+from infthor_eval.household.wording import noun, plural, with_article
 
 __all__ = ["Task", "TaskType", "sub_task", "task_of"]
 
@@ -135,11 +135,11 @@ def _describe(task: Task) -> str:
     bare = f"sliced {noun(task.pickup)}" if task.sliced else noun(task.pickup)
     place = task.receptacle
     text = _TEMPLATES[task.task_type].format(
-        item=an(bare),
+        item=with_article(bare),
         items=f"slices of {noun(task.pickup)}" if task.sliced else plural(bare),
         bare=bare,
         where=f"{preposition(place)} the {noun(place)}" if place else "",
         light=noun(task.light) if task.light else "",
-        movable=an(noun(task.movable)) if task.movable else "",
+        movable=with_article(noun(task.movable)) if task.movable else "",
     )
     return text.replace(" in it ", " on it ") if task.movable in _ONTO else text

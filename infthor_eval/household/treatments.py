@@ -8,7 +8,7 @@ import math
 from dataclasses import dataclass, replace
 
 from infthor_eval.household.containment import contents_of
-from infthor_eval.thor.view import ThorObject, View
+from infthor_eval.thor.view import SimulatorView, ThorObject
 
 __all__ = ["Treatments"]
 
@@ -33,7 +33,7 @@ class Treatments:
     hot: frozenset[str] = frozenset()
     cold: frozenset[str] = frozenset()
 
-    def after(self, action: str, object_id: str | None, view: View) -> "Treatments":
+    def after(self, action: str, object_id: str | None, view: SimulatorView) -> "Treatments":
         """What is treated once an action was tried.
 
         Args:
@@ -56,7 +56,7 @@ class Treatments:
         return self
 
 
-def _basin_of(faucet: ThorObject, view: View) -> ThorObject | None:
+def _basin_of(faucet: ThorObject, view: SimulatorView) -> ThorObject | None:
     """The basin that a tap runs into: the nearest one.
 
     ALFRED looks among the sinks' alone, so that filling a bathtub washes what lies in the sink across the room.

@@ -6,7 +6,7 @@ nothing is renamed, so joining the words again gives the type but for capitals.
 
 import re
 
-__all__ = ["an", "canonical", "compact", "noun", "plural"]
+__all__ = ["canonical_type", "compact_name", "noun", "plural", "with_article"]
 
 _VOWEL_SOUND = re.compile(r"^(?:[aeio]|u(?!se|ni))", re.IGNORECASE)
 _WHOLE = {"SinkBasin": "Sink", "BathtubBasin": "Bathtub"}
@@ -15,7 +15,7 @@ _BARE = {"blinds", "boots", "bread", "curtains", "lettuce", "toilet paper"}  # p
 _IRREGULAR = {"knife": "knives", "butter knife": "butter knives", "shelf": "shelves", "bread": "loaves of bread"}
 
 
-def canonical(object_type: str) -> str:
+def canonical_type(object_type: str) -> str:
     """The type that people would name: the basin of a sink is the sink."""
     return _WHOLE.get(object_type, object_type)
 
@@ -30,7 +30,7 @@ def noun(object_type: str) -> str:
     return " ".join(word.lower() for word in words)
 
 
-def an(words: str) -> str:
+def with_article(words: str) -> str:
     """The words with "a" or "an" before them; plurals ("boots") and substances ("bread") stay as they are."""
     if words.removeprefix("sliced ") in _BARE:
         return words
@@ -50,6 +50,6 @@ def plural(words: str) -> str:
     return f"{words}s"
 
 
-def compact(object_type: str) -> str:
+def compact_name(object_type: str) -> str:
     """An object type as the published data write it: lower case in one word ("coffeetable")."""
     return object_type.lower()

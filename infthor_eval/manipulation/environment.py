@@ -17,7 +17,7 @@ from infthor_eval.thor.restore import restore
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.teleport import teleport_call
 from infthor_eval.thor.transfer import transfer
-from infthor_eval.thor.view import AgentPose, ArmState, ThorObject, Vector, View
+from infthor_eval.thor.view import AgentPose, ArmState, SimulatorView, ThorObject, Vector
 from model_adapters import ArmDelta
 
 __all__ = ["ArmEnvironment", "ArmOutcome", "Grasp", "arm_of"]
@@ -58,7 +58,7 @@ class ArmOutcome:
         ended: how the episode ended with it; None where it goes on.
     """
 
-    view: View
+    view: SimulatorView
     frame: FrameRef | None
     calls: tuple[Call, ...] = ()
     refusals: tuple[str, ...] = ()
@@ -153,7 +153,7 @@ class ArmEnvironment:
         return ArmOutcome(view, self._frames.keep(view), tuple(calls), tuple(refusals), self._distance(view), ended)
 
     @property
-    def view(self) -> View:
+    def view(self) -> SimulatorView:
         """The world now."""
         return self._simulator.view
 
@@ -198,7 +198,7 @@ class ArmEnvironment:
                 return
             self._simulator.step("Pass")
 
-    def _take_in_hand(self, target: str, before: View) -> None:
+    def _take_in_hand(self, target: str, before: SimulatorView) -> None:
         """Raise the arm to where the expert's hand was, and have the magnet hold the object.
 
         It is held before the palm, or in the middle of the sphere: as near to that as there is room on the way to it.
@@ -216,19 +216,19 @@ class ArmEnvironment:
             self._must(brought[-1] | {"forceAction": True})
         self._must({"action": "PickupObject", "objectIdCandidates": [target]})
 
-    def _must(self, call: Call) -> View:
+    def _must(self, call: Call) -> SimulatorView:
         view = self._simulator.step(**call)
         if not view.success:
             raise UnfitEpisodeError(f"the episode cannot be begun: {call['action']}: {view.error}")
         return view
 
-    def _distance(self, view: View) -> float:
+    def _distance(self, view: SimulatorView) -> float:
         # What broke and is no more (an egg) is where it was last.
         self._goal = view.objects.get(self.moment.receptacle_id or self.moment.object_id, self._goal)
         return gap(point_of(arm_of(view).sphere_center), self._goal)
 
 
-def arm_of(view: View) -> ArmState:
+def arm_of(view: SimulatorView) -> ArmState:
     """The arm of an agent that has one.
 
     Raises:

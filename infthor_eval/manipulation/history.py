@@ -10,7 +10,7 @@ from infthor_eval.thor.grounding import Grounding
 from infthor_eval.thor.recorded import MissingObjectError, translate
 from infthor_eval.thor.restore import restore
 from infthor_eval.thor.simulator import Simulator
-from infthor_eval.thor.view import View
+from infthor_eval.thor.view import SimulatorView
 
 __all__ = ["Errand", "History", "ManipulationKind", "Moment", "UnfitEpisodeError", "errands_of", "history_of"]
 
@@ -49,7 +49,7 @@ class Moment:
         receptacle_id: where to, likewise; None of pick-ups.
     """
 
-    view: View
+    view: SimulatorView
     object_id: str
     receptacle_id: str | None = None
 
@@ -122,7 +122,7 @@ def history_of(trajectory: Trajectory, simulator: Simulator) -> History:
     return History(moments)
 
 
-def _moment(low: LowAction, before: View, named: str) -> Moment:
+def _moment(low: LowAction, before: SimulatorView, named: str) -> Moment:
     if low.api_action.action == "PickupObject":
         return Moment(before, named)
     return Moment(before, before.inventory[0], named)

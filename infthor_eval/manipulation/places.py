@@ -8,7 +8,7 @@ import numpy as np
 from infthor_eval.manipulation.environment import ArmEnvironment
 from infthor_eval.manipulation.geometry import Corners, middle_of, point_of, size_of
 from infthor_eval.manipulation.linkage import Array, Parts
-from infthor_eval.thor.view import ThorObject, View
+from infthor_eval.thor.view import SimulatorView, ThorObject
 
 __all__ = [
     "ENTERED",
@@ -115,7 +115,7 @@ def is_entered(item: ThorObject) -> bool:
     return item.object_type in ENTERED
 
 
-def entry_of(view: View, item: ThorObject, places: Places) -> Entry | None:
+def entry_of(view: SimulatorView, item: ThorObject, places: Places) -> Entry | None:
     """The opening of what is entered from the front.
 
     An open door widens its box on that side; what has no door is open towards the agent.
@@ -130,7 +130,7 @@ def entry_of(view: View, item: ThorObject, places: Places) -> Entry | None:
     return Entry(axis, sign, float((high if sign > 0 else low)[axis]) + sign * _BREADTH)
 
 
-def others_on(view: View, item: ThorObject, held: str) -> list[ThorObject]:
+def others_on(view: SimulatorView, item: ThorObject, held: str) -> list[ThorObject]:
     """Loose things that may stand in or on a receptacle, but for what is held and what the receptacle is in."""
     around = {name for name, other in view.objects.items() if item.object_id in (other.receptacle_object_ids or ())}
     apart = {held, item.object_id, *around, *(item.parent_receptacles or ())}

@@ -9,7 +9,7 @@ from infthor_eval.manipulation.geometry import Point, along, away, middle_of, po
 from infthor_eval.manipulation.history import ManipulationKind
 from infthor_eval.manipulation.putting import put
 from infthor_eval.manipulation.stand import Stand
-from infthor_eval.thor.view import View
+from infthor_eval.thor.view import SimulatorView
 
 __all__ = ["plan"]
 
@@ -43,7 +43,7 @@ def _approach(environment: ArmEnvironment, target: str) -> Iterator[Call]:
         yield {"action": "Pass"}
 
 
-def _aim(view: View, goal: Point) -> Call:
+def _aim(view: SimulatorView, goal: Point) -> Call:
     """Turn the hand so that it looks at a point."""
     arm = arm_of(view)
     wrist = point_of(arm.wrist)
@@ -57,7 +57,7 @@ def _elevation(direction: Point) -> float:
     return math.atan2(direction[1], math.hypot(direction[0], direction[2]))
 
 
-def _short_of(view: View, goal: Point) -> Point:
+def _short_of(view: SimulatorView, goal: Point) -> Point:
     """Where the wrist is to be for the sphere to have its centre at a point, coming from where it is."""
     arm = arm_of(view)
     wrist = point_of(arm.wrist)
@@ -66,7 +66,7 @@ def _short_of(view: View, goal: Point) -> Point:
     return along(wrist, goal, max(0.0, distance - length) / distance) if distance else wrist
 
 
-def _lift(view: View, height: float) -> Call:
+def _lift(view: SimulatorView, height: float) -> Call:
     """Bring the arm's base to a height of the world, as far as it goes."""
     return {"action": "MoveArmBase", "y": Stand.of(view.agent).share(height), "returnToStart": False}
 

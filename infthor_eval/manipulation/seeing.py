@@ -8,7 +8,7 @@ from infthor_eval.manipulation.environment import arm_of
 from infthor_eval.manipulation.geometry import Point, middle_of, point_of, size_of
 from infthor_eval.manipulation.moments import ArmSight, Place, Reach, Solid
 from infthor_eval.thor.actions import object_type_of
-from infthor_eval.thor.view import ThorObject, View
+from infthor_eval.thor.view import SimulatorView, ThorObject
 
 __all__ = ["Onlooker"]
 
@@ -20,7 +20,7 @@ _NOT_DRAWN = {"Floor", "Wall", "Ceiling"}  # the room's own, as large as the pic
 class Onlooker:
     """Looks at one episode; all its pictures have the same bounds."""
 
-    def __init__(self, begun: View, hands: Iterable[Point], named: Sequence[str]) -> None:
+    def __init__(self, begun: SimulatorView, hands: Iterable[Point], named: Sequence[str]) -> None:
         """Begin.
 
         Args:
@@ -37,7 +37,7 @@ class Onlooker:
         points += [_moved(self._way[0], sign * radius) for sign in (-1, 1)]
         self._low, self._high = _corner(points, min, -_MARGIN), _corner(points, max, _MARGIN)
 
-    def sight(self, view: View) -> ArmSight:
+    def sight(self, view: SimulatorView) -> ArmSight:
         """What there is to be seen after a step; at the start, of that.
 
         Raises:
@@ -59,13 +59,13 @@ class Onlooker:
         )
         return ArmSight(view.frame, reach, tuple(map(object_type_of, arm.held)))
 
-    def _hand(self, view: View) -> Place:
+    def _hand(self, view: SimulatorView) -> Place:
         return self._place(point_of(arm_of(view).sphere_center))
 
-    def _joints(self, view: View) -> Iterator[Place]:
+    def _joints(self, view: SimulatorView) -> Iterator[Place]:
         return (self._place(point_of(joint.position)) for joint in arm_of(view).joints)
 
-    def _solids(self, view: View) -> Iterator[Solid]:
+    def _solids(self, view: SimulatorView) -> Iterator[Solid]:
         return (self._solid(item) for item in view.objects.values() if self._is_drawn(item))
 
     def _is_drawn(self, item: ThorObject) -> bool:

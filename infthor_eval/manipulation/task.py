@@ -9,7 +9,7 @@ from infthor_eval.episodes.trajectory_sets import TrajectorySet, find_trajectori
 from infthor_eval.errors import DataError, UsageError
 from infthor_eval.formats.digests import digest
 from infthor_eval.formats.trajectory import Trajectory, TrajectorySource
-from infthor_eval.household.wording import canonical, noun
+from infthor_eval.household.wording import canonical_type, noun
 from infthor_eval.manipulation.conversion import Conversion
 from infthor_eval.manipulation.environment import Grasp
 from infthor_eval.manipulation.history import Errand, errands_of
@@ -129,7 +129,7 @@ class ManipulationTask:
         if template == "short":
             return KIND_NAMES[self.kind]
         names = {"object": errand.object_type, "receptacle": errand.receptacle_type}
-        return template.format(**{key: noun(canonical(name)) for key, name in names.items() if name is not None})
+        return template.format(**{key: noun(canonical_type(name)) for key, name in names.items() if name is not None})
 
     def identity(self) -> dict[str, Any]:
         """What its numbers depend on, as JSON values."""

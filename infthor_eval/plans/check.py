@@ -15,7 +15,7 @@ from infthor_eval.plans.environment import Ended, Observation, StepOutcome
 from infthor_eval.plans.expert import ExpertAction, ExpertRefusedError
 from infthor_eval.plans.plan import Plan
 from infthor_eval.thor.actions import object_type_of
-from infthor_eval.thor.view import View
+from infthor_eval.thor.view import SimulatorView
 from model_adapters import ContractError
 
 __all__ = ["Environment", "check_env"]
@@ -198,7 +198,7 @@ def _check_observation(observation: Observation) -> None:
         _require(np.array_equal(kept, view.frame), f"{observation.frame.path} is another picture than the view's")
 
 
-def _alike(one: View, other: View) -> bool:
+def _alike(one: SimulatorView, other: SimulatorView) -> bool:
     return (one.agent, one.inventory, one.objects) == (other.agent, other.inventory, other.objects)
 
 

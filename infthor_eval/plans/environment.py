@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.household.navigation import Grid
-from infthor_eval.household.scout import HORIZON_STEP, reachable, stand_of
+from infthor_eval.household.scout import HORIZON_STEP, grid_pose_of, reachable_grid
 from infthor_eval.plans.expert import Expert, ExpertAction
 from infthor_eval.plans.memory import Past
 from infthor_eval.plans.plan import Plan, PlanKind, plans_of, tasks_of
@@ -20,7 +20,7 @@ from infthor_eval.thor.actions import ActionText, UngroundedError, ground, parse
 from infthor_eval.thor.frames import FrameKeeper, NoFrames
 from infthor_eval.thor.recorded import degrees_of
 from infthor_eval.thor.simulator import Simulator
-from infthor_eval.thor.view import AgentPose, View
+from infthor_eval.thor.view import AgentPose, SimulatorView
 
 __all__ = ["Ended", "Observation", "PlanEnvironment", "StepInfo", "StepOutcome"]
 
@@ -49,7 +49,7 @@ class Observation:
         frame: the same picture as a reference; None where the environment keeps no frames.
     """
 
-    view: View
+    view: SimulatorView
     frame: FrameRef | None
 
 
@@ -207,13 +207,13 @@ class PlanEnvironment:
         ids = (grounding.ground(key, view) for key in (found.object_id, found.receptacle_id) if key is not None)
         return [key for key in ids if key is not None]
 
-    def _grounded(self, action: str | Mapping[str, Any], view: View) -> tuple[str, Mapping[str, Any]]:
+    def _grounded(self, action: str | Mapping[str, Any], view: SimulatorView) -> tuple[str, Mapping[str, Any]]:
         if not isinstance(action, str):
             return str(text_of_call(action, view)), action
         text: ActionText = parse_action(action)
         return str(text), ground(text, view, self.look_degrees, self._meant)
 
-    def _carried_out(self, text: str, call: Mapping[str, Any], before: View) -> StepOutcome:
+    def _carried_out(self, text: str, call: Mapping[str, Any], before: SimulatorView) -> StepOutcome:
         after = self._simulator.step(**call)
         self._n_steps += 1
         earned = self._reward.after(call, before, after)
@@ -226,28 +226,28 @@ class PlanEnvironment:
         return StepOutcome(seen, earned.reward, ended is not None, truncated, info)
 
     @staticmethod
-    def _ended(earned: StepReward, after: View) -> Ended | None:
+    def _ended(earned: StepReward, after: SimulatorView) -> Ended | None:
         if earned.done:
             return Ended.DONE
         if not earned.failed:
             return None
         return Ended.WRONG if after.success else Ended.REFUSED
 
-    def _target(self, plan: Plan, view: View, end: AgentPose, grid: Grid | None) -> PlanTarget:
+    def _target(self, plan: Plan, view: SimulatorView, end: AgentPose, grid: Grid | None) -> PlanTarget:
         """What the plan asks for; to go somewhere is to stand and look as the expert did in the end."""
         if grid is not None:
-            return PlanTarget(plan.kind, goal_stand=stand_of(end, grid), goal_horizon=end.horizon)
+            return PlanTarget(plan.kind, goal_stand=grid_pose_of(end, grid), goal_horizon=end.horizon)
         return target_of(plan, self._expert.grounding, view)
 
-    def _grid(self, plan: Plan, expert_actions: Sequence[ExpertAction], view: View) -> Grid | None:
+    def _grid(self, plan: Plan, expert_actions: Sequence[ExpertAction], view: SimulatorView) -> Grid | None:
         """Where the agent can stand; where the expert went in this plan it can, whatever the simulator says."""
         if plan.kind != PlanKind.GOTO:
             return None
         walked = [view.agent, *(action.pose for action in expert_actions)]
-        return reachable(self._simulator).joined((pose.position.x, pose.position.z) for pose in walked)
+        return reachable_grid(self._simulator).with_positions((pose.position.x, pose.position.z) for pose in walked)
 
 
-def _meant(target: PlanTarget, start: View) -> set[str]:
+def _meant(target: PlanTarget, start: SimulatorView) -> set[str]:
     """What a plan means where words do not tell: its objects, and what they are in (a thing in one of ten drawers)."""
     named = [start.objects[key] for key in (target.object_id, target.receptacle_id) if key in start.objects]
     return {key for item in named for key in (item.object_id, *(item.parent_receptacles or ()))}

@@ -19,7 +19,7 @@ from infthor_eval.thor.recorded import MissingObjectError, translate
 from infthor_eval.thor.recorder import Recorder
 from infthor_eval.thor.restore import restore
 from infthor_eval.thor.simulator import Simulator, SimulatorMark
-from infthor_eval.thor.view import AgentPose, View
+from infthor_eval.thor.view import AgentPose, SimulatorView
 
 __all__ = ["Expert", "ExpertRefusedError", "PlanStart"]
 
@@ -64,7 +64,7 @@ class _Step(NamedTuple):
     """An action, and what came of it."""
 
     action: ExpertAction
-    view: View
+    view: SimulatorView
     frame: FrameRef | None
     treatments: Treatments
 
@@ -176,7 +176,7 @@ class Expert:
             action = ExpertAction(call, self._text(number), view.agent, completes)
             yield _Step(action, view, self._frames.keep(view), treatments)
 
-    def _call(self, plan: Plan, number: int, view: View) -> dict[str, Any]:
+    def _call(self, plan: Plan, number: int, view: SimulatorView) -> dict[str, Any]:
         try:
             return translate(self._trajectory.plan.low_actions[number], self.grounding, view)
         except MissingObjectError as error:

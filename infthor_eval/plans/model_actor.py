@@ -12,7 +12,7 @@ from infthor_eval.plans.actors import Act, Situation
 from infthor_eval.plans.environment import StepOutcome
 from infthor_eval.plans.history import Part
 from infthor_eval.plans.memory import Memory
-from infthor_eval.thor.actions import applicable
+from infthor_eval.thor.actions import applicable_actions
 from model_adapters import Decoding, Model, wrap_request_errors
 
 __all__ = ["Manner", "ModelActor"]
@@ -62,7 +62,7 @@ class ModelActor:
         """See `Actor`."""
         decoding = replace(self._manner.decoding, seed=seed_of(f"{self._seed}/{self._n_acts}"))
         if self._manner.constrained:
-            possible = tuple(str(text) for text in applicable(self._observation.view))
+            possible = tuple(str(text) for text in applicable_actions(self._observation.view))
             decoding = replace(decoding, choices=possible, max_new_tokens=max(decoding.max_new_tokens, _LONGEST))
         self._n_acts += 1
         with wrap_request_errors(self._model.name):

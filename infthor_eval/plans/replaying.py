@@ -15,7 +15,7 @@ from infthor_eval.episodes.shared_units import only_name
 from infthor_eval.episodes.simulators import Simulators
 from infthor_eval.episodes.trajectory_sets import find_again
 from infthor_eval.errors import DataError, UsageError, wrap_errors
-from infthor_eval.household.scout import reachable
+from infthor_eval.household.scout import reachable_grid
 from infthor_eval.plans.environment import MAX_STEPS, PlanEnvironment, StepOutcome
 from infthor_eval.plans.moments import Moment, PlanTitle, Point, Pose, Rewards, Room, Sight, Thing
 from infthor_eval.plans.plan import PlanKind
@@ -222,7 +222,7 @@ class _Stage:
         self._view, self._over = observation.view, False
         self._walked = [_point(self._view.agent)]
         self._named = frozenset(environment.named(plan))
-        grid = reachable(simulator)
+        grid = reachable_grid(simulator)
         self._floor = tuple(grid.position(cell) for cell in sorted(grid.cells))
         is_way = environment.plans[plan].kind == PlanKind.GOTO
         self._goal = _pose(environment.expert_actions(plan)[-1].pose) if is_way else None

@@ -17,13 +17,13 @@ from infthor_eval.errors import unknown_name
 from infthor_eval.formats.yaml_files import read_yaml
 from infthor_eval.household.containment import contents_of, is_in
 from infthor_eval.household.goals import APPLIANCE, goal_holds
-from infthor_eval.household.navigation import Grid, Stand
-from infthor_eval.household.scout import stand_of
+from infthor_eval.household.navigation import Grid, GridPose
+from infthor_eval.household.scout import grid_pose_of
 from infthor_eval.household.tasks import Task
 from infthor_eval.household.treatments import Treatments
 from infthor_eval.plans.plan import PlanKind, UnfitPlanError
 from infthor_eval.plans.targets import PlanTarget, in_hand, subject_of
-from infthor_eval.thor.view import AgentPose, ThorObject, View
+from infthor_eval.thor.view import AgentPose, SimulatorView, ThorObject
 
 __all__ = ["PlanReward", "RewardRules", "StepReward", "max_reward", "n_on_the_way", "reward_rules"]
 
@@ -105,7 +105,7 @@ class PlanReward:
         rules: RewardRules,
         target: PlanTarget,
         task: Task,
-        start: View,
+        start: SimulatorView,
         treatments: Treatments = _NOTHING,
         grid: Grid | None = None,
     ) -> None:
@@ -139,7 +139,7 @@ class PlanReward:
         """Whether the task's goal came to hold in this plan."""
         return self._goal_reached
 
-    def after(self, call: Mapping[str, Any], before: View, after: View) -> StepReward:
+    def after(self, call: Mapping[str, Any], before: SimulatorView, after: SimulatorView) -> StepReward:
         """What an action gave.
 
         Args:
@@ -165,12 +165,12 @@ class PlanReward:
         self._over = step.done or step.failed
         return step
 
-    def _follow(self, action: str, object_id: str | None, after: View) -> None:
+    def _follow(self, action: str, object_id: str | None, after: SimulatorView) -> None:
         if not self._rules.treatments_unnoticed:
             self.treatments = self.treatments.after(action, object_id, after)
             self._in_plan = self._in_plan.after(action, object_id, after)
 
-    def _with_task(self, step: StepReward, after: View) -> StepReward:
+    def _with_task(self, step: StepReward, after: SimulatorView) -> StepReward:
         """The same, and the task's reward where its goal holds for the first time."""
         if not self._task_open or not goal_holds(self._task, after, self.treatments):
             return step
@@ -179,7 +179,7 @@ class PlanReward:
 
     # -- the kinds
 
-    def _goto(self, action: str, object_id: str | None, before: View, after: View) -> StepReward:
+    def _goto(self, action: str, object_id: str | None, before: SimulatorView, after: SimulatorView) -> StepReward:
         assert self._way is not None  # as of every GotoLocation
         left = self._way.left(after.agent)
         reference = self._closest if self._rules.steps_count_once else self._way.left(before.agent)
@@ -188,12 +188,12 @@ class PlanReward:
         arrived = left < self._rules.nearer_than
         return StepReward(gained * self._rules.per_step + arrived * self._worth, done=arrived)
 
-    def _pickup(self, action: str, object_id: str | None, before: View, after: View) -> StepReward:
+    def _pickup(self, action: str, object_id: str | None, before: SimulatorView, after: SimulatorView) -> StepReward:
         if action != "PickupObject":
             return StepReward()
         return self._success() if in_hand(self._wanted, after) else StepReward(failed=True)
 
-    def _put(self, action: str, object_id: str | None, before: View, after: View) -> StepReward:
+    def _put(self, action: str, object_id: str | None, before: SimulatorView, after: SimulatorView) -> StepReward:
         receptacle = self._target.receptacle_id or ""
         there = is_in(self._wanted, receptacle, after)
         if action == "PutObject" and not there:
@@ -207,28 +207,28 @@ class PlanReward:
             return self._stage("open")
         return self._stage("close", last=True) if there and "put" in self._stages else StepReward()
 
-    def _open(self, action: str, object_id: str | None, before: View, after: View) -> StepReward:
+    def _open(self, action: str, object_id: str | None, before: SimulatorView, after: SimulatorView) -> StepReward:
         return self._success() if object_id == self._wanted and after.objects[object_id].is_open else StepReward()
 
-    def _close(self, action: str, object_id: str | None, before: View, after: View) -> StepReward:
+    def _close(self, action: str, object_id: str | None, before: SimulatorView, after: SimulatorView) -> StepReward:
         return self._success() if object_id == self._wanted and not after.objects[object_id].is_open else StepReward()
 
-    def _toggle(self, action: str, object_id: str | None, before: View, after: View) -> StepReward:
+    def _toggle(self, action: str, object_id: str | None, before: SimulatorView, after: SimulatorView) -> StepReward:
         if object_id != self._wanted:
             return StepReward()
         changed = after.objects[object_id].is_toggled != self._start.objects[object_id].is_toggled
         return self._success() if changed else StepReward()
 
-    def _slice(self, action: str, object_id: str | None, before: View, after: View) -> StepReward:
+    def _slice(self, action: str, object_id: str | None, before: SimulatorView, after: SimulatorView) -> StepReward:
         return self._success() if action == "SliceObject" and object_id == self._wanted else StepReward()
 
-    def _clean(self, action: str, object_id: str | None, before: View, after: View) -> StepReward:
+    def _clean(self, action: str, object_id: str | None, before: SimulatorView, after: SimulatorView) -> StepReward:
         return self._success() if self._subject in self._in_plan.clean else StepReward()
 
-    def _heat(self, action: str, object_id: str | None, before: View, after: View) -> StepReward:
+    def _heat(self, action: str, object_id: str | None, before: SimulatorView, after: SimulatorView) -> StepReward:
         return self._success() if self._subject in self._in_plan.hot else StepReward()
 
-    def _cool(self, action: str, object_id: str | None, before: View, after: View) -> StepReward:
+    def _cool(self, action: str, object_id: str | None, before: SimulatorView, after: SimulatorView) -> StepReward:
         subject = self._subject or ""
         if subject not in self._in_plan.cold:
             return StepReward()
@@ -262,7 +262,11 @@ class PlanReward:
 
 
 def max_reward(
-    rules: RewardRules, target: PlanTarget, start: View, grid: Grid | None = None, completes: Task | None = None
+    rules: RewardRules,
+    target: PlanTarget,
+    start: SimulatorView,
+    grid: Grid | None = None,
+    completes: Task | None = None,
 ) -> float:
     """The most that a plan can give from its start.
 
@@ -307,7 +311,7 @@ def n_on_the_way(rules: RewardRules, target: PlanTarget, poses: Sequence[AgentPo
     return next((number for number, left in enumerate(lefts, 1) if left < rules.nearer_than), len(poses))
 
 
-def _most_on_the_way(rules: RewardRules, target: PlanTarget, start: View, grid: Grid | None) -> float:
+def _most_on_the_way(rules: RewardRules, target: PlanTarget, start: SimulatorView, grid: Grid | None) -> float:
     """Every step of the shortest way up to where it is done, and arriving; at least one step has to be made."""
     way = _way(rules, target, grid)
     left = math.inf if way is None else way.left(start.agent)
@@ -320,13 +324,13 @@ def _most_on_the_way(rules: RewardRules, target: PlanTarget, start: View, grid: 
 class _Way:
     """The shortest ways to a pose."""
 
-    def __init__(self, goal: Stand, horizon: float, grid: Grid, look_degrees: float) -> None:
+    def __init__(self, goal: GridPose, horizon: float, grid: Grid, look_degrees: float) -> None:
         self._grid, self._horizon, self._look = grid, horizon, look_degrees
         self._distances = grid.distances_to(goal)
 
     def left(self, pose: AgentPose) -> float:
         """Number of actions left; a look begun counts whole. Infinite where there is no way."""
-        steps = self._distances.get(stand_of(pose, self._grid), math.inf)
+        steps = self._distances.get(grid_pose_of(pose, self._grid), math.inf)
         looks = abs(self._horizon - pose.horizon) / self._look
         return steps + math.ceil(looks - _SMALL_ANGLE)
 
@@ -344,7 +348,7 @@ def _is_closed(item: ThorObject) -> bool:
     return item.openable and not item.is_open
 
 
-def _check(target: PlanTarget, start: View) -> None:
+def _check(target: PlanTarget, start: SimulatorView) -> None:
     """Refuse a plan that nobody can carry out for want of what it is about."""
     kind = target.kind
     if kind == PlanKind.GOTO:
@@ -361,7 +365,7 @@ def _check(target: PlanTarget, start: View) -> None:
         )
 
 
-_KINDS: dict[PlanKind, Callable[[PlanReward, str, str | None, View, View], StepReward]] = {
+_KINDS: dict[PlanKind, Callable[[PlanReward, str, str | None, SimulatorView, SimulatorView], StepReward]] = {
     PlanKind.GOTO: PlanReward._goto,
     PlanKind.PICKUP: PlanReward._pickup,
     PlanKind.PUT: PlanReward._put,

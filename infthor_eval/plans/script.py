@@ -4,11 +4,11 @@ import re
 from collections.abc import Sequence
 
 from infthor_eval.household.affordances import KNOWN_TYPES
-from infthor_eval.household.wording import compact
+from infthor_eval.household.wording import compact_name
 
 __all__ = ["about", "read_plan", "scripted"]
 
-_TYPES = {compact(name): name for name in sorted(KNOWN_TYPES)}
+_TYPES = {compact_name(name): name for name in sorted(KNOWN_TYPES)}
 _TYPES |= {"sink": "SinkBasin", "bathtub": "BathtubBasin"}  # things are put into the basin
 _CLOSED = frozenset({"Box", "Cabinet", "Drawer", "Fridge", "Laptop", "Microwave", "Safe"})  # at first, as a rule
 _VERBS = ("go to", "open", "close", "pick up", "put", "wash", "heat", "cool", "toggle", "slice")
@@ -42,7 +42,7 @@ def about(plan: str, types: Sequence[str]) -> str:
     assert found is not None
     for group, name in reversed([*enumerate(types, start=2)]):
         start, end = found.span(group)
-        plan = plan[:start] + compact(name) + plan[end:]
+        plan = plan[:start] + compact_name(name) + plan[end:]
     return plan
 
 

@@ -2,10 +2,10 @@
 
 from dataclasses import dataclass
 
-from infthor_eval.household.navigation import Stand
+from infthor_eval.household.navigation import GridPose
 from infthor_eval.plans.plan import Plan, PlanKind, UnfitPlanError
 from infthor_eval.thor.grounding import Grounding
-from infthor_eval.thor.view import View
+from infthor_eval.thor.view import SimulatorView
 
 __all__ = ["PlanTarget", "in_hand", "subject_of", "target_of"]
 
@@ -27,11 +27,11 @@ class PlanTarget:
     kind: PlanKind
     object_id: str | None = None
     receptacle_id: str | None = None
-    goal_stand: Stand | None = None
+    goal_stand: GridPose | None = None
     goal_horizon: float = 0.0
 
 
-def target_of(plan: Plan, grounding: Grounding, view: View) -> PlanTarget:
+def target_of(plan: Plan, grounding: Grounding, view: SimulatorView) -> PlanTarget:
     """What a recorded plan asks for here; where GotoLocation leads the environment alone can tell.
 
     Args:
@@ -45,7 +45,7 @@ def target_of(plan: Plan, grounding: Grounding, view: View) -> PlanTarget:
     return PlanTarget(plan.kind, _here(plan.object_id, grounding, view), _here(plan.receptacle_id, grounding, view))
 
 
-def subject_of(target: PlanTarget, start: View) -> str | None:
+def subject_of(target: PlanTarget, start: SimulatorView) -> str | None:
     """The object that a plan is about.
 
     ALFRED's plans of washing, heating and cooling name the appliance: there it is what is in the hand at the start.
@@ -64,7 +64,7 @@ def subject_of(target: PlanTarget, start: View) -> str | None:
     return target.object_id
 
 
-def in_hand(wanted: str, view: View) -> bool:
+def in_hand(wanted: str, view: SimulatorView) -> bool:
     """Whether an object is held, or another slice of the same thing: words do not tell slices apart."""
     return any(held == wanted or _are_slices_of_one(held, wanted) for held in view.inventory)
 
@@ -74,7 +74,7 @@ def _are_slices_of_one(one: str, other: str) -> bool:
     return parts[0][0] == parts[1][0] and all("Sliced" in part for _, _, part in parts)
 
 
-def _here(recorded: str | None, grounding: Grounding, view: View) -> str | None:
+def _here(recorded: str | None, grounding: Grounding, view: SimulatorView) -> str | None:
     if recorded is None:
         return None
     found = grounding.ground(recorded, view)

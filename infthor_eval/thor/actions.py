@@ -10,13 +10,13 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
 
-from infthor_eval.thor.view import ThorObject, View
+from infthor_eval.thor.view import SimulatorView, ThorObject
 
 __all__ = [
     "ActionText",
     "Misuse",
     "UngroundedError",
-    "applicable",
+    "applicable_actions",
     "applicable_calls",
     "ground",
     "object_type_of",
@@ -101,7 +101,7 @@ def text_of(action: str, object_id: str | None = None, receptacle_id: str | None
 
 
 def ground(
-    text: ActionText, view: View, degrees: float = _LOOK_DEGREES, preferred: Container[str] = ()
+    text: ActionText, view: SimulatorView, degrees: float = _LOOK_DEGREES, preferred: Container[str] = ()
 ) -> dict[str, Any]:
     """Turn an action text into a call.
 
@@ -129,12 +129,12 @@ def ground(
     return {"action": text.action, "objectId": _chosen(text, view, preferred).object_id}
 
 
-def applicable(view: View) -> list[ActionText]:
+def applicable_actions(view: SimulatorView) -> list[ActionText]:
     """Every action text that can be grounded in a view, in a fixed order."""
     return list(dict.fromkeys(text_of_call(call, view) for call in applicable_calls(view)))
 
 
-def applicable_calls(view: View, degrees: float = _LOOK_DEGREES) -> list[dict[str, Any]]:
+def applicable_calls(view: SimulatorView, degrees: float = _LOOK_DEGREES) -> list[dict[str, Any]]:
     """Every call that is possible in a view, in a fixed order: an action with each visible object that it applies to.
 
     Args:
@@ -151,7 +151,7 @@ def applicable_calls(view: View, degrees: float = _LOOK_DEGREES) -> list[dict[st
     return found
 
 
-def text_of_call(call: Mapping[str, Any], view: View) -> ActionText:
+def text_of_call(call: Mapping[str, Any], view: SimulatorView) -> ActionText:
     """The text of a call in a view: what is put is what is held there."""
     if call["action"] == "Pass":
         return ActionText("NoOp")
@@ -171,14 +171,14 @@ def object_type_of(object_id: str) -> str:
     return parts[4].split("_")[0] if len(parts) > 4 else parts[0]
 
 
-def _refuse_unknown(text: ActionText, view: View) -> None:
+def _refuse_unknown(text: ActionText, view: SimulatorView) -> None:
     here = {item.object_type for item in view.objects.values()}
     for name in text.types:
         if name not in here:
             raise UngroundedError(Misuse.UNKNOWN_OBJECT, f"{text}: {name}: none in this scene")
 
 
-def _chosen(text: ActionText, view: View, preferred: Container[str]) -> ThorObject:
+def _chosen(text: ActionText, view: SimulatorView, preferred: Container[str]) -> ThorObject:
     object_type, applies = text.types[-1], _APPLIES[text.action]
     fitting = [item for item in view.objects.values() if item.object_type == object_type and item.visible]
     able = [item for item in fitting if applies(item)]

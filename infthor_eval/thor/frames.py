@@ -7,7 +7,7 @@ from PIL import Image
 
 from infthor_eval.errors import DataError, SimulatorError
 from infthor_eval.formats.frames import FrameRef
-from infthor_eval.thor.view import View
+from infthor_eval.thor.view import SimulatorView
 
 __all__ = ["FrameFolder", "FrameKeeper", "NoFrames"]
 
@@ -15,7 +15,7 @@ __all__ = ["FrameFolder", "FrameKeeper", "NoFrames"]
 class FrameKeeper(Protocol):
     """Makes a reference of what the agent sees."""
 
-    def keep(self, view: View) -> FrameRef | None:
+    def keep(self, view: SimulatorView) -> FrameRef | None:
         """The frame of a view; None where nobody looks.
 
         Raises:
@@ -28,7 +28,7 @@ class FrameKeeper(Protocol):
 class NoFrames:
     """For agents that do not look."""
 
-    def keep(self, view: View) -> FrameRef | None:
+    def keep(self, view: SimulatorView) -> FrameRef | None:
         """None."""
         return None
 
@@ -40,7 +40,7 @@ class FrameFolder:
         self._folder = folder
         self._n_frames = 0
 
-    def keep(self, view: View) -> FrameRef | None:
+    def keep(self, view: SimulatorView) -> FrameRef | None:
         """See `FrameKeeper`."""
         if view.frame is None:
             raise SimulatorError("the simulator sent no frame; start it with rendering on")

@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterable
 
 from infthor_eval.thor.actions import object_type_of
-from infthor_eval.thor.view import ThorObject, View
+from infthor_eval.thor.view import SimulatorView, ThorObject
 
 __all__ = ["Grounding", "id_position"]
 
@@ -29,7 +29,7 @@ class Grounding:
     """The ids of one episode. `distances` tells how far each chosen object lies from where its id says, in
     metres."""
 
-    def __init__(self, view: View) -> None:
+    def __init__(self, view: SimulatorView) -> None:
         """Remember where everything is.
 
         Args:
@@ -39,7 +39,7 @@ class Grounding:
         self._chosen: dict[str, str] = {}
         self.distances: dict[str, float] = {}
 
-    def ground(self, object_id: str, view: View) -> str | None:
+    def ground(self, object_id: str, view: SimulatorView) -> str | None:
         """The id that the simulator has for a recorded one.
 
         Args:

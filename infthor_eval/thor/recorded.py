@@ -5,7 +5,7 @@ from typing import Any
 
 from infthor_eval.formats.trajectory import LowAction
 from infthor_eval.thor.grounding import Grounding
-from infthor_eval.thor.view import View
+from infthor_eval.thor.view import SimulatorView
 
 __all__ = ["MissingObjectError", "degrees_of", "translate"]
 
@@ -16,7 +16,7 @@ class MissingObjectError(LookupError):
     """A recorded action is about an object of a type that the scene does not have."""
 
 
-def translate(low: LowAction, grounding: Grounding, view: View) -> dict[str, Any]:
+def translate(low: LowAction, grounding: Grounding, view: SimulatorView) -> dict[str, Any]:
     """The call that does in 5.x what the recorded one did.
 
     Args:

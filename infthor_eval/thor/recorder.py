@@ -7,7 +7,7 @@ from PIL import Image
 from infthor_eval.errors import SimulatorError
 from infthor_eval.formats.step_log import LoggedPose, ObjectInFrame, ObjectLog, ObjectState, Step
 from infthor_eval.thor.actions import object_type_of
-from infthor_eval.thor.view import ThorObject, View
+from infthor_eval.thor.view import SimulatorView, ThorObject
 
 __all__ = ["Recorder", "object_log", "state_of"]
 
@@ -33,7 +33,7 @@ class Recorder:
 
     def record(
         self,
-        view: View,
+        view: SimulatorView,
         *,
         step: int = 0,
         action: str | None = None,
@@ -75,7 +75,7 @@ class Recorder:
         self.steps.append(entry)
         return entry
 
-    def _changes(self, view: View) -> dict[str, ObjectState]:
+    def _changes(self, view: SimulatorView) -> dict[str, ObjectState]:
         now = {key: state_of(item) for key, item in view.objects.items()}
         changes = {key: state for key, state in now.items() if self._world.get(key) != state}
         for key in self._world.keys() - now.keys():
@@ -84,13 +84,13 @@ class Recorder:
         return changes
 
     @staticmethod
-    def _save(view: View, path: Path) -> None:
+    def _save(view: SimulatorView, path: Path) -> None:
         if view.frame is None:
             raise SimulatorError(f"{path.name}: the simulator sent no frame; start it with rendering on")
         Image.fromarray(view.frame).save(path, compress_level=_PNG_LEVEL)
 
 
-def object_log(view: View) -> ObjectLog:
+def object_log(view: SimulatorView) -> ObjectLog:
     """What the published log holds of a view: types, each once, in alphabetical order."""
     visible = [item for item in view.objects.values() if item.visible]
     inside: dict[str, set[str]] = {}
@@ -129,14 +129,14 @@ def _types(items: list[ThorObject]) -> list[str]:
     return sorted({item.object_type for item in items})
 
 
-def _pose(view: View) -> LoggedPose:
+def _pose(view: SimulatorView) -> LoggedPose:
     at = view.agent.position
     return LoggedPose(
         round(at.x, 4), round(at.y, 4), round(at.z, 4), round(view.agent.rotation, 2), round(view.agent.horizon, 2)
     )
 
 
-def _seen(view: View) -> dict[str, ObjectInFrame] | None:
+def _seen(view: SimulatorView) -> dict[str, ObjectInFrame] | None:
     if view.instances is None:
         return None
     return {

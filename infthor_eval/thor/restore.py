@@ -13,13 +13,13 @@ from infthor_eval.formats.trajectory import ObjectPose, Scene
 from infthor_eval.thor.axes import modern_rotation
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.teleport import teleport_call
-from infthor_eval.thor.view import AgentPose, Vector, View
+from infthor_eval.thor.view import AgentPose, SimulatorView, Vector
 
-__all__ = ["Restored", "restore"]
+__all__ = ["RestoreReport", "restore"]
 
 
 @dataclass
-class Restored:
+class RestoreReport:
     """What came of it.
 
     Attributes:
@@ -31,7 +31,7 @@ class Restored:
     refused: list[str] = field(default_factory=list)
 
 
-def restore(simulator: Simulator, scene: Scene) -> Restored:
+def restore(simulator: Simulator, scene: Scene) -> RestoreReport:
     """Load the scene of a trajectory and put everything where the recording begins.
 
     Args:
@@ -42,7 +42,7 @@ def restore(simulator: Simulator, scene: Scene) -> Restored:
         SimulatorError: the simulator has no such scene or fails.
     """
     view = simulator.reset(scene.floor_plan)
-    report = Restored()
+    report = RestoreReport()
     calls = _state_calls(scene)
     if scene.object_poses:
         poses, report.dropped = _poses(scene.object_poses, view)
@@ -68,7 +68,7 @@ def _state_calls(scene: Scene) -> list[dict[str, Any]]:
     return calls
 
 
-def _poses(recorded: list[ObjectPose], view: View) -> tuple[list[dict[str, Any]], list[str]]:
+def _poses(recorded: list[ObjectPose], view: SimulatorView) -> tuple[list[dict[str, Any]], list[str]]:
     """The poses under this scene's names, and the names that nothing here answers to."""
     known = {item.name for item in view.objects.values()}
     spare = defaultdict(list)

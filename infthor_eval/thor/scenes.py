@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from infthor_eval.errors import SimulatorError
 from infthor_eval.formats.floor_plans import write_floor_plan
 from infthor_eval.thor.simulator import Simulator
-from infthor_eval.thor.view import View
+from infthor_eval.thor.view import SimulatorView
 
 __all__ = ["dump_scene", "scene_pictures"]
 
@@ -49,7 +49,7 @@ def dump_scene(simulator: Simulator, scene: str, folder: Path, overwrite: bool =
     return len(objects)
 
 
-def _asked(simulator: Simulator, action: str) -> View:
+def _asked(simulator: Simulator, action: str) -> SimulatorView:
     view = simulator.query(action)
     if not view.success:
         raise SimulatorError(f"{action} failed: {view.error}; use AI2-THOR 5.x")

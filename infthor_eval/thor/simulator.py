@@ -15,7 +15,7 @@ from infthor_eval.thor.controller import SafeController
 from infthor_eval.thor.launch import Launch
 from infthor_eval.thor.teleport import teleport_call
 from infthor_eval.thor.transport import PeerFault
-from infthor_eval.thor.view import View, view_of
+from infthor_eval.thor.view import SimulatorView, view_of
 
 __all__ = ["Simulator", "SimulatorMark"]
 
@@ -31,7 +31,7 @@ class SimulatorMark:
     """A moment since the scene was loaded: the actions that led to it, and the world then."""
 
     episode: tuple["_Done", ...]
-    view: View
+    view: SimulatorView
 
 
 class Simulator:
@@ -85,7 +85,7 @@ class Simulator:
         self._episode: list[_Done] = []
         self._failures = 0
         self._copies: dict[SimulatorMark, int] = {}  # to the slot of the process's copy; the longest unused first
-        self._view: View | None = None
+        self._view: SimulatorView | None = None
         self.restarts = 0
 
     def __enter__(self) -> Self:
@@ -102,7 +102,7 @@ class Simulator:
         return self._launch.label
 
     @property
-    def view(self) -> View:
+    def view(self) -> SimulatorView:
         """The world after the last action.
 
         Raises:
@@ -123,7 +123,7 @@ class Simulator:
             raise SimulatorError("no scene is loaded; reset the simulator to one first")
         return dict(self._controller.last_event.metadata)
 
-    def reset(self, scene: str | dict[str, Any] | None) -> View:
+    def reset(self, scene: str | dict[str, Any] | None) -> SimulatorView:
         """Load a scene and begin an episode.
 
         Args:
@@ -143,7 +143,7 @@ class Simulator:
             except PeerFault as fault:
                 self._recover_from(fault)
 
-    def step(self, action: str, **arguments: Any) -> View:
+    def step(self, action: str, **arguments: Any) -> SimulatorView:
         """Run one action; a refused one is told by the view's `success` and `error`.
 
         Raises:
@@ -163,7 +163,7 @@ class Simulator:
                 self._view = view
                 return view
 
-    def query(self, action: str, **arguments: Any) -> View:
+    def query(self, action: str, **arguments: Any) -> SimulatorView:
         """Run an action that only asks (`GetReachablePositions`): it is no part of the episode, nor is its
         view kept.
 
@@ -189,7 +189,7 @@ class Simulator:
         self._failures = 0  # the episode has come on
         return mark
 
-    def rewind(self, mark: SimulatorMark, *, exactly: bool = False) -> View:
+    def rewind(self, mark: SimulatorMark, *, exactly: bool = False) -> SimulatorView:
         """Bring the world to where it was at a mark, behind or beside the present moment, of the scene loaded.
 
         Args:
@@ -247,7 +247,7 @@ class Simulator:
             self._controller.stop()
             self._controller = None
 
-    def _load(self) -> View:
+    def _load(self) -> SimulatorView:
         """Bring the process to the start of the episode, starting one if need be."""
         if self._scene is None:
             raise SimulatorError("no scene is loaded; reset the simulator to one first")
@@ -260,7 +260,7 @@ class Simulator:
             message = " ".join(str(error).split())[:300]
             raise SceneError(f"scene {self._scene}: {message}") from error
 
-    def _call(self, call: dict[str, Any]) -> View:
+    def _call(self, call: dict[str, Any]) -> SimulatorView:
         assert self._controller is not None
         try:
             return view_of(self._controller.step({**self._unseen, **call}))

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 from infthor_eval.thor.simulator import Simulator
-from infthor_eval.thor.view import ThorObject, Vector, View
+from infthor_eval.thor.view import SimulatorView, ThorObject, Vector
 
 __all__ = ["transfer"]
 
@@ -39,7 +39,7 @@ _STATES = (
 )
 
 
-def transfer(simulator: Simulator, wanted: View) -> list[str]:
+def transfer(simulator: Simulator, wanted: SimulatorView) -> list[str]:
     """Make the objects' states and poses those of another view; the agent stays where it is.
 
     What a hand holds there floats here where the hand holds it.
@@ -69,13 +69,13 @@ def transfer(simulator: Simulator, wanted: View) -> list[str]:
     return sorted(_misplaced(simulator.view, wanted))
 
 
-def _cut(here: View, wanted: View) -> list[str]:
+def _cut(here: SimulatorView, wanted: SimulatorView) -> list[str]:
     """What is in slices there; the embedded simulator no longer tells of the whole thing then."""
     parts = {key.rpartition("|")[0] for key in wanted.objects.keys() - here.objects.keys()}
     return [key for key, item in here.objects.items() if key in parts and item.sliceable and not item.is_sliced]
 
 
-def _set(simulator: Simulator, wanted: View, state: _State) -> None:
+def _set(simulator: Simulator, wanted: SimulatorView, state: _State) -> None:
     for key, there in wanted.objects.items():
         here = simulator.view.objects.get(key)
         call = state.on if state.read(there) else state.off
@@ -83,7 +83,7 @@ def _set(simulator: Simulator, wanted: View, state: _State) -> None:
             simulator.step(**call, objectId=key, forceAction=True)
 
 
-def _doors(here: View, wanted: View) -> Iterator[dict[str, Any]]:
+def _doors(here: SimulatorView, wanted: SimulatorView) -> Iterator[dict[str, Any]]:
     """What was opened and closed; a thing that runs is switched off before, and on again by its state."""
     for key, there in wanted.objects.items():
         item = here.objects.get(key)
@@ -97,7 +97,7 @@ def _doors(here: View, wanted: View) -> Iterator[dict[str, Any]]:
             yield {"action": "OpenObject", "objectId": key, "openness": there.openness, "forceAction": True}
 
 
-def _moves(here: View, wanted: View) -> Iterator[dict[str, Any]]:
+def _moves(here: SimulatorView, wanted: SimulatorView) -> Iterator[dict[str, Any]]:
     """What lies elsewhere or otherwise; receptacles before what is in them."""
     for key, there in sorted(wanted.objects.items(), key=lambda pair: not pair[1].receptacle):
         item = here.objects.get(key)
@@ -113,7 +113,7 @@ def _moves(here: View, wanted: View) -> Iterator[dict[str, Any]]:
         }
 
 
-def _misplaced(here: View, wanted: View) -> Iterator[str]:
+def _misplaced(here: SimulatorView, wanted: SimulatorView) -> Iterator[str]:
     for key, there in wanted.objects.items():
         item = here.objects.get(key)
         if item is None or (there.pickupable and not _is_at(item, there)):

@@ -16,9 +16,9 @@ __all__ = [
     "AxisAngle",
     "Box",
     "Instance",
+    "SimulatorView",
     "ThorObject",
     "Vector",
-    "View",
     "instances_of",
     "view_of",
 ]
@@ -151,7 +151,7 @@ class Instance:
 
 
 @dataclass(frozen=True)
-class View:
+class SimulatorView:
     """The world after one action.
 
     Attributes:
@@ -183,7 +183,7 @@ class View:
     arm: ArmState | None = None
 
 
-def view_of(event: Any) -> View:
+def view_of(event: Any) -> SimulatorView:
     """Turn an `ai2thor.server.Event` into a View.
 
     Raises:
@@ -198,7 +198,7 @@ def view_of(event: Any) -> View:
         in_hand = [item["objectId"] for item in metadata["inventoryObjects"] or ()]
     except (msgspec.ValidationError, KeyError, TypeError) as error:
         raise SimulatorError(f"metadata of {metadata['lastAction']}: {error}; use AI2-THOR 5.x") from error
-    return View(
+    return SimulatorView(
         frame=None if event.frame is None else np.ascontiguousarray(event.frame),
         depth=None if event.depth_frame is None else np.ascontiguousarray(event.depth_frame),
         objects={item.object_id: item for item in objects},

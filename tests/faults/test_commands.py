@@ -164,12 +164,13 @@ def test_a_full_disk_behind_standard_output_is_one_line(make_nieh_set, tmp_path,
 
 
 def test_questions_do_not_replace_what_somebody_edited(tmp_path, run, monkeypatch):
-    from infthor_eval.generation.questions.make import MadeQuestions
+    from infthor_eval.generation.questions.generate import GeneratedQuestions
 
     from ..conftest import QUESTIONS
 
     monkeypatch.setattr(
-        "infthor_eval.generation.questions.make.make_questions", lambda *_, **__: MadeQuestions(list(QUESTIONS))
+        "infthor_eval.generation.questions.generate.generate_questions",
+        lambda *_, **__: GeneratedQuestions(list(QUESTIONS)),
     )
     arguments = ["questions", tmp_path, "--out", tmp_path / "qa.csv"]
     assert run(*arguments)[0] == 0

@@ -4,8 +4,8 @@ import pytest
 from infthor_eval.errors import DataError
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.packaged import packaged_folder
-from infthor_eval.generation.bundle import MANIFEST, make_bundle, read_manifest
-from infthor_eval.generation.questions.make import make_questions
+from infthor_eval.generation.bundle import MANIFEST, build_bundle, read_manifest
+from infthor_eval.generation.questions.generate import generate_questions
 from infthor_eval.thor.launch import embedded
 from infthor_eval.thor.simulator import Simulator
 
@@ -25,7 +25,7 @@ def test_the_bundled_set_is_small_and_has_every_type_and_number_of_clues():
 
 def test_the_bundled_questions_follow_from_the_bundled_logs():
     manifest = read_manifest(BUNDLED / MANIFEST)
-    made = make_questions(
+    made = generate_questions(
         BUNDLED, seed=manifest.question_seed, per_trajectory=manifest.per_trajectory, further=manifest.further
     )
     assert made.questions == list(NiehSet(BUNDLED).questions)
@@ -35,7 +35,7 @@ def test_bundled_trajectories_come_out_again_bit_for_bit(tmp_path):
     manifest = read_manifest(BUNDLED / MANIFEST)
     part = msgspec.structs.replace(manifest, trajectories=manifest.trajectories[-1:])
     with Simulator(embedded()) as simulator:
-        again, _ = make_bundle(part, simulator, tmp_path / "set")
+        again, _ = build_bundle(part, simulator, tmp_path / "set")
     files = {name: digest for name, digest in again.files.items() if name.startswith("metadata/")}
     assert len(files) > 75
     assert {name: manifest.files[name] for name in files} == files
@@ -46,12 +46,12 @@ def test_a_folder_that_is_not_empty_and_a_scene_that_is_not_there_are_refused(tm
     (tmp_path / "file").write_text("")
     with Simulator(embedded()) as simulator:
         with pytest.raises(DataError, match="is not empty"):
-            make_bundle(manifest, simulator, tmp_path)
+            build_bundle(manifest, simulator, tmp_path)
         nowhere = msgspec.structs.replace(
             manifest, trajectories=(msgspec.structs.replace(manifest.trajectories[0], scene="attic-1"),)
         )
         with pytest.raises(DataError, match="attic-1"):
-            make_bundle(nowhere, simulator, tmp_path / "set")
+            build_bundle(nowhere, simulator, tmp_path / "set")
 
 
 @pytest.mark.parametrize("content", ["{", '{"name": "x"}', '{"name": "x", "trajectories": [], "more": 1}'])

@@ -9,7 +9,7 @@ from infthor_eval.formats.trajectory import (
     TaskInfo,
     Trajectory,
 )
-from infthor_eval.generation.final_task import ends_of, violation
+from infthor_eval.generation.final_task import end_types, violation
 
 
 def log(*types):
@@ -18,7 +18,7 @@ def log(*types):
 
 
 def test_the_ends_are_a_fifth_each():
-    early, late = ends_of(log(*["Aa"] * 2, *"BBBBBB", *["Cc"] * 2))
+    early, late = end_types(log(*["Aa"] * 2, *"BBBBBB", *["Cc"] * 2))
     assert (early.pickupable, early.visible) == ({"A"}, {"C", "c"})
     assert (late.pickupable, late.visible) == ({"C"}, {"A", "a"})
 

@@ -9,7 +9,7 @@ from infthor_eval.errors import SimulatorError
 from infthor_eval.formats.step_log import iter_object_states, read_steps
 from infthor_eval.formats.trajectory import iter_sources, iter_trajectories
 from infthor_eval.generation.generate_set import generate_set
-from infthor_eval.generation.questions.make import make_questions
+from infthor_eval.generation.questions.generate import generate_questions
 from infthor_eval.generation.replay import box_iou
 from infthor_eval.generation.replay_set import replay_set, select
 from infthor_eval.generation.replay_summary import summarise
@@ -134,8 +134,8 @@ def test_what_the_published_saver_writes_is_replayed_asked_about_and_evaluated(t
     training, test = (item for _, item in selection.items)
     assert training.long_horizon_task is None
     assert test.long_horizon_task.task_desc == test.sub_tasks[-1].task_desc == test.sub_trajs[-1].subgoal
-    made = make_questions(tmp_path / "set", per_trajectory=20)
-    assert len(made.questions) == 40 and not made.doubted
+    made = generate_questions(tmp_path / "set", per_trajectory=20)
+    assert len(made.questions) == 40 and not made.unconfirmed
     assert "put a cold apple in the microwave" in (tmp_path / "set/metadata/floorplan28_test/traj.txt").read_text()
     predict = BASELINES["oracle"](0).fit(made.questions)
     said = {question: predict(Sample(question, question.clues)) for question in made.questions}

@@ -16,7 +16,7 @@ def drawn(number):
     chosen = []
     for _ in range(number):
         task = next(pool.sample(ROOM, {"Faucet"}))
-        pool.used(task)
+        pool.note_use(task)
         chosen.append(task)
     return chosen
 
@@ -50,7 +50,7 @@ def test_a_task_that_failed_comes_later_but_is_not_given_up():
         for seed in range(60):
             pool = TaskPool(TaskType, random.Random(seed))
             for _ in range(failures):
-                pool.failed(failing)
+                pool.note_failure(failing)
             ranks.append(list(pool.sample(ROOM)).index(failing))
         return sum(ranks) / len(ranks)
 

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from infthor_eval.household.goals import achieved, goal_holds
-from infthor_eval.household.symbolic import ABSENT, FLOOR, Room, State
+from infthor_eval.household.goals import goal_holds, is_achieved
+from infthor_eval.household.symbolic import ABSENT, FLOOR, State, SymbolicRoom
 from infthor_eval.household.tasks import Task, TaskType
 from infthor_eval.household.treatments import Treatments
 from tests.plans import building
@@ -36,7 +36,7 @@ def state(at=None, held=None, clean=(), hot=(), cold=(), lit=(), **where):
 
 def holds(task, now):
     places = frozenset({"table-1", "table-2", "desk", "lamp", "other-lamp"})
-    return achieved(task, Room(TYPES, places, frozenset({"table-1", "table-2", "desk", "plate"}), now), now)
+    return is_achieved(task, SymbolicRoom(TYPES, places, frozenset({"table-1", "table-2", "desk", "plate"}), now), now)
 
 
 PLACE = Task(TaskType.PLACE, "Mug", "SideTable")

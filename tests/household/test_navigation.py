@@ -1,7 +1,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from infthor_eval.household.navigation import GRID, Grid, Stand
+from infthor_eval.household.navigation import GRID, Grid, GridPose
 
 cells = st.frozensets(st.tuples(st.integers(0, 4), st.integers(0, 4)), min_size=1, max_size=25)
 
@@ -13,7 +13,7 @@ def grid_of(chosen):
 @given(cells, st.data())
 def test_paths_lead_where_they_should_and_are_shortest(chosen, data):
     grid = grid_of(chosen)
-    stands = sorted(Stand(cell, facing) for cell in grid.cells for facing in (0, 90, 180, 270))
+    stands = sorted(GridPose(cell, facing) for cell in grid.cells for facing in (0, 90, 180, 270))
     start, goal = data.draw(st.sampled_from(stands)), data.draw(st.sampled_from(stands))
     distances = grid.distances(start)
     path = grid.path(start, goal)
@@ -27,27 +27,27 @@ def test_paths_lead_where_they_should_and_are_shortest(chosen, data):
 def test_distances_to_a_goal_are_the_lengths_of_the_paths_there(chosen, data):
     grid = grid_of(chosen)
     facing = st.sampled_from((0, 90, 180, 270))
-    goal = Stand(data.draw(st.sampled_from(sorted(grid.cells))), data.draw(facing))
+    goal = GridPose(data.draw(st.sampled_from(sorted(grid.cells))), data.draw(facing))
     x, z = data.draw(st.sampled_from(sorted(grid.cells)))
-    start = Stand((x + data.draw(st.integers(-1, 1)), z + data.draw(st.integers(-1, 1))), data.draw(facing))
+    start = GridPose((x + data.draw(st.integers(-1, 1)), z + data.draw(st.integers(-1, 1))), data.draw(facing))
     path = grid.path(start, goal)
     assert grid.distances_to(goal).get(start) == (None if path is None else len(path))
 
 
 def test_a_goal_off_the_grid_is_stepped_onto():
     grid = grid_of([(0, 0), (0, 1)])
-    goal = Stand(max(grid.cells), 0)
-    beyond = Stand(goal.ahead, 0)
+    goal = GridPose(max(grid.cells), 0)
+    beyond = GridPose(goal.ahead, 0)
     assert grid.path(goal, beyond) is None
     distances = grid.distances_to(beyond)
-    assert distances[goal] == 1 and distances[Stand(min(grid.cells), 180)] == 4
+    assert distances[goal] == 1 and distances[GridPose(min(grid.cells), 180)] == 4
 
 
 def test_distances_to_a_goal_are_searched_for_once():
     grid = grid_of([(0, 0), (0, 1)])
-    goal = Stand(min(grid.cells), 0)
+    goal = GridPose(min(grid.cells), 0)
     assert grid.distances_to(goal) is grid.distances_to(goal)
-    assert grid.distances_to(goal) != grid.distances_to(Stand(goal.cell, 90))
+    assert grid.distances_to(goal) != grid.distances_to(GridPose(goal.cell, 90))
 
 
 def walk(grid, stand, path):
@@ -59,7 +59,7 @@ def walk(grid, stand, path):
             dx, dz = ahead[stand.facing]
             cell = (cell[0] + dx, cell[1] + dz)
             assert cell in grid.cells
-        stand = Stand(cell, (stand.facing + turn) % 360)
+        stand = GridPose(cell, (stand.facing + turn) % 360)
     return stand
 
 

@@ -2,7 +2,7 @@ from collections import deque
 
 import pytest
 
-from infthor_eval.household.goals import achieved, least_remaining
+from infthor_eval.household.goals import is_achieved, lower_bound
 from infthor_eval.household.planner import plan
 from infthor_eval.household.possible_tasks import tasks_of
 from infthor_eval.household.symbolic import room_of
@@ -66,8 +66,8 @@ def shortest(task, limit):
     queue = deque([problem.start])
     while queue:
         state = queue.popleft()
-        assert least_remaining(task, ROOM, state) + depth[state] <= limit or not achieved(task, ROOM, state)
-        if achieved(task, ROOM, state):
+        assert lower_bound(task, ROOM, state) + depth[state] <= limit or not is_achieved(task, ROOM, state)
+        if is_achieved(task, ROOM, state):
             return depth[state]
         for _, following in problem.successors(state):
             if following not in depth:

@@ -1,7 +1,7 @@
 import pytest
 
 from infthor_eval.household.affordances import preposition
-from infthor_eval.household.wording import an, noun, plural
+from infthor_eval.household.wording import noun, plural, with_article
 
 
 @pytest.mark.parametrize(
@@ -20,7 +20,7 @@ from infthor_eval.household.wording import an, noun, plural
     ],
 )
 def test_words_with_their_article(object_type, words):
-    assert an(noun(object_type)) == words
+    assert with_article(noun(object_type)) == words
 
 
 @pytest.mark.parametrize(

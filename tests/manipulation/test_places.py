@@ -6,7 +6,7 @@ import pytest
 from infthor_eval.manipulation.geometry import corners_of
 from infthor_eval.manipulation.linkage import Parts
 from infthor_eval.manipulation.places import Entry, Places, entry_of, firmness, others_on, support, taken
-from infthor_eval.thor.view import AgentPose, Box, ThorObject, Vector, View
+from infthor_eval.thor.view import AgentPose, Box, SimulatorView, ThorObject, Vector
 
 BOARD = 0.8  # metres above the floor
 
@@ -34,7 +34,7 @@ def thing(name, x, y, z, size=(0.1, 0.1, 0.1), **more):
 
 def view_of(*things):
     agent = AgentPose(Vector(0.0, 0.9, -1.0), 0.0, 0.0)
-    return View(None, None, {t.object_id: t for t in things}, agent, (), True, "", "", None, "a", None)
+    return SimulatorView(None, None, {t.object_id: t for t in things}, agent, (), True, "", "", None, "a", None)
 
 
 @pytest.mark.parametrize(("x", "y", "supported"), [

@@ -10,7 +10,7 @@ from infthor_eval.formats.trajectory import iter_trajectories
 from infthor_eval.plans.check import check_env
 from infthor_eval.plans.environment import Ended, PlanEnvironment
 from infthor_eval.thor.frames import FrameFolder
-from infthor_eval.thor.view import View
+from infthor_eval.thor.view import SimulatorView
 from model_adapters import ContractError
 
 from .cut import FORK, cut, write
@@ -151,5 +151,5 @@ def test_without_frames_and_without_a_keeper_of_them_it_holds_too(simulators, tr
         environment = PlanEnvironment(trajectory, simulator, max_steps=12)
         check_env(environment, (2,))
         observation, _ = environment.reset(2)
-        assert isinstance(observation.view, View)
+        assert isinstance(observation.view, SimulatorView)
         assert (observation.frame, observation.view.frame) == (None, None)

@@ -3,8 +3,8 @@
 import pytest
 
 from infthor_eval.household.goals import goal_holds
-from infthor_eval.household.navigation import GRID, Stand
-from infthor_eval.household.scout import reachable
+from infthor_eval.household.navigation import GRID, GridPose
+from infthor_eval.household.scout import reachable_grid
 from infthor_eval.household.treatments import Treatments
 from infthor_eval.plans.plan import PlanKind, plans_of, tasks_of
 from infthor_eval.plans.rewards import PlanReward, max_reward, reward_rules
@@ -27,7 +27,7 @@ def simulator():
 def recorded_goal(plan, grid):
     """Where the recording says that a plan leads."""
     x, z, turn, horizon = map(int, plan.location.removeprefix("loc|").split("|"))
-    stand = Stand(grid.cell(x * GRID, z * GRID), turn * 90)
+    stand = GridPose(grid.cell(x * GRID, z * GRID), turn * 90)
     return PlanTarget(plan.kind, goal_stand=stand, goal_horizon=float(horizon))
 
 
@@ -43,7 +43,7 @@ def test_every_plan_is_carried_out(simulator, name):
         begins = plan.index == 0 or plans[plan.index - 1].task != plan.task
         treatments = Treatments() if begins else treatments
         task, start = tasks[plan.task].task, simulator.view
-        grid = reachable(simulator) if plan.kind == PlanKind.GOTO else None
+        grid = reachable_grid(simulator) if plan.kind == PlanKind.GOTO else None
         target = target_of(plan, grounding, start) if grid is None else recorded_goal(plan, grid)
         held = goal_holds(task, start, treatments)
         reward, earned, ended = PlanReward(rules, target, task, start, treatments, grid), 0.0, None

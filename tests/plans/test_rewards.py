@@ -4,7 +4,7 @@ import msgspec
 import pytest
 
 from infthor_eval.errors import DataError, UsageError
-from infthor_eval.household.navigation import Stand
+from infthor_eval.household.navigation import GridPose
 from infthor_eval.household.tasks import Task, TaskType
 from infthor_eval.household.treatments import Treatments
 from infthor_eval.plans.plan import PlanKind
@@ -49,7 +49,7 @@ def run(rules, target, start, events, task=ELSEWHERE, grid=None, treatments=None
 
 def walk(rules, poses, actions, goal=(0, 9), start=(0, 0), horizon=30.0, goal_horizon=30.0):
     """Rewards of walking through the corridor, at cells along it."""
-    target = PlanTarget(PlanKind.GOTO, goal_stand=Stand(goal, 0), goal_horizon=goal_horizon)
+    target = PlanTarget(PlanKind.GOTO, goal_stand=GridPose(goal, 0), goal_horizon=goal_horizon)
     events = [(action, None, kitchen(at=(0, z))) for action, z in zip(actions, poses, strict=True)]
     return run(rules, target, kitchen(at=start, horizon=horizon), events, grid=CORRIDOR)
 
@@ -89,7 +89,7 @@ def test_to_and_fro_is_paid_once():
 
 @pytest.mark.parametrize("rules", [DEFAULT, COMPAT])
 def test_looks_and_turns_are_steps(rules):
-    target = PlanTarget(PlanKind.GOTO, goal_stand=Stand((0, 2), 90), goal_horizon=60.0)
+    target = PlanTarget(PlanKind.GOTO, goal_stand=GridPose((0, 2), 90), goal_horizon=60.0)
     start = kitchen(at=(0, 0), horizon=-30.0)  # two ahead, one turn, three looks: six left
     events = [
         ("LookDown", None, kitchen(at=(0, 0), horizon=0.0)),
@@ -113,7 +113,7 @@ def test_looks_and_turns_are_steps(rules):
 
 
 def test_half_a_look_counts_whole():
-    target = PlanTarget(PlanKind.GOTO, goal_stand=Stand((0, 2), 0), goal_horizon=45.0)
+    target = PlanTarget(PlanKind.GOTO, goal_stand=GridPose((0, 2), 0), goal_horizon=45.0)
     events = [("MoveAhead", None, kitchen(at=(0, 1), horizon=30.0))]  # one ahead and half a look
     assert run(DEFAULT, target, kitchen(), events, grid=CORRIDOR) == [(pytest.approx(4.2), DONE)]
     assert max_reward(DEFAULT, target, kitchen(horizon=30.0), CORRIDOR) == pytest.approx(4.2)
@@ -475,11 +475,11 @@ MOST = [
     (CLEAN, HOLDING, CLEAN_MUG, 7.0, 0.0),
     (HEAT, HOLDING, None, 2.0, 0.0),
     (COOL, HOLDING, None, 6.0, 0.0),
-    (PlanTarget(PlanKind.GOTO, goal_stand=Stand((0, 9), 0), goal_horizon=60.0), kitchen(), None, 5.6, 5.6),
-    (PlanTarget(PlanKind.GOTO, goal_stand=Stand((0, 3), 0), goal_horizon=30.0), kitchen(), None, 4.2, 4.2),
-    (PlanTarget(PlanKind.GOTO, goal_stand=Stand((0, 2), 0), goal_horizon=30.0), kitchen(), None, 4.2, 4.2),
-    (PlanTarget(PlanKind.GOTO, goal_stand=Stand((0, 0), 0), goal_horizon=30.0), kitchen(), EXAMINE, 9.0, 9.0),
-    (PlanTarget(PlanKind.GOTO, goal_stand=Stand((7, 7), 0), goal_horizon=30.0), kitchen(), None, 0.0, 0.0),
+    (PlanTarget(PlanKind.GOTO, goal_stand=GridPose((0, 9), 0), goal_horizon=60.0), kitchen(), None, 5.6, 5.6),
+    (PlanTarget(PlanKind.GOTO, goal_stand=GridPose((0, 3), 0), goal_horizon=30.0), kitchen(), None, 4.2, 4.2),
+    (PlanTarget(PlanKind.GOTO, goal_stand=GridPose((0, 2), 0), goal_horizon=30.0), kitchen(), None, 4.2, 4.2),
+    (PlanTarget(PlanKind.GOTO, goal_stand=GridPose((0, 0), 0), goal_horizon=30.0), kitchen(), EXAMINE, 9.0, 9.0),
+    (PlanTarget(PlanKind.GOTO, goal_stand=GridPose((7, 7), 0), goal_horizon=30.0), kitchen(), None, 0.0, 0.0),
 ]
 
 
@@ -491,7 +491,7 @@ def test_the_most_that_a_plan_gives(target, start, completes, most, published):
 
 def test_a_way_is_over_before_its_end_and_other_plans_go_on():
     poses = [kitchen(at=(0, z)).agent for z in range(1, 8)]
-    ahead = PlanTarget(PlanKind.GOTO, goal_stand=Stand((0, 7), 0), goal_horizon=30.0)
+    ahead = PlanTarget(PlanKind.GOTO, goal_stand=GridPose((0, 7), 0), goal_horizon=30.0)
     assert n_on_the_way(DEFAULT, ahead, poses, CORRIDOR) == 5  # two steps are left
     assert n_on_the_way(DEFAULT, ahead, poses[:4], CORRIDOR) == 4
     assert n_on_the_way(DEFAULT, PICKUP, poses) == len(poses)

@@ -3,7 +3,7 @@ import pytest
 from infthor_eval.thor.actions import (
     ActionText,
     UngroundedError,
-    applicable,
+    applicable_actions,
     applicable_calls,
     ground,
     object_type_of,
@@ -83,7 +83,7 @@ def test_what_is_possible_counts_every_object_in_view():
     assert {"action": "LookUp", "degrees": 15.0} in calls
     assert {call["objectId"] for call in calls if call["action"] == "PickupObject"} == {mug.object_id}
     assert not [call for call in calls if call["action"] == "PutObject"]
-    texts = [str(text) for text in applicable(view(*drawers, mug, hidden))]
+    texts = [str(text) for text in applicable_actions(view(*drawers, mug, hidden))]
     assert texts.count("OpenObject Drawer") == 1
     held = view(*drawers, mug, inventory=[mug.object_id])
     assert [str(text_of_call(call, held)) for call in applicable_calls(held) if call["action"] == "PutObject"] == [

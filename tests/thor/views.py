@@ -1,6 +1,6 @@
 """Views made by hand, for tests that need no simulator."""
 
-from infthor_eval.thor.view import AgentPose, ThorObject, Vector, View
+from infthor_eval.thor.view import AgentPose, SimulatorView, ThorObject, Vector
 
 
 def thing(object_id, **fields):
@@ -14,7 +14,7 @@ def thing(object_id, **fields):
 
 def view(*things, inventory=(), instances=None):
     """The world with these objects, after a successful action."""
-    return View(
+    return SimulatorView(
         frame=None,
         depth=None,
         objects={item.object_id: item for item in things},

@@ -18,7 +18,7 @@ def command(manifest: Path, out: Path) -> int:
     """
     from infthor_eval.cli.progress.bar import PacedBar
     from infthor_eval.formats.files import prepare_folder
-    from infthor_eval.generation.bundle import differing_files, make_bundle, read_manifest
+    from infthor_eval.generation.bundle import build_bundle, differing_files, read_manifest
     from infthor_eval.terminal import error_console, print_line, progress_bar
     from infthor_eval.thor.launch import embedded
     from infthor_eval.thor.simulator import Simulator
@@ -27,10 +27,10 @@ def command(manifest: Path, out: Path) -> int:
     prepare_folder(out)
     with Simulator(embedded()) as simulator, progress_bar(error_console()) as progress:
         bar = PacedBar(progress, wanted.name, 2 * len(wanted.trajectories))
-        finished, made = make_bundle(wanted, simulator, out, bar.advance)
+        finished, made = build_bundle(wanted, simulator, out, bar.advance)
     size = sum(path.stat().st_size for path in out.rglob("*") if path.is_file())
     print_line(f"{len(made.questions)} questions on {made.trajectories} trajectories, {size / 1e6:.1f} MB: {out}")
-    print_line(made.words())
+    print_line(made.summary_text())
     if not wanted.files:
         return 0
     n_files, differing = len(wanted.files.keys() | finished.files.keys()), differing_files(wanted, finished)

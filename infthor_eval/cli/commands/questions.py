@@ -49,12 +49,12 @@ def command(
     from infthor_eval.errors import wrap_errors
     from infthor_eval.formats.files import prepare_file, refuse_overwrite, write_atomically
     from infthor_eval.formats.qa_csv import encode_questions
-    from infthor_eval.generation.questions.make import make_questions
+    from infthor_eval.generation.questions.generate import generate_questions
     from infthor_eval.terminal import error_console, print_line
 
     prepare_file(out)
     notes = error_console()
-    made = make_questions(
+    made = generate_questions(
         folder,
         seed=seed,
         per_trajectory=per_trajectory,
@@ -68,9 +68,9 @@ def command(
         refuse_overwrite(out, content)
     with wrap_errors(f"{out}: cannot be written", "give another --out"), write_atomically(out) as partial:
         partial.write_bytes(content)
-    told = f"{len(made.questions)} questions on {made.trajectories} trajectories: {out}\n{made.words()}"
+    told = f"{len(made.questions)} questions on {made.trajectories} trajectories: {out}\n{made.summary_text()}"
     print_line(told)
-    for question in made.doubted:
+    for question in made.unconfirmed:
         notes.print(f"skipped, the checker disagrees: {question.traj_id}: {question.text}")
     for line in made.skipped:
         notes.print(f"skipped: {line}", style="red")

@@ -246,7 +246,7 @@ def make_data(scenes: Scenes, seed: int, out: Path, worker_settings: WorkerSetti
     from infthor_eval.formats.qa_csv import write_questions
     from infthor_eval.generation.generate_set import generate_with_workers
     from infthor_eval.generation.jobs import trajectory_jobs
-    from infthor_eval.generation.questions.make import make_questions
+    from infthor_eval.generation.questions.generate import generate_questions
     from infthor_eval.generation.replay_set import replay_with_workers, select
     from infthor_eval.thor.launch import embedded
 
@@ -263,7 +263,7 @@ def make_data(scenes: Scenes, seed: int, out: Path, worker_settings: WorkerSetti
     failures += [f"{item.place}: {item.message}" for item in replayed.failures]
     if failures:
         raise DataError(f"{out}: {failures[0]}; give other scenes")
-    questions = make_questions(
+    questions = generate_questions(
         made_set,
         seed=seed,
         per_trajectory=_PER_TRAJECTORY,

@@ -6,9 +6,18 @@ from dataclasses import dataclass
 
 from infthor_eval.formats.question import Answer, Question
 from infthor_eval.household.affordances import preposition
-from infthor_eval.household.wording import canonical, compact, noun
+from infthor_eval.household.wording import canonical_type, compact_name, noun
 
-__all__ = ["MANY", "Candidate", "answer_of", "distinct", "further", "listing", "the", "within"]
+__all__ = [
+    "MANY",
+    "Candidate",
+    "answer_of",
+    "are_distinguishable",
+    "further_type",
+    "in_or_on",
+    "listing_question",
+    "with_the",
+]
 
 MANY = 6  # gold answers; longer lists are a test of writing, not of seeing
 _SIMILAR = 0.75  # the published scorer takes answers alike from 0.8 on
@@ -59,27 +68,27 @@ class Candidate:
         return Question(traj_id, self.text, self.clues, self.answers, self.question_type, self.absence)
 
 
-def further(question_type: str) -> str:
+def further_type(question_type: str) -> str:
     """The question type of our own forms beside those of Table 3's type."""
     return f"{question_type}_further"
 
 
-def the(object_type: str) -> str:
+def with_the(object_type: str) -> str:
     """ "the coffee table" for an object type."""
-    return f"the {noun(canonical(object_type))}"
+    return f"the {noun(canonical_type(object_type))}"
 
 
-def within(object_type: str) -> str:
+def in_or_on(object_type: str) -> str:
     """ "on the coffee table", "in the fridge" for a receptacle type."""
-    return f"{preposition(object_type)} {the(object_type)}"
+    return f"{preposition(object_type)} {with_the(object_type)}"
 
 
 def answer_of(object_type: str) -> str:
     """An object type as a gold answer, in the published data's form ("coffeetable")."""
-    return compact(canonical(object_type))
+    return compact_name(canonical_type(object_type))
 
 
-def distinct(object_types: Sequence[str]) -> bool:
+def are_distinguishable(object_types: Sequence[str]) -> bool:
     """Whether a list of these types can be a gold answer: no scorer may take one for another.
 
     The published scorer deletes "and" inside words of lists too ("candle"), so such words cannot be in one.
@@ -91,12 +100,14 @@ def distinct(object_types: Sequence[str]) -> bool:
         for other, object_type in zip(words[:index], object_types[:index], strict=True):
             if difflib.SequenceMatcher(None, word, other).ratio() >= _SIMILAR:
                 return False
-            if any({canonical(object_type), canonical(object_types[index])} <= group for group in _ALIKE):
+            if any({canonical_type(object_type), canonical_type(object_types[index])} <= group for group in _ALIKE):
                 return False
     return True
 
 
-def listing(question_type: str, form: str, occasions: Iterable[tuple[str | None, int | None]]) -> Iterator[Candidate]:
+def listing_question(
+    question_type: str, form: str, occasions: Iterable[tuple[str | None, int | None]]
+) -> Iterator[Candidate]:
     """A question on all types that something happened with, each with the first frame that shows it happen.
 
     Args:
@@ -111,8 +122,8 @@ def listing(question_type: str, form: str, occasions: Iterable[tuple[str | None,
     first: dict[str, int] = {}
     for name, frame in everything:
         if name is not None and frame is not None:
-            first.setdefault(canonical(name), frame)
-    complete = all(name is not None and canonical(name) in first for name, _ in everything)
-    if first and complete and len(first) <= MANY and distinct(list(first)):
+            first.setdefault(canonical_type(name), frame)
+    complete = all(name is not None and canonical_type(name) in first for name, _ in everything)
+    if first and complete and len(first) <= MANY and are_distinguishable(list(first)):
         answers = tuple(answer_of(name) for name in first)
         yield Candidate(question_type, form, (), tuple(first.values()), answers, tuple(first))

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from infthor_eval.formats.question import Question
 from infthor_eval.formats.step_log import Step
-from infthor_eval.generation.questions.solvers import Glimpse, answer, glimpses
+from infthor_eval.generation.questions.solvers import FrameFacts, answer, frame_facts
 
 __all__ = ["Checker", "Verdict"]
 
@@ -39,8 +39,8 @@ class Checker:
             steps: the log.
             share: of the frame's pixels that an object must fill to be seen.
         """
-        self._whole = glimpses(steps, share)
-        self._single = {item.frame: item for item in glimpses(steps, share, range(len(steps)))}
+        self._whole = frame_facts(steps, share)
+        self._single = {item.frame: item for item in frame_facts(steps, share, range(len(steps)))}
 
     def verdict(self, question: Question) -> Verdict:
         """Judge one question.
@@ -51,7 +51,7 @@ class Checker:
         gold = sorted(str(item) for item in question.answers)
         clues = question.clues
 
-        def gives(seen: Sequence[Glimpse]) -> bool:
+        def gives(seen: Sequence[FrameFacts]) -> bool:
             found = answer(question.text, seen)
             return found is not None and sorted(found) == gold
 

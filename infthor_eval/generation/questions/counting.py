@@ -10,20 +10,20 @@ from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import replace
 
-from infthor_eval.generation.questions.candidates import Candidate, further, the, within
-from infthor_eval.generation.questions.history import Event, History, Move
-from infthor_eval.household.wording import an, noun
+from infthor_eval.generation.questions.candidates import Candidate, further_type, in_or_on, with_the
+from infthor_eval.generation.questions.history import Event, ObjectMove, TrajectoryHistory
+from infthor_eval.household.wording import noun, with_article
 
 __all__ = ["FURTHER", "MIXED", "QUESTION_TYPE", "counts", "further_counts"]
 
 QUESTION_TYPE = "movement_counting"
-FURTHER = further(QUESTION_TYPE)
+FURTHER = further_type(QUESTION_TYPE)
 MIXED = "movement_counting_mixed"
 _SHARE_MIXED = 0.5
 _MOST_ADDED = 3
 
 
-def counts(history: History) -> Iterator[Candidate]:
+def counts(history: TrajectoryHistory) -> Iterator[Candidate]:
     """How often what was picked up more than once, alone of its type, was moved: picked up and put down."""
     for object_type, items in sorted(history.handled.items()):
         item = min(items)
@@ -31,10 +31,12 @@ def counts(history: History) -> Iterator[Candidate]:
         shown = all(history.shows(move.after, move.item, move.target) for move in moves)
         if len(items) == 1 and shown and len(moves) == history.pickups[item] > 1:
             frames = [move.after for move in moves]
-            yield _count(QUESTION_TYPE, "How many times did you move {}?", (the(object_type),), frames, object_type)
+            yield _count(
+                QUESTION_TYPE, "How many times did you move {}?", (with_the(object_type),), frames, object_type
+            )
 
 
-def further_counts(history: History, rng: random.Random) -> Iterator[Candidate]:
+def further_counts(history: TrajectoryHistory, rng: random.Random) -> Iterator[Candidate]:
     """Every other count, some of them mixed with frames that hold no occasion.
 
     Args:
@@ -50,7 +52,7 @@ def further_counts(history: History, rng: random.Random) -> Iterator[Candidate]:
             yield candidate
 
 
-def _openings(history: History) -> Iterator[Candidate]:
+def _openings(history: TrajectoryHistory) -> Iterator[Candidate]:
     """Of every type: "the fridge" where there is one, "a drawer" where there are several."""
     by_type: dict[str, list[Event]] = defaultdict(list)
     for event in history.events:
@@ -59,14 +61,14 @@ def _openings(history: History) -> Iterator[Candidate]:
     for object_type, events in sorted(by_type.items()):
         if all(history.shows(event.frame, event.target) for event in events):
             single = all(history.only_one(event.frame, event.target) for event in events)
-            name = the(object_type) if single else an(noun(object_type))
+            name = with_the(object_type) if single else with_article(noun(object_type))
             frames = [event.frame for event in events]
             yield _count(FURTHER, "How many times did you open {}?", (name,), frames, object_type)
 
 
-def _puts(history: History) -> Iterator[Candidate]:
+def _puts(history: TrajectoryHistory) -> Iterator[Candidate]:
     """Of every receptacle that alone is of its type."""
-    by_target: dict[str, list[Move]] = defaultdict(list)
+    by_target: dict[str, list[ObjectMove]] = defaultdict(list)
     for move in history.moves:
         by_target[move.target].append(move)
     for target, moves in sorted(by_target.items()):
@@ -75,10 +77,10 @@ def _puts(history: History) -> Iterator[Candidate]:
             place_type = history.world(moves[0].after)[target].type
             frames = [move.after for move in moves]
             form = "How many times did you put something {}?"
-            yield _count(FURTHER, form, (within(place_type),), frames, place_type)
+            yield _count(FURTHER, form, (in_or_on(place_type),), frames, place_type)
 
 
-def _items(history: History) -> Iterator[Candidate]:
+def _items(history: TrajectoryHistory) -> Iterator[Candidate]:
     """Of the different objects, each with the frame in which it is first held."""
     first: dict[str, int] = {}
     for event in history.events:

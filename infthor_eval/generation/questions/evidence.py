@@ -3,10 +3,10 @@
 from collections.abc import Callable, Mapping, Set
 from typing import Any
 
-__all__ = ["cover"]
+__all__ = ["minimal_cover"]
 
 
-def cover(
+def minimal_cover(
     wanted: Set[str], shown: Mapping[int, Set[str]], clearness: Callable[[int, Set[str]], Any]
 ) -> tuple[int, ...] | None:
     """A small set of frames that shows every wanted object, and from which none can be left out.

@@ -2,18 +2,25 @@
 
 from collections.abc import Iterator
 
-from infthor_eval.generation.questions.candidates import MANY, Candidate, answer_of, distinct, the, within
-from infthor_eval.generation.questions.evidence import cover
-from infthor_eval.generation.questions.history import History
+from infthor_eval.generation.questions.candidates import (
+    MANY,
+    Candidate,
+    answer_of,
+    are_distinguishable,
+    in_or_on,
+    with_the,
+)
+from infthor_eval.generation.questions.evidence import minimal_cover
+from infthor_eval.generation.questions.history import TrajectoryHistory
 from infthor_eval.generation.questions.readings import is_plain
-from infthor_eval.household.wording import canonical
+from infthor_eval.household.wording import canonical_type
 
 __all__ = ["QUESTION_TYPE", "final_states"]
 
 QUESTION_TYPE = "final_state"
 
 
-def final_states(history: History) -> Iterator[Candidate]:
+def final_states(history: TrajectoryHistory) -> Iterator[Candidate]:
     """Questions on receptacles that the agent put something into and that alone are of their type."""
     last = len(history) - 1
     targets = sorted({move.target for move in history.moves})
@@ -23,7 +30,7 @@ def final_states(history: History) -> Iterator[Candidate]:
         yield from _what(history, key)
 
 
-def _inside(history: History, receptacle: str) -> Iterator[Candidate]:
+def _inside(history: TrajectoryHistory, receptacle: str) -> Iterator[Candidate]:
     """Whether a moved object is in it in the end: yes where it was put there last, no where it was taken away."""
     last = len(history) - 1
     world = history.world(last)
@@ -35,12 +42,12 @@ def _inside(history: History, receptacle: str) -> Iterator[Candidate]:
             continue
         if history.shows_put(move):
             place_type = world[receptacle].type
-            names, subjects = (the(world[item].type), within(place_type)), (world[item].type, place_type)
+            names, subjects = (with_the(world[item].type), in_or_on(place_type)), (world[item].type, place_type)
             answer = "yes" if here == receptacle else "no"
             yield Candidate(QUESTION_TYPE, "Is {} {}?", names, (move.after,), (answer,), subjects)
 
 
-def _what(history: History, receptacle: str) -> Iterator[Candidate]:
+def _what(history: TrajectoryHistory, receptacle: str) -> Iterator[Candidate]:
     """What is in it in the end, and how many things."""
     last = len(history) - 1
     world = history.world(last)
@@ -54,19 +61,19 @@ def _what(history: History, receptacle: str) -> Iterator[Candidate]:
         stays = held <= inside and all(frame >= since[key] for key in held)
         if history.shows(frame, receptacle) and stays:
             shown[frame] = frozenset(key for key in held if history.shows_inside(frame, key))
-    clues = cover(inside, shown, lambda frame, keys: history.clearness(frame, *keys)) if inside else None
+    clues = minimal_cover(inside, shown, lambda frame, keys: history.clearness(frame, *keys)) if inside else None
     if clues is None or len(inside) > MANY or not is_plain(history, last, receptacle):
         return
     place_type = world[receptacle].type
     types = sorted(world[key].type for key in inside)
-    where, count = (within(place_type),), str(len(inside))
+    where, count = (in_or_on(place_type),), str(len(inside))
     yield Candidate(QUESTION_TYPE, "How many objects were {}?", where, clues, (count,), (place_type, "#"))
-    if len({canonical(item) for item in types}) == len(types) and distinct(types):
+    if len({canonical_type(item) for item in types}) == len(types) and are_distinguishable(types):
         answers = tuple(answer_of(item) for item in types)
         yield Candidate(QUESTION_TYPE, "What objects are {}?", where, clues, answers, (place_type, *types))
 
 
-def _arrival(history: History, item: str, receptacle: str) -> int:
+def _arrival(history: TrajectoryHistory, item: str, receptacle: str) -> int:
     """The frame from which on the object stays in the receptacle."""
     frame = len(history) - 1
     while frame > 0 and history.is_inside(frame - 1, item, receptacle):

@@ -8,9 +8,9 @@ from functools import cached_property
 from infthor_eval.errors import DataError
 from infthor_eval.formats.step_log import ObjectInFrame, ObjectState, Step, iter_object_states
 from infthor_eval.household.containment import logged_parent
-from infthor_eval.household.wording import canonical
+from infthor_eval.household.wording import canonical_type
 
-__all__ = ["DEFAULT_SHARE", "FRAME_PIXELS", "Event", "History", "Move", "is_same"]
+__all__ = ["DEFAULT_SHARE", "FRAME_PIXELS", "Event", "ObjectMove", "TrajectoryHistory", "is_same_object"]
 
 _SIDE = 300
 FRAME_PIXELS = _SIDE * _SIDE
@@ -19,7 +19,7 @@ DEFAULT_SHARE = 0.001  # of the frame: 90 pixels, about a fork on a table an arm
 
 
 @dataclass(frozen=True)
-class Move:
+class ObjectMove:
     """An object was picked up and put somewhere.
 
     Attributes:
@@ -58,7 +58,7 @@ class Event:
     receptacle: str | None
 
 
-class History:
+class TrajectoryHistory:
     """The log of one trajectory, for question rules.
 
     Attributes:
@@ -112,7 +112,7 @@ class History:
         shown = [frame for frame in frames if self.shows(frame, *ids)]
         return max(shown, key=lambda frame: self.clearness(frame, *ids), default=None)
 
-    def shows_put(self, move: Move) -> bool:
+    def shows_put(self, move: ObjectMove) -> bool:
         """Whether the frame after a move shows the object where it was put."""
         shown = self.shows(move.after, move.item, move.target)
         return shown and self.parent(move.after, move.item) == move.target
@@ -132,7 +132,7 @@ class History:
     @cached_property
     def all_object_types(self) -> frozenset[str]:
         """The types that exist at any time."""
-        return frozenset(canonical(state.type) for step in self.steps for state in step.changes.values())
+        return frozenset(canonical_type(state.type) for step in self.steps for state in step.changes.values())
 
     @cached_property
     def has_rooms(self) -> bool:
@@ -159,9 +159,9 @@ class History:
         )
 
     @cached_property
-    def moves(self) -> tuple[Move, ...]:
+    def moves(self) -> tuple[ObjectMove, ...]:
         """Every time that an object was picked up and put down, in order."""
-        found: list[Move] = []
+        found: list[ObjectMove] = []
         picked: dict[str, int] = {}
         for event in self.events:
             if event.action == "PickupObject":
@@ -169,10 +169,10 @@ class History:
             elif event.action == "PutObject" and event.receptacle is not None and event.target in picked:
                 before = picked.pop(event.target)
                 origin = self.parent(before, event.target)
-                found.append(Move(event.target, event.object_type, origin, before, event.receptacle, event.frame))
+                found.append(ObjectMove(event.target, event.object_type, origin, before, event.receptacle, event.frame))
         return tuple(found)
 
-    def moves_of(self, item: str) -> tuple[Move, ...]:
+    def moves_of(self, item: str) -> tuple[ObjectMove, ...]:
         """The moves of one object."""
         return tuple(move for move in self.moves if move.item == item)
 
@@ -192,16 +192,20 @@ class History:
 
     def alone(self, frame: int, item: str) -> bool:
         """Whether a frame shows no other object that people would call the same, however small."""
-        object_type = canonical(self._type_of(frame, item))
+        object_type = canonical_type(self._type_of(frame, item))
         world = self.world(frame)
         others = (key for key in self.seen(frame) if key != item and key in world)
-        return not any(canonical(world[key].type) == object_type and not is_same(key, item) for key in others)
+        return not any(
+            canonical_type(world[key].type) == object_type and not is_same_object(key, item) for key in others
+        )
 
     def only_one(self, frame: int, item: str) -> bool:
         """Whether the scene has no other object that people would call the same."""
         world = self.world(frame)
-        object_type = canonical(world[item].type)
-        return not any(canonical(state.type) == object_type and not is_same(key, item) for key, state in world.items())
+        object_type = canonical_type(world[item].type)
+        return not any(
+            canonical_type(state.type) == object_type and not is_same_object(key, item) for key, state in world.items()
+        )
 
     def contents(self, frame: int, receptacle: str) -> frozenset[str]:
         """The objects directly in or on a receptacle."""
@@ -210,7 +214,7 @@ class History:
     def is_inside(self, frame: int, item: str, receptacle: str) -> bool:
         """Whether an object is directly in or on a receptacle; a sink and its basin are one to people."""
         parent = self.parent(frame, item)
-        return parent is not None and is_same(parent, receptacle)
+        return parent is not None and is_same_object(parent, receptacle)
 
     def shows_inside(self, frame: int, item: str) -> bool:
         """Whether a frame shows an object and what it is directly in or on."""
@@ -223,7 +227,7 @@ class History:
         return state.type
 
 
-def is_same(one: str, other: str) -> bool:
+def is_same_object(one: str, other: str) -> bool:
     """Whether two ids mean one thing, or one of them a part of the other, as a basin is of its sink."""
     return one == other or one.startswith(f"{other}|") or other.startswith(f"{one}|")
 

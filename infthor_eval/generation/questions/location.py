@@ -5,17 +5,23 @@ Which pick-up or put is meant must be clear: what was picked up twice has no "be
 
 from collections.abc import Iterator, Sequence
 
-from infthor_eval.generation.questions.candidates import Candidate, answer_of, distinct, further, the
-from infthor_eval.generation.questions.history import History, Move
-from infthor_eval.household.wording import canonical
+from infthor_eval.generation.questions.candidates import (
+    Candidate,
+    answer_of,
+    are_distinguishable,
+    further_type,
+    with_the,
+)
+from infthor_eval.generation.questions.history import ObjectMove, TrajectoryHistory
+from infthor_eval.household.wording import canonical_type
 
 __all__ = ["FURTHER", "QUESTION_TYPE", "further_locations", "locations"]
 
 QUESTION_TYPE = "location_tracing"
-FURTHER = further(QUESTION_TYPE)
+FURTHER = further_type(QUESTION_TYPE)
 
 
-def locations(history: History) -> Iterator[Candidate]:
+def locations(history: TrajectoryHistory) -> Iterator[Candidate]:
     """Questions on every object that alone of its type was handled."""
     for object_type, moves in _traced(history):
         yield from _before_put(history, object_type, moves)
@@ -23,7 +29,7 @@ def locations(history: History) -> Iterator[Candidate]:
         yield from _now(history, object_type, moves)
 
 
-def further_locations(history: History) -> Iterator[Candidate]:
+def further_locations(history: TrajectoryHistory) -> Iterator[Candidate]:
     """Further questions on the same objects."""
     for object_type, moves in _traced(history):
         yield from _origin(history, object_type, moves)
@@ -31,14 +37,14 @@ def further_locations(history: History) -> Iterator[Candidate]:
         yield from _journey(history, object_type, moves)
 
 
-def _traced(history: History) -> Iterator[tuple[str, tuple[Move, ...]]]:
+def _traced(history: TrajectoryHistory) -> Iterator[tuple[str, tuple[ObjectMove, ...]]]:
     for object_type, items in sorted(history.handled.items()):
         moves = history.moves_of(next(iter(items))) if len(items) == 1 else ()
         if moves:
             yield object_type, moves
 
 
-def _before_put(history: History, object_type: str, moves: tuple[Move, ...]) -> Iterator[Candidate]:
+def _before_put(history: TrajectoryHistory, object_type: str, moves: tuple[ObjectMove, ...]) -> Iterator[Candidate]:
     """Of the first move, where nothing else led to such a container: it then was in one place before."""
     move = moves[0]
     to = _end(history, move)
@@ -48,7 +54,7 @@ def _before_put(history: History, object_type: str, moves: tuple[Move, ...]) -> 
         yield _candidate(QUESTION_TYPE, form, (move.before, move.after), [_start(history, move)], object_type, to)
 
 
-def _moved_from(history: History, object_type: str, moves: tuple[Move, ...]) -> Iterator[Candidate]:
+def _moved_from(history: TrajectoryHistory, object_type: str, moves: tuple[ObjectMove, ...]) -> Iterator[Candidate]:
     """Of the last move, where no other began at such a container: it then was in one place after."""
     move = moves[-1]
     if not _left(history, move) or not history.shows_put(move) or not _is_down(history, move):
@@ -60,7 +66,7 @@ def _moved_from(history: History, object_type: str, moves: tuple[Move, ...]) -> 
         yield _candidate(QUESTION_TYPE, form, (move.before, move.after), [_end(history, move)], object_type, origin)
 
 
-def _now(history: History, object_type: str, moves: tuple[Move, ...]) -> Iterator[Candidate]:
+def _now(history: TrajectoryHistory, object_type: str, moves: tuple[ObjectMove, ...]) -> Iterator[Candidate]:
     move, last = moves[-1], len(history) - 1
     alone = move.item in history.world(last) and history.only_one(last, move.item)
     if alone and history.shows_put(move) and _is_down(history, move):
@@ -68,7 +74,7 @@ def _now(history: History, object_type: str, moves: tuple[Move, ...]) -> Iterato
         yield _candidate(QUESTION_TYPE, "Where is {} now?", (move.after,), [place], object_type)
 
 
-def _origin(history: History, object_type: str, moves: tuple[Move, ...]) -> Iterator[Candidate]:
+def _origin(history: TrajectoryHistory, object_type: str, moves: tuple[ObjectMove, ...]) -> Iterator[Candidate]:
     move = moves[0]
     if _left(history, move):
         when = "first picked it up" if history.pickups[move.item] > 1 else "picked it up"
@@ -76,44 +82,44 @@ def _origin(history: History, object_type: str, moves: tuple[Move, ...]) -> Iter
         yield _candidate(FURTHER, form, (move.before,), [_start(history, move)], object_type)
 
 
-def _destination(history: History, object_type: str, moves: tuple[Move, ...]) -> Iterator[Candidate]:
+def _destination(history: TrajectoryHistory, object_type: str, moves: tuple[ObjectMove, ...]) -> Iterator[Candidate]:
     move = moves[0]
     if history.pickups[move.item] == 1 and history.shows_put(move):
         yield _candidate(FURTHER, "Where did you move {} to?", (move.after,), [_end(history, move)], object_type)
 
 
-def _journey(history: History, object_type: str, moves: tuple[Move, ...]) -> Iterator[Candidate]:
+def _journey(history: TrajectoryHistory, object_type: str, moves: tuple[ObjectMove, ...]) -> Iterator[Candidate]:
     first = moves[0]
     if not _left(history, first) or not all(history.shows_put(move) for move in moves):
         return
     places = [_start(history, first), *(_end(history, move) for move in moves)]
-    if distinct([place or "" for place in places]):
+    if are_distinguishable([place or "" for place in places]):
         clues = (first.before, *(move.after for move in moves))
         yield _candidate(FURTHER, "In which places was {}, from first to last?", clues, places, object_type)
 
 
-def _start(history: History, move: Move) -> str | None:
+def _start(history: TrajectoryHistory, move: ObjectMove) -> str | None:
     """The type of what an object was in or on before a move."""
     return None if move.origin is None else history.world(move.before)[move.origin].type
 
 
-def _end(history: History, move: Move) -> str:
+def _end(history: TrajectoryHistory, move: ObjectMove) -> str:
     """The type of what an object was put into or onto."""
     return history.world(move.after)[move.target].type
 
 
-def _changes(history: History, move: Move) -> bool:
+def _changes(history: TrajectoryHistory, move: ObjectMove) -> bool:
     """Whether a move led to another type of receptacle: else the question would hold the answer."""
     start = _start(history, move)
-    return start is not None and canonical(start) != canonical(_end(history, move))
+    return start is not None and canonical_type(start) != canonical_type(_end(history, move))
 
 
-def _is_down(history: History, move: Move) -> bool:
+def _is_down(history: TrajectoryHistory, move: ObjectMove) -> bool:
     """Whether an object is still where its last move put it."""
     return history.parent(len(history) - 1, move.item) == move.target
 
 
-def _left(history: History, move: Move) -> bool:
+def _left(history: TrajectoryHistory, move: ObjectMove) -> bool:
     """Whether the frame before the pick-up shows the object, and no other of its type, where it was."""
     shown = move.origin is not None and history.shows(move.before, move.item, move.origin)
     return shown and history.alone(move.before, move.item)
@@ -131,4 +137,4 @@ def _candidate(
     types = [place for place in places if place is not None]
     names = [object_type] if named is None else [object_type, named]
     answers = tuple(map(answer_of, types))
-    return Candidate(question_type, form, tuple(map(the, names)), clues, answers, (object_type, *types))
+    return Candidate(question_type, form, tuple(map(with_the, names)), clues, answers, (object_type, *types))

@@ -3,19 +3,19 @@
 from collections import Counter
 from collections.abc import Iterator
 
-from infthor_eval.generation.questions.candidates import Candidate, further, listing, the, within
-from infthor_eval.generation.questions.history import Event, History
+from infthor_eval.generation.questions.candidates import Candidate, further_type, in_or_on, listing_question, with_the
+from infthor_eval.generation.questions.history import Event, TrajectoryHistory
 
 __all__ = ["FURTHER", "QUESTION_TYPE", "further_open_states", "open_states"]
 
 QUESTION_TYPE = "open_state"
-FURTHER = further(QUESTION_TYPE)
+FURTHER = further_type(QUESTION_TYPE)
 _CONTAINERS = frozenset({"Box", "Cabinet", "Drawer", "Fridge", "Microwave", "Safe"})
 _UNASKED = frozenset({"Blinds", "Curtains", "Book", "Kettle", "ShowerCurtain", "ShowerDoor", "Window"})
 _ASKED_AT = {"PickupObject", "PutObject", "SliceObject", "ToggleObjectOn"}
 
 
-def open_states(history: History) -> Iterator[Candidate]:
+def open_states(history: TrajectoryHistory) -> Iterator[Candidate]:
     """Whether a container that is the only one of its type was ever open: no where the log never has it open."""
     frames = range(len(history))
     for key in _singles(history):
@@ -24,10 +24,12 @@ def open_states(history: History) -> Iterator[Candidate]:
         frame = history.clearest(open_at or frames, key)
         if object_type in _CONTAINERS and frame is not None:
             answer = "yes" if open_at else "no"
-            yield Candidate(QUESTION_TYPE, "Was {} open?", (the(object_type),), (frame,), (answer,), (object_type,))
+            yield Candidate(
+                QUESTION_TYPE, "Was {} open?", (with_the(object_type),), (frame,), (answer,), (object_type,)
+            )
 
 
-def further_open_states(history: History) -> Iterator[Candidate]:
+def further_open_states(history: TrajectoryHistory) -> Iterator[Candidate]:
     """Questions on when what is the only one of its type was open, and on all that was opened."""
     phrases = Counter(_phrase(history, event) for event in history.events)
     for key in _singles(history):
@@ -40,7 +42,7 @@ def further_open_states(history: History) -> Iterator[Candidate]:
     yield from _opened(history)
 
 
-def _singles(history: History) -> list[str]:
+def _singles(history: TrajectoryHistory) -> list[str]:
     """What can be opened and is the only one of its type."""
     last = len(history) - 1
     return sorted(
@@ -50,24 +52,24 @@ def _singles(history: History) -> list[str]:
     )
 
 
-def _phrase(history: History, event: Event) -> str:
+def _phrase(history: TrajectoryHistory, event: Event) -> str:
     """What the agent did, as the end of a "when you ..." """
     if event.action == "PutObject" and event.receptacle is not None:
         place_type = history.world(event.frame)[event.receptacle].type
-        return f"put {the(event.object_type)} {within(place_type)}"
+        return f"put {with_the(event.object_type)} {in_or_on(place_type)}"
     verbs = {"PickupObject": "picked up", "SliceObject": "sliced", "ToggleObjectOn": "turned on"}
-    return f"{verbs.get(event.action, event.action)} {the(event.object_type)}"
+    return f"{verbs.get(event.action, event.action)} {with_the(event.object_type)}"
 
 
-def _then(history: History, key: str, event: Event, told: str) -> Iterator[Candidate]:
+def _then(history: TrajectoryHistory, key: str, event: Event, told: str) -> Iterator[Candidate]:
     world = history.world(event.frame)
     if key in world and history.shows(event.frame, key) and _shows_event(history, event):
         answer = "yes" if world[key].is_open else "no"
-        names, subjects = (the(world[key].type), told), (world[key].type, event.object_type)
+        names, subjects = (with_the(world[key].type), told), (world[key].type, event.object_type)
         yield Candidate(FURTHER, "Was {} open when you {}?", names, (event.frame,), (answer,), subjects)
 
 
-def _shows_event(history: History, event: Event) -> bool:
+def _shows_event(history: TrajectoryHistory, event: Event) -> bool:
     """Whether the frame after it shows what was done."""
     if event.action == "SliceObject":
         return history.shows_slices(event.frame, event.target)
@@ -77,24 +79,24 @@ def _shows_event(history: History, event: Event) -> bool:
     return inside and history.shows(event.frame, event.target, event.receptacle)
 
 
-def _now(history: History, key: str) -> Iterator[Candidate]:
+def _now(history: TrajectoryHistory, key: str) -> Iterator[Candidate]:
     last = len(history) - 1
     state = history.world(last)[key]
     changed = next((frame for frame in range(last, -1, -1) if _is_open(history, frame, key) != state.is_open), -1)
     frame = history.clearest(range(changed + 1, last + 1), key)
     if frame is not None:
         answer = "yes" if state.is_open else "no"
-        yield Candidate(FURTHER, "Is {} open now?", (the(state.type),), (frame,), (answer,), (state.type,))
+        yield Candidate(FURTHER, "Is {} open now?", (with_the(state.type),), (frame,), (answer,), (state.type,))
 
 
-def _is_open(history: History, frame: int, key: str) -> bool | None:
+def _is_open(history: TrajectoryHistory, frame: int, key: str) -> bool | None:
     state = history.world(frame).get(key)
     return None if state is None else state.is_open
 
 
-def _opened(history: History) -> Iterator[Candidate]:
+def _opened(history: TrajectoryHistory) -> Iterator[Candidate]:
     """Everything that was opened."""
-    yield from listing(
+    yield from listing_question(
         FURTHER,
         "What did you open?",
         (

@@ -13,10 +13,10 @@ import random
 from collections.abc import Iterator
 
 from infthor_eval.generation.questions.candidates import Candidate
-from infthor_eval.generation.questions.history import History
-from infthor_eval.household.wording import an, noun
+from infthor_eval.generation.questions.history import TrajectoryHistory
+from infthor_eval.household.wording import noun, with_article
 
-__all__ = ["QUESTION_TYPE", "absent", "present"]
+__all__ = ["QUESTION_TYPE", "absent_types", "present_types"]
 
 QUESTION_TYPE = "object_presence"
 _FEW = 8  # types of other trajectories below which AI2-THOR's join them
@@ -62,7 +62,7 @@ _TAKEN_FOR_EACH_OTHER = (
 )
 
 
-def present(history: History) -> Iterator[Candidate]:
+def present_types(history: TrajectoryHistory) -> Iterator[Candidate]:
     """Yes-questions, each with the first frame that shows such an object."""
     first: dict[str, int] = {}
     for frame in range(len(history)):
@@ -75,7 +75,7 @@ def present(history: History) -> Iterator[Candidate]:
             yield from _asking(history, object_type, frame, "yes")
 
 
-def absent(history: History, vocabulary: frozenset[str], rng: random.Random) -> Iterator[Candidate]:
+def absent_types(history: TrajectoryHistory, vocabulary: frozenset[str], rng: random.Random) -> Iterator[Candidate]:
     """No-questions on types that the scene does not have.
 
     Args:
@@ -92,21 +92,21 @@ def absent(history: History, vocabulary: frozenset[str], rng: random.Random) -> 
         yield from _asking(history, object_type, frame, "no")
 
 
-def _asking(history: History, object_type: str, frame: int, answer: str) -> Iterator[Candidate]:
+def _asking(history: TrajectoryHistory, object_type: str, frame: int, answer: str) -> Iterator[Candidate]:
     """The forms that suit the scene."""
     words = noun(object_type)
     of_a_room = () if history.has_rooms else (("Is there any {} in this room?", words),)
-    for form, name in (*of_a_room, ("Have you seen {}?", an(words))):
+    for form, name in (*of_a_room, ("Have you seen {}?", with_article(words))):
         yield Candidate(QUESTION_TYPE, form, (name,), (frame,), (answer,), (object_type,), absence=answer == "no")
 
 
-def _missing(history: History, vocabulary: frozenset[str]) -> set[str]:
+def _missing(history: TrajectoryHistory, vocabulary: frozenset[str]) -> set[str]:
     there = history.all_object_types
     alike = set().union(*(group for group in _TAKEN_FOR_EACH_OTHER if group & there))
     return {object_type for object_type in vocabulary - there - alike if _asked(object_type)}
 
 
-def _shown(history: History, frame: int) -> int:
+def _shown(history: TrajectoryHistory, frame: int) -> int:
     return sum(seen.pixels >= history.least for seen in history.seen(frame).values())
 
 

@@ -5,29 +5,37 @@ Table 3's form has two clues that follow each other: the object in the hand, and
 
 from collections.abc import Iterator, Sequence
 
-from infthor_eval.generation.questions.candidates import MANY, Candidate, answer_of, distinct, further, listing, within
-from infthor_eval.generation.questions.history import History, Move
+from infthor_eval.generation.questions.candidates import (
+    MANY,
+    Candidate,
+    answer_of,
+    are_distinguishable,
+    further_type,
+    in_or_on,
+    listing_question,
+)
+from infthor_eval.generation.questions.history import ObjectMove, TrajectoryHistory
 
 __all__ = ["FURTHER", "QUESTION_TYPE", "further_puts", "puts"]
 
 QUESTION_TYPE = "put_action"
-FURTHER = further(QUESTION_TYPE)
+FURTHER = further_type(QUESTION_TYPE)
 
 
-def puts(history: History) -> Iterator[Candidate]:
+def puts(history: TrajectoryHistory) -> Iterator[Candidate]:
     """What was put into a container, where it was one put into one of its type."""
     for place_type, moves in sorted(_by_type(history).items()):
         (move, *others) = moves
         before = move.after - 1
         if not others and history.shows(before, move.item) and history.shows_put(move):
-            names, subjects = (within(place_type),), (place_type, move.object_type)
+            names, subjects = (in_or_on(place_type),), (place_type, move.object_type)
             answers = (answer_of(move.object_type),)
             yield Candidate(
                 QUESTION_TYPE, "What object did you put {}?", names, (before, move.after), answers, subjects
             )
 
 
-def further_puts(history: History) -> Iterator[Candidate]:
+def further_puts(history: TrajectoryHistory) -> Iterator[Candidate]:
     """All that was put into one receptacle, where that were several things, and one question on all puts."""
     for place_type, moves in sorted(_by_type(history).items()):
         if len(moves) > 1 and len({move.target for move in moves}) == 1:
@@ -36,28 +44,30 @@ def further_puts(history: History) -> Iterator[Candidate]:
     yield from _where(history)
 
 
-def _by_type(history: History) -> dict[str, list[Move]]:
+def _by_type(history: TrajectoryHistory) -> dict[str, list[ObjectMove]]:
     """The moves by the type of receptacle that they end in."""
-    found: dict[str, list[Move]] = {}
+    found: dict[str, list[ObjectMove]] = {}
     for move in history.moves:
         found.setdefault(history.world(move.after)[move.target].type, []).append(move)
     return found
 
 
-def _what(history: History, form: str, places: tuple[str, ...], moves: Sequence[Move]) -> Iterator[Candidate]:
+def _what(
+    history: TrajectoryHistory, form: str, places: tuple[str, ...], moves: Sequence[ObjectMove]
+) -> Iterator[Candidate]:
     """Which objects were moved, each with the frame after its first put."""
     first_puts = list({move.item: move for move in reversed(moves)}.values())[::-1]
     items = [move.object_type for move in first_puts]
     shown = all(history.shows_put(move) for move in first_puts)
-    if shown and len(set(items)) == len(items) and 0 < len(items) <= MANY and distinct(items):
+    if shown and len(set(items)) == len(items) and 0 < len(items) <= MANY and are_distinguishable(items):
         answers = tuple(answer_of(item) for item in items)
         clues = tuple(move.after for move in first_puts)
-        yield Candidate(FURTHER, form, tuple(map(within, places)), clues, answers, (*places, *items))
+        yield Candidate(FURTHER, form, tuple(map(in_or_on, places)), clues, answers, (*places, *items))
 
 
-def _where(history: History) -> Iterator[Candidate]:
+def _where(history: TrajectoryHistory) -> Iterator[Candidate]:
     """The places that something was put into or onto."""
-    yield from listing(
+    yield from listing_question(
         FURTHER,
         "Where did you put things?",
         (

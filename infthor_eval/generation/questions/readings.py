@@ -8,7 +8,7 @@ and is directly there.
 import math
 from collections.abc import Iterable
 
-from infthor_eval.generation.questions.history import History
+from infthor_eval.generation.questions.history import TrajectoryHistory
 
 __all__ = ["can_be_picked_up", "is_plain"]
 
@@ -21,7 +21,7 @@ _FIXTURES = frozenset(
 _SPAN = 1.5  # metres from the middle of a table within which something may stand on it
 
 
-def can_be_picked_up(history: History, frame: int, keys: Iterable[str]) -> frozenset[str] | None:
+def can_be_picked_up(history: TrajectoryHistory, frame: int, keys: Iterable[str]) -> frozenset[str] | None:
     """Those of some objects that can be picked up; None where the log never tells of one of them."""
     world = history.world(frame)
     types = {key: world[key].type for key in keys}
@@ -30,7 +30,7 @@ def can_be_picked_up(history: History, frame: int, keys: Iterable[str]) -> froze
     return frozenset(key for key, object_type in types.items() if object_type in history.types_picked_up)
 
 
-def is_plain(history: History, frame: int, place: str) -> bool:
+def is_plain(history: TrajectoryHistory, frame: int, place: str) -> bool:
     """Whether a receptacle holds nothing but loose objects, themselves empty, and no fixture stands on it."""
     inside = history.contents(frame, place)
     loose = can_be_picked_up(history, frame, inside) == inside
@@ -38,7 +38,7 @@ def is_plain(history: History, frame: int, place: str) -> bool:
     return loose and not nested and not _bears_fixtures(history, frame, place)
 
 
-def _bears_fixtures(history: History, frame: int, place: str) -> bool:
+def _bears_fixtures(history: TrajectoryHistory, frame: int, place: str) -> bool:
     world = history.world(frame)
     fixtures = [state.position for state in world.values() if state.type in _FIXTURES]
     if world[place].type == _COUNTER:

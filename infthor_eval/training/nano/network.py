@@ -11,7 +11,7 @@ import torch
 from torch import Tensor
 from torch.nn.functional import binary_cross_entropy_with_logits
 
-from infthor_eval.household.wording import compact, noun
+from infthor_eval.household.wording import compact_name, noun
 from infthor_eval.training.nano.architecture import TOKENS
 from infthor_eval.training.nano.frame_dataset import FrameDataset
 from infthor_eval.training.network import SequenceModel
@@ -26,7 +26,7 @@ _SCALE, _BIAS = 8.0, -4.0  # of how alike a part of a frame and a name are, to b
 
 def spellings(object_type: str) -> tuple[str, ...]:
     """An object type as questions, answers, actions and plans write it."""
-    return f" {noun(object_type)}", compact(object_type), f" {object_type}", f" {compact(object_type)}"
+    return f" {noun(object_type)}", compact_name(object_type), f" {object_type}", f" {compact_name(object_type)}"
 
 
 class NanoNetwork(SequenceModel):

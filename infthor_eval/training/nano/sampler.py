@@ -8,7 +8,7 @@ from infthor_eval.errors import DataError
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question
 from infthor_eval.household.sequence_text import MARKS
-from infthor_eval.household.wording import an, noun
+from infthor_eval.household.wording import noun, with_article
 from infthor_eval.nieh.contexts import CONTEXTS
 from infthor_eval.nieh.prompts import question_text
 from infthor_eval.nieh.samples import find_samples
@@ -157,7 +157,7 @@ class SequenceSampler:
             if (self._album.shown if is_there else 1 - self._album.present)[place, kind]:
                 break
         words = noun(name)
-        text = self._draw.choice(_FORMS).format(an(words), words)
+        text = self._draw.choice(_FORMS).format(with_article(words), words)
         asked = question_text(CONTEXTS["clues"].intro, Question("", text, (), ()))
         parts: list[Part] = [self._album.frames[place], asked]
         return self._encoder.answer("made up", parts, "yes" if self._album.shown[place, kind] else "no")

@@ -1,7 +1,7 @@
 """Step logs made by hand: everything is always in sight, unless it is said not to be."""
 
 from infthor_eval.formats.step_log import ObjectInFrame, ObjectLog, ObjectState, Step
-from infthor_eval.generation.questions.history import History
+from infthor_eval.generation.questions.history import TrajectoryHistory
 
 LOOSE = ("Apple", "Book", "Egg", "Laptop", "Mug", "Pan", "Vase")
 
@@ -36,7 +36,7 @@ def history(start, *events, boxes=None):
                 changes=changes,
             )
         )
-    return History("made", steps)
+    return TrajectoryHistory("made", steps)
 
 
 def moved(key, origin, target):

@@ -6,7 +6,7 @@ import pytest
 
 from infthor_eval.generation.questions import contents, counting, final_state, location, open_state, presence
 from infthor_eval.generation.questions.checker import Checker
-from infthor_eval.generation.questions.history import DEFAULT_SHARE, History
+from infthor_eval.generation.questions.history import DEFAULT_SHARE, TrajectoryHistory
 from infthor_eval.thor.launch import embedded
 from infthor_eval.thor.recorder import Recorder
 from infthor_eval.thor.simulator import Simulator
@@ -115,7 +115,7 @@ def test_moves_are_counted_of_what_was_moved_more_than_once():
 def test_the_first_sighting_is_shown():
     log = history({**PLACES, MUG: state(MUG, TABLE)}, ("LookUp", None, None, {}))
     del log.steps[0].seen[MUG]
-    clues = {candidate.text: candidate.clues for candidate in presence.present(log)}
+    clues = {candidate.text: candidate.clues for candidate in presence.present_types(log)}
     assert clues["Have you seen a mug?"] == clues["Is there any mug in this room?"] == (1,)
     assert clues["Have you seen a fridge?"] == (0,)
 
@@ -127,7 +127,7 @@ def test_no_room_is_meant_in_a_house_of_several():
         (rooms, {"Have you seen"}),
     ):
         log = history({**PLACES, **floors, MUG: state(MUG, TABLE)})
-        asked = [*presence.present(log), *presence.absent(log, frozenset({"Toaster"}), random.Random(0))]
+        asked = [*presence.present_types(log), *presence.absent_types(log, frozenset({"Toaster"}), random.Random(0))]
         assert {" ".join(candidate.text.split()[:3]) for candidate in asked} == forms
         assert {candidate.answers for candidate in asked} == {("yes",), ("no",)}
 
@@ -137,7 +137,7 @@ def test_the_rules_know_a_house_by_its_floors():
         for scene, has_rooms in (("house-1", True), ("kitchen-1", False)):
             recorder = Recorder()
             recorder.record(simulator.reset(scene))
-            assert History(scene, recorder.steps).has_rooms is has_rooms
+            assert TrajectoryHistory(scene, recorder.steps).has_rooms is has_rooms
 
 
 def test_a_view_well_inside_the_frame_is_preferred():

@@ -10,8 +10,8 @@ from infthor_eval.errors import DataError
 from infthor_eval.formats.step_log import Step, read_steps
 from infthor_eval.generation.generate_set import generate_set
 from infthor_eval.generation.questions.checker import Checker
-from infthor_eval.generation.questions.history import DEFAULT_SHARE, History
-from infthor_eval.generation.questions.make import make_questions
+from infthor_eval.generation.questions.generate import generate_questions
+from infthor_eval.generation.questions.history import DEFAULT_SHARE, TrajectoryHistory
 from infthor_eval.generation.replay_set import replay_set, select
 from infthor_eval.generation.replay_summary import summarise
 from infthor_eval.generation.settings import TrajectorySettings
@@ -78,17 +78,17 @@ def replayed(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def everything(replayed):
-    return make_questions(replayed, per_trajectory=1000, further=True)
+    return generate_questions(replayed, per_trajectory=1000, further=True)
 
 
 def test_the_checker_agrees_with_every_question(everything):
-    assert not everything.doubted and not everything.skipped
+    assert not everything.unconfirmed and not everything.skipped
     assert {question.question_type for question in everything.questions} >= (QUESTION_TYPES | FURTHER_TYPES) - RARE
     assert all(everything.by_clues().values())
 
 
 def test_without_further_forms_all_are_in_the_words_of_table_3(replayed, everything):
-    asked = make_questions(replayed, per_trajectory=1000).questions
+    asked = generate_questions(replayed, per_trajectory=1000).questions
     assert QUESTION_TYPES - RARE <= {question.question_type for question in asked} <= QUESTION_TYPES
     for question in asked:
         forms = TABLE_3[question.question_type]
@@ -135,7 +135,7 @@ def test_the_checker_notices_what_is_wrong(everything, replayed):
 
 
 def test_choice_is_balanced_and_seeded(replayed):
-    made = [make_questions(replayed, seed=seed, per_trajectory=25) for seed in (0, 0, 1)]
+    made = [generate_questions(replayed, seed=seed, per_trajectory=25) for seed in (0, 0, 1)]
     assert made[0].questions == made[1].questions != made[2].questions
     assert len(made[0].questions) <= 50
     yes = [question for question in made[0].questions if question.answers == ("yes",)]
@@ -153,7 +153,7 @@ def test_absences_are_flagged_and_look_like_presences(everything):
 
 
 def test_no_answer_follows_from_the_form_of_a_question(replayed):
-    made = make_questions(replayed, per_trajectory=60, further=True)
+    made = generate_questions(replayed, per_trajectory=60, further=True)
     answers = defaultdict(Counter)
     for question in made.questions:
         if str(question.answers[0]) in {"yes", "no"} or str(question.answers[0]).isdecimal():
@@ -185,6 +185,6 @@ def test_no_answer_is_in_its_question(everything):
 
 def test_a_log_without_what_frames_show_is_skipped(replayed, tmp_path):
     with pytest.raises(DataError, match="does not say what the frames show"):
-        History("t", [Step(0, "0.png")])
+        TrajectoryHistory("t", [Step(0, "0.png")])
     with pytest.raises(DataError, match="no trajectory there"):
-        make_questions(tmp_path)
+        generate_questions(tmp_path)

@@ -3,17 +3,17 @@
 from collections.abc import Iterator
 
 from infthor_eval.household.containment import direct_parent
-from infthor_eval.household.symbolic import Room, room_of
-from infthor_eval.thor.view import ThorObject, View
+from infthor_eval.household.symbolic import SymbolicRoom, room_of
+from infthor_eval.thor.view import SimulatorView, ThorObject
 
-__all__ = ["Setbacks"]
+__all__ = ["KnownFailures"]
 
 _Size = tuple[float, ...]
 _BELIEVED = 8  # tasks that a setback is believed for: other things move too and may clear the way
 _NEAR = 0.02  # metres within which an object has not moved
 
 
-class Setbacks:
+class KnownFailures:
     """Objects out of reach, and receptacles without room for an object."""
 
     def __init__(self) -> None:
@@ -25,7 +25,7 @@ class Setbacks:
     def __bool__(self) -> bool:
         return bool(self._blocked or self._refused)
 
-    def note(self, view: View, item: str, receptacle: str | None) -> None:
+    def note(self, view: SimulatorView, item: str, receptacle: str | None) -> None:
         """Remember that an object cannot be acted on, or finds no room in a receptacle, as things are.
 
         Args:
@@ -49,7 +49,7 @@ class Setbacks:
         self._blocked.clear()
         self._refused.clear()
 
-    def room(self, view: View) -> Room:
+    def room(self, view: SimulatorView) -> SymbolicRoom:
         """The room without what is not believed to work."""
         oldest = self._tasks - _BELIEVED
         self._blocked = {
@@ -65,7 +65,7 @@ class Setbacks:
         }
         return room_of(view, self._blocked.keys(), set(self._without_room(view)))
 
-    def _without_room(self, view: View) -> Iterator[tuple[str, str]]:
+    def _without_room(self, view: SimulatorView) -> Iterator[tuple[str, str]]:
         """Where things find no room: as was found, and where they are larger than what did not, or than the place."""
         yield from self._refused
         sizes = {key: size for key, item in view.objects.items() if (size := _size(item)) is not None}
@@ -89,7 +89,7 @@ def _covers(one: _Size, other: _Size) -> bool:
     return all(a >= b - _NEAR for a, b in zip(one, other, strict=True))
 
 
-def _position(view: View, item: str) -> tuple[float, float, float]:
+def _position(view: SimulatorView, item: str) -> tuple[float, float, float]:
     at = view.objects[item].position
     return at.x, at.y, at.z
 
@@ -98,6 +98,6 @@ def _is_near(one: tuple[float, float, float], other: tuple[float, float, float])
     return all(abs(a - b) <= _NEAR for a, b in zip(one, other, strict=True))
 
 
-def _contents(view: View, receptacle: str) -> frozenset[str]:
+def _contents(view: SimulatorView, receptacle: str) -> frozenset[str]:
     objects = view.objects
     return frozenset(key for key, item in objects.items() if direct_parent(item, objects) == receptacle)

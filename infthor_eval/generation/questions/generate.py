@@ -25,10 +25,10 @@ from infthor_eval.generation.questions import (
 )
 from infthor_eval.generation.questions.candidates import Candidate
 from infthor_eval.generation.questions.checker import Checker
-from infthor_eval.generation.questions.history import DEFAULT_SHARE, History
+from infthor_eval.generation.questions.history import DEFAULT_SHARE, TrajectoryHistory
 from infthor_eval.workers import WorkerSettings, shared_out
 
-__all__ = ["MadeQuestions", "candidates_of", "further_candidates_of", "make_questions"]
+__all__ = ["GeneratedQuestions", "candidates_of", "further_candidates_of", "generate_questions"]
 
 
 _ALONE = WorkerSettings()
@@ -37,20 +37,20 @@ _WRONG = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError)
 
 
 @dataclass
-class MadeQuestions:
+class GeneratedQuestions:
     """What came of it.
 
     Attributes:
         questions: in the order of trajectories, then of their first clue.
         trajectories: how many were read.
         skipped: those that could not be, one line each.
-        doubted: questions skipped because the checker did not agree with them.
+        unconfirmed: questions skipped because the checker did not agree with them.
     """
 
     questions: list[Question] = field(default_factory=list)
     trajectories: int = 0
     skipped: list[str] = field(default_factory=list)
-    doubted: list[Question] = field(default_factory=list)
+    unconfirmed: list[Question] = field(default_factory=list)
 
     def by_type(self) -> dict[str, int]:
         """Number of questions by type."""
@@ -61,14 +61,14 @@ class MadeQuestions:
         found = Counter(clue_column(item.n_clues) for item in self.questions)
         return {name: found[name] for name in ("1", "2", ">=3", ABSENCE)}
 
-    def words(self) -> str:
+    def summary_text(self) -> str:
         """The counts by type and by number of clues, a line each, for people."""
         types = ", ".join(f"{name} {count}" for name, count in self.by_type().items())
         clues = ", ".join(f"{name}: {count}" for name, count in self.by_clues().items())
         return f"by type: {types}\nby number of clues: {clues}"
 
 
-def make_questions(
+def generate_questions(
     folder: Path,
     *,
     seed: int = 0,
@@ -77,7 +77,7 @@ def make_questions(
     further: bool = False,
     worker_settings: WorkerSettings = _ALONE,
     say: Callable[[str], None] = lambda _: None,
-) -> MadeQuestions:
+) -> GeneratedQuestions:
     """Make questions on a replayed set.
 
     Args:
@@ -96,7 +96,7 @@ def make_questions(
         DataError: the set has no trajectory, or is of another version.
     """
     simulator_of(folder)
-    made = MadeQuestions()
+    made = GeneratedQuestions()
     types: dict[Path, frozenset[str]] = {}
     for path in _folders(folder):
         try:
@@ -116,7 +116,7 @@ def make_questions(
     sound = _shared_out(checking, worker_settings, say, made)
     for item in checking:
         for question, verdict in zip(item.questions, sound.get(item.path, ()), strict=False):
-            (made.questions if verdict else made.doubted).append(question)
+            (made.questions if verdict else made.unconfirmed).append(question)
     return made
 
 
@@ -173,7 +173,7 @@ def _shared_out(
     jobs: Sequence[_Asking] | Sequence[_Checking],
     worker_settings: WorkerSettings,
     say: Callable[[str], None],
-    made: MadeQuestions,
+    made: GeneratedQuestions,
 ) -> dict[Path, Any]:
     """What came of the jobs, by trajectory; where worker after worker was lost at one, it is skipped."""
     found: dict[Path, Any] = {}
@@ -185,9 +185,9 @@ def _shared_out(
     return found
 
 
-def _history(path: Path, share: float) -> History:
+def _history(path: Path, share: float) -> TrajectoryHistory:
     with wrap_errors(f"{path}: its log does not hang together", "replay the trajectory again", catch=_WRONG):
-        return History(path.name, read_steps(path), share)
+        return TrajectoryHistory(path.name, read_steps(path), share)
 
 
 def _folders(folder: Path) -> list[Path]:
@@ -198,7 +198,7 @@ def _folders(folder: Path) -> list[Path]:
     return found
 
 
-def candidates_of(history: History, vocabulary: frozenset[str], rng: random.Random) -> list[Candidate]:
+def candidates_of(history: TrajectoryHistory, vocabulary: frozenset[str], rng: random.Random) -> list[Candidate]:
     """All questions of Table 3's forms on one trajectory.
 
     Args:
@@ -207,8 +207,8 @@ def candidates_of(history: History, vocabulary: frozenset[str], rng: random.Rand
         rng: samples the frames of absences.
     """
     return [
-        *presence.present(history),
-        *presence.absent(history, vocabulary, rng),
+        *presence.present_types(history),
+        *presence.absent_types(history, vocabulary, rng),
         *open_state.open_states(history),
         *location.locations(history),
         *contents.slicings(history),
@@ -220,7 +220,7 @@ def candidates_of(history: History, vocabulary: frozenset[str], rng: random.Rand
     ]
 
 
-def further_candidates_of(history: History, rng: random.Random) -> list[Candidate]:
+def further_candidates_of(history: TrajectoryHistory, rng: random.Random) -> list[Candidate]:
     """All questions of our further forms on one trajectory.
 
     Args:

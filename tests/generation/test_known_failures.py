@@ -1,6 +1,6 @@
 from msgspec.structs import replace
 
-from infthor_eval.generation.setbacks import Setbacks
+from infthor_eval.generation.known_failures import KnownFailures
 from infthor_eval.thor.view import Vector
 from tests.household.rooms import APPLE, COUNTER, FRIDGE, KITCHEN, KNIFE, MUG, TABLE
 from tests.thor.views import view
@@ -13,7 +13,7 @@ def items(room):
 
 
 def test_an_object_out_of_reach_is_no_item_until_it_moves():
-    setbacks = Setbacks()
+    setbacks = KnownFailures()
     setbacks.note(KITCHEN, MUG.object_id, None)
     assert setbacks and MUG.object_id not in items(setbacks.room(KITCHEN))
     moved = view(*OTHERS, replace(MUG, position=Vector(3.0, 0.9, 0.0)))
@@ -22,7 +22,7 @@ def test_an_object_out_of_reach_is_no_item_until_it_moves():
 
 
 def test_a_full_receptacle_refuses_until_it_loses_something():
-    setbacks = Setbacks()
+    setbacks = KnownFailures()
     setbacks.note(KITCHEN, MUG.object_id, FRIDGE.object_id)
     pair = (MUG.object_id, FRIDGE.object_id)
     assert setbacks.room(KITCHEN).refused == {pair}
@@ -34,7 +34,7 @@ def test_a_full_receptacle_refuses_until_it_loses_something():
 
 
 def test_setbacks_are_believed_for_some_tasks_only():
-    setbacks = Setbacks()
+    setbacks = KnownFailures()
     setbacks.note(KITCHEN, KNIFE.object_id, None)
     setbacks.note(KITCHEN, MUG.object_id, COUNTER.object_id)
     believed = 0
@@ -45,13 +45,13 @@ def test_setbacks_are_believed_for_some_tasks_only():
 
 
 def test_forgetting():
-    setbacks = Setbacks()
+    setbacks = KnownFailures()
     setbacks.note(KITCHEN, KNIFE.object_id, None)
     setbacks.forget()
     assert not setbacks and KNIFE.object_id in items(setbacks.room(KITCHEN))
 
 
 def test_an_object_that_is_gone_is_not_remembered():
-    setbacks = Setbacks()
+    setbacks = KnownFailures()
     setbacks.note(KITCHEN, "Egg|+00.00|+00.00|+00.00", None)
     assert not setbacks
