@@ -11,18 +11,24 @@ class BuiltIn(NamedTuple):
     Attributes:
         adapter: of the model.
         options: its adapter's `Options`, in a module that imports nothing slow.
+        note: what a user must know before running it; empty for nothing.
     """
 
     adapter: str
     options: str
+    note: str = ""
 
+
+_RANDOM_WEIGHTS = "random weights, to try the commands with; scores are about 0"
 
 BUILT_IN = {
     "deepseek-vl": BuiltIn(
         "model_adapters.hf.families.deepseek_vl:DeepseekVL", "model_adapters.options.families:DeepseekVLOptions"
     ),
     "deepseek-vl-tiny": BuiltIn(
-        "model_adapters.tiny.deepseek_vl:DeepseekVLTiny", "model_adapters.options.tiny:TinyOptions"
+        "model_adapters.tiny.deepseek_vl:DeepseekVLTiny",
+        "model_adapters.options.tiny:TinyOptions",
+        _RANDOM_WEIGHTS,
     ),
     "hf-vlm": BuiltIn("model_adapters.hf.families.hf_vlm:HfVlm", "model_adapters.options.families:HfVlmOptions"),
     "hf-vlm@vllm": BuiltIn("model_adapters.vllm.adapter:HfVlmOnVllm", "model_adapters.vllm.options:HfVlmOnVllmOptions"),
@@ -34,7 +40,9 @@ BUILT_IN = {
         "model_adapters.vllm.adapter:LlavaOnevisionOnVllm", "model_adapters.vllm.options:LlavaOnevisionOnVllmOptions"
     ),
     "llava-onevision-tiny": BuiltIn(
-        "model_adapters.tiny.llava_onevision:LlavaOnevisionTiny", "model_adapters.options.tiny:TinyOptions"
+        "model_adapters.tiny.llava_onevision:LlavaOnevisionTiny",
+        "model_adapters.options.tiny:TinyOptions",
+        _RANDOM_WEIGHTS,
     ),
     "openai": BuiltIn("model_adapters.openai.adapter:OpenAI", "model_adapters.openai.options:OpenAIOptions"),
     "openvla": BuiltIn(
@@ -44,13 +52,19 @@ BUILT_IN = {
         "model_adapters.vllm.openvla:OpenVLAOnVllm", "model_adapters.vllm.options:OpenVLAOnVllmOptions"
     ),
     "openvla-tiny": BuiltIn(
-        "model_adapters.tiny.openvla:OpenVLATiny", "model_adapters.options.tiny:OpenVLATinyOptions"
+        "model_adapters.tiny.openvla:OpenVLATiny",
+        "model_adapters.options.tiny:OpenVLATinyOptions",
+        _RANDOM_WEIGHTS,
     ),
     "pixtral": BuiltIn("model_adapters.hf.families.pixtral:Pixtral", "model_adapters.options.families:PixtralOptions"),
     "pixtral@vllm": BuiltIn(
         "model_adapters.vllm.adapter:PixtralOnVllm", "model_adapters.vllm.options:PixtralOnVllmOptions"
     ),
-    "pixtral-tiny": BuiltIn("model_adapters.tiny.pixtral:PixtralTiny", "model_adapters.options.tiny:TinyOptions"),
+    "pixtral-tiny": BuiltIn(
+        "model_adapters.tiny.pixtral:PixtralTiny",
+        "model_adapters.options.tiny:TinyOptions",
+        _RANDOM_WEIGHTS,
+    ),
     "qwen2.5-vl": BuiltIn(
         "model_adapters.hf.families.qwen2_5_vl:Qwen25VL", "model_adapters.options.families:Qwen25VLOptions"
     ),
@@ -61,14 +75,18 @@ BUILT_IN = {
         "model_adapters.tiny.qwen2_5_vl_nano:Qwen25VLNano", "model_adapters.options.families:Qwen25VLNanoOptions"
     ),
     "qwen2.5-vl-tiny": BuiltIn(
-        "model_adapters.tiny.qwen2_5_vl:Qwen25VLTiny", "model_adapters.options.tiny:Qwen25VLTinyOptions"
+        "model_adapters.tiny.qwen2_5_vl:Qwen25VLTiny",
+        "model_adapters.options.tiny:Qwen25VLTinyOptions",
+        _RANDOM_WEIGHTS,
     ),
     "spatialvla": BuiltIn(
         "model_adapters.policies.spatialvla.adapter:SpatialVLA",
         "model_adapters.options.policies:SpatialVLACheckpointOptions",
     ),
     "spatialvla-tiny": BuiltIn(
-        "model_adapters.tiny.spatialvla:SpatialVLATiny", "model_adapters.options.tiny:SpatialVLATinyOptions"
+        "model_adapters.tiny.spatialvla:SpatialVLATiny",
+        "model_adapters.options.tiny:SpatialVLATinyOptions",
+        _RANDOM_WEIGHTS,
     ),
     "vla-http": BuiltIn(
         "model_adapters.policies.http.adapter:VlaHttp", "model_adapters.options.policies:VlaHttpOptions"

@@ -28,6 +28,7 @@ __all__ = [
     "is_known",
     "label",
     "load",
+    "model_note",
     "name_on_engine",
     "names",
     "options",
@@ -77,6 +78,11 @@ def options(name: str) -> str:
         ModelError: the adapter cannot be imported.
     """
     return describe(_options(name))
+
+
+def model_note(name: str) -> str:
+    """What a user must know before running a model; empty for nothing, and for a model of another package."""
+    return BUILT_IN[name].note if name in BUILT_IN else ""
 
 
 def check_options(name: str, options: Mapping[str, str]) -> None:

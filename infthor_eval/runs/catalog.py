@@ -46,12 +46,14 @@ class TaskFile:
         suite: the kind of evaluation that it belongs to.
         path: its file.
         settings: what the file says, with the included ones merged in; functions by name.
+        description: what the task evaluates, in a sentence; empty where the file has none.
     """
 
     name: str
     suite: str
     path: Path
     settings: Mapping[str, Any]
+    description: str = ""
 
     def require(self, *keys: str) -> None:
         """Refuse a file that lacks a key which its suite needs.
@@ -173,10 +175,13 @@ def _folder_of(point: EntryPoint) -> Path:
 
 def _task(name: str, path: Path, settings: Mapping[str, Any]) -> TaskFile:
     metadata = settings.get("metadata")
-    suite = metadata.get("suite") if isinstance(metadata, Mapping) else None
-    if not isinstance(suite, str):
+    if not isinstance(metadata, Mapping) or not isinstance(metadata.get("suite"), str):
         raise DataError(f"{path}: no suite; write it as metadata: {{suite: NAME}} (NIEH tasks include _nieh.yaml)")
-    return TaskFile(name, suite, path, settings)
+    # The description changes no number, so it is no part of the settings, which the run's hash depends on.
+    others = {key: value for key, value in metadata.items() if key != "description"}
+    return TaskFile(
+        name, metadata["suite"], path, {**settings, "metadata": others}, str(metadata.get("description", ""))
+    )
 
 
 def _are_names(value: object) -> bool:

@@ -1,8 +1,10 @@
 """Commands that only tell something import nothing that takes seconds."""
 
+import os
 import pkgutil
 import subprocess
 import sys
+from pathlib import Path
 
 import click
 import pytest
@@ -11,6 +13,7 @@ from infthor_eval import suites
 from infthor_eval.cli import commands
 from infthor_eval.cli.main import _infthor_eval
 
+ROOT = Path(__file__).parents[2]
 HEAVY = {"torch", "transformers", "numpy", "scipy", "ai2thor", "lm_eval", "datasets", "matplotlib"}
 PROGRAM = """
 import sys
@@ -33,6 +36,33 @@ def test_what_is_told_is_told_at_once(typed: str) -> None:
     assert done.returncode == 0, done.stderr
     assert done.stdout
     assert not HEAVY & set(done.stderr.splitlines()[-1].split())
+
+
+@pytest.mark.parametrize(
+    "typed",
+    [
+        "generate --scene bathroom-1 --test-set --out set",
+        "replay nowhere.json --out set",
+        "questions nowhere --out qa.csv",
+        "scenes show attic-1",
+    ],
+)
+def test_making_data_loads_nothing_of_runs(typed: str, tmp_path: Path) -> None:
+    code = (
+        "import sys\nfrom infthor_eval.cli import main\ntry:\n    main(sys.argv[1:])\n"
+        "except SystemExit:\n    print(*(name for name in sys.modules if name.startswith('infthor_eval')))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, *typed.split()],
+        capture_output=True,
+        text=True,
+        check=True,
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+    )
+    loaded = done.stdout.split()
+    assert "infthor_eval.cli.commands." + typed.split(maxsplit=1)[0] in loaded
+    assert not [name for name in loaded if name.startswith(("infthor_eval.runs", "infthor_eval.nieh"))]
 
 
 @pytest.mark.parametrize("name", suites.suite_names())

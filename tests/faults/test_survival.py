@@ -299,13 +299,13 @@ def test_sigterm_leaves_no_temporary_folder(tmp_path):
     code = (
         "import sys, time\n"
         "from infthor_eval.cli import main\n"
-        "import infthor_eval.cli.commands.ls as listing\n"
+        "from infthor_eval.cli.commands import ls\n"
         "from infthor_eval.formats.scratch import ScratchFolder\n"
-        "def wait(*_):\n"
+        "def wait(**_):\n"
         "    with ScratchFolder():\n"
         "        print('waiting', flush=True)\n"
         "        time.sleep(60)\n"
-        "listing.tasks = wait\n"
+        "ls.command.commands['tasks'].callback = wait\n"
         "main(['ls', 'tasks'])\n"
     )
     process = subprocess.Popen(

@@ -17,6 +17,14 @@ def test_the_packaged_tasks_are_those_that_lm_eval_sees():
     assert catalog.tasks["nieh_gt"].settings["generation_kwargs"]["max_gen_toks"] == 50
 
 
+def test_each_task_says_what_distinguishes_it_and_that_is_no_setting():
+    tasks = Catalog.packaged().tasks.values()
+    descriptions = [task.description for task in tasks]
+    assert all(descriptions)
+    assert len(set(descriptions)) == len(descriptions)
+    assert {tuple(task.settings["metadata"]) for task in tasks} == {("version", "suite")}
+
+
 @pytest.mark.parametrize(("name", "near"), [("nieh_ful", "'nieh_full'"), ("neih", "'nieh'"), ("xyz", "nieh_mini_gt")])
 def test_an_unknown_name_is_answered_with_the_nearest(name, near):
     with pytest.raises(UsageError) as caught:

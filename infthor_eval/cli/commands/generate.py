@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from infthor_eval.cli.options.values import WholeNumber, floor_plans_option
+from infthor_eval.cli.options.values import SceneName, WholeNumber, floor_plans_option
 from infthor_eval.cli.options.workers import parse_worker_settings, worker_options
 
 if TYPE_CHECKING:
@@ -21,7 +21,14 @@ _PATH = click.Path(path_type=Path)
 
 
 @click.command("generate")
-@click.option("--scene", "scenes", multiple=True, required=True, help="kitchen-3, FloorPlan10, ...; may be repeated.")
+@click.option(
+    "--scene",
+    "scenes",
+    type=SceneName(),
+    multiple=True,
+    required=True,
+    help="kitchen-3, FloorPlan10, ... (see `ls scenes`); may be repeated.",
+)
 @click.option("--min-steps", type=click.IntRange(1), default=300, show_default=True, help="Low-level actions at least.")
 @click.option("--min-subgoals", type=click.IntRange(1), default=10, show_default=True, help="Tasks at least.")
 @click.option("--max-fail", type=click.IntRange(1), default=20, show_default=True, help="Tasks that may fail, at most.")
@@ -82,10 +89,10 @@ def command(
         import msgspec
 
         click.echo(msgspec.json.encode(result.summary()))
-    else:
+    elif result.paths:
         _print(result.summary(), out, console())
     for failure in result.failures:
-        notes.print(f"not made: {failure}", style="red")
+        notes.print(f"not generated: {failure}", style="red")
     context.exit(1 if result.failures else 0)
 
 

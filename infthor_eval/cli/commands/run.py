@@ -10,12 +10,13 @@ import click
 from infthor_eval.cli.options.run import RunOptions, run_options
 from infthor_eval.cli.options.show import ShowOptions, show_options
 from infthor_eval.cli.options.trackers import parse_trackers, tracker_options
-from infthor_eval.cli.progress.notes import NOTES, print_failure, quiet_notes
+from infthor_eval.cli.progress.notes import NOTES, print_failure, print_note, quiet_notes
 from infthor_eval.cli.progress.runs import execute_with_progress
 from infthor_eval.cli.results import RunResults, print_results
 from infthor_eval.errors import DataError
 from infthor_eval.reasons import count_reasons
 from infthor_eval.runs import RunOutcome, RunRequest, Suite, prepare
+from model_adapters import model_note
 
 if TYPE_CHECKING:
     from infthor_eval.harness.trackers import Trackers
@@ -58,6 +59,9 @@ def evaluate(
 
     senders = Trackers(**(trackers or {}))
     with quiet_notes(show.quiet):
+        for model in dict.fromkeys(request.model for request, _ in requests):
+            if note := model_note(model):
+                print_note(f"{model}: {note}", "yellow")
         with NOTES.status("reading the tasks and their data"):  # retrieval embeds every frame: minutes
             runs = [prepare(request, suite) for request, suite in requests]
         outcomes = []

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from infthor_eval.cli.options.values import floor_plans_option
+from infthor_eval.cli.options.values import SceneName, floor_plans_option
 
 __all__ = ["command"]
 
@@ -17,7 +17,7 @@ def command() -> None:
 
 
 @command.command("show")
-@click.argument("name")
+@click.argument("name", type=SceneName())
 @floor_plans_option
 @click.option("--out", type=click.Path(path_type=Path), help="The picture to write; NAME.png otherwise.")
 @click.option("--size", type=click.IntRange(64, 2048), default=600, show_default=True, help="Of each view, pixels.")

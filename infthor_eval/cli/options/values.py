@@ -1,17 +1,22 @@
 """Types of option values, and options that several commands share."""
 
 import math
+import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import click
 
+from infthor_eval.errors import unknown_name
+
 __all__ = [
+    "SCENE_KINDS",
     "FiniteFloat",
     "ModelArgs",
     "ModelList",
     "ModelSpec",
+    "SceneName",
     "WholeNumber",
     "floor_plans_option",
     "include_option",
@@ -20,6 +25,7 @@ __all__ = [
     "split_names",
 ]
 
+SCENE_KINDS = ("kitchen", "living-room", "bedroom", "bathroom", "house")  # procedural scenes, KIND-SEED
 _LARGEST = 2**63 - 1  # the largest integer of a run's JSON
 
 floor_plans_option = click.option(
@@ -80,6 +86,20 @@ class FiniteFloat(click.FloatRange):
         if not math.isfinite(number):
             self.fail(f"{value!r} is not a number.", param, ctx)
         return number
+
+
+class SceneName(click.ParamType):
+    """The name of a procedural scene or of a floor plan; whether there is such a floor plan is not checked."""
+
+    name = "SCENE"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """See `click.ParamType`."""
+        kind, _, seed = str(value).rpartition("-")
+        if (kind in SCENE_KINDS and re.fullmatch(r"[0-9]+", seed)) or str(value).startswith("FloorPlan"):
+            return str(value)
+        number = seed if re.fullmatch(r"[0-9]+", seed) else "<seed>"
+        raise unknown_name("scene", value, [*(f"{kind}-{number}" for kind in SCENE_KINDS), "FloorPlan<N> with --data"])
 
 
 class ModelArgs(click.ParamType):

@@ -62,13 +62,16 @@ def test_a_truncated_trajectory_is_named_and_nothing_half_written(made, tmp_path
     [
         (("replay", "nowhere.jsonl", "--out", "set"), "nowhere.jsonl"),
         (("questions", "nowhere", "--out", "qa.csv"), "no trajectory there"),
-        (("generate", "--scene", "nowhere-1", "--out", "out"), "nowhere-1"),
+        (("generate", "--scene", "nowhere-1", "--out", "out"), "unknown scene 'nowhere-1'"),
+        (("generate", "--scene", "kitchn-3", "--out", "out"), "unknown scene 'kitchn-3'; did you mean 'kitchen-3'?"),
+        (("generate", "--scene", "FloorPlan1", "--out", "out"), "not generated: scene FloorPlan1"),
     ],
 )
 def test_bad_input_is_one_line(arguments, words, tmp_path, monkeypatch, run):
     monkeypatch.chdir(tmp_path)
-    code, _, err = run(*arguments)
+    code, out, err = run(*arguments)
     assert code in {1, 2}
+    assert out == ""
     assert words in err
     assert "Traceback" not in err
 
@@ -98,7 +101,7 @@ def test_a_scene_in_which_no_task_can_be_done_is_one_line_and_leaves_no_file(tmp
     code, _, err = run("generate", "--scene", "FloorPlan7", "--data", data, "--out", tmp_path / "out")
     assert code == 1
     (line,) = err.strip().splitlines()
-    assert line.startswith("not made: scene FloorPlan7, seed 0: no further task works after 0 steps")
+    assert line.startswith("not generated: scene FloorPlan7, seed 0: no further task works after 0 steps")
     assert line.endswith("choose another scene or seed")
     assert not list((tmp_path / "out").iterdir())
 

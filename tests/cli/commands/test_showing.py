@@ -108,7 +108,7 @@ def test_a_killed_run_is_listed_without_results_and_a_broken_one_is_named(ran, r
 def test_a_folder_without_runs_says_how_to_make_one(run, tmp_path):
     code, out, _ = run("ls", "runs", tmp_path)
     assert code == 0
-    assert "infthor-eval --model MODEL --tasks TASKS makes one" in out
+    assert "`infthor-eval --model MODEL --tasks TASKS` starts one" in out
     said_in_one_line(run("ls", "runs", tmp_path / "no"), "no: no such folder")
 
 
