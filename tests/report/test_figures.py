@@ -8,8 +8,8 @@ from PIL import Image
 
 from infthor_eval.errors import DataError
 from infthor_eval.plans.curves import plan_curves
-from infthor_eval.report.curves import curves_table, embedded_label, one_panel, read_panels
-from infthor_eval.report.figures import draw_curves
+from infthor_eval.report.figures.curve_tables import curves_table, embedded_label, one_panel, read_panels
+from infthor_eval.report.figures.curves import draw_curves
 
 from ..plans.made_runs import made_run, plan, planner_run
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from infthor_eval.plans.moments import Moment, PlanTitle, Pose, Rewards, Room, Sight, Thing
-from infthor_eval.report.lettering import fitted, font, lines_of, one_line
-from infthor_eval.report.recording import END_HELD, SIZE, TITLE_HELD, draw_moment, draw_title, pictures
-from infthor_eval.report.room_map import draw_map
+from infthor_eval.report.recordings.fonts import fitted, font, lines_of, one_line
+from infthor_eval.report.recordings.plan_pictures import END_HELD, SIZE, TITLE_HELD, draw_moment, draw_title, pictures
+from infthor_eval.report.recordings.room_map import draw_map
 
 FLOOR = tuple((x * 0.25, z * 0.25) for x in range(8) for z in range(8))
 TABLE, MUG = Thing("SideTable", (2.0, 0.0), (2.6, 1.0)), Thing("Mug", (2.2, 0.4), (2.3, 0.5), is_named=True)

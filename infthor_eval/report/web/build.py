@@ -1,99 +1,101 @@
-"""From runs to the page: which sections there are, and which samples."""
+"""From runs to the page: its sections and its samples."""
 
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
 
 import infthor_eval
 from infthor_eval.errors import DataError
 from infthor_eval.report.comparison import compare, comparison_table
-from infthor_eval.report.web.arm_samples import ERRANDS
-from infthor_eval.report.web.episode_charts import arm_sections, plan_sections
-from infthor_eval.report.web.episode_samples import Opener, episode_samples
-from infthor_eval.report.web.nieh_charts import nieh_charts
-from infthor_eval.report.web.nieh_samples import nieh_samples
-from infthor_eval.report.web.page import About, Page
-from infthor_eval.report.web.plan_samples import PLANS
-from infthor_eval.report.web.primary_metrics import left_out_table, primary_metrics_table, took_table
-from infthor_eval.report.web.runs import ReportRun
+from infthor_eval.report.runs import ReportRun
+from infthor_eval.report.web.page import About, Page, SuiteLabels
+from infthor_eval.report.web.replays import EpisodeReplays, ReplayProgress
+from infthor_eval.report.web.run_tables import costs_table, left_out_table, primary_metrics_table
+from infthor_eval.report.web.sample_list import build_samples
 from infthor_eval.report.web.samples import Sample
 from infthor_eval.report.web.sections import Section
 from infthor_eval.report.web.thumbnails import Thumbnails
 
-__all__ = ["Wanted", "build_page"]
+__all__ = ["PageRequest", "build_page"]
 
-_TITLES = {"nieh": "Questions", "plans": "Plans", "manipulation": "Pick-ups and puts"}
 _FEW = 4  # runs of which each is compared with each
-_MAIN_METRIC = "strict"  # stands first among the scorers of samples
 
 
 @dataclass(frozen=True)
-class Wanted:
-    """What the page is to hold.
+class PageRequest:
+    """Options of the page.
 
     Attributes:
-        data: folder of the questions' set, or of the trajectories, where runs do not tell; None asks them.
-        stages: on which episodes are carried out again, by suite; of another suite nothing is shown that was seen.
-        episodes: of each run that are carried out again.
-        pictures: bytes of all pictures together.
+        data: folder of the questions' set, or of the trajectories; None for the one that each run names.
+        scenes: folder of recorded floor plans, for replays.
+        episodes: number of episodes of each run to replay.
+        pictures: maximum size of all pictures together, in bytes.
     """
 
     data: Path | None = None
-    stages: Mapping[str, Opener] = field(default_factory=dict)
+    scenes: Path | None = None
     episodes: int = 12
     pictures: int = 15_000_000
 
 
-def build_page(runs: Sequence[ReportRun], wanted: Wanted) -> Page:
-    """The page of some runs, of one suite or of several.
+def build_page(runs: Sequence[ReportRun], request: PageRequest, progress: ReplayProgress) -> Page:
+    """Build the page of some runs, of one suite or of several.
 
     Raises:
-        DataError: an identity is not that of a run of its suite.
+        DataError: a run's header is not one of its suite.
     """
-    suites: dict[str, list[ReportRun]] = {}
+    by_suite: dict[str, list[ReportRun]] = {}
     for run in runs:
-        suites.setdefault(run.suite.name, []).append(run)
+        by_suite.setdefault(run.suite.name, []).append(run)
     sections = [Section("results", "Results", tables=(primary_metrics_table(runs),))]
-    for name, same in suites.items():
-        sections += _suite_sections(name, same)
-    sections += _comparisons(suites.values())
-    sections.append(Section("cost", "Speed and cost", tables=(took_table(runs),)))
+    for same in by_suite.values():
+        sections += _suite_sections(same)
+    sections += _comparisons(by_suite.values())
+    sections.append(Section("cost", "Speed and cost", tables=(costs_table(runs),)))
     left_out = left_out_table(runs)
     if left_out is not None:
-        sections.append(Section("left-out", "Failed, skipped, left out", tables=(left_out,)))
-    thumbnails = Thumbnails(wanted.pictures)
-    samples, notes = _samples(runs, suites, wanted, thumbnails)
+        sections.append(Section("left-out", "Failed, skipped, excluded", tables=(left_out,)))
+    thumbnails = Thumbnails(request.pictures)
+    replays = EpisodeReplays(runs, request.episodes, (request.data, request.scenes), thumbnails, progress)
+    samples: list[Sample] = []
+    notes: list[str] = []
+    for same in by_suite.values():
+        of_suite, remarks = build_samples(same, request.data, replays, thumbnails)
+        places = [runs.index(run) for run in same]
+        samples += [sample.spread_over(len(runs), places) for sample in of_suite]
+        notes += remarks
+    if thumbnails.n_left_out:
+        notes.append(f"{thumbnails.n_left_out:,} pictures left out, to keep the page small")
     return Page(
         title=_title(runs),
         version=infthor_eval.__version__,
         runs=[_about(run) for run in runs],
+        suites={name: _labels(same[0]) for name, same in by_suite.items()},
         sections=[section for section in sections if not section.is_empty],
         samples=samples,
-        metrics=_metrics(samples),
+        metrics=_metrics(runs, samples),
         pictures=thumbnails.encoded,
         notes=notes,
     )
 
 
 def _title(runs: Sequence[ReportRun]) -> str:
-    named = ", ".join(run.label for run in runs)
-    return named if len(named) <= 60 else f"{len(runs)} runs"
+    names = ", ".join(run.label for run in runs)
+    return names if len(names) <= 60 else f"{len(runs)} runs"
 
 
-def _suite_sections(name: str, runs: Sequence[ReportRun]) -> Iterator[Section]:
-    charts = nieh_charts(runs) if name == "nieh" else []
-    tables = runs[0].suite.tables([run.summary for run in runs])
-    yield Section(name, _TITLES.get(name, name), tuple(charts), tuple(tables))
-    if name == "plans":
-        yield from plan_sections(runs)
-    if name == "manipulation":
-        yield from arm_sections(runs)
+def _suite_sections(runs: Sequence[ReportRun]) -> Iterator[Section]:
+    suite, presenter = runs[0].suite, runs[0].presenter
+    title = presenter.title or suite.name.replace("_", " ").capitalize()
+    tables = suite.tables([run.summary for run in runs])
+    yield Section(suite.name, title, tuple(presenter.charts(runs)), tuple(tables))
+    yield from presenter.sections(runs)
 
 
 def _comparisons(suites: Iterable[Sequence[ReportRun]]) -> Iterator[Section]:
-    """Each run against each before it, of its suite; of many, each against the first."""
+    """Each run against each before it, of its suite; if there are many, each against the first."""
     tables, notes = [], []
     for runs in suites:
         pairs = combinations(runs, 2) if len(runs) <= _FEW else ((runs[0], other) for other in runs[1:])
@@ -105,43 +107,23 @@ def _comparisons(suites: Iterable[Sequence[ReportRun]]) -> Iterator[Section]:
                 continue
             tables.append(comparison_table(rows, first.label, second.label))
         if len(runs) > _FEW:
-            notes.append(f"each run against {runs[0].label}; infthor-eval compare tells of any two")
+            notes.append(f"each run against {runs[0].label}; infthor-eval compare shows any two")
     if tables or notes:
         yield Section("comparison", "Comparison", (), tuple(tables), tuple(notes))
 
 
-def _samples(
-    runs: Sequence[ReportRun], suites: dict[str, list[ReportRun]], wanted: Wanted, thumbnails: Thumbnails
-) -> tuple[list[Sample], list[str]]:
-    """Of all suites; a sample has a place for the result of every run of the page."""
-    samples: list[Sample] = []
-    notes: list[str] = []
-    for name, same in suites.items():
-        found, told = _samples_of(name, same, wanted, thumbnails)
-        places = [runs.index(run) for run in same]
-        samples += [sample.among(len(runs), places) for sample in found]
-        notes += told
-    if thumbnails.n_left_out:
-        notes.append(f"{thumbnails.n_left_out:,} pictures left out, to keep the page small")
-    return samples, notes
+def _labels(run: ReportRun) -> SuiteLabels:
+    presenter = run.presenter
+    return SuiteLabels(presenter.target_label, presenter.reply_label, presenter.compares_scorers)
 
 
-def _samples_of(
-    suite: str, runs: Sequence[ReportRun], wanted: Wanted, thumbnails: Thumbnails
-) -> tuple[list[Sample], list[str]]:
-    if suite == "nieh":
-        return nieh_samples(runs, wanted.data, thumbnails)
-    kind = {"plans": PLANS, "manipulation": ERRANDS}.get(suite)
-    if kind is None:  # of another package
-        return [], [f"samples of {suite} are not shown: how is not known here"]
-    return episode_samples(runs, kind, wanted.stages.get(suite), wanted.data, wanted.episodes, thumbnails)
-
-
-def _metrics(samples: Sequence[Sample]) -> list[str]:
+def _metrics(runs: Sequence[ReportRun], samples: Sequence[Sample]) -> list[str]:
+    """Names of all metrics; those that decide the outcome first."""
+    main = {run.presenter.main_metric for run in runs}
     names = dict.fromkeys(
         name for sample in samples for result in sample.results if result is not None for name in result.scores
     )
-    return sorted(names, key=lambda name: name != _MAIN_METRIC)
+    return sorted(names, key=lambda name: name not in main)
 
 
 def _about(run: ReportRun) -> About:
@@ -159,5 +141,5 @@ def _about(run: ReportRun) -> About:
         "units": f"{len(run.records):,}",
         "folder": str(run.folder),
     }
-    told = tuple((name, value) for name, value in facts.items() if value)
-    return About(run.label, told, run.command, json.dumps(identity, indent=1, ensure_ascii=False, sort_keys=True))
+    known = tuple((name, value) for name, value in facts.items() if value)
+    return About(run.label, known, run.command, json.dumps(identity, indent=1, ensure_ascii=False, sort_keys=True))

@@ -3,7 +3,7 @@
 import base64
 import hashlib
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -18,7 +18,7 @@ from infthor_eval.formats.files import write_atomically
 from infthor_eval.report.web.samples import Sample
 from infthor_eval.report.web.sections import Section
 
-__all__ = ["About", "Page", "write_page"]
+__all__ = ["About", "Page", "SuiteLabels", "write_page"]
 
 # In a script element "</script" and "<!--" would end or twist it; the line separators end a line of a script.
 _ESCAPED = {"<": "\\u003c", ">": "\\u003e", "&": "\\u0026", "\u2028": "\\u2028", "\u2029": "\\u2029"}
@@ -26,12 +26,12 @@ _ESCAPED = {"<": "\\u003c", ">": "\\u003e", "&": "\\u0026", "\u2028": "\\u2028",
 
 @dataclass(frozen=True)
 class About:
-    """Who a run is.
+    """A run's settings.
 
     Attributes:
-        label: what it is called.
+        label: name of the run.
         facts: names and values, in the order shown.
-        command: that runs it again; empty where it is not known.
+        command: command that repeats the run; empty if unknown.
         identity: everything that can change a number, as JSON.
     """
 
@@ -41,24 +41,40 @@ class About:
     identity: str
 
 
-@dataclass(frozen=True)
-class Page:
-    """All that stands on the page.
+class SuiteLabels(msgspec.Struct, frozen=True):
+    """Words for the samples of a suite.
 
     Attributes:
-        title: of it.
-        version: of the package that made it.
-        runs: who they are.
-        sections: what was found; the first stands above the runs.
-        samples: for the browser.
-        metrics: names of the scorers, the one that says right or wrong first.
+        target: what a sample's target is called.
+        reply: what the reply to a sample is called.
+        compares_scorers: whether samples can be filtered by disagreement of the metrics.
+    """
+
+    target: str
+    reply: str
+    compares_scorers: bool
+
+
+@dataclass(frozen=True)
+class Page:
+    """Contents of the page.
+
+    Attributes:
+        title: title of the page.
+        version: version of the package that built it.
+        runs: settings of the runs.
+        suites: words for samples, by suite.
+        sections: tables and charts; the first section is above the runs.
+        samples: samples for the browser.
+        metrics: names of the metrics, those that decide the outcome first.
         pictures: WebP in base64, by their numbers in the samples.
-        notes: what must be said of the samples.
+        notes: remarks on the samples.
     """
 
     title: str
     version: str
     runs: Sequence[About]
+    suites: Mapping[str, SuiteLabels]
     sections: Sequence[Section]
     samples: Sequence[Sample]
     metrics: Sequence[str]
@@ -70,11 +86,11 @@ def write_page(page: Page, path: Path) -> int:
     """Write the page; equal pages are equal bytes.
 
     Args:
-        page: what stands on it.
-        path: of the file.
+        page: contents of the page.
+        path: path of the file.
 
     Returns:
-        Its size in bytes.
+        Size of the file in bytes.
 
     Raises:
         DataError: it cannot be written.
@@ -101,9 +117,10 @@ def _read(name: str) -> str:
 
 
 def _data(page: Page) -> Markup:
-    """What the browser of samples reads, as JSON that may stand in a script element."""
+    """Return the data of the samples' browser, as JSON that is safe in a script element."""
     document: dict[str, Any] = {
         "runs": [run.label for run in page.runs],
+        "suites": msgspec.to_builtins(page.suites),
         "metrics": list(page.metrics),
         "samples": msgspec.to_builtins(page.samples),
         "pictures": list(page.pictures),

@@ -1,23 +1,22 @@
-"""Samples as the page's browser has them: what was asked, and what each run made of it."""
+"""Samples as the page's browser has them: what was asked, and the result of each run."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import msgspec
 
-__all__ = ["Frame", "Result", "Sample", "StepRow", "Timeline", "outcome"]
+__all__ = ["Frame", "Result", "Sample", "StepRow", "Timeline"]
 
 
 class Frame(msgspec.Struct, frozen=True, omit_defaults=True):
     """A frame of a trajectory.
 
     Attributes:
-        at: its place, from 0 on.
-        picture: number of its thumbnail; None where there was no room for it.
-        is_clue: whether it holds evidence.
+        index: place in the trajectory, from 0 on.
+        picture: number of the thumbnail; None if there was no room for it.
+        is_clue: whether the frame is evidence for the answer.
     """
 
-    at: int
+    index: int
     picture: int | None = None
     is_clue: bool = False
 
@@ -26,9 +25,9 @@ class Timeline(msgspec.Struct, frozen=True, omit_defaults=True):
     """A trajectory, and the frames of it that are shown.
 
     Attributes:
-        n_frames: of the trajectory.
-        frames: in time order.
-        note: what must be said of them.
+        n_frames: number of frames of the trajectory.
+        frames: the shown ones in time order.
+        note: a remark on the choice of frames.
     """
 
     n_frames: int
@@ -37,70 +36,72 @@ class Timeline(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class StepRow(msgspec.Struct, frozen=True, omit_defaults=True):
-    """An action in an episode.
+    """A step of an episode.
 
     Attributes:
-        action: in words; empty where there was none that could be tried.
-        reply: what the model said, where that is not the action.
-        wrong: what was wrong with it.
-        reward: what it earned; None where steps earn nothing by themselves.
-        told: other numbers, in words.
-        picture: number of the thumbnail of what was seen after it.
+        action: the action in words; empty if the reply held none that could be tried.
+        reply: the model's reply, if it is not the action.
+        error: what was wrong with the action.
+        reward: reward of the step; None if steps have none.
+        note: further numbers, in words.
+        picture: number of the thumbnail of the frame after the step.
     """
 
     action: str = ""
     reply: str = ""
-    wrong: str = ""
+    error: str = ""
     reward: float | None = None
-    told: str = ""
+    note: str = ""
     picture: int | None = None
 
 
 class Result(msgspec.Struct, frozen=True, omit_defaults=True):
-    """What a run made of a sample.
+    """The result of a run on a sample.
 
     Attributes:
-        outcome: "right", "partly", "wrong", "failed" or "left out".
-        said: the reply, or how the episode ended.
-        scores: by metric.
-        why: why it failed or was left out.
-        faults: what was survived on the way.
-        seconds: that it took.
-        tokens: of context, cached and of reply; None where they are not known.
-        steps: of an episode.
-        first: number of the thumbnail of what was seen before the first step.
-        map: number of the picture of the room, or of the arm's reach, at the end.
-        note: what must be said of the pictures.
+        outcome: "right", "partly", "wrong", "failed" or "excluded".
+        reply: the reply, or how the episode ended.
+        scores: scores by metric.
+        reason: why the sample failed or was excluded.
+        faults: faults after which it was retried.
+        seconds: time it took.
+        tokens: number of context tokens, of cached ones among them, and of reply tokens; None if unknown.
+        details: further facts by name.
+        steps: steps of an episode.
+        start: number of the thumbnail of the frame before the first step.
+        map: number of the picture of the map at the end.
+        note: how the replay differs from the recorded episode.
     """
 
     outcome: str
-    said: str = ""
+    reply: str = ""
     scores: Mapping[str, float] = {}
-    why: str = ""
+    reason: str = ""
     faults: tuple[str, ...] = ()
     seconds: float = 0.0
     tokens: tuple[int | None, int | None, int | None] = (None, None, None)
+    details: Mapping[str, str] = {}
     steps: tuple[StepRow, ...] = ()
-    first: int | None = None
+    start: int | None = None
     map: int | None = None
     note: str = ""
 
 
 class Sample(msgspec.Struct, frozen=True, omit_defaults=True):
-    """What was asked of one or several runs.
+    """A question or an episode, with the result of each run of the page.
 
     Attributes:
-        suite: the kind of evaluation.
-        task: the task.
-        id: of the question or the episode.
-        variant: of several ways of asking it.
+        suite: name of the suite.
+        task: name of the task.
+        id: the question's or the episode's id.
+        variant: one of the task's ways of evaluating it; empty if there is one.
         cluster: the trajectory.
-        kind: type of question, of plan, or of errand.
-        clues: column of Table 4; empty where there are none of it.
-        title: the question, or what was to be done.
-        wanted: the gold answers, or the goal.
-        results: a result per run of the page; None where a run does not have it.
-        timeline: of the trajectory that a question is about.
+        kind: type of the question or the episode.
+        clues: number of clues in words; empty for none.
+        title: the question, or the instruction.
+        target: the gold answers, or the goal.
+        results: a result per run of the page; None for runs that did not evaluate the sample.
+        timeline: the trajectory that the sample is about.
     """
 
     suite: str
@@ -112,26 +113,12 @@ class Sample(msgspec.Struct, frozen=True, omit_defaults=True):
     variant: str = ""
     kind: str = ""
     clues: str = ""
-    wanted: str = ""
+    target: str = ""
     timeline: Timeline | None = None
 
-    def among(self, n_runs: int, places: Sequence[int]) -> "Sample":
-        """The same sample on a page of more runs: its results stand in these places."""
+    def spread_over(self, n_runs: int, places: Sequence[int]) -> "Sample":
+        """Return the same sample for a page of more runs: `places` are those of its results."""
         results: list[Result | None] = [None] * n_runs
         for place, result in zip(places, self.results, strict=True):
             results[place] = result
         return msgspec.structs.replace(self, results=tuple(results))
-
-
-def outcome(record: Any, score: float) -> str:
-    """How a unit came out.
-
-    Args:
-        record: of the unit.
-        score: its score, where 1 is right.
-    """
-    if record.excluded is not None:
-        return "left out"
-    if record.failure is not None:
-        return "failed"
-    return "right" if score >= 1 else "partly" if score > 0 else "wrong"

@@ -7,7 +7,7 @@ from PIL import Image
 
 from infthor_eval.cli import main
 from infthor_eval.manipulation.records import RECORDS
-from infthor_eval.report.page import END_HELD, SIZE, TITLE_HELD
+from infthor_eval.report.recordings.canvas import END_HELD, SIZE, TITLE_HELD
 from infthor_eval.runs import read_run
 from infthor_eval.runs.journal import Journal
 

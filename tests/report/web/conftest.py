@@ -12,7 +12,7 @@ from infthor_eval.cli.commands.report import stages
 from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.report.web.build import Wanted, build_page
 from infthor_eval.report.web.page import Page, write_page
-from infthor_eval.report.web.runs import read_report_runs
+from infthor_eval.report.runs import read_report_runs
 from infthor_eval.suites import suite_named
 
 HOSTILE = '</script><img src=x onerror="window.hacked=1">"\'&{{ 7*7 }}<!--\u2028'

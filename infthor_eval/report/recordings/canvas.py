@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from PIL import Image, ImageDraw
 
-from infthor_eval.report.lettering import fitted, font, lines_of, one_line
+from infthor_eval.report.recordings.fonts import fitted, font, lines_of, one_line
 
 __all__ = [
     "BAD",

@@ -7,7 +7,6 @@ from pathlib import Path
 from infthor_eval.episodes.curves import RewardCurves, RunCurves
 from infthor_eval.errors import DataError
 from infthor_eval.formats.yaml_files import read_yaml
-from infthor_eval.runs import RunHeader
 from infthor_eval.tables import Column, Row, Table
 
 __all__ = [
@@ -15,10 +14,8 @@ __all__ = [
     "curves_table",
     "embedded_label",
     "embedded_note",
-    "model_names",
     "one_panel",
     "read_panels",
-    "run_labels",
     "trajectories_told",
 ]
 
@@ -37,23 +34,6 @@ class Panel:
 
     title: str
     labels: tuple[str, ...]
-
-
-def run_labels(folders: Sequence[Path], named: Sequence[str]) -> list[str]:
-    """What runs are called beside each other: by their names, and where these are alike by their folders too."""
-    places = [f"{name} ({folder.name})" for name, folder in zip(named, folders, strict=True)]
-    told = [place if named.count(name) > 1 else name for name, place in zip(named, places, strict=True)]
-    return [str(folder) if told.count(name) > 1 else name for name, folder in zip(told, folders, strict=True)]
-
-
-def model_names(headers: Sequence[RunHeader]) -> list[str]:
-    """What the models of runs are called, alike in runs that differ in a setting alone."""
-    return [_name(header) for header in headers]
-
-
-def _name(header: RunHeader) -> str:
-    frames = header.config.get("frames", "shown")
-    return header.name if frames == "shown" else f"{header.name}, {frames} frames"
 
 
 def one_panel(curves: RewardCurves) -> list[Panel]:

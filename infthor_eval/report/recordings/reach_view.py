@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from PIL import Image, ImageDraw
 
 from infthor_eval.manipulation.moments import Place, Reach, Solid
-from infthor_eval.report.lettering import Font, font
+from infthor_eval.report.recordings.fonts import Font, font
 
 __all__ = ["draw_reach"]
 

@@ -5,8 +5,8 @@ from collections.abc import Iterable, Iterator
 from PIL import Image
 
 from infthor_eval.plans.moments import Moment, PlanTitle
-from infthor_eval.report.lettering import one_line
-from infthor_eval.report.page import (
+from infthor_eval.report.recordings.fonts import one_line
+from infthor_eval.report.recordings.canvas import (
     BAD,
     END_HELD,
     FAINT,
@@ -23,7 +23,7 @@ from infthor_eval.report.page import (
     write_lines,
     write_numbers,
 )
-from infthor_eval.report.room_map import draw_map
+from infthor_eval.report.recordings.room_map import draw_map
 
 __all__ = ["END_HELD", "SIZE", "TITLE_HELD", "draw_moment", "draw_title", "pictures"]
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from PIL import Image, ImageDraw
 
 from infthor_eval.plans.moments import Point, Pose, Room, Sight, Thing
-from infthor_eval.report.lettering import Font, font
+from infthor_eval.report.recordings.fonts import Font, font
 
 __all__ = ["draw_map"]
 

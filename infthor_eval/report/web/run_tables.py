@@ -1,22 +1,21 @@
-"""The one number of each run and task that says most, with its interval; and what runs took and left out."""
+"""Tables of all runs: primary metrics, costs, and what was left out."""
 
 from collections.abc import Iterator, Sequence
 
 from infthor_eval.rates import Rate
 from infthor_eval.reasons import count_reasons
-from infthor_eval.report.web.runs import ReportRun
+from infthor_eval.report.runs import ReportRun
 from infthor_eval.tables import Column, Row, Table
 
-__all__ = ["left_out_table", "primary_metrics_table", "took_table"]
+__all__ = ["costs_table", "left_out_table", "primary_metrics_table"]
 
-_MEASURES = {"nieh": "questions right", "plans": "plans carried out", "manipulation": "episodes that were a success"}
 _NAMES = (Column("run", False), Column("task", False))
 
 
 def primary_metrics_table(runs: Sequence[ReportRun]) -> Table:
     """A row per run and task."""
     rows = [
-        Row((run.label, task, _MEASURES.get(run.suite.name, run.suite.name), *_cells(rate), str(rate.n)))
+        Row((run.label, task, run.presenter.measure, *_cells(rate), str(rate.n)))
         for run in runs
         for task, rate in run.suite.primary_metrics(run.summary.summary).items()
     ]
@@ -29,7 +28,7 @@ def _cells(rate: Rate) -> tuple[str, str]:
     return f"{100 * rate.mean:.1f}", interval
 
 
-def took_table(runs: Sequence[ReportRun]) -> Table:
+def costs_table(runs: Sequence[ReportRun]) -> Table:
     """Speed and cost: a row per run."""
     columns = (
         "units",

@@ -5,8 +5,8 @@ from collections.abc import Iterable, Sequence
 from PIL import Image, ImageDraw
 
 from infthor_eval.manipulation.moments import ArmMoment
-from infthor_eval.report.lettering import fitted, font, lines_of, one_line
-from infthor_eval.report.page import BAD, FAINT, GOOD, INK, WARN
+from infthor_eval.report.recordings.fonts import fitted, font, lines_of, one_line
+from infthor_eval.report.recordings.canvas import BAD, FAINT, GOOD, INK, WARN
 
 __all__ = ["COLUMNS", "MOST_ROWS", "draw_sheet", "shown_steps"]
 

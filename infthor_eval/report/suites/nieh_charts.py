@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from infthor_eval.formats.question import ABSENCE
 from infthor_eval.nieh.gains import gains, name_of
 from infthor_eval.nieh.summary import CLUE_COLUMNS, Cell, Score, TaskSummary, main_metric
-from infthor_eval.report.drawing import LEGEND, Look, add_legend, inline_svg, looks_of
-from infthor_eval.report.web.runs import ReportRun
+from infthor_eval.report.figures.style import LEGEND, Look, add_legend, inline_svg, looks_of
+from infthor_eval.report.runs import ReportRun
 from infthor_eval.report.web.sections import Chart
 from infthor_eval.statistics import MeanEstimate
 from infthor_eval.terminal import printable

@@ -5,8 +5,8 @@ from collections.abc import Iterable, Iterator
 from PIL import Image
 
 from infthor_eval.manipulation.moments import ArmMoment
-from infthor_eval.report.lettering import one_line
-from infthor_eval.report.page import (
+from infthor_eval.report.recordings.fonts import one_line
+from infthor_eval.report.recordings.canvas import (
     BAD,
     FAINT,
     PANE,
@@ -20,7 +20,7 @@ from infthor_eval.report.page import (
     write_lines,
     write_numbers,
 )
-from infthor_eval.report.reach_view import draw_reach
+from infthor_eval.report.recordings.reach_view import draw_reach
 
 __all__ = ["arm_pictures", "draw_arm_moment", "draw_arm_title"]
 

@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 from infthor_eval.manipulation.kinds import KIND_NAMES, ManipulationKind
 from infthor_eval.manipulation.radii import RadiusLine, SuccessByRadius
 from infthor_eval.rates import Rate, format_percent
-from infthor_eval.report.curves import embedded_note, trajectories_told
-from infthor_eval.report.drawing import BOUND, LEGEND, Look, add_legend, add_words, looks_of, save_figure
+from infthor_eval.report.figures.curve_tables import embedded_note, trajectories_told
+from infthor_eval.report.figures.style import BOUND, LEGEND, Look, add_legend, add_words, looks_of, save_figure
 from infthor_eval.tables import Column, Row, Table
 
 __all__ = ["draw_radii", "radii_figure", "radii_table"]

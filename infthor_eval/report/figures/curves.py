@@ -8,8 +8,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from infthor_eval.episodes.curves import Curve, Facet, RewardCurves, RunCurves
-from infthor_eval.report.curves import Panel, embedded_label, trajectories_told
-from infthor_eval.report.drawing import BOUND, LEGEND, Look, add_legend, add_words, looks_of, save_figure
+from infthor_eval.report.figures.curve_tables import Panel, embedded_label, trajectories_told
+from infthor_eval.report.figures.style import BOUND, LEGEND, Look, add_legend, add_words, looks_of, save_figure
 from infthor_eval.terminal import printable
 
 __all__ = ["curves_figure", "draw_curves"]

@@ -1,0 +1,71 @@
+"""The presenter of suites that have none, and a base for those that have one."""
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from infthor_eval.report.presenter import Description, Figure, Replay, Timelines
+from infthor_eval.report.runs import ReportRun
+from infthor_eval.report.web.samples import StepRow
+from infthor_eval.report.web.sections import Chart, Section
+from infthor_eval.report.web.thumbnails import Thumbnails
+from infthor_eval.runs import UnitRecord
+
+__all__ = ["PlainPresenter"]
+
+_LONGEST = 2000  # characters of a field on the page
+
+
+class PlainPresenter:
+    """See `Presenter`: samples are the fields of the records, and there are no charts, figures or replays."""
+
+    title: str = ""
+    measure: str = "primary metric"
+    target_label: str = "target"
+    reply_label: str = "reply"
+    main_metric: str | None = None
+    compares_scorers: bool = False
+    replay: Replay | None = None
+    figures: Mapping[str, Figure] = {}
+
+    def is_share(self, metric: str, scores: Sequence[float]) -> bool:
+        """See `Presenter.is_share`: a metric with a value below 0 or above 1 is none."""
+        return all(0 <= score <= 1 for score in scores)
+
+    def charts(self, runs: Sequence[ReportRun]) -> Sequence[Chart]:
+        """See `Presenter.charts`: none."""
+        return ()
+
+    def sections(self, runs: Sequence[ReportRun]) -> Iterable[Section]:
+        """See `Presenter.sections`: none."""
+        return ()
+
+    def describe(self, record: UnitRecord[Any]) -> Description:
+        """See `Presenter.describe`: the unit's id."""
+        return Description(record.id)
+
+    def reply(self, record: UnitRecord[Any]) -> str:
+        """See `Presenter.reply`: none, `details` has all fields."""
+        return ""
+
+    def details(self, record: UnitRecord[Any]) -> Mapping[str, str]:
+        """See `Presenter.details`: the fields of the record's payload."""
+        payload = record.payload
+        fields = {field.name: getattr(payload, field.name) for field in msgspec.structs.fields(payload)}
+        return {name: _text(value) for name, value in fields.items() if value is not None}
+
+    def steps(self, record: UnitRecord[Any]) -> Sequence[StepRow]:
+        """See `Presenter.steps`: none."""
+        return ()
+
+    def timelines(self, runs: Sequence[ReportRun], data: Path | None, thumbnails: Thumbnails) -> Timelines:
+        """See `Presenter.timelines`: none."""
+        return Timelines()
+
+
+def _text(value: Any) -> str:
+    text = value if isinstance(value, str) else json.dumps(msgspec.to_builtins(value), ensure_ascii=False)
+    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}…"

@@ -1,0 +1,279 @@
+"""How the results of a suite are presented: on the report's page, as figures and as recordings.
+
+`Presenter` is what a suite offers; `infthor_eval.report.plain.PlainPresenter` implements all of it for suites that offer
+nothing. `infthor_eval.suites.presenter_of` finds the presenter of a suite.
+"""
+
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
+
+from PIL import Image
+
+from infthor_eval.report.runs import ReportRun
+from infthor_eval.report.web.samples import StepRow, Timeline
+from infthor_eval.report.web.sections import Chart, Section
+from infthor_eval.report.web.thumbnails import Thumbnails
+from infthor_eval.runs import UnitKey, UnitRecord
+from infthor_eval.tables import Table
+
+__all__ = [
+    "Description",
+    "Figure",
+    "FigureRequest",
+    "FigureResult",
+    "Presenter",
+    "Recording",
+    "Replay",
+    "ReplayFrame",
+    "ReplaySession",
+    "Selection",
+    "Timelines",
+]
+
+Record = UnitRecord[Any]
+
+
+class Description(NamedTuple):
+    """A sample in words.
+
+    Attributes:
+        title: the question or the instruction.
+        target: the gold answers or the goal.
+        kind: type of the question or the episode, for the page's filter; empty for none.
+        clues: number of clues in words, for the page's filter; empty for none.
+    """
+
+    title: str
+    target: str = ""
+    kind: str = ""
+    clues: str = ""
+
+
+class Timelines(NamedTuple):
+    """Frames that samples are about.
+
+    Attributes:
+        by_unit: timeline of each unit that has one.
+        notes: reasons why frames are missing, a line each.
+    """
+
+    by_unit: Mapping[UnitKey, Timeline] = {}
+    notes: Sequence[str] = ()
+
+
+@dataclass(frozen=True)
+class FigureRequest:
+    """Options of `report --figure`.
+
+    Attributes:
+        task: name of the task to draw, or names separated by commas; None for what the runs share.
+        panels: YAML file with the runs of each panel; None draws all runs in one.
+    """
+
+    task: str | None = None
+    panels: Path | None = None
+
+
+@dataclass(frozen=True)
+class FigureResult:
+    """A figure, ready to be drawn.
+
+    Attributes:
+        table: the numbers of the figure.
+        draw: writes the files of the figure into a folder, under a name without suffix, and returns their paths.
+        notes: remarks to print below the table, a line each.
+    """
+
+    table: Table
+    draw: Callable[[Path, str], list[Path]]
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A figure that can be drawn from runs of a suite.
+
+    Attributes:
+        about: contents of the figure, in words.
+        build: builds the figure of some runs, which are all of the suite.
+        has_panels: whether runs can be assigned to panels.
+    """
+
+    about: str
+    build: Callable[[Sequence[ReportRun], FigureRequest], FigureResult]
+    has_panels: bool = True
+
+
+@dataclass(frozen=True)
+class Selection:
+    """The episodes of a run to replay; None stands for all, or for the only one where one is needed.
+
+    Attributes:
+        task: name of a task of the run.
+        trajectory: name of a trajectory of the run.
+        plans: numbers of plans, "7" or "3-7".
+        episode: numbers of expert actions, "17" or "17,75".
+        most: maximum number of episodes, chosen evenly if there are more; None for no maximum.
+    """
+
+    task: str | None = None
+    trajectory: str | None = None
+    plans: str | None = None
+    episode: str | None = None
+    most: int | None = None
+
+
+class ReplayFrame(Protocol):
+    """A state of a replayed episode: its start, or the result of a step."""
+
+    @property
+    def sight(self) -> Any:
+        """The world at that state, with an image `frame` (uint8 RGB array); None if nobody acted in the episode."""
+        ...
+
+    @property
+    def note(self) -> str:
+        """How the replay differs from the recorded episode; empty if it does not."""
+        ...
+
+
+class ReplaySession(Protocol):
+    """A simulator in which recorded episodes of one trajectory are replayed."""
+
+    @property
+    def n_episodes(self) -> int:
+        """Number of episodes of the trajectory."""
+        ...
+
+    def frames(self, records: Sequence[Record], /) -> Iterator[Any]:
+        """Replay some episodes and yield their frames (`ReplayFrame`): the start of each, then a frame per step.
+
+        Raises:
+            InfthorError: an episode cannot be replayed.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class Recording:
+    """The recorded episodes of one trajectory that were selected.
+
+    Attributes:
+        trajectory: name of the trajectory.
+        tasks: names of the tasks that have episodes of it.
+        records: records of the selected episodes, in time order.
+        simulator: name of the run's simulator.
+        open: opens a simulator like the run's; takes the folder or file of the trajectories and the folder of recorded
+            floor plans, each None if the run did not need it.
+    """
+
+    trajectory: str
+    tasks: Sequence[str]
+    records: Sequence[Record]
+    simulator: str
+    open: Callable[[Path | None, Path | None], AbstractContextManager[ReplaySession]]
+
+
+class Replay(Protocol):
+    """Replays recorded episodes and draws them.
+
+    Attributes:
+        unit: what an episode is called, in the plural.
+        options: options of `watch` that this suite supports besides those of all suites.
+        sheet_rows: maximum number of episodes on a sheet; 0 if there are no sheets.
+    """
+
+    unit: str
+    options: Collection[str]
+    sheet_rows: int
+
+    def select(self, run: ReportRun, selection: Selection) -> Recording:
+        """Find the selected episodes in a run.
+
+        Raises:
+            UsageError: the run has no such episodes, or the selection is ambiguous.
+            DataError: the run has no episodes, or its header is not one of this suite.
+        """
+        ...
+
+    def draw_map(self, sight: Any, size: int) -> Image.Image:
+        """Draw an observation from above, as a square of `size` pixels."""
+        ...
+
+    def pictures(self, frames: Iterable[Any], heading: str) -> Iterator[Image.Image]:
+        """Draw the frames as pictures of a film, all of one size, with a heading."""
+        ...
+
+    def draw_sheet(self, frames: Iterable[Any], heading: str) -> Image.Image:
+        """Draw the frames as one picture with a row per episode."""
+        ...
+
+
+class Presenter(Protocol):
+    """How results of a suite are presented.
+
+    Attributes:
+        title: heading of the suite's section; empty for the suite's name.
+        measure: what the primary metric measures, in words.
+        target_label: what a sample's target is called.
+        reply_label: what the reply to a sample is called.
+        main_metric: metric that decides whether a sample is right; None for the first one of each sample.
+        compares_scorers: whether the metrics judge the same reply, so that samples can be filtered by disagreement.
+        replay: replays recorded episodes; None if the suite has no episodes.
+        figures: figures by name, as `report --figure` takes it.
+    """
+
+    title: str
+    measure: str
+    target_label: str
+    reply_label: str
+    main_metric: str | None
+    compares_scorers: bool
+    replay: Replay | None
+    figures: Mapping[str, Figure]
+
+    def is_share(self, metric: str, scores: Sequence[float]) -> bool:
+        """Whether a metric is a share, which is shown in percent; others are shown as they are.
+
+        Args:
+            metric: name of the metric.
+            scores: its values in the runs that are shown.
+        """
+        ...
+
+    def charts(self, runs: Sequence[ReportRun]) -> Sequence[Chart]:
+        """Draw the charts of the suite's section; its tables are `Suite.tables`."""
+        ...
+
+    def sections(self, runs: Sequence[ReportRun]) -> Iterable[Section]:
+        """Build further sections, which follow the suite's own."""
+        ...
+
+    def describe(self, record: Record) -> Description:
+        """Describe the sample of a record."""
+        ...
+
+    def reply(self, record: Record) -> str:
+        """Return the reply of a record; empty if there is none."""
+        ...
+
+    def details(self, record: Record) -> Mapping[str, str]:
+        """Return further facts about a record, by name."""
+        ...
+
+    def steps(self, record: Record) -> Sequence[StepRow]:
+        """Return the steps of a recorded episode; empty if it has none."""
+        ...
+
+    def timelines(self, runs: Sequence[ReportRun], data: Path | None, thumbnails: Thumbnails) -> Timelines:
+        """Find the frames that the samples of some runs are about.
+
+        Args:
+            runs: runs of the suite.
+            data: folder of the data set; None for the one that each run names.
+            thumbnails: collects the pictures.
+        """
+        ...

@@ -1,0 +1,1 @@
+"""Pictures of replayed episodes, for recordings and for the page."""

@@ -1,0 +1,145 @@
+"""Runs as the report presents them: their headers, records and costs."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import msgspec
+
+from infthor_eval.errors import UsageError
+from infthor_eval.runs import RunHeader, RunSummary, Suite, UnitKey, UnitRecord, Usage, read_header
+from infthor_eval.runs.configuration import read_configuration
+from infthor_eval.runs.run_search import read_results
+from infthor_eval.runs.shards import read_shards
+
+if TYPE_CHECKING:
+    from infthor_eval.report.presenter import Presenter
+
+__all__ = ["ReportRun", "model_names", "read_report_runs", "records_by_unit", "run_labels"]
+
+
+@dataclass(frozen=True)
+class ReportRun:
+    """A run.
+
+    Attributes:
+        folder: folder of the run.
+        label: name of the run beside the others.
+        model: name of the model, the same for runs that differ in other settings.
+        suite: suite of the run.
+        presenter: presenter of the suite.
+        header: first line of the journal; its name is `label` where names alone would be ambiguous.
+        records: records of all units.
+        usage: tokens and requests of the whole run.
+        n_missing: number of units that were not attempted; None if unknown.
+        command: command that repeats the run; empty if unknown.
+        data: folder of the data set, if the command named one.
+    """
+
+    folder: Path
+    label: str
+    model: str
+    suite: Suite
+    presenter: "Presenter"
+    header: RunHeader
+    records: tuple[UnitRecord[Any], ...]
+    usage: Usage
+    n_missing: int | None
+    command: str = ""
+    data: Path | None = None
+
+    @cached_property
+    def summary(self) -> RunSummary:
+        """Summary of the records."""
+        return RunSummary(self.header, self.suite.summarise(self.header, self.records))
+
+    @property
+    def tasks(self) -> Mapping[str, Any]:
+        """Settings of the tasks in the run's identity, by name."""
+        tasks: Mapping[str, Any] = self.header.identity["tasks"]
+        return tasks
+
+    def dataset(self, task: str) -> Mapping[str, Any]:
+        """Return the settings of a task's data (`dataset_kwargs` of its file)."""
+        settings = self.tasks[task].get("config", {}).get("dataset_kwargs", {})
+        return settings if isinstance(settings, Mapping) else {}
+
+    def main_score(self, record: UnitRecord[Any]) -> float:
+        """Return the score that decides whether a unit is right, 1 being right."""
+        scores, main = self.suite.scores(record), self.presenter.main_metric
+        if main is None:
+            return next(iter(scores.values()), 0.0)
+        return scores.get(main, max(scores.values(), default=0.0))
+
+
+def read_report_runs(
+    folders: Sequence[Path], suite_named: Callable[[str], Suite], presenter_of: Callable[[str], "Presenter"]
+) -> list[ReportRun]:
+    """Read runs from their folders.
+
+    Args:
+        folders: folders of the runs, at least one.
+        suite_named: returns a suite by name.
+        presenter_of: returns the presenter of a suite by the suite's name.
+
+    Raises:
+        UsageError: a folder is given twice.
+        DataError: a folder has no journal, or it cannot be read.
+    """
+    if len({folder.resolve() for folder in folders}) < len(folders):
+        raise UsageError("one run is given twice; give each once")
+    headers = [read_header(folder) for folder in folders]
+    models = model_names(headers)
+    return [
+        _read(folder, label, model, header, suite_named(header.suite), presenter_of(header.suite))
+        for folder, label, model, header in zip(folders, run_labels(folders, models), models, headers, strict=True)
+    ]
+
+
+def _read(folder: Path, label: str, model: str, header: RunHeader, suite: Suite, presenter: "Presenter") -> ReportRun:
+    log, results, configuration = (
+        read_shards(folder, suite.records.decoder()),
+        read_results(folder),
+        read_configuration(folder),
+    )
+    return ReportRun(
+        folder=folder,
+        label=label,
+        model=model,
+        suite=suite,
+        presenter=presenter,
+        header=header if label == model else msgspec.structs.replace(header, name=label),
+        records=tuple(log.records),
+        usage=log.usage,
+        n_missing=results.n_missing if results else None,
+        command=configuration.command if configuration else "",
+        data=configuration.data if configuration else None,
+    )
+
+
+def run_labels(folders: Sequence[Path], names: Sequence[str]) -> list[str]:
+    """Return a label per run: its name, with its folder where several runs have one name."""
+    places = [f"{name} ({folder.name})" for name, folder in zip(names, folders, strict=True)]
+    labels = [place if names.count(name) > 1 else name for name, place in zip(names, places, strict=True)]
+    return [str(folder) if labels.count(name) > 1 else name for name, folder in zip(labels, folders, strict=True)]
+
+
+def model_names(headers: Sequence[RunHeader]) -> list[str]:
+    """Return the name of each run's model, the same for runs that differ in other settings."""
+    return [_model_name(header) for header in headers]
+
+
+def _model_name(header: RunHeader) -> str:
+    frames = header.identity.get("frames", "shown")
+    return header.name if frames == "shown" else f"{header.name}, {frames} frames"
+
+
+def records_by_unit(runs: Sequence[ReportRun]) -> Mapping[UnitKey, list[UnitRecord[Any] | None]]:
+    """Return the records of each unit, with a place per run, in the order of the units' keys."""
+    units: dict[UnitKey, list[UnitRecord[Any] | None]] = {}
+    for place, run in enumerate(runs):
+        for record in run.records:
+            units.setdefault(record.key, [None] * len(runs))[place] = record
+    return dict(sorted(units.items()))

@@ -1,0 +1,1 @@
+"""Presenters of the suites of this package."""

@@ -1,0 +1,163 @@
+"""Presenter of manipulation: what an arm did step by step, its reward, and its success by radius."""
+
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from PIL import Image
+
+from infthor_eval.errors import UsageError
+from infthor_eval.manipulation.curve_runs import ArmRun, with_radii
+from infthor_eval.manipulation.curves import arm_curves
+from infthor_eval.manipulation.radii import success_by_radius
+from infthor_eval.manipulation.records import ArmRecord
+from infthor_eval.report.figures.radius import draw_radii, radii_figure, radii_table
+from infthor_eval.report.plain import PlainPresenter
+from infthor_eval.report.presenter import Description, Figure, FigureRequest, FigureResult, Recording, Selection
+from infthor_eval.report.recordings.arm_pictures import arm_pictures
+from infthor_eval.report.recordings.episode_sheet import MOST_ROWS, draw_sheet, sheet_rows
+from infthor_eval.report.recordings.reach_view import draw_reach
+from infthor_eval.report.runs import ReportRun, run_labels
+from infthor_eval.report.suites.reward_curves import DrawnFigure, curves_on_page, curves_result, figure_section
+from infthor_eval.report.web.samples import StepRow
+from infthor_eval.report.web.sections import Section
+from infthor_eval.runs import UnitRecord
+
+if TYPE_CHECKING:
+    from infthor_eval.manipulation.moments import ArmMoment, ArmSight
+    from infthor_eval.manipulation.replaying import RecordedEpisodes
+
+__all__ = ["ManipulationPresenter"]
+
+Record = UnitRecord[ArmRecord]
+
+
+class ArmEpisodesReplay:
+    """See `Replay`."""
+
+    unit = "episodes"
+    options = ("--episode", "--sheet")
+    sheet_rows = MOST_ROWS
+
+    def select(self, run: ReportRun, selection: Selection) -> Recording:
+        """See `Replay.select`."""
+        from infthor_eval.manipulation.replaying import recorded_episodes, replay_episodes
+
+        recorded = recorded_episodes(_arm_run(run), selection.task, selection.trajectory)
+        return Recording(
+            trajectory=recorded.trajectory,
+            tasks=sorted({record.task for record in recorded.episodes}),
+            records=_select_episodes(recorded, selection),
+            simulator=recorded.run.about.simulator,
+            open=lambda data, scenes: replay_episodes(recorded, None if data is None else str(data), scenes),
+        )
+
+    def draw_map(self, sight: "ArmSight", size: int) -> Image.Image:
+        """See `Replay.draw_map`: the arm's reach, from above and from the side."""
+        return draw_reach(sight.reach, size)
+
+    def pictures(self, frames: Iterable["ArmMoment"], heading: str) -> Iterator[Image.Image]:
+        """See `Replay.pictures`."""
+        return arm_pictures(frames, heading)
+
+    def draw_sheet(self, frames: Iterable["ArmMoment"], heading: str) -> Image.Image:
+        """See `Replay.draw_sheet`."""
+        return draw_sheet(list(sheet_rows(frames)), heading)
+
+
+def _select_episodes(recorded: "RecordedEpisodes", selection: Selection) -> Sequence[Record]:
+    most = selection.most
+    if selection.episode is None:
+        every = recorded.episodes
+        if most is None or len(every) <= most:
+            return every
+        return [every[round(number * (len(every) - 1) / (most - 1))] for number in range(most)]
+    if re.fullmatch(r"\s*\d{1,9}\s*(,\s*\d{1,9}\s*)*", selection.episode, re.ASCII) is None:
+        raise UsageError(f"--episode {selection.episode!r:.60}: is no number of an action; write 17, or 17,75")
+    chosen = recorded.standing_for([int(number) for number in selection.episode.split(",")])
+    if most is not None and len(chosen) > most:
+        raise UsageError(f"--episode: {len(chosen)} episodes, and a sheet has room for {most}; give fewer")
+    return chosen
+
+
+def _arm_run(run: ReportRun) -> ArmRun:
+    return ArmRun(run.label, run.header, run.records)
+
+
+def _model_runs(runs: Sequence[ReportRun]) -> list[ArmRun]:
+    """Runs named after their models: those of one model with several radii become one line."""
+    return [replace(_arm_run(run), label=run.model) for run in runs]
+
+
+def _build_figure_6(runs: Sequence[ReportRun], request: FigureRequest) -> FigureResult:
+    named = with_radii(_model_runs(runs))
+    labels = run_labels([run.folder for run in runs], [run.label for run in named])
+    labelled = [replace(run, label=label) for run, label in zip(named, labels, strict=True)]
+    return curves_result(arm_curves(labelled, request.task), request.panels)
+
+
+def _build_radius_figure(runs: Sequence[ReportRun], request: FigureRequest) -> FigureResult:
+    by_radius = success_by_radius(_model_runs(runs), request.task)
+    return FigureResult(radii_table(by_radius), lambda folder, name: draw_radii(by_radius, folder, name))
+
+
+def _radii_on_page(runs: Sequence[ReportRun]) -> DrawnFigure:
+    by_radius = success_by_radius(_model_runs(runs))
+    return DrawnFigure(lambda: radii_figure(by_radius), radii_table(by_radius), "the numbers are in the table")
+
+
+class ManipulationPresenter(PlainPresenter):
+    """See `Presenter`."""
+
+    title = "Pick-ups and puts"
+    measure = "successful episodes"
+    target_label = "target"
+    reply_label = "ended"
+    main_metric = "success"
+    replay = ArmEpisodesReplay()
+    figures: Mapping[str, Figure] = {
+        "6": Figure("reward of pick-ups and puts along trajectories", _build_figure_6),
+        "radius": Figure("success of pick-ups and puts by the radius of the hand", _build_radius_figure, False),
+    }
+
+    def is_share(self, metric: str, scores: Sequence[float]) -> bool:
+        """See `Presenter.is_share`."""
+        return metric == self.main_metric
+
+    def sections(self, runs: Sequence[ReportRun]) -> Iterator[Section]:
+        """See `Presenter.sections`: reward along trajectories, and success by radius where there are several radii."""
+        arm_runs = [_arm_run(run) for run in runs]
+        title = "Reward of pick-ups and puts"
+        yield figure_section("arm-rewards", title, lambda: curves_on_page(arm_curves(with_radii(arm_runs))))
+        if len({task.radius for run in arm_runs for task in run.about.tasks.values()}) > 1:
+            yield figure_section("arm-radius", "Success by the hand's radius", lambda: _radii_on_page(runs))
+
+    def describe(self, record: Record) -> Description:
+        """See `Presenter.describe`."""
+        payload = record.payload
+        target = payload.object_id
+        if payload.receptacle_id is not None:
+            target = f"{target} → {payload.receptacle_id}"
+        return Description(payload.instruction, target, payload.kind)
+
+    def reply(self, record: Record) -> str:
+        """See `Presenter.reply`: how the episode ended."""
+        return record.payload.ended
+
+    def details(self, record: Record) -> Mapping[str, str]:
+        """See `Presenter.details`: the page shows all of it elsewhere."""
+        return {}
+
+    def steps(self, record: Record) -> list[StepRow]:
+        """See `Presenter.steps`."""
+        return [
+            StepRow(
+                action=", ".join(str(call.get("action", "")) for call in step.calls),
+                reply="" if step.delta is None else " ".join(f"{value:+.3f}" for value in step.delta),
+                error="; ".join(step.refusals),
+                note=f"{step.distance:.3f} m off",
+            )
+            for step in record.payload.steps
+        ]

@@ -1,0 +1,55 @@
+"""Presenter of NIEH: questions with the clue frames that answer them."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from infthor_eval.formats.question import clue_column
+from infthor_eval.nieh.records import NiehAnswer
+from infthor_eval.report.plain import PlainPresenter
+from infthor_eval.report.presenter import Description, Timelines
+from infthor_eval.report.runs import ReportRun
+from infthor_eval.report.suites.nieh_charts import nieh_charts
+from infthor_eval.report.suites.nieh_frames import find_timelines
+from infthor_eval.report.web.sections import Chart
+from infthor_eval.report.web.thumbnails import Thumbnails
+from infthor_eval.runs import UnitRecord
+
+__all__ = ["NiehPresenter"]
+
+Record = UnitRecord[NiehAnswer]
+
+
+class NiehPresenter(PlainPresenter):
+    """See `Presenter`."""
+
+    title = "Questions"
+    measure = "questions right"
+    target_label = "gold answer"
+    main_metric = "strict"
+    compares_scorers = True
+
+    def is_share(self, metric: str, scores: Sequence[float]) -> bool:
+        """See `Presenter.is_share`: all of them, although the reference scorer can exceed 1."""
+        return True
+
+    def charts(self, runs: Sequence[ReportRun]) -> list[Chart]:
+        """See `Presenter.charts`."""
+        return nieh_charts(runs)
+
+    def describe(self, record: Record) -> Description:
+        """See `Presenter.describe`."""
+        payload = record.payload
+        target = ", ".join(map(str, payload.answers))
+        return Description(payload.question, target, payload.question_type or "untyped", clue_column(payload.n_clues))
+
+    def reply(self, record: Record) -> str:
+        """See `Presenter.reply`."""
+        return record.payload.reply or ""
+
+    def details(self, record: Record) -> Mapping[str, str]:
+        """See `Presenter.details`: the page shows all of it elsewhere."""
+        return {}
+
+    def timelines(self, runs: Sequence[ReportRun], data: Path | None, thumbnails: Thumbnails) -> Timelines:
+        """See `Presenter.timelines`."""
+        return find_timelines(runs, data, thumbnails)

@@ -1,0 +1,126 @@
+"""Frames of questions: the clues with their neighbours, or some of all frames where there are no clues."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from infthor_eval.errors import DataError, UsageError
+from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.question import Question
+from infthor_eval.nieh.records import NiehAnswer
+from infthor_eval.nieh.samples import find_set
+from infthor_eval.report.presenter import Timelines
+from infthor_eval.report.runs import ReportRun, records_by_unit
+from infthor_eval.report.web.samples import Frame, Timeline
+from infthor_eval.report.web.thumbnails import Thumbnails
+from infthor_eval.runs import UnitKey, UnitRecord
+
+__all__ = ["find_timelines"]
+
+Record = UnitRecord[NiehAnswer]
+_OVERVIEW = 5  # frames of a trajectory that are shown for a question without clues
+
+
+def find_timelines(runs: Sequence[ReportRun], data: Path | None, thumbnails: Thumbnails) -> Timelines:
+    """See `Presenter.timelines`; a set that is missing or has changed since the run has a note.
+
+    Clues of all questions get their pictures before any neighbour does, as there is a limit on the size of all.
+    """
+    sets = _Sets(runs, data)
+    chosen: dict[UnitKey, _Choice] = {}
+    for key, records in records_by_unit(runs).items():
+        choice = sets.choose_frames(key, next(record for record in records if record))
+        if choice is not None:
+            chosen[key] = choice
+    for choice in chosen.values():
+        for index in sorted(choice.clues):
+            _picture(choice.frames[index], thumbnails)
+    timelines = {key: _timeline(choice, thumbnails) for key, choice in chosen.items()}
+    return Timelines(timelines, sets.problems)
+
+
+@dataclass(frozen=True)
+class _Choice:
+    """Frames to show for a question.
+
+    Attributes:
+        frames: all frames of the trajectory.
+        clues: indices of the clues.
+        others: indices of further frames.
+    """
+
+    frames: Sequence[FrameRef]
+    clues: frozenset[int]
+    others: frozenset[int]
+
+
+class _Sets:
+    """The question sets of the tasks, as far as they are there and unchanged."""
+
+    def __init__(self, runs: Sequence[ReportRun], data: Path | None) -> None:
+        self._problems: dict[str, None] = {}
+        self._sets: dict[str, tuple[NiehSet, Mapping[str, Question]] | None] = {}
+        for run in runs:
+            for task in run.tasks:
+                if task not in self._sets:
+                    self._sets[task] = self._read(run, task, data)
+
+    @property
+    def problems(self) -> list[str]:
+        """Reasons why frames are missing, each once."""
+        return list(self._problems)
+
+    def choose_frames(self, key: UnitKey, record: Record) -> _Choice | None:
+        """Choose frames of a record's question; None if its set is missing or has another question there."""
+        known = self._sets[key.task]
+        if known is None:
+            return None
+        data, questions = known
+        question = questions.get(key.id)
+        if question is None or question.text != record.payload.question:
+            return None
+        return _choose_frames(data, question)
+
+    def _read(self, run: ReportRun, task: str, data: Path | None) -> tuple[NiehSet, Mapping[str, Question]] | None:
+        folder = data or run.data
+        try:
+            questions = find_set(str(folder) if folder else None, run.dataset(task).get("bundled"))
+        except (UsageError, DataError) as error:
+            self._problems[f"{task}: no frames are shown: {error}; give the set's folder with --data"] = None
+            return None
+        if questions.fingerprint != run.tasks[task].get("data"):
+            problem = f"{task}: no frames are shown: {questions.root} has changed since {run.label} was run"
+            self._problems[problem] = None
+            return None
+        return questions, {question.id: question for question in questions.questions}
+
+
+def _choose_frames(data: NiehSet, question: Question) -> _Choice | None:
+    try:
+        frames = data.frames(question.traj_id)
+        clue_frames = set(data.clue_frames(question))
+    except DataError:  # the question was skipped or failed for it, and its record has the reason
+        return None
+    clues = frozenset(index for index, frame in enumerate(frames) if frame in clue_frames)
+    last = len(frames) - 1
+    others = {near for index in clues for near in (index - 1, index + 1) if 0 <= near <= last}
+    if not clues:
+        others = {round(number * last / (_OVERVIEW - 1)) for number in range(_OVERVIEW)}
+    return _Choice(frames, clues, frozenset(others - clues))
+
+
+def _timeline(choice: _Choice, thumbnails: Thumbnails) -> Timeline:
+    frames = (
+        Frame(index, _picture(choice.frames[index], thumbnails), index in choice.clues)
+        for index in sorted(choice.clues | choice.others)
+    )
+    note = "" if choice.clues else "absence question: no frame is evidence, so five frames are shown, evenly spaced"
+    return Timeline(len(choice.frames), tuple(frames), note)
+
+
+def _picture(frame: FrameRef, thumbnails: Thumbnails) -> int | None:
+    try:
+        return thumbnails.add(str(frame.path), frame.load)
+    except DataError:  # an unreadable frame has its place on the timeline, without a picture
+        return None

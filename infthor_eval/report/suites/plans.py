@@ -1,0 +1,144 @@
+"""Presenter of plans: what an agent did step by step, and the reward it earned."""
+
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from PIL import Image
+
+from infthor_eval.errors import UsageError
+from infthor_eval.plans.curve_runs import PlansRun
+from infthor_eval.plans.curves import reward_curves
+from infthor_eval.plans.records import PlanRecord
+from infthor_eval.report.plain import PlainPresenter
+from infthor_eval.report.presenter import Description, Figure, FigureRequest, FigureResult, Recording, Selection
+from infthor_eval.report.recordings.plan_pictures import pictures
+from infthor_eval.report.recordings.room_map import draw_map
+from infthor_eval.report.runs import ReportRun
+from infthor_eval.report.suites.reward_curves import DrawnFigure, curves_on_page, curves_result, figure_section
+from infthor_eval.report.web.samples import StepRow
+from infthor_eval.report.web.sections import Section
+from infthor_eval.runs import UnitRecord
+
+if TYPE_CHECKING:
+    from infthor_eval.plans.moments import Moment, Sight
+    from infthor_eval.plans.replaying import Recorded
+
+__all__ = ["PlansPresenter"]
+
+Record = UnitRecord[PlanRecord]
+
+
+class PlansReplay:
+    """See `Replay`."""
+
+    unit = "plans"
+    options = ("--plans",)
+    sheet_rows = 0
+
+    def select(self, run: ReportRun, selection: Selection) -> Recording:
+        """See `Replay.select`."""
+        from infthor_eval.plans.replaying import recorded_plans, replay
+
+        recorded = recorded_plans(_plans_run(run), selection.task, selection.trajectory)
+        return Recording(
+            trajectory=recorded.trajectory,
+            tasks=(recorded.task,),
+            records=_select_plans(recorded, selection.plans),
+            simulator=recorded.run.about.simulator,
+            open=lambda data, scenes: replay(recorded, None if data is None else str(data), scenes),
+        )
+
+    def draw_map(self, sight: "Sight", size: int) -> Image.Image:
+        """See `Replay.draw_map`."""
+        return draw_map(sight, size)
+
+    def pictures(self, frames: Iterable["Moment"], heading: str) -> Iterator[Image.Image]:
+        """See `Replay.pictures`."""
+        return pictures(frames, heading)
+
+    def draw_sheet(self, frames: Iterable["Moment"], heading: str) -> Image.Image:
+        """See `Replay.draw_sheet`: plans have none."""
+        raise NotImplementedError
+
+
+def _select_plans(recorded: "Recorded", plans: str | None) -> Sequence[Record]:
+    if plans is None:
+        return recorded.plans
+    numbers = re.fullmatch(r"(\d{1,9})(?:-(\d{1,9}))?", plans.strip())
+    if numbers is None:
+        raise UsageError(f"--plans {plans!r:.60}: is neither a plan's number nor two of them; write 7, or 3-7")
+    return recorded.between(int(numbers[1]), int(numbers[2] or numbers[1]))
+
+
+def _plans_run(run: ReportRun) -> PlansRun:
+    return PlansRun(run.label, run.header, run.records)
+
+
+def _build_figure_7(runs: Sequence[ReportRun], request: FigureRequest) -> FigureResult:
+    return curves_result(reward_curves([_plans_run(run) for run in runs], request.task), request.panels)
+
+
+def _task_curves(runs: Sequence[PlansRun], task: str) -> DrawnFigure:
+    return curves_on_page(reward_curves(runs, task))
+
+
+class PlansPresenter(PlainPresenter):
+    """See `Presenter`."""
+
+    title = "Plans"
+    measure = "plans completed"
+    target_label = "goal"
+    reply_label = "ended"
+    main_metric = "success"
+    replay = PlansReplay()
+    figures: Mapping[str, Figure] = {
+        "7": Figure("reward of plans over steps and over context tokens", _build_figure_7),
+    }
+
+    def is_share(self, metric: str, scores: Sequence[float]) -> bool:
+        """See `Presenter.is_share`."""
+        return metric == self.main_metric
+
+    def sections(self, runs: Sequence[ReportRun]) -> Iterator[Section]:
+        """See `Presenter.sections`: curves of reward for each task that all runs have."""
+        plans_runs = [_plans_run(run) for run in runs]
+        for task in runs[0].tasks:
+            if all(task in run.tasks for run in runs):
+                title = f"{task}: reward over steps and context"
+                yield figure_section(f"rewards-{task}", title, partial(_task_curves, plans_runs, task))
+
+    def describe(self, record: Record) -> Description:
+        """See `Presenter.describe`."""
+        return Description(record.payload.plan, record.payload.goal, record.payload.kind)
+
+    def reply(self, record: Record) -> str:
+        """See `Presenter.reply`: how the plan ended."""
+        return record.payload.ended
+
+    def details(self, record: Record) -> Mapping[str, str]:
+        """See `Presenter.details`: the page shows all of it elsewhere."""
+        return {}
+
+    def steps(self, record: Record) -> list[StepRow]:
+        """See `Presenter.steps`."""
+        return [
+            StepRow(
+                action=_action_text(step.action, step.call),
+                reply=reply if (reply := (step.reply or "").strip()) != step.action else "",
+                error=step.message,
+                reward=round(step.reward, 4),
+                note="" if step.n_context_tokens is None else f"{step.n_context_tokens:,} tokens",
+            )
+            for step in record.payload.steps
+        ]
+
+
+def _action_text(action: str, call: Mapping[str, Any] | None) -> str:
+    """Baselines give calls, of which the record's text has the name alone: the object's type is added to it."""
+    object_id = (call or {}).get("objectId")
+    if call is not None and action == call.get("action") and isinstance(object_id, str):
+        return f"{action} {object_id.partition('|')[0]}"
+    return action

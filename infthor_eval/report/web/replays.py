@@ -1,0 +1,130 @@
+"""Episodes replayed for the page: a journal has every action and no frame."""
+
+from collections.abc import Mapping, Sequence
+from itertools import groupby
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
+
+from PIL import Image
+
+from infthor_eval.errors import InfthorError
+from infthor_eval.report.presenter import Replay, ReplaySession, Selection
+from infthor_eval.report.runs import ReportRun
+from infthor_eval.report.web.thumbnails import Thumbnails
+from infthor_eval.runs import UnitKey, UnitRecord
+
+__all__ = ["EpisodePictures", "EpisodeReplays", "ReplayProgress"]
+
+Record = UnitRecord[Any]
+# Pixels of a map's side: drawn larger than it is shown, since small letters are easier to read when they are reduced.
+_DRAWN, _SHOWN = 560, 300
+
+
+class EpisodePictures(NamedTuple):
+    """Pictures of a replayed episode.
+
+    Attributes:
+        frames: numbers of the thumbnails before the first step and after each.
+        map: number of the map at the end.
+        note: how the replay differs from the recorded episode; empty if it does not.
+    """
+
+    frames: Sequence[int | None] = ()
+    map: int | None = None
+    note: str = ""
+
+
+class ReplayProgress(Protocol):
+    """Observes replays, which take seconds each."""
+
+    def begin(self, n_episodes: int) -> None:
+        """Start to count; called once, before the first episode."""
+        ...
+
+    def advance(self, run: str, trajectory: str) -> None:
+        """Count an episode of a run."""
+        ...
+
+
+class EpisodeReplays:
+    """Replays some episodes of each run of a page."""
+
+    def __init__(
+        self,
+        runs: Sequence[ReportRun],
+        most: int,
+        folders: tuple[Path | None, Path | None],
+        thumbnails: Thumbnails,
+        progress: ReplayProgress,
+    ) -> None:
+        """Choose the episodes.
+
+        Args:
+            runs: runs of the page.
+            most: number of episodes of each run to replay.
+            folders: those of the trajectories and of recorded floor plans, see `Recording.open`.
+            thumbnails: collects the pictures.
+            progress: observes the replays.
+        """
+        self._chosen = {run.folder: _choose(run, most) for run in runs if run.presenter.replay is not None}
+        self._data, self._scenes = folders
+        self._thumbnails, self._progress = thumbnails, progress
+        n_episodes = sum(map(len, self._chosen.values()))
+        if n_episodes:
+            progress.begin(n_episodes)
+
+    def replay(self, run: ReportRun) -> tuple[Mapping[UnitKey, EpisodePictures], list[str]]:
+        """Replay the chosen episodes of a run.
+
+        Returns:
+            Their pictures, and the reasons why a trajectory could not be replayed.
+        """
+        pictures: dict[UnitKey, EpisodePictures] = {}
+        notes: list[str] = []
+        replay = run.presenter.replay
+        if replay is None:
+            return pictures, notes
+        # By trajectory, so that each scene is loaded once.
+        chosen = sorted(self._chosen[run.folder], key=lambda record: (record.task, record.cluster, record.key))
+        for (task, trajectory), group in groupby(chosen, key=lambda record: (record.task, record.cluster)):
+            records = list(group)
+            try:
+                recording = replay.select(run, Selection(task, trajectory))
+                with recording.open(self._data or run.data, self._scenes) as session:
+                    while records:
+                        pictures[records[0].key] = self._draw(replay, session, run, records[0])
+                        self._progress.advance(run.label, trajectory)
+                        del records[0]
+            except InfthorError as error:
+                notes.append(f"{run.label}, {trajectory}: no frames are shown: {error}")
+                for _ in records:
+                    self._progress.advance(run.label, trajectory)
+        return pictures, notes
+
+    def _draw(self, replay: Replay, session: ReplaySession, run: ReportRun, record: Record) -> EpisodePictures:
+        frames = list(session.frames([record]))
+        seen = [frame.sight for frame in frames if frame.sight is not None]
+        if not seen:
+            return EpisodePictures()
+        name = f"{run.folder}/{record.key.task}/{record.key}"
+        numbers = [
+            self._thumbnails.add(f"{name}/{number}", lambda frame=sight.frame: Image.fromarray(frame))  # type: ignore[misc]
+            for number, sight in enumerate(seen)
+        ]
+        at_end = self._thumbnails.add(f"{name}/map", lambda: replay.draw_map(seen[-1], _DRAWN), _SHOWN)
+        return EpisodePictures(numbers, at_end, next((frame.note for frame in frames if frame.note), ""))
+
+
+def _choose(run: ReportRun, most: int) -> list[Record]:
+    """Two thirds of the room for episodes that went wrong, the rest for successes."""
+    acted = [record for record in run.records if run.presenter.steps(record)]
+    wrong = [record for record in acted if run.main_score(record) < 1]
+    right = [record for record in acted if run.main_score(record) >= 1]
+    first = _choose_evenly(wrong, max(most - len(right), (2 * most + 2) // 3))
+    return first + _choose_evenly(right, most - len(first))
+
+
+def _choose_evenly(records: Sequence[Record], n: int) -> list[Record]:
+    if len(records) <= n:
+        return list(records)
+    return [records[round(number * (len(records) - 1) / max(n - 1, 1))] for number in range(n)]

@@ -1,0 +1,98 @@
+"""From records to samples: what was asked, and the result of each run."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from infthor_eval.report.runs import ReportRun, records_by_unit
+from infthor_eval.report.web.replays import EpisodePictures, EpisodeReplays
+from infthor_eval.report.web.samples import Result, Sample, StepRow, Timeline
+from infthor_eval.report.web.thumbnails import Thumbnails
+from infthor_eval.runs import UnitKey, UnitRecord
+
+__all__ = ["build_samples"]
+
+Record = UnitRecord[Any]
+
+
+def build_samples(
+    runs: Sequence[ReportRun], data: Path | None, replays: EpisodeReplays, thumbnails: Thumbnails
+) -> tuple[list[Sample], list[str]]:
+    """Build the samples of all units that have a record, in the order of their keys.
+
+    Args:
+        runs: runs of one suite.
+        data: folder of the data set; None for the one that each run names.
+        replays: replays some of the episodes.
+        thumbnails: collects the pictures.
+
+    Returns:
+        The samples, and notes on missing pictures.
+    """
+    timelines = runs[0].presenter.timelines(runs, data, thumbnails)
+    replayed = [replays.replay(run) for run in runs]
+    samples = [
+        _sample(key, runs, records, [pictures.get(key) for pictures, _ in replayed], timelines.by_unit)
+        for key, records in records_by_unit(runs).items()
+    ]
+    return samples, [*timelines.notes, *(note for _, notes in replayed for note in notes)]
+
+
+def _sample(
+    key: UnitKey,
+    runs: Sequence[ReportRun],
+    records: Sequence[Record | None],
+    pictures: Sequence[EpisodePictures | None],
+    timelines: Mapping[UnitKey, Timeline],
+) -> Sample:
+    first = next(record for record in records if record is not None)
+    results = (
+        None if record is None else _result(run, record, shown or EpisodePictures())
+        for run, record, shown in zip(runs, records, pictures, strict=True)
+    )
+    return Sample(
+        suite=runs[0].suite.name,
+        task=key.task,
+        id=key.id,
+        variant=key.variant,
+        cluster=first.cluster,
+        results=tuple(results),
+        timeline=timelines.get(key),
+        **runs[0].presenter.describe(first)._asdict(),
+    )
+
+
+def _result(run: ReportRun, record: Record, pictures: EpisodePictures) -> Result:
+    presenter, tokens = run.presenter, record.tokens
+    return Result(
+        outcome=_outcome(record, run.main_score(record)),
+        reply=presenter.reply(record),
+        scores=run.suite.scores(record),
+        reason=record.failure or record.excluded or "",
+        faults=record.faults,
+        seconds=round(record.seconds, 4),
+        tokens=(tokens.context, tokens.cached, tokens.reply),
+        details=presenter.details(record),
+        steps=_with_pictures(presenter.steps(record), pictures.frames),
+        start=pictures.frames[0] if pictures.frames else None,
+        map=pictures.map,
+        note=pictures.note,
+    )
+
+
+def _outcome(record: Record, score: float) -> str:
+    if record.excluded is not None:
+        return "excluded"
+    if record.failure is not None:
+        return "failed"
+    return "right" if score >= 1 else "partly" if score > 0 else "wrong"
+
+
+def _with_pictures(steps: Sequence[StepRow], frames: Sequence[int | None]) -> tuple[StepRow, ...]:
+    """The first frame is the start; an episode that ends early in the replay has fewer frames than steps."""
+    return tuple(
+        msgspec.structs.replace(step, picture=frames[number]) if number < len(frames) else step
+        for number, step in enumerate(steps, 1)
+    )
