@@ -1,7 +1,8 @@
-"""The suites that there are, by the names that task files use.
+"""The suites and their presenters, by the names that task files use.
 
-A suite, and its options for the command line, are imported only when asked for, so that `--help` stays quick. Packages
-add their own through the entry point group `infthor_eval.suites`, as "module:Class" under the suite's name.
+A suite, its options for the command line and its presenter are imported only when needed, so that `--help` stays quick.
+Other packages add theirs through the entry point groups `infthor_eval.suites` and `infthor_eval.presenters`, as
+"module:Class" under the suite's name. A suite of another package without a presenter gets `PlainPresenter`.
 """
 
 import importlib
@@ -13,32 +14,38 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from infthor_eval.errors import UsageError, unknown_name, wrap_errors
 
 if TYPE_CHECKING:
+    from infthor_eval.report.presenter import Presenter
     from infthor_eval.runs import Suite, TaskFile
 
 __all__ = [
     "ENTRY_POINTS",
+    "PRESENTERS",
     "baseline_names",
     "options_of",
+    "presenter_of",
     "split_by_suite",
     "suite_identity",
     "suite_named",
     "suite_names",
 ]
 
-ENTRY_POINTS = "infthor_eval.suites"
+ENTRY_POINTS, PRESENTERS = "infthor_eval.suites", "infthor_eval.presenters"
+_PLAIN = "infthor_eval.report.plain:PlainPresenter"
 
 
 class _Target(NamedTuple):
     """Where a suite is found.
 
     Attributes:
-        suite: "module:Class" of it.
+        suite: "module:Class" of the suite.
         options: "module:Class" of its options.
+        presenter: "module:Class" of its presenter.
         baselines: names of its `baselines`, which can be listed without importing them; None asks the suite.
     """
 
     suite: str
     options: str
+    presenter: str
     baselines: tuple[str, ...] | None = None
 
 
@@ -46,16 +53,19 @@ _BUILT_IN = {
     "nieh": _Target(
         "infthor_eval.nieh.suite:NiehSuite",
         "infthor_eval.nieh.options:NiehOptions",
+        "infthor_eval.report.suites.nieh:NiehPresenter",
         ("oracle", "blind", "blind-count", "random"),
     ),
     "manipulation": _Target(
         "infthor_eval.manipulation.suite:ManipulationSuite",
         "infthor_eval.manipulation.options:ManipulationOptions",
+        "infthor_eval.report.suites.manipulation:ManipulationPresenter",
         ("planner-arm", "random-arm", "still"),
     ),
     "plans": _Target(
         "infthor_eval.plans.suite:PlansSuite",
         "infthor_eval.plans.options:PlansOptions",
+        "infthor_eval.report.suites.plans:PlansPresenter",
         ("planner", "random", "scripted", "history"),
     ),
 }
@@ -75,11 +85,30 @@ def suite_named(name: str) -> "Suite":
     """
     if name not in suite_names():
         raise unknown_name("suite", name, suite_names())
-    found = _imported(name, _target(name).suite)
+    from infthor_eval.runs import Suite
+
+    suite_class = _import(name, _target(name).suite)
     if name not in _BUILT_IN:
-        _check(name, found)
-    made: Suite = found()
-    return made
+        _require_members(name, suite_class, Suite)
+        if suite_class.name != name:
+            raise UsageError(f"the suite {name} of another package calls itself {suite_class.name!r}; give it one name")
+    suite: Suite = suite_class()
+    return suite
+
+
+def presenter_of(name: str) -> "Presenter":
+    """Return the presenter of a suite.
+
+    Raises:
+        UsageError: that of another package cannot be imported or lacks a member of `Presenter`.
+    """
+    from infthor_eval.report.presenter import Presenter
+
+    presenter_class = _import(name, _target(name).presenter)
+    if name not in _BUILT_IN:
+        _require_members(name, presenter_class, Presenter)
+    presenter: Presenter = presenter_class()
+    return presenter
 
 
 def options_of(name: str) -> type:
@@ -88,8 +117,8 @@ def options_of(name: str) -> type:
     Raises:
         UsageError: the suite of another package cannot be imported.
     """
-    found: type = _imported(name, _target(name).options)
-    return found
+    options: type = _import(name, _target(name).options)
+    return options
 
 
 def suite_identity(name: str) -> dict[str, Any]:
@@ -121,38 +150,35 @@ def split_by_suite(tasks: Iterable["TaskFile"]) -> Mapping[str, list["TaskFile"]
     return found
 
 
-def _entry_points() -> dict[str, EntryPoint]:
-    return {point.name: point for point in entry_points(group=ENTRY_POINTS)}
+def _entry_points(group: str = ENTRY_POINTS) -> dict[str, EntryPoint]:
+    return {point.name: point for point in entry_points(group=group)}
 
 
 def _target(name: str) -> _Target:
-    """Where a suite is found; other packages are looked at for theirs alone, as that takes time."""
+    # Entry points are read only for suites of other packages: reading them takes time.
     if name in _BUILT_IN:
         return _BUILT_IN[name]
-    value = _entry_points()[name].value
-    return _Target(value, f"{value}.options")
+    suite, presenter = _entry_points()[name].value, _entry_points(PRESENTERS).get(name)
+    return _Target(suite, f"{suite}.options", _PLAIN if presenter is None else presenter.value)
 
 
-def _imported(name: str, target: str) -> Any:
+def _import(name: str, target: str) -> Any:
     module, _, attributes = target.partition(":")
     problem = f"the suite {name} cannot be imported from {target}"
     with wrap_errors(
-        problem, "mend its package, or uninstall it", catch=(ImportError, AttributeError), raise_as=UsageError
+        problem, "fix its package, or uninstall it", catch=(ImportError, AttributeError), raise_as=UsageError
     ):
         return reduce(getattr, attributes.split("."), importlib.import_module(module))
 
 
-def _check(name: str, found: Any) -> None:
-    """Refuse a class of another package that lacks what a suite has.
+def _require_members(name: str, given: Any, protocol: Any) -> None:
+    """Check a class of another package.
 
     Raises:
-        UsageError: names what it lacks.
+        UsageError: the class lacks members of the protocol.
     """
-    from infthor_eval.runs import Suite
-
-    members = [*Suite.__annotations__, *(member for member in vars(Suite) if not member.startswith("_"))]
-    missing = [member for member in members if not hasattr(found, member)]
+    members = [*protocol.__annotations__, *(member for member in vars(protocol) if not member.startswith("_"))]
+    missing = [member for member in members if not hasattr(given, member)]
     if missing:
-        raise UsageError(f"the suite {name} of another package lacks {', '.join(missing)}; see docs/own-tasks.md")
-    if found.name != name:
-        raise UsageError(f"the suite {name} of another package calls itself {found.name!r}; give it one name")
+        what = protocol.__name__.lower()
+        raise UsageError(f"the {what} {name} of another package lacks {', '.join(missing)}; see docs/own-tasks.md")

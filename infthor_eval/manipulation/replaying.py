@@ -134,13 +134,18 @@ def _course(source: TrajectorySource) -> ArmCourse:
 
 
 class ArmReplay:
-    """See `replay_episodes`. Simulators are started when the first episode is asked for."""
+    """See `replay_episodes`. Simulators are started when the first episode is replayed.
+
+    Attributes:
+        n_episodes: number of recorded episodes of the trajectory.
+    """
 
     def __init__(self, recorded: RecordedEpisodes, course: ArmCourse, opened: Callable[..., Simulator]) -> None:
+        self.n_episodes = len(recorded.episodes)
         self._recorded, self._course, self._opened = recorded, course, opened
         self._environments: dict[_Camera, ArmEnvironment] = {}
 
-    def moments(self, episodes: Sequence[Record]) -> Iterator[ArmMoment]:
+    def frames(self, episodes: Sequence[Record]) -> Iterator[ArmMoment]:
         """The moments of some episodes, in time order: the start of each, then its steps.
 
         Raises:

@@ -135,15 +135,15 @@ class Replay:
     """See `replay`. The scene is restored when the first plan is asked for.
 
     Attributes:
-        n_plans: of the trajectory.
+        n_episodes: number of plans of the trajectory.
     """
 
     def __init__(self, recorded: Recorded, course: Course, simulator: Simulator) -> None:
         self._recorded, self._course, self._simulator = recorded, course, simulator
         self._environment: PlanEnvironment | None = None
-        self.n_plans = len(course.plans)
+        self.n_episodes = len(course.plans)
 
-    def moments(self, plans: Sequence[Record]) -> Iterator[Moment]:
+    def frames(self, plans: Sequence[Record]) -> Iterator[Moment]:
         """The moments of some plans, in time order: the start of each, then its actions.
 
         Raises:
@@ -186,7 +186,7 @@ class Replay:
     def _title(self, plan: Record) -> PlanTitle:
         payload = plan.payload
         number, n_actions = payload.index + 1, len(payload.steps)
-        return PlanTitle(number, self.n_plans, payload.plan, payload.goal, payload.n_expert_steps, n_actions)
+        return PlanTitle(number, self.n_episodes, payload.plan, payload.goal, payload.n_expert_steps, n_actions)
 
     def _rewards(self, plan: Record, number: int) -> Rewards:
         """After so many actions."""

@@ -48,7 +48,7 @@ def opened(recorded, data=SET):
 
 def test_a_plan_is_its_start_and_its_actions_as_they_were_recorded(recorded, stage):
     plans = recorded.between(1, 2)
-    found = list(stage.moments(plans))
+    found = list(stage.frames(plans))
     assert [moment.number for moment in found] == [n for plan in plans for n in range(len(plan.payload.steps) + 1)]
     assert [moment.note for moment in found] == [""] * len(found)  # the world went where it went then
     assert all(moment.sight.frame.shape == (300, 300, 3) for moment in found)
@@ -63,7 +63,7 @@ def test_a_plan_is_its_start_and_its_actions_as_they_were_recorded(recorded, sta
 
 
 def test_the_map_has_what_the_plan_is_about_and_where_it_leads(recorded, stage):
-    going, putting = (next(stage.moments(recorded.between(number, number))).sight.room for number in (3, 4))
+    going, putting = (next(stage.frames(recorded.between(number, number))).sight.room for number in (3, 4))
     assert [thing.name for thing in going.things if thing.is_named] == ["Desk"]
     assert going.goal.at in going.floor
     assert putting.goal is None
@@ -72,7 +72,7 @@ def test_the_map_has_what_the_plan_is_about_and_where_it_leads(recorded, stage):
 
 
 def test_rewards_add_up_over_the_trajectory(recorded, stage):
-    last = list(stage.moments(recorded.plans[3:4]))[-1]
+    last = list(stage.frames(recorded.plans[3:4]))[-1]
     before = recorded.plans[:4]
     assert last.rewards.so_far == pytest.approx(sum(plan.payload.reward for plan in before))
     assert last.rewards.most == pytest.approx(sum(plan.payload.max_reward for plan in before))
@@ -89,38 +89,38 @@ def test_what_differs_is_told_once_and_it_goes_on(recorded, stage):
     plan = recorded.plans[0]
     steps = plan.payload.steps
     paid = tuple(msgspec.structs.replace(step, reward=step.reward + 1) for step in steps)
-    notes = [moment.note for moment in stage.moments([changed(plan, steps=paid)])]
+    notes = [moment.note for moment in stage.frames([changed(plan, steps=paid)])]
     assert notes == ["", "plan 1, action 1: MoveAhead earns 0.2 now, and 1.2 in the run", *[""] * (len(steps) - 1)]
     ended = (*steps[:-1], msgspec.structs.replace(steps[-1], message=""))
-    *_, last = stage.moments([changed(plan, steps=ended)])
+    *_, last = stage.frames([changed(plan, steps=ended)])
     assert last.note.startswith("plan 1, action 7: MoveAhead is refused (Wall is blocking")
     longer = (*steps, steps[0])  # here the plan is over before
-    found = list(stage.moments([changed(plan, steps=longer)]))
+    found = list(stage.frames([changed(plan, steps=longer)]))
     assert len(found) == len(longer) + 1
     assert found[-2].note == "plan 1, action 7: the plan ends now, and goes on in the run"
 
 
 def test_a_reply_that_could_not_be_tried_shows_the_world_as_it_was(recorded, stage):
     step = StepRecord(reply="jump high", message="unknown action 'jump'")
-    start, end = stage.moments([changed(recorded.plans[0], steps=(step,), ended="no action")])
+    start, end = stage.frames([changed(recorded.plans[0], steps=(step,), ended="no action")])
     assert (end.action, end.reply, end.wrong, end.ending) == ("", "jump high", "unknown action 'jump'", "no action")
     assert np.array_equal(start.sight.frame, end.sight.frame)
     said = msgspec.structs.replace(recorded.plans[0].payload.steps[0], reply=" MoveAhead ")
-    _, moment = stage.moments([changed(recorded.plans[0], steps=(said,))])
+    _, moment = stage.frames([changed(recorded.plans[0], steps=(said,))])
     assert moment.reply == ""  # it is the action
 
 
 def test_an_action_recorded_as_a_call_names_its_object(recorded, stage):
     plan = recorded.plans[1]
     bare = tuple(msgspec.structs.replace(step, action="PickupObject") for step in plan.payload.steps)
-    assert list(stage.moments([changed(plan, steps=bare)]))[1].action == "PickupObject Mug"
+    assert list(stage.frames([changed(plan, steps=bare)]))[1].action == "PickupObject Mug"
 
 
 def test_of_plans_that_were_never_begun_only_the_words_are_there(recorded, stage):
     idle = changed(recorded.plans[0], steps=(), ended="not come to")
     failed = msgspec.structs.replace(idle, failure="the model broke")
     excluded = msgspec.structs.replace(idle, excluded="the expert is refused")
-    found = list(stage.moments([idle, failed, excluded]))
+    found = list(stage.frames([idle, failed, excluded]))
     assert [moment.sight for moment in found] == [None] * 3
     assert [moment.ending for moment in found] == [
         "not come to",
@@ -171,4 +171,4 @@ def test_rewards_of_another_version_are_an_error(recorded):
 
     strange = with_identity(recorded, change)
     with replay(strange, SET, None) as stage, pytest.raises(DataError, match="rewards that this version does not know"):
-        list(stage.moments(strange.plans[:1]))
+        list(stage.frames(strange.plans[:1]))

@@ -10,12 +10,12 @@ from PIL import Image
 from infthor_eval.manipulation.curves import arm_curves
 from infthor_eval.manipulation.moments import ArmMoment, ArmSight, EpisodeTitle, Reach, Solid
 from infthor_eval.manipulation.radii import success_by_radius
-from infthor_eval.report.recordings.arm_pictures import arm_pictures, draw_arm_moment, draw_arm_title
 from infthor_eval.report.figures.curve_tables import curves_table, one_panel
-from infthor_eval.report.recordings.episode_sheet import COLUMNS, draw_sheet, shown_steps
 from infthor_eval.report.figures.curves import draw_curves
-from infthor_eval.report.recordings.canvas import END_HELD, SIZE, TITLE_HELD
 from infthor_eval.report.figures.radius import draw_radii, radii_table
+from infthor_eval.report.recordings.arm_pictures import arm_pictures, draw_arm_moment, draw_arm_title
+from infthor_eval.report.recordings.canvas import END_HELD, SIZE, TITLE_HELD
+from infthor_eval.report.recordings.episode_sheet import COLUMNS, draw_sheet, shown_steps
 from infthor_eval.report.recordings.reach_view import draw_reach
 
 from ..manipulation.made_runs import episode, made_run, planner_run

@@ -5,7 +5,6 @@ from collections.abc import Iterable, Iterator
 from PIL import Image
 
 from infthor_eval.manipulation.moments import ArmMoment
-from infthor_eval.report.recordings.fonts import one_line
 from infthor_eval.report.recordings.canvas import (
     BAD,
     FAINT,
@@ -20,6 +19,7 @@ from infthor_eval.report.recordings.canvas import (
     write_lines,
     write_numbers,
 )
+from infthor_eval.report.recordings.fonts import one_line
 from infthor_eval.report.recordings.reach_view import draw_reach
 
 __all__ = ["arm_pictures", "draw_arm_moment", "draw_arm_title"]

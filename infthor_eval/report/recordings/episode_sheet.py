@@ -1,14 +1,15 @@
 """Episodes of an arm on one page: a row for each, with frames from its start to its end."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 
 from PIL import Image, ImageDraw
 
 from infthor_eval.manipulation.moments import ArmMoment
-from infthor_eval.report.recordings.fonts import fitted, font, lines_of, one_line
 from infthor_eval.report.recordings.canvas import BAD, FAINT, GOOD, INK, WARN
+from infthor_eval.report.recordings.fonts import fitted, font, lines_of, one_line
 
-__all__ = ["COLUMNS", "MOST_ROWS", "draw_sheet", "shown_steps"]
+__all__ = ["COLUMNS", "MOST_ROWS", "draw_sheet", "sheet_rows", "shown_steps"]
 
 COLUMNS, MOST_ROWS = 5, 8  # more cannot be taken in at a glance
 _CELL, _CAPTION, _GAP = 260, 56, 12  # pixels; a caption has three lines
@@ -42,6 +43,20 @@ def draw_sheet(episodes: Sequence[Sequence[ArmMoment]], heading: str) -> Image.I
         for column, moment in enumerate(moments):
             _draw_cell(picture, moment, _EDGE + _SIDE + column * (_CELL + _GAP), top)
     return picture
+
+
+def sheet_rows(moments: Iterable[ArmMoment]) -> Iterator[list[ArmMoment]]:
+    """Yield the moments of each episode that have a place; a difference between two places goes to the later one."""
+    row: list[ArmMoment] = []
+    note = ""
+    for moment in moments:
+        note = moment.note or note
+        if moment.number in shown_steps(moment.title.n_steps):
+            row.append(replace(moment, note=note))
+            note = ""
+        if moment.ending:
+            yield row
+            row, note = [], ""
 
 
 def _write_side(pen: ImageDraw.ImageDraw, end: ArmMoment, top: float) -> None:

@@ -5,7 +5,6 @@ from collections.abc import Iterable, Iterator
 from PIL import Image
 
 from infthor_eval.plans.moments import Moment, PlanTitle
-from infthor_eval.report.recordings.fonts import one_line
 from infthor_eval.report.recordings.canvas import (
     BAD,
     END_HELD,
@@ -23,6 +22,7 @@ from infthor_eval.report.recordings.canvas import (
     write_lines,
     write_numbers,
 )
+from infthor_eval.report.recordings.fonts import one_line
 from infthor_eval.report.recordings.room_map import draw_map
 
 __all__ = ["END_HELD", "SIZE", "TITLE_HELD", "draw_moment", "draw_title", "pictures"]

@@ -1,9 +1,8 @@
 """Presenter of manipulation: what an arm did step by step, its reward, and its success by radius."""
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from PIL import Image
@@ -38,7 +37,7 @@ class ArmEpisodesReplay:
     """See `Replay`."""
 
     unit = "episodes"
-    options = ("--episode", "--sheet")
+    options: Collection[str] = ("--episode", "--sheet")
     sheet_rows = MOST_ROWS
 
     def select(self, run: ReportRun, selection: Selection) -> Recording:

@@ -1,6 +1,6 @@
 """Frames of questions: the clues with their neighbours, or some of all frames where there are no clues."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 

@@ -1,9 +1,8 @@
 """Presenter of plans: what an agent did step by step, and the reward it earned."""
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from PIL import Image
@@ -35,7 +34,7 @@ class PlansReplay:
     """See `Replay`."""
 
     unit = "plans"
-    options = ("--plans",)
+    options: Collection[str] = ("--plans",)
     sheet_rows = 0
 
     def select(self, run: ReportRun, selection: Selection) -> Recording:

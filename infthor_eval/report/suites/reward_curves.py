@@ -54,6 +54,4 @@ def curves_result(curves: RewardCurves, panels_file: Path | None) -> FigureResul
     drawn = {label for panel in panels for label in panel.labels}
     left_out = [run.label for run in curves.runs if not run.is_bound and run.label not in drawn]
     notes = (f"in no panel: {', '.join(left_out)}",) if left_out else ()
-    return FigureResult(
-        curves_table(curves), lambda folder, name: draw_curves(curves, panels, folder, name), notes
-    )
+    return FigureResult(curves_table(curves), lambda folder, name: draw_curves(curves, panels, folder, name), notes)

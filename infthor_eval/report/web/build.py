@@ -40,7 +40,7 @@ class PageRequest:
     pictures: int = 15_000_000
 
 
-def build_page(runs: Sequence[ReportRun], request: PageRequest, progress: ReplayProgress) -> Page:
+def build_page(runs: Sequence[ReportRun], request: PageRequest, progress: ReplayProgress | None = None) -> Page:
     """Build the page of some runs, of one suite or of several.
 
     Raises:

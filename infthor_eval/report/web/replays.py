@@ -55,7 +55,7 @@ class EpisodeReplays:
         most: int,
         folders: tuple[Path | None, Path | None],
         thumbnails: Thumbnails,
-        progress: ReplayProgress,
+        progress: ReplayProgress | None,
     ) -> None:
         """Choose the episodes.
 
@@ -64,13 +64,13 @@ class EpisodeReplays:
             most: number of episodes of each run to replay.
             folders: those of the trajectories and of recorded floor plans, see `Recording.open`.
             thumbnails: collects the pictures.
-            progress: observes the replays.
+            progress: observes the replays, if given.
         """
         self._chosen = {run.folder: _choose(run, most) for run in runs if run.presenter.replay is not None}
         self._data, self._scenes = folders
         self._thumbnails, self._progress = thumbnails, progress
         n_episodes = sum(map(len, self._chosen.values()))
-        if n_episodes:
+        if progress is not None and n_episodes:
             progress.begin(n_episodes)
 
     def replay(self, run: ReportRun) -> tuple[Mapping[UnitKey, EpisodePictures], list[str]]:
@@ -93,13 +93,17 @@ class EpisodeReplays:
                 with recording.open(self._data or run.data, self._scenes) as session:
                     while records:
                         pictures[records[0].key] = self._draw(replay, session, run, records[0])
-                        self._progress.advance(run.label, trajectory)
                         del records[0]
+                        self._count(run, trajectory)
             except InfthorError as error:
                 notes.append(f"{run.label}, {trajectory}: no frames are shown: {error}")
                 for _ in records:
-                    self._progress.advance(run.label, trajectory)
+                    self._count(run, trajectory)
         return pictures, notes
+
+    def _count(self, run: ReportRun, trajectory: str) -> None:
+        if self._progress is not None:
+            self._progress.advance(run.label, trajectory)
 
     def _draw(self, replay: Replay, session: ReplaySession, run: ReportRun, record: Record) -> EpisodePictures:
         frames = list(session.frames([record]))

@@ -13,9 +13,9 @@
     return;
   }
 
-  const { runs, metrics, samples, pictures } = JSON.parse(byId("data").textContent);
-  const MARKS = { right: "✓", partly: "◐", wrong: "✗", failed: "!", "left out": "–" };
-  const BATCH = 120; // samples put into the list at a time
+  const { runs, suites, metrics, samples, pictures } = JSON.parse(byId("data").textContent);
+  const MARKS = { right: "✓", partly: "◐", wrong: "✗", failed: "!", excluded: "–" };
+  const BATCH = 120; // list items added at a time: thousands at once would block the page for seconds
   let shown = [];
   let chosen = -1;
 
@@ -28,9 +28,8 @@
   const picture = (number, alt) => number === undefined || number === null
     ? make("div", { class: "blank" }, "no picture")
     : make("img", { src: `data:image/webp;base64,${pictures[number]}`, alt, loading: "lazy" });
-  const cssName = outcome => outcome ? outcome.replace(" ", "-") : "none";
-  const mark = (result, label) => make(
-    "span", { class: `mark ${cssName(result?.outcome)}`, title: `${label}: ${result?.outcome ?? "not asked"}` },
+    const mark = (result, label) => make(
+    "span", { class: `mark ${result?.outcome ?? "none"}`, title: `${label}: ${result?.outcome ?? "not evaluated"}` },
     result ? MARKS[result.outcome] : "·");
 
   // -- filters
@@ -46,17 +45,18 @@
   fill("clues", distinct("clues"), "all");
   fill("run", runs.map((label, at) => [String(at), label]), "any");
   fill("outcome", Object.keys(MARKS).map(name => [name, name]), "all");
-  if (metrics.length < 2 || !samples.some(sample => sample.suite === "nieh")) byId("disagree").parentElement.hidden = true;
+  if (metrics.length < 2 || !Object.values(suites).some(labels => labels.compares_scorers)) byId("disagree").parentElement.hidden = true;
   if (runs.length < 2) byId("differ").parentElement.hidden = true;
 
   const resultsOf = sample => sample.results.filter(Boolean);
   const disagrees = result => {
-    const found = metrics.map(name => result.scores?.[name]).filter(score => score !== undefined);
-    return new Set(found).size > 1;
+    const scores = metrics.map(name => result.scores?.[name]).filter(score => score !== undefined);
+    return new Set(scores).size > 1;
   };
   const texts = samples.map(sample => [
-    sample.title, sample.wanted, sample.cluster, sample.id, sample.variant,
-    ...resultsOf(sample).flatMap(result => [result.said, result.why, ...(result.steps ?? []).map(step => step.action)]),
+    sample.title, sample.target, sample.cluster, sample.id, sample.variant,
+    ...resultsOf(sample).flatMap(result => [
+      result.reply, result.reason, ...Object.values(result.details ?? {}), ...(result.steps ?? []).map(step => step.action)]),
   ].join("\n").toLowerCase());
 
   const matches = (sample, at) => {
@@ -67,7 +67,7 @@
       && (!value("clues") || sample.clues === value("clues"))
       && of.length > 0
       && (!value("outcome") || of.some(result => result.outcome === value("outcome")))
-      && (!byId("disagree").checked || of.some(disagrees))
+      && (!byId("disagree").checked || (suites[sample.suite].compares_scorers && of.some(disagrees)))
       && (!byId("differ").checked || new Set(sample.results.map(result => result?.outcome)).size > 1)
       && texts[at].includes(value("search").trim().toLowerCase());
   };
@@ -92,8 +92,8 @@
     if (list.scrollTop + list.clientHeight > list.scrollHeight - 400) more();
   });
   list.addEventListener("click", event => {
-    const found = event.target.closest(".item");
-    if (found) choose(Number(found.dataset.place));
+    const clicked = event.target.closest(".item");
+    if (clicked) choose(Number(clicked.dataset.place));
   });
 
   const filter = () => {
@@ -104,7 +104,7 @@
     chosen = -1;
     more();
     if (shown.length) choose(0, false);
-    else byId("sample").replaceChildren(make("p", { class: "note" }, "No sample is like that."));
+    else byId("sample").replaceChildren(make("p", { class: "note" }, "No sample matches the filters."));
   };
 
   const choose = (place, intoView = true) => {
@@ -123,11 +123,11 @@
   const show = sample => {
     const facts = [sample.suite, sample.task, sample.kind, sample.clues && `clues: ${sample.clues}`, sample.variant,
       sample.cluster, sample.id].filter(Boolean).join("  ·  ");
-    const isEpisode = resultsOf(sample).some(result => result.steps);
     byId("sample").replaceChildren(
       make("h3", {}, sample.title),
-      make("p", { class: "gold" }, isEpisode || sample.suite !== "nieh" ? "for: " : "gold answer: ", make("b", {}, sample.wanted ?? "")),
+      sample.target ? make("p", { class: "target" }, `${suites[sample.suite].target}: `, make("b", {}, sample.target)) : "",
       results(sample),
+      ...details(sample),
       ...(sample.timeline ? timeline(sample.timeline) : []),
       ...episodes(sample),
       make("p", { class: "note" }, facts));
@@ -135,15 +135,15 @@
 
   const results = sample => {
     const names = metrics.filter(name => resultsOf(sample).some(result => result.scores?.[name] !== undefined));
-    const head = ["run", "", sample.suite === "nieh" ? "reply" : "ended", ...names, "seconds", "tokens"];
+    const head = ["run", "", suites[sample.suite].reply, ...names, "seconds", "tokens"];
     const rows = sample.results.map((result, at) => {
-      if (!result) return make("tr", {}, make("td", {}, runs[at]), make("td", {}, mark(null, runs[at])), make("td", { class: "note" }, "not asked"));
-      const why = [result.why, ...(result.faults ?? [])].filter(Boolean).join("; ");
-      const said = make("td", {}, result.said ?? "", why ? make("span", { class: "note" }, ` (${why})`) : null);
+      if (!result) return make("tr", {}, make("td", {}, runs[at]), make("td", {}, mark(null, runs[at])), make("td", { class: "note" }, "not evaluated"));
+      const reason = [result.reason, ...(result.faults ?? [])].filter(Boolean).join("; ");
+      const reply = make("td", {}, result.reply ?? "", reason ? make("span", { class: "note" }, ` (${reason})`) : "");
       const scores = names.map(name => make("td", { class: "n" }, result.scores?.[name]?.toFixed(2) ?? "-"));
       const [context, cached] = result.tokens ?? [];
       const tokens = context == null ? "-" : context.toLocaleString("en") + (cached ? ` (${cached.toLocaleString("en")} cached)` : "");
-      return make("tr", {}, make("td", {}, runs[at]), make("td", {}, mark(result, runs[at]), ` ${result.outcome}`), said,
+      return make("tr", {}, make("td", {}, runs[at]), make("td", {}, mark(result, runs[at]), ` ${result.outcome}`), reply,
         ...scores, make("td", { class: "n" }, (result.seconds ?? 0).toFixed(2)), make("td", { class: "n" }, tokens));
     });
     return make("div", { class: "scroll" }, make("table", { class: "results" },
@@ -151,19 +151,26 @@
       make("tbody", {}, ...rows)));
   };
 
+  // What the records of a suite without a presenter hold.
+  const details = sample => sample.results
+    .map((result, at) => result?.details ? [result.details, runs[at]] : null).filter(Boolean)
+    .map(([facts, label]) => make("div", { class: "details" }, make("b", {}, label), make("dl", {},
+      ...Object.entries(facts).flatMap(([name, value]) => [make("dt", {}, name), make("dd", {}, value)]))));
+
   const timeline = ({ n_frames, frames = [], note }) => {
-    const at = frame => `left: ${(100 * frame.at / Math.max(n_frames - 1, 1)).toFixed(2)}%`;
+    const left = frame => `left: ${(100 * frame.index / Math.max(n_frames - 1, 1)).toFixed(2)}%`;
     const line = make("div", { class: "line", role: "img", "aria-label": `where the frames lie among ${n_frames}` });
     for (const frame of frames) {
-      const place = make("i", { class: frame.is_clue ? "clue" : "", title: `frame ${frame.at}` });
-      place.style.cssText = at(frame);
+      const place = make("i", { class: frame.is_clue ? "clue" : "", title: `frame ${frame.index}` });
+      place.style.cssText = left(frame);
       line.append(place);
     }
     const cards = frames.map(frame => make("figure", { class: frame.is_clue ? "clue" : "" },
-      picture(frame.picture, `frame ${frame.at}`),
-      make("figcaption", {}, `${frame.at}${frame.is_clue ? " clue" : ""}`)));
-    const said = make("p", { class: "note" }, `${n_frames} frames in the trajectory; clues are framed in orange`, note ? `; ${note}` : "");
-    return [line, make("div", { class: "frames" }, ...cards), said];
+      picture(frame.picture, `frame ${frame.index}`),
+      make("figcaption", {}, `${frame.index}${frame.is_clue ? " clue" : ""}`)));
+    const clues = frames.some(frame => frame.is_clue) ? "; clues are framed in orange" : "";
+    const remark = make("p", { class: "note" }, `${n_frames} frames in the trajectory${clues}${note ? `; ${note}` : ""}`);
+    return [line, make("div", { class: "frames" }, ...cards), remark];
   };
 
   // Of many runs the first two are open, the others at a click.
@@ -172,26 +179,26 @@
     .map(([result, label], number) => episode(result, label, number < 2));
 
   const episode = (result, label, isOpen) => {
-    const seen = result.first !== undefined || result.steps.some(step => step.picture !== undefined);
+    const seen = result.start !== undefined || result.steps.some(step => step.picture !== undefined);
     const earns = result.steps.some(step => step.reward !== undefined);
-    const head = ["", ...(seen ? ["seen after it"] : []), "action", ...(earns ? ["reward"] : []), ""];
-    const start = seen && result.first !== undefined
-      ? [make("tr", {}, make("td", {}, "0"), make("td", {}, picture(result.first, "at the start")), make("td", { class: "note" }, "at the start"))] : [];
+    const head = ["", ...(seen ? ["frame after it"] : []), "action", ...(earns ? ["reward"] : []), ""];
+    const start = seen && result.start !== undefined
+      ? [make("tr", {}, make("td", {}, "0"), make("td", {}, picture(result.start, "at the start")), make("td", { class: "note" }, "at the start"))] : [];
     const rows = result.steps.map((step, at) => make("tr", {},
       make("td", {}, String(at + 1)),
       ...(seen ? [make("td", {}, step.picture === undefined ? "" : picture(step.picture, `after action ${at + 1}`))] : []),
-      make("td", {}, make("code", {}, step.action || "(none that could be tried)"),
-        step.reply ? make("div", { class: "note" }, `said: ${step.reply}`) : null,
-        step.wrong ? make("div", { class: "wrong" }, step.wrong) : null),
+      make("td", {}, make("code", {}, step.action || "(no valid action)"),
+        step.reply ? make("div", { class: "note" }, `reply: ${step.reply}`) : null,
+        step.error ? make("div", { class: "error" }, step.error) : null),
       ...(earns ? [make("td", { class: "n" }, step.reward === undefined ? "" : step.reward.toFixed(1))] : []),
-      make("td", { class: "note" }, step.told ?? "")));
+      make("td", { class: "note" }, step.note ?? "")));
     const table = make("table", {}, make("thead", {}, make("tr", {}, ...head.map(name => make("th", {}, name)))),
       make("tbody", {}, ...start, ...rows));
     const map = result.map === undefined ? null
       : make("img", { class: "map", src: `data:image/webp;base64,${pictures[result.map]}`, alt: "map at the end" });
     const count = `${result.steps.length} ${result.steps.length === 1 ? "action" : "actions"}`;
     return make("details", isOpen ? { open: "" } : {}, make("summary", {}, make("b", {}, label), `: ${count}`),
-      result.note ? make("p", { class: "note" }, `otherwise than recorded: ${result.note}`) : null,
+      result.note ? make("p", { class: "note" }, `the replay differs from the run: ${result.note}`) : null,
       make("div", { class: "episode" }, make("div", { class: "steps" }, table), map));
   };
 

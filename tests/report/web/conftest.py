@@ -8,12 +8,11 @@ from typing import Any
 import pytest
 
 from infthor_eval.cli import main
-from infthor_eval.cli.commands.report import stages
 from infthor_eval.formats.packaged import packaged_folder
-from infthor_eval.report.web.build import Wanted, build_page
-from infthor_eval.report.web.page import Page, write_page
 from infthor_eval.report.runs import read_report_runs
-from infthor_eval.suites import suite_named
+from infthor_eval.report.web.build import PageRequest, build_page
+from infthor_eval.report.web.page import Page, write_page
+from infthor_eval.suites import presenter_of, suite_named
 
 HOSTILE = '</script><img src=x onerror="window.hacked=1">"\'&{{ 7*7 }}<!--\u2028'
 _BROWSERS = ("chromium", "chromium-browser", "google-chrome")
@@ -35,8 +34,8 @@ def nieh_runs(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
 def make_page() -> Callable[..., Page]:
     """The page of runs in some folders."""
 
-    def make(*folders: Path, **wanted: Any) -> Page:
-        return build_page(read_report_runs(folders, suite_named), Wanted(stages=stages(None), **wanted))
+    def make(*folders: Path, **options: Any) -> Page:
+        return build_page(read_report_runs(folders, suite_named, presenter_of), PageRequest(**options))
 
     return make
 

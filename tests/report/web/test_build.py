@@ -24,11 +24,11 @@ def test_every_sample_of_every_run_is_there_with_its_frames(page, nieh_runs):
     for sample in page.samples:
         question = questions[sample.id]
         assert (sample.title, len(sample.results)) == (question.text, len(nieh_runs))
-        clues = {frame.at for frame in sample.timeline.frames if frame.is_clue}
+        clues = {frame.index for frame in sample.timeline.frames if frame.is_clue}
         assert clues == set(question.clues)
         assert all(frame.picture is not None for frame in sample.timeline.frames)
         beside = {near for at in clues for near in (at - 1, at + 1) if 0 <= near < sample.timeline.n_frames}
-        assert {frame.at for frame in sample.timeline.frames} >= beside
+        assert {frame.index for frame in sample.timeline.frames} >= beside
 
 
 def test_outcomes_are_what_the_strict_scorer_says(page):
@@ -68,8 +68,8 @@ def test_frames_that_there_is_no_room_for_are_counted_and_clues_come_first(make_
     assert sum(map(len, page.pictures)) <= 100_000
     assert any("pictures left out" in note for note in page.notes)
     frames = [(sample.cluster, frame) for sample in page.samples for frame in sample.timeline.frames]
-    clues = {(trajectory, frame.at) for trajectory, frame in frames if frame.is_clue}
-    pictured = {(trajectory, frame.at) for trajectory, frame in frames if frame.picture is not None}
+    clues = {(trajectory, frame.index) for trajectory, frame in frames if frame.is_clue}
+    pictured = {(trajectory, frame.index) for trajectory, frame in frames if frame.picture is not None}
     assert pictured < clues
 
 
@@ -77,7 +77,7 @@ def test_without_its_set_or_with_another_one_there_are_no_frames_and_it_is_said(
     make_page, nieh_runs, make_nieh_set, tmp_path
 ):
     page = make_page(nieh_runs[0], data=make_nieh_set())
-    assert any("is not what it was" in note for note in page.notes)
+    assert any("has changed since" in note for note in page.notes)
     haystack = [sample for sample in page.samples if sample.task != "nieh_mini_gt"]
     assert haystack
     assert all(sample.timeline is None for sample in haystack)
@@ -110,7 +110,7 @@ def test_plans_have_their_steps_and_what_was_seen(make_page, scripted_run):
     assert len(seen) == 3
     for sample in seen:
         result = sample.results[0]
-        assert result.first is not None
+        assert result.start is not None
         assert all(step.picture is not None for step in result.steps)
         assert not result.note  # it went as it was recorded
     unseen = next(sample for sample in page.samples if sample.results[0].steps and sample not in seen)

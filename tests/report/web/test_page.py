@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from infthor_eval.errors import DataError
-from infthor_eval.report.web.page import About, Page, write_page
+from infthor_eval.report.web.page import About, Page, SuiteLabels, write_page
 from infthor_eval.report.web.samples import Result, Sample
 from infthor_eval.report.web.sections import Section
 from infthor_eval.tables import Column, Row, Table
@@ -23,7 +23,9 @@ def page_of(text, n_samples=1):
     sample = Sample("nieh", text, text, text, text, (Result("right", text, {"strict": 1.0}, text),), text, text)
     table = Table(text, (Column(text),), (Row((text,)),), (text,))
     about = About(text, ((text, text),), text, text)
-    return Page(text, "0", [about], [Section("key", text, (), (table,), (text,))], [sample] * n_samples, ["strict"], [])
+    labels = {"nieh": SuiteLabels(text, text, True)}
+    sections = [Section("key", text, (), (table,), (text,))]
+    return Page(text, "0", [about], labels, sections, [sample] * n_samples, ["strict"], [])
 
 
 class Elements(HTMLParser):
@@ -67,7 +69,7 @@ def test_no_text_becomes_an_element_and_the_data_come_out_as_they_went_in(writte
     assert hostile.names.count("script") == plain.names.count("script") == 2
     assert not any(name.startswith("on") for name in hostile.attributes)
     (sample,) = json.loads(hostile.data)["samples"]
-    assert (sample["title"], sample["results"][0]["said"]) == (text, text)
+    assert (sample["title"], sample["results"][0]["reply"]) == (text, text)
 
 
 def test_nothing_is_fetched(written):
