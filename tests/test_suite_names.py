@@ -19,7 +19,9 @@ def decisions(tree):
         if isinstance(node, ast.Compare):
             sides = [node.left, *node.comparators]
             yield from sides
-            yield from (item for side in sides if isinstance(side, ast.Tuple | ast.List | ast.Set) for item in side.elts)
+            yield from (
+                item for side in sides if isinstance(side, ast.Tuple | ast.List | ast.Set) for item in side.elts
+            )
         elif isinstance(node, ast.Dict):
             yield from filter(None, node.keys)
         elif isinstance(node, ast.Subscript):

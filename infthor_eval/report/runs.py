@@ -57,8 +57,8 @@ class ReportRun:
 
     @property
     def tasks(self) -> Mapping[str, Any]:
-        """Settings of the tasks in the run's identity, by name."""
-        tasks: Mapping[str, Any] = self.header.identity["tasks"]
+        """Settings of the tasks in the run's config, by name."""
+        tasks: Mapping[str, Any] = self.header.config["tasks"]
         return tasks
 
     def dataset(self, task: str) -> Mapping[str, Any]:
@@ -132,7 +132,7 @@ def model_names(headers: Sequence[RunHeader]) -> list[str]:
 
 
 def _model_name(header: RunHeader) -> str:
-    frames = header.identity.get("frames", "shown")
+    frames = header.config.get("frames", "shown")
     return header.name if frames == "shown" else f"{header.name}, {frames} frames"
 
 

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 from PIL import Image
 
 from infthor_eval.errors import UsageError
-from infthor_eval.manipulation.curve_runs import ArmRun, with_radii
 from infthor_eval.manipulation.curves import arm_curves
 from infthor_eval.manipulation.radii import success_by_radius
+from infthor_eval.manipulation.recorded_runs import ArmRun, label_by_radius
 from infthor_eval.manipulation.records import ArmRecord
 from infthor_eval.report.figures.radius import draw_radii, radii_figure, radii_table
 from infthor_eval.report.plain import PlainPresenter
@@ -49,7 +49,7 @@ class ArmEpisodesReplay:
             trajectory=recorded.trajectory,
             tasks=sorted({record.task for record in recorded.episodes}),
             records=_select_episodes(recorded, selection),
-            simulator=recorded.run.about.simulator,
+            simulator=recorded.run.config.simulator,
             open=lambda data, scenes: replay_episodes(recorded, None if data is None else str(data), scenes),
         )
 
@@ -91,7 +91,7 @@ def _model_runs(runs: Sequence[ReportRun]) -> list[ArmRun]:
 
 
 def _build_figure_6(runs: Sequence[ReportRun], request: FigureRequest) -> FigureResult:
-    named = with_radii(_model_runs(runs))
+    named = label_by_radius(_model_runs(runs))
     labels = run_labels([run.folder for run in runs], [run.label for run in named])
     labelled = [replace(run, label=label) for run, label in zip(named, labels, strict=True)]
     return curves_result(arm_curves(labelled, request.task), request.panels)
@@ -129,8 +129,8 @@ class ManipulationPresenter(PlainPresenter):
         """See `Presenter.sections`: reward along trajectories, and success by radius where there are several radii."""
         arm_runs = [_arm_run(run) for run in runs]
         title = "Reward of pick-ups and puts"
-        yield figure_section("arm-rewards", title, lambda: curves_on_page(arm_curves(with_radii(arm_runs))))
-        if len({task.radius for run in arm_runs for task in run.about.tasks.values()}) > 1:
+        yield figure_section("arm-rewards", title, lambda: curves_on_page(arm_curves(label_by_radius(arm_runs))))
+        if len({task.radius for run in arm_runs for task in run.config.tasks.values()}) > 1:
             yield figure_section("arm-radius", "Success by the hand's radius", lambda: _radii_on_page(runs))
 
     def describe(self, record: Record) -> Description:

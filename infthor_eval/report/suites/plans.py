@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 from PIL import Image
 
 from infthor_eval.errors import UsageError
-from infthor_eval.plans.curve_runs import PlansRun
-from infthor_eval.plans.curves import reward_curves
+from infthor_eval.plans.curves import plan_curves
+from infthor_eval.plans.recorded_runs import PlansRun
 from infthor_eval.plans.records import PlanRecord
 from infthor_eval.report.plain import PlainPresenter
 from infthor_eval.report.presenter import Description, Figure, FigureRequest, FigureResult, Recording, Selection
@@ -46,7 +46,7 @@ class PlansReplay:
             trajectory=recorded.trajectory,
             tasks=(recorded.task,),
             records=_select_plans(recorded, selection.plans),
-            simulator=recorded.run.about.simulator,
+            simulator=recorded.run.config.simulator,
             open=lambda data, scenes: replay(recorded, None if data is None else str(data), scenes),
         )
 
@@ -77,11 +77,11 @@ def _plans_run(run: ReportRun) -> PlansRun:
 
 
 def _build_figure_7(runs: Sequence[ReportRun], request: FigureRequest) -> FigureResult:
-    return curves_result(reward_curves([_plans_run(run) for run in runs], request.task), request.panels)
+    return curves_result(plan_curves([_plans_run(run) for run in runs], request.task), request.panels)
 
 
 def _task_curves(runs: Sequence[PlansRun], task: str) -> DrawnFigure:
-    return curves_on_page(reward_curves(runs, task))
+    return curves_on_page(plan_curves(runs, task))
 
 
 class PlansPresenter(PlainPresenter):

@@ -127,19 +127,19 @@ def _metrics(runs: Sequence[ReportRun], samples: Sequence[Sample]) -> list[str]:
 
 
 def _about(run: ReportRun) -> About:
-    identity = run.header.config
+    config = run.header.config
     simulators = {about.get("simulator") for about in run.tasks.values() if isinstance(about, dict)}
     facts = {
         "suite": run.suite.name,
-        "model": str(identity["model"].get("name", "")),
-        "checkpoint": str(identity["model"].get("checkpoint", "")),
+        "model": str(config["model"].get("name", "")),
+        "checkpoint": str(config["model"].get("checkpoint", "")),
         "tasks": ", ".join(run.tasks),
-        "simulator": str(identity.get("simulator", "") or ", ".join(sorted(filter(None, simulators)))),
-        "seed": str(identity.get("seed", "")),
-        "limit": str(identity["limit"]) if identity.get("limit") is not None else "",
-        "infthor-eval": str(identity.get("infthor_eval", "")),
+        "simulator": str(config.get("simulator", "") or ", ".join(sorted(filter(None, simulators)))),
+        "seed": str(config.get("seed", "")),
+        "limit": str(config["limit"]) if config.get("limit") is not None else "",
+        "infthor-eval": str(config.get("infthor_eval", "")),
         "units": f"{len(run.records):,}",
         "folder": str(run.folder),
     }
     known = tuple((name, value) for name, value in facts.items() if value)
-    return About(run.label, known, run.command, json.dumps(identity, indent=1, ensure_ascii=False, sort_keys=True))
+    return About(run.label, known, run.command, json.dumps(config, indent=1, ensure_ascii=False, sort_keys=True))

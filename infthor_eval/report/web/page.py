@@ -32,13 +32,13 @@ class About:
         label: name of the run.
         facts: names and values, in the order shown.
         command: command that repeats the run; empty if unknown.
-        identity: everything that can change a number, as JSON.
+        config: everything that can change a number, as JSON.
     """
 
     label: str
     facts: tuple[tuple[str, str], ...]
     command: str
-    identity: str
+    config: str
 
 
 class SuiteLabels(msgspec.Struct, frozen=True):

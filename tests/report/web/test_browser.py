@@ -90,7 +90,9 @@ def test_text_can_be_read_in_both_schemes(page, opened, scheme):
 
 def test_hostile_text_stays_text(page, opened):
     sample = page.samples[0]
-    results = tuple(msgspec.structs.replace(it, reply=HOSTILE, reason=HOSTILE, faults=(HOSTILE,)) for it in sample.results)
+    results = tuple(
+        msgspec.structs.replace(it, reply=HOSTILE, reason=HOSTILE, faults=(HOSTILE,)) for it in sample.results
+    )
     hostile = msgspec.structs.replace(
         sample, title=HOSTILE, target=HOSTILE, kind=HOSTILE, cluster=HOSTILE, variant=HOSTILE, results=results
     )
