@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
+from infthor_eval.tables import TableCell, interval_cell
+
 if TYPE_CHECKING:
     from infthor_eval.statistics import MeanEstimate
 
@@ -44,12 +46,12 @@ def rate_over_clusters(values: Sequence[float]) -> Rate | None:
     return _rate(mean_over_clusters(values)) if values else None
 
 
-def format_percent(rate: Rate | None) -> str:
+def format_percent(rate: Rate | None) -> TableCell:
     """Return a share as a table cell, in percent."""
     return _format(rate, 100.0)
 
 
-def format_number(rate: Rate | None) -> str:
+def format_number(rate: Rate | None) -> TableCell:
     """Return a number as a table cell."""
     return _format(rate, 1.0)
 
@@ -58,10 +60,10 @@ def _rate(estimate: "MeanEstimate") -> Rate:
     return Rate(estimate.mean, estimate.low, estimate.high, estimate.n)
 
 
-def _format(rate: Rate | None, factor: float) -> str:
+def _format(rate: Rate | None, factor: float) -> TableCell:
     if rate is None:
-        return "-"
+        return TableCell("-", {"": "", "low": "", "high": ""})
     mean = f"{factor * rate.mean:.1f}"
-    if rate.low is None or rate.high is None:
-        return mean
-    return f"{mean} [{factor * rate.low:.1f}, {factor * rate.high:.1f}]"
+    low, high = (None if end is None else factor * end for end in (rate.low, rate.high))
+    interval = interval_cell(low, high)
+    return TableCell(mean if low is None else f"{mean} {interval}", {"": mean, **interval.numbers})

@@ -1,14 +1,47 @@
-"""Tables as values: what suites say, before it is known whether a terminal or a page shows it."""
+"""Tables as values, which a terminal, a page or a file shows."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Self
 
-__all__ = ["Column", "Row", "Table", "told_left_out"]
+__all__ = ["Column", "Row", "Table", "TableCell", "interval_cell", "left_out_notes"]
 
-_TOLD = 5  # reasons that a table tells of
+_N_REASONS = 5  # reasons that a table lists
 
 Reasons = Mapping[str, int]
+
+
+class TableCell(str):
+    """Text of a cell that holds several numbers, and each of them for files.
+
+    Attributes:
+        numbers: the numbers by name, as text; the main one has an empty name, missing ones are empty.
+    """
+
+    __slots__ = ("numbers",)
+    numbers: Mapping[str, str]
+
+    def __new__(cls, text: str, numbers: Mapping[str, str]) -> Self:
+        """Return a cell with that text and those numbers."""
+        cell = super().__new__(cls, text)
+        cell.numbers = numbers
+        return cell
+
+
+def interval_cell(low: float | None, high: float | None, form: str = ".1f", pattern: str = "[{}, {}]") -> TableCell:
+    """Return a cell with an interval; `-` if there is none.
+
+    Args:
+        low: lower end.
+        high: upper end.
+        form: format of an end.
+        pattern: text of the cell, with a place for each end.
+    """
+    if low is None or high is None:
+        return TableCell("-", {"low": "", "high": ""})
+    ends = {"low": f"{low:{form}}", "high": f"{high:{form}}"}
+    return TableCell(pattern.format(*ends.values()), ends)
 
 
 @dataclass(frozen=True)
@@ -16,8 +49,8 @@ class Column:
     """A column.
 
     Attributes:
-        name: its heading.
-        is_number: whether its cells line up on the right.
+        name: heading of the column.
+        is_number: whether its cells are numbers, which are aligned on the right.
     """
 
     name: str
@@ -30,7 +63,7 @@ class Row:
 
     Attributes:
         cells: a text per column; missing ones at the end are empty.
-        is_published: whether its numbers are somebody else's.
+        is_published: whether its numbers are published ones of others.
         ends_section: whether a line is drawn below it.
     """
 
@@ -45,9 +78,9 @@ class Table:
 
     Attributes:
         title: one line; empty for none.
-        columns: at least one.
-        rows: in the order shown.
-        notes: what must be said with it, a paragraph each.
+        columns: at least one column.
+        rows: rows in the order shown.
+        notes: remarks below the table, a paragraph each.
     """
 
     title: str
@@ -56,17 +89,17 @@ class Table:
     notes: tuple[str, ...] = ()
 
 
-def told_left_out(runs: Sequence[Sequence[tuple[Reasons, Reasons]]]) -> list[str]:
-    """Notes on what does not count, by reason.
+def left_out_notes(runs: Sequence[Sequence[tuple[Reasons, Reasons]]]) -> list[str]:
+    """Return notes on units that do not count, by reason.
 
     Args:
-        runs: of each run, of each of its tasks: what was excluded, and what was skipped, by reason. The tasks of a run
-            read the same files, and runs side by side leave out the same.
+        runs: for each run and each of its tasks the number of excluded and of skipped units, by reason. The tasks of a
+            run read the same files and runs side by side leave out the same, so these are not added up over runs.
     """
     reasons: Counter[str] = Counter()
     for tasks in runs:
-        excluded = sum((Counter(one) for one, _ in tasks), Counter[str]())
+        excluded = sum((Counter(of_task) for of_task, _ in tasks), Counter[str]())
         reasons |= excluded | Counter({reason: n for _, skipped in tasks for reason, n in skipped.items()})
-    told = sorted(reasons.items())
-    more = [f"{len(told) - _TOLD} more reasons to leave out"] if len(told) > _TOLD else []
-    return [f"{n} left out: {reason}" for reason, n in told[:_TOLD]] + more
+    counts = sorted(reasons.items())
+    more = [f"{len(counts) - _N_REASONS} more reasons to leave out"] if len(counts) > _N_REASONS else []
+    return [f"{n} left out: {reason}" for reason, n in counts[:_N_REASONS]] + more

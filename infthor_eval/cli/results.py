@@ -9,7 +9,7 @@ import click
 import msgspec
 
 from infthor_eval.cli.options.show import ShowOptions
-from infthor_eval.report.exporting import exported
+from infthor_eval.report.exporting import export_tables
 from infthor_eval.report.terminal import print_table, table_console
 from infthor_eval.runs import RunSummary, Suite, Usage
 from infthor_eval.runs.results import results_document
@@ -77,7 +77,7 @@ def _print_tables(runs: Sequence[RunResults], options: ShowOptions) -> None:
         suite = same_suite[0].suite
         tables += (suite.tables if options.full else suite.overview)([run.summary for run in same_suite])
     if options.form is not None:
-        click.echo(exported(tables, options.form))
+        click.echo(export_tables(tables, options.form))
         return
     console = table_console()
     for table in tables:

@@ -8,7 +8,7 @@ from infthor_eval.manipulation.history import ManipulationKind
 from infthor_eval.manipulation.summary import ManipulationSummary, TaskSummary
 from infthor_eval.rates import Rate, format_percent
 from infthor_eval.runs import RunSummary
-from infthor_eval.tables import Column, Row, Table, told_left_out
+from infthor_eval.tables import Column, Row, Table, left_out_notes
 
 __all__ = ["overview", "tables"]
 
@@ -99,4 +99,4 @@ def _number(value: float | None, digits: int = 1) -> str:
 
 def _notes(runs: Sequence[RunSummary]) -> list[str]:
     notes = [_EMBEDDED] if any(summary.simulator == "embedded" for _, summary in _named(runs)) else []
-    return notes + told_left_out([[(t.excluded, t.skipped) for t in s.tasks.values()] for _, s in _named(runs)])
+    return notes + left_out_notes([[(t.excluded, t.skipped) for t in s.tasks.values()] for _, s in _named(runs)])

@@ -9,7 +9,7 @@ from infthor_eval.nieh.options import SHOWN
 from infthor_eval.nieh.summary import CLUE_COLUMNS, OPEN_ENDED, Cell, NiehSummary, TaskSummary, main_metric
 from infthor_eval.runs import RunSummary
 from infthor_eval.statistics import MeanEstimate
-from infthor_eval.tables import Column, Row, Table
+from infthor_eval.tables import Column, Row, Table, TableCell, interval_cell
 
 __all__ = ["clues_table", "overview", "tables"]
 
@@ -136,21 +136,25 @@ def _intervals(cell: Cell, metric: str) -> tuple[str, str]:
     """Clustered, and over resampled trajectories; one trajectory alone tells nothing about others."""
     score = cell.scores.get(metric)
     if score is None:
-        return "-", "-"
-    return _range(score.low, score.high), _range(*score.bootstrap) if score.bootstrap else "-"
+        return _range(None, None), _range(None, None)
+    return _range(score.low, score.high), _range(*(score.bootstrap or (None, None)))
 
 
 def _mean(cell: Cell, metric: str) -> str:
     return f"{100 * cell.scores[metric].mean:.2f}" if cell.n else "-"
 
 
-def _mean_of(cell: Cell | None, metric: str) -> str:
+def _mean_of(cell: Cell | None, metric: str) -> TableCell:
     """With the number of questions behind it."""
-    return f"{_mean(cell, metric)} ({cell.n})" if cell and cell.n else "-"
+    if not cell or not cell.n:
+        return TableCell("-", {"": "", "questions": ""})
+    mean = _mean(cell, metric)
+    return TableCell(f"{mean} ({cell.n})", {"": mean, "questions": str(cell.n)})
 
 
-def _range(low: float | None, high: float | None) -> str:
-    return "-" if low is None or high is None else f"{100 * low:.1f}–{100 * high:.1f}"
+def _range(low: float | None, high: float | None) -> TableCell:
+    low, high = (None if end is None else 100 * end for end in (low, high))
+    return interval_cell(low, high, pattern="{}–{}")
 
 
 def _published_rows(table: PublishedTable, runs: Sequence[RunSummary]) -> Iterator[Row]:
@@ -181,7 +185,8 @@ def _difference(cell: Cell, value: float | None, metric: str) -> str:
         return "-"
     ours = cell.scores[metric]
     within = ours.low is not None and ours.high is not None and 100 * ours.low <= value <= 100 * ours.high
-    return f"{100 * ours.mean - value:+.2f}{' =' if within else ''}"
+    difference = f"{100 * ours.mean - value:+.2f}"
+    return TableCell(f"{difference} =", {"": difference}) if within else difference
 
 
 # -- published, by anything else
@@ -220,10 +225,10 @@ def _gain_cells(gain: Gain) -> tuple[str, ...]:
     return *by_clues, _points_interval(gain.total()), *apart
 
 
-def _points_interval(total: MeanEstimate | None) -> str:
+def _points_interval(total: MeanEstimate | None) -> TableCell:
     if total is None or total.low is None or total.high is None:  # one trajectory alone tells nothing about others
-        return "-"
-    return f"[{100 * total.low:+.2f}, {100 * total.high:+.2f}]"
+        return interval_cell(None, None)
+    return interval_cell(100 * total.low, 100 * total.high, "+.2f")
 
 
 def _points(gain: float | None) -> str:
@@ -254,7 +259,7 @@ def _depth_table(runs: Sequence[RunSummary]) -> Table | None:
 
 def _replies_table(runs: Sequence[RunSummary]) -> Table:
     """A leaning to yes, and replies that are no answer: a row per run and task."""
-    numbers = ("yes/no questions", "gold yes, %", "said yes, %", "not in the form asked for")
+    numbers = ("yes/no questions", "gold yes, %", "said yes, %")
     rows = []
     for run, name, task in _tasks(runs):
         if not task.n:
@@ -262,7 +267,8 @@ def _replies_table(runs: Sequence[RunSummary]) -> Table:
         shares = [_percent(share) for share in (task.yes_no.share_gold_yes, task.yes_no.share_said_yes)]
         said = ", ".join(f"{n} {reason}" for reason, n in task.format_failures.items()) or "-"
         rows.append(Row((run, name, str(task.yes_no.n), *shares, said)))
-    return Table("Form of the replies", (*_NAMES, *map(Column, numbers)), tuple(rows))
+    columns = (*_NAMES, *map(Column, numbers), Column("not in the form asked for", False))
+    return Table("Form of the replies", columns, tuple(rows))
 
 
 def _percent(share: float | None) -> str:

@@ -6,7 +6,7 @@ from infthor_eval.formats.published import published_tables
 from infthor_eval.plans.summary import FINAL_COLUMNS, PlansSummary, TaskSummary
 from infthor_eval.rates import format_number, format_percent
 from infthor_eval.runs import RunSummary
-from infthor_eval.tables import Column, Row, Table, told_left_out
+from infthor_eval.tables import Column, Row, Table, left_out_notes
 
 __all__ = ["overview", "tables"]
 
@@ -92,7 +92,7 @@ def _sizes(task: TaskSummary) -> tuple[str, ...]:
 
 def _notes(runs: Sequence[RunSummary]) -> list[str]:
     notes = [_EMBEDDED] if any(run.summary.simulator == "embedded" for run in runs) else []
-    return notes + told_left_out([[(t.excluded, t.skipped) for t in run.summary.tasks.values()] for run in runs])
+    return notes + left_out_notes([[(t.excluded, t.skipped) for t in run.summary.tasks.values()] for run in runs])
 
 
 def _is_final(run: RunSummary) -> bool:

@@ -3,12 +3,12 @@
 import csv
 import io
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
-from infthor_eval.tables import Table
+from infthor_eval.tables import Column, Table, TableCell
 from infthor_eval.terminal import printable
 
-__all__ = ["exported"]
+__all__ = ["export_tables"]
 
 _LATEX = {
     "\\": r"\textbackslash{}",
@@ -22,32 +22,69 @@ _LATEX = {
 _MARKDOWN = re.compile(r"([\\`*_\[\]<>|~#])")
 
 
-def exported(tables: Sequence[Table], form: str) -> str:
-    """Tables in a form; several are parted by an empty line.
+_THOUSANDS = re.compile(r"(?<=\d),(?=\d{3}(?!\d))")
+
+
+def export_tables(tables: Sequence[Table], form: str) -> str:
+    """Return tables in a form, separated by empty lines.
 
     Args:
-        tables: with at least one column each.
-        form: csv, latex or markdown. In CSV the title and the notes are lines that begin with `#`, and where there is
-            one table alone they are left out.
+        tables: tables with at least one column each.
+        form: csv, latex or markdown. In CSV a cell holds one number: a cell with several (an interval, a count) becomes
+            several columns. The title and the notes are lines that begin with `#`; a table alone has none.
     """
     if form == "csv":
         return "\n".join(_csv(table, with_words=len(tables) > 1) for table in tables)
     return "\n".join({"latex": _latex, "markdown": _markdown}[form](table) for table in tables)
 
 
-def _rows(table: Table, escaped: Callable[[str], str]) -> list[list[str]]:
-    """Heading and rows, each with a cell per column, in one line each."""
-    width = len(table.columns)
-    texts = [[column.name for column in table.columns], *(list(row.cells) for row in table.rows)]
-    return [[escaped(" ".join(printable(cell).split())) for cell in [*cells, *[""] * width][:width]] for cells in texts]
-
-
 def _csv(table: Table, *, with_words: bool) -> str:
     text = io.StringIO()
     words = [word for word in (table.title, *table.notes) if word] if with_words else []
-    text.writelines(f"# {' '.join(printable(word).split())}\n" for word in words)
-    csv.writer(text, lineterminator="\n").writerows(_rows(table, str))
+    text.writelines(f"# {_in_one_line(word)}\n" for word in words)
+    rows = _cells(table)
+    columns = [
+        lines
+        for place, column in enumerate(table.columns)
+        for lines in _csv_columns(column, [cells[place] for cells in rows])
+    ]
+    csv.writer(text, lineterminator="\n").writerows(zip(*columns, strict=True))
     return text.getvalue()
+
+
+def _csv_columns(column: Column, cells: Sequence[str]) -> Iterator[list[str]]:
+    """Yield a column with its heading, or one for each of the numbers that its cells hold."""
+    names = list(dict.fromkeys(name for cell in cells if isinstance(cell, TableCell) for name in cell.numbers)) or [""]
+    for place, name in enumerate(names):
+        heading = _in_one_line(f"{column.name} {name}")
+        yield [heading, *(_csv_cell(cell, name, column, is_first=place == 0) for cell in cells)]
+
+
+def _csv_cell(cell: str, name: str, column: Column, *, is_first: bool) -> str:
+    if isinstance(cell, TableCell):
+        return cell.numbers.get(name, "")
+    if not is_first:
+        return ""
+    text = _in_one_line(cell)
+    if not column.is_number:
+        return text
+    return "" if text == "-" else _THOUSANDS.sub("", text)
+
+
+def _in_one_line(text: str) -> str:
+    return " ".join(printable(text).split())
+
+
+def _cells(table: Table) -> list[list[str]]:
+    """Return the cells of each row, one per column."""
+    width = len(table.columns)
+    return [[*row.cells, *[""] * width][:width] for row in table.rows]
+
+
+def _rows(table: Table, escape: Callable[[str], str]) -> list[list[str]]:
+    """Return the heading and the rows, with escaped cells of one line each."""
+    texts = [[column.name for column in table.columns], *_cells(table)]
+    return [[escape(_in_one_line(cell)) for cell in cells] for cells in texts]
 
 
 def _latex(table: Table) -> str:
@@ -56,8 +93,8 @@ def _latex(table: Table) -> str:
     lines = [rf"\begin{{tabular}}{{{aligned}}}", r"\toprule", _latex_row(heading), r"\midrule"]
     for cells, row in zip(rows, table.rows, strict=True):
         lines += [_latex_row(cells), *([r"\midrule"] if row.ends_section and cells is not rows[-1] else [])]
-    lines += [r"\bottomrule", r"\end{tabular}", *(f"% {' '.join(printable(note).split())}" for note in table.notes)]
-    title = [f"% {' '.join(printable(table.title).split())}"] if table.title else []
+    lines += [r"\bottomrule", r"\end{tabular}", *(f"% {_in_one_line(note)}" for note in table.notes)]
+    title = [f"% {_in_one_line(table.title)}"] if table.title else []
     return "\n".join([*title, *lines]) + "\n"
 
 
@@ -74,7 +111,7 @@ def _markdown(table: Table) -> str:
     rule = ["---:" if column.is_number else "---" for column in table.columns]
     title = [f"**{_markdown_text(table.title)}**", ""] if table.title else []
     lines = [f"| {' | '.join(cells)} |" for cells in (heading, rule, *rows)]
-    notes = [line for note in table.notes for line in ("", _markdown_text(" ".join(printable(note).split())))]
+    notes = [line for note in table.notes for line in ("", _markdown_text(_in_one_line(note)))]
     return "\n".join([*title, *lines, *notes]) + "\n"
 
 

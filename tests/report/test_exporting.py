@@ -8,8 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from infthor_eval.report.exporting import exported
-from infthor_eval.tables import Column, Row, Table
+from infthor_eval.rates import Rate, format_number
+from infthor_eval.report.exporting import export_tables
+from infthor_eval.tables import Column, Row, Table, TableCell, interval_cell
 
 # What a table's cell may hold; blanks in a row are one, and control characters are written out.
 CELLS = st.text(st.characters(categories=("L", "N", "P", "S"), include_characters=" \n"), max_size=12).map(
@@ -22,9 +23,38 @@ def table(rows):
     return Table("", (Column("name", False), Column("number")), tuple(Row(row) for row in rows))
 
 
+def read_csv(*tables):
+    return list(csv.reader(io.StringIO(export_tables(tables, "csv"))))
+
+
 @given(TABLES)
 def test_csv_reads_back(rows):
-    assert list(csv.reader(io.StringIO(exported([table(rows)], "csv")))) == [["name", "number"], *map(list, rows)]
+    texts = Table("", (Column("name", False), Column("text", False)), tuple(map(Row, rows)))
+    assert read_csv(texts) == [["name", "text"], *map(list, rows)]
+
+
+@given(st.lists(st.tuples(st.none() | st.floats(-1e6, 1e6), st.floats(0, 10)), max_size=4))
+def test_every_number_of_csv_has_a_column_of_its_own_and_a_missing_one_is_empty(values):
+    rates = [None if mean is None else Rate(mean, *((mean - off, mean + off) if off else (None, None)), 7)
+             for mean, off in values]  # fmt: skip
+    ends = [(None, None) if rate is None else (rate.low, rate.high) for rate in rates]
+    columns = (Column("a"), Column("95 %"), Column("n"))
+    rows = [Row((format_number(rate), interval_cell(*end, pattern="{}–{}"), "1,234"))
+            for rate, end in zip(rates, ends, strict=True)]  # fmt: skip
+    heading, *lines = read_csv(Table("", columns, (*rows, Row(("-", "-", "-")))))
+    if rows:
+        assert heading == ["a", "a low", "a high", "95 % low", "95 % high", "n"]
+        for line, rate, (low, high) in zip(lines, rates, ends, strict=False):
+            numbers = [None if rate is None else rate.mean, low, high, low, high, 1234]
+            assert line == ["" if value is None else f"{value:.1f}" for value in numbers[:5]] + ["1234"]
+    assert set(lines[-1]) == {""}
+
+
+def test_a_plain_number_stands_in_the_first_of_several_columns():
+    both = TableCell("12.5 (4)", {"": "12.5", "questions": "4"})
+    rows = (Row((both,)), Row(("20.25",), is_published=True), Row(("+1.00 =",)))
+    assert read_csv(Table("", (Column("one"),), rows))[:3] == [["one", "one questions"], ["12.5", "4"], ["20.25", ""]]
+    assert export_tables([Table("", (Column("one"),), rows)], "markdown").splitlines()[2] == "| 12.5 (4) |"
 
 
 _COMMANDS = {
@@ -41,7 +71,7 @@ _TOKEN = re.compile("|".join(map(re.escape, sorted(_COMMANDS, key=len, reverse=T
 
 @given(TABLES)
 def test_latex_has_no_letter_that_acts_and_reads_back(rows):
-    lines = exported([table(rows)], "latex").splitlines()
+    lines = export_tables([table(rows)], "latex").splitlines()
     assert lines[:2] == [r"\begin{tabular}{lr}", r"\toprule"]
     assert lines[-2:] == [r"\bottomrule", r"\end{tabular}"]
     body = lines[4:-2]
@@ -56,7 +86,7 @@ def test_latex_has_no_letter_that_acts_and_reads_back(rows):
 
 @given(TABLES)
 def test_markdown_has_as_many_cells_as_the_table_and_reads_back(rows):
-    lines = exported([table(rows)], "markdown").splitlines()
+    lines = export_tables([table(rows)], "markdown").splitlines()
     assert lines[:2] == ["| name | number |", "| --- | ---: |"]
     assert len(lines) == 2 + len(rows)
     for line, row in zip(lines[2:], rows, strict=True):
@@ -69,17 +99,17 @@ def test_markdown_has_as_many_cells_as_the_table_and_reads_back(rows):
 def test_titles_notes_and_published_numbers_are_kept():
     rows = (Row(("a", "1"), ends_section=True), Row(("b",), is_published=True))
     told = Table("A & B", (Column("name", False), Column("number")), rows, ("50 % of it",))
-    latex = exported([told], "latex")
+    latex = export_tables([told], "latex")
     assert latex.splitlines()[0] == "% A & B"
     assert latex.count(r"\midrule") == 2
     assert r"b &  \\" in latex
     assert latex.rstrip().endswith("% 50 % of it")
-    markdown = exported([told, told], "markdown")
+    markdown = export_tables([told, told], "markdown")
     assert markdown.count("**A & B**") == 2
-    assert exported([told], "csv") == "name,number\na,1\nb,\n"
-    assert exported([told, told], "csv").count("# 50 % of it\n") == 2
+    assert export_tables([told], "csv") == "name,number\na,1\nb,\n"
+    assert export_tables([told, told], "csv").count("# 50 % of it\n") == 2
 
 
 @pytest.mark.parametrize("form", ["csv", "latex", "markdown"])
 def test_a_control_character_is_written_out(form):
-    assert "\x1b" not in exported([table([("\x1b[31mred", "1")])], form)
+    assert "\x1b" not in export_tables([table([("\x1b[31mred", "1")])], form)

@@ -7,7 +7,7 @@ from pathlib import Path
 from infthor_eval.episodes.curves import RewardCurves, RunCurves
 from infthor_eval.errors import DataError
 from infthor_eval.formats.yaml_files import read_yaml
-from infthor_eval.tables import Column, Row, Table
+from infthor_eval.tables import Column, Row, Table, interval_cell
 
 __all__ = [
     "Panel",
@@ -105,7 +105,7 @@ def trajectories_told(count: int) -> str:
 
 def _row(run: RunCurves, bound: float, curves: RewardCurves) -> Row:
     end = run.curves[curves.main].end
-    interval = "-" if end.low is None or end.high is None else f"[{end.low:.2f}, {end.high:.2f}]"
+    interval = interval_cell(end.low, end.high, ".2f")
     share = f"{100 * end.mean / bound:.1f}" if bound > 0 else "-"
     found = [(facet, run.curves.get(name)) for name, facet in curves.facets.items()]
     earned = ("-" if curve is None else f"{curve.end.mean:.2f}" for facet, curve in found if facet.earned)

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from infthor_eval.rates import Rate
 from infthor_eval.reasons import count_reasons
 from infthor_eval.report.runs import ReportRun
-from infthor_eval.tables import Column, Row, Table
+from infthor_eval.tables import Column, Row, Table, interval_cell
 
 __all__ = ["costs_table", "left_out_table", "primary_metrics_table"]
 
@@ -13,7 +13,7 @@ _NAMES = (Column("run", False), Column("task", False))
 
 
 def primary_metrics_table(runs: Sequence[ReportRun]) -> Table:
-    """A row per run and task."""
+    """Return the primary metric of each run and task, with a row for each."""
     rows = [
         Row((run.label, task, run.presenter.measure, *_cells(rate), str(rate.n)))
         for run in runs
@@ -24,12 +24,12 @@ def primary_metrics_table(runs: Sequence[ReportRun]) -> Table:
 
 
 def _cells(rate: Rate) -> tuple[str, str]:
-    interval = "-" if rate.low is None or rate.high is None else f"{100 * rate.low:.1f}–{100 * rate.high:.1f}"
-    return f"{100 * rate.mean:.1f}", interval
+    low, high = (None if end is None else 100 * end for end in (rate.low, rate.high))
+    return f"{100 * rate.mean:.1f}", interval_cell(low, high, pattern="{}–{}")
 
 
 def costs_table(runs: Sequence[ReportRun]) -> Table:
-    """Speed and cost: a row per run."""
+    """Return speed and cost, with a row per run."""
     columns = (
         "units",
         "seconds",
@@ -41,10 +41,10 @@ def costs_table(runs: Sequence[ReportRun]) -> Table:
         "cost",
     )
     note = "Seconds are the units' own, added up: several workers take less by the clock. Cost is in US dollars."
-    return Table("", (Column("run", False), *map(Column, columns)), tuple(map(_took, runs)), (note,))
+    return Table("", (Column("run", False), *map(Column, columns)), tuple(map(_cost_row, runs)), (note,))
 
 
-def _took(run: ReportRun) -> Row:
+def _cost_row(run: ReportRun) -> Row:
     seconds = sum(record.seconds for record in run.records)
     rate = f"{len(run.records) / seconds:.2f}" if seconds else "-"
     usage = run.usage
@@ -55,14 +55,14 @@ def _took(run: ReportRun) -> Row:
 
 
 def left_out_table(runs: Sequence[ReportRun]) -> Table | None:
-    """What failed, was left out, was skipped or was not come to, by reason; None where all is well."""
+    """Return the numbers of failed, excluded, retried, skipped and missing units by reason; None if there are none."""
     rows = [
         Row((run.label, task, what, str(n), reason))
         for run in runs
         for (task, what), reason, n in count_reasons(_left_out(run))
     ]
     rows += [
-        Row((run.label, "", "not come to", str(run.n_missing), "the run was stopped; the same command goes on"))
+        Row((run.label, "", "not attempted", str(run.n_missing), "the run was stopped; the same command continues it"))
         for run in runs
         if run.n_missing
     ]
@@ -77,7 +77,7 @@ def _left_out(run: ReportRun) -> Iterator[tuple[tuple[str, str], str]]:
         if record.failure is not None:
             yield (record.task, "failed"), record.failure
         if record.excluded is not None:
-            yield (record.task, "left out"), record.excluded
+            yield (record.task, "excluded"), record.excluded
         for fault in record.faults:
             yield (record.task, "retried"), fault
     for task, about in run.tasks.items():

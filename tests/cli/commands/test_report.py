@@ -1,6 +1,10 @@
 """The command that writes pages and draws figures."""
 
+import re
+
 import pytest
+
+from infthor_eval.formats.packaged import packaged_folder
 
 from ...plans.made_runs import made_run, plan, planner_run, write_run
 
@@ -74,3 +78,17 @@ def test_a_page_is_written_and_its_size_is_told(make_nieh_set, tmp_path, run):
     page = (tmp_path / "pages" / "report.html").read_text()
     assert "infthor-eval run --model oracle --tasks nieh_gt" in page  # how it is done again, and where its frames were
     assert "no frames are shown" not in page
+
+
+def test_replays_are_counted_with_the_time_left_also_where_there_is_no_terminal(
+    scripted_run, tmp_path, run, monkeypatch
+):
+    monkeypatch.setattr("infthor_eval.cli.progress.pace._LEAST_S", 0.0)
+    data = packaged_folder("sets/nieh_mini")
+    code, out, err = run("report", scripted_run, "--data", data, "--episodes", 3, "--out", tmp_path / "report.html")
+    assert code == 0
+    assert "12 samples, " in out
+    first, second = err.splitlines()  # the third is the last: the page's size follows
+    pattern = r"episodes replayed: {} of 3 \({} %\), .* left, .*; scripted, bedroom-1-seed7"
+    assert re.fullmatch(pattern.format(1, 33), first)
+    assert re.fullmatch(pattern.format(2, 67), second)

@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+import math
 
 import pytest
 
@@ -65,11 +66,21 @@ def test_json_alone_is_on_standard_output(ran):
     assert documents[0]["primary_metrics"]["nieh_gt"]["mean"] == 1.0
 
 
-def test_csv_is_a_table_and_nothing_else(ran):
+def test_csv_is_a_table_with_one_number_a_cell(ran):
     _, printed = ran("--format", "csv")
     heading, *rows = csv.reader(io.StringIO(printed))
-    assert heading == ["model", "task", "total", "95 %", "bootstrap", "n"]
-    assert [row[:3] for row in rows][:2] == [["oracle", "nieh_gt", "100.00"], ["oracle", "nieh_full", "100.00"]]
+    assert heading == ["model", "task", "total", "95 % low", "95 % high", "bootstrap low", "bootstrap high", "n"]
+    assert rows[0] == ["oracle", "nieh_gt", "100.00", "34.2", "100.0", "", "", "5"]
+    assert rows[1][:3] == ["oracle", "nieh_full", "100.00"]
+
+
+def test_all_tables_of_csv_have_numbers_in_their_columns_of_numbers(ran):
+    _, printed = ran("--format", "csv", "--full")
+    texts = ("model", "task", "scorer", "not in the form asked for")
+    for block in filter(str.strip, printed.split("\n\n")):
+        heading, *rows = csv.reader(line for line in block.splitlines() if not line.startswith("#"))
+        for name, *cells in zip(heading, *rows, strict=True):
+            assert name in texts or all(cell == "" or math.isfinite(float(cell)) for cell in cells), (name, cells)
 
 
 def test_json_leaves_nothing_to_choose(run, tmp_path):
