@@ -109,7 +109,7 @@ class _ReplayBar:
 
     def advance(self, run: str, trajectory: str) -> None:
         """See `ReplayProgress.advance`."""
-        self._bar.advance(said=f"{run}, {trajectory}")
+        self._bar.advance(detail=f"{run}, {trajectory}")
 
 
 def _draw(folders: tuple[Path, ...], name: str, request: FigureRequest, out: Path) -> None:
