@@ -83,7 +83,7 @@ def test_a_page_is_written_and_its_size_is_told(make_nieh_set, tmp_path, run):
 def test_replays_are_counted_with_the_time_left_also_where_there_is_no_terminal(
     scripted_run, tmp_path, run, monkeypatch
 ):
-    monkeypatch.setattr("infthor_eval.cli.progress.pace._LEAST_S", 0.0)
+    monkeypatch.setattr("infthor_eval.cli.progress.pace._MIN_INTERVAL_S", 0.0)
     data = packaged_folder("sets/nieh_mini")
     code, out, err = run("report", scripted_run, "--data", data, "--episodes", 3, "--out", tmp_path / "report.html")
     assert code == 0
