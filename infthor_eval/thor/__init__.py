@@ -1,3 +1,3 @@
-"""Talking to AI2-THOR, be it the embedded simulator or Unity."""
+"""Talking to AI2-THOR, either the embedded simulator or Unity."""
 
 __all__: list[str] = []

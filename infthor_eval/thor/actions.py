@@ -1,8 +1,7 @@
-"""Action text and calls of AI2-THOR's 5.x API, both ways.
+"""Conversion between action texts and calls of AI2-THOR's 5.x API.
 
-Text is what models read and write: `MoveAhead`, `PickupObject Mug`, `PutObject Mug Fridge`. Its arguments are
-object types; a call names objects by id. A text is grounded to the nearest visible object of that type which
-the action applies to.
+Models read and write texts: `MoveAhead`, `PickupObject Mug`, `PutObject Mug Fridge`. Their arguments are object types,
+whereas calls have object ids. A text is grounded to the nearest visible object of the type to which the action applies.
 """
 
 from collections.abc import Callable, Container, Mapping
@@ -39,7 +38,7 @@ _LOOK_DEGREES = 30.0
 
 
 class Misuse(StrEnum):
-    """Why a text is no call."""
+    """Why a text cannot be turned into a call."""
 
     NO_ACTION = "no action"
     UNKNOWN_OBJECT = "unknown object"
@@ -48,10 +47,10 @@ class Misuse(StrEnum):
 
 
 class UngroundedError(ValueError):
-    """A text names no known action, lacks an argument, or fits no object in sight; the message says which.
+    """A text has no known action, lacks an argument, or matches no visible object; the message says which.
 
     Attributes:
-        misuse: which of these.
+        misuse: kind of the error.
     """
 
     def __init__(self, misuse: Misuse, message: str) -> None:
@@ -61,7 +60,7 @@ class UngroundedError(ValueError):
 
 @dataclass(frozen=True)
 class ActionText:
-    """A low-level action in words: its name and the object types it is about."""
+    """A low-level action in words: its name and its object types."""
 
     action: str
     types: tuple[str, ...] = ()
@@ -71,10 +70,10 @@ class ActionText:
 
 
 def parse_action(text: str) -> ActionText:
-    """Read an action text; white space does not matter, the case of the names does.
+    """Parse an action text; names are case-sensitive, and any white space separates them.
 
     Raises:
-        UngroundedError: an unknown action, or not as many object types as it takes.
+        UngroundedError: the action is unknown, or has a wrong number of object types.
     """
     words = text.split()
     if not words:
@@ -82,19 +81,19 @@ def parse_action(text: str) -> ActionText:
     action, *types = words
     if action not in _APPLIES and action not in _PLAIN:
         raise UngroundedError(Misuse.NO_ACTION, f"unknown action '{action}'")
-    wanted = 0 if action in _PLAIN else 2 if action == "PutObject" else 1
-    if len(types) != wanted:
-        raise UngroundedError(Misuse.NO_ACTION, f"{action} takes {wanted} object types, got {len(types)}")
+    n_types = 0 if action in _PLAIN else 2 if action == "PutObject" else 1
+    if len(types) != n_types:
+        raise UngroundedError(Misuse.NO_ACTION, f"{action} takes {n_types} object types, got {len(types)}")
     return ActionText(action, tuple(types))
 
 
 def text_of(action: str, object_id: str | None = None, receptacle_id: str | None = None) -> ActionText:
-    """The text of a call.
+    """Return the text of a call.
 
     Args:
-        action: its name.
-        object_id: the object acted on; for PutObject the object put.
-        receptacle_id: for PutObject where it is put.
+        action: name of the action.
+        object_id: id of the object acted on; for PutObject, of the object that is put.
+        receptacle_id: id of the receptacle, for PutObject.
     """
     ids = [item for item in (object_id, receptacle_id) if item is not None]
     return ActionText(action, tuple(object_type_of(item) for item in ids))
@@ -107,15 +106,15 @@ def ground(
 
     Args:
         text: the action.
-        view: what the agent sees now.
-        degrees: by which LookUp and LookDown turn the camera.
-        preferred: ids of objects that are meant where several of their type will do; else the nearest one is.
+        view: the current state of the simulator.
+        degrees: angle by which LookUp and LookDown turn the camera.
+        preferred: ids of objects that take precedence over nearer ones of their type.
 
     Returns:
-        `{"action": ..., arguments}` as `Simulator.step(**call)` takes it.
+        `{"action": ..., arguments}` for `Simulator.step(**call)`.
 
     Raises:
-        UngroundedError: no visible object of that type to which the action applies.
+        UngroundedError: there is no visible object of the type to which the action applies.
     """
     if text.action == "NoOp":
         return {"action": "Pass"}
@@ -126,33 +125,33 @@ def ground(
     _refuse_unknown(text, view)
     if text.action == "PutObject" and text.types[0] not in map(object_type_of, view.inventory):
         raise UngroundedError(Misuse.NOT_POSSIBLE, f"{text}: no {text.types[0]} in the hand")
-    return {"action": text.action, "objectId": _chosen(text, view, preferred).object_id}
+    return {"action": text.action, "objectId": _choose_object(text, view, preferred).object_id}
 
 
 def applicable_actions(view: SimulatorView) -> list[ActionText]:
-    """Every action text that can be grounded in a view, in a fixed order."""
+    """Return all action texts that can be grounded now, in a fixed order."""
     return list(dict.fromkeys(text_of_call(call, view) for call in applicable_calls(view)))
 
 
 def applicable_calls(view: SimulatorView, degrees: float = _LOOK_DEGREES) -> list[dict[str, Any]]:
-    """Every call that is possible in a view, in a fixed order: an action with each visible object that it applies to.
+    """Return all calls that are possible now, in a fixed order: each action with each visible object it applies to.
 
     Args:
-        view: what the agent sees now.
-        degrees: by which LookUp and LookDown turn the camera.
+        view: the current state of the simulator.
+        degrees: angle by which LookUp and LookDown turn the camera.
     """
-    found = [ground(ActionText(name), view, degrees) for name in sorted(_PLAIN)]
+    calls = [ground(ActionText(name), view, degrees) for name in sorted(_PLAIN)]
     visible = sorted((item.object_type, item.object_id) for item in view.objects.values() if item.visible)
     for action, applies in _APPLIES.items():
         if action == "PutObject" and not view.inventory:
             continue
         ids = [key for _, key in visible if applies(view.objects[key])]
-        found += [{"action": action, "objectId": key} for key in ids]
-    return found
+        calls += [{"action": action, "objectId": key} for key in ids]
+    return calls
 
 
 def text_of_call(call: Mapping[str, Any], view: SimulatorView) -> ActionText:
-    """The text of a call in a view: what is put is what is held there."""
+    """Return the text of a call in a state; the object of PutObject is the held one."""
     if call["action"] == "Pass":
         return ActionText("NoOp")
     key = call.get("objectId")
@@ -162,28 +161,28 @@ def text_of_call(call: Mapping[str, Any], view: SimulatorView) -> ActionText:
 
 
 def object_type_of(object_id: str) -> str:
-    """The type that an object id names.
+    """Return the object type in an object id.
 
-    Ids are "Type|x|y|z", with the part's type at the end for parts ("Sink|...|SinkBasin") and its number
-    after an underscore for slices ("Apple|...|AppleSliced_2").
+    Ids are "Type|x|y|z". Parts have the type of the part at the end ("Sink|...|SinkBasin"), slices also a number after
+    an underscore ("Apple|...|AppleSliced_2").
     """
     parts = object_id.split("|")
     return parts[4].split("_")[0] if len(parts) > 4 else parts[0]
 
 
 def _refuse_unknown(text: ActionText, view: SimulatorView) -> None:
-    here = {item.object_type for item in view.objects.values()}
+    known = {item.object_type for item in view.objects.values()}
     for name in text.types:
-        if name not in here:
+        if name not in known:
             raise UngroundedError(Misuse.UNKNOWN_OBJECT, f"{text}: {name}: none in this scene")
 
 
-def _chosen(text: ActionText, view: SimulatorView, preferred: Container[str]) -> ThorObject:
+def _choose_object(text: ActionText, view: SimulatorView, preferred: Container[str]) -> ThorObject:
     object_type, applies = text.types[-1], _APPLIES[text.action]
-    fitting = [item for item in view.objects.values() if item.object_type == object_type and item.visible]
-    able = [item for item in fitting if applies(item)]
-    if not fitting:
+    visible = [item for item in view.objects.values() if item.object_type == object_type and item.visible]
+    possible = [item for item in visible if applies(item)]
+    if not visible:
         raise UngroundedError(Misuse.NOT_IN_VIEW, f"{text}: {object_type}: none in sight")
-    if not able:
+    if not possible:
         raise UngroundedError(Misuse.NOT_POSSIBLE, f"{text}: {object_type}: none of those in sight allows it")
-    return min(able, key=lambda item: (item.object_id not in preferred, item.distance, item.object_id))
+    return min(possible, key=lambda item: (item.object_id not in preferred, item.distance, item.object_id))

@@ -1,7 +1,7 @@
-"""Axes of objects in AI2-THOR 2.1.0 against 5.x: some long things lie across where they lay along.
+"""Object axes of AI2-THOR 2.1.0 and 5.x: the models of some long objects are turned by 90 or 270 degrees in 5.x.
 
-A pose recorded in 2.1.0 (ALFRED, the published trajectories) is that of the same thing in 5.x only after a turn about
-the thing's own vertical axis. The turns are those that fit the boxes recorded in ALFRED's training trajectories best.
+So rotations recorded in 2.1.0 (ALFRED, the published trajectories) need a turn about the object's own vertical axis.
+The turns below are those that fit the boxes recorded in ALFRED's training trajectories best.
 """
 
 import math
@@ -17,7 +17,7 @@ _TURNS = {**dict.fromkeys(_ACROSS, 90.0), "Spatula": 270.0}  # degrees
 
 
 def modern_rotation(object_type: str, rotation: Mapping[str, float]) -> dict[str, float]:
-    """A rotation recorded in 2.1.0 as that of the 5.x object which looks the same.
+    """Convert a rotation recorded in 2.1.0 to one with which the 5.x object looks the same.
 
     Args:
         object_type: AI2-THOR object type.
@@ -30,7 +30,7 @@ def modern_rotation(object_type: str, rotation: Mapping[str, float]) -> dict[str
 
 
 def _matrix(rotation: Mapping[str, float]) -> NDArray[np.float64]:
-    """Unity applies z, then x, then y."""
+    """Return the rotation matrix of Unity's Euler angles: about z first, then x, then y."""
     x, y, z = (math.radians(rotation[axis]) for axis in "xyz")
     about_x = np.array([[1, 0, 0], [0, math.cos(x), -math.sin(x)], [0, math.sin(x), math.cos(x)]])
     about_y = np.array([[math.cos(y), 0, math.sin(y)], [0, 1, 0], [-math.sin(y), 0, math.cos(y)]])
@@ -41,7 +41,7 @@ def _matrix(rotation: Mapping[str, float]) -> NDArray[np.float64]:
 
 def _angles(matrix: NDArray[np.float64]) -> dict[str, float]:
     x = math.asin(max(-1.0, min(1.0, -matrix[1, 2])))
-    if abs(matrix[1, 2]) > 1 - 1e-9:  # straight up or down: y and z turn about one axis
+    if abs(matrix[1, 2]) > 1 - 1e-9:  # gimbal lock: y and z turn about the same axis, so z can be 0
         y, z = math.atan2(-matrix[2, 0], matrix[0, 0]), 0.0
     else:
         y, z = math.atan2(matrix[0, 2], matrix[2, 2]), math.atan2(matrix[1, 0], matrix[1, 1])

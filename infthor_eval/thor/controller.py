@@ -1,4 +1,4 @@
-"""The Controller of ai2thor 5.0.0 on the safe transport, cleaning up behind itself."""
+"""The Controller of ai2thor 5.0.0 on the safe transport."""
 
 from pathlib import Path
 from typing import Any
@@ -12,26 +12,26 @@ from infthor_eval.thor.transport import PeerFault, SafeFifoServer
 
 __all__ = ["SafeController"]
 
-_ANY_DISPLAY = "0"  # Popen needs some DISPLAY; a simulator without a window never looks at it
+_ANY_DISPLAY = "0"  # ai2thor requires some DISPLAY; a simulator without a window does not use it
 
 
 class SafeController(ai2thor.controller.Controller):
-    """`ai2thor.controller.Controller` that never hangs and leaves nothing behind.
+    """An `ai2thor.controller.Controller` that never hangs, and removes its process, pipes and files.
 
-    A simulator started from an executable keeps its log in a temporary folder instead of `~/.ai2thor`.
+    A simulator started from an executable has its log in a temporary folder instead of `~/.ai2thor`.
     """
 
     def __init__(self, launch: Launch, scene: str | dict[str, Any], **options: Any) -> None:
         """Start the simulator and load a scene.
 
         Args:
-            launch: what to start.
+            launch: the simulator to start.
             scene: name of the scene, or a house description.
-            options: of ai2thor's Controller (`width`, `renderInstanceSegmentation`, ...).
+            options: options of ai2thor's Controller (`width`, `renderInstanceSegmentation`, ...).
 
         Raises:
-            SceneError: it refuses the scene.
-            SimulatorError: it does not start.
+            SceneError: the simulator refuses the scene.
+            SimulatorError: the simulator does not start.
         """
         self.server: SafeFifoServer | None = None
         self._folder = None if launch.executable is None else ScratchFolder()
@@ -47,18 +47,19 @@ class SafeController(ai2thor.controller.Controller):
                 **options,
             )
         except PeerFault as fault:
-            raise self._explained(fault) from fault
+            raise self._with_log(fault) from fault
         except OSError as error:
             self.stop()
             what = launch.executable or "AI2-THOR's own build"
             raise SimulatorError(f"{what}: cannot be started ({error}); check the command, or the network") from error
         except (RuntimeError, ValueError) as error:
-            # Also what ai2thor says of a scene or a build that does not exist.
+            # ai2thor raises the same classes for a scene and for a build that does not exist.
             self.stop()
             message = " ".join(str(error).split())[:300]
-            if "no build exists" in message:  # what ai2thor says where it cannot reach its download server either
+            if "no build exists" in message:  # its message also if the download server cannot be reached
                 raise SimulatorError(
-                    "AI2-THOR's Unity build is neither here nor to be downloaded; go online once, or name an executable"
+                    "AI2-THOR's Unity build is not installed and cannot be downloaded; go online once, "
+                    "or name an executable"
                 ) from error
             raise SceneError(f"scene {_scene_name(scene)}: {message}") from error
         except BaseException:
@@ -67,33 +68,33 @@ class SafeController(ai2thor.controller.Controller):
 
     @property
     def base_dir(self) -> str:
-        """Where ai2thor keeps its log and releases."""
+        """Folder of ai2thor's log and releases."""
         return super().base_dir if self._folder is None else str(self._folder.path)
 
     def reset(self, scene: str | dict[str, Any] | None = None, **init_params: Any) -> Any:
-        """Load a scene; as the published method, but a failed simulator raises SimulatorError."""
+        """Load a scene as ai2thor's method does, but raise SimulatorError if the simulator fails."""
         try:
             return super().reset(scene, **init_params)
         except PeerFault as fault:
-            raise self._explained(fault) from fault
+            raise self._with_log(fault) from fault
 
     def step(self, action: str | dict[str, Any] | None = None, **action_args: Any) -> Any:
-        """Run one action; as the published method, but a failed simulator raises SimulatorError."""
+        """Run one action as ai2thor's method does, but raise SimulatorError if the simulator fails."""
         try:
             return super().step(action, **action_args)
         except PeerFault as fault:
-            raise self._explained(fault) from fault
+            raise self._with_log(fault) from fault
         except (RuntimeError, TimeoutError) as error:
-            # ai2thor wraps what receive() raised in one of these two.
+            # ai2thor wraps the errors of `receive` in one of these two, so the fault is taken from the server.
             if self.server is None or self.server.fault is None:
                 raise
-            raise self._explained(self.server.fault) from error
+            raise self._with_log(self.server.fault) from error
 
     def stop(self) -> None:
-        """Kills and reaps the simulator, removes pipes and temporary files. Safe to call again."""
+        """Kill and reap the simulator, and remove its pipes and temporary files. Calling it again does nothing."""
         if self.server is not None:
             self.server.stop()
-        # ai2thor registers an exit handler that keeps this object alive: let go of what is large.
+        # ai2thor registers an exit handler that keeps this object alive, so the large event is released here.
         self.last_event = None
         build = getattr(self, "_build", None)
         if build is not None:
@@ -103,22 +104,22 @@ class SafeController(ai2thor.controller.Controller):
             self._folder.cleanup()
 
     def unity_command(self, width: int, height: int, headless: bool) -> list[str]:
-        """The command line; an executable at hand is never told a GPU, which ai2thor asks vulkaninfo for."""
+        """Return the command line of the simulator."""
         if self._folder is not None:
-            self.gpu_device = None
+            self.gpu_device = None  # for a GPU number ai2thor would run vulkaninfo, which many machines lack
         return super().unity_command(width, height, headless)
 
     def _build_server(self, host: str, port: int, width: int, height: int) -> None:
         if self.server is None:
             self.server = SafeFifoServer(width, height, self.server_timeout, self.depth_format, self.add_depth_noise)
 
-    def _explained(self, fault: PeerFault) -> PeerFault:
-        """The fault with the last line that the simulator logged, the simulator stopped."""
-        words = self._last_words()
+    def _with_log(self, fault: PeerFault) -> PeerFault:
+        """Stop the simulator and return the fault with the last line of its log."""
+        line = self._last_log_line()
         self.stop()
-        return PeerFault(fault.fault_type, f"{fault}; its log ends with: {words}" if words else str(fault))
+        return PeerFault(fault.fault_type, f"{fault}; its log ends with: {line}" if line else str(fault))
 
-    def _last_words(self) -> str:
+    def _last_log_line(self) -> str:
         log = Path(self.log_dir) / "unity.log"
         if not log.is_file():
             return ""

@@ -1,4 +1,4 @@
-"""Where an agent's frames are kept while it acts."""
+"""Storing the frames of an acting agent."""
 
 from pathlib import Path
 from typing import Protocol
@@ -13,28 +13,28 @@ __all__ = ["FrameFolder", "FrameKeeper", "NoFrames"]
 
 
 class FrameKeeper(Protocol):
-    """Makes a reference of what the agent sees."""
+    """Stores frames and returns references to them."""
 
     def keep(self, view: SimulatorView) -> FrameRef | None:
-        """The frame of a view; None where nobody looks.
+        """Store the frame of a state; returns None for an agent without vision.
 
         Raises:
-            SimulatorError: the view has none.
-            DataError: it cannot be written.
+            SimulatorError: the simulator sent no frame.
+            DataError: the frame cannot be written.
         """
         ...
 
 
 class NoFrames:
-    """For agents that do not look."""
+    """Frames of agents without vision: none is stored."""
 
     def keep(self, view: SimulatorView) -> FrameRef | None:
-        """None."""
+        """Return None."""
         return None
 
 
 class FrameFolder:
-    """PNG files of a folder that exists."""
+    """Frames as PNG files in an existing folder."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
@@ -47,7 +47,7 @@ class FrameFolder:
         path = self._folder / f"{self._n_frames:09d}.png"
         self._n_frames += 1
         try:
-            Image.fromarray(view.frame).save(path, compress_level=1)
+            Image.fromarray(view.frame).save(path, compress_level=1)  # temporary: speed matters more than size
         except OSError as error:
             raise DataError(f"{path}: cannot be written ({error.strerror}); make room, or set TMPDIR") from error
         return FrameRef(path)

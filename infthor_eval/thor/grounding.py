@@ -1,9 +1,7 @@
-"""Object ids recorded by another AI2-THOR version, or in a scene restored from poses, to ids of this
-simulator.
+"""Mapping object ids that another AI2-THOR version recorded, or of a restored scene, to ids of this simulator.
 
-An id holds its type and the position that the object had when the scene was set up, so the object meant is
-the one of that type nearest to that position then. The choice is made once per episode and kept, because
-objects move and ids do not.
+An id has the object's type and its position when the scene was loaded. It is mapped to the object of this type that was
+nearest to this position when the episode began. The choice is made once per episode, as objects move and ids do not.
 """
 
 import math
@@ -16,7 +14,7 @@ __all__ = ["Grounding", "id_position"]
 
 
 def id_position(object_id: str) -> tuple[float, float, float] | None:
-    """The position (metres) that an id holds; None where it holds none."""
+    """Return the position (metres) in an object id, or None if it has none."""
     parts = object_id.split("|")[1:4]
     try:
         x, y, z = (float(part) for part in parts)
@@ -26,28 +24,28 @@ def id_position(object_id: str) -> tuple[float, float, float] | None:
 
 
 class Grounding:
-    """The ids of one episode. `distances` tells how far each chosen object lies from where its id says, in
-    metres."""
+    """The id mapping of one episode.
+
+    Attributes:
+        distances: distance of each chosen object from the position in the recorded id, metres, by recorded id.
+    """
 
     def __init__(self, view: SimulatorView) -> None:
-        """Remember where everything is.
+        """Store the initial positions of all objects.
 
         Args:
-            view: the world when the episode begins, after the scene was restored.
+            view: state at the start of the episode, after the scene was restored.
         """
-        self._homes = {key: _position(item) for key, item in view.objects.items()}
+        self._initial_positions = {key: _position(item) for key, item in view.objects.items()}
         self._chosen: dict[str, str] = {}
         self.distances: dict[str, float] = {}
 
     def ground(self, object_id: str, view: SimulatorView) -> str | None:
-        """The id that the simulator has for a recorded one.
+        """Return the simulator's id for a recorded one, or None if the scene has no object of the type.
 
         Args:
-            object_id: as recorded.
-            view: the world now.
-
-        Returns:
-            None where the scene has no object of that type.
+            object_id: the recorded id.
+            view: the current state.
         """
         chosen = self._chosen.get(object_id)
         if chosen in view.objects:
@@ -57,26 +55,27 @@ class Grounding:
             return object_id
         object_type = object_type_of(object_id)
         taken = set(self._chosen.values())
-        fitting = [item for item in view.objects.values() if item.object_type == object_type]
-        # Two recorded things of one type are two things here, unless the scene has too few; furniture may be
-        # merged.
-        free = [item for item in fitting if not item.pickupable or item.object_id not in taken]
-        return self._choose(object_id, free or fitting)
+        candidates = [item for item in view.objects.values() if item.object_type == object_type]
+        # Two recorded objects of a type are mapped to two objects, unless the scene has too few. Furniture is not
+        # restricted: versions differ in how many parts a piece has.
+        free = [item for item in candidates if not item.pickupable or item.object_id not in taken]
+        return self._choose(object_id, free or candidates)
 
     def _choose(self, object_id: str, candidates: Iterable[ThorObject]) -> str | None:
         target = id_position(object_id)
-        ranked = sorted((self._gap(item, target), item.object_id) for item in candidates)
+        ranked = sorted((self._distance(item, target), item.object_id) for item in candidates)
         if not ranked:
             return None
         self.distances[object_id], self._chosen[object_id] = ranked[0]
         return ranked[0][1]
 
-    def _gap(self, item: ThorObject, target: tuple[float, float, float] | None) -> float:
-        """Distance from where the recorded id says to where the object was, by its place or by its own id."""
+    def _distance(self, item: ThorObject, target: tuple[float, float, float] | None) -> float:
+        """Return the distance of a recorded position from the object's initial position, or from that in its id."""
         if target is None:
             return 0.0
-        places = [self._homes.get(item.object_id, _position(item)), id_position(item.object_id)]
-        return min(math.dist(target, place) for place in places if place is not None)
+        # The id has the position at which the scene file has the object; restoring the scene may have moved it.
+        positions = [self._initial_positions.get(item.object_id, _position(item)), id_position(item.object_id)]
+        return min(math.dist(target, position) for position in positions if position is not None)
 
 
 def _position(item: ThorObject) -> tuple[float, float, float]:

@@ -1,5 +1,4 @@
-"""How a simulator is started: the embedded one, a Unity executable at hand, or AI2-THOR's own downloaded
-build."""
+"""Command lines of simulators: the embedded one, a local Unity executable, or the build that ai2thor downloads."""
 
 import shlex
 import sys
@@ -11,14 +10,14 @@ __all__ = ["Launch", "embedded", "unity"]
 
 @dataclass(frozen=True)
 class Launch:
-    """What to start and how long to wait for it.
+    """The simulator to start, and its time limits.
 
     Attributes:
-        label: "unity" or "embedded": what sets made with it are labelled by.
+        label: "unity" or "embedded", which is recorded in the sets that it renders.
         executable: command line of the simulator; None for the build that ai2thor downloads.
         platform: name of ai2thor's platform for its own build ("CloudRendering" needs no X server).
-        timeout: seconds for one reply.
-        start_timeout: seconds until the first message.
+        timeout: time limit of one reply, seconds.
+        start_timeout: time limit of the first message, seconds.
     """
 
     executable: str | None = None
@@ -35,15 +34,15 @@ def embedded(
     timeout: float = 60.0,
     start_timeout: float = 300.0,
 ) -> Launch:
-    """The simulator that comes with this package.
+    """Return the launch of the simulator in this package.
 
     Args:
-        data: folder with recorded floor plans; without it only procedural scenes exist.
-        supplement: file with what the trajectories at hand tell of the floor plans beside it.
-        timeout: seconds for one reply.
-        start_timeout: seconds until the first message. The first start of an installation compiles the renderer, which
-            takes ten seconds of a processor; several at once on a busy machine take minutes, and one that is stopped
-            in the middle of it would have to begin anew.
+        data: folder of recorded floor plans; without it there are only procedural scenes.
+        supplement: file with additions to the floor plans from trajectories (see `supplement`).
+        timeout: time limit of one reply, seconds.
+        start_timeout: time limit of the first message, seconds. The first start of an installation compiles the
+            renderer, which takes ten seconds of a processor. Several at once on a busy machine take minutes, and one
+            that is stopped in the middle would have to restart from the beginning.
     """
     words = [sys.executable, "-m", "infthor_eval.sim"]
     if data is not None:
@@ -54,5 +53,5 @@ def embedded(
 
 
 def unity(executable: Path | None = None, *, platform: str | None = None) -> Launch:
-    """A Unity build of AI2-THOR: an executable at hand, or the build that ai2thor downloads itself."""
+    """Return the launch of a Unity build of AI2-THOR: a local executable, or the build that ai2thor downloads."""
     return Launch(None if executable is None else shlex.quote(str(executable)), platform=platform)

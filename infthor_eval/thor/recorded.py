@@ -1,5 +1,4 @@
-"""Recorded low-level actions (AI2-THOR 2.1.0 form, as ALFRED and ∞-THOR store them) as calls of the 5.x
-API."""
+"""Conversion of recorded low-level actions (AI2-THOR 2.1.0, as in ALFRED and ∞-THOR) to calls of the 5.x API."""
 
 from typing import Any
 
@@ -9,26 +8,26 @@ from infthor_eval.thor.view import SimulatorView
 
 __all__ = ["MissingObjectError", "degrees_of", "translate"]
 
-_TURNS = {"RotateLeft": 90.0, "RotateRight": 90.0, "LookUp": 30.0, "LookDown": 30.0}
+_TURNS = {"RotateLeft": 90.0, "RotateRight": 90.0, "LookUp": 30.0, "LookDown": 30.0}  # default angles of 2.1.0, degrees
 
 
 class MissingObjectError(LookupError):
-    """A recorded action is about an object of a type that the scene does not have."""
+    """The scene has no object of the type that a recorded action needs."""
 
 
 def translate(low: LowAction, grounding: Grounding, view: SimulatorView) -> dict[str, Any]:
-    """The call that does in 5.x what the recorded one did.
+    """Return the 5.x call with the effect of a recorded action.
 
     Args:
         low: the recorded action.
-        grounding: the episode's ids.
-        view: the world now.
+        grounding: id mapping of the episode.
+        view: the current state.
 
     Returns:
-        `{"action": ..., arguments}` as `Simulator.step(**call)` takes it.
+        `{"action": ..., arguments}` for `Simulator.step(**call)`.
 
     Raises:
-        MissingObjectError: the scene has no object of the type that the action is about.
+        MissingObjectError: the scene has no object of the type that the action needs.
     """
     recorded = low.api_action
     name = recorded.action
@@ -37,21 +36,20 @@ def translate(low: LowAction, grounding: Grounding, view: SimulatorView) -> dict
     call: dict[str, Any] = {"action": name}
     if recorded.move_magnitude is not None and name.startswith("Move"):
         call["moveMagnitude"] = recorded.move_magnitude
-    # 2.1.0 names the held object and its receptacle, 5.x the receptacle alone.
-    wanted = recorded.receptacle_id if name == "PutObject" else recorded.object_id
-    if wanted is not None:
-        found = grounding.ground(wanted, view)
-        if found is None:
-            raise MissingObjectError(f"{name}: the scene has no object for '{wanted}'")
-        call["objectId"] = found
+    # PutObject of 2.1.0 has the held object and its receptacle, that of 5.x only the receptacle.
+    recorded_id = recorded.receptacle_id if name == "PutObject" else recorded.object_id
+    if recorded_id is not None:
+        object_id = grounding.ground(recorded_id, view)
+        if object_id is None:
+            raise MissingObjectError(f"{name}: the scene has no object for '{recorded_id}'")
+        call["objectId"] = object_id
     if name == "PutObject":
         call |= {"forceAction": bool(recorded.force_action), "placeStationary": True}
     return call
 
 
 def degrees_of(low: LowAction) -> float:
-    """By how much a recorded turn turns: its own argument, the number in its name ("LookDown_15"), or 2.1.0's
-    step."""
+    """Return the angle of a recorded turn: its argument, the number in its name ("LookDown_15"), or 2.1.0's default."""
     if low.api_action.degrees is not None:
         return low.api_action.degrees
     name = low.discrete_action.action if low.discrete_action is not None else ""

@@ -1,4 +1,4 @@
-"""Frames and step log of an episode, written as it runs."""
+"""Recording the frames and the step log of an episode."""
 
 from pathlib import Path
 
@@ -11,24 +11,24 @@ from infthor_eval.thor.view import SimulatorView, ThorObject
 
 __all__ = ["Recorder", "object_log", "state_of"]
 
-_PNG_LEVEL = 4  # rendered frames hardly shrink further, and higher levels take several times as long
+_PNG_LEVEL = 4  # higher levels take several times as long and hardly shrink rendered frames further
 
 
 class Recorder:
-    """Turns views into steps, and into image files where a folder is given.
+    """Turns simulator states into log entries, and into image files if a folder is given.
 
     Attributes:
-        steps: one per frame so far.
+        steps: log entries so far, one per frame.
     """
 
     def __init__(self, images: Path | None = None) -> None:
-        """Begin with no frame.
+        """Start without a frame.
 
         Args:
-            images: folder for the frames, which must exist; None keeps the log only.
+            images: existing folder for the frames, or None to keep only the log.
         """
         self._images = images
-        self._world: dict[str, ObjectState] = {}
+        self._states: dict[str, ObjectState] = {}
         self.steps: list[Step] = []
 
     def record(
@@ -44,15 +44,15 @@ class Recorder:
         """Add one frame.
 
         Args:
-            view: the world after the action.
-            step: index of the action; 0 for the first frame too.
-            action: its text; None for the first frame.
-            high_idx: the sub-goal it belongs to.
+            view: state after the action.
+            step: index of the action; 0 also for the first frame.
+            action: text of the action; None for the first frame.
+            high_idx: index of the action's sub-goal.
             target: id of the object acted on.
             receptacle: id of the receptacle acted on.
 
         Raises:
-            SimulatorError: the view has no frame to write.
+            SimulatorError: the simulator sent no frame.
         """
         number = len(self.steps)
         entry = Step(
@@ -67,7 +67,7 @@ class Recorder:
             pose=_pose(view),
             target=target,
             receptacle=receptacle,
-            seen=_seen(view),
+            seen=_objects_in_frame(view),
             changes=self._changes(view),
         )
         if self._images is not None:
@@ -76,11 +76,11 @@ class Recorder:
         return entry
 
     def _changes(self, view: SimulatorView) -> dict[str, ObjectState]:
-        now = {key: state_of(item) for key, item in view.objects.items()}
-        changes = {key: state for key, state in now.items() if self._world.get(key) != state}
-        for key in self._world.keys() - now.keys():
-            changes[key] = ObjectState(self._world[key].type, exists=False)
-        self._world = now
+        states = {key: state_of(item) for key, item in view.objects.items()}
+        changes = {key: state for key, state in states.items() if self._states.get(key) != state}
+        for key in self._states.keys() - states.keys():
+            changes[key] = ObjectState(self._states[key].type, exists=False)
+        self._states = states
         return changes
 
     @staticmethod
@@ -91,7 +91,7 @@ class Recorder:
 
 
 def object_log(view: SimulatorView) -> ObjectLog:
-    """What the published log holds of a view: types, each once, in alphabetical order."""
+    """Return the published fields of a log entry: object types, each once, in alphabetical order."""
     visible = [item for item in view.objects.values() if item.visible]
     inside: dict[str, set[str]] = {}
     for item in visible:
@@ -109,12 +109,12 @@ def object_log(view: SimulatorView) -> ObjectLog:
 
 
 def state_of(item: ThorObject) -> ObjectState:
-    """The part of an object's metadata that the log keeps; positions to the millimetre."""
-    where = item.position
+    """Return the part of an object's metadata that is logged, with the position to the millimetre."""
+    at = item.position
     return ObjectState(
         type=item.object_type,
         parents=tuple(item.parent_receptacles or ()),
-        position=(round(where.x, 3), round(where.y, 3), round(where.z, 3)),
+        position=(round(at.x, 3), round(at.y, 3), round(at.z, 3)),
         held=item.is_picked_up,
         is_open=item.is_open if item.openable else None,
         is_on=item.is_toggled if item.toggleable else None,
@@ -136,7 +136,7 @@ def _pose(view: SimulatorView) -> LoggedPose:
     )
 
 
-def _seen(view: SimulatorView) -> dict[str, ObjectInFrame] | None:
+def _objects_in_frame(view: SimulatorView) -> dict[str, ObjectInFrame] | None:
     if view.instances is None:
         return None
     return {

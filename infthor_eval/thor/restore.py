@@ -1,8 +1,7 @@
-"""Bringing a scene to the recorded initial state of a trajectory.
+"""Restoring the recorded initial state of a trajectory.
 
-The order is ALFRED's: toggles, dirt and liquids, object poses, then the agent. Recorded poses name Unity
-objects, and those names differ between AI2-THOR versions; a name that the scene does not know is replaced by
-that of an object of the same type.
+The order is ALFRED's: toggles, dirt and liquids, object poses, then the agent. Recorded poses have names of Unity
+objects, which differ between AI2-THOR versions. An unknown name is replaced by that of an object of the same type.
 """
 
 from collections import defaultdict
@@ -20,11 +19,11 @@ __all__ = ["RestoreReport", "restore"]
 
 @dataclass
 class RestoreReport:
-    """What came of it.
+    """What could not be restored.
 
     Attributes:
-        dropped: recorded objects that the scene has no counterpart for.
-        refused: calls that the simulator refused, with its message.
+        dropped: names of recorded objects for which the scene has no object.
+        refused: calls that the simulator refused, with its messages.
     """
 
     dropped: list[str] = field(default_factory=list)
@@ -32,14 +31,14 @@ class RestoreReport:
 
 
 def restore(simulator: Simulator, scene: Scene) -> RestoreReport:
-    """Load the scene of a trajectory and put everything where the recording begins.
+    """Load the scene of a trajectory and restore its initial state.
 
     Args:
-        simulator: is reset to the scene; its `view` then is the first frame.
+        simulator: the simulator, which is reset; its `view` is the first frame afterwards.
         scene: the recorded initial state.
 
     Raises:
-        SimulatorError: the simulator has no such scene or fails.
+        SimulatorError: the simulator has no such scene, or fails.
     """
     view = simulator.reset(scene.floor_plan)
     report = RestoreReport()
@@ -69,7 +68,7 @@ def _state_calls(scene: Scene) -> list[dict[str, Any]]:
 
 
 def _poses(recorded: list[ObjectPose], view: SimulatorView) -> tuple[list[dict[str, Any]], list[str]]:
-    """The poses under this scene's names, and the names that nothing here answers to."""
+    """Return the poses with this scene's object names, and the recorded names without an object."""
     known = {item.name for item in view.objects.values()}
     spare = defaultdict(list)
     for item in sorted(view.objects.values(), key=lambda item: item.name):
@@ -81,14 +80,14 @@ def _poses(recorded: list[ObjectPose], view: SimulatorView) -> tuple[list[dict[s
         if name not in known and name not in renamed:
             names = spare[_type_of(name, spare)]
             if names:
-                # Turn about, so that two recorded models of one type become two objects where there are two.
+                # Round-robin, so that two recorded names of one type get two objects if there are two.
                 renamed[name] = names[0]
                 names.append(names.pop(0))
         target = name if name in known else renamed.get(name)
         if target is None:
             dropped.append(name)
         else:
-            # A name that had to be replaced is another version's, and so are the axes of its object.
+            # An unknown name is of another AI2-THOR version, so its object may have other axes too.
             turned = modern_rotation(_type_of(name, spare), pose.rotation) if name in renamed else pose.rotation
             poses.append({"objectName": target, "position": pose.position, "rotation": turned})
     return poses, dropped
@@ -98,6 +97,6 @@ _RENAMED = {"Glassbottle": "Bottle"}  # 2.1.0 to 5.x
 
 
 def _type_of(name: str, types: dict[str, list[str]]) -> str:
-    """The object type in a Unity object's name ("Mug_291e6e8a")."""
+    """Return the object type in a Unity object's name ("Mug_291e6e8a")."""
     head = name.partition("_")[0]
     return head if head in types else _RENAMED.get(head, head)

@@ -1,4 +1,4 @@
-"""Scenes of a simulator: what they look like, and carrying them to machines without Unity."""
+"""Scenes of a simulator: pictures of them, and recording them for machines without Unity."""
 
 from pathlib import Path
 
@@ -14,42 +14,42 @@ __all__ = ["dump_scene", "scene_pictures"]
 
 
 def scene_pictures(simulator: Simulator, scene: str) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
-    """The scene from above, and the agent's first view: RGB, uint8, [height, width, 3].
+    """Return the scene from above, and the agent's first frame: RGB, uint8, [height, width, 3].
 
     Raises:
-        SimulatorError: the simulator does not have the scene, or frames are off.
+        SimulatorError: the simulator does not have the scene, or sends no frames.
     """
     first = simulator.reset(scene).frame
-    above = _asked(simulator, "ToggleMapView").frame
+    above = _query(simulator, "ToggleMapView").frame
     if first is None or above is None:
         raise SimulatorError(f"scene {scene}: the simulator sends no frames; start it with rendering")
     return above, first
 
 
 def dump_scene(simulator: Simulator, scene: str, folder: Path, overwrite: bool = False) -> int:
-    """Write what the simulator reports of a scene into a folder of recorded floor plans.
+    """Record a scene's objects and reachable positions in a folder of floor plans.
 
     Args:
-        simulator: Unity, to carry a scene to machines without it; any other serves.
-        scene: its name.
+        simulator: the simulator that has the scene, usually Unity.
+        scene: name of the scene.
         folder: the folder (`--data`).
-        overwrite: whether it may take the place of another recording of the scene.
+        overwrite: True to replace a different recording of the scene.
 
     Returns:
         The number of objects.
 
     Raises:
         SimulatorError: the simulator does not have the scene.
-        DataError: the folder has another recording of the scene, or cannot be written.
+        DataError: the folder has a different recording of the scene, or cannot be written.
     """
     simulator.reset(scene)
     objects = simulator.metadata["objects"]
-    reachable = _asked(simulator, "GetReachablePositions").result
+    reachable = _query(simulator, "GetReachablePositions").result
     write_floor_plan(folder, scene, objects, [(place["x"], place["z"]) for place in reachable], overwrite)
     return len(objects)
 
 
-def _asked(simulator: Simulator, action: str) -> SimulatorView:
+def _query(simulator: Simulator, action: str) -> SimulatorView:
     view = simulator.query(action)
     if not view.success:
         raise SimulatorError(f"{action} failed: {view.error}; use AI2-THOR 5.x")

@@ -1,8 +1,8 @@
-"""The simulator as the other rooms use it: scenes, actions, views, and survival of its process.
+"""The simulator that all other packages use: scenes, actions, typed states, and recovery from crashes.
 
-Every action since the last scene change is kept. When the process dies, hangs or talks nonsense, a fresh one
-is started and the episode so far is run again, action for action; the caller sees nothing but the delay. That
-holds as far as the simulator is deterministic, so each repeated action must end as it did before.
+All actions since the last scene change are recorded. If the process dies, hangs or breaks the protocol, a new one is
+started and the episode is repeated action by action, so that callers notice only the delay. This requires a
+deterministic simulator: each repeated action must succeed or fail as it did before, or the episode ends in an error.
 """
 
 import logging
@@ -19,27 +19,27 @@ from infthor_eval.thor.view import SimulatorView, view_of
 
 __all__ = ["Simulator", "SimulatorMark"]
 
-_Done = tuple[dict[str, Any], bool]  # a call, and whether it was carried out
+_CallResult = tuple[dict[str, Any], bool]  # a call, and whether it succeeded
 _LOG = logging.getLogger(__name__)
 _INITIAL = {"gridSize": 0.25, "fieldOfView": 60, "visibilityDistance": 1.5, "snapToGrid": True}
-_UNSEEN = {"renderImage": False, "renderInstanceSegmentation": False, "renderDepthImage": False}
+_NO_RENDERING = {"renderImage": False, "renderInstanceSegmentation": False, "renderDepthImage": False}
 _WALKING = {"MoveAhead", "MoveBack", "MoveLeft", "MoveRight", "RotateLeft", "RotateRight", "LookUp", "LookDown"}
 
 
 @dataclass(frozen=True, eq=False)
 class SimulatorMark:
-    """A moment since the scene was loaded: the actions that led to it, and the world then."""
+    """A point of an episode to which the simulator can return: the actions up to it, and the state there."""
 
-    episode: tuple["_Done", ...]
+    episode: tuple["_CallResult", ...]
     view: SimulatorView
 
 
 class Simulator:
-    """One simulator process, kept alive. Use it as a context manager.
+    """One simulator process, which is restarted if it fails. Use it as a context manager.
 
     Attributes:
-        view: the world after the last action.
-        restarts: how often a fresh process had to be started so far.
+        view: state after the last action.
+        restarts: number of restarts so far.
     """
 
     def __init__(
@@ -55,17 +55,17 @@ class Simulator:
         max_copies: int = 2,
         **options: Any,
     ) -> None:
-        """Describe the simulator; it starts with the first `reset`.
+        """Configure the simulator; the process starts with the first `reset`.
 
         Args:
-            launch: what to start.
-            width: of the frames, pixels.
-            height: of the frames, pixels.
-            image: whether views after actions have a frame; half of an action's time is spent on it.
-            instances: whether views tell which object each pixel shows.
-            depth: whether views have depth.
-            max_restarts: how many failures one episode may survive from one mark to the next.
-            max_copies: of how many marks the embedded simulator keeps a copy of its state (0.2 MB each).
+            launch: the simulator to start.
+            width: width of the frames, pixels.
+            height: height of the frames, pixels.
+            image: True to render a frame after each action, which takes half of an action's time.
+            instances: True to render which object each pixel shows.
+            depth: True to render depth.
+            max_restarts: maximum number of restarts from one mark to the next.
+            max_copies: number of marks whose state the embedded simulator stores (0.2 MB each).
             options: further initialisation parameters of AI2-THOR (`fieldOfView`, `agentMode`, ...).
         """
         self._launch = launch
@@ -77,14 +77,15 @@ class Simulator:
             "renderDepthImage": depth,
             **options,
         }
-        self._unseen = {} if image else {"renderImage": False}
+        self._rendering = {} if image else {"renderImage": False}
         self._max_restarts = max_restarts
         self._max_copies = max_copies
         self._controller: SafeController | None = None
         self._scene: str | dict[str, Any] | None = None
-        self._episode: list[_Done] = []
-        self._failures = 0
-        self._copies: dict[SimulatorMark, int] = {}  # to the slot of the process's copy; the longest unused first
+        self._episode: list[_CallResult] = []
+        self._failures = 0  # since the last mark
+        # Slot of the stored state of each mark, the least recently used first.
+        self._copies: dict[SimulatorMark, int] = {}
         self._view: SimulatorView | None = None
         self.restarts = 0
 
@@ -98,12 +99,12 @@ class Simulator:
 
     @property
     def label(self) -> str:
-        """Which simulator this is, "embedded" or "unity"."""
+        """Kind of the simulator, "embedded" or "unity"."""
         return self._launch.label
 
     @property
     def view(self) -> SimulatorView:
-        """The world after the last action.
+        """State after the last action.
 
         Raises:
             SimulatorError: no scene is loaded.
@@ -114,7 +115,7 @@ class Simulator:
 
     @property
     def metadata(self) -> dict[str, Any]:
-        """The simulator's last reply as it came, with all its fields; `view` is the typed part of it.
+        """Raw metadata of the simulator's last reply; `view` is its typed part.
 
         Raises:
             SimulatorError: no scene is loaded.
@@ -127,12 +128,12 @@ class Simulator:
         """Load a scene and begin an episode.
 
         Args:
-            scene: its name (`FloorPlan10`, `kitchen-3`), the description of a ProcTHOR house, or None for the
-                present one.
+            scene: name of the scene (`FloorPlan10`, `kitchen-3`), description of a ProcTHOR house, or None for the
+                current scene.
 
         Raises:
             SceneError: the simulator refuses the scene.
-            SimulatorError: it cannot be started.
+            SimulatorError: the simulator cannot be started.
         """
         self._scene, self._episode, self._failures = scene or self._scene, [], 0
         self._copies = {}
@@ -144,11 +145,11 @@ class Simulator:
                 self._recover_from(fault)
 
     def step(self, action: str, **arguments: Any) -> SimulatorView:
-        """Run one action; a refused one is told by the view's `success` and `error`.
+        """Run one action and return the state after it, whose `success` and `error` tell whether it was refused.
 
         Raises:
-            SimulatorError: the simulator failed more often than it may, or a repeated episode went another
-                way.
+            SimulatorError: the simulator failed more often than `max_restarts`, or an action of the repeated episode
+                ended differently.
         """
         call = {"action": action, **arguments}
         while True:
@@ -164,44 +165,44 @@ class Simulator:
                 return view
 
     def query(self, action: str, **arguments: Any) -> SimulatorView:
-        """Run an action that only asks (`GetReachablePositions`): it is no part of the episode, nor is its
-        view kept.
+        """Run an action without a lasting effect (`GetReachablePositions`), which is not part of the episode.
 
         Raises:
             SimulatorError: as `step`.
         """
-        before, length = self._view, len(self._episode)
-        answer = self.step(action, **arguments)
+        view, length = self._view, len(self._episode)
+        reply = self.step(action, **arguments)
         del self._episode[length:]
-        self._view = before
-        return answer
+        self._view = view
+        return reply
 
     def mark(self) -> SimulatorMark:
-        """Remember this moment, for `rewind`; of marks that were not used for long the simulator keeps no copy.
+        """Mark the current state for `rewind`.
 
-        The embedded simulator keeps a copy of its state. Unity cannot: there `rewind` may repeat the episode.
+        The embedded simulator stores its state, for the `max_copies` marks that were used last. Unity cannot, so that
+        `rewind` may have to repeat the episode there.
         """
         latest = next(reversed(self._copies), None)
         if latest is not None and self._is_at(latest):
             return latest
         mark = SimulatorMark(tuple(self._episode), self.view)
         self._copy(mark)
-        self._failures = 0  # the episode has come on
+        self._failures = 0  # the episode made progress since the last failure
         return mark
 
     def rewind(self, mark: SimulatorMark, *, exactly: bool = False) -> SimulatorView:
-        """Bring the world to where it was at a mark, behind or beside the present moment, of the scene loaded.
+        """Return to the state at a mark of the current scene, whether or not it is in the current episode's past.
 
         Args:
-            mark: where to.
-            exactly: whether it matters that walking back is off by the rounding errors of the steps, and single
-                pixels with it; else an agent that only walked since is put back, which is faster.
+            mark: the mark.
+            exactly: True to restore the state bit by bit. If False, an agent that only walked since the mark is
+                teleported back, which is faster, but can differ by rounding errors and hence by single pixels.
 
         Raises:
             SimulatorError: as `step`.
         """
-        there = self._is_at(mark) or (not exactly and self._walk_back(mark)) or self._restore(mark)
-        if not there:
+        done = self._is_at(mark) or (not exactly and self._walk_back(mark)) or self._restore(mark)
+        if not done:
             self.reset(None)
             for call, _ in mark.episode:
                 self.step(**call)
@@ -212,13 +213,13 @@ class Simulator:
         return mark.view
 
     def _is_at(self, mark: SimulatorMark) -> bool:
-        return len(self._episode) == len(mark.episode) and self._began_with(mark)
+        return len(self._episode) == len(mark.episode) and self._starts_with(mark)
 
-    def _began_with(self, mark: SimulatorMark) -> bool:
+    def _starts_with(self, mark: SimulatorMark) -> bool:
         return tuple(self._episode[: len(mark.episode)]) == mark.episode
 
     def _copy(self, mark: SimulatorMark) -> None:
-        """Have the process keep a copy of the present state, which is the mark's."""
+        """Let the process store its current state, which is that of the mark."""
         if len(self._copies) == self._max_copies:
             self._copies.pop(next(iter(self._copies)))
         slot = min(set(range(self._max_copies)) - set(self._copies.values()))
@@ -227,18 +228,18 @@ class Simulator:
 
     def _restore(self, mark: SimulatorMark) -> bool:
         slot = self._copies.pop(mark, None)
-        if slot is None or not self.query("RestoreState", slot=slot, **_UNSEEN).success:
+        if slot is None or not self.query("RestoreState", slot=slot, **_NO_RENDERING).success:
             return False
-        self._copies[mark] = slot  # the last one used
+        self._copies[mark] = slot  # now the most recently used one
         return True
 
     def _walk_back(self, mark: SimulatorMark) -> bool:
-        """Put the agent where it was, where it only walked and looked about since."""
+        """Teleport the agent to its pose at the mark, if it only walked and looked around since."""
         since = self._episode[len(mark.episode) :]
-        if not self._began_with(mark) or any(call["action"] not in _WALKING for call, _ in since):
+        if not self._starts_with(mark) or any(call["action"] not in _WALKING for call, _ in since):
             return False
-        back = self.query(**teleport_call(mark.view.agent))
-        return back.success and back.agent == mark.view.agent
+        view = self.query(**teleport_call(mark.view.agent))
+        return view.success and view.agent == mark.view.agent
 
     def close(self) -> None:
         """Stop the simulator; a later `reset` starts it again."""
@@ -248,7 +249,7 @@ class Simulator:
             self._controller = None
 
     def _load(self) -> SimulatorView:
-        """Bring the process to the start of the episode, starting one if need be."""
+        """Load the scene, in a new process if there is none."""
         if self._scene is None:
             raise SimulatorError("no scene is loaded; reset the simulator to one first")
         if self._controller is None:
@@ -263,9 +264,9 @@ class Simulator:
     def _call(self, call: dict[str, Any]) -> SimulatorView:
         assert self._controller is not None
         try:
-            return view_of(self._controller.step({**self._unseen, **call}))
+            return view_of(self._controller.step({**self._rendering, **call}))
         except ValueError:
-            # ai2thor raises it for unknown actions and arguments; the reply is kept and says so itself.
+            # ai2thor raises this for unknown actions and arguments, after it stored the reply that refuses them.
             return view_of(self._controller.last_event)
 
     def _repeat_episode(self) -> None:
@@ -274,11 +275,11 @@ class Simulator:
             if self._call(call).success != success:
                 raise SimulatorError(
                     f"after a restart action {index} ({call['action']}) of the episode in {self._scene} "
-                    "ended otherwise than before; run the episode again from its start"
+                    "ended differently than before; run the episode again from its start"
                 )
 
     def _recover_from(self, fault: PeerFault) -> None:
-        """Drop the failed process; raise where it failed too often."""
+        """Stop the failed process; raise if it failed too often."""
         self.close()
         self._failures += 1
         if self._failures > self._max_restarts:

@@ -1,7 +1,7 @@
-"""What trajectories tell of the floor plans they were recorded in.
+"""Additions to recorded floor plans, taken from the trajectories that are replayed in them.
 
-Recorded scene data may be of another AI2-THOR version than the trajectories, and its navigation grid has
-gaps. Where the expert walked there is floor, and what it opened, switched and put things into is there.
+Scene data may be recorded by another AI2-THOR version than the trajectories, and their navigation grid has gaps. Where
+the expert walked there must be floor, and what it opened, switched or put things into must exist.
 """
 
 import math
@@ -31,14 +31,14 @@ class _FloorPlan:
 
 
 def write_supplement(trajectories: Iterable[Trajectory], path: Path) -> None:
-    """Write what the trajectories tell of each floor plan.
+    """Write the additions to each floor plan as JSON.
 
-    The file is `{floor plan: {"cells": [[x, z], ...], "floor_y": y, "objects": [id, ...]}}`: cells (metres)
-    where the agent stood, the agent's height, ids of the fixed objects it acted on.
+    The content is `{floor plan: {"cells": [[x, z], ...], "floor_y": y, "objects": [id, ...]}}`: positions (metres)
+    where the agent stood, the agent's height, and ids of the fixed objects that it acted on.
 
     Args:
-        trajectories: of any number of floor plans.
-        path: of the file.
+        trajectories: trajectories in any number of floor plans.
+        path: the file.
     """
     plans: dict[str, _FloorPlan] = {}
     for trajectory in trajectories:
@@ -55,7 +55,7 @@ def write_supplement(trajectories: Iterable[Trajectory], path: Path) -> None:
 
 @contextmanager
 def supplement_file(trajectories: Iterable[Trajectory]) -> Iterator[Path]:
-    """What the trajectories tell of each floor plan, in a temporary file."""
+    """Yield a temporary file with the additions to each floor plan, see `write_supplement`."""
     with ScratchFolder() as folder:
         path = folder / "supplement.json"
         write_supplement(trajectories, path)
@@ -63,10 +63,10 @@ def supplement_file(trajectories: Iterable[Trajectory]) -> Iterator[Path]:
 
 
 def agent_path(trajectory: Trajectory) -> list[tuple[float, float]]:
-    """The (x, z) positions, metres, that the agent passes if every action succeeds, the first included."""
+    """Return the (x, z) positions, metres, of the agent if all actions succeed, including the first."""
     start = trajectory.scene.init_action
     x, z, yaw = start.x, start.z, start.yaw
-    path = [(_rounded(x), _rounded(z))]
+    path = [(_round(x), _round(z))]
     for low in trajectory.plan.low_actions:
         name = low.api_action.action
         if name in {"RotateLeft", "RotateRight"}:
@@ -75,20 +75,20 @@ def agent_path(trajectory: Trajectory) -> list[tuple[float, float]]:
             length = low.api_action.move_magnitude or _GRID
             heading = math.radians(yaw + _HEADINGS[name])
             x, z = x + length * math.sin(heading), z + length * math.cos(heading)
-            path.append((_rounded(x), _rounded(z)))
+            path.append((_round(x), _round(z)))
     return path
 
 
-def _rounded(value: float) -> float:
-    return round(value, 4) + 0.0  # no negative zero
+def _round(value: float) -> float:
+    return round(value, 4) + 0.0  # adding 0.0 turns -0.0 into 0.0
 
 
 def _fixed_objects(trajectory: Trajectory) -> set[str]:
-    found = set()
+    ids = set()
     for low in trajectory.plan.low_actions:
         api = low.api_action
         if api.receptacle_id is not None:
-            found.add(api.receptacle_id)
+            ids.add(api.receptacle_id)
         if api.action in _ON_FIXED and api.object_id is not None:
-            found.add(api.object_id)
-    return found
+            ids.add(api.object_id)
+    return ids

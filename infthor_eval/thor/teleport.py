@@ -1,4 +1,4 @@
-"""The call that puts the agent at a pose."""
+"""The call that teleports the agent."""
 
 from typing import Any
 
@@ -8,14 +8,14 @@ __all__ = ["teleport_call"]
 
 
 def teleport_call(pose: AgentPose, *, force: bool = True) -> dict[str, Any]:
-    """The call of 5.x that puts the agent at a pose.
+    """Return the 5.x call that teleports the agent to a pose.
 
     Args:
-        pose: where to; whether it stands is left out where the agent cannot crouch.
-        force: whether it is put there even where it does not fit; else the simulator may refuse.
+        pose: the pose; without `standing` if the agent cannot crouch.
+        force: True to place the agent even where it collides; otherwise the simulator may refuse.
 
     Returns:
-        `{"action": ..., arguments}` as `Simulator.step(**call)` takes it.
+        `{"action": ..., arguments}` for `Simulator.step(**call)`.
     """
     at = pose.position
     call: dict[str, Any] = {

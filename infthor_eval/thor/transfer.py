@@ -1,7 +1,8 @@
-"""Bringing a simulator to where another one is in the same scene, by calls that every back end and agent mode knows.
+"""Copying the object states of one simulator to another in the same scene.
 
-An expert acts with AI2-THOR's default agent, an arm in a simulator of the arm's mode. Both begin with the same restored
-scene, so their objects have the same ids; what was opened, switched, cut, dirtied and moved since then is done again.
+Experts act with AI2-THOR's default agent, arms in a simulator of the arm's agent mode. Both start from the same
+restored scene, so their objects have the same ids. What was opened, switched, sliced, dirtied and moved since then is
+repeated by calls that every back end and agent mode supports.
 """
 
 import math
@@ -13,13 +14,19 @@ from infthor_eval.thor.view import SimulatorView, ThorObject, Vector
 
 __all__ = ["transfer"]
 
-_NEAR = 0.01  # metres within which an object is where it should be
-_ALIKE = 0.5  # degrees within which it is turned as it should be
-_ROUNDS = 3  # of putting things where they should be: what stands in another moves with it
+_NEAR = 0.01  # tolerance of positions, metres
+_ALIKE = 0.5  # tolerance of rotations, degrees
+_ROUNDS = 3  # passes over all objects: moving a receptacle also moves what is in it
 
 
 class _State(NamedTuple):
-    """A state that can be set either way: how to read it, and the calls that make it so, and not so."""
+    """A state of objects that calls can change.
+
+    Attributes:
+        read: returns the state of an object.
+        on: call that sets it; empty if there is none.
+        off: call that unsets it; empty if there is none.
+    """
 
     read: Callable[[ThorObject], Any]
     on: dict[str, Any]
@@ -39,93 +46,92 @@ _STATES = (
 )
 
 
-def transfer(simulator: Simulator, wanted: SimulatorView) -> list[str]:
-    """Make the objects' states and poses those of another view; the agent stays where it is.
+def transfer(simulator: Simulator, target: SimulatorView) -> list[str]:
+    """Give all objects the states and poses that they have in another simulator; the agent stays where it is.
 
-    What a hand holds there floats here where the hand holds it.
+    An object held by the other agent floats where that agent holds it.
 
     Args:
-        simulator: in the same scene, from the same initial state on.
-        wanted: the view.
+        simulator: simulator in the same scene, restored to the same initial state.
+        target: state of the other simulator.
 
     Returns:
-        Ids of the objects that are missing or lie elsewhere nevertheless, sorted.
+        Sorted ids of the objects that are missing, or could not be moved to their position.
 
     Raises:
         SimulatorError: the simulator fails.
     """
-    for key in _cut(simulator.view, wanted):  # first: slices are objects of their own, and can be moved then
+    for key in _objects_to_slice(simulator.view, target):  # first, so that the slices exist when objects are moved
         simulator.step("SliceObject", objectId=key, forceAction=True)
-    for call in _doors(simulator.view, wanted):
+    for call in _door_calls(simulator.view, target):
         simulator.step(**call)
     for state in _STATES:
-        _set(simulator, wanted, state)
+        _set_state(simulator, target, state)
     for _ in range(_ROUNDS):
-        moves = list(_moves(simulator.view, wanted))
-        if not moves:
+        calls = list(_move_calls(simulator.view, target))
+        if not calls:
             break
-        for call in moves:
+        for call in calls:
             simulator.step(**call)
-    return sorted(_misplaced(simulator.view, wanted))
+    return sorted(_misplaced_objects(simulator.view, target))
 
 
-def _cut(here: SimulatorView, wanted: SimulatorView) -> list[str]:
-    """What is in slices there; the embedded simulator no longer tells of the whole thing then."""
-    parts = {key.rpartition("|")[0] for key in wanted.objects.keys() - here.objects.keys()}
-    return [key for key, item in here.objects.items() if key in parts and item.sliceable and not item.is_sliced]
+def _objects_to_slice(current: SimulatorView, target: SimulatorView) -> list[str]:
+    # By the ids of new slices: the embedded simulator no longer reports the sliced object itself.
+    sliced = {key.rpartition("|")[0] for key in target.objects.keys() - current.objects.keys()}
+    return [key for key, item in current.objects.items() if key in sliced and item.sliceable and not item.is_sliced]
 
 
-def _set(simulator: Simulator, wanted: SimulatorView, state: _State) -> None:
-    for key, there in wanted.objects.items():
-        here = simulator.view.objects.get(key)
-        call = state.on if state.read(there) else state.off
-        if here is not None and call and state.read(here) != state.read(there):
+def _set_state(simulator: Simulator, target: SimulatorView, state: _State) -> None:
+    for key, goal in target.objects.items():
+        item = simulator.view.objects.get(key)
+        call = state.on if state.read(goal) else state.off
+        if item is not None and call and state.read(item) != state.read(goal):
             simulator.step(**call, objectId=key, forceAction=True)
 
 
-def _doors(here: SimulatorView, wanted: SimulatorView) -> Iterator[dict[str, Any]]:
-    """What was opened and closed; a thing that runs is switched off before, and on again by its state."""
-    for key, there in wanted.objects.items():
-        item = here.objects.get(key)
-        if item is None or not there.openable or item.openness == there.openness:
+def _door_calls(current: SimulatorView, target: SimulatorView) -> Iterator[dict[str, Any]]:
+    for key, goal in target.objects.items():
+        item = current.objects.get(key)
+        if item is None or not goal.openable or item.openness == goal.openness:
             continue
-        if item.is_toggled and there.is_open:
+        if item.is_toggled and goal.is_open:  # a running appliance cannot be opened; `_STATES` switches it on again
             yield {"action": "ToggleObjectOff", "objectId": key, "forceAction": True}
-        if item.is_open:  # how far open it is can be changed from closed alone
+        if item.is_open:  # AI2-THOR changes `openness` only of closed objects
             yield {"action": "CloseObject", "objectId": key, "forceAction": True}
-        if there.is_open:
-            yield {"action": "OpenObject", "objectId": key, "openness": there.openness, "forceAction": True}
+        if goal.is_open:
+            yield {"action": "OpenObject", "objectId": key, "openness": goal.openness, "forceAction": True}
 
 
-def _moves(here: SimulatorView, wanted: SimulatorView) -> Iterator[dict[str, Any]]:
-    """What lies elsewhere or otherwise; receptacles before what is in them."""
-    for key, there in sorted(wanted.objects.items(), key=lambda pair: not pair[1].receptacle):
-        item = here.objects.get(key)
-        if item is None or not there.pickupable or (_is_at(item, there) and _is_turned(item, there)):
+def _move_calls(current: SimulatorView, target: SimulatorView) -> Iterator[dict[str, Any]]:
+    # Receptacles before their contents, which move along with them.
+    for key, goal in sorted(target.objects.items(), key=lambda pair: not pair[1].receptacle):
+        item = current.objects.get(key)
+        if item is None or not goal.pickupable or (_is_at(item, goal) and _is_turned_like(item, goal)):
             continue
         yield {
             "action": "TeleportObject",
             "objectId": key,
-            "position": _xyz(there.position),
-            "rotation": _xyz(there.rotation),
+            "position": _xyz(goal.position),
+            "rotation": _xyz(goal.rotation),
             "forceAction": True,
             "forceKinematic": True,
         }
 
 
-def _misplaced(here: SimulatorView, wanted: SimulatorView) -> Iterator[str]:
-    for key, there in wanted.objects.items():
-        item = here.objects.get(key)
-        if item is None or (there.pickupable and not _is_at(item, there)):
+def _misplaced_objects(current: SimulatorView, target: SimulatorView) -> Iterator[str]:
+    for key, goal in target.objects.items():
+        item = current.objects.get(key)
+        if item is None or (goal.pickupable and not _is_at(item, goal)):
             yield key
 
 
-def _is_at(item: ThorObject, there: ThorObject) -> bool:
-    return math.dist(_tuple(item.position), _tuple(there.position)) <= _NEAR
+def _is_at(item: ThorObject, goal: ThorObject) -> bool:
+    return math.dist(_tuple(item.position), _tuple(goal.position)) <= _NEAR
 
 
-def _is_turned(item: ThorObject, there: ThorObject) -> bool:
-    turns = zip(_tuple(item.rotation), _tuple(there.rotation), strict=True)
+def _is_turned_like(item: ThorObject, goal: ThorObject) -> bool:
+    turns = zip(_tuple(item.rotation), _tuple(goal.rotation), strict=True)
     return all(abs((a - b + 180.0) % 360.0 - 180.0) <= _ALIKE for a, b in turns)
 
 

@@ -1,8 +1,8 @@
-"""ai2thor's FIFO server made safe against a simulator that dies, hangs or talks nonsense.
+"""ai2thor's FIFO server, safe against a simulator that dies, hangs or breaks the protocol.
 
-The published server opens its pipes with blocking calls and reads without looking at the child process, so a
-simulator that dies leaves the program hanging. This one opens the pipes non-blocking, watches the child while
-it waits, and turns every failure into a `PeerFault` that says which it was.
+The original server opens its pipes with blocking calls and reads without watching the child process, so it waits for
+ever for a simulator that died. This one opens the pipes non-blocking, watches the child while it waits, and raises a
+`PeerFault` that says what failed.
 """
 
 import contextlib
@@ -22,8 +22,8 @@ from infthor_eval.errors import SimulatorError
 
 __all__ = ["PeerFault", "SafeFifoServer"]
 
-_WATCH_SECONDS = 0.1  # how often a waiting read or write looks whether the child still lives
-_PIPE_BYTES = 1 << 20  # a frame with ids and depth is 0.9 MB; the default 64 KiB costs many wake-ups
+_WATCH_SECONDS = 0.1  # interval at which a waiting read or write checks the child process
+_PIPE_BYTES = 1 << 20  # a frame with ids and depth has 0.9 MB; the default of 64 KiB would cost many wake-ups
 _LARGEST_BODY = 1 << 30
 _NOT_PROTOCOL = (
     KeyError,
@@ -44,7 +44,12 @@ class PeerFault(SimulatorError):
 
 
 class SafeFifoServer(FifoServer):
-    """A drop-in FIFO server. `fault` holds the first failure; after it the server is dead for good."""
+    """A drop-in replacement of ai2thor's FIFO server.
+
+    Attributes:
+        fault: the failure, after which the server cannot be used again; None before.
+        current_action: name of the action in progress, for messages.
+    """
 
     server_pipe: Any
     client_pipe: Any
@@ -59,16 +64,16 @@ class SafeFifoServer(FifoServer):
     ) -> None:
         super().__init__(width, height, timeout, depth_format, add_depth_noise)
         self.fault: PeerFault | None = None
-        self.doing = "starting"
+        self.current_action = "starting"
         self._deadline = float("inf")
         self._seconds = 0.0
-        self._connected = False
+        self._connected = False  # True once the simulator has sent something
 
     def receive(self, timeout: float | None = None) -> MultiAgentEvent:
         """Wait for one reply.
 
         Args:
-            timeout: seconds for the whole reply; None takes the server's own.
+            timeout: time limit of the whole reply in seconds; None is the server's own limit.
 
         Raises:
             PeerFault: the simulator died, hung, or sent something that is not its protocol.
@@ -86,11 +91,11 @@ class SafeFifoServer(FifoServer):
         Raises:
             PeerFault: the simulator died or does not read.
         """
-        self.doing = str(action.get("action"))
+        self.current_action = str(action.get("action"))
         super().send(action)
 
     def stop(self) -> None:
-        """Kills the simulator, reaps it, closes the pipes and removes their folder. Safe to call again."""
+        """Kill and reap the simulator, and remove its pipes. Calling it again does nothing."""
         process = self.unity_proc
         if process is not None and process.poll() is None:
             process.kill()
@@ -118,7 +123,7 @@ class SafeFifoServer(FifoServer):
         self,
         server_pipe: io.FileIO,
         message_size: int,
-        timeout: float | None,  # the deadline is that of the whole reply, not of one read
+        timeout: float | None,  # unused: `_start_clock` sets the deadline of the whole reply
     ) -> bytearray:
         """Read exactly `message_size` bytes."""
         if message_size > _LARGEST_BODY:
@@ -131,7 +136,7 @@ class SafeFifoServer(FifoServer):
         return body
 
     def _read_some(self, descriptor: int, into: memoryview) -> int:
-        """Read what is there, at least one byte."""
+        """Read what is available, at least one byte."""
         while True:
             try:
                 count = os.readv(descriptor, [into])
@@ -141,8 +146,8 @@ class SafeFifoServer(FifoServer):
                 self._connected = True
                 return count
             if count == 0 and self._connected:
-                raise self._fail("died", self._exit_words())
-            # No writer yet (0) or nothing to read (-1). Without a writer select would return at once.
+                raise self._fail("died", self._exit_message())  # end of file: the simulator closed its end
+            # No writer yet (0), or nothing to read (-1). Without a writer `select` would return at once, so sleep.
             self._check()
             if count == 0:
                 time.sleep(0.005)
@@ -158,14 +163,14 @@ class SafeFifoServer(FifoServer):
                 self._check()
                 select.select([], [descriptor], [], _WATCH_SECONDS)
             except BrokenPipeError as error:
-                raise self._fail("died", self._exit_words()) from error
+                raise self._fail("died", self._exit_message()) from error
 
     def _open_client_pipe(self) -> io.FileIO:
         """Open the pipe to the simulator as soon as it has opened its end."""
         while True:
             try:
                 return _open_pipe(self.client_pipe_path, os.O_WRONLY)
-            except OSError:  # ENXIO: nobody reads yet
+            except OSError:  # ENXIO: the simulator has not opened it for reading yet
                 self._check()
                 time.sleep(0.005)
 
@@ -175,29 +180,29 @@ class SafeFifoServer(FifoServer):
         self._deadline = time.monotonic() + self._seconds
 
     def _check(self) -> None:
-        """Raise where waiting on is pointless."""
+        """Raise if the process has ended or the time limit has passed."""
         if self.unity_proc is not None and self.unity_proc.poll() is not None:
-            raise self._fail("died", self._exit_words())
+            raise self._fail("died", self._exit_message())
         if time.monotonic() > self._deadline:
             raise self._fail("hung", f"gave no answer within {self._seconds:g} s")
 
-    def _exit_words(self) -> str:
+    def _exit_message(self) -> str:
         if self.unity_proc is None:
             return "closed its pipe"
         try:
-            code = self.unity_proc.wait(timeout=1.0)
+            code = self.unity_proc.wait(timeout=1.0)  # pipes close a moment before the process can be reaped
         except subprocess.TimeoutExpired:
             return "closed its pipe while still running"
         return f"died (exit status {code})"
 
-    def _fail(self, fault_type: str, words: str) -> PeerFault:
-        self.fault = PeerFault(fault_type, f"the simulator {words} at {self.doing}")
+    def _fail(self, fault_type: str, message: str) -> PeerFault:
+        self.fault = PeerFault(fault_type, f"the simulator {message} at {self.current_action}")
         return self.fault
 
 
 def _open_pipe(path: str, mode: int) -> io.FileIO:
     descriptor = os.open(path, mode | os.O_NONBLOCK | os.O_CLOEXEC)
-    with contextlib.suppress(OSError):  # a smaller pipe only costs time, and systems may limit its size
+    with contextlib.suppress(OSError):  # systems may limit the size; a smaller pipe only costs time
         fcntl.fcntl(descriptor, fcntl.F_SETPIPE_SZ, _PIPE_BYTES)
     return io.FileIO(descriptor, "rb" if mode == os.O_RDONLY else "wb")
 

@@ -1,4 +1,4 @@
-"""A typed view of what the simulator reports after an action."""
+"""Typed metadata that the simulator reports after an action."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -25,7 +25,7 @@ __all__ = [
 
 
 class Vector(msgspec.Struct, frozen=True):
-    """Metres in Unity's axes (y up), or degrees about them."""
+    """Metres along Unity's axes (y up), or degrees about them."""
 
     x: float = 0.0
     y: float = 0.0
@@ -40,7 +40,7 @@ class Box(msgspec.Struct, frozen=True):
 
 
 class ThorObject(msgspec.Struct, rename="camel", frozen=True):
-    """One object of `metadata["objects"]`; the names and meanings are AI2-THOR's."""
+    """One object of `metadata["objects"]`; names and meanings are AI2-THOR's."""
 
     object_id: str
     object_type: str
@@ -75,9 +75,13 @@ class ThorObject(msgspec.Struct, rename="camel", frozen=True):
 
 
 class AgentPose(msgspec.Struct, frozen=True):
-    """Where the agent is; `rotation` is about the vertical, `horizon` downwards, both in degrees.
+    """The agent's pose.
 
-    `standing` is None where the agent cannot crouch.
+    Attributes:
+        position: position in metres.
+        rotation: rotation about the vertical, degrees.
+        horizon: angle of the camera below the horizon, degrees.
+        standing: False if the agent crouches, None if it cannot crouch.
     """
 
     position: Vector
@@ -99,7 +103,7 @@ class ArmJoint(msgspec.Struct, rename="camel", frozen=True):
     """One joint of an arm.
 
     `root_relative_position` and `root_relative_rotation` are in the frame of the arm's base, `local_rotation` in that
-    of the joint before; what the first joint alone tells is None at the others.
+    of the joint before. AI2-THOR reports `arm_base_height` and `elbow_orientation` only for the first joint.
     """
 
     name: str
@@ -113,15 +117,15 @@ class ArmJoint(msgspec.Struct, rename="camel", frozen=True):
 
 
 class ArmState(msgspec.Struct, frozen=True):
-    """`metadata["arm"]`: how the arm is bent, what it holds, and what the sphere of its hand meets.
+    """`metadata["arm"]`: the arm's joints, what it holds, and what is in the sphere of its hand.
 
     Attributes:
-        joints: from the base to the wrist.
-        held: ids of what it holds.
-        pickupable: ids of what `PickupObject` would pick up now.
-        touched: ids of all loose things and furniture in the sphere that it does not hold.
-        sphere_center: metres, in the world.
-        sphere_radius: metres.
+        joints: joints from the base to the wrist.
+        held: ids of the held objects.
+        pickupable: ids of the objects that `PickupObject` would pick up now.
+        touched: ids of all other objects in the sphere, furniture included.
+        sphere_center: centre of the sphere in world coordinates, metres.
+        sphere_radius: radius of the sphere, metres.
     """
 
     joints: list[ArmJoint]
@@ -133,12 +137,12 @@ class ArmState(msgspec.Struct, frozen=True):
 
     @property
     def wrist(self) -> Vector:
-        """Where the wrist is, metres in the world."""
+        """Position of the wrist in world coordinates, metres."""
         return self.joints[-1].position
 
     @property
     def base_height(self) -> float:
-        """Height of the arm's base in the world, metres."""
+        """Height of the arm's base in world coordinates, metres."""
         return self.joints[0].position.y
 
 
@@ -152,21 +156,21 @@ class Instance:
 
 @dataclass(frozen=True)
 class SimulatorView:
-    """The world after one action.
+    """State of the simulator after one action.
 
     Attributes:
-        frame: RGB, uint8, [height, width, 3], contiguous; None where frames are off.
-        depth: metres, float32, [height, width]; None where depth is off.
-        objects: the objects by id.
-        agent: the agent's pose.
+        frame: RGB, uint8, [height, width, 3], contiguous; None if frames are not rendered.
+        depth: metres, float32, [height, width]; None if depth is not rendered.
+        objects: objects by id.
+        agent: pose of the agent.
         inventory: ids of the objects that the agent holds, in its hand or with its arm.
-        success: whether the action was carried out.
-        error: the simulator's message where it was not.
-        error_code: the simulator's code for it.
+        success: True if the action was accepted.
+        error: the simulator's message if the action was refused.
+        error_code: the simulator's code of this error.
         result: `actionReturn`.
         scene: name of the scene.
-        instances: what the frame shows, by object id; None where instance segmentation is off.
-        arm: the agent's arm; None for an agent without.
+        instances: objects in the frame by id; None if instance segmentation is not rendered.
+        arm: arm of the agent; None if it has none.
     """
 
     frame: NDArray[np.uint8] | None
@@ -184,17 +188,17 @@ class SimulatorView:
 
 
 def view_of(event: Any) -> SimulatorView:
-    """Turn an `ai2thor.server.Event` into a View.
+    """Convert an `ai2thor.server.Event`.
 
     Raises:
-        SimulatorError: the metadata lacks a field or has it in another form.
+        SimulatorError: a field of the metadata is missing or has another form.
     """
     metadata = event.metadata
     try:
         objects = msgspec.convert(metadata["objects"], list[ThorObject])
         agent = _pose(metadata["agent"])
         arm = msgspec.convert(metadata.get("arm"), ArmState | None)
-        # Arm agents leave the inventory empty and tell of what they hold among the arm's state.
+        # The inventory of arm agents is always empty; what they hold is in the arm's state.
         in_hand = [item["objectId"] for item in metadata["inventoryObjects"] or ()]
     except (msgspec.ValidationError, KeyError, TypeError) as error:
         raise SimulatorError(f"metadata of {metadata['lastAction']}: {error}; use AI2-THOR 5.x") from error
@@ -215,32 +219,29 @@ def view_of(event: Any) -> SimulatorView:
 
 
 def instances_of(codes: NDArray[np.uint32]) -> dict[int, Instance]:
-    """Count and box the pixels of each code.
+    """Return the number of pixels and the box of each code.
 
     Args:
         codes: one code per pixel, [height, width].
-
-    Returns:
-        Code to its instance.
     """
     width = codes.shape[1]
-    # Work on runs of equal pixels within a row: there are some thousands of them, not 90,000.
+    # This works on runs of equal pixels within a row, of which there are a few thousand instead of 90,000 pixels.
     starts = np.empty(codes.shape, dtype=bool)
     starts[:, 0] = True
     np.not_equal(codes[:, 1:], codes[:, :-1], out=starts[:, 1:])
     first = np.flatnonzero(starts)
     length = np.diff(first, append=codes.size)
-    shown, which = np.unique(codes.ravel()[first], return_inverse=True)
+    values, index = np.unique(codes.ravel()[first], return_inverse=True)
     row, left = np.divmod(first, width)
-    pixels = np.bincount(which, weights=length).astype(int)
-    low = np.full((len(shown), 2), codes.size)
-    high = np.zeros((len(shown), 2), dtype=int)
-    np.minimum.at(low, which, np.stack([left, row], axis=1))
-    np.maximum.at(high, which, np.stack([left + length - 1, row], axis=1))
+    pixels = np.bincount(index, weights=length).astype(int)
+    low = np.full((len(values), 2), codes.size)
+    high = np.zeros((len(values), 2), dtype=int)
+    np.minimum.at(low, index, np.stack([left, row], axis=1))
+    np.maximum.at(high, index, np.stack([left + length - 1, row], axis=1))
     boxes = np.concatenate([low, high], axis=1).tolist()
     return {
         int(code): Instance(int(count), (box[0], box[1], box[2], box[3]))
-        for code, count, box in zip(shown, pixels, boxes, strict=True)
+        for code, count, box in zip(values, pixels, boxes, strict=True)
     }
 
 
@@ -258,7 +259,7 @@ def _instances(event: Any) -> dict[str, Instance] | None:
     if frame is None:
         return None
     pixels = frame.astype(np.uint32)
-    found = instances_of(pixels[..., 0] << 16 | pixels[..., 1] << 8 | pixels[..., 2])
+    instances = instances_of(pixels[..., 0] << 16 | pixels[..., 1] << 8 | pixels[..., 2])
     names = {r << 16 | g << 8 | b: name for (r, g, b), name in event.color_to_object_id.items()}
-    # A name without "|" is a class of the surroundings (walls, floor), not an object.
-    return {names[code]: instance for code, instance in found.items() if code in names and "|" in names[code]}
+    # A name without "|" is a class of the structure (walls, floor), not an object.
+    return {names[code]: instance for code, instance in instances.items() if code in names and "|" in names[code]}
