@@ -1,3 +1,3 @@
-"""What is to be done in a home: tasks, what they need of objects, plans for them, and their words."""
+"""Household tasks: goals, affordances, symbolic states, plans, places to act from, and texts."""
 
 __all__: list[str] = []

@@ -1,7 +1,7 @@
-"""Which objects go where, and what can be done to them: what makes a task sensible.
+"""The receptacles that each object type can be put into, and the actions that apply to it.
 
-The tables are the published ones (`affordances.yaml`), narrower than what AI2-THOR allows: it would take a statue into
-the sink basin. Types are those of AI2-THOR 5.x.
+The tables are the published ones (`affordances.yaml`). They are narrower than what AI2-THOR allows, which would accept
+a statue in the sink basin. Types are those of AI2-THOR 5.x.
 """
 
 from collections.abc import Iterable
@@ -32,7 +32,7 @@ _RENAMED = {"Glassbottle": "Bottle", "PaperTowel": "PaperTowelRoll", "ToiletPape
 
 
 def modern_type(name: str) -> str:
-    """The name that AI2-THOR 5.x has for an object type of 2.1.0; one of 5.x stays as it is."""
+    """Return the AI2-THOR 5.x name of an object type of 2.1.0; names of 5.x are returned unchanged."""
     return _RENAMED.get(name, name)
 
 
@@ -44,14 +44,14 @@ _HOLDS = {receptacle: _types(names) for receptacle, names in _TABLES["receptacle
 _ACTIONS = {action: _types(names) for action, names in _TABLES["action_objects"].items()}
 
 CLEANABLE, COOLABLE, HEATABLE = (_ACTIONS[name] for name in ("Cleanable", "Coolable", "Heatable"))
-STOWABLE = frozenset[str]().union(*_HOLDS.values())  # what goes anywhere at all
-# The table has the egg too, but a cut egg is cracked: it leaves nothing that could be put anywhere.
+STOWABLE = frozenset[str]().union(*_HOLDS.values())  # types with at least one receptacle
+# Without the egg of the published table: a sliced egg is cracked and leaves nothing that could be put anywhere.
 SLICEABLE = frozenset(name for name in _ACTIONS["Sliceable"] if f"{name}Sliced" in STOWABLE)
 KNIVES = frozenset({"ButterKnife", "Knife"})
 LIGHTS = _ACTIONS["Toggleable"]
 MOVABLE_RECEPTACLES = _types(_TABLES["movable_receptacles"])
 GOALS_BY_ROOM: dict[str, frozenset[str]] = {name: frozenset(rooms) for name, rooms in _TABLES["goals_by_room"].items()}
-KNOWN_TYPES = STOWABLE.union(_HOLDS, KNIVES, *_ACTIONS.values(), {"Faucet", "Microwave"})  # that tasks are about
+KNOWN_TYPES = STOWABLE.union(_HOLDS, KNIVES, *_ACTIONS.values(), {"Faucet", "Microwave"})  # all types in tasks
 MAX_PLAN_STEPS: int = _TABLES["planner_max_steps"]
 
 _INSIDE = frozenset(
@@ -61,11 +61,10 @@ _INSIDE = frozenset(
 
 
 def goes_into(item: str, receptacle: str) -> bool:
-    """Whether it is sensible to put an object of type `item` into or onto a receptacle of type
-    `receptacle`."""
+    """Return True if the published table has object type `item` for receptacle type `receptacle`."""
     return item in _HOLDS.get(receptacle, frozenset())
 
 
 def preposition(receptacle: str) -> str:
-    """ "in" or "on", as fits the receptacle type."""
+    """Return "in" or "on" for a receptacle type."""
     return "in" if receptacle in _INSIDE else "on"

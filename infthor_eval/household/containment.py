@@ -1,4 +1,4 @@
-"""What an object is directly in or on, of all the receptacles that the simulator names for it."""
+"""Which of the receptacles that the simulator reports for an object it is directly in or on."""
 
 import math
 from collections.abc import Mapping
@@ -11,35 +11,37 @@ __all__ = ["contents_of", "direct_parent", "is_in", "logged_parent"]
 
 
 def contents_of(holder: str, objects: Mapping[str, ThorObject]) -> frozenset[str]:
-    """Ids of what is in or on a receptacle, and of what is in or on that."""
-    found: set[str] = set()
+    """Return the ids of all objects in or on a receptacle, including those in or on its contents."""
+    contents: set[str] = set()
     new = {holder}
     while new:
+        # Both directions are read, as either may be missing from the metadata.
         inside = {key for parent in new for key in objects[parent].receptacle_object_ids or ()}
         inside |= {key for key, item in objects.items() if new & set(item.parent_receptacles or ())}
-        new = (inside & objects.keys()) - found - {holder}
-        found |= new
-    return frozenset(found)
+        new = (inside & objects.keys()) - contents - {holder}
+        contents |= new
+    return frozenset(contents)
 
 
-def is_in(wanted: str, receptacle_id: str, view: SimulatorView) -> bool:
-    """Whether an object lies in or on a receptacle itself.
+def is_in(object_id: str, receptacle_id: str, view: SimulatorView) -> bool:
+    """Return True if an object is directly in or on a receptacle.
 
-    In a bowl that stands in it is not in it; of furniture within furniture, each that the simulator names will do.
+    An object in a bowl is not directly in the cabinet around the bowl. If furniture is nested (a drawer in a dresser),
+    every piece that the simulator reports counts.
     """
-    item, holder = view.objects.get(wanted), view.objects.get(receptacle_id)
+    item, holder = view.objects.get(object_id), view.objects.get(receptacle_id)
     if item is None or holder is None:
         return False
     parents = set(item.parent_receptacles or ())
-    carried = any(key in view.objects and view.objects[key].pickupable for key in parents - {receptacle_id})
-    named = receptacle_id in parents or wanted in (holder.receptacle_object_ids or ())
-    return named and (holder.pickupable or not carried)
+    in_carrier = any(key in view.objects and view.objects[key].pickupable for key in parents - {receptacle_id})
+    reported = receptacle_id in parents or object_id in (holder.receptacle_object_ids or ())
+    return reported and (holder.pickupable or not in_carrier)
 
 
 def direct_parent(item: ThorObject, objects: Mapping[str, ThorObject]) -> str | None:
-    """The innermost receptacle that an object is in or on, by its id; the floor may be it.
+    """Return the id of the innermost receptacle that an object is in or on, possibly the floor; None if there is none.
 
-    Where several could be, it is the smallest: who plans or acts must take the object for somewhere.
+    If several qualify, it is the smallest: planning needs one place even where the report is ambiguous.
     """
     parents = [objects[key] for key in item.parent_receptacles or () if key in objects and key != item.object_id]
     if not parents:
@@ -48,16 +50,17 @@ def direct_parent(item: ThorObject, objects: Mapping[str, ThorObject]) -> str | 
 
 
 def logged_parent(state: ObjectState, world: Mapping[str, ObjectState]) -> str | None:
-    """The same of an object in the step log; None where it is held, lies on the floor, or it is not clear.
+    """Return the innermost receptacle of an object in the step log.
 
-    Who tells what was seen must not guess, and a log has no sizes to guess by.
+    It is None if the object is held, lies on the floor, or its receptacle is ambiguous: questions and summaries must
+    not guess, and a log has no sizes to compare.
     """
     if state.held:
         return None
     parents = [key for key in state.parents if key in world and world[key].type != "Floor"]
-    # The innermost is in all the others; basins count as their sinks.
-    inner = [key for key in parents if all(_within(world, key, other) for other in parents if other != key)]
-    return inner[0] if inner else None
+    # The innermost one is inside all others. Basins are inside their sinks.
+    innermost = [key for key in parents if all(_within(world, key, other) for other in parents if other != key)]
+    return innermost[0] if innermost else None
 
 
 def _volume(item: ThorObject) -> float:

@@ -1,8 +1,8 @@
-"""The planner's operators and problems as PDDL, so that anyone can check that plans are optimal.
+"""The planner's operators and problems as PDDL, so that others can verify that the plans are optimal.
 
-The domain is STRIPS with types, negative preconditions and action costs: every operator costs one, and the `finish`
-actions, which recognise a goal by its object types, cost nothing. A problem holds what the planner searches in full:
-every place of the room, and the items of the types that the task is about.
+The domain is STRIPS with types, negative preconditions and action costs: every operator costs one. PDDL goals refer to
+objects but tasks to object types, so zero-cost `finish` actions recognise each task's goal. A problem has all places of
+the room, without the planner's reductions, and the items of the task's types.
 """
 
 from collections.abc import Iterable
@@ -101,19 +101,20 @@ DOMAIN = _domain()
 
 
 def problem(task: Task, room: SymbolicRoom, name: str = "task") -> str:
-    """One task in one room as a PDDL problem for `DOMAIN`.
+    """Return a task in a room as a PDDL problem for `DOMAIN`.
 
     Args:
-        task: what is to hold in the end.
-        room: as it is now.
-        name: of the problem.
+        task: the task.
+        room: the room in its current state.
+        name: name of the problem.
     """
     items = sorted(relevant_items(task, room))
     where = dict(room.start.where)
-    spots = [item for item in items if where[item] == FLOOR]
+    on_floor = [item for item in items if where[item] == FLOOR]
     names = {key: f"p{number}" for number, key in enumerate(sorted(room.places))}
     names |= {key: f"i{number}" for number, key in enumerate(items)}
-    places = [names[key] for key in sorted(room.places)] + [f"floor-{names[key]}" for key in spots] + ["nowhere"]
+    # An item on the floor has a place of its own. "nowhere" is where the agent starts if it is at no place.
+    places = [names[key] for key in sorted(room.places)] + [f"floor-{names[key]}" for key in on_floor] + ["nowhere"]
     comments = [f" ; {short} {key}" for key, short in names.items()]
     facts = [*_state(room, items, names), *_rules(task, room, items, names), *_goal(task, room, items, names)]
     return "\n".join(

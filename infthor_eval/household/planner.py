@@ -1,8 +1,8 @@
-"""Optimal plans: fewest sub-goals, by A* over the symbolic state.
+"""Optimal plans, with the fewest sub-goals, by A* over symbolic states.
 
-Only what can matter is searched. Every operator costs one, so all places that play no part in the task (not a
-source of a needed item, not a goal, no sink, microwave, fridge or lamp that is needed) are alike, and for
-each item that may have to be put aside one of those is enough; this keeps plans optimal.
+The search is reduced to what can matter, and plans stay optimal. Every operator costs one, so all places are equivalent
+that are not part of the task (not the source of a needed item, not a goal, not a needed sink, microwave, fridge or
+lamp). Each item that may have to be put aside needs only one of these.
 """
 
 import heapq
@@ -17,44 +17,45 @@ from infthor_eval.household.tasks import Task, TaskType
 
 __all__ = ["plan", "relevant_items"]
 
-_LIMIT = 60_000  # states looked at; the hardest of the solvable problems tried took a quarter of it
+_LIMIT = 60_000  # states of a search; the hardest of the solvable problems tried needed a quarter of it
 
 
 def plan(task: Task, room: SymbolicRoom) -> list[Operator] | None:
-    """The shortest plan for a task.
+    """Return the shortest plan for a task.
 
     Args:
-        task: what is to hold in the end.
-        room: as it is now.
+        task: the task.
+        room: the room in its current state.
 
     Returns:
-        The operators in order, empty where the goal holds already; None where there is no plan.
+        The operators in order; empty if the goal holds already, None if there is no plan.
     """
-    if _hopeless(task, room):
+    if _is_infeasible(task, room):
         return None
     problem = _Problem(task, room)
     start = problem.start
-    tie = itertools.count()
-    queue = [(lower_bound(task, room, start), next(tie), 0, start)]
-    came: dict[State, tuple[State, Operator] | None] = {start: None}
+    # Ties are broken by the order of insertion: states are not ordered, and plans must not depend on hashes.
+    order = itertools.count()
+    queue = [(lower_bound(task, room, start), next(order), 0, start)]
+    previous: dict[State, tuple[State, Operator] | None] = {start: None}
     cost = {start: 0}
-    while queue and len(came) < _LIMIT:
+    while queue and len(previous) < _LIMIT:
         bound, _, spent, state = heapq.heappop(queue)
-        if spent > cost[state]:
+        if spent > cost[state]:  # an outdated entry: the state was reached at a lower cost since
             continue
-        if bound == spent:  # the bound is 0 at goals alone
-            return _trace(came, state)
+        if bound == spent:  # `lower_bound` is 0 only at goals
+            return _trace(previous, state)
         for operator, following in problem.successors(state):
             if spent + 1 < cost.get(following, _LIMIT):
                 cost[following] = spent + 1
-                came[following] = (state, operator)
+                previous[following] = (state, operator)
                 rest = lower_bound(task, room, following)
-                heapq.heappush(queue, (spent + 1 + rest, next(tie), spent + 1, following))
+                heapq.heappush(queue, (spent + 1 + rest, next(order), spent + 1, following))
     return None
 
 
-def _hopeless(task: Task, room: SymbolicRoom) -> bool:
-    """Whether it is plain, without searching, that nothing can get to where the task wants it."""
+def _is_infeasible(task: Task, room: SymbolicRoom) -> bool:
+    """Return True if no item fits into any goal receptacle; without this check the search would run to its limit."""
     if task.receptacle is None:
         return False
     carried = {task.movable} if task.movable is not None else {task.pickup, task.target}
@@ -64,49 +65,49 @@ def _hopeless(task: Task, room: SymbolicRoom) -> bool:
 
 
 def relevant_items(task: Task, room: SymbolicRoom) -> set[str]:
-    """Ids of the items that can play a part: those of the task's types, knives to slice with, and what holds them."""
+    """Return the ids of the items of the task's types, of knives if it slices, and of the items that hold these."""
     types = {task.pickup, task.target, task.movable} | (set(KNIVES) if task.sliced else set())
     where = dict(room.start.where)
-    kept = {item for item in where if room.types[item] in types or item == room.start.held}
+    relevant = {item for item in where if room.types[item] in types or item == room.start.held}
     if task.sliced:
-        kept |= {slice_item(item, number) for item in kept if slice_item(item, 1) in where for number in (1, 2)}
-    # What the kept items lie in may itself be carried (a mug on a plate), and must then be known.
-    for item in list(kept):
+        relevant |= {slice_item(item, number) for item in relevant if slice_item(item, 1) in where for number in (1, 2)}
+    # What these items are in can itself be carried (a mug on a plate), so its place must be known.
+    for item in list(relevant):
         while (item := where.get(item, ABSENT)) in where:
-            kept.add(item)
-    return kept
+            relevant.add(item)
+    return relevant
 
 
-def _trace(came: dict[State, tuple[State, Operator] | None], state: State) -> list[Operator]:
+def _trace(previous: dict[State, tuple[State, Operator] | None], state: State) -> list[Operator]:
     operators: list[Operator] = []
-    while (step := came[state]) is not None:
+    while (step := previous[state]) is not None:
         operators.append(step[1])
         state = step[0]
     return operators[::-1]
 
 
 class _Problem:
-    """One task in one room, cut down to what can matter."""
+    """One task in one room, reduced to the relevant items and places."""
 
     def __init__(self, task: Task, room: SymbolicRoom) -> None:
         self._task = task
         self._room = room
         where = dict(room.start.where)
-        kept = relevant_items(task, room)
+        relevant = relevant_items(task, room)
         self.start = State(
             room.start.at,
             room.start.held,
-            tuple((item, parent) for item, parent in room.start.where if item in kept),
-            room.start.clean & kept,
-            room.start.hot & kept,
-            room.start.cold & kept,
+            tuple((item, parent) for item, parent in room.start.where if item in relevant),
+            room.start.clean & relevant,
+            room.start.hot & relevant,
+            room.start.cold & relevant,
             room.start.lit,
         )
-        self._movables = [item for item in sorted(kept) if room.types[item] == task.movable]
-        self._targets = self._relevant_places(kept, where)
+        self._movables = [item for item in sorted(relevant) if room.types[item] == task.movable]
+        self._targets = self._relevant_places(relevant, where)
 
     def successors(self, state: State) -> Iterator[tuple[Operator, State]]:
-        """Every operator that applies, and what it leads to."""
+        """Yield the applicable operators with the states that they lead to."""
         where = dict(state.where)
         yield from self._gotos(state, where)
         if state.held is None:
@@ -117,19 +118,18 @@ class _Problem:
         if state.at is not None and self._room.types[state.at] == self._task.light and state.at not in state.lit:
             yield Operator("ToggleObject", state.at), _with(state, lit=state.lit | {state.at})
 
-    def _relevant_places(self, kept: set[str], where: dict[str, str]) -> list[str]:
+    def _relevant_places(self, items: set[str], where: dict[str, str]) -> list[str]:
         room, task = self._room, self._task
-        wanted = {task.receptacle, task.light, APPLIANCE.get(task.task_type)}
-        chosen = {place for place in room.places if room.types[place] in wanted}
-        chosen |= {place for item in kept if (place := room.place_of(item, where)) in room.places and place}
-        wanted_or_source = set(chosen)
-        for item in sorted(kept):
-            fitting = [place for place in sorted(room.places) if self._takes(place, item)]
-            spare = [place for place in fitting if place not in wanted_or_source]
-            chosen |= set(spare[:1])
-        return sorted(chosen)
+        types = {task.receptacle, task.light, APPLIANCE.get(task.task_type)}
+        needed = {place for place in room.places if room.types[place] in types}
+        needed |= {place for item in items if (place := room.place_of(item, where)) in room.places and place}
+        spare = set()  # one place per item to put it aside, see the module's docstring
+        for item in sorted(items):
+            others = [place for place in sorted(room.places - needed) if self._fits(place, item)]
+            spare |= set(others[:1])
+        return sorted(needed | spare)
 
-    def _takes(self, receptacle: str, item: str) -> bool:
+    def _fits(self, receptacle: str, item: str) -> bool:
         types = self._room.types
         fits = receptacle in self._room.receptacles and goes_into(types[item], types[receptacle])
         return fits and (item, receptacle) not in self._room.refused
@@ -143,14 +143,14 @@ class _Problem:
     def _pickups(self, state: State, where: dict[str, str]) -> Iterator[tuple[Operator, State]]:
         for item, parent in where.items():
             if parent != ABSENT and self._room.place_of(item, where) == state.at:
-                yield Operator("PickupObject", item), _moved(state, item, ABSENT, held=item)
+                yield Operator("PickupObject", item), _move(state, item, ABSENT, held=item)
 
     def _puts(self, state: State, where: dict[str, str], held: str) -> Iterator[tuple[Operator, State]]:
         for receptacle in itertools.chain((state.at,), self._movables):
-            if receptacle is None or receptacle == held or not self._takes(receptacle, held):
+            if receptacle is None or receptacle == held or not self._fits(receptacle, held):
                 continue
             if self._room.place_of(receptacle, where) == state.at:
-                yield Operator("PutObject", held, receptacle), _moved(state, held, receptacle, held=None)
+                yield Operator("PutObject", held, receptacle), _move(state, held, receptacle, held=None)
 
     def _treatments(self, state: State, where: dict[str, str], held: str) -> Iterator[tuple[Operator, State]]:
         at = self._room.types.get(state.at or "")
@@ -173,13 +173,13 @@ class _Problem:
                 slices = {key: parent for key in where if key.startswith(f"{item}#")}
                 changed = tuple((key, slices.get(key, old)) for key, old in state.where)
                 after = _with(state, where=changed)
-                yield Operator("SliceObject", item), _moved(after, item, ABSENT, held=state.held)
+                yield Operator("SliceObject", item), _move(after, item, ABSENT, held=state.held)
 
 
 def _with(state: State, **changes: object) -> State:
     return replace(state, **changes)  # type: ignore[arg-type]
 
 
-def _moved(state: State, item: str, parent: str, held: str | None) -> State:
+def _move(state: State, item: str, parent: str, held: str | None) -> State:
     where = tuple((key, parent if key == item else old) for key, old in state.where)
     return _with(state, where=where, held=held)

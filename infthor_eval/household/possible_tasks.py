@@ -1,4 +1,4 @@
-"""The tasks that a room has the objects for."""
+"""The tasks that are possible with the objects of a room."""
 
 from collections import Counter
 from collections.abc import Iterable, Iterator
@@ -24,29 +24,30 @@ _APPLIANCES = {TaskType.CLEAN: {"SinkBasin", "Faucet"}, TaskType.HEAT: {"Microwa
 
 
 def tasks_of(room: SymbolicRoom, extra_types: Iterable[str] = ()) -> list[Task]:
-    """Every task that the room has the objects for, in a fixed order."""
+    """Return all tasks that are possible with a room's objects, in a fixed order, which seeded sampling relies on.
+
+    Args:
+        room: the room in its current state.
+        extra_types: types of the objects that are neither items nor places (faucets).
+    """
     where = dict(room.start.where)
-    here = {room.types[item] for item, parent in where.items() if parent != ABSENT or item == room.start.held}
+    items = {room.types[item] for item, parent in where.items() if parent != ABSENT or item == room.start.held}
     furniture = {room.types[place] for place in room.places & room.receptacles}
     lamps = {room.types[lamp] for lamp in room.places - room.start.lit if room.types[lamp] in LIGHTS}
-    known = here | furniture | set(extra_types)
+    known = items | furniture | set(extra_types)
     count = Counter(room.types[item] for item, parent in where.items() if parent != ABSENT)
     tasks: list[Task] = []
-    for pickup in sorted(here & STOWABLE):
-        for sliced in (False, True) if _can_be_sliced(pickup, here) else (False,):
+    for pickup in sorted(items & STOWABLE):
+        for sliced in (False, True) if pickup in SLICEABLE and KNIVES & items else (False,):
             tasks += [Task(TaskType.EXAMINE, pickup, light=lamp, sliced=sliced) for lamp in sorted(lamps)]
             for receptacle in sorted(furniture):
                 if goes_into(f"{pickup}Sliced" if sliced else pickup, receptacle):
-                    tasks += _placements(pickup, receptacle, sliced, known, here, count)
+                    tasks += _placements(pickup, receptacle, sliced, known, items, count)
     return [task for task in tasks if not task.pickup.endswith("Sliced")]
 
 
-def _can_be_sliced(pickup: str, here: set[str]) -> bool:
-    return pickup in SLICEABLE and bool(KNIVES & here)
-
-
 def _placements(
-    pickup: str, receptacle: str, sliced: bool, known: set[str], here: set[str], count: Counter[str]
+    pickup: str, receptacle: str, sliced: bool, known: set[str], items: set[str], count: Counter[str]
 ) -> Iterator[Task]:
     task = Task(TaskType.PLACE, pickup, receptacle, sliced=sliced)
     target = task.target
@@ -56,6 +57,6 @@ def _placements(
     for task_type, types in _TREATED.items():
         if target in types and known >= _APPLIANCES[task_type] and receptacle not in _APPLIANCES[task_type]:
             yield Task(task_type, pickup, receptacle, sliced=sliced)
-    for movable in sorted(MOVABLE_RECEPTACLES & here - {pickup}):
+    for movable in sorted(MOVABLE_RECEPTACLES & items - {pickup}):
         if goes_into(target, movable) and goes_into(movable, receptacle):
             yield Task(TaskType.STACK, pickup, receptacle, movable=movable, sliced=sliced)

@@ -1,4 +1,4 @@
-"""What sort of room a scene is, by its name, and which tasks belong in it."""
+"""Room types of scenes, by their names, and the task types of each."""
 
 import re
 
@@ -18,7 +18,7 @@ _FLOOR_PLANS = {
 
 
 def scene_type(scene: str) -> str | None:
-    """The sort of room, in the published tables' words ("LivingRoom"); None of a house and of unknown names."""
+    """Return the room type in the published tables' words ("LivingRoom"), or None for houses and unknown names."""
     number = re.fullmatch(r"FloorPlan(\d+)", scene)
     if number is not None:
         return next((name for name, numbers in _FLOOR_PLANS.items() if int(number[1]) in numbers), None)
@@ -26,6 +26,6 @@ def scene_type(scene: str) -> str | None:
 
 
 def usual_tasks(scene: str) -> frozenset[TaskType]:
-    """The task types that belong in a scene; all of them where its sort is not known."""
+    """Return the task types of a scene's room type, or all task types if that is unknown."""
     room = scene_type(scene)
     return frozenset(name for name in TaskType if room is None or room in GOALS_BY_ROOM[name])

@@ -1,7 +1,7 @@
-"""Finding where to stand so that an object can be seen and acted on.
+"""Finding poses from which an object is visible and can be acted on.
 
-Candidates come from geometry; whether one does is asked of the simulator itself, by teleporting there and
-back. That moves nothing but the agent, so it leaves no trace in a trajectory.
+Candidates come from geometry. The simulator then tests them: the agent is teleported there and back, which moves
+nothing else and is not part of the trajectory.
 """
 
 import math
@@ -17,21 +17,21 @@ from infthor_eval.thor.view import AgentPose, SimulatorView, ThorObject, Vector
 
 __all__ = ["CAMERA_HEIGHT", "HORIZON_STEP", "Viewpoint", "find_viewpoint", "grid_pose_of", "reachable_grid"]
 
-CAMERA_HEIGHT = 0.675  # of the camera above the agent's position, metres
-HORIZON_STEP = 30
+CAMERA_HEIGHT = 0.675  # height of the camera above the agent's position, metres
+HORIZON_STEP = 30  # degrees
 _HORIZONS = (-30, 0, 30, 60)
 _REACH = 1.5  # the simulator's visibility distance, metres
-_SIDEWAYS = 32.0  # degrees off the camera's axis; half the field of view is 30
-_TOO_NEAR = 0.5  # closer than this a door may hit the agent and an object fills the frame
-_TRIALS = 30
-_PATIENCE = 4  # viewpoints more that are tried for one that has a small object well inside the frame
-_MARGIN, _SIDE = 15, 300  # pixels: of the frame's edge, and of the frame
-_UNSEEN: dict[str, Any] = {"renderImage": False}  # the id image tells what is in the frame
+_SIDEWAYS = 32.0  # maximum angle from the camera's axis, degrees; half the field of view is 30
+_TOO_NEAR = 0.5  # metres; closer, a door may hit the agent, and an object fills the frame
+_MAX_TRIALS = 30
+_EXTRA_TRIALS = 4  # trials after the first success, for a viewpoint with the object well inside the frame
+_MARGIN, _SIDE = 15, 300  # margin and width of the frame, pixels
+_NO_IMAGE: dict[str, Any] = {"renderImage": False}  # the instance image is enough to tell what is in the frame
 
 
 @dataclass(frozen=True)
 class Viewpoint:
-    """A stand and the camera's horizon (degrees downwards)."""
+    """A pose on the grid, and the camera's angle below the horizon in degrees."""
 
     pose: GridPose
     horizon: int
@@ -44,48 +44,48 @@ def find_viewpoint(
     inside: str | None = None,
     min_pixels: int = 0,
 ) -> Viewpoint | None:
-    """The viewpoint that is the fewest actions away and from which all asked objects are visible.
+    """Return the viewpoint with the fewest actions to it from which all given objects are visible.
 
-    One a little farther away is taken where it has an object that can be carried well inside the frame, and not at the
-    edge: what is done with it then can be seen.
+    For an object that can be picked up, a slightly farther viewpoint is preferred if it has the object well inside the
+    frame, and not at its edge: the frame then shows what is done with it.
 
     Args:
-        simulator: its agent is back where it was afterwards.
+        simulator: the simulator; its agent returns to its pose.
         grid: the reachable cells.
-        shown: ids of the objects that must be visible; the first is what the agent faces.
-        inside: id of an object that is hidden in the first and must come into view when that is opened.
-        min_pixels: how large the first must appear in the frame.
+        shown: ids of the objects that must be visible; the agent faces the first.
+        inside: id of an object hidden in the first one, which must become visible when that is opened.
+        min_pixels: minimum size of the first object in the frame, pixels.
 
     Returns:
-        None where no candidate does.
+        The viewpoint, or None if no candidate qualifies.
     """
-    here = simulator.view
-    focus = here.objects[inside or shown[0]]
-    distances = grid.distances(grid_pose_of(here.agent, grid))
-    found, patience = None, _PATIENCE
-    for viewpoint in list(_candidates(here, grid, focus, distances))[:_TRIALS]:
-        there = _teleport(simulator, grid, here, viewpoint)
-        shows = there.success and _shows(there, shown, min_pixels)
-        if shows and (inside is None or _comes_into_view(simulator, shown[0], inside, min_pixels)):
-            well = inside is not None or not focus.pickupable or _is_well_inside(there, shown[0])
-            found = viewpoint if well or found is None else found
-            if well:
+    start = simulator.view
+    focus = start.objects[inside or shown[0]]
+    distances = grid.distances(grid_pose_of(start.agent, grid))
+    best, trials_left = None, _EXTRA_TRIALS
+    for viewpoint in list(_candidates(start, grid, focus, distances))[:_MAX_TRIALS]:
+        view = _teleport(simulator, grid, start, viewpoint)
+        qualifies = view.success and _shows(view, shown, min_pixels)
+        if qualifies and (inside is None or _comes_into_view(simulator, shown[0], inside, min_pixels)):
+            is_clear = inside is not None or not focus.pickupable or _is_well_inside(view, shown[0])
+            best = viewpoint if is_clear or best is None else best
+            if is_clear:
                 break
-        patience -= found is not None
-        if not patience:
+        trials_left -= best is not None
+        if not trials_left:
             break
-    simulator.query(**teleport_call(here.agent), **_UNSEEN)
-    return found
+    simulator.query(**teleport_call(start.agent), **_NO_IMAGE)
+    return best
 
 
 def reachable_grid(simulator: Simulator) -> Grid:
-    """The cells that the agent can reach as things are now."""
-    positions = simulator.query("GetReachablePositions", **_UNSEEN).result or ()
+    """Return the cells that the agent can reach in the current state."""
+    positions = simulator.query("GetReachablePositions", **_NO_IMAGE).result or ()
     return Grid((position["x"], position["z"]) for position in positions)
 
 
 def grid_pose_of(pose: AgentPose, grid: Grid) -> GridPose:
-    """The stand of a pose."""
+    """Return the nearest pose on the grid."""
     return GridPose(grid.cell(pose.position.x, pose.position.z), round(pose.rotation / 90) * 90 % 360)
 
 
@@ -97,21 +97,22 @@ def _shows(view: SimulatorView, shown: list[str], min_pixels: int) -> bool:
 
 
 def _is_well_inside(view: SimulatorView, item: str) -> bool:
-    """Whether the frame has an object off its edges."""
-    shown = (view.instances or {}).get(item)
-    return shown is None or all(_MARGIN <= edge < _SIDE - _MARGIN for edge in shown.box)
+    """Return True if an object does not touch the margin of the frame."""
+    instance = (view.instances or {}).get(item)
+    return instance is None or all(_MARGIN <= edge < _SIDE - _MARGIN for edge in instance.box)
 
 
 def _comes_into_view(simulator: Simulator, holder: str, inside: str, min_pixels: int) -> bool:
-    """Whether opening a receptacle shows an object in it, and it can be closed from here; it is closed again."""
-    opened = simulator.query("OpenObject", objectId=holder, **_UNSEEN)
-    if not opened.success:
+    """Open a receptacle and close it; return True if the object in it was visible and closing succeeded."""
+    view = simulator.query("OpenObject", objectId=holder, **_NO_IMAGE)
+    if not view.success:
         return False
-    shown = _shows(opened, [inside], min_pixels)
-    if simulator.query("CloseObject", objectId=holder, **_UNSEEN).success:
-        return shown
-    # Where an open drawer is out of sight it must not stay open: a trajectory has no action that opened it.
-    if not simulator.query("CloseObject", objectId=holder, forceAction=True, **_UNSEEN).success:
+    is_visible = _shows(view, [inside], min_pixels)
+    if simulator.query("CloseObject", objectId=holder, **_NO_IMAGE).success:
+        return is_visible
+    # An open drawer can be out of view, and then cannot be closed normally. It must not stay open, as the trajectory
+    # has no action that opened it.
+    if not simulator.query("CloseObject", objectId=holder, forceAction=True, **_NO_IMAGE).success:
         raise SimulatorError(f"{holder} was opened to look into it and cannot be closed again; choose another scene")
     return False
 
@@ -119,39 +120,35 @@ def _comes_into_view(simulator: Simulator, holder: str, inside: str, min_pixels:
 def _candidates(
     view: SimulatorView, grid: Grid, focus: ThorObject, distances: dict[GridPose, int]
 ) -> Iterator[Viewpoint]:
-    """Viewpoints from which the object should be in the frame, the nearest to walk to first."""
-    target = _middle(focus)
+    """Yield viewpoints from which the object should be in the frame, those with the fewest actions first."""
+    box = focus.axis_aligned_bounding_box
+    target = focus.position if box is None else box.center
     eye = view.agent.position.y + CAMERA_HEIGHT
     ranked = []
-    for stand, length in distances.items():
-        flat, aside = _bearing(grid.position(stand.cell), stand.facing, target)
-        if flat > _REACH or aside > _SIDEWAYS:
+    for pose, length in distances.items():
+        distance, sideways = _bearing(grid.position(pose.cell), pose.facing, target)
+        if distance > _REACH or sideways > _SIDEWAYS:
             continue
-        down = math.degrees(math.atan2(eye - target.y, max(flat, 0.1)))
-        # Worse: standing too near, or the object at the edge of the frame.
-        penalty = 4 * (flat < _TOO_NEAR) + aside / 15
+        down = math.degrees(math.atan2(eye - target.y, max(distance, 0.1)))
+        # Penalties, in numbers of actions, for standing too near and for an object off the centre of the frame.
+        penalty = 4 * (distance < _TOO_NEAR) + sideways / 15
         for horizon in sorted(_HORIZONS, key=lambda angle: abs(angle - down))[:2]:
             off = abs(horizon - down)
             turns = abs(horizon - view.agent.horizon) / HORIZON_STEP
-            ranked.append((length + turns + penalty + off / 10, stand, horizon))
-    for _, stand, horizon in sorted(ranked):
-        yield Viewpoint(stand, horizon)
+            ranked.append((length + turns + penalty + off / 10, pose, horizon))
+    for _, pose, horizon in sorted(ranked):
+        yield Viewpoint(pose, horizon)
 
 
 def _bearing(position: tuple[float, float], facing: int, target: Vector) -> tuple[float, float]:
-    """Horizontal distance to the target, and how far it is off the agent's axis, degrees."""
+    """Return the horizontal distance to the target (metres), and its angle from the agent's heading (degrees)."""
     dx, dz = target.x - position[0], target.z - position[1]
-    off = (math.degrees(math.atan2(dx, dz)) - facing + 180) % 360 - 180
-    return math.hypot(dx, dz), abs(off)
+    angle = (math.degrees(math.atan2(dx, dz)) - facing + 180) % 360 - 180
+    return math.hypot(dx, dz), abs(angle)
 
 
-def _middle(item: ThorObject) -> Vector:
-    box = item.axis_aligned_bounding_box
-    return item.position if box is None else box.center
-
-
-def _teleport(simulator: Simulator, grid: Grid, here: SimulatorView, viewpoint: Viewpoint) -> SimulatorView:
+def _teleport(simulator: Simulator, grid: Grid, start: SimulatorView, viewpoint: Viewpoint) -> SimulatorView:
     x, z = grid.position(viewpoint.pose.cell)
-    position = Vector(x, here.agent.position.y, z)
-    pose = AgentPose(position, float(viewpoint.pose.facing), float(viewpoint.horizon), here.agent.standing)
-    return simulator.query(**teleport_call(pose, force=False), **_UNSEEN)
+    position = Vector(x, start.agent.position.y, z)
+    pose = AgentPose(position, float(viewpoint.pose.facing), float(viewpoint.horizon), start.agent.standing)
+    return simulator.query(**teleport_call(pose, force=False), **_NO_IMAGE)

@@ -1,7 +1,7 @@
-"""A trajectory as the text that models are trained and prompted on (`traj.txt`).
+"""A trajectory as the text on which models are trained and prompted (`traj.txt`).
 
-Per task: `<|goal|>Your main goal: ...<|goal|>`, the frame at its start, then per sub-goal `<|plan|>Plan:
-...<|plan|>` and per action `<|act|>...<|act|><image>`.
+Each task has `<|goal|>Your main goal: ...<|goal|>` and the frame at its start, each sub-goal `<|plan|>Plan:
+...<|plan|>`, and each action `<|act|>...<|act|><image>`.
 """
 
 from infthor_eval.formats.step_log import Step
@@ -10,7 +10,7 @@ from infthor_eval.formats.trajectory import HighAction, SubTask, Trajectory
 __all__ = ["ACT", "MARKS", "action_part", "goal_part", "goal_text", "plan_part", "plan_text", "sequence_text"]
 
 ACT, _PLAN, _GOAL = "<|act|>", "<|plan|>", "<|goal|>"
-MARKS = (ACT, _PLAN, _GOAL)  # each a token of its own for models that are trained on sequences
+MARKS = (ACT, _PLAN, _GOAL)  # special tokens of models that are trained on sequences
 
 _PLANS = {
     "GotoLocation": "go to the {0}",
@@ -27,17 +27,17 @@ _PLANS = {
 
 
 def plan_text(high: HighAction) -> str:
-    """A sub-goal in words ("put the mug in the fridge"); one without a template keeps its name."""
+    """Return a sub-goal in words ("put the mug in the fridge"), or its name if it has no template."""
     action = high.discrete_action
     template = _PLANS.get(action.action)
-    if template is None:  # a name out of a file, which is no template whatever is in it
+    if template is None:  # not formatted: the name is from a file and may have braces
         return action.action
     names = [str(name) for name in action.args] if isinstance(action.args, list) else []
     return template.format(*names) if len(names) >= template.count("{") else action.action
 
 
 def goal_text(trajectory: Trajectory, task: SubTask | None) -> str:
-    """The goal of a task; for ALFRED's trajectories the first annotator's."""
+    """Return the goal of a task, in ALFRED's trajectories that of the first annotator."""
     if task is not None:
         return task.task_desc
     annotations = (trajectory.turk_annotations or {}).get("anns") or [{}]
@@ -45,41 +45,41 @@ def goal_text(trajectory: Trajectory, task: SubTask | None) -> str:
 
 
 def goal_part(goal: str) -> str:
-    """A goal in the sequence; the frame at its start follows."""
+    """Return a goal as part of the sequence; the frame at its start follows."""
     return f"{_GOAL}Your main goal: {goal}{_GOAL}"
 
 
 def plan_part(plan: str) -> str:
-    """A plan in the sequence; its actions follow."""
+    """Return a plan as part of the sequence; its actions follow."""
     return f"{_PLAN}Plan: {plan}{_PLAN}"
 
 
 def action_part(action: str) -> str:
-    """An action in the sequence; the frame after it follows. A model is asked behind the first mark."""
+    """Return an action as part of the sequence; the frame after it follows. Models continue after the first mark."""
     return f"{ACT}{action}{ACT}"
 
 
 def sequence_text(trajectory: Trajectory, steps: list[Step]) -> str:
-    """The whole trajectory.
+    """Return the whole trajectory as text.
 
     Args:
-        trajectory: for goals and sub-goals.
-        steps: the replayed log; of several frames of one action the last counts.
+        trajectory: the trajectory, for its goals and sub-goals.
+        steps: log of its replay; only the last of several frames of one action is used.
     """
     starts: dict[int, int | None] = {item.low_pddl_idx[0]: item.sub_traj_idx for item in trajectory.sub_trajs}
     starts = starts or {0: None}
     plans = {high.high_idx: plan_text(high) for high in trajectory.plan.high_pddl}
     parts: list[str] = []
-    shown: int | None = None
+    sub_goal: int | None = None
     for step in steps:
-        if step.action is None:
+        if step.action is None:  # the first frame, or one of several during an action
             continue
         if step.step in starts:
             task = _task(trajectory, starts[step.step])
             parts.append(f"{goal_part(goal_text(trajectory, task))}<image>")
-        if step.high_idx is not None and step.high_idx != shown:
-            shown = step.high_idx
-            parts.append(plan_part(plans.get(shown, "")))
+        if step.high_idx is not None and step.high_idx != sub_goal:
+            sub_goal = step.high_idx
+            parts.append(plan_part(plans.get(sub_goal, "")))
         parts.append(f"{action_part(step.action)}<image>")
     return "".join(parts)
 

@@ -1,7 +1,7 @@
-"""The state of the room and the agent in words, as far as the agent has seen it.
+"""The state of the room and the agent in words, restricted to what the agent has seen.
 
-A model that is given text in place of the whole trajectory reads this: of every object that was ever in a frame the
-place where it was last seen, what is open or on, and what the agent holds.
+Models that get text instead of all frames read it: the place where each seen object was seen last, what is open or
+switched on, and what the agent holds.
 """
 
 from infthor_eval.formats.step_log import ObjectState, Step, iter_object_states
@@ -15,18 +15,15 @@ _SURROUNDINGS = frozenset({"Floor", "Wall", "Ceiling"})
 
 
 def state_summaries(steps: list[Step], at: set[int]) -> dict[int, str]:
-    """Summaries after some of the actions.
+    """Return the summaries after some low-level actions, by index of the action.
 
     Args:
         steps: the log, with the fields that a replay adds.
-        at: indices of low-level actions.
-
-    Returns:
-        Index of the action to the summary.
+        at: indices of the actions.
     """
     known: dict[str, tuple[ObjectState, str | None]] = {}
     held: list[str] = []
-    found: dict[int, str] = {}
+    summaries: dict[int, str] = {}
     for step, world in zip(steps, iter_object_states(steps), strict=True):
         held = [noun(state.type) for state in world.values() if state.held and state.exists]
         for key in step.seen or {}:
@@ -35,11 +32,11 @@ def state_summaries(steps: list[Step], at: set[int]) -> dict[int, str]:
         for key in [key for key in known if not world[key].exists or world[key].held]:
             del known[key]
         if step.step in at and step.action is not None:
-            found[step.step] = _words(known, held)
-    return found
+            summaries[step.step] = _summary(known, held)
+    return summaries
 
 
-def _words(known: dict[str, tuple[ObjectState, str | None]], held: list[str]) -> str:
+def _summary(known: dict[str, tuple[ObjectState, str | None]], held: list[str]) -> str:
     sentences = [
         f"You are holding {' and '.join(with_article(item) for item in held)}." if held else "Your hands are free."
     ]
@@ -58,6 +55,6 @@ def _words(known: dict[str, tuple[ObjectState, str | None]], held: list[str]) ->
 
 
 def _place(world: dict[str, ObjectState], state: ObjectState) -> str | None:
-    """The type of what an object is directly in or on."""
+    """Return the type of the receptacle that an object is directly in or on."""
     parent = logged_parent(state, world)
     return None if parent is None else world[parent].type

@@ -1,9 +1,8 @@
-"""A room as the planner sees it: which thing is where, what was done to it, where the agent stands.
+"""A room as the planner sees it: where the items are, what was done to them, and where the agent is.
 
-A *place* is what the agent walks to: a piece of furniture, a lamp, or a thing that lies on the floor. An
-*item* is what can be carried. Slices are items of their own that come into being when the whole is sliced;
-two of them are enough for every task. Opening and closing are not modelled: the rollout adds them around what
-needs them, as ALFRED does.
+A *place* is what the agent can go to: a piece of furniture, a lamp, or an item on the floor. An *item* can be carried.
+Slices are items that start to exist when the whole is sliced; every task needs at most two. Opening and closing are not
+modelled: the rollout adds them where they are needed, as ALFRED does.
 """
 
 from collections.abc import Container, Iterable
@@ -15,7 +14,7 @@ from infthor_eval.thor.view import SimulatorView, ThorObject
 
 __all__ = ["ABSENT", "FLOOR", "Operator", "State", "SymbolicRoom", "room_of", "slice_item"]
 
-ABSENT = ""  # where an item is that does not exist yet, or no longer
+ABSENT = ""  # parent of an item that is held, or does not exist yet or any more
 FLOOR = "floor"
 _SLICES = 2
 
@@ -31,12 +30,12 @@ class Operator:
 
 @dataclass(frozen=True)
 class State:
-    """What operators change. `where` maps an item to the id of what it is in or on; a held item has none.
+    """What operators change.
 
     Attributes:
-        at: the place where the agent stands, or None.
-        held: the item in its hand, or None.
-        where: (item, parent id) pairs in a fixed order.
+        at: id of the place where the agent is, or None.
+        held: id of the held item, or None.
+        where: (item, parent) pairs of ids in a fixed order, as states are compared and hashed.
         clean: items that were washed in this task.
         hot: items that were heated in this task and not cooled since.
         cold: items that were cooled in this task and not heated since.
@@ -54,14 +53,14 @@ class State:
 
 @dataclass(frozen=True)
 class SymbolicRoom:
-    """What operators do not change.
+    """What operators do not change, and the initial state.
 
     Attributes:
-        types: type of every item, receptacle and lamp, by id.
+        types: types of the items, receptacles and lamps, by id.
         places: ids of the furniture and lamps.
-        receptacles: ids of what things can be put into or onto, items among them.
-        start: the state now.
-        refused: (item, receptacle) pairs of which it is known that the one finds no room in the other.
+        receptacles: ids of the receptacles, including items (plates).
+        start: the initial state.
+        refused: (item, receptacle) pairs that are known not to fit.
     """
 
     types: dict[str, str]
@@ -71,9 +70,8 @@ class SymbolicRoom:
     refused: frozenset[tuple[str, str]] = frozenset()
 
     def place_of(self, item: str, where: dict[str, str]) -> str | None:
-        """The place at which an item, or a receptacle, can be reached; None where it does not exist or is
-        held."""
-        seen = set()
+        """Return the place where an item or receptacle can be reached, or None if it is held or does not exist."""
+        seen = set()  # in case objects are reported to be inside each other
         while item not in self.places:
             if item in seen or item not in where or where[item] == ABSENT:
                 return None
@@ -85,17 +83,17 @@ class SymbolicRoom:
 
 
 def room_of(view: SimulatorView, blocked: Container[str] = (), refused: Iterable[tuple[str, str]] = ()) -> SymbolicRoom:
-    """Read a room from what the simulator reports. The agent counts as being at no place.
+    """Read a room from the simulator's state. The agent counts as being at no place.
 
     Args:
-        view: the world now.
-        blocked: ids of objects that cannot be acted on as things are: not picked up, or not put into.
-        refused: as `Room.refused`.
+        view: the current state of the simulator.
+        blocked: ids of objects that cannot be acted on at present.
+        refused: see `SymbolicRoom.refused`.
     """
     objects = {key: item for key, item in view.objects.items() if not _is_remains(item)}
     items = {key: item for key, item in objects.items() if item.pickupable and key not in blocked}
     places = {key for key, item in objects.items() if _is_place(item)}
-    where = {key: _whereabouts(item, objects, places) for key, item in items.items()}
+    where = {key: _parent_of(item, objects, places) for key, item in items.items()}
     types = {key: item.object_type for key, item in objects.items() if key in places or key in items}
     for key, item in items.items():
         if item.object_type in SLICEABLE:
@@ -120,11 +118,11 @@ def room_of(view: SimulatorView, blocked: Container[str] = (), refused: Iterable
 
 
 def slice_item(whole: str, number: int) -> str:
-    """Name of a slice that does not exist yet."""
+    """Return the id of a slice that does not exist yet."""
     return f"{whole}#{number}"
 
 
-def _whereabouts(item: ThorObject, objects: dict[str, ThorObject], places: Iterable[str]) -> str:
+def _parent_of(item: ThorObject, objects: dict[str, ThorObject], places: Iterable[str]) -> str:
     if item.is_picked_up:
         return ABSENT
     parent = direct_parent(item, objects)
@@ -133,7 +131,7 @@ def _whereabouts(item: ThorObject, objects: dict[str, ThorObject], places: Itera
 
 
 def _is_remains(item: ThorObject) -> bool:
-    """Whether it is what sliced or broken things leave in the metadata."""
+    """Return True for what sliced or broken objects leave in the metadata."""
     return item.is_broken or (item.is_sliced and not item.object_type.endswith("Sliced"))
 
 

@@ -1,4 +1,4 @@
-"""The task pool: ALFRED's seven task types over the object types of a room."""
+"""Tasks: ALFRED's seven task types, with object types."""
 
 from enum import StrEnum
 from typing import Any
@@ -26,15 +26,15 @@ class TaskType(StrEnum):
 
 
 class Task(msgspec.Struct, frozen=True):
-    """One task, by object types.
+    """One task; objects are given by their types.
 
     Attributes:
-        task_type: its type.
-        pickup: the object that is handled (the whole's type, also where `sliced`).
-        receptacle: where it goes; None for EXAMINE.
-        movable: for STACK, the receptacle that is carried with it.
-        light: for EXAMINE, the lamp.
-        sliced: whether a slice of the object is asked for.
+        task_type: type of the task.
+        pickup: the object to pick up (the type of the whole, also if `sliced`).
+        receptacle: the receptacle to put it into; None for EXAMINE.
+        movable: the receptacle that is carried with it, for STACK.
+        light: the lamp, for EXAMINE.
+        sliced: True if the task requires a slice of the object.
     """
 
     task_type: TaskType
@@ -46,7 +46,7 @@ class Task(msgspec.Struct, frozen=True):
 
     @property
     def target(self) -> str:
-        """The type that must be at its place in the end."""
+        """Type of the object that must be in the receptacle in the end."""
         return f"{self.pickup}Sliced" if self.sliced else self.pickup
 
 
@@ -59,11 +59,11 @@ _TEMPLATES = {
     TaskType.COOL: "put a cold {bare} {where}",
     TaskType.STACK: "put {movable} with {item} in it {where}",
 }
-_ONTO = {"Plate"}  # things lie on these, not in them
+_ONTO = {"Plate"}  # objects are on these, not in them
 
 
 def sub_task(task: Task, scene: str) -> SubTask:
-    """The task as trajectories hold it, with a description in words.
+    """Return the task in the form of trajectories, with a description in words.
 
     Args:
         task: the task.
@@ -81,12 +81,12 @@ def sub_task(task: Task, scene: str) -> SubTask:
 
 
 def task_of(recorded: SubTask) -> Task:
-    """The task that a trajectory holds: the inverse of `sub_task`, for the published data and ALFRED's too.
+    """Return the task in a trajectory, ours, published or ALFRED's; the inverse of `sub_task`.
 
-    Types are named as AI2-THOR 5.x does; what a task of its type has no use for is left out.
+    Object types get their AI2-THOR 5.x names. Fields that the task type does not need are ignored.
 
     Raises:
-        DataError: no goal or one of an unknown type, or a type of object that its goal needs is missing.
+        DataError: the goal is missing or of an unknown type, or an object type that it needs is missing.
     """
     info, params = recorded.task_info, recorded.pddl_params
     task_type = _task_type(info.goal)
@@ -105,29 +105,29 @@ def task_of(recorded: SubTask) -> Task:
 
 def _task_type(goal: str) -> TaskType:
     if not goal:
-        raise DataError(f"a task has no goal; name one of {', '.join(TaskType)}")
+        raise DataError(f"a task has no goal; give one of {', '.join(TaskType)}")
     try:
         return TaskType(goal)
     except ValueError as error:
-        raise DataError(f"a task's goal is {goal!r:.60}; there are {', '.join(TaskType)}") from error
+        raise DataError(f"a task's goal is {goal!r:.60}; give one of {', '.join(TaskType)}") from error
 
 
 _IN_INFO = {"object_target": "pickup", "parent_target": "receptacle", "mrecep_target": "movable"}
 
 
 def _object_type(task_type: TaskType, params: dict[str, Any], name: str, in_info: str | None) -> str:
-    """A type that a goal needs; where `task_info` does not name it, `pddl_params` does."""
-    found = in_info or params.get(name)
-    if isinstance(found, str) and found:
-        return modern_type(found)
+    """Return an object type that a goal needs, from `task_info` or else from `pddl_params`."""
+    object_type = in_info or params.get(name)
+    if isinstance(object_type, str) and object_type:
+        return modern_type(object_type)
     places = f"task_info's {_IN_INFO[name]} or pddl_params' {name}" if name in _IN_INFO else f"pddl_params' {name}"
-    raise DataError(f"a task of type {task_type} has no {places}; name an object type there")
+    raise DataError(f"a task of type {task_type} has no {places}; give an object type there")
 
 
 def _is_sliced(params: dict[str, Any]) -> bool:
     sliced = params.get("object_sliced")
     if sliced is not None and not isinstance(sliced, bool):
-        raise DataError(f"a task's pddl_params have object_sliced {sliced!r:.60}; make it true or false")
+        raise DataError(f"a task's pddl_params have object_sliced {sliced!r:.60}; set it to true or false")
     return sliced is True
 
 

@@ -1,7 +1,7 @@
-"""What was washed, heated and cooled for real: AI2-THOR's objects do not tell it, so it is followed action by action.
+"""Tracking of what was washed, heated and cooled, which AI2-THOR's metadata does not record.
 
-The rules are ALFRED's: a tap that is turned on cleans what lies in the basin below it, a microwave that is turned on
-heats what is in it, and a fridge that is closed cools what is in it.
+The rules are ALFRED's: turning on a tap cleans what is in the basin below it, turning on a microwave heats what is in
+it, and closing a fridge cools what is in it.
 """
 
 import math
@@ -17,16 +17,16 @@ _BASINS = {"SinkBasin", "BathtubBasin"}
 
 @dataclass(frozen=True)
 class Treatments:
-    """Ids of the objects that were treated since this was empty; whoever follows a task begins with none.
+    """Ids of the objects that were treated since the start of a task, at which the sets are empty.
 
-    The sets only grow, as in ALFRED: a hot potato in the fridge is hot and, once that is closed, cold. In the planner's
-    `State` the later treatment replaces the earlier, which it can, because there nothing but `CoolObject` cools; here
-    the closing door would undo "put a hot potato in the fridge". Slices are objects of their own and begin untreated.
+    The sets only grow, as in ALFRED: a hot potato in the fridge is both hot and, after closing the door, cold.
+    Otherwise closing the door would undo "put a hot potato in the fridge". In the planner's `State` the later treatment
+    replaces the earlier one, as there only `CoolObject` cools. Slices are separate objects and start untreated.
 
     Attributes:
-        clean: the washed ones.
-        hot: the heated ones.
-        cold: the cooled ones.
+        clean: washed objects.
+        hot: heated objects.
+        cold: cooled objects.
     """
 
     clean: frozenset[str] = frozenset()
@@ -34,21 +34,20 @@ class Treatments:
     cold: frozenset[str] = frozenset()
 
     def after(self, action: str, object_id: str | None, view: SimulatorView) -> "Treatments":
-        """What is treated once an action was tried.
+        """Return the treatments after an action.
 
         Args:
-            action: its name, in AI2-THOR's 5.x form.
-            object_id: what it was about, as the simulator names it.
-            view: the world after it; a refused action treats nothing.
+            action: name of the action in AI2-THOR 5.x.
+            object_id: the simulator's id of the object acted on.
+            view: state after the action; a refused action treats nothing.
         """
         tool = view.objects.get(object_id or "")
         if not view.success or tool is None:
             return self
         if action == "ToggleObjectOn" and tool.object_type == "Faucet":
             basin = _basin_of(tool, view)
-            return (
-                self if basin is None else replace(self, clean=self.clean | contents_of(basin.object_id, view.objects))
-            )
+            inside = frozenset[str]() if basin is None else contents_of(basin.object_id, view.objects)
+            return replace(self, clean=self.clean | inside)
         if action == "ToggleObjectOn" and tool.object_type == "Microwave":
             return replace(self, hot=self.hot | contents_of(tool.object_id, view.objects))
         if action == "CloseObject" and tool.object_type == "Fridge":
@@ -57,16 +56,15 @@ class Treatments:
 
 
 def _basin_of(faucet: ThorObject, view: SimulatorView) -> ThorObject | None:
-    """The basin that a tap runs into: the nearest one.
+    """Return the basin nearest to a tap.
 
-    ALFRED looks among the sinks' alone, so that filling a bathtub washes what lies in the sink across the room.
+    ALFRED considers only sink basins, so that there filling a bathtub washes what is in a sink across the room.
     """
     basins = [item for item in view.objects.values() if item.object_type in _BASINS]
-    return min(basins, key=lambda item: (_gap(item, faucet), item.object_id), default=None)
+    return min(basins, key=lambda item: (_distance(item, faucet), item.object_id), default=None)
 
 
-def _gap(one: ThorObject, other: ThorObject) -> float:
-    """Distance in metres."""
+def _distance(one: ThorObject, other: ThorObject) -> float:
     return math.dist(
         (one.position.x, one.position.y, one.position.z), (other.position.x, other.position.y, other.position.z)
     )

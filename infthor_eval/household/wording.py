@@ -1,7 +1,7 @@
 """Object types as English words.
 
-The words keep the type recoverable: a type is split at its capitals ("CoffeeTable" to "coffee table") and
-nothing is renamed, so joining the words again gives the type but for capitals.
+Types are split at their capitals ("CoffeeTable" to "coffee table") and not renamed, so that the type can be recovered
+by joining the words.
 """
 
 import re
@@ -16,12 +16,12 @@ _IRREGULAR = {"knife": "knives", "butter knife": "butter knives", "shelf": "shel
 
 
 def canonical_type(object_type: str) -> str:
-    """The type that people would name: the basin of a sink is the sink."""
+    """Return the type that people would name: the basin of a sink is the sink."""
     return _WHOLE.get(object_type, object_type)
 
 
 def noun(object_type: str) -> str:
-    """An object type in words: "CoffeeTable" to "coffee table", "AppleSliced" to "sliced apple"."""
+    """Return an object type in words: "coffee table" for "CoffeeTable", "sliced apple" for "AppleSliced"."""
     if object_type in _LETTERS:
         return _LETTERS[object_type]
     if object_type.endswith("Sliced"):
@@ -31,19 +31,17 @@ def noun(object_type: str) -> str:
 
 
 def with_article(words: str) -> str:
-    """The words with "a" or "an" before them; plurals ("boots") and substances ("bread") stay as they are."""
+    """Return the words after "a" or "an"; plurals ("boots") and uncountable nouns ("bread") get no article."""
     if words.removeprefix("sliced ") in _BARE:
         return words
     return f"{'an' if _VOWEL_SOUND.match(words) else 'a'} {words}"
 
 
 def plural(words: str) -> str:
-    """The plural of a noun made by `noun`."""
+    """Return the plural of a result of `noun`."""
     if words in _IRREGULAR:
         return _IRREGULAR[words]
-    if words.endswith(("s", "x", "ch", "sh")):
-        return f"{words}es"
-    if words.endswith(("tomato", "potato")):
+    if words.endswith(("s", "x", "ch", "sh", "tomato", "potato")):
         return f"{words}es"
     if words.endswith("y") and words[-2] not in "aeiou":
         return f"{words[:-1]}ies"
@@ -51,5 +49,5 @@ def plural(words: str) -> str:
 
 
 def compact_name(object_type: str) -> str:
-    """An object type as the published data write it: lower case in one word ("coffeetable")."""
+    """Return an object type as the published data write it, in lower case as one word ("coffeetable")."""
     return object_type.lower()

@@ -50,8 +50,8 @@ def test_types_out_of_the_parameters_and_of_another_version():
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        (recorded(""), "a task has no goal; name one of pick_and_place_simple, "),
-        (recorded("juggle", "Mug"), "a task's goal is 'juggle'; there are pick_and_place_simple, "),
+        (recorded(""), "a task has no goal; give one of pick_and_place_simple, "),
+        (recorded("juggle", "Mug"), "a task's goal is 'juggle'; give one of pick_and_place_simple, "),
         (
             recorded("pick_and_place_simple", receptacle="Desk"),
             "has no task_info's pickup or pddl_params' object_target",
