@@ -1,6 +1,7 @@
-"""Entry point: which commands there are, and how errors are shown."""
+"""Entry point: the commands, and how errors are printed."""
 
 import contextlib
+import difflib
 import importlib
 import io
 import os
@@ -13,46 +14,58 @@ from types import FrameType
 import click
 
 import infthor_eval
-from infthor_eval.cli.options.repeated import refuse_repeated
-from infthor_eval.errors import InfthorError, in_one_line
+from infthor_eval.cli.help import ExampleGroup
+from infthor_eval.cli.options.repeated import refuse_repeated_options
+from infthor_eval.errors import InfthorError, in_one_line, unknown_name
 from infthor_eval.terminal import print_error
 
 __all__ = ["main"]
 
-# Name, and the one line that the overview shows.
+# By group: the name of each command, of which infthor_eval.cli.commands has the module, and its line in the overview.
 _COMMANDS = {
-    "run": "Evaluate a model on tasks (the default command).",
-    "plan": "Estimate what a run will take, before it begins.",
-    "fetch": "Download the published data.",
-    "validate": "Keep the questions of a set that one of several models answers.",
-    "train": "Fine-tune a model on trajectories and questions.",
-    "import-checkpoint": "Make a checkpoint of the published trainer one that models load.",
-    "compare": "Compare two runs on the same data.",
-    "check-adapter": "Check that a model of your own keeps the contract of adapters.",
-    "check-parity": "Compare a policy's actions with another implementation's.",
-    "report": "Write runs as a page with every sample, or as a figure of the paper.",
-    "watch": "Show what was done in a run of plans or of arms, as MP4 or GIF.",
-    "ls": "List the models, the tasks, the scenes, or the runs in a folder.",
-    "show": "Print the results of runs again, or write them as CSV, LaTeX, Markdown or JSON.",
-    "doctor": "Look at what this machine has, and tell what to do where something is missing.",
-    "scenes": "Look at a scene, or carry it to machines without Unity.",
-    "generate": "Make long-horizon trajectories in a scene.",
-    "replay": "Replay trajectories in the simulator into frames and metadata.",
-    "bundle": "Make a question set from a manifest of scenes and seeds.",
-    "questions": "Make NIEH questions from replayed trajectories.",
-    "lm-eval": "Run lm-eval's own command, with these models known to it.",
+    "Evaluate": {
+        "run": "Evaluate a model on tasks (the default command).",
+        "plan": "Estimate time, memory and cost of a run.",
+        "ls": "List models, tasks, scenes, or the runs in a folder.",
+    },
+    "Look at results": {
+        "show": "Print the results of runs, also as CSV, LaTeX, Markdown or JSON.",
+        "compare": "Compare two runs on the same data.",
+        "report": "Write a page with results and all samples, or a figure of the paper.",
+        "watch": "Write a video of an agent or an arm.",
+    },
+    "Make data": {
+        "generate": "Generate long-horizon trajectories in a scene.",
+        "replay": "Replay trajectories in the simulator into frames and metadata.",
+        "questions": "Generate NIEH questions on replayed trajectories.",
+        "validate": "Keep the questions of a set that one of several models answers.",
+        "bundle": "Build a question set from a manifest of scenes and seeds.",
+        "scenes": "Draw a scene, or export it for machines without Unity.",
+    },
+    "Own models": {
+        "check-adapter": "Check a model adapter against the adapter contract.",
+        "check-parity": "Compare a policy's actions with another implementation's.",
+        "train": "Fine-tune a model on trajectories and questions.",
+        "import-checkpoint": "Convert a checkpoint of the published trainer.",
+    },
+    "Tools": {
+        "fetch": "Download the published data.",
+        "doctor": "Check the installation and suggest fixes.",
+        "lm-eval": "Run lm-eval's own command with these models.",
+    },
 }
+_NAMES = tuple(name for group in _COMMANDS.values() for name in group)
 _DEFAULT = "run"
 
 
-class _Commands(click.Group):
+class _Commands(ExampleGroup):
     """Commands imported on demand; options without a command are those of `run`."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        return list(_COMMANDS)
+        return list(_NAMES)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        if cmd_name not in _COMMANDS:
+        if cmd_name not in _NAMES:
             return None
         command = importlib.import_module(f"infthor_eval.cli.commands.{cmd_name.replace('-', '_')}").command
         assert isinstance(command, click.Command)
@@ -66,78 +79,85 @@ class _Commands(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
+        if args and args[0] not in _NAMES and not ctx.resilient_parsing:  # completion asks for parts of names
+            raise unknown_name("command", args[0], _NAMES)
         name, command, rest = super().resolve_command(ctx, args)
         if command is not None:
-            refuse_repeated(ctx, command, rest)
+            refuse_repeated_options(ctx, command, rest)
         return name, command, rest
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Also those of the default command, which are typed without its name."""
-        super().format_options(ctx, formatter)
+        """Write the commands, then the options, with those of the default command, which is typed without its name."""
+        for group, commands in _COMMANDS.items():
+            with formatter.section(group):  # not click's own list, which would import every command
+                formatter.write_dl(list(commands.items()))
+        click.Command.format_options(self, ctx, formatter)
         run = self.get_command(ctx, _DEFAULT)
         assert run is not None
         with formatter.section("Options of a run"):
-            formatter.write_dl([told for option in run.params if (told := option.get_help_record(ctx)) is not None])
-
-    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        # Not click's own, which would import every command for its first line of help.
-        with formatter.section("Commands"):
-            formatter.write_dl(list(_COMMANDS.items()))
+            formatter.write_dl([record for option in run.params if (record := option.get_help_record(ctx))])
 
 
-@click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"]}, no_args_is_help=True)
+@click.group(
+    cls=_Commands,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    no_args_is_help=True,
+    example="infthor-eval --model oracle,blind,qwen2.5-vl-nano --tasks nieh_mini_gt",
+)
 @click.version_option(infthor_eval.__version__, prog_name="infthor-eval")
 def _infthor_eval() -> None:
     """Evaluate multimodal models on long-horizon embodied tasks (∞-THOR).
 
-    Without a command: infthor-eval --model MODEL --tasks TASKS runs an evaluation.
+    Without a command: infthor-eval --model MODEL --tasks TASKS evaluates a model.
     """
 
 
 def main(args: list[str] | None = None) -> None:
-    """Run the command line; errors meant for people end in one line on standard error."""
+    """Run the command line; errors meant for people are printed as one line on standard error."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="backslashreplace")  # whatever the terminal's encoding, a name must not end a run
+            stream.reconfigure(errors="backslashreplace")  # no name in the data may end a run, whatever the encoding
     try:
-        with _stopped_by_sigterm():
+        with _raise_on_sigterm():
             code = _infthor_eval.main(args, prog_name="infthor-eval", standalone_mode=False)
-        sys.stdout.flush()  # here, and not where Python ends: a full disk is an error like any other
+        sys.stdout.flush()  # here and not at Python's exit, so that a full disk is an error like any other
     except click.exceptions.NoArgsIsHelpError as error:
         click.echo(error.format_message())
         sys.exit(2)
-    except (click.MissingParameter, click.NoSuchOption) as error:
+    except click.NoSuchOption as error:
+        _exit(_unknown_option(error), error.exit_code)
+    except click.MissingParameter as error:
         assert error.ctx is not None
-        said = error.format_message().rstrip(".")
-        _fail(f"{said}; `{error.ctx.command_path} --help` tells what there is", error.exit_code)
+        message = error.format_message().rstrip(".")
+        _exit(f"{message}; see `{error.ctx.command_path} --help`", error.exit_code)
     except click.ClickException as error:
-        _fail(error.format_message(), error.exit_code)
+        _exit(error.format_message(), error.exit_code)
     except InfthorError as error:
-        _fail(str(error), error.exit_code)
+        _exit(str(error), error.exit_code)
     except _Terminated:
-        _fail("stopped; run the same command to continue", 143)
+        _exit("stopped; run the same command to continue", 143)
     except (click.Abort, KeyboardInterrupt):
-        _fail("stopped; run the same command to continue", 130)
-    except OSError as error:  # no command's own: a disk that is full, a file that was taken away in mid-work
+        _exit("stopped; run the same command to continue", 130)
+    except OSError as error:  # that no command expects: a full disk, a file removed during the work
         _discard_output()
         place = error.filename if error.filename is not None else "standard output or a file"
-        _fail(f"{place}: cannot be read or written ({in_one_line(error)}); mend that and run the same command again", 2)
+        _exit(f"{place}: cannot be read or written ({in_one_line(error)}); fix that and run the same command again", 2)
     else:
         sys.exit(code if isinstance(code, int) else 0)
 
 
 class _Terminated(BaseException):
-    """SIGTERM came: everything is to be tidied up, as on Ctrl-C."""
+    """SIGTERM arrived."""
 
 
 @contextlib.contextmanager
-def _stopped_by_sigterm() -> Iterator[None]:
-    """SIGTERM as an exception, so that temporary folders and the simulator's processes go with the command."""
+def _raise_on_sigterm() -> Iterator[None]:
+    """Raise `_Terminated` on SIGTERM, so that temporary folders and simulator processes are removed as on Ctrl-C."""
 
     def stop(_number: int, _frame: FrameType | None) -> None:
         raise _Terminated
 
-    if threading.current_thread() is not threading.main_thread():
+    if threading.current_thread() is not threading.main_thread():  # only the main thread may set signal handlers
         yield
         return
     before = signal.signal(signal.SIGTERM, stop)
@@ -148,15 +168,23 @@ def _stopped_by_sigterm() -> Iterator[None]:
 
 
 def _discard_output() -> None:
-    """What standard output cannot take is dropped now; Python would try again, and complain, where it ends."""
+    """Discard what standard output cannot take; Python would try again at its exit, and complain."""
     try:
         sys.stdout.flush()
     except OSError:
-        nothing = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(nothing, sys.stdout.fileno())
-        os.close(nothing)
+        null = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(null, sys.stdout.fileno())
+        os.close(null)
 
 
-def _fail(message: str, code: int) -> None:
+def _unknown_option(error: click.NoSuchOption) -> str:
+    assert error.ctx is not None
+    options = {name for option in error.ctx.command.params for name in option.opts if name.startswith("--")}
+    near = difflib.get_close_matches(error.option_name, options, n=1)
+    hint = f"did you mean {near[0]}?" if near else f"see `{error.ctx.command_path} --help`"
+    return f"unknown option {error.option_name}; {hint}"
+
+
+def _exit(message: str, code: int) -> None:
     print_error(message)
     sys.exit(code)

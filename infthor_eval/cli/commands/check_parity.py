@@ -5,20 +5,27 @@ from pathlib import Path
 
 import click
 
+from infthor_eval.cli.help import ExampleCommand
 from infthor_eval.cli.options.values import FiniteFloat, parse_model_args
 
 __all__ = ["command"]
 
 
-@click.command("check-parity")
-@click.argument("model")
-@click.option("--reference-url", required=True, metavar="URL", help="Server of the /act convention.")
-@click.option("--frames", type=click.Path(path_type=Path), help="Folder of pictures; black, white and noise if none.")
-@click.option("--instruction", multiple=True, help="What is to be done; may be repeated. A few if none.")
-@click.option(
-    "--model-args", default="", metavar="K=V,...", help="Options of MODEL; unnorm_key goes to the server too."
+@click.command(
+    "check-parity", cls=ExampleCommand, example="infthor-eval check-parity openvla --reference-url http://HOST:8000"
 )
-@click.option("--tolerance", type=FiniteFloat(min=0), default=1e-6, show_default=True, help="Taken for equal.")
+@click.argument("model")
+@click.option(
+    "--reference-url", required=True, metavar="URL", help="Server with the reference policy (/act convention)."
+)
+@click.option("--frames", type=click.Path(path_type=Path), help="Folder of images; default: black, white and noise.")
+@click.option("--instruction", multiple=True, help="Instruction to the policy; may be repeated. Default: a few.")
+@click.option(
+    "--model-args", default="", metavar="K=V,...", help="Options of MODEL; unnorm_key is sent to the server too."
+)
+@click.option(
+    "--tolerance", type=FiniteFloat(min=0), default=1e-6, show_default=True, help="Largest difference of equal actions."
+)
 def command(
     model: str,
     reference_url: str,
@@ -27,9 +34,9 @@ def command(
     model_args: str,
     tolerance: float,
 ) -> int:
-    """Have MODEL (openvla, spatialvla) and a reference server act on the same frames, and compare their actions.
+    """Compare the actions of MODEL (openvla, spatialvla) with those of a reference server on the same frames.
 
-    Exits with 0 where all agree, with 1 where one does not.
+    Exit code 1 if one differs.
     """
     from infthor_eval.report.terminal import print_table, table_console
     from model_adapters.policies.parity import (
@@ -43,11 +50,11 @@ def command(
 
     options = parse_model_args(model_args)
     theirs = reference_policy(reference_url, options.get("unnorm_key"))
-    with nullcontext(frames_in_folder(frames)) if frames else synthetic_frames() as shown:
+    with nullcontext(frames_in_folder(frames)) if frames else synthetic_frames() as images:
         ours = load_policy(model, options)
         try:
-            found = compare_policies(ours, theirs, shown, instruction or INSTRUCTIONS, tolerance)
+            comparison = compare_policies(ours, theirs, images, instruction or INSTRUCTIONS, tolerance)
         finally:
             ours.close()
-    print_table(found.table(), table_console())
-    return 0 if found.equal else 1
+    print_table(comparison.table(), table_console())
+    return int(not comparison.equal)

@@ -4,10 +4,12 @@ from pathlib import Path
 
 import click
 
+from infthor_eval.cli.help import ExampleCommand
+
 __all__ = ["command"]
 
 
-@click.command("compare")
+@click.command("compare", cls=ExampleCommand, example="infthor-eval compare results/oracle/RUN results/blind/RUN")
 @click.argument("first", type=click.Path(path_type=Path))
 @click.argument("second", type=click.Path(path_type=Path))
 def command(first: Path, second: Path) -> None:

@@ -1,4 +1,4 @@
-"""`infthor-eval doctor`: what there is on this machine, and what to do where something is missing."""
+"""`infthor-eval doctor`: check the installation and suggest fixes."""
 
 import ctypes.util
 import importlib.util
@@ -18,6 +18,7 @@ import click
 import msgspec
 from rich.text import Text
 
+from infthor_eval.cli.help import ExampleCommand
 from infthor_eval.errors import in_one_line
 from infthor_eval.formats.hub_data import default_folder
 from infthor_eval.formats.user_cache import user_cache
@@ -26,9 +27,9 @@ from infthor_eval.terminal import console, print_line, printable
 __all__ = ["Check", "checks", "command"]
 
 _STYLES = {"ok": "green", "optional": "yellow", "wrong": "red"}
-_PATIENCE_S = 2.0  # for the hub
+_HUB_TIMEOUT_S = 2.0
 _GB = 1e9
-_LEAST_DISK_GB = 20.0  # for one checkpoint of 7 billion parameters
+_MIN_DISK_GB = 20.0  # for one checkpoint of 7 billion parameters
 _EXTRAS = {
     "openai": ("openai", "models behind a server (`--model openai`)"),
     "vllm": ("vllm", "models in vLLM (`--engine vllm`), on a GPU"),
@@ -38,45 +39,45 @@ _EXTRAS = {
 
 
 class Check(msgspec.Struct, frozen=True):
-    """What was found of one thing.
+    """The result of one check.
 
     Attributes:
-        name: of the thing.
-        state: "ok"; "optional" where it is not there, and only some uses need it; "wrong" where none will do without.
-        found: what is there, or why it is not.
-        mend: what to do; empty where nothing is to be done.
+        name: what is checked.
+        state: "ok"; "optional" if it is missing and only some uses need it; "wrong" if every use needs it.
+        detail: what is installed, or what is missing.
+        hint: how to fix it; empty if there is nothing to fix.
     """
 
     name: str
     state: Literal["ok", "optional", "wrong"]
-    found: str
-    mend: str = ""
+    detail: str
+    hint: str = ""
 
 
-@click.command("doctor")
-@click.option("--json", "as_json", is_flag=True, help="Write what was found as JSON.")
+@click.command("doctor", cls=ExampleCommand, example="infthor-eval doctor")
+@click.option("--json", "as_json", is_flag=True, help="Print the checks as JSON.")
 def command(as_json: bool) -> int:
-    """Look at what evaluations need: Python, torch, simulators, the hub, disk, data; each with its mend.
+    """Check the installation and suggest fixes: Python, torch, simulators, the hub, disk, data.
 
-    Ends with 1 where something is missing that nothing will do without.
+    Exit code 1 if something is missing that every use needs.
     """
-    found = []
+    results = []
     on = console()
     for check in checks():
-        found.append(check)
+        results.append(check)
         if not as_json:
             on.print(
-                Text.assemble((f"{check.state:9}", _STYLES[check.state]), printable(f"{check.name}: {check.found}"))
+                Text.assemble((f"{check.state:9}", _STYLES[check.state]), printable(f"{check.name}: {check.detail}"))
             )
-            if check.mend:
-                print_line(f"{'':9}{check.mend}")
+            if check.hint:
+                print_line(f"{'':9}{check.hint}")
     if as_json:
-        click.echo(msgspec.json.format(msgspec.json.encode(found), indent=2))
-    return int(any(check.state == "wrong" for check in found))
+        click.echo(msgspec.json.format(msgspec.json.encode(results), indent=2))
+    return int(any(check.state == "wrong" for check in results))
 
 
 def checks() -> Iterator[Check]:
-    """All checks, one after the other; the hub has two seconds to answer."""
+    """Run all checks, one after the other; the hub has two seconds to answer."""
     yield Check("Python", "ok", f"{platform.python_version()}, {sys.executable}")
     yield _torch()
     yield _memory()
@@ -99,8 +100,8 @@ def _torch() -> Check:
     if torch.cuda.is_available():
         properties = torch.cuda.get_device_properties(0)
         return Check("torch", "ok", f"{torch.__version__}, {properties.name}, {properties.total_memory / _GB:.0f} GB")
-    mend = "large models want a GPU and a torch built for it; tiny models, baselines and served ones need none"
-    return Check("torch", "optional", f"{torch.__version__}, no GPU: models run on {os.cpu_count()} processors", mend)
+    hint = "large models need a GPU and a torch built for it; tiny models, baselines and served ones do not"
+    return Check("torch", "optional", f"{torch.__version__}, no GPU: models run on {os.cpu_count()} processors", hint)
 
 
 def _memory() -> Check:
@@ -112,7 +113,7 @@ def _embedded() -> Check:
     missing = [name for name in ("infthor_eval.sim", "numba") if importlib.util.find_spec(name) is None]
     if missing:
         return Check("embedded simulator", "wrong", f"no {missing[0]}", "install the package again: pip install .")
-    return Check("embedded simulator", "ok", "there; its first start compiles the renderer, ten seconds")
+    return Check("embedded simulator", "ok", "installed; its first start compiles the renderer, ten seconds")
 
 
 def _unity() -> Check:
@@ -124,81 +125,80 @@ def _unity() -> Check:
         return Check("AI2-THOR", "wrong", "ai2thor is not installed", "install the package again: pip install .")
     if builds:
         return Check("AI2-THOR", "ok", f"{package}, build {builds[-1]}")
-    mend = "`--simulator unity` downloads it when it is first used; the embedded simulator needs none"
-    return Check("AI2-THOR", "optional", f"{package}, no build in {folder}", mend)
+    hint = "`--simulator unity` downloads it when it is first used; the embedded simulator needs none"
+    return Check("AI2-THOR", "optional", f"{package}, no build in {folder}", hint)
 
 
 def _display() -> Check:
-    there = [name for name, found in _displays() if found]
-    if there:
-        return Check("display", "ok", " and ".join(there))
-    mend = "AI2-THOR's own build needs one: start an X server, or install Vulkan; the embedded simulator needs none"
-    return Check("display", "optional", "neither an X server (DISPLAY) nor Vulkan", mend)
-
-
-def _displays() -> Iterator[tuple[str, bool]]:
-    yield f"X server {os.environ.get('DISPLAY', '')}", bool(os.environ.get("DISPLAY"))
-    yield "Vulkan", ctypes.util.find_library("vulkan") is not None
+    server = os.environ.get("DISPLAY", "")
+    available = [f"X server {server}"] if server else []
+    available += ["Vulkan"] if ctypes.util.find_library("vulkan") is not None else []
+    if available:
+        return Check("display", "ok", " and ".join(available))
+    hint = "AI2-THOR's own build needs one: start an X server, or install Vulkan; the embedded simulator needs none"
+    return Check("display", "optional", "neither an X server (DISPLAY) nor Vulkan", hint)
 
 
 def _token() -> Check:
     from huggingface_hub import get_token
 
     if get_token() is not None:
-        return Check("hub token", "ok", "there is one")
-    mend = "`hf auth login`, for data and models that are not given to everybody"
-    return Check("hub token", "optional", "none", mend)
+        return Check("hub token", "ok", "stored")
+    return Check("hub token", "optional", "none", "`hf auth login`, for data and models with restricted access")
 
 
 def _hub() -> Check:
     from huggingface_hub import constants
 
-    mend = "checkpoints and data from the hub must lie in its cache, or in folders (pretrained=DIR, --data DIR)"
+    hint = "put checkpoints and data of the hub into its cache, or into folders (pretrained=DIR, --data DIR)"
     if constants.HF_HUB_OFFLINE:
-        return Check("hub", "optional", "not asked: HF_HUB_OFFLINE is set", mend)
-    said = _within(_PATIENCE_S, lambda: _reached(constants.ENDPOINT))
-    state: Literal["ok", "optional"] = "ok" if said == "" else "optional"
-    found = f"{constants.ENDPOINT} answers" if said == "" else f"{constants.ENDPOINT} cannot be reached ({said})"
-    return Check("hub", state, found, "" if said == "" else mend)
+        return Check("hub", "optional", "not tried: HF_HUB_OFFLINE is set", hint)
+    problem = _call_with_timeout(_HUB_TIMEOUT_S, lambda: _connection_problem(constants.ENDPOINT))
+    if problem:
+        return Check("hub", "optional", f"{constants.ENDPOINT} cannot be reached ({problem})", hint)
+    return Check("hub", "ok", f"{constants.ENDPOINT} answers")
 
 
-def _reached(url: str) -> str:
-    """Why it is not to be reached; empty where it is."""
+def _connection_problem(url: str) -> str:
+    """Return why a server cannot be reached; empty if it can."""
     try:
-        urllib.request.urlopen(urllib.request.Request(url, method="HEAD"), timeout=_PATIENCE_S).close()
-    except urllib.error.HTTPError:  # an answer all the same
+        urllib.request.urlopen(urllib.request.Request(url, method="HEAD"), timeout=_HUB_TIMEOUT_S).close()
+    except urllib.error.HTTPError:  # an error page is an answer
         return ""
     except (OSError, ValueError) as error:
         return in_one_line(error)
     return ""
 
 
-def _within(seconds: float, ask: Callable[[], str]) -> str:
-    """An answer, or that there was none in time: looking a name up can take longer than any time-out of the asking."""
-    answers: list[str] = []
-    asking = threading.Thread(target=lambda: answers.append(ask()), daemon=True)
-    asking.start()
-    asking.join(seconds)
-    return answers[0] if answers else f"no answer in {seconds:g} s"
+def _call_with_timeout(seconds: float, function: Callable[[], str]) -> str:
+    """Return the result of a function, or that there was none in time.
+
+    The timeout of a request does not cover the name look-up, which can take minutes, so it runs in a thread.
+    """
+    results: list[str] = []
+    thread = threading.Thread(target=lambda: results.append(function()), daemon=True)
+    thread.start()
+    thread.join(seconds)
+    return results[0] if results else f"no answer in {seconds:g} s"
 
 
 def _disks() -> Iterator[Check]:
     for name, place in (("disk, here", Path.cwd()), ("disk, cache", user_cache(""))):
-        there = next(folder for folder in (place, *place.parents) if folder.exists())
-        free = shutil.disk_usage(there).free / _GB
-        if free < _LEAST_DISK_GB:
-            mend = "a checkpoint of 7 billion parameters takes 16 GB: make room, or set HF_HOME and XDG_CACHE_HOME"
-            yield Check(name, "optional", f"{free:.1f} GB free in {there}", mend)
+        folder = next(path for path in (place, *place.parents) if path.exists())
+        free = shutil.disk_usage(folder).free / _GB
+        if free < _MIN_DISK_GB:
+            hint = "a checkpoint of 7 billion parameters takes 16 GB: make room, or set HF_HOME and XDG_CACHE_HOME"
+            yield Check(name, "optional", f"{free:.1f} GB free in {folder}", hint)
         else:
-            yield Check(name, "ok", f"{free:.0f} GB free in {there}")
+            yield Check(name, "ok", f"{free:.0f} GB free in {folder}")
 
 
 def _data() -> Check:
     folder = default_folder()
     if (folder / "metadata").is_dir():
         return Check("NIEH data", "ok", f"the published set, in {folder}")
-    mend = "`infthor-eval fetch nieh`; the bundled set (`--tasks nieh_mini`) needs no download"
-    return Check("NIEH data", "optional", f"the published set is not in {folder}", mend)
+    hint = "`infthor-eval fetch nieh`; the bundled set (`--tasks nieh_mini`) needs no download"
+    return Check("NIEH data", "optional", f"the published set is not in {folder}", hint)
 
 
 def _extra(extra: str, module: str, use: str) -> Check:

@@ -4,18 +4,20 @@ from pathlib import Path
 
 import click
 
+from infthor_eval.cli.help import ExampleCommand
+
 __all__ = ["command"]
 
 
-@click.command("fetch")
+@click.command("fetch", cls=ExampleCommand, example="infthor-eval fetch nieh")
 @click.argument("what", type=click.Choice(["nieh"]))
-@click.option("--dir", "folder", type=click.Path(path_type=Path), help="Where to keep it, instead of the cache.")
-@click.option("--token", help="Access token; without it, the one that `hf auth login` stored.")
+@click.option("--dir", "folder", type=click.Path(path_type=Path), help="Folder for the data, instead of the cache.")
+@click.option("--token", help="Access token; default: the one that `hf auth login` stored.")
 @click.option("--endpoint", hidden=True, help="Another hub.")
 def command(what: str, folder: Path | None, token: str | None, endpoint: str | None) -> None:
-    """Download the published NIEH data, unpack and check it.
+    """Download, unpack and check the published NIEH data.
 
-    `--tasks nieh` finds it afterwards; with --dir, pass the same folder as --data.
+    Tasks such as `--tasks nieh` find it without --data; after --dir DIR, they need --data DIR.
     """
     from infthor_eval.formats.files import prepare_folder
     from infthor_eval.formats.hub_data import default_folder, fetch_nieh

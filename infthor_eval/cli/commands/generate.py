@@ -1,4 +1,4 @@
-"""`infthor-eval generate`: make long trajectories from seeds."""
+"""`infthor-eval generate`: generate long trajectories from seeds."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from infthor_eval.cli.help import ExampleCommand
 from infthor_eval.cli.options.values import SceneName, WholeNumber, floor_plans_option
 from infthor_eval.cli.options.workers import parse_worker_settings, worker_options
 
@@ -20,7 +21,9 @@ __all__ = ["command"]
 _PATH = click.Path(path_type=Path)
 
 
-@click.command("generate")
+@click.command(
+    "generate", cls=ExampleCommand, example="infthor-eval generate --scene kitchen-3 --seed 1 --out trajectories"
+)
 @click.option(
     "--scene",
     "scenes",
@@ -29,14 +32,20 @@ _PATH = click.Path(path_type=Path)
     required=True,
     help="kitchen-3, FloorPlan10, ... (see `ls scenes`); may be repeated.",
 )
-@click.option("--min-steps", type=click.IntRange(1), default=300, show_default=True, help="Low-level actions at least.")
-@click.option("--min-subgoals", type=click.IntRange(1), default=10, show_default=True, help="Tasks at least.")
-@click.option("--max-fail", type=click.IntRange(1), default=20, show_default=True, help="Tasks that may fail, at most.")
-@click.option("--seed", type=WholeNumber(0), default=0, show_default=True, help="Of the first trajectory.")
+@click.option(
+    "--min-steps", type=click.IntRange(1), default=300, show_default=True, help="Low-level actions, at least."
+)
+@click.option("--min-subgoals", type=click.IntRange(1), default=10, show_default=True, help="Tasks, at least.")
+@click.option("--max-fail", type=click.IntRange(1), default=20, show_default=True, help="Failed tasks, at most.")
+@click.option("--seed", type=WholeNumber(0), default=0, show_default=True, help="Seed of the first trajectory.")
 @click.option("--count", type=click.IntRange(1), default=1, show_default=True, help="Trajectories for each scene.")
-@click.option("--final-task", is_flag=True, help="End with a task on what was seen at both ends of the trajectory.")
-@click.option("--test-set", is_flag=True, help="As the published test sets: with a final task, without bathrooms.")
-@click.option("--out", required=True, type=_PATH, help="Directory for the trajectory files.")
+@click.option(
+    "--final-task", is_flag=True, help="Add a final task that needs objects seen early and late in the trajectory."
+)
+@click.option(
+    "--test-set", is_flag=True, help="Generate a test set as published: with a final task, without bathrooms."
+)
+@click.option("--out", required=True, type=_PATH, help="Folder for the trajectory files.")
 @floor_plans_option
 @worker_options
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as one JSON object.")
@@ -56,9 +65,9 @@ def command(
     as_json: bool,
     **workers: Any,
 ) -> None:
-    """Generate trajectories: tasks are sampled, planned, and carried out in the embedded simulator.
+    """Generate trajectories: sample tasks, plan them, and execute the plans in the embedded simulator.
 
-    Trajectories that the directory has already are not made again. Exit status 1 where one could not be made.
+    Trajectories in the folder are not generated again. Exit code 1 if one cannot be generated.
     """
     from infthor_eval.cli.progress.bar import PacedBar
     from infthor_eval.formats.files import prepare_folder
@@ -101,6 +110,6 @@ def _print(summary: GenerationSummary, out: Path, output: Console) -> None:
     from infthor_eval.report.terminal import print_table
 
     output.print(
-        f"{summary.trajectories} trajectories ({summary.resumed} made earlier), {summary.steps} steps: {out}",
+        f"{summary.trajectories} trajectories ({summary.resumed} generated earlier), {summary.steps} steps: {out}",
     )
     print_table(tasks_table(summary), output)

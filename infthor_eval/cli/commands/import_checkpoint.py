@@ -1,9 +1,10 @@
-"""`infthor-eval import-checkpoint`: a checkpoint of the published trainer as one that adapters load."""
+"""`infthor-eval import-checkpoint`: convert a checkpoint of the published trainer."""
 
 from pathlib import Path
 
 import click
 
+from infthor_eval.cli.help import ExampleCommand
 from infthor_eval.cli.options.values import parse_model_args
 
 __all__ = ["command"]
@@ -11,15 +12,18 @@ __all__ = ["command"]
 _PATH = click.Path(path_type=Path)
 
 
-@click.command("import-checkpoint")
+@click.command(
+    "import-checkpoint", cls=ExampleCommand, example="infthor-eval import-checkpoint global_step_1000 --out checkpoint"
+)
 @click.argument("folder", type=_PATH)
-@click.option("--model", default="llava-onevision", show_default=True, help="The model that the training began with.")
+@click.option("--model", default="llava-onevision", show_default=True, help="Model that the training started from.")
 @click.option("--model-args", default="", metavar="K=V,...", help="Its options (pretrained, dtype, ...).")
-@click.option("--out", required=True, type=_PATH, help="Folder of the checkpoint that is written.")
+@click.option("--out", required=True, type=_PATH, help="Folder of the new checkpoint.")
 def command(folder: Path, model: str, model_args: str, out: Path) -> int:
-    """Write a distributed checkpoint FOLDER of the published trainer as safetensors, with tokenizer and processor.
+    """Convert FOLDER, a distributed checkpoint of the published trainer, into one that models load.
 
-    Weights that it has not (those that were frozen) are those of the model that the training began with.
+    The new checkpoint has safetensors, tokenizer and processor. Weights that FOLDER lacks, because they were frozen,
+    come from the model that the training started from.
     """
     from infthor_eval.formats.files import prepare_folder
     from infthor_eval.terminal import print_line
@@ -29,9 +33,9 @@ def command(folder: Path, model: str, model_args: str, out: Path) -> int:
 
     prepare_folder(out)
     loaded = load_starting_model(model, parse_model_args(model_args), "plain", seed=0)
-    found = import_weights(loaded, folder)
+    weights = import_weights(loaded, folder)
     export(loaded, out)
     print_line(
-        f"{found.n_taken} weights taken over, {found.n_kept} kept, {found.n_ignored} other tensors ignored: {out}"
+        f"{weights.n_taken} weights imported, {weights.n_kept} kept, {weights.n_ignored} other tensors ignored: {out}"
     )
     return 0

@@ -7,6 +7,7 @@ import click
 from rich import box
 from rich.table import Table as RichTable
 
+from infthor_eval.cli.help import ExampleCommand, ExampleGroup
 from infthor_eval.cli.options.values import SCENE_KINDS, floor_plans_option, include_option
 from infthor_eval.cli.progress.notes import print_note
 from infthor_eval.errors import ModelError
@@ -26,7 +27,7 @@ _AGES = ((86_400, "d"), (3_600, "h"), (60, "min"), (1, "s"))
 _COUNTS = ("done", "missing", "failed")
 
 
-@click.group("ls", invoke_without_command=True)
+@click.group("ls", cls=ExampleGroup, invoke_without_command=True, example="infthor-eval ls models")
 @click.pass_context
 def command(context: click.Context) -> None:
     """List the models with their options, the tasks, the scenes, or the runs in a folder."""
@@ -34,7 +35,7 @@ def command(context: click.Context) -> None:
         click.echo(context.get_help())
 
 
-@command.command("models")
+@command.command("models", cls=ExampleCommand, example="infthor-eval ls models")
 def _models() -> None:
     """Models and baselines, with their options and defaults."""
     table = RichTable("model", "options and defaults (--model-args)", box=box.SIMPLE_HEAD)
@@ -49,7 +50,7 @@ def _models() -> None:
     console().print(table, soft_wrap=False)
 
 
-@command.command("tasks")
+@command.command("tasks", cls=ExampleCommand, example="infthor-eval ls tasks --include-path my_tasks")
 @include_option
 def _tasks(include: tuple[Path, ...]) -> None:
     """Tasks and groups of tasks."""
@@ -67,7 +68,7 @@ def _tasks(include: tuple[Path, ...]) -> None:
         console().print(table, soft_wrap=False)
 
 
-@command.command("scenes")
+@command.command("scenes", cls=ExampleCommand, example="infthor-eval ls scenes")
 @floor_plans_option
 def _scenes(data: Path | None) -> None:
     """Scenes of the embedded simulator."""
@@ -83,7 +84,7 @@ def _scenes(data: Path | None) -> None:
     console().print(table, soft_wrap=False)
 
 
-@command.command("runs")
+@command.command("runs", cls=ExampleCommand, example="infthor-eval ls runs results")
 @click.argument("folder", metavar="[DIR]", type=click.Path(path_type=Path), default=Path("results"))
 def _runs(folder: Path) -> None:
     """Runs below DIR (default: results): units done, missing and failed, and the primary metric of each task."""

@@ -1,4 +1,4 @@
-"""`infthor-eval plan`: what a run will take, before it begins."""
+"""`infthor-eval plan`: estimate time, memory and cost of a run."""
 
 import resource
 import sys
@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from infthor_eval.cli.help import ExampleCommand
 from infthor_eval.cli.options.run import RunOptions, run_options
 from infthor_eval.cli.options.values import FiniteFloat, WholeNumber
 from infthor_eval.cli.progress.notes import NOTES, print_note
@@ -24,16 +25,18 @@ __all__ = ["command", "plan"]
 _COLUMNS = ("units", "measured", "frames", "requests", "tokens read", "encoded", "written", "time")
 
 
-@click.command("plan")
-@click.option("--measure", type=WholeNumber(1), default=6, show_default=True, help="Units of each task.")
+@click.command(
+    "plan", cls=ExampleCommand, example="infthor-eval plan --model qwen2.5-vl --tasks nieh --price-per-hour 2.5"
+)
+@click.option("--measure", type=WholeNumber(1), default=6, show_default=True, help="Units of each task to measure.")
 @click.option(
-    "--price-per-hour", type=FiniteFloat(min=0), metavar="USD", help="Of the machine that a worker has, for its cost."
+    "--price-per-hour", type=FiniteFloat(min=0), metavar="USD", help="Price of a worker's machine, for the cost."
 )
 @run_options
 def command(measure: int, price_per_hour: float | None, **given: Any) -> int:
     """Estimate what a run would take: requests, tokens, frames, memory, time and money.
 
-    Takes the options of `run`. A few units of each task are done to tell, and nothing of them is kept.
+    Takes the options of `run`. A few units of each task are evaluated to measure, and not kept.
     """
     return max([plan(*request, measure, price_per_hour) for request in RunOptions.from_click(given).requests()])
 
@@ -44,33 +47,33 @@ def plan(request: RunRequest, suite: Suite, measure: int, price_per_hour: float 
     Args:
         request: the run.
         suite: its suite.
-        measure: units of each task that are done.
-        price_per_hour: US dollars of a worker's machine; None asks for no such cost.
+        measure: units of each task to measure.
+        price_per_hour: price of a worker's machine in US dollars; None for no such cost.
 
     Returns:
-        Exit code: 1 where a unit that was measured failed, else 0.
+        Exit code: 1 if a measured unit failed, else 0.
 
     Raises:
-        ModelError: all of them failed.
+        ModelError: every measured unit failed.
     """
     with progress_bar(NOTES) as progress:
         bar = progress.add_task(f"{request.label}: measuring", total=None)
-        found = estimate_run(request, suite, measure, lambda: progress.advance(bar))
-    print_workload(found.workload)
-    for task, reason, n in count_reasons(found.failures):
+        estimate = estimate_run(request, suite, measure, lambda: progress.advance(bar))
+    print_workload(estimate.workload)
+    for task, reason, n in count_reasons(estimate.failures):
         print_note(f"{task}: {n} measured unit(s) failed: {reason}", "red")
-    if not found.tasks:
-        raise ModelError(f"{request.label}: every unit that was measured failed; mend what is told above")
+    if not estimate.tasks:
+        raise ModelError(f"{request.label}: every measured unit failed; fix the failures above")
     console = table_console()
-    print_table(_table(request, found.tasks), console)
-    for line in _totals(request, found.tasks, price_per_hour):
+    print_table(_table(request, estimate.tasks), console)
+    for line in _totals(request, estimate.tasks, price_per_hour):
         console.print(line)
-    return int(bool(found.failures))
+    return int(bool(estimate.failures))
 
 
 def _table(request: RunRequest, tasks: Sequence[TaskEstimate]) -> Table:
     rows = [_row(item) for item in tasks]
-    title = f"What {request.label} will take, by {sum(item.n_measured for item in tasks)} units that were done"
+    title = f"Estimate for {request.label}, from {sum(item.n_measured for item in tasks)} measured units"
     return Table(title, (Column("task", False), *map(Column, _COLUMNS)), tuple(rows))
 
 
@@ -82,12 +85,12 @@ def _row(item: TaskEstimate) -> Row:
 
 def _totals(request: RunRequest, tasks: Sequence[TaskEstimate], price_per_hour: float | None) -> list[str]:
     seconds, workers = sum(item.total.seconds for item in tasks), request.worker_settings.workers
-    shared = f", {format_duration(seconds / workers)} by {workers} workers" if workers > 1 else ""
-    lines = [f"time: {format_duration(seconds)} of one worker{shared}, loading not counted"]
-    lines.append(f"memory: {_peak_megabytes():,} MB at most while it was measured{_gpu_memory()}")
+    by_all = f", {format_duration(seconds / workers)} by {workers} workers" if workers > 1 else ""
+    lines = [f"time: {format_duration(seconds)} of one worker{by_all}, loading not counted"]
+    lines.append(f"memory: {_peak_megabytes():,} MB at most while measuring{_gpu_memory()}")
     cost = sum(item.total.cost for item in tasks)
     if cost:
-        lines.append(f"money: {cost:.2f} US dollars by the prices of the model")
+        lines.append(f"money: {cost:.2f} US dollars, by the prices of the model")
     if price_per_hour is not None:
         lines.append(
             f"money: {seconds / 3600 * price_per_hour:.2f} US dollars of machines at {price_per_hour:g} an hour"

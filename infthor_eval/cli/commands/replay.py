@@ -1,4 +1,4 @@
-"""`infthor-eval replay`: run recorded trajectories in a simulator and write frames and logs."""
+"""`infthor-eval replay`: replay recorded trajectories in a simulator, into frames and logs."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from infthor_eval.cli.help import ExampleCommand
 from infthor_eval.cli.options.values import floor_plans_option
 from infthor_eval.cli.options.workers import parse_worker_settings, worker_options
 
@@ -18,15 +19,15 @@ if TYPE_CHECKING:
 __all__ = ["command"]
 
 _PATH = click.Path(path_type=Path)
-_SHOWN = 20  # failures and divergences printed one by one; all are in the JSON summary
+_MAX_SHOWN = 20  # failures and divergences printed one by one; all are in the JSON summary
 
 
-@click.command("replay")
+@click.command("replay", cls=ExampleCommand, example="infthor-eval replay trajectories --out SET")
 @click.argument("trajectories", nargs=-1, required=True, type=_PATH)
-@click.option("--out", required=True, type=_PATH, help="The set to write or to continue.")
+@click.option("--out", required=True, type=_PATH, help="Folder of the set, new or to be continued.")
 @floor_plans_option
-@click.option("--limit", type=click.IntRange(1), help="Replay at most this many trajectories.")
-@click.option("--per-floor-plan", type=click.IntRange(1), help="At most this many of one floor plan.")
+@click.option("--limit", type=click.IntRange(1), help="Trajectories, at most.")
+@click.option("--per-floor-plan", type=click.IntRange(1), help="Trajectories of one floor plan, at most.")
 @click.option("--frames", type=click.IntRange(1), default=1, show_default=True, help="Frames per move or turn.")
 @click.option("--unity", is_flag=True, help="Use AI2-THOR's own Unity build, not the embedded simulator.")
 @worker_options
@@ -46,9 +47,9 @@ def command(
 ) -> None:
     """Replay trajectories (.json, .jsonl, .jsonl.gz, directories) into an NIEH set.
 
-    Writes one frame per low-level action (and the first one), the log of every frame, and the trajectory
-    itself. Trajectories that the set has already are not replayed again. A refused action is reported and the
-    replay goes on. Exit status 1 where a trajectory could not be replayed at all.
+    Writes the first frame and one after each low-level action, the log of every frame, and the trajectory itself.
+    Trajectories in the set are not replayed again. Refused actions are reported, and the replay continues. Exit code 1
+    if a trajectory cannot be replayed at all.
     """
     from infthor_eval.cli.progress.bar import PacedBar
     from infthor_eval.formats.files import prepare_folder
@@ -73,7 +74,7 @@ def command(
         click.echo(msgspec.json.encode(summarise(replayed)))
     else:
         _print(summarise(replayed), console())
-    for failure in replayed.failures[:_SHOWN]:
+    for failure in replayed.failures[:_MAX_SHOWN]:
         notes.print(f"not replayed: {failure.place}: {failure.message}", style="red")
     context.exit(1 if replayed.failures else 0)
 
@@ -90,9 +91,9 @@ def _print(summary: ReplaySummary, output: Console) -> None:
     overlaps = overlaps_table(summary)
     if overlaps is not None:
         print_table(overlaps, output)
-    for item in summary.diverged[:_SHOWN]:
+    for item in summary.diverged[:_MAX_SHOWN]:
         line = f"diverged: {item.traj_id}: step {item.step}: {item.action}: {item.error}"
         output.print(line)
-    hidden = len(summary.diverged) - _SHOWN
+    hidden = len(summary.diverged) - _MAX_SHOWN
     if hidden > 0:
         output.print(f"and {hidden} more; --json lists all")

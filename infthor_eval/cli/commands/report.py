@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from infthor_eval.cli.help import ExampleCommand
 from infthor_eval.cli.options.values import WholeNumber
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ _PATH = click.Path(path_type=Path)
 _PAGE, _FOLDER = Path("results/report.html"), Path("results/figures")
 
 
-@click.command("report")
+@click.command("report", cls=ExampleCommand, example="infthor-eval report results/*/nieh_mini-* --out report.html")
 @click.argument("runs", metavar="RUN...", nargs=-1, required=True, type=_PATH)
 @click.option(
     "--out",

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from infthor_eval.cli.help import ExampleCommand
 from infthor_eval.cli.options.run import RunOptions, run_options
 from infthor_eval.cli.options.show import ShowOptions, show_options
 from infthor_eval.cli.options.trackers import parse_trackers, tracker_options
@@ -24,7 +25,9 @@ if TYPE_CHECKING:
 __all__ = ["command", "evaluate"]
 
 
-@click.command("run")
+@click.command(
+    "run", cls=ExampleCommand, example="infthor-eval run --model oracle,blind,qwen2.5-vl-nano --tasks nieh_mini_gt"
+)
 @run_options
 @show_options
 @tracker_options

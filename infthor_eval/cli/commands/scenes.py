@@ -1,9 +1,10 @@
-"""`infthor-eval scenes`: look at a scene, or carry it to machines without Unity."""
+"""`infthor-eval scenes`: draw a scene, or export it for machines without Unity."""
 
 from pathlib import Path
 
 import click
 
+from infthor_eval.cli.help import ExampleCommand, ExampleGroup
 from infthor_eval.cli.options.values import SceneName, floor_plans_option
 
 __all__ = ["command"]
@@ -11,17 +12,23 @@ __all__ = ["command"]
 _PICTURES = (".png", ".jpg", ".jpeg")
 
 
-@click.group("scenes")
+@click.group("scenes", cls=ExampleGroup, example="infthor-eval scenes show kitchen-3")
 def command() -> None:
-    """Look at scenes (show), or carry them to machines without Unity (dump)."""
+    """Draw a scene (show), or export scenes for machines without Unity (dump)."""
 
 
-@command.command("show")
+@command.command("show", cls=ExampleCommand, example="infthor-eval scenes show kitchen-3 --out kitchen.png")
 @click.argument("name", type=SceneName())
 @floor_plans_option
-@click.option("--out", type=click.Path(path_type=Path), help="The picture to write; NAME.png otherwise.")
-@click.option("--size", type=click.IntRange(64, 2048), default=600, show_default=True, help="Of each view, pixels.")
-@click.option("--overwrite", is_flag=True, help="Replace a file that holds something else.")
+@click.option("--out", type=click.Path(path_type=Path), help="Image to write; default: NAME.png.")
+@click.option(
+    "--size",
+    type=click.IntRange(64, 2048),
+    default=600,
+    show_default=True,
+    help="Width and height of each view, pixels.",
+)
+@click.option("--overwrite", is_flag=True, help="Replace a file with other content.")
 def show(name: str, data: Path | None, out: Path | None, size: int, overwrite: bool) -> None:
     """Draw scene NAME from above and as the agent first sees it, side by side."""
     import io
@@ -37,7 +44,7 @@ def show(name: str, data: Path | None, out: Path | None, size: int, overwrite: b
 
     path = prepare_file(out or Path(f"{name}.png"))
     if path.suffix.lower() not in _PICTURES:
-        raise click.UsageError(f"--out {path}: not a picture; use {', '.join(_PICTURES)}")
+        raise click.UsageError(f"--out {path}: not an image; use {', '.join(_PICTURES)}")
     with Simulator(embedded(data), width=size, height=size, quality="Ultra") as simulator:
         above, first = scene_pictures(simulator, name)
     sheet = Image.new("RGB", (2 * size, size))
@@ -55,19 +62,23 @@ def show(name: str, data: Path | None, out: Path | None, size: int, overwrite: b
     print_line(f"{name}: {path} (from above; first view)")
 
 
-@command.command("dump")
+@command.command("dump", cls=ExampleCommand, example="infthor-eval scenes dump FloorPlan1 FloorPlan201 --out scenes")
 @click.argument("names", nargs=-1, required=True)
-@click.option("--out", type=click.Path(path_type=Path), required=True, help="Folder of floor plans, made or added to.")
-@click.option("--unity", type=click.Path(path_type=Path), help="Unity's executable, not the build ai2thor downloads.")
-@click.option("--embedded", "is_embedded", is_flag=True, help="Dump scenes of the embedded simulator instead.")
-@click.option("--overwrite", is_flag=True, help="Replace scenes of which the folder has something else.")
+@click.option("--out", type=click.Path(path_type=Path), required=True, help="Folder of floor plans, new or existing.")
+@click.option(
+    "--unity",
+    type=click.Path(path_type=Path),
+    help="Unity executable to use instead of the build that ai2thor downloads.",
+)
+@click.option("--embedded", "is_embedded", is_flag=True, help="Export scenes of the embedded simulator instead.")
+@click.option("--overwrite", is_flag=True, help="Replace other recordings of these scenes.")
 @floor_plans_option
 def dump(
     names: tuple[str, ...], out: Path, unity: Path | None, is_embedded: bool, overwrite: bool, data: Path | None
 ) -> None:
-    """Write what Unity reports of the scenes NAMES, for --data of the other commands.
+    """Export the metadata of the scenes NAMES from Unity into a folder.
 
-    With that folder they run in the embedded simulator on machines without Unity.
+    Other commands take that folder as --data, to run these scenes in the embedded simulator.
     """
     from infthor_eval.formats.files import prepare_folder
     from infthor_eval.terminal import print_line

@@ -5,6 +5,7 @@ from typing import Any
 
 import click
 
+from infthor_eval.cli.help import ExampleCommand
 from infthor_eval.cli.options.show import ShowOptions, show_options
 from infthor_eval.cli.results import RunResults, print_results
 from infthor_eval.runs import RunSummary, read_header
@@ -15,7 +16,7 @@ from infthor_eval.suites import suite_named
 __all__ = ["command", "read_run_results"]
 
 
-@click.command("show")
+@click.command("show", cls=ExampleCommand, example="infthor-eval show results/oracle/RUN results/blind/RUN --full")
 @click.argument("folders", metavar="RUN...", nargs=-1, required=True, type=click.Path(path_type=Path))
 @show_options
 def command(folders: tuple[Path, ...], **given: Any) -> None:

@@ -6,6 +6,7 @@ from typing import Any, Literal
 
 import click
 
+from infthor_eval.cli.help import ExampleCommand
 from infthor_eval.cli.options.run import RunOptions
 from infthor_eval.cli.options.values import ModelList, ModelSpec, WholeNumber
 from infthor_eval.cli.options.workers import parse_worker_settings, worker_options
@@ -24,19 +25,19 @@ from infthor_eval.runs.run_labels import label_runs
 __all__ = ["command", "validate"]
 
 
-@click.command("validate")
+@click.command("validate", cls=ExampleCommand, example="infthor-eval validate SET --models A,B,C,D --out VALIDATED")
 @click.argument("set_folder", metavar="SET", type=click.Path(path_type=Path))
 @click.option(
     "--models",
     type=ModelList(),
     required=True,
     metavar="MODEL,...",
-    help="Model names with commas; the paper uses four. MODEL:K=V,... gives one options of its own.",
+    help="Model names with commas; the paper uses four. MODEL:K=V,... gives a model its own options.",
 )
 @click.option("--out", type=click.Path(path_type=Path), required=True, help="Folder of the validated set.")
-@click.option("--decisions", type=click.Path(path_type=Path), help="The inspection list with keep or drop filled in.")
+@click.option("--decisions", type=click.Path(path_type=Path), help="inspection.csv with keep or drop filled in.")
 @click.option("--scorer", type=click.Choice(["strict", "reference"]), default="strict", show_default=True)
-@click.option("--seed", type=WholeNumber(), default=0, show_default=True, help="For whatever is random.")
+@click.option("--seed", type=WholeNumber(), default=0, show_default=True, help="Seed of everything random.")
 @worker_options
 def command(
     set_folder: Path,
@@ -47,10 +48,11 @@ def command(
     seed: int,
     **workers: Any,
 ) -> int:
-    """Ask every question of SET of each model, on its clue frames alone, and keep what one of them answers.
+    """Ask each model every question of SET with its clue frames alone; keep what one of them answers.
 
-    Rejected questions go to rejected.jsonl with every reply. Those with several clues that no model answers go to
-    inspection.csv and inspection.html; decide, and pass the decisions back. Stopped, the same command goes on.
+    Rejected questions are written to rejected.jsonl with every reply. Questions with several clues that no model
+    answers are written to inspection.csv and inspection.html: decide on them, and pass the file as --decisions. If the
+    command is stopped, run it again to continue.
     """
     options = RunOptions(
         models=models,
@@ -66,16 +68,16 @@ def command(
 def validate(
     requests: Sequence[tuple[RunRequest, Suite]], out: Path, decisions_file: Path | None, scorer: Scorer
 ) -> int:
-    """Run the models, sort the questions out, write the validated set, and print Table 4 on it.
+    """Run the models, judge the questions, write the validated set, and print Table 4 on it.
 
     Args:
-        requests: one per model, all on the clue frames of the same set.
-        out: folder of the validated set; the runs lie in it too.
-        decisions_file: an inspection list with decisions.
-        scorer: under which an answer is correct.
+        requests: one run for each model, all with the clue frames of the same set.
+        out: folder of the validated set, with the runs in it.
+        decisions_file: inspection list with decisions; None for none.
+        scorer: scorer that decides whether an answer is correct.
 
     Returns:
-        Exit code: 130 where somebody stopped it, 1 where a model failed on a question, else 0.
+        Exit code: 130 if a run was stopped, 1 if a model failed on a question, else 0.
     """
     decisions = read_decisions(decisions_file) if decisions_file else {}
     data = find_set(str(requests[0][0].tasks.data))
@@ -93,10 +95,10 @@ def validate(
     verdicts = judge(questions, dict(zip(_model_names(outcomes), replies, strict=True)), decisions, scorer)
     earlier = write_validated_set(out, data, verdicts)
     if earlier is not None:
-        print_note(f"{earlier}: the earlier list, with decisions on questions that are not to be inspected any more")
+        print_note(f"{earlier}: the earlier list; it has decisions on questions that need no inspection now")
     write_inspection_page(out / "inspection.html", verdicts.to_inspect, data)
     console = table_console()
-    print_table(clues_table([_on_kept(outcome, verdicts) for outcome in outcomes]), console)
+    print_table(clues_table([_summarise_kept(outcome, verdicts) for outcome in outcomes]), console)
     console.print(
         f"{len(questions)} questions: {len(verdicts.kept)} kept, {len(verdicts.rejected)} rejected, "
         f"{len(verdicts.to_inspect)} to inspect: {out}",
@@ -111,8 +113,8 @@ def _model_names(outcomes: Sequence[RunOutcome]) -> list[str]:
     return [label if models.count(model) > 1 else model for model, label in zip(models, labels, strict=True)]
 
 
-def _on_kept(outcome: RunOutcome, verdicts: Verdicts) -> RunSummary:
-    """The run's summary on the questions that stay."""
+def _summarise_kept(outcome: RunOutcome, verdicts: Verdicts) -> RunSummary:
+    """The run's summary on the questions that are kept."""
     kept = {item.question.id for item in verdicts.kept}
     header = outcome.summary.header
     records = [record for record in outcome.records if record.id in kept]

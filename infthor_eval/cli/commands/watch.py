@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from infthor_eval.cli.help import ExampleCommand
 from infthor_eval.cli.options.values import FiniteFloat
 
 if TYPE_CHECKING:
@@ -24,7 +25,11 @@ _PATH = click.Path(path_type=Path)
 _FOLDER = Path("results/recordings")
 
 
-@click.command("watch")
+@click.command(
+    "watch",
+    cls=ExampleCommand,
+    example="infthor-eval watch results/scripted/RUN --trajectory kitchen-4-seed0 --out scripted.mp4",
+)
 @click.argument("run", type=_PATH)
 @click.option("--trajectory", metavar="NAME", help="A trajectory of the run, if it has several.")
 @click.option("--task", metavar="NAME", help="A task of the run, if it has several.")

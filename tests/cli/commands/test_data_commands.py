@@ -45,7 +45,7 @@ def test_what_they_print_for_people(made, tmp_path, run):
     assert "MoveAhead" in out
     code, out, _ = run("generate", "--scene", "kitchen-5", "--min-steps", 1, "--min-subgoals", 1, "--out", tmp_path)
     assert code == 0
-    assert "1 trajectories (0 made earlier)" in out
+    assert "1 trajectories (0 generated earlier)" in out
 
 
 def test_a_truncated_trajectory_is_named_and_nothing_half_written(made, tmp_path, run):

@@ -1,4 +1,4 @@
-"""`doctor`: what is there and what is not, each with its mend, and no token in it."""
+"""`doctor`: what is there and what is not, each with a hint, and no token in it."""
 
 import json
 import time
@@ -14,21 +14,25 @@ TOKEN = "hf_of_nobody_0123456789"
 def offline(monkeypatch):
     """The hub takes its time, as where a name cannot be looked up."""
     monkeypatch.setattr("huggingface_hub.constants.HF_HUB_OFFLINE", False)
-    monkeypatch.setattr(checks, "_PATIENCE_S", 0.1)
-    monkeypatch.setattr(checks, "_reached", lambda url: time.sleep(5) or "")
+    monkeypatch.setattr(checks, "_HUB_TIMEOUT_S", 0.1)
+    monkeypatch.setattr(checks, "_connection_problem", lambda url: time.sleep(5) or "")
 
 
-def test_everything_is_looked_at_and_what_is_missing_has_its_mend(run, monkeypatch):
+def test_everything_is_checked_and_what_is_missing_has_a_hint(run, monkeypatch):
     monkeypatch.setenv("HF_TOKEN", TOKEN)
     code, out, err = run("doctor", "--json")
     assert (code, err) == (0, "")
-    found = {check["name"]: check for check in json.loads(out)}
-    assert {"Python", "torch", "memory", "embedded simulator", "AI2-THOR", "display", "hub token", "hub"} <= set(found)
-    assert {"disk, here", "disk, cache", "NIEH data", *(f"extra {name}" for name in checks._EXTRAS)} <= set(found)
-    assert all(check["mend"] for check in found.values() if check["state"] != "ok")
-    assert found["hub"]["found"].endswith("cannot be reached (no answer in 0.1 s)")
-    assert found["hub token"] == {"name": "hub token", "state": "ok", "found": "there is one", "mend": ""}
-    assert "fetch nieh" in found["NIEH data"]["mend"]
+    checks_by_name = {check["name"]: check for check in json.loads(out)}
+    assert {"Python", "torch", "memory", "embedded simulator", "AI2-THOR", "display", "hub token", "hub"} <= set(
+        checks_by_name
+    )
+    assert {"disk, here", "disk, cache", "NIEH data", *(f"extra {name}" for name in checks._EXTRAS)} <= set(
+        checks_by_name
+    )
+    assert all(check["hint"] for check in checks_by_name.values() if check["state"] != "ok")
+    assert checks_by_name["hub"]["detail"].endswith("cannot be reached (no answer in 0.1 s)")
+    assert checks_by_name["hub token"] == {"name": "hub token", "state": "ok", "detail": "stored", "hint": ""}
+    assert "fetch nieh" in checks_by_name["NIEH data"]["hint"]
     assert TOKEN not in out
 
 
@@ -49,4 +53,4 @@ def test_what_nothing_will_do_without_is_told_by_the_exit_code(run, monkeypatch)
 @pytest.mark.parametrize("url", ["http://localhost:9", "no address"])
 def test_a_hub_that_refuses_is_told_at_once(url, monkeypatch):
     monkeypatch.undo()
-    assert checks._reached(url)
+    assert checks._connection_problem(url)

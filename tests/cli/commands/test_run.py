@@ -177,13 +177,17 @@ BAD = [
     (["--model", "oracle", "--tasks", "nieh"], "give its folder with --data"),
     (["--model", "oracle", "--tasks", "nieh", "--data", "nowhere"], "nowhere: no such folder"),
     (["--model", "oracle", "--tasks", ",", "--data", "SET"], "--tasks is empty"),
-    (["--model", "oracle"], "Missing option '--tasks'; `infthor-eval run --help` tells what there is"),
+    (["--model", "oracle"], "Missing option '--tasks'; see `infthor-eval run --help`"),
     (["--model", "oracle", "--tasks", "nieh", "--data", "SET", "--model-args", "a"], "not of the form key=value"),
     (["--model", "oracle", "--tasks", "nieh", "--data", "SET", "--model-args", "a=1"], "oracle has no option a"),
     (["--model", "qwen2.5-vl-tiny", "--tasks", "nieh", "--data", "SET", "--model-args", "dtpe=x"], "mean dtype?"),
     (["--model", "oracle", "--tasks", "nieh", "--data", "SET", "--limit", "0"], "--limit"),
-    (["--modle", "oracle"], "`infthor-eval run --help` tells what there is"),
-    (["evaluate"], "No such command 'evaluate'"),
+    (["--modle", "oracle"], "unknown option --modle; did you mean --model?"),
+    (["--model", "oracle", "--taks", "nieh"], "unknown option --taks; did you mean --tasks?"),
+    (["--zzz", "oracle"], "unknown option --zzz; see `infthor-eval run --help`"),
+    (["compair", "a", "b"], "unknown command 'compair'; did you mean 'compare'?"),
+    (["xyz"], "unknown command 'xyz'; there are bundle, "),
+    (["ls", "modles"], "Did you mean 'models'?"),
 ]
 
 
