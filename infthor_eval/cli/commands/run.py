@@ -62,11 +62,11 @@ def evaluate(
 
     senders = Trackers(**(trackers or {}))
     with quiet_notes(show.quiet):
+        with NOTES.status("reading the tasks and their data"):  # retrieval embeds every frame: minutes
+            runs = [prepare(request, suite) for request, suite in requests]
         for model in dict.fromkeys(request.model for request, _ in requests):
             if note := model_note(model):
                 print_note(f"{model}: {note}", "yellow")
-        with NOTES.status("reading the tasks and their data"):  # retrieval embeds every frame: minutes
-            runs = [prepare(request, suite) for request, suite in requests]
         outcomes = []
         for run in runs:
             outcomes.append(execute_with_progress(run))

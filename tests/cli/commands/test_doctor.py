@@ -22,17 +22,15 @@ def test_everything_is_checked_and_what_is_missing_has_a_hint(run, monkeypatch):
     monkeypatch.setenv("HF_TOKEN", TOKEN)
     code, out, err = run("doctor", "--json")
     assert (code, err) == (0, "")
-    checks_by_name = {check["name"]: check for check in json.loads(out)}
+    by_name = {check["name"]: check for check in json.loads(out)}
     assert {"Python", "torch", "memory", "embedded simulator", "AI2-THOR", "display", "hub token", "hub"} <= set(
-        checks_by_name
+        by_name
     )
-    assert {"disk, here", "disk, cache", "NIEH data", *(f"extra {name}" for name in checks._EXTRAS)} <= set(
-        checks_by_name
-    )
-    assert all(check["hint"] for check in checks_by_name.values() if check["state"] != "ok")
-    assert checks_by_name["hub"]["detail"].endswith("cannot be reached (no answer in 0.1 s)")
-    assert checks_by_name["hub token"] == {"name": "hub token", "state": "ok", "detail": "stored", "hint": ""}
-    assert "fetch nieh" in checks_by_name["NIEH data"]["hint"]
+    assert {"disk, here", "disk, cache", "NIEH data", *(f"extra {name}" for name in checks._EXTRAS)} <= set(by_name)
+    assert all(check["hint"] for check in by_name.values() if check["state"] != "ok")
+    assert by_name["hub"]["detail"].endswith("cannot be reached (no answer in 0.1 s)")
+    assert by_name["hub token"] == {"name": "hub token", "state": "ok", "detail": "stored", "hint": ""}
+    assert "fetch nieh" in by_name["NIEH data"]["hint"]
     assert TOKEN not in out
 
 
