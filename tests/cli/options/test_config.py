@@ -1,6 +1,5 @@
 """`--config`: a run by a file, and the file that every run leaves; models with options of their own."""
 
-import json
 import shlex
 from pathlib import Path
 from typing import Any
@@ -188,4 +187,4 @@ def test_models_that_cannot_be_meant(run, typed, said):
 
 def test_results_do_not_know_of_it(config, tmp_path, run):
     run("--config", config(limit=1))
-    assert "config" not in json.loads(only(tmp_path / "out", "results.json").read_text())
+    assert "asked.yaml" not in only(tmp_path / "out", "results.json").read_text()
