@@ -1,3 +1,5 @@
+import threading
+
 import msgspec
 import pytest
 from hypothesis import given
@@ -185,3 +187,43 @@ def test_a_folder_that_cannot_be_written_is_named(tmp_path):
     (tmp_path / "run").write_text("a file")
     with pytest.raises(UsageError, match="cannot be written"):
         opened(tmp_path / "run")
+
+
+def test_an_artifact_is_known_as_soon_as_it_is_cached(tmp_path):
+    with opened(tmp_path) as journal:
+        journal.cache_artifact("inputs", Note("a mug"))
+        assert journal.find_artifact("inputs") == Note("a mug")
+        assert [artifact.payload for artifact in journal.artifacts] == [Note("a mug")]
+
+
+def test_a_worker_s_record_is_written_here_only_where_its_shard_cannot_be_seen(tmp_path):
+    with opened(tmp_path) as driver:
+        before = shard(tmp_path).read_bytes()
+        driver.add_from(7, record("unseen"))
+        assert shard(tmp_path).read_bytes().count(b"\n") == before.count(b"\n") + 1
+        with opened(tmp_path, worker=1) as worker:
+            worker.append(record("seen"))
+        driver.add_from(1, record("seen"))
+        assert shard(tmp_path).read_bytes().count(b"\n") == before.count(b"\n") + 1
+        assert {known.id for known in driver.records} == {"unseen", "seen"}
+    assert len(read_run(tmp_path, TYPES)[1]) == 2
+
+
+def test_what_a_lost_worker_wrote_is_read_again(tmp_path):
+    with opened(tmp_path) as driver:
+        with opened(tmp_path, worker=1) as worker:
+            worker.append(record())
+        assert driver.records == []
+        driver.reread(1)
+        assert driver.records == [record()]
+        driver.reread(2)  # it never wrote
+
+
+def test_a_worker_waits_for_one_that_is_still_ending(tmp_path):
+    ending = opened(tmp_path, worker=1)
+    with pytest.raises(UsageError, match="another run is writing it"):
+        opened(tmp_path, worker=1)
+    threading.Timer(0.3, ending.__exit__, (None, None, None)).start()
+    with Journal(tmp_path, HEADER, TYPES, worker=1, wait_s=600.0) as journal:
+        journal.append(record())
+    assert read_run(tmp_path, TYPES)[1] == [record()]

@@ -156,6 +156,19 @@ def test_a_question_without_a_needle_is_asked_once_outside_the_depths():
     assert found(5).reason == "the window reaches outside the trajectory"
 
 
+def test_the_smallest_and_the_fullest_windows():
+    assert [sample.frames for sample in windows(10, [4], ctx_size=1, tokens_per_frame=1000)] == [(4,)] * 5
+    assert {sample.frames for sample in windows(100, [1, 5, 9], ctx_size=3, tokens_per_frame=1000)} == {(1, 5, 9)}
+
+
+@pytest.mark.parametrize(("n_frames", "starts"), [(10, {0}), (11, {0, 1})])
+def test_a_window_without_a_needle_lies_anywhere_inside_the_trajectory(n_frames, starts):
+    question = Question("t", "Is there a mug?", (3,), ("no",), absence=True)
+    seeded = (ContextSettings(ctx_size=10, tokens_per_frame=1000, seed=seed) for seed in range(20))
+    samples = [CONTEXTS["haystack"].samples(Frames(n_frames), question, settings)[0] for settings in seeded]
+    assert {sample.frames for sample in samples} == {tuple(range(start, start + 10)) for start in starts}
+
+
 def test_what_does_not_fit_says_why():
     def reasons(n_frames, clues, size):
         return {skipped.reason for skipped in windows(n_frames, clues, ctx_size=size, tokens_per_frame=1000)}
