@@ -7,7 +7,7 @@ INSTALLED := $(VENV)/.installed
 # here. It must stay out of the environment itself, where transformers would find it and fail.
 PEERS := $(VENV)/test-peers
 
-.PHONY: demo test test-all test-times lint docs clean
+.PHONY: demo shell test test-all test-times lint docs clean
 
 # A trajectory in a procedural kitchen, its frames and questions; then the bundled set, by the bounds and a small model.
 demo: $(INSTALLED)
@@ -16,6 +16,11 @@ demo: $(INSTALLED)
 	$(BIN)/infthor-eval questions results/demo/set --out results/demo/set/qa_set_demo.csv
 	$(BIN)/infthor-eval --model oracle,blind,qwen2.5-vl-nano --tasks nieh_mini --output results/demo
 	$(BIN)/infthor-eval report results/demo/*/nieh_mini-* --out results/demo/report.html
+	@echo 'To type infthor-eval yourself, activate the environment: . $(BIN)/activate (or: make shell)'
+
+# A shell with the environment active; `exit` leaves it.
+shell: $(INSTALLED)
+	@. $(BIN)/activate && exec "$${SHELL:-/bin/sh}"
 
 test: $(INSTALLED) $(PEERS)
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 3 --dist loadfile -m "not slow"

@@ -1,0 +1,32 @@
+"""One model with several options: a run and a row for each, told apart by what differs."""
+
+import pytest
+
+
+@pytest.fixture
+def variants(make_nieh_set, tmp_path, run):
+    """The output of a command with two variants of a model, and the folders of their runs."""
+    models = "qwen2.5-vl-tiny:max_tokens=3000,qwen2.5-vl-tiny:max_tokens=4000,oracle"
+    data, out = make_nieh_set(size=56), tmp_path / "out"
+    code, printed, err = run("--model", models, "--tasks", "nieh_gt", "--data", data, "--limit", 1, "--output", out)
+    assert code == 0, err
+    return printed, err, sorted((out / "qwen2.5-vl-tiny").iterdir())
+
+
+def test_each_variant_has_a_folder_and_a_label(variants, run, tmp_path):
+    printed, err, folders = variants
+    labels = ("qwen2.5-vl-tiny (max_tokens=3000)", "qwen2.5-vl-tiny (max_tokens=4000)")
+    assert len(folders) == 2
+    assert err.count("qwen2.5-vl-tiny: random weights") == 1
+    _, shown, _ = run("show", *folders)
+    _, listed, _ = run("ls", "runs", tmp_path / "out")
+    for text in (printed, shown, listed):
+        for label in labels:
+            assert any(label in line for line in text.splitlines() if "nieh_gt" in line)
+    assert "oracle (" not in printed
+
+
+def test_csv_has_the_labels_too(variants, run):
+    _, _, folders = variants
+    _, shown, _ = run("show", *folders, "--format", "csv")
+    assert "qwen2.5-vl-tiny (max_tokens=3000)" in shown

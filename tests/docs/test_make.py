@@ -1,0 +1,32 @@
+"""The Makefile's targets for people: a shell with the environment, and how to activate it."""
+
+import subprocess
+
+import pytest
+
+from .blocks import ROOT
+
+
+@pytest.fixture
+def venv(tmp_path):
+    """A folder that looks like an environment that is set up already."""
+    program = tmp_path / "bin" / "infthor-eval"
+    program.parent.mkdir()
+    program.write_text("#!/bin/sh\necho this one\n")
+    program.chmod(0o755)
+    (tmp_path / "bin" / "activate").write_text(f'PATH="{program.parent}:$PATH"\nexport PATH\n')
+    (tmp_path / ".installed").touch()
+    return tmp_path
+
+
+def test_the_shell_has_the_environment(venv):
+    words = ["make", "--silent", "shell", f"VENV={venv}", "SHELL=/bin/sh"]
+    done = subprocess.run(words, cwd=ROOT, input="infthor-eval\n", capture_output=True, text=True, check=True)
+    assert done.stdout == "this one\n"
+
+
+def test_the_demo_ends_with_how_to_activate_the_environment(venv):
+    words = ["make", "--dry-run", "demo", f"VENV={venv}"]
+    done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=True)
+    assert f". {venv}/bin/activate" in done.stdout.splitlines()[-1]
+    assert "make shell" in done.stdout.splitlines()[-1]
