@@ -108,9 +108,9 @@ def told(n_steps: int) -> tuple[list[Part], list[Step]]:
     steps: list[Step] = []
     data = NiehSet(packaged_folder("sets/nieh_mini"))
     for name in trajectory_names(data):
-        for chapter in read_history(data, name)[1]:
-            (steps[-1][1] if steps else opening).extend(chapter.opening())
-            steps += [(action, [frame]) for action, frame in chapter.steps]
+        for segment in read_history(data, name)[1]:
+            (steps[-1][1] if steps else opening).extend(segment.opening())
+            steps += [(action, [frame]) for action, frame in segment.steps]
     if len(steps) < n_steps:
         raise SystemExit(f"the bundled trajectories have {len(steps)} steps; ask for at most that many")
     return opening, steps[:n_steps]

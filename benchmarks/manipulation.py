@@ -17,9 +17,10 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from infthor_eval.formats.trajectory import TrajectorySource, iter_sources
-from infthor_eval.manipulation.history import ManipulationKind, errands_of
+from infthor_eval.manipulation.kinds import ManipulationKind
 from infthor_eval.manipulation.records import ArmRecord
 from infthor_eval.manipulation.suite import ManipulationSuite
+from infthor_eval.manipulation.trajectories import arm_episodes
 from infthor_eval.rates import format_percent
 from infthor_eval.runs import UnitRecord, read_run
 
@@ -59,7 +60,7 @@ def chosen(options: argparse.Namespace) -> Iterator[TrajectorySource]:
     step = max(1, round(len(every) * 0.618))  # goes through them without favouring a scene
     for number in range(len(every)):
         source = every[number * step % len(every)]
-        counts.update(errand.kind for errand in errands_of(source.read()))
+        counts.update(episode.kind for episode in arm_episodes(source.read()))
         yield source
         if min(counts[kind] for kind in ManipulationKind) >= options.episodes:
             return

@@ -20,7 +20,7 @@ from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.household.sequence_text import ACT
 from infthor_eval.plans.habits import Habits
-from infthor_eval.plans.history import Chapter
+from infthor_eval.plans.segments import PlanSegment
 from infthor_eval.statistics import MeanEstimate, clustered_mean, paired_difference
 from infthor_eval.training.data import read_history, trajectory_names
 from model_adapters import Decoding, load
@@ -34,7 +34,7 @@ def main() -> None:
     options = _arguments()
     data = NiehSet(options.data)
     found = [read_history(data, name) for name in trajectory_names(data)]
-    clusters = [trajectory.traj_id for trajectory, chapters in found for chapter in chapters for _ in chapter.steps]
+    clusters = [trajectory.traj_id for trajectory, segments in found for segment in segments for _ in segment.steps]
     rows = {
         "most frequent": [float(hit) for hit in most_frequent(found)],
         "history": [float(hit) for hit in habitual(found)],
@@ -42,7 +42,7 @@ def main() -> None:
     model: Any = load(options.model, parse_model_args(options.model_args), seed=0)
     for way in options.frames.split(","):
         rows[f"{options.model}, frames {way}"] = [
-            float(hit) for _, chapters in found for hit in said(model, chapters, _SHOWN[way])
+            float(hit) for _, segments in found for hit in said(model, segments, _SHOWN[way])
         ]
     print(f"{len(clusters)} actions of {len(found)} trajectories; next action right, %, with its 95 % interval")
     for name, hits in rows.items():
@@ -59,31 +59,31 @@ def _arguments() -> argparse.Namespace:
     return parser.parse_args()
 
 
-def most_frequent(found: Sequence[tuple[Trajectory, Sequence[Chapter]]]) -> list[bool]:
+def most_frequent(found: Sequence[tuple[Trajectory, Sequence[PlanSegment]]]) -> list[bool]:
     """Whether each action is the most frequent one of all."""
-    actions = [action for _, chapters in found for chapter in chapters for action, _ in chapter.steps]
+    actions = [action for _, segments in found for segment in segments for action, _ in segment.steps]
     ((first, _),) = Counter(actions).most_common(1)
     return [action == first for action in actions]
 
 
-def habitual(found: Sequence[tuple[Trajectory, Sequence[Chapter]]]) -> Iterator[bool]:
+def habitual(found: Sequence[tuple[Trajectory, Sequence[PlanSegment]]]) -> Iterator[bool]:
     """Whether habits of the other scenes lead to each action."""
-    for trajectory, chapters in found:
+    for trajectory, segments in found:
         scene = trajectory.scene.floor_plan
         habits = Habits(other for other, _ in found if other.scene.floor_plan != scene)
-        for chapter in chapters:
+        for segment in segments:
             done: list[str] = []
-            for action, _ in chapter.steps:
-                yield habits.next(chapter.plan, done) == action
+            for action, _ in segment.steps:
+                yield habits.next_action(segment.plan, done) == action
                 done.append(action)
 
 
-def said(model: Any, chapters: Sequence[Chapter], show: Show) -> Iterator[bool]:
+def said(model: Any, segments: Sequence[PlanSegment], show: Show) -> Iterator[bool]:
     """Whether a model's replies are the actions, each on the true history before it."""
     talk, decoding = model.conversation(), Decoding(max_new_tokens=10, stop=(ACT,))
-    for chapter in chapters:
-        talk.append(*(part if isinstance(part, str) else show(part) for part in chapter.opening()))
-        for action, frame in chapter.steps:
+    for segment in segments:
+        talk.append(*(part if isinstance(part, str) else show(part) for part in segment.opening()))
+        for action, frame in segment.steps:
             talk.append(ACT)
             yield talk.reply(decoding).text.strip() == action
             talk.append(f"{action}{ACT}", show(frame))

@@ -26,7 +26,7 @@ from infthor_eval.plans.environment import PlanEnvironment
 from infthor_eval.plans.expert import ExpertRefusedError
 from infthor_eval.plans.records import PlanRecord
 from infthor_eval.plans.suite import PlansSuite
-from infthor_eval.plans.summary import TaskSummary
+from infthor_eval.plans.summary import PlanTaskSummary
 from infthor_eval.rates import Rate
 from infthor_eval.runs import UnitRecord, read_run
 
@@ -39,7 +39,7 @@ Record = UnitRecord[PlanRecord]
 class Run(NamedTuple):
     """What came of a baseline."""
 
-    about: TaskSummary
+    about: PlanTaskSummary
     records: list[Record]
 
 

@@ -30,7 +30,8 @@ from threading import Lock, Thread
 from typing import Any
 
 from infthor_eval.formats.trajectory import iter_sources
-from infthor_eval.manipulation.history import ManipulationKind, errands_of
+from infthor_eval.manipulation.kinds import ManipulationKind
+from infthor_eval.manipulation.trajectories import arm_episodes
 
 _STALL_S = 4.0  # longer than the model's timeout_s
 _SERVER_FAULTS = ("500", "stall", "429", "reset")
@@ -72,7 +73,7 @@ def _with_pick_ups(folder: Path, n: int) -> Iterator[bytes]:
     for source in iter_sources(folder):
         if found >= n:
             return
-        found += sum(errand.kind is ManipulationKind.PICKUP for errand in errands_of(source.read()))
+        found += sum(episode.kind is ManipulationKind.PICKUP for episode in arm_episodes(source.read()))
         yield source.raw.replace(b"\n", b" ").strip() + b"\n"
 
 

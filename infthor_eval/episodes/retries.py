@@ -1,4 +1,4 @@
-"""Doing something again where the simulator failed for good."""
+"""Retrying work for which the simulator failed for good."""
 
 from collections.abc import Callable
 from typing import TypeVar
@@ -9,39 +9,40 @@ from infthor_eval.thor.simulator import Simulator
 __all__ = ["with_retries"]
 
 T = TypeVar("T")
-_TRIALS = 3
+_MAX_TRIES = 3
 
 
-def with_retries(
-    simulator: Simulator, do: Callable[[], T], begin_anew: Callable[[], None]
-) -> tuple[T, tuple[str, ...]]:
-    """What comes of something, tried again in a fresh process where the simulator fails.
+def with_retries(simulator: Simulator, do: Callable[[], T], reset: Callable[[], None]) -> tuple[T, tuple[str, ...]]:
+    """Do something, and retry it in a fresh process if the simulator fails.
+
+    The simulator itself survives the loss of its process by repeating the actions since the last mark. It gives up if
+    these end otherwise than before, or if it is lost again and again; then only the whole work can be done again.
 
     Args:
-        simulator: what it is done in; failures that it mends by itself are told too.
-        do: what is done.
-        begin_anew: forgets what was made in the failed process.
+        simulator: simulator that the work is done in.
+        do: the work.
+        reset: drops everything that was built in the failed process.
 
     Returns:
-        What came of it, and the simulator's faults on the way.
+        The result, and the faults on the way: errors of the simulator, and restarts that it survived itself.
 
     Raises:
-        SceneError: the simulator has no such scene; another try would end the same way.
+        SceneError: the simulator has no such scene; a retry would end the same way.
         SimulatorError: it failed every time.
     """
     faults: list[str] = []
     while True:
         restarts = simulator.restarts
         try:
-            made = do()
+            result = do()
         except SceneError:
             raise
         except SimulatorError as error:
-            begin_anew()
+            reset()
             faults.append(str(error))
-            if len(faults) == _TRIALS:
+            if len(faults) == _MAX_TRIES:
                 raise
         else:
             if simulator.restarts > restarts:
                 faults.append(f"simulator started again: {simulator.restarts - restarts}")
-            return made, tuple(faults)
+            return result, tuple(faults)

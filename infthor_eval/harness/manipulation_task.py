@@ -14,7 +14,7 @@ from infthor_eval.harness.registration import model_takes_references, register
 from infthor_eval.manipulation.evaluation import ManipulationEvaluation
 from infthor_eval.manipulation.options import ManipulationOptions
 from infthor_eval.manipulation.records import ArmRecord
-from infthor_eval.manipulation.task import TaskSettings
+from infthor_eval.manipulation.task import ArmTaskSettings
 from infthor_eval.runs import TaskFile, TaskRequest, UnitRecord
 
 __all__ = ["arm_evaluation", "arm_response", "dataset", "doc_to_target", "doc_to_text", "process_results"]
@@ -41,7 +41,7 @@ def dataset(**config: Any) -> dict[str, Any]:
             "arms are driven in a simulator, which infthor-eval's policies alone do; use --model infthor"
             " --model_args adapter=openvla"
         )
-    about = about_run(config, TaskSettings, ManipulationOptions)
+    about = about_run(config, ArmTaskSettings, ManipulationOptions)
     units = arm_evaluation(about, "dataset", 0).units
     return {
         "test": Dataset.from_list([

@@ -15,7 +15,7 @@ from infthor_eval.harness.registration import model_takes_references, register
 from infthor_eval.plans.evaluation import PlansEvaluation
 from infthor_eval.plans.options import PlansOptions
 from infthor_eval.plans.records import PlanRecord
-from infthor_eval.plans.task import TaskSettings
+from infthor_eval.plans.task import PlanTaskSettings
 from infthor_eval.runs import TaskFile, TaskRequest, UnitRecord
 
 __all__ = ["dataset", "doc_to_target", "doc_to_text", "episode_response", "evaluation_around", "process_results"]
@@ -41,9 +41,12 @@ def dataset(**config: Any) -> dict[str, Any]:
         raise UsageError(
             "plans are carried out in a simulator, which infthor-eval's models alone do; use --model infthor"
         )
-    about = about_run(config, TaskSettings, PlansOptions)
-    plans = evaluation_around({**about, "traj_id": ""}, "dataset", {"max_gen_toks": 1}, 0)
-    return {"test": Dataset.from_list([{**about, "traj_id": name, "plans": texts} for name, texts in plans.outline()])}
+    about = about_run(config, PlanTaskSettings, PlansOptions)
+    evaluation = evaluation_around({**about, "traj_id": ""}, "dataset", {"max_gen_toks": 1}, 0)
+    texts: dict[str, list[str]] = {}
+    for unit in evaluation.units:
+        texts.setdefault(unit.cluster, []).append(unit.payload.plan)
+    return {"test": Dataset.from_list([{**about, "traj_id": name, "plans": plans} for name, plans in texts.items()])}
 
 
 def doc_to_text(doc: Doc) -> str:

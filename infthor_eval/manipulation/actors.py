@@ -11,27 +11,27 @@ from infthor_eval.formats.blank import blank_like
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.manipulation.conversion import Call
 from infthor_eval.manipulation.environment import ArmEnvironment
-from infthor_eval.manipulation.history import ManipulationKind
-from infthor_eval.manipulation.reaching import plan
+from infthor_eval.manipulation.kinds import ManipulationKind
+from infthor_eval.manipulation.reaching import plan_steps
 from infthor_eval.runs.baseline import BaselineSubject
 from model_adapters import ArmDelta, Capabilities, Policy, Subject
 
-__all__ = ["BASELINES", "ArmActor", "ArmBaseline", "ArmSituation", "PolicyActor"]
+__all__ = ["BASELINES", "ArmActor", "ArmBaseline", "ArmSituation", "PolicyActor", "Step"]
 
 Step = ArmDelta | Sequence[Call]
-_IN_FLIGHT = 2  # episodes at a time; each has two simulators of its own
+_IN_FLIGHT = 2  # trajectories at a time; each has two simulators
 _N_NUMBERS = 7  # of a policy's step
-_LARGEST_TURN = 0.17  # radians of a random turn about each axis: 10 degrees
+_MAX_TURN = 0.17  # radians of a random turn about each axis: 10 degrees
 
 
 @dataclass(frozen=True)
 class ArmSituation:
-    """An episode that is begun.
+    """An episode that begins.
 
     Attributes:
-        environment: brought to it.
-        instruction: what is to be done, in words.
-        seed: for whatever is random in it.
+        environment: the environment, reset to the episode.
+        instruction: the instruction.
+        seed: seed of everything random.
         max_step: length of the longest movement, metres.
     """
 
@@ -45,14 +45,14 @@ class ArmActor(Protocol):
     """Drives an arm through one episode after the other."""
 
     def begin(self, situation: ArmSituation) -> None:
-        """An episode begins."""
+        """Begin an episode."""
         ...
 
     def act(self, frame: FrameRef | None) -> Sequence[Step]:
-        """The next steps, to be carried out in order; none to give up.
+        """Choose the next steps, to be executed in order; an empty sequence gives up.
 
         Raises:
-            ModelError: a policy cannot act, or what it gives is no movement.
+            ModelError: a policy fails, or its result is no movement.
             DataError: the frame cannot be read.
         """
         ...
@@ -60,10 +60,10 @@ class ArmActor(Protocol):
 
 @runtime_checkable
 class ArmBaseline(Subject, Protocol):
-    """What drives an arm without looking."""
+    """A subject that drives an arm without frames."""
 
     def arm_actor(self) -> ArmActor:
-        """An actor of one trajectory."""
+        """Create the actor of a trajectory."""
         ...
 
 
@@ -71,7 +71,12 @@ class PolicyActor:
     """A vision-language-action policy."""
 
     def __init__(self, policy: Policy, *, blank: bool) -> None:
-        """Say whether it is to see frames that show nothing."""
+        """Take a policy.
+
+        Args:
+            policy: the policy.
+            blank: whether it is shown grey frames instead of the actual ones.
+        """
         self._policy, self._blank = policy, blank
 
     def begin(self, situation: ArmSituation) -> None:
@@ -81,26 +86,26 @@ class PolicyActor:
 
     def act(self, frame: FrameRef | None) -> Sequence[Step]:
         """See `ArmActor`."""
-        assert frame is not None  # as wherever a policy looks
+        assert frame is not None  # frames are kept for policies
         chunk = self._policy.act(blank_like(frame) if self._blank else frame, self._instruction)
         if not chunk:
             raise ModelError(f"{self._policy.name} gives no movement; a policy gives at least one")
         for step in chunk:
-            _check(step)
+            _check_step(step)
         return chunk
 
 
-def _check(step: object) -> None:
-    """Refuse what a policy should not give.
+def _check_step(step: object) -> None:
+    """Check a step of a policy, which is code of others.
 
     Raises:
         ModelError: it is not three lengths, three angles and a gripper, all finite numbers.
     """
     if not isinstance(step, ArmDelta):
-        raise ModelError(f"the policy gives {step!r:.60} for a step; it takes an ArmDelta")
+        raise ModelError(f"the policy gives {step!r:.60} for a step; it must be an ArmDelta")
     numbers = (*step.translation, *step.rotation, step.gripper)
     if (len(step.translation), len(step.rotation)) != (3, 3):
-        raise ModelError(f"the policy gives {len(numbers)} numbers for a step; it takes {_N_NUMBERS}")
+        raise ModelError(f"the policy gives {len(numbers)} numbers for a step; it must be {_N_NUMBERS}")
     try:
         finite = all(math.isfinite(number) for number in numbers)
     except TypeError:
@@ -109,44 +114,42 @@ def _check(step: object) -> None:
         raise ModelError("the policy gives numbers that are not finite; its weights or its input are broken")
 
 
-class _Baseline(BaselineSubject):
-    """What the baselines of arms have in common."""
-
+class _ArmBaseline(BaselineSubject):
     capabilities = Capabilities(counts_tokens=False, token_ids=False, max_in_flight=_IN_FLIGHT)
 
 
 class _StillActor:
     def begin(self, situation: ArmSituation) -> None:
         environment = situation.environment
-        pickup = environment.errand.kind == ManipulationKind.PICKUP
-        take: Call = {"action": "PickupObject", "objectIdCandidates": [environment.moment.object_id]}
-        self._left: list[Step] = [[take if pickup else {"action": "ReleaseObject"}]]
+        is_pickup = environment.episode.kind == ManipulationKind.PICKUP
+        take: Call = {"action": "PickupObject", "objectIdCandidates": [environment.start.object_id]}
+        self._left: list[Step] = [[take if is_pickup else {"action": "ReleaseObject"}]]
 
     def act(self, frame: FrameRef | None) -> Sequence[Step]:
         return [self._left.pop()] if self._left else []
 
 
-class _RandomActor:
+class _RandomArmActor:
     def begin(self, situation: ArmSituation) -> None:
-        self._draw, self._longest = random.Random(situation.seed), situation.max_step
+        self._random, self._max_step = random.Random(situation.seed), situation.max_step
 
     def act(self, frame: FrameRef | None) -> Sequence[Step]:
-        x, y, z = (self._draw.uniform(-self._longest, self._longest) for _ in range(3))
-        roll, pitch, yaw = (self._draw.uniform(-_LARGEST_TURN, _LARGEST_TURN) for _ in range(3))
-        return [ArmDelta((x, y, z), (roll, pitch, yaw), self._draw.random())]
+        x, y, z = (self._random.uniform(-self._max_step, self._max_step) for _ in range(3))
+        roll, pitch, yaw = (self._random.uniform(-_MAX_TURN, _MAX_TURN) for _ in range(3))
+        return [ArmDelta((x, y, z), (roll, pitch, yaw), self._random.random())]
 
 
 class _PlannerActor:
     def begin(self, situation: ArmSituation) -> None:
-        self._steps = plan(situation.environment)
+        self._steps = plan_steps(situation.environment)
 
     def act(self, frame: FrameRef | None) -> Sequence[Step]:
-        following = next(self._steps, None)
-        return [] if following is None else [following]
+        step = next(self._steps, None)
+        return [] if step is None else [step]
 
 
-class Still(_Baseline):
-    """Closes its hand, or opens it, where it is: what is reached without moving."""
+class StillArm(_ArmBaseline):
+    """Closes its hand, or opens it, where it is: what succeeds without a movement."""
 
     name = "still"
 
@@ -155,18 +158,18 @@ class Still(_Baseline):
         return _StillActor()
 
 
-class RandomArm(_Baseline):
-    """Moves and turns at random, and closes and opens its hand by chance."""
+class RandomArm(_ArmBaseline):
+    """Moves, turns, closes and opens its hand at random."""
 
     name = "random-arm"
 
     def arm_actor(self) -> ArmActor:
         """See `ArmBaseline`."""
-        return _RandomActor()
+        return _RandomArmActor()
 
 
-class PlannerArm(_Baseline):
-    """Knows where everything is, and goes straight there by inverse kinematics: the upper bound."""
+class PlannerArm(_ArmBaseline):
+    """Knows where everything is, and moves there by inverse kinematics: the upper bound."""
 
     name = "planner-arm"
 
@@ -175,4 +178,6 @@ class PlannerArm(_Baseline):
         return _PlannerActor()
 
 
-BASELINES: Mapping[str, Callable[[int], ArmBaseline]] = {made.name: made for made in (PlannerArm, RandomArm, Still)}
+BASELINES: Mapping[str, Callable[[int], ArmBaseline]] = {
+    baseline.name: baseline for baseline in (PlannerArm, RandomArm, StillArm)
+}

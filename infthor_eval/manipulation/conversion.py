@@ -1,8 +1,9 @@
 """From a policy's 7 degrees of freedom to calls of AI2-THOR's arm (docs/manipulation.md).
 
 A policy moves the end effector in the frame of a robot's base: x forward, y left, z up, right-handed. AI2-THOR's arm is
-moved in the frame "armBase": x right, y up, z forward, left-handed. With handedness the sense of a turn changes: yaw
-changes its sign; pitch keeps it, as its axis is turned round as well, and roll, which AI2-THOR counts the other way.
+moved in the frame "armBase": x right, y up, z forward, left-handed. A change of handedness reverses the sense of turns.
+So yaw changes its sign. Pitch keeps it, as its axis is reversed too, and so does roll, as AI2-THOR counts it the other
+way.
 """
 
 import math
@@ -11,10 +12,10 @@ from typing import Any
 
 from model_adapters import ArmDelta
 
-__all__ = ["Conversion"]
+__all__ = ["Call", "Conversion"]
 
 Call = dict[str, Any]
-_STILL = 1e-6  # metres or degrees; a smaller movement is none
+_STILL = 1e-6  # metres or degrees; a smaller movement is left out
 
 
 @dataclass(frozen=True)
@@ -22,10 +23,10 @@ class Conversion:
     """How a step of a policy moves the arm.
 
     Attributes:
-        translation_scale: by which translations are multiplied.
-        max_step: length in metres that a translation is cut to, in its direction.
+        translation_scale: factor of translations.
+        max_step: maximum length of a translation in metres; a longer one is shortened.
         rotation: whether the wrist is turned.
-        return_to_start: whether the arm goes back where it met something (AI2-THOR's default); else it stays there.
+        return_to_start: whether the arm goes back after a collision (AI2-THOR's default), or stays where it collided.
     """
 
     translation_scale: float = 1.0
@@ -34,9 +35,9 @@ class Conversion:
     return_to_start: bool = True
 
     def calls(self, delta: ArmDelta) -> list[Call]:
-        """The movements of a step, in order; none where it stands still. The gripper is not its matter."""
-        found = [self._translation(delta), self._rotation(delta) if self.rotation else None]
-        return [call | {"returnToStart": self.return_to_start} for call in found if call is not None]
+        """Return the movements of a step in order, without the gripper; none if the arm stands still."""
+        calls = [self._translation(delta), self._rotation(delta) if self.rotation else None]
+        return [call | {"returnToStart": self.return_to_start} for call in calls if call is not None]
 
     def _translation(self, delta: ArmDelta) -> Call | None:
         x, y, z = (self.translation_scale * value for value in delta.translation)

@@ -1,4 +1,4 @@
-"""What episodes of an arm are about."""
+"""Kinds of manipulation episodes."""
 
 from enum import StrEnum
 
@@ -6,7 +6,7 @@ __all__ = ["KIND_NAMES", "ManipulationKind"]
 
 
 class ManipulationKind(StrEnum):
-    """What an episode is about."""
+    """What the arm does in an episode."""
 
     PICKUP = "pickup"
     PUT = "put"

@@ -1,35 +1,24 @@
-"""What the suite of manipulation can be told on the command line, beside its task files."""
+"""Options of the suite of manipulation on the command line, beside its task files."""
 
 from dataclasses import dataclass, field
 
+from infthor_eval.episodes.options import SimulatorOptions
 from infthor_eval.errors import UsageError
 
 __all__ = ["RADII", "ManipulationOptions"]
 
-_FRAMES = ("shown", "blank")
 RADII = (0.04, 0.5)  # of the hand's sphere, metres, as AI2-THOR allows
 
 
 @dataclass(frozen=True, kw_only=True)
-class ManipulationOptions:
-    """Options of the suite; the help that people see stands with each.
+class ManipulationOptions(SimulatorOptions):
+    """Options of the suite, with their help texts.
 
     Attributes:
-        simulator: "embedded", "unity" (the build that ai2thor downloads), or the path of a Unity executable.
-        scenes: folder with recorded floor plans, for trajectories in them.
-        radius: of the hand's sphere, metres, as typed; None takes the task's own.
-        instruction: of a policy; None takes the task's own.
-        frames: what is shown in the frames' places.
+        radius: radius of the hand's sphere in metres, as typed; None for the task's own.
+        instruction: instruction of a policy; None for the task's own.
     """
 
-    simulator: str = field(
-        default="embedded",
-        metadata={"help": "embedded, unity, or the path of a Unity executable.", "metavar": "NAME"},
-    )
-    scenes: str | None = field(
-        default=None,
-        metadata={"help": "Folder with recorded floor plans (thor_scenes/).", "metavar": "DIR", "is_place": True},
-    )
     radius: str | None = field(
         default=None,
         metadata={"help": "Radius of the hand's magnet, metres, a run with each.", "metavar": "R,...", "each": True},
@@ -37,36 +26,25 @@ class ManipulationOptions:
     instruction: str | None = field(
         default=None,
         metadata={
-            "help": 'What a policy is told: words with {object} and {receptacle}, or "short".',
+            "help": 'Instruction of a policy: words with {object} and {receptacle}, or "short".',
             "metavar": "TEXT",
         },
     )
-    frames: str = field(
-        default="shown",
-        metadata={"help": "Show what in the frames' places, a run with each.", "metavar": "HOW,...", "each": True},
-    )
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be.
+        """Check the options.
 
         Raises:
-            UsageError: unknown stand-ins for frames, or no radius.
+            UsageError: an unknown kind of frames, or a radius that AI2-THOR does not allow.
         """
-        if self.frames not in _FRAMES:
-            raise UsageError(f"--frames {self.frames}: tasks of manipulation have {', '.join(_FRAMES)}")
-        if self.radius is not None:
-            self._metres()
+        super().__post_init__()
+        if self.radius_metres is not None and not RADII[0] <= self.radius_metres <= RADII[1]:
+            raise UsageError(f"--radius {self.radius}: is a length of {RADII[0]} to {RADII[1]} metres")
 
     @property
     def radius_metres(self) -> float | None:
-        """The radius; None where the task's own is meant."""
-        return None if self.radius is None else self._metres()
-
-    def _metres(self) -> float:
+        """The radius; None for the task's own."""
         try:
-            metres = float(str(self.radius))
+            return None if self.radius is None else float(self.radius)
         except ValueError:
-            metres = 0.0
-        if not RADII[0] <= metres <= RADII[1]:
-            raise UsageError(f"--radius {self.radius}: is a length of {RADII[0]} to {RADII[1]} metres")
-        return metres
+            return 0.0  # no number, which is refused like one that is too small

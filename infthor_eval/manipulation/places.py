@@ -1,4 +1,4 @@
-"""Where in or on a receptacle a thing can be put down, and whether it would come to lie there from where it is held."""
+"""Places in or on a receptacle, and whether a held object would come to rest there if it was released."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,22 +17,22 @@ __all__ = [
     "entry_of",
     "firmness",
     "is_entered",
+    "occupancy",
     "others_on",
     "places_of",
     "support",
-    "taken",
 ]
 
 ENTERED = {"Fridge", "Microwave", "Cabinet", "Safe", "CoffeeMachine", "Shelf", "ShelvingUnit"}  # from the front
-_SPACING = 0.05  # metres between places where there is but one
-_SUNK = 0.05  # metres that a thing may be below the places that it stands on, as their boxes are drawn
-_LEVEL = 0.01  # metres: places of one board
+_SPACING = 0.05  # metres between places if there is only one
+_SUNK = 0.05  # metres that an object may be below the places that it stands on, as boxes are inexact
+_LEVEL = 0.01  # metres within which places are on one board
 _BREADTH = 0.05  # metres from the foremost places to the opening
-_THIN = 0.05  # metres above its topmost places from which on a receptacle has a roof
-_SHRUNK = 0.9  # of what is held: its outermost corners may stick out
-_FIRM, _WHOLE = 1.1, 4.0  # of the distance of places; and how many are so near to what is well within
-_BESIDE = 0.5  # of a place where another thing would be touched
-_OVER = 0.75  # of the distance of places: what is so near to one is on the board
+_THIN = 0.05  # metres above its topmost places from which a receptacle has a roof
+_SHRUNK = 0.9  # of the held object's box, whose outermost corners may stick out
+_FIRM, _WHOLE = 1.1, 4.0  # radius in units of the spacing, and the number of places within it around an inner one
+_BESIDE = 0.5  # occupancy of a place at which another object would be touched
+_OVER = 0.75  # distance to a place, in units of the spacing, within which a point is over the board
 
 
 @dataclass(frozen=True)
@@ -40,10 +40,10 @@ class Places:
     """Points at which things can stand in or on a receptacle.
 
     Attributes:
-        points: metres (n, 3).
-        spacing: from one to the next, metres.
-        top: height of the receptacle's box.
-        entered: whether it is entered from the front, and so may have a roof.
+        points: positions, metres (n, 3).
+        spacing: distance from one to the next, metres.
+        top: top of the receptacle's box, metres.
+        entered: whether it is entered from the front, so that it may have a roof.
     """
 
     points: Array
@@ -53,20 +53,20 @@ class Places:
 
     @property
     def heights(self) -> list[float]:
-        """Heights of the boards, from the lowest on."""
+        """Heights of the boards, ascending."""
         return sorted(set(np.round(self.points[:, 1], 3).tolist()))
 
     def level(self, height: float) -> Array:
-        """The places of one board (n, 3)."""
+        """Return the places of one board (n, 3)."""
         chosen: Array = self.points[np.abs(self.points[:, 1] - height) < _LEVEL]
         return chosen
 
     def is_roofed(self, height: float) -> bool:
-        """Whether the receptacle reaches over the places of one of its boards."""
+        """Return whether the receptacle extends over the places of one of its boards."""
         return height < self.heights[-1] - _LEVEL or (self.entered and self.top > height + _THIN)
 
     def ceiling(self, height: float) -> float:
-        """Height of what is over the places of a board: the next one, or the receptacle's top."""
+        """Return the height of the ceiling over a board: the next board, or the receptacle's top."""
         above = [other for other in self.heights if other > height + _LEVEL]
         return above[0] if above else self.top
 
@@ -76,8 +76,8 @@ class Entry:
     """An opening at the front of a receptacle.
 
     Attributes:
-        axis: the way out of it is along: 0 for x, 2 for z.
-        sign: and in this direction of it.
+        axis: axis along which one leaves it: 0 for x, 2 for z.
+        sign: direction along that axis.
         position: coordinate of the opening on that axis, metres.
     """
 
@@ -86,24 +86,24 @@ class Entry:
     position: float
 
     def out(self, metres: float) -> Array:
-        """A way out of the opening (3,)."""
-        way = np.zeros(3)
-        way[self.axis] = self.sign * metres
-        return way
+        """Return a vector out of the opening (3,)."""
+        vector = np.zeros(3)
+        vector[self.axis] = self.sign * metres
+        return vector
 
 
 def places_of(environment: ArmEnvironment, item: ThorObject) -> Places | None:
-    """What the simulator says of a receptacle's places; None where it has none."""
-    found = environment.query("GetSpawnCoordinatesAboveReceptacle", objectId=item.object_id, anywhere=True)
-    if not found:
+    """Return a receptacle's places, as the simulator reports them; None if it has none."""
+    answer = environment.query("GetSpawnCoordinatesAboveReceptacle", objectId=item.object_id, anywhere=True)
+    if not answer:
         return None
-    points = np.array([(place["x"], place["y"], place["z"]) for place in found], dtype=float)
+    points = np.array([(place["x"], place["y"], place["z"]) for place in answer], dtype=float)
     top = middle_of(item)[1] + size_of(item)[1] / 2
     return Places(points, _spacing(points), top, is_entered(item))
 
 
 def _spacing(points: Array) -> float:
-    """Metres from a place to the next one of the same board."""
+    """Return the metres from a place to the next one of the same board."""
     board = points[np.abs(points[:, 1] - points[0, 1]) < _LEVEL]
     apart = np.linalg.norm(board[1:] - board[0], axis=1)
     apart = apart[apart > _LEVEL]
@@ -111,14 +111,15 @@ def _spacing(points: Array) -> float:
 
 
 def is_entered(item: ThorObject) -> bool:
-    """Whether things are brought into a receptacle from its front."""
+    """Return whether objects are brought into a receptacle from its front."""
     return item.object_type in ENTERED
 
 
 def entry_of(view: SimulatorView, item: ThorObject, places: Places) -> Entry | None:
-    """The opening of what is entered from the front.
+    """Return the opening of a receptacle that is entered from the front; None for others.
 
-    An open door widens its box on that side; what has no door is open towards the agent.
+    The metadata have no direction of it. An open door extends the box on that side, so the box's middle is off the
+    places' middle towards the opening. A receptacle without a door is open towards the agent.
     """
     if not is_entered(item):
         return None
@@ -131,23 +132,23 @@ def entry_of(view: SimulatorView, item: ThorObject, places: Places) -> Entry | N
 
 
 def others_on(view: SimulatorView, item: ThorObject, held: str) -> list[ThorObject]:
-    """Loose things that may stand in or on a receptacle, but for what is held and what the receptacle is in."""
+    """Return loose objects that may stand in or on a receptacle, except the held one and what the receptacle is in."""
     around = {name for name, other in view.objects.items() if item.object_id in (other.receptacle_object_ids or ())}
     apart = {held, item.object_id, *around, *(item.parent_receptacles or ())}
     return [other for name, other in view.objects.items() if name not in apart and other.pickupable]
 
 
 def support(held: Parts, places: Places) -> Array:
-    """How much (n,) of what is held would be over a board of its own height or below: 0, where its middle is not, to 1.
+    """Return the share (n,) of the held object that would be over a board below it; 0 if its middle would not.
 
     Args:
-        held: the box of what is held in some poses (n, 1).
-        places: of the receptacle.
+        held: box of the held object in some poses (n, 1).
+        places: places of the receptacle.
     """
     corners = held.axes[:, 0].transpose(0, 2, 1)[:, None] @ (_CORNERS * held.half)[..., None]
     spots = (held.center + _SHRUNK * corners[..., 0])[:, :, [0, 2]]
     bottom = held.center[:, 0, 1] - (np.abs(held.axes[:, 0, :, 1]) * held.half[:, 0]).sum(axis=1)
-    found = np.zeros(len(spots))
+    supported = np.zeros(len(spots))
     for height in places.heights:
         above = bottom > height
         if places.is_roofed(height):
@@ -156,20 +157,20 @@ def support(held: Parts, places: Places) -> Array:
             board = places.level(height)[:, [0, 2]]
             apart = np.linalg.norm(spots[above][:, :, None] - board, axis=-1).min(axis=-1)
             on = apart <= _OVER * places.spacing
-            found[above] = np.where(on[:, 0], on.mean(axis=1), found[above])
-    return found
+            supported[above] = np.where(on[:, 0], on.mean(axis=1), supported[above])
+    return supported
 
 
 _CORNERS: Array = np.array([(0, 0, 0), *((x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1))], dtype=float)
 
 
-def taken(held: Parts, places: Places, others: Sequence[Corners]) -> Array:
-    """How much (n,) other things are where what is held would fall: 1 where its middle would fall on one, half at all.
+def occupancy(held: Parts, places: Places, others: Sequence[Corners]) -> Array:
+    """Return how much (n,) a place is occupied: 1 if the object's middle would fall on another, half if it would touch.
 
     Args:
-        held: the box of what is held in some poses (n, 1).
-        places: of the receptacle.
-        others: boxes of what may stand there, or be over it; what begins below the places is not on them.
+        held: box of the held object in some poses (n, 1).
+        places: places of the receptacle.
+        others: boxes of objects that may stand there, or be over it; one that begins below the places is not on them.
     """
     if not others:
         return np.zeros(len(held.center))
@@ -183,12 +184,12 @@ def taken(held: Parts, places: Places, others: Sequence[Corners]) -> Array:
     apart = np.maximum(low - middle[:, None], middle[:, None] - high)[:, :, [0, 2]]
     over = level & (apart <= 0).all(axis=-1)
     beside = level & (apart <= extent[:, None, [0, 2]]).all(axis=-1)
-    found: Array = np.maximum(over.any(axis=1) * 1.0, beside.any(axis=1) * _BESIDE)
-    return found
+    occupied: Array = np.maximum(over.any(axis=1) * 1.0, beside.any(axis=1) * _BESIDE)
+    return occupied
 
 
 def firmness(held: Parts, places: Places) -> Array:
-    """How far (n,) the middle of what is held is from the edge of all boards: 0 at it, to 1."""
+    """Return how far (n,) the middle of the held object is from the edge of the boards: from 0, at the edge, to 1."""
     middles = held.center[:, 0]
     apart = np.abs(middles[:, None, [0, 2]] - places.points[None, :, [0, 2]])
     around = (np.linalg.norm(apart, axis=-1) <= _FIRM * places.spacing).sum(axis=1) / len(places.heights)

@@ -1,30 +1,30 @@
-"""How an arm that knows where everything is brings its hand there, to pick something up or to put it down."""
+"""How an arm that knows where everything is moves its hand to an object, to pick it up or to put it down."""
 
 import math
 from collections.abc import Iterator, Sequence
 
 from infthor_eval.manipulation.conversion import Call
 from infthor_eval.manipulation.environment import ArmEnvironment, arm_of
-from infthor_eval.manipulation.geometry import Point, along, away, middle_of, point_of, xyz
-from infthor_eval.manipulation.history import ManipulationKind
-from infthor_eval.manipulation.putting import put
-from infthor_eval.manipulation.stand import Stand
+from infthor_eval.manipulation.geometry import Point, interpolate, middle_of, offset, point_of, xyz
+from infthor_eval.manipulation.kinds import ManipulationKind
+from infthor_eval.manipulation.putting import put_steps
+from infthor_eval.manipulation.stand import ArmStand
 from infthor_eval.thor.view import SimulatorView
 
-__all__ = ["plan"]
+__all__ = ["plan_steps"]
 
-_SHIFTS = (0.0, 0.25, -0.25, 0.5, -0.5)  # metres by which the base is brought above a target, one after the other
+_SHIFTS = (0.0, 0.25, -0.25, 0.5, -0.5)  # metres of the base above a target's height, tried one after the other
 
 Steps = Iterator[Sequence[Call]]
 
 
-def plan(environment: ArmEnvironment) -> Steps:
-    """Steps to the end of the present episode: each after the one before was carried out."""
-    return _pick_up(environment) if environment.errand.kind == ManipulationKind.PICKUP else put(environment)
+def plan_steps(environment: ArmEnvironment) -> Steps:
+    """Yield steps up to the end of the present episode; each is planned after the one before was executed."""
+    return _pick_up(environment) if environment.episode.kind == ManipulationKind.PICKUP else put_steps(environment)
 
 
 def _pick_up(environment: ArmEnvironment) -> Steps:
-    target = environment.moment.object_id
+    target = environment.start.object_id
     for call in _approach(environment, target):
         if target in arm_of(environment.view).pickupable:
             yield [{"action": "PickupObject", "objectIdCandidates": [target]}]
@@ -32,24 +32,27 @@ def _pick_up(environment: ArmEnvironment) -> Steps:
 
 
 def _approach(environment: ArmEnvironment, target: str) -> Iterator[Call]:
-    """Bring the arm to the target's height, then others; at each turn the hand to it, and move the hand up to it."""
+    """Yield movements of the hand to a target, from several heights of the arm's base.
+
+    At each height the hand is aimed and moved twice: what blocked the first movement may let the second one pass, as it
+    begins elsewhere.
+    """
     for shift in _SHIFTS:
         goal = middle_of(environment.view.objects[target])
         yield _lift(environment.view, goal[1] + shift)
-        yield _aim(environment.view, goal)
-        yield _move(_short_of(environment.view, goal))
-        yield _aim(environment.view, goal)
-        yield _move(_short_of(environment.view, goal))
+        for _ in range(2):
+            yield _aim(environment.view, goal)
+            yield _move(_wrist_before(environment.view, goal))
         yield {"action": "Pass"}
 
 
 def _aim(view: SimulatorView, goal: Point) -> Call:
-    """Turn the hand so that it looks at a point."""
+    """Turn the hand so that it points to a goal."""
     arm = arm_of(view)
     wrist = point_of(arm.wrist)
-    now, wanted = away(wrist, point_of(arm.sphere_center)), away(wrist, goal)
-    yaw = math.degrees(math.atan2(wanted[0], wanted[2]) - math.atan2(now[0], now[2]))
-    pitch = math.degrees(_elevation(now) - _elevation(wanted))
+    now, aim = offset(wrist, point_of(arm.sphere_center)), offset(wrist, goal)
+    yaw = math.degrees(math.atan2(aim[0], aim[2]) - math.atan2(now[0], now[2]))
+    pitch = math.degrees(_elevation(now) - _elevation(aim))
     return {"action": "RotateWristRelative", "pitch": pitch, "yaw": yaw, "roll": 0.0, "returnToStart": False}
 
 
@@ -57,18 +60,18 @@ def _elevation(direction: Point) -> float:
     return math.atan2(direction[1], math.hypot(direction[0], direction[2]))
 
 
-def _short_of(view: SimulatorView, goal: Point) -> Point:
-    """Where the wrist is to be for the sphere to have its centre at a point, coming from where it is."""
+def _wrist_before(view: SimulatorView, goal: Point) -> Point:
+    """Return the position of the wrist for which the sphere's centre is at a goal, coming from where the wrist is."""
     arm = arm_of(view)
     wrist = point_of(arm.wrist)
     length = math.dist(wrist, point_of(arm.sphere_center))
     distance = math.dist(wrist, goal)
-    return along(wrist, goal, max(0.0, distance - length) / distance) if distance else wrist
+    return interpolate(wrist, goal, max(0.0, distance - length) / distance) if distance else wrist
 
 
 def _lift(view: SimulatorView, height: float) -> Call:
-    """Bring the arm's base to a height of the world, as far as it goes."""
-    return {"action": "MoveArmBase", "y": Stand.of(view.agent).share(height), "returnToStart": False}
+    """Bring the arm's base to a height of the world, or as near to it as it goes."""
+    return {"action": "MoveArmBase", "y": ArmStand.of(view.agent).share(height), "returnToStart": False}
 
 
 def _move(wrist: Point) -> Call:

@@ -1,4 +1,4 @@
-"""What the suite of manipulation writes into a run's journal: episodes, each with all that the arm did."""
+"""What the suite of manipulation writes into a run's journal: episodes, each with everything that the arm did."""
 
 from enum import StrEnum
 from typing import Any
@@ -11,7 +11,7 @@ __all__ = ["RECORDS", "ArmEnded", "ArmRecord", "ArmStep"]
 
 Call = dict[str, Any]
 Place = tuple[float, float, float]
-_COLLIDED = "Collided"  # as AI2-THOR's message begins
+_COLLIDED = "Collided"  # beginning of AI2-THOR's message
 
 
 class ArmEnded(StrEnum):
@@ -27,11 +27,12 @@ class ArmStep(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     """One step of an arm.
 
     Attributes:
-        delta: what a policy asked for: translation (m), rotation (rad), gripper; None of baselines.
-        calls: what the simulator was asked, as JSON values.
+        delta: request of a policy: translation (m), rotation (rad), gripper; None for baselines.
+        calls: calls of the simulator, as JSON values.
         hand: centre of the hand's sphere after it, metres in the world.
-        distance: metres from there to the nearest point of the target's box: the object, or where it is to be put.
-        refusals: what the simulator refused, in its words: the arm met something, or closed around nothing.
+        distance: metres from there to the nearest point of the target's box: the object's, or the receptacle's of a
+            put.
+        refusals: messages of the simulator on calls that it refused: the arm collided, or closed around nothing.
     """
 
     delta: tuple[float, ...] | None = None
@@ -42,7 +43,7 @@ class ArmStep(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
 
     @property
     def n_collisions(self) -> int:
-        """How many movements met something."""
+        """Number of movements that collided."""
         return sum(text.startswith(_COLLIDED) for text in self.refusals)
 
 
@@ -50,18 +51,18 @@ class ArmRecord(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, t
     """One episode, and what an arm did in it.
 
     Attributes:
-        index: of the expert's low-level action that it stands for.
+        index: index of the expert's low-level action that the episode replaces.
         kind: "pickup" or "put".
-        instruction: what a policy is told.
-        object_id: what is to be picked up or put, as this simulator names it.
-        receptacle_id: where to, likewise; None of pick-ups.
-        steps: what the arm did.
-        starts_inside: whether the object lies in the hand's sphere at the start; of pick-ups alone.
-        start_distance: metres from the hand's sphere's centre to the target's box at the start.
-        closest: the same at its smallest.
-        reward: what was earned.
-        max_reward: what could be.
-        ended: how it ended, see `ArmEnded`; empty where nobody acted.
+        instruction: instruction of a policy.
+        object_id: id of the object that is picked up or put, in this simulator.
+        receptacle_id: id of the receptacle that it is put into; None for pick-ups.
+        steps: steps of the arm.
+        starts_inside: whether the object is in the hand's sphere at the start; for pick-ups alone.
+        start_distance: metres from the centre of the hand's sphere to the target's box at the start.
+        closest: smallest such distance.
+        reward: reward of the episode.
+        max_reward: highest possible reward.
+        ended: how it ended, see `ArmEnded`; empty if nobody acted.
     """
 
     index: int
@@ -84,12 +85,12 @@ class ArmRecord(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, t
 
     @property
     def done(self) -> bool:
-        """Whether the episode was a success."""
+        """Whether the episode is a success."""
         return self.ended == ArmEnded.DONE
 
     @property
     def n_collisions(self) -> int:
-        """How many movements met something."""
+        """Number of movements that collided."""
         return sum(step.n_collisions for step in self.steps)
 
 

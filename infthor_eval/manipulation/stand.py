@@ -5,20 +5,20 @@ from dataclasses import dataclass
 
 from infthor_eval.thor.view import AgentPose
 
-__all__ = ["Stand"]
+__all__ = ["ArmStand"]
 
 _FLOOR = 0.9  # metres from the agent's position down to the floor
 _RANGE = 0.451, 1.801  # metres: heights of the arm's base above the floor
 
 
 @dataclass(frozen=True)
-class Stand:
-    """Where an agent stands.
+class ArmStand:
+    """Where an agent stands, and the range of its arm's base.
 
     Attributes:
         low: lowest height of the arm's base in the world, metres.
-        high: the highest.
-        heading: the way that the agent looks, radians.
+        high: highest height of the arm's base.
+        heading: direction that the agent faces, radians.
     """
 
     low: float
@@ -26,8 +26,8 @@ class Stand:
     heading: float
 
     @classmethod
-    def of(cls, agent: AgentPose) -> "Stand":
-        """That of an agent; AI2-THOR's are all of the same height."""
+    def of(cls, agent: AgentPose) -> "ArmStand":
+        """Return the stand of an agent; AI2-THOR's agents with an arm are all of the same height."""
         floor = agent.position.y - _FLOOR
         return cls(floor + _RANGE[0], floor + _RANGE[1], math.radians(agent.rotation))
 
@@ -37,5 +37,5 @@ class Stand:
         return self.low - _RANGE[0]
 
     def share(self, base: float) -> float:
-        """A height of the base as `MoveArmBase` takes it, from 0 to 1."""
+        """Return a height of the base as `MoveArmBase` takes it, from 0 to 1."""
         return min(1.0, max(0.0, (base - self.low) / (self.high - self.low)))

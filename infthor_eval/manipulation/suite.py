@@ -1,4 +1,4 @@
-"""Manipulation as a suite: an arm picks up and puts what the experts of long trajectories did."""
+"""Manipulation as a suite: an arm does the pick-ups and puts of the experts of long trajectories."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import ClassVar
@@ -7,8 +7,8 @@ from infthor_eval.manipulation.actors import BASELINES
 from infthor_eval.manipulation.evaluation import ManipulationEvaluation
 from infthor_eval.manipulation.options import ManipulationOptions
 from infthor_eval.manipulation.records import RECORDS, ArmRecord
-from infthor_eval.manipulation.summary import ManipulationSummary, summarise
-from infthor_eval.manipulation.tables import overview, tables
+from infthor_eval.manipulation.summary import ManipulationSummary, summarise_manipulation
+from infthor_eval.manipulation.tables import overview_table, result_tables
 from infthor_eval.rates import Rate
 from infthor_eval.runs import RecordTypes, RunHeader, RunSummary, TaskRequest, UnitRecord
 from infthor_eval.runs.suite import Need
@@ -19,7 +19,7 @@ __all__ = ["ManipulationSuite"]
 
 
 class ManipulationSuite:
-    """The suite."""
+    """The suite; see `infthor_eval.runs.Suite`."""
 
     name: ClassVar[str] = "manipulation"
     needs: ClassVar[Need] = "policy"
@@ -33,21 +33,21 @@ class ManipulationSuite:
 
     def summarise(self, header: RunHeader, records: Sequence[UnitRecord[ArmRecord]]) -> ManipulationSummary:
         """See `Suite.summarise`."""
-        return summarise(header.config, records)
+        return summarise_manipulation(header.config, records)
 
     def scores(self, record: UnitRecord[ArmRecord]) -> Mapping[str, float]:
-        """See `Suite.scores`: whether the episode was a success, and what it earned."""
+        """See `Suite.scores`: whether the episode is a success, and its reward."""
         payload = record.payload
-        return {"success": float(payload.done), "reward": payload.reward} if payload.ended else {}
+        return {"success": float(payload.done), "reward": payload.reward} if payload.attempted else {}
 
     def primary_metrics(self, summary: ManipulationSummary) -> Mapping[str, Rate]:
-        """See `Suite.primary_metrics`: episodes that were a success."""
+        """See `Suite.primary_metrics`: share of successful episodes."""
         return {name: task.success for name, task in summary.tasks.items() if task.success is not None}
 
     def overview(self, runs: Sequence[RunSummary]) -> list[Table]:
         """See `Suite.overview`."""
-        return overview(runs)
+        return [overview_table(runs)]
 
     def tables(self, runs: Sequence[RunSummary]) -> list[Table]:
         """See `Suite.tables`."""
-        return tables(runs)
+        return result_tables(runs)

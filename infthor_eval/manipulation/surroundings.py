@@ -1,4 +1,4 @@
-"""What an agent that is to put something down knows of what stands around it, and how sure it is of that."""
+"""The surroundings of an agent that is to put an object down, and beliefs about what in them is an obstacle."""
 
 import math
 from enum import IntEnum
@@ -8,92 +8,94 @@ import numpy as np
 from infthor_eval.manipulation.environment import ArmEnvironment
 from infthor_eval.manipulation.geometry import Corners, Point, corners_of
 from infthor_eval.manipulation.linkage import Linkage, Parts
+from infthor_eval.manipulation.obstacles import Obstacles, cavity, clearances, columns, obstacles_of
 from infthor_eval.manipulation.places import Entry, Places, entry_of, is_entered, others_on, places_of
-from infthor_eval.manipulation.solids import Solids, cavity, columns, gaps, solids_of
 from infthor_eval.thor.view import ThorObject
 
 __all__ = ["Belief", "Surroundings"]
 
-_REACHED = 1.5  # metres from the wrist within which things are looked at
-_GROUND = 3.0  # metres to each side that the floor is told of
-_SUNK = 0.02  # metres that places may be in a box which they are only beside
-_UNSEEN = 0.03  # metres from all that was known: what was met there is something else
+_REACH = 1.5  # metres from the wrist within which things are obstacles
+_FLOOR_EXTENT = 3.0  # metres of the floor to each side
+_SUNK = 0.02  # metres that places may be inside a box that they are only beside
+_UNEXPLAINED = 0.03  # metres from all known boxes: a collision there is with something else
 _ASIDE = 0.25  # of an opening's width: an origin so far from its middle is at the hinge
-_LEFT = {"Microwave"}  # doors that hang on the left; others do on the right, where their origin does not tell
+_LEFT = {"Microwave"}  # doors that hang on the left; others hang on the right, if their origin does not tell
 
 _Boxes = list[tuple[str, Corners]]
 
 
 class Belief(IntEnum):
-    """How much of what is known is believed: boxes have room within that the metadata do not tell of."""
+    """Which boxes are believed to be obstacles: furniture is partly empty, which the metadata do not tell."""
 
     NOTHING = 0
-    RECEPTACLE = 1  # what that is made of which something is to be put into or onto
-    MET = 2  # and the whole boxes of what was met
-    FILLED = 3  # of all furniture what is below its places
-    WHOLE = 4  # of all furniture the whole boxes, but for those that the arm is in
+    RECEPTACLE = 1  # the parts of the receptacle that the object is to be put into
+    COLLIDED = 2  # also the whole boxes of things that the arm collided with
+    FILLED = 3  # also the parts of all furniture below its places
+    WHOLE = 4  # the whole boxes of all furniture, except those that the arm is in
 
 
 class Surroundings:
-    """Solids around an agent.
+    """Obstacles around an agent.
 
     Attributes:
-        places: of the receptacle; None where it has none.
-        entry: its opening, if it is entered from the front.
+        places: places of the receptacle; None if it has none.
+        entry: its opening; None if it is not entered from the front.
     """
 
     def __init__(self, environment: ArmEnvironment, linkage: Linkage, floor: float) -> None:
-        """Look around.
+        """Collect the boxes.
 
         Args:
-            environment: an episode that is begun.
-            linkage: the arm, as it is now.
-            floor: its height, metres.
+            environment: environment that was reset to an episode.
+            linkage: the arm in its present pose.
+            floor: height of the floor, metres.
         """
         self._environment, self._linkage = environment, linkage
-        self._item = environment.view.objects[str(environment.moment.receptacle_id)]
+        self._item = environment.view.objects[str(environment.start.receptacle_id)]
         self.places = places_of(environment, self._item)
         self.entry = None if self.places is None else entry_of(environment.view, self._item, self.places)
         self._hinges = _hinges(self._item, self.places, self.entry)
-        self._wrong = [0] * len(self._hinges)
+        self._n_refuted = [0] * len(self._hinges)  # collisions that each side of the door cannot explain
         x, _, z = linkage.shoulder.tolist()
-        self._floor = Corners((x - _GROUND, floor - 1.0, z - _GROUND), (x + _GROUND, floor, z + _GROUND))
-        self._met: set[str] = set()
+        self._floor = Corners(
+            (x - _FLOOR_EXTENT, floor - 1.0, z - _FLOOR_EXTENT), (x + _FLOOR_EXTENT, floor, z + _FLOOR_EXTENT)
+        )
+        self._collided: set[str] = set()
         self._around = {belief: self._boxes_around(belief) for belief in (Belief.FILLED, Belief.WHOLE)}
 
-    def solids(self, belief: Belief) -> Solids:
-        """What is in the way, if so much is believed, and the door is where it has proved wrong least often."""
+    def obstacles(self, belief: Belief) -> Obstacles:
+        """Return the obstacles of a belief, with the door on the side that collisions have refuted least often."""
         if belief == Belief.NOTHING:
-            return solids_of(())
-        hinge = self._hinges[self._wrong.index(min(self._wrong))]
+            return obstacles_of(())
+        hinge = self._hinges[self._n_refuted.index(min(self._n_refuted))]
         around = self._around.get(belief, [])
-        if belief == Belief.MET:
-            around = [(name, box) for name, box in self._around[Belief.WHOLE] if name in self._met]
-        return solids_of([*self._receptacle(hinge), *around])
+        if belief == Belief.COLLIDED:
+            around = [(name, box) for name, box in self._around[Belief.WHOLE] if name in self._collided]
+        return obstacles_of([*self._receptacle(hinge), *around])
 
     def others(self) -> list[Corners]:
-        """What may stand on the receptacle's places, or cover them: loose things, and what is fixed around it."""
-        loose = others_on(self._environment.view, self._item, self._environment.moment.object_id)
+        """Return boxes that may be on the receptacle's places, or cover them: loose objects, and furniture nearby."""
+        loose = others_on(self._environment.view, self._item, self._environment.start.object_id)
         return [*map(corners_of, loose), *(box for _, box in self._around[Belief.FILLED])]
 
-    def met(self, parts: Parts, error: str) -> bool:
-        """The arm met something in a pose (1): count that against each side of the door where nothing is known there.
+    def add_collision(self, parts: Parts, error: str) -> bool:
+        """Take a collision; one with the receptacle counts against each side of the door that does not explain it.
 
         Args:
-            parts: of the arm.
-            error: what the simulator said.
+            parts: parts of the arm in the colliding pose (1).
+            error: message of the simulator.
 
         Returns:
-            Whether it was the receptacle.
+            Whether the arm collided with the receptacle.
         """
         objects = self._environment.view.objects
-        self._met.update(name for name, item in objects.items() if f"'{item.name}'" in error)
+        self._collided.update(name for name, item in objects.items() if f"'{item.name}'" in error)
         if f"'{self._item.name}'" not in error:
             return False
         for number, hinge in enumerate(self._hinges):
-            solids = solids_of(self._receptacle(hinge))
-            if len(solids.names) and gaps(parts, solids).min() > _UNSEEN:
-                self._wrong[number] += 1
+            obstacles = obstacles_of(self._receptacle(hinge))
+            if len(obstacles.names) and clearances(parts, obstacles).min() > _UNEXPLAINED:
+                self._n_refuted[number] += 1
         return True
 
     def _receptacle(self, hinge: int) -> _Boxes:
@@ -106,34 +108,34 @@ class Surroundings:
         return [(self._item.object_id, box) for box in boxes]
 
     def _boxes_around(self, belief: Belief) -> _Boxes:
-        """The floor, and what does not give way."""
+        """Return the boxes of the floor, and of everything nearby that cannot be picked up."""
         view = self._environment.view
         wrist: Point = tuple(self._linkage.now.world()[0].tolist())
-        found = [("Floor", self._floor)]
+        around = [("Floor", self._floor)]
         for name, item in view.objects.items():
             if item.pickupable or item.object_type == "Floor" or name == self._item.object_id:
                 continue
             box = corners_of(item)
-            if _apart(wrist, box) > _REACHED:
+            if _distance_to_box(wrist, box) > _REACH:
                 continue
             is_whole = belief == Belief.WHOLE and not self._is_in(box)
             boxes = [box] if is_whole else self._boxes_of(item)
-            found += [(name, part) for part in boxes if not self._has_places_in(part)]
-        return found
+            around += [(name, part) for part in boxes if not self._has_places_in(part)]
+        return around
 
     def _has_places_in(self, box: Corners) -> bool:
-        """Whether places of the receptacle are in a box, as those of a shelf are in a table's: it is not filled."""
+        """Return whether a box has places of the receptacle, and so is partly empty: a shelf in a table's box."""
         if self.places is None:
             return False
         points = self.places.points
         return bool(((points > np.array(box.low) + _SUNK) & (points < np.array(box.high) - _SUNK)).all(axis=1).any())
 
     def _is_in(self, box: Corners) -> bool:
-        """Whether the arm is in a box, which is then not filled."""
-        return bool(gaps(self._linkage.parts(self._linkage.now), solids_of([("", box)])).min() < 0)
+        """Return whether the arm is in a box, which is then partly empty."""
+        return bool(clearances(self._linkage.parts(self._linkage.now), obstacles_of([("", box)])).min() < 0)
 
     def _boxes_of(self, item: ThorObject) -> list[Corners]:
-        """An open cupboard has room within, a counter may have."""
+        """Return boxes of a piece of furniture without the room in an open cupboard, or below a counter."""
         hollow = item.is_open if is_entered(item) and item.openable else not item.openable
         places = places_of(self._environment, item) if item.receptacle and hollow else None
         if places is None:
@@ -144,15 +146,15 @@ class Surroundings:
         return cavity(item, places, entry, _hinges(item, places, entry)[0])
 
 
-def _apart(point: Point, box: Corners) -> float:
-    """Metres from a point to a box."""
+def _distance_to_box(point: Point, box: Corners) -> float:
+    """Return the metres from a point to a box."""
     return math.hypot(*(max(a - v, v - b, 0.0) for a, v, b in zip(box.low, point, box.high, strict=True)))
 
 
 def _hinges(item: ThorObject, places: Places | None, entry: Entry | None) -> list[int]:
-    """Edges of an opening on which the door may hang, the likeliest first, as coordinates go; 0 where there is none.
+    """Return the edges of an opening that the door may hang on, the likeliest first; see `cavity`.
 
-    The origin of a cupboard is where its hinge is.
+    The origin of a cupboard is at its hinge.
     """
     if entry is None or places is None or not item.openable:
         return [0]

@@ -1,4 +1,4 @@
-"""What an arm was asked to do, in words for people."""
+"""Steps of an arm in words, for people."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -7,29 +7,26 @@ from typing import Any
 from infthor_eval.manipulation.records import ArmStep
 from infthor_eval.thor.actions import object_type_of
 
-__all__ = ["asked_in_words", "call_in_words"]
+__all__ = ["describe_call", "describe_request"]
 
-_UNTOLD = {"action", "returnToStart"}
+_LEFT_OUT = {"action", "returnToStart"}
 
 
-def asked_in_words(step: ArmStep) -> Iterator[str]:
-    """What a policy asked for, in centimetres and degrees; then what the simulator was asked, a line each."""
+def describe_request(step: ArmStep) -> Iterator[str]:
+    """Yield the request of a policy in centimetres and degrees, then the simulator's calls, a line each."""
     if step.delta is not None:
         x, y, z, roll, pitch, yaw, gripper = step.delta
         moved = ", ".join(f"{name} {100 * value:+.1f}" for name, value in (("x", x), ("y", y), ("z", z)))
         turned = (("roll", roll), ("pitch", pitch), ("yaw", yaw))
         angles = ", ".join(f"{name} {math.degrees(value):+.0f}" for name, value in turned)
         yield f"delta: {moved} cm; {angles} deg; gripper {gripper:.2f}"
-    if step.calls:
-        yield "; ".join(map(call_in_words, step.calls))
-    else:
-        yield "(no call: it stands still)"
+    yield "; ".join(map(describe_call, step.calls)) or "(no call: the arm stands still)"
 
 
-def call_in_words(call: Mapping[str, Any]) -> str:
-    """A call of AI2-THOR's, shortened: numbers with three digits, objects by their types."""
-    told = (_argument(name, value) for name, value in call.items() if name not in _UNTOLD)
-    return " ".join([str(call.get("action", "?")), *filter(None, told)])
+def describe_call(call: Mapping[str, Any]) -> str:
+    """Return a call of AI2-THOR's, shortened: numbers with three digits, objects by their types."""
+    arguments = (_argument(name, value) for name, value in call.items() if name not in _LEFT_OUT)
+    return " ".join([str(call.get("action", "?")), *filter(None, arguments)])
 
 
 def _argument(name: str, value: Any) -> str:

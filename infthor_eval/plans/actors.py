@@ -1,4 +1,4 @@
-"""What acts in a trajectory: an agent enters it, begins a plan, and acts until the plan is over."""
+"""The protocols of actors and baselines: an actor begins a plan, and acts until the plan is over."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -9,16 +9,16 @@ from infthor_eval.plans.environment import Observation, PlanEnvironment, StepOut
 from infthor_eval.plans.plan import Plan
 from model_adapters import Reply, Subject
 
-__all__ = ["Act", "Actor", "Baseline", "Situation"]
+__all__ = ["Act", "PlanActor", "PlanBaseline", "PlanSituation"]
 
 
 @dataclass(frozen=True)
 class Act:
-    """One action, as it is asked for.
+    """An action that an actor chose.
 
     Attributes:
-        action: its text, or a call of AI2-THOR's.
-        reply: of the model that said it; None where none did.
+        action: text of the action, or a call of AI2-THOR's.
+        reply: reply of the model; None for baselines.
     """
 
     action: str | Mapping[str, Any]
@@ -26,14 +26,14 @@ class Act:
 
 
 @dataclass(frozen=True)
-class Situation:
-    """A plan that is begun.
+class PlanSituation:
+    """A plan that begins.
 
     Attributes:
-        environment: brought to it.
-        plan: which one.
-        seed: for whatever is random in it.
-        observation: what is seen.
+        environment: the environment, reset to the plan.
+        plan: the plan.
+        seed: seed of everything random.
+        observation: the first observation.
     """
 
     environment: PlanEnvironment
@@ -42,11 +42,11 @@ class Situation:
     observation: Observation
 
 
-class Actor(Protocol):
-    """Carries out plans of one trajectory."""
+class PlanActor(Protocol):
+    """Acts in the plans of one trajectory."""
 
-    def begin(self, situation: Situation) -> None:
-        """A plan begins.
+    def begin(self, situation: PlanSituation) -> None:
+        """Begin a plan.
 
         Raises:
             DataError: a frame cannot be read.
@@ -55,27 +55,27 @@ class Actor(Protocol):
         ...
 
     def act(self) -> Act:
-        """The next action.
+        """Choose the next action.
 
         Raises:
-            DataError: as `begin`.
+            DataError: a frame cannot be read.
             ModelError: the model cannot reply.
         """
         ...
 
-    def saw(self, outcome: StepOutcome) -> None:
-        """What came of the last action, where the plan goes on."""
+    def observe(self, outcome: StepOutcome) -> None:
+        """Take the outcome of the last action, if the plan goes on."""
         ...
 
 
 @runtime_checkable
-class Baseline(Subject, Protocol):
-    """What acts without looking at a frame."""
+class PlanBaseline(Subject, Protocol):
+    """A subject that acts without frames."""
 
     def fit(self, trajectories: Sequence[Trajectory]) -> None:
-        """Read all the trajectories of the run, once, before the first plan."""
+        """Take all trajectories of the run; called once, before the first plan."""
         ...
 
-    def actor(self, trajectory: Trajectory) -> Actor:
-        """What carries out the plans of a trajectory."""
+    def actor(self, trajectory: Trajectory) -> PlanActor:
+        """Create the actor of a trajectory."""
         ...

@@ -1,115 +1,115 @@
-"""Yardsticks that see no frame: the expert itself, chance, what the words of a plan say, and habit."""
+"""Baselines that see no frame: the expert, chance, a script for a plan's words, and habits of experts."""
 
 import random
 from collections.abc import Callable, Mapping, Sequence
 
 from infthor_eval.formats.trajectory import Trajectory
-from infthor_eval.plans.actors import Act, Baseline, Situation
+from infthor_eval.plans.actors import Act, PlanBaseline, PlanSituation
 from infthor_eval.plans.environment import StepOutcome
 from infthor_eval.plans.habits import Habits
-from infthor_eval.plans.script import scripted
+from infthor_eval.plans.script import scripted_action
 from infthor_eval.runs.baseline import BaselineSubject
 from infthor_eval.thor.actions import applicable_calls
 from model_adapters import Capabilities
 
 __all__ = ["BASELINES"]
 
-_IN_FLIGHT = 4  # episodes at a time; each has a simulator of its own
+_IN_FLIGHT = 4  # trajectories at a time; each has its own simulator
 
 
-class _Unseeing(BaselineSubject):
-    """What the baselines of plans have in common."""
-
+class _PlanBaseline(BaselineSubject):
     capabilities = Capabilities(counts_tokens=False, token_ids=False, max_in_flight=_IN_FLIGHT)
 
     def fit(self, trajectories: Sequence[Trajectory]) -> None:
-        """Nothing to learn."""
+        """See `PlanBaseline`; there is nothing to learn."""
 
 
-class _Reader:
+class _BlindActor:
     """An actor that knows the plan and its own actions so far."""
 
-    def begin(self, situation: Situation) -> None:
+    def begin(self, situation: PlanSituation) -> None:
         self._situation = situation
         self._done: list[str] = []
         self._view = situation.observation.view
 
-    def saw(self, outcome: StepOutcome) -> None:
+    def observe(self, outcome: StepOutcome) -> None:
         self._done.append(outcome.info.action)
         self._view = outcome.observation.view
 
 
-class _ExpertActor(_Reader):
+class _ExpertActor(_BlindActor):
     def act(self) -> Act:
         actions = self._situation.environment.expert_actions(self._situation.plan.index)
         return Act(actions[len(self._done)].call if len(self._done) < len(actions) else "NoOp")
 
 
-class _RandomActor(_Reader):
-    def begin(self, situation: Situation) -> None:
+class _RandomPlanActor(_BlindActor):
+    def begin(self, situation: PlanSituation) -> None:
         super().begin(situation)
-        self._draw = random.Random(situation.seed)
+        self._random = random.Random(situation.seed)
 
     def act(self) -> Act:
-        return Act(self._draw.choice(applicable_calls(self._view, self._situation.environment.look_degrees)))
+        return Act(self._random.choice(applicable_calls(self._view, self._situation.environment.look_degrees)))
 
 
-class _ScriptedActor(_Reader):
+class _ScriptedActor(_BlindActor):
     def act(self) -> Act:
-        return Act(scripted(self._situation.plan.text, self._done))
+        return Act(scripted_action(self._situation.plan.text, self._done))
 
 
-class _HabitualActor(_Reader):
+class _HabitualActor(_BlindActor):
     def __init__(self, habits: Habits) -> None:
         self._habits = habits
 
     def act(self) -> Act:
-        return Act(self._habits.next(self._situation.plan.text, self._done))
+        return Act(self._habits.next_action(self._situation.plan.text, self._done))
 
 
-class Planner(_Unseeing):
-    """Does what the expert did: the upper bound."""
+class PlannerAgent(_PlanBaseline):
+    """Repeats the expert's actions: the upper bound."""
 
     name = "planner"
 
     def actor(self, trajectory: Trajectory) -> _ExpertActor:
-        """The same for all."""
+        """See `PlanBaseline`."""
         return _ExpertActor()
 
 
-class Random(_Unseeing):
-    """Any action that is possible in the present view, with any of the objects there: each call as likely."""
+class RandomAgent(_PlanBaseline):
+    """Draws uniformly from the calls that are possible in view, each action with each of its objects."""
 
     name = "random"
 
-    def actor(self, trajectory: Trajectory) -> _RandomActor:
-        """The draws depend on the situation's seed alone."""
-        return _RandomActor()
+    def actor(self, trajectory: Trajectory) -> _RandomPlanActor:
+        """See `PlanBaseline`; the draws depend on the situation's seed alone."""
+        return _RandomPlanActor()
 
 
-class Scripted(_Unseeing):
-    """What the plan's words ask for, and nothing else; see `script`."""
+class ScriptedAgent(_PlanBaseline):
+    """Does what the plan's words say, and nothing else; see `script`."""
 
     name = "scripted"
 
     def actor(self, trajectory: Trajectory) -> _ScriptedActor:
-        """The same for all."""
+        """See `PlanBaseline`."""
         return _ScriptedActor()
 
 
-class History(_Unseeing):
-    """What experts did next in other scenes, after the same action in a plan of the same words; see `Habits`."""
+class HabitualAgent(_PlanBaseline):
+    """Does what experts did next in other scenes, after the same action in a plan of the same words; see `Habits`."""
 
     name = "history"
 
     def fit(self, trajectories: Sequence[Trajectory]) -> None:
-        """Learn from all of them; what acts in one has not learnt from its scene."""
+        """See `PlanBaseline`."""
         self._trajectories = trajectories
 
     def actor(self, trajectory: Trajectory) -> _HabitualActor:
-        """What was learnt in other scenes than this trajectory's."""
+        """See `PlanBaseline`; it learns from other scenes than the trajectory's."""
         scene = trajectory.scene.floor_plan
         return _HabitualActor(Habits(item for item in self._trajectories if item.scene.floor_plan != scene))
 
 
-BASELINES: Mapping[str, Callable[[int], Baseline]] = {made.name: made for made in (Planner, Random, Scripted, History)}
+BASELINES: Mapping[str, Callable[[int], PlanBaseline]] = {
+    baseline.name: baseline for baseline in (PlannerAgent, RandomAgent, ScriptedAgent, HabitualAgent)
+}

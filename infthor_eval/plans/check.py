@@ -1,7 +1,7 @@
-"""The contract of an environment of plans, for anyone to run on their own: on another simulator, or on a robot.
+"""The contract of an environment of plans, to check one's own: on another simulator, or on a robot.
 
-It asks for behaviour through `reset`, `step` and the lists of plans and of the expert's actions only; each violated
-clause raises an error of one line.
+It uses `reset`, `step` and the lists of plans and of the expert's actions alone. Each violated clause raises an error
+of one line.
 """
 
 import math
@@ -24,15 +24,15 @@ _ID = re.compile(r"[A-Za-z]+\|[^|]+\|[^|]+\|[^|]+(\|\w+)*")  # type, position, p
 _NONSENSE = ("", "fly to the moon", "MoveAhead Mug", "PutObject Mug", "pickupobject Mug")
 _UNKNOWN = "PickupObject Unicorn"
 _SMALL = 1e-6  # of rewards
-_PLANS = 3  # that are carried out, where no more are asked for
+_PLANS = 3  # number that is checked by default
 
 
 class Environment(Protocol):
-    """What is checked: see `PlanEnvironment`, which says what each of these gives."""
+    """The interface that is checked; `PlanEnvironment` describes what each method returns."""
 
     @property
     def plans(self) -> Sequence[Plan]:
-        """What can be reset to."""
+        """Plans that can be reset to."""
         ...
 
     def reset(self, plan: int = 0) -> tuple[Observation, Mapping[str, Any]]:
@@ -40,23 +40,23 @@ class Environment(Protocol):
         ...
 
     def step(self, action: str | Mapping[str, Any]) -> StepOutcome:
-        """Carry out one action of the present plan."""
+        """Execute one action of the present plan."""
         ...
 
     def expert_actions(self, plan: int) -> Sequence[ExpertAction]:
-        """What the expert did for a plan."""
+        """Return the expert's actions of a plan."""
         ...
 
 
 def check_env(environment: Environment, plans: Sequence[int] | None = None) -> None:
-    """Hold an environment to its contract.
+    """Check that an environment fulfils its contract.
 
     Args:
-        environment: just made, with the default rules of rewards.
-        plans: which plans are carried out; the first ones where None. Those whose expert is refused are passed over.
+        environment: new environment with the default reward rules.
+        plans: indices of the plans to check; None for the first ones. Those whose expert is refused are left out.
 
     Raises:
-        ContractError: names the clause that does not hold.
+        ContractError: a clause does not hold; the message names it.
     """
     _check_plans(environment.plans)
     _check_nothing_under_way(environment, "before the first reset()")
@@ -96,9 +96,9 @@ def _check_nothing_under_way(environment: Environment, when: str) -> None:
 
 
 def _check_reset(environment: Environment, plan: int) -> None:
-    found = environment.reset(plan)
-    _require(isinstance(found, tuple) and len(found) == 2, "reset() does not give an observation and information")
-    observation, info = found
+    result = environment.reset(plan)
+    _require(isinstance(result, tuple) and len(result) == 2, "reset() does not give an observation and information")
+    observation, info = result
     _require({"max_reward", "n_expert"} <= set(info), "the information of reset() lacks max_reward or n_expert")
     most = info["max_reward"]
     _require(math.isfinite(most) and most >= 0, f"max_reward of plan {plan} is {most}")
@@ -108,7 +108,7 @@ def _check_reset(environment: Environment, plan: int) -> None:
 
 
 def _check_expert(environment: Environment, plan: int) -> None:
-    """The expert's own actions carry a plan out, and earn the most that there is."""
+    """Check that the expert's actions complete a plan, and earn its highest possible reward."""
     _, info = environment.reset(plan)
     earned, over = 0.0, False
     for action in environment.expert_actions(plan):
@@ -119,7 +119,7 @@ def _check_expert(environment: Environment, plan: int) -> None:
         if over:
             break
     _require(
-        over and outcome.info.ended == Ended.DONE, f"the expert's actions do not carry plan {plan} out: {outcome.info}"
+        over and outcome.info.ended == Ended.DONE, f"the expert's actions do not complete plan {plan}: {outcome.info}"
     )
     most = info["max_reward"]
     _require(abs(earned - most) < _SMALL, f"the expert earns {earned:g} in plan {plan}, and max_reward says {most:g}")
@@ -127,12 +127,12 @@ def _check_expert(environment: Environment, plan: int) -> None:
 
 
 def _check_state_is_the_plans_own(environment: Environment, plans: Sequence[int]) -> None:
-    """Whatever came before a reset, the plan begins the same."""
+    """Check that a plan begins in the same state, whatever came before the reset."""
     first = {plan: environment.reset(plan) for plan in plans}
     for plan in (*reversed(plans), *plans):
         observation, info = environment.reset(plan)
         before, before_info = first[plan]
-        _require(_alike(observation.view, before.view), f"plan {plan} begins in another state the second time")
+        _require(_is_same(observation.view, before.view), f"plan {plan} begins in another state the second time")
         _require(_same_picture(observation, before), f"plan {plan} begins with another picture the second time")
         _require(dict(info) == dict(before_info), f"the information of reset({plan}) differs the second time")
         for action in ("RotateLeft", "LookUp"):
@@ -141,22 +141,22 @@ def _check_state_is_the_plans_own(environment: Environment, plans: Sequence[int]
 
 
 def _check_nonsense(environment: Environment, plan: int) -> None:
-    """What is no action ends the plan, and earns nothing."""
+    """Check that a text that is no action ends the plan, and earns nothing."""
     for text in (*_NONSENSE, _UNKNOWN):
         environment.reset(plan)
         outcome = environment.step(text)
         _check_outcome(outcome)
         _require(outcome.terminated, f"{text!r}, which is no action, does not terminate the plan")
         _require(outcome.reward == 0, f"{text!r}, which is no action, earns {outcome.reward}")
-        wanted = Ended.UNKNOWN_OBJECT if text == _UNKNOWN else Ended.NO_ACTION
-        _require(outcome.info.ended == wanted, f"{text!r} ends the plan with {outcome.info.ended}, not {wanted}")
+        expected = Ended.UNKNOWN_OBJECT if text == _UNKNOWN else Ended.NO_ACTION
+        _require(outcome.info.ended == expected, f"{text!r} ends the plan with {outcome.info.ended}, not {expected}")
         _require(outcome.info.call is None, f"{text!r}, which is no action, has a call")
         _require(bool(outcome.info.message), f"{text!r}, which is no action, has no message")
         _check_nothing_under_way(environment, "after what is no action")
 
 
 def _check_limit(environment: Environment, plan: int) -> None:
-    """Who does nothing for long is truncated."""
+    """Check that a plan without progress is truncated."""
     environment.reset(plan)
     for _ in range(10_000):
         outcome = environment.step("NoOp")
@@ -198,7 +198,7 @@ def _check_observation(observation: Observation) -> None:
         _require(np.array_equal(kept, view.frame), f"{observation.frame.path} is another picture than the view's")
 
 
-def _alike(one: SimulatorView, other: SimulatorView) -> bool:
+def _is_same(one: SimulatorView, other: SimulatorView) -> bool:
     return (one.agent, one.inventory, one.objects) == (other.agent, other.inventory, other.objects)
 
 

@@ -1,4 +1,4 @@
-"""One trajectory as an environment in Gymnasium's manner: reset to any of its plans, then step until it is over."""
+"""One trajectory as an environment like Gymnasium's: reset to any of its plans, then step until it is over."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -14,7 +14,14 @@ from infthor_eval.household.scout import HORIZON_STEP, grid_pose_of, reachable_g
 from infthor_eval.plans.expert import Expert, ExpertAction
 from infthor_eval.plans.memory import Past
 from infthor_eval.plans.plan import Plan, PlanKind, plans_of, tasks_of
-from infthor_eval.plans.rewards import PlanReward, RewardRules, StepReward, max_reward, n_on_the_way, reward_rules
+from infthor_eval.plans.rewards import (
+    PlanReward,
+    RewardRules,
+    StepReward,
+    count_actions_to_goal,
+    max_reward,
+    reward_rules,
+)
 from infthor_eval.plans.targets import PlanTarget, target_of
 from infthor_eval.thor.actions import ActionText, UngroundedError, ground, parse_action, text_of_call
 from infthor_eval.thor.frames import FrameKeeper, NoFrames
@@ -42,11 +49,11 @@ class Ended(StrEnum):
 
 @dataclass(frozen=True)
 class Observation:
-    """What there is to be seen.
+    """What an agent observes.
 
     Attributes:
-        view: the simulator's.
-        frame: the same picture as a reference; None where the environment keeps no frames.
+        view: the simulator's view.
+        frame: its picture as a reference; None if the environment keeps no frames.
     """
 
     view: SimulatorView
@@ -55,14 +62,14 @@ class Observation:
 
 @dataclass(frozen=True)
 class StepInfo:
-    """What came of an action.
+    """Details of a step.
 
     Attributes:
-        call: what the simulator was asked; None where the text could not be turned into a call.
-        action: the action in words, as it goes into the history; empty likewise.
-        message: what was wrong with it; empty where nothing was.
-        ended: how the plan ended with it; None where it goes on.
-        goal_reached: whether the whole task's goal came to hold with it.
+        call: call of the simulator; None if the text could not be turned into one.
+        action: the action in words, as it is added to the history; empty if there is no call.
+        message: what was wrong with it; empty if nothing was.
+        ended: how the plan ended with it; None if it goes on.
+        goal_reached: whether the goal of the whole task has been reached in this plan.
     """
 
     call: Mapping[str, Any] | None
@@ -73,7 +80,7 @@ class StepInfo:
 
 
 class StepOutcome(NamedTuple):
-    """What `step` gives, in Gymnasium's order."""
+    """The result of `step`, in Gymnasium's order."""
 
     observation: Observation
     reward: float
@@ -85,13 +92,13 @@ class StepOutcome(NamedTuple):
 class PlanEnvironment:
     """One trajectory.
 
-    Preparing a plan costs the embedded simulator the same wherever it is, once the expert has come by; Unity repeats
-    the actions before it.
+    Once the expert has passed a plan, a reset to it restores a copy in the embedded simulator, wherever it is in the
+    trajectory. Unity repeats all actions before it.
 
     Attributes:
-        plans: what can be reset to.
-        tasks: the tasks that they belong to.
-        look_degrees: by how much a look up or down turns the camera.
+        plans: plans that can be reset to.
+        tasks: tasks that they belong to.
+        look_degrees: angle by which a look up or down turns the camera.
     """
 
     def __init__(
@@ -107,12 +114,12 @@ class PlanEnvironment:
         """Restore the scene.
 
         Args:
-            trajectory: whose expert is the truth.
-            simulator: where it happens; several copies of its state are kept (`max_copies`).
-            rules: of rewards; the default ones where None.
-            max_steps: of one plan, after which it is truncated.
-            frames: keeps what is seen; nothing is kept where None.
-            in_words: whether the past is to be told in words too; the simulator must tell what each pixel shows then.
+            trajectory: trajectory whose expert defines the true states.
+            simulator: simulator; it should keep a copy of its state for each plan (`max_copies`).
+            rules: reward rules; None for the default ones.
+            max_steps: number of steps after which a plan is truncated.
+            frames: keeps the frames; None keeps none.
+            in_words: whether the past is also described in words; the simulator must then send instance masks.
 
         Raises:
             DataError: the trajectory has a task without a goal, or an unknown kind of plan.
@@ -133,55 +140,57 @@ class PlanEnvironment:
         """Bring the world to the true state before a plan.
 
         Returns:
-            What is seen, and information: `max_reward`, the most that the rules allow from here, and `n_expert`, the
-            number of actions that the expert took.
+            The observation, and information: `max_reward`, the highest possible reward from here, and `n_expert`, the
+            number of the expert's actions.
 
         Raises:
             IndexError: there is no such plan.
             ExpertRefusedError: this simulator refuses an action of the expert before the plan's end.
-            UnfitPlanError: the scene has not what the plan is about.
+            InfeasibleError: the scene lacks an object of the plan.
             SimulatorError: the simulator fails.
         """
         if not 0 <= plan < len(self.plans):
             raise IndexError(f"there is no plan {plan}; there are 0 to {len(self.plans) - 1}")
-        found = self.plans[plan]
+        present = self.plans[plan]
+        # The whole plan is replayed before its start is restored: a plan whose expert fails here is infeasible, and the
+        # expert's end is the goal of GotoLocation.
         expert_actions = self._expert.actions(plan)
         start, end = self._expert.start(plan), self._expert.start(plan + 1)
         view = self._simulator.rewind(start.mark, exactly=True)
-        task = self.tasks[found.task].task
-        grid = self._grid(found, expert_actions, view)
-        target = self._target(found, view, end.mark.view.agent, grid)
+        task = self.tasks[present.task].task
+        grid = self._grid(present, expert_actions, view)
+        target = self._target(present, view, end.mark.view.agent, grid)
         self._reward = PlanReward(self._rules, target, task, view, start.treatments, grid)
-        self._meant = _meant(target, view)
-        self._plan, self._n_steps = found, 0
-        n_acts = n_on_the_way(self._rules, target, [action.pose for action in expert_actions], grid)
-        completes = any(action.completes for action in expert_actions[:n_acts])
+        self._preferred = _preferred_objects(target, view)
+        self._plan, self._n_steps = present, 0
+        n_actions = count_actions_to_goal(self._rules, target, [action.pose for action in expert_actions], grid)
+        completes = any(action.completes for action in expert_actions[:n_actions])
         most = max_reward(self._rules, target, view, grid, task if completes else None)
         return Observation(view, start.frame), {"max_reward": most, "n_expert": len(expert_actions)}
 
     def step(self, action: str | Mapping[str, Any]) -> StepOutcome:
-        """Carry out one action of the present plan.
+        """Execute one action of the present plan.
 
         Args:
-            action: its text (`PickupObject Mug`), or a call of AI2-THOR's.
+            action: text of the action (`PickupObject Mug`), or a call of AI2-THOR's.
 
         Raises:
-            RuntimeError: the plan is over, or was never begun.
+            RuntimeError: the plan is over, or there was no reset.
             SimulatorError: the simulator fails.
         """
         if self._plan is None:
             raise RuntimeError("no plan is under way; reset the environment to one")
         before = self._simulator.view
         try:
-            text, call = self._grounded(action, before)
+            text, call = self._ground(action, before)
         except UngroundedError as error:
             self._plan = None
             info = StepInfo(None, "", str(error), Ended(str(error.misuse)))
             return StepOutcome(Observation(before, None), 0.0, True, False, info)
-        return self._carried_out(text, call, before)
+        return self._execute(text, call, before)
 
     def past(self, plan: int) -> Past:
-        """What there is to remember before a plan; only where frames are kept.
+        """Return the history before a plan; only if frames are kept.
 
         Raises:
             ExpertRefusedError: as `reset`.
@@ -189,7 +198,7 @@ class PlanEnvironment:
         return self._expert.past(plan)
 
     def expert_actions(self, plan: int) -> Sequence[ExpertAction]:
-        """What the expert did for a plan.
+        """Return the expert's actions of a plan.
 
         Raises:
             ExpertRefusedError: as `reset`.
@@ -197,64 +206,67 @@ class PlanEnvironment:
         return self._expert.actions(plan)
 
     def named(self, plan: int) -> Sequence[str]:
-        """Ids of the objects that a plan names, as far as they are there; for looking at, not for rewards.
+        """Return the ids of the objects that a plan names and that the scene has; for pictures, not for rewards.
 
         Raises:
             ExpertRefusedError: as `reset`.
         """
-        found, view = self.plans[plan], self._expert.start(plan).mark.view
-        grounding = deepcopy(self._expert.grounding)  # what is chosen here must not decide what an action is about
-        ids = (grounding.ground(key, view) for key in (found.object_id, found.receptacle_id) if key is not None)
+        present, view = self.plans[plan], self._expert.start(plan).mark.view
+        grounding = deepcopy(self._expert.grounding)  # it remembers its choices, and a picture must not decide any
+        ids = (grounding.ground(key, view) for key in (present.object_id, present.receptacle_id) if key is not None)
         return [key for key in ids if key is not None]
 
-    def _grounded(self, action: str | Mapping[str, Any], view: SimulatorView) -> tuple[str, Mapping[str, Any]]:
+    def _ground(self, action: str | Mapping[str, Any], view: SimulatorView) -> tuple[str, Mapping[str, Any]]:
         if not isinstance(action, str):
             return str(text_of_call(action, view)), action
         text: ActionText = parse_action(action)
-        return str(text), ground(text, view, self.look_degrees, self._meant)
+        return str(text), ground(text, view, self.look_degrees, self._preferred)
 
-    def _carried_out(self, text: str, call: Mapping[str, Any], before: SimulatorView) -> StepOutcome:
+    def _execute(self, text: str, call: Mapping[str, Any], before: SimulatorView) -> StepOutcome:
         after = self._simulator.step(**call)
         self._n_steps += 1
         earned = self._reward.after(call, before, after)
-        ended = self._ended(earned, after)
+        ended = _ended(earned, after)
         truncated = ended is None and self._n_steps >= self._max_steps
         if ended is not None or truncated:
             self._plan = None
         info = StepInfo(call, text, after.error, Ended.LIMIT if truncated else ended, self._reward.goal_reached)
-        seen = Observation(after, self._frames.keep(after))
-        return StepOutcome(seen, earned.reward, ended is not None, truncated, info)
-
-    @staticmethod
-    def _ended(earned: StepReward, after: SimulatorView) -> Ended | None:
-        if earned.done:
-            return Ended.DONE
-        if not earned.failed:
-            return None
-        return Ended.WRONG if after.success else Ended.REFUSED
+        observation = Observation(after, self._frames.keep(after))
+        return StepOutcome(observation, earned.reward, ended is not None, truncated, info)
 
     def _target(self, plan: Plan, view: SimulatorView, end: AgentPose, grid: Grid | None) -> PlanTarget:
-        """What the plan asks for; to go somewhere is to stand and look as the expert did in the end."""
+        """Return the target of a plan; that of GotoLocation is the pose in which the expert ended."""
         if grid is not None:
             return PlanTarget(plan.kind, goal_stand=grid_pose_of(end, grid), goal_horizon=end.horizon)
         return target_of(plan, self._expert.grounding, view)
 
     def _grid(self, plan: Plan, expert_actions: Sequence[ExpertAction], view: SimulatorView) -> Grid | None:
-        """Where the agent can stand; where the expert went in this plan it can, whatever the simulator says."""
+        """Return the reachable cells for GotoLocation, None for other plans.
+
+        The expert's own cells are added: the simulator need not report all of them, yet the expert stood there.
+        """
         if plan.kind != PlanKind.GOTO:
             return None
         walked = [view.agent, *(action.pose for action in expert_actions)]
         return reachable_grid(self._simulator).with_positions((pose.position.x, pose.position.z) for pose in walked)
 
 
-def _meant(target: PlanTarget, start: SimulatorView) -> set[str]:
-    """What a plan means where words do not tell: its objects, and what they are in (a thing in one of ten drawers)."""
+def _ended(earned: StepReward, after: SimulatorView) -> Ended | None:
+    if earned.done:
+        return Ended.DONE
+    if not earned.failed:
+        return None
+    return Ended.WRONG if after.success else Ended.REFUSED
+
+
+def _preferred_objects(target: PlanTarget, start: SimulatorView) -> set[str]:
+    """Return the ids that ambiguous words mean: the plan's objects, and what they are in (one of ten drawers)."""
     named = [start.objects[key] for key in (target.object_id, target.receptacle_id) if key in start.objects]
     return {key for item in named for key in (item.object_id, *(item.parent_receptacles or ()))}
 
 
 def _look_degrees(trajectory: Trajectory) -> float:
-    """By how much a look up or down turns the camera in this trajectory: 15 degrees in ALFRED's, 30 in others."""
+    """Return the angle of most looks up or down in this trajectory: 15 degrees in ALFRED's, 30 in others."""
     looks = Counter(
         degrees_of(low) for low in trajectory.plan.low_actions if low.api_action.action in {"LookUp", "LookDown"}
     )

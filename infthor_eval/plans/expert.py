@@ -1,17 +1,18 @@
-"""The expert's actions of one trajectory, carried out as far as they are needed: the true history."""
+"""The expert's actions of one trajectory, replayed as far as they are needed: the true history."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+from infthor_eval.episodes.errors import InfeasibleError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.household.goals import goal_holds
 from infthor_eval.household.state_summary import state_summaries
 from infthor_eval.household.treatments import Treatments
-from infthor_eval.plans.history import Chapter
 from infthor_eval.plans.memory import Past
-from infthor_eval.plans.plan import Plan, TrajectoryTask, UnfitPlanError
+from infthor_eval.plans.plan import Plan, TrajectoryTask
+from infthor_eval.plans.segments import PlanSegment
 from infthor_eval.thor.actions import text_of
 from infthor_eval.thor.frames import FrameKeeper
 from infthor_eval.thor.grounding import Grounding
@@ -21,10 +22,10 @@ from infthor_eval.thor.restore import restore
 from infthor_eval.thor.simulator import Simulator, SimulatorMark
 from infthor_eval.thor.view import AgentPose, SimulatorView
 
-__all__ = ["Expert", "ExpertRefusedError", "PlanStart"]
+__all__ = ["Expert", "ExpertAction", "ExpertRefusedError", "PlanStart"]
 
 
-class ExpertRefusedError(UnfitPlanError):
+class ExpertRefusedError(InfeasibleError):
     """This simulator refuses an action of the expert: there is no true history from its plan on."""
 
 
@@ -33,10 +34,10 @@ class ExpertAction:
     """An action of the expert.
 
     Attributes:
-        call: what the simulator is asked.
-        text: in words.
-        pose: where the agent stands after it.
-        completes: whether the goal of the plan's task holds after it, and did not when the plan began.
+        call: call of the simulator.
+        text: the action in words.
+        pose: pose of the agent after it.
+        completes: whether the goal of the plan's task holds after it, and did not at the plan's start.
     """
 
     call: Mapping[str, Any]
@@ -50,8 +51,8 @@ class PlanStart:
     """The true state before a plan.
 
     Attributes:
-        mark: of the simulator.
-        frame: what the agent sees; None where nobody looks.
+        mark: mark of the simulator.
+        frame: frame that the agent sees; None if frames are not kept.
         treatments: what was done to objects so far in the plan's task.
     """
 
@@ -61,8 +62,6 @@ class PlanStart:
 
 
 class _Step(NamedTuple):
-    """An action, and what came of it."""
-
     action: ExpertAction
     view: SimulatorView
     frame: FrameRef | None
@@ -70,7 +69,11 @@ class _Step(NamedTuple):
 
 
 class Expert:
-    """Goes through a trajectory as its expert did."""
+    """Replays the expert of a trajectory, plan by plan.
+
+    Attributes:
+        grounding: ids of the trajectory's objects in this simulator.
+    """
 
     def __init__(
         self,
@@ -92,16 +95,16 @@ class Expert:
         self.grounding = Grounding(simulator.view)
         self._starts = [PlanStart(simulator.mark(), frames.keep(simulator.view), Treatments())]
         self._actions: list[list[ExpertAction]] = []
-        self._chapters: list[Chapter] = []
+        self._segments: list[PlanSegment] = []
         self._refused: ExpertRefusedError | None = None
         self._log = Recorder() if in_words else None
         if self._log is not None:
             self._log.record(simulator.view)
 
     def start(self, plan: int) -> PlanStart:
-        """The true state before a plan; what comes before it is carried out the first time.
+        """Return the true state before a plan; the plans before it are replayed the first time.
 
-        The number of plans stands for the end of the trajectory. The simulator is anywhere afterwards.
+        The number of plans is the end of the trajectory. The simulator is in any state afterwards.
 
         Raises:
             ExpertRefusedError: an action before it is refused here.
@@ -110,11 +113,11 @@ class Expert:
         while len(self._starts) <= plan:
             if self._refused is not None:
                 raise self._refused
-            self._carry_out(self._plans[len(self._starts) - 1])
+            self._replay(self._plans[len(self._starts) - 1])
         return self._starts[plan]
 
     def actions(self, plan: int) -> Sequence[ExpertAction]:
-        """What the expert did for a plan.
+        """Return the expert's actions of a plan.
 
         Raises:
             ExpertRefusedError: as `start` of the next one.
@@ -123,30 +126,30 @@ class Expert:
         return self._actions[plan]
 
     def past(self, plan: int) -> Past:
-        """What there is to remember before a plan; only where frames are kept.
+        """Return the history before a plan; only if frames are kept.
 
         Raises:
             ExpertRefusedError: as `start`.
         """
-        present = self._chapter(plan)
-        return Past(self._chapters[:plan], present, self._state(self._plans[plan].low[0]) if self._log else "")
+        segment = self._open_segment(plan)
+        return Past(self._segments[:plan], segment, self._state(self._plans[plan].low[0]) if self._log else "")
 
-    def _chapter(self, plan: int) -> Chapter:
-        """What a plan's own chapter begins with."""
-        found = self._plans[plan]
-        begins = plan == 0 or self._plans[plan - 1].task != found.task
+    def _open_segment(self, plan: int) -> PlanSegment:
+        """Return the segment of a plan, without a step."""
+        present = self._plans[plan]
+        begins_task = plan == 0 or self._plans[plan - 1].task != present.task
         frame = self.start(plan).frame
         assert frame is not None
-        return Chapter(found.text, self._tasks[found.task].text if begins else None, frame)
+        return PlanSegment(present.text, self._tasks[present.task].text if begins_task else None, frame)
 
     def _state(self, n_actions: int) -> str:
-        """The state after so many actions, in words."""
+        """Return the state after a number of actions, in words."""
         assert self._log is not None
-        told = state_summaries(self._log.steps[: n_actions + 1], {n_actions - 1})
-        return told.get(n_actions - 1, "")
+        summaries = state_summaries(self._log.steps[: n_actions + 1], {n_actions - 1})
+        return summaries.get(n_actions - 1, "")
 
-    def _carry_out(self, plan: Plan) -> None:
-        """The actions of the next plan; nothing is kept of them unless all can be."""
+    def _replay(self, plan: Plan) -> None:
+        """Replay the next plan; nothing of it is kept unless all its actions succeed."""
         start = self._starts[-1]
         steps = list(self._steps(plan, start))
         mark, last = self._simulator.mark(), steps[-1]
@@ -154,15 +157,15 @@ class Expert:
             for number, step in zip(range(*plan.low), steps, strict=True):
                 self._log.record(step.view, step=number, action=step.action.text)
         if start.frame is not None:
-            opening = self._chapter(plan.index)
-            told = tuple((step.action.text, step.frame) for step in steps if step.frame is not None)
-            self._chapters.append(Chapter(opening.plan, opening.goal, opening.before, told))
+            segment = self._open_segment(plan.index)
+            after = tuple((step.action.text, step.frame) for step in steps if step.frame is not None)
+            self._segments.append(PlanSegment(segment.plan, segment.goal, segment.before, after))
         self._actions.append([step.action for step in steps])
         following = self._plans[plan.index + 1 : plan.index + 2]
-        goes_on = any(item.task == plan.task for item in following)
-        self._starts.append(PlanStart(mark, last.frame, last.treatments if goes_on else Treatments()))
+        task_goes_on = any(item.task == plan.task for item in following)
+        self._starts.append(PlanStart(mark, last.frame, last.treatments if task_goes_on else Treatments()))
 
-    def _steps(self, plan: Plan, start: PlanStart) -> Iterator["_Step"]:
+    def _steps(self, plan: Plan, start: PlanStart) -> Iterator[_Step]:
         view, treatments = self._simulator.rewind(start.mark, exactly=True), start.treatments
         task = self._tasks[plan.task].task
         task_open = not goal_holds(task, view, treatments)

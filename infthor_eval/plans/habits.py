@@ -1,4 +1,4 @@
-"""What experts did next, by the words of their plan and the action before: how far one comes without a pixel."""
+"""What experts did next, by the words of their plan and the action before: how far an agent gets without a frame."""
 
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Sequence
@@ -15,10 +15,10 @@ _Key = tuple[str, ...]
 
 
 class Habits:
-    """The most frequent next action in the nearest situation known, of equally frequent ones the first by name.
+    """The most frequent next action in the most similar known situation; of equally frequent ones the first by name.
 
-    A situation is the plan's text, how far it has come, and the action before; where that was never met, less and less
-    of it is asked for (`_situations`). Actions are learnt with the plan's own objects left open.
+    A situation is the plan's text, the number of actions so far, and the last action. If it is unknown, less and less
+    of it is compared (`_situations`). Actions are learned with placeholders for the plan's own objects.
     """
 
     def __init__(self, trajectories: Iterable[Trajectory]) -> None:
@@ -28,12 +28,12 @@ class Habits:
             for plan in plans_of(trajectory):
                 self._learn(plan.text, expert_texts(trajectory, plan))
 
-    def next(self, plan: str, done: Sequence[str]) -> str:
-        """The next action.
+    def next_action(self, plan: str, done: Sequence[str]) -> str:
+        """Return the next action.
 
         Args:
-            plan: its text.
-            done: the actions so far.
+            plan: text of the plan.
+            done: actions so far.
         """
         for key in _situations(plan, done):
             if key in self._seen:
@@ -48,13 +48,13 @@ class Habits:
 
 
 def expert_texts(trajectory: Trajectory, plan: Plan) -> list[str]:
-    """The expert's actions of a plan, in words."""
+    """Return the expert's actions of a plan, in words."""
     calls = [trajectory.plan.low_actions[number].api_action for number in range(*plan.low)]
     return [str(text_of(call.action, call.object_id, call.receptacle_id)) for call in calls]
 
 
 def _situations(plan: str, done: Sequence[str]) -> Iterator[_Key]:
-    """What tells of a situation, the most telling first."""
+    """Yield descriptions of a situation, the most specific first."""
     verb, _ = read_plan(plan)
     before, number = open_action(done[-1], plan) if done else _START, str(len(done))
     yield "text", plan, number, before
@@ -65,13 +65,13 @@ def _situations(plan: str, done: Sequence[str]) -> Iterator[_Key]:
 
 
 def open_action(action: str, plan: str) -> str:
-    """An action with places for the objects that its plan names."""
+    """Return an action with placeholders for the objects that its plan names."""
     _, types = read_plan(plan)
     return " ".join(f"{{{types.index(word)}}}" if word in types else word for word in action.split())
 
 
 def fill_action(action: str, plan: str) -> str:
-    """An action with the objects of a plan in their places."""
+    """Return an action with the objects of a plan in place of its placeholders."""
     _, types = read_plan(plan)
     for number, name in enumerate(types):
         action = action.replace(f"{{{number}}}", name)

@@ -7,83 +7,83 @@ from typing import ClassVar, Protocol
 from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.household.sequence_text import goal_part, plan_part
-from infthor_eval.plans.history import Chapter, Part, chapter_parts, goal_before, opened
+from infthor_eval.plans.segments import Part, PlanSegment, goal_of_last, restart_at, segment_parts
 
 __all__ = ["FullHistory", "LastTokens", "Memory", "Past", "StateInWords", "TopFrames", "memory_named"]
 
-Count = Callable[[Sequence[Part]], int | None]
+CountTokens = Callable[[Sequence[Part]], int | None]
 _RETRIEVER = "openai/clip-vit-large-patch14"  # as published for questions
 
 
 @dataclass(frozen=True)
 class Past:
-    """What there is to remember, before a plan.
+    """The history before a plan.
 
     Attributes:
-        chapters: the history, a chapter a plan.
-        present: the plan's own chapter, without a step.
-        state: the state of room and agent in words, so far as it was seen; empty where no memory asks for it.
+        segments: segments of the plans before.
+        present: the plan's own segment, without a step.
+        state: the state of room and agent in words, as far as it was seen; empty if no memory needs it.
     """
 
-    chapters: Sequence[Chapter]
-    present: Chapter
+    segments: Sequence[PlanSegment]
+    present: PlanSegment
     state: str = ""
 
     @property
-    def all(self) -> list[Chapter]:
-        """The present chapter behind the others."""
-        return [*self.chapters, self.present]
+    def all(self) -> list[PlanSegment]:
+        """All segments, the present one last."""
+        return [*self.segments, self.present]
 
     @property
     def goal(self) -> str:
-        """The goal that the plan serves."""
-        return goal_before(self.all)
+        """The goal that the plan belongs to."""
+        return goal_of_last(self.all)
 
     @property
     def frames(self) -> list[FrameRef]:
         """Every frame before the present one."""
-        after = [frame for chapter in self.chapters for _, frame in chapter.steps]
-        return [chapter.before for chapter in self.all[:1] if after] + after[:-1]
+        after = [frame for segment in self.segments for _, frame in segment.steps]
+        return [segment.before for segment in self.all[:1] if after] + after[:-1]
 
 
 class Memory(Protocol):
-    """Chooses what a model is given.
+    """Selects what a model is given.
 
     Attributes:
-        needs_state: whether it wants the state in words.
+        needs_state: whether it needs the state in words.
     """
 
     needs_state: ClassVar[bool]
 
-    def recall(self, past: Past, count: Count) -> list[Part]:
-        """What the model sees before the first action of a plan.
+    def recall(self, past: Past, count: CountTokens) -> list[Part]:
+        """Return what the model is given before the first action of a plan.
 
         Args:
-            past: what there is.
-            count: tokens of parts, as the model takes them; None where it counts none.
+            past: the history.
+            count: counts the tokens of some parts; returns None if the model does not count.
 
         Raises:
             DataError: a frame cannot be read.
-            ModelError: what must be there does not fit.
+            ModelError: the required parts do not fit.
         """
         ...
 
 
 class FullHistory:
-    """All of it."""
+    """The whole history."""
 
     needs_state: ClassVar[bool] = False
 
-    def recall(self, past: Past, count: Count) -> list[Part]:
+    def recall(self, past: Past, count: CountTokens) -> list[Part]:
         """See `Memory`."""
-        return chapter_parts(past.all)
+        return segment_parts(past.all)
 
 
 class LastTokens:
-    """As many of the last plans as fit, behind the goal that they serve and the frame that they begin with.
+    """As many of the last plans as fit, after the goal that they belong to and the frame that they begin with.
 
-    Whole plans are left out, from the first on, and the goal is said again where what is left would begin without it:
-    so every window has the form of a trajectory's beginning, as the models know it.
+    Whole plans are left out, from the first on, and the goal is repeated if the rest would begin without it. So every
+    window has the form of a trajectory's beginning, which is what the models were trained on.
     """
 
     needs_state: ClassVar[bool] = False
@@ -92,47 +92,46 @@ class LastTokens:
         """Set the limit.
 
         Args:
-            n_tokens: of what the model is given before its first action; what the plan adds comes on top.
+            n_tokens: maximum number of tokens before the model's first action; the plan's own steps come on top.
         """
         self._n_tokens = n_tokens
 
-    def recall(self, past: Past, count: Count) -> list[Part]:
-        """See `Memory`; the number of plans is found by bisection, a count of tokens each."""
-        chapters = past.all
-        least, most = 1, len(chapters)  # how many of the last chapters
-        if not self._fits(chapters, least, count):
+    def recall(self, past: Past, count: CountTokens) -> list[Part]:
+        """See `Memory`; by bisection, as each count encodes the window."""
+        segments = past.all
+        least, most = 1, len(segments)  # number of last segments
+        if not self._fits(segments, least, count):
             raise ModelError(
                 f"the plan alone takes more than {self._n_tokens} tokens; give --history last:N a larger N"
             )
         while least < most:
             middle = (least + most + 1) // 2
-            if self._fits(chapters, middle, count):
+            if self._fits(segments, middle, count):
                 least = middle
             else:
                 most = middle - 1
-        return _window(chapters, least)
+        return _window(segments, least)
 
-    def _fits(self, chapters: Sequence[Chapter], n_last: int, count: Count) -> bool:
-        n_tokens = count(_window(chapters, n_last))
+    def _fits(self, segments: Sequence[PlanSegment], n_last: int, count: CountTokens) -> bool:
+        n_tokens = count(_window(segments, n_last))
         if n_tokens is None:
-            raise ModelError("the model counts no tokens, so --history last:N cannot be held; use full")
+            raise ModelError("the model counts no tokens, so --history last:N cannot be used; use full")
         return n_tokens <= self._n_tokens
 
 
-def _window(chapters: Sequence[Chapter], n_last: int) -> list[Part]:
-    """The last chapters, the first of them beginning with its goal."""
-    return chapter_parts(opened(chapters, len(chapters) - n_last))
+def _window(segments: Sequence[PlanSegment], n_last: int) -> list[Part]:
+    return segment_parts(restart_at(segments, len(segments) - n_last))
 
 
 class StateInWords:
-    """No frame but the present one: what was seen so far in words, as the published text state has it."""
+    """The present frame, and what was seen before it in words, as in the published text state."""
 
     needs_state: ClassVar[bool] = True
 
-    def recall(self, past: Past, count: Count) -> list[Part]:
+    def recall(self, past: Past, count: CountTokens) -> list[Part]:
         """See `Memory`."""
-        said = f" State: {past.state}; Last agent's view: "
-        return [goal_part(past.goal) + said, past.present.before, plan_part(past.present.plan)]
+        text = f" State: {past.state}; Last agent's view: "
+        return [goal_part(past.goal) + text, past.present.before, plan_part(past.present.plan)]
 
 
 class TopFrames:
@@ -141,10 +140,10 @@ class TopFrames:
     needs_state: ClassVar[bool] = False
 
     def __init__(self, n_frames: int, retriever: str) -> None:
-        """Set the number.
+        """Load the retriever.
 
         Args:
-            n_frames: beside the present one; the paper shows 20.
+            n_frames: number of frames beside the present one; the paper shows 20.
             retriever: CLIP model, a hub id or a folder.
 
         Raises:
@@ -154,7 +153,7 @@ class TopFrames:
 
         self._n_frames, self._retriever = n_frames, open_retriever(retriever, None)
 
-    def recall(self, past: Past, count: Count) -> list[Part]:
+    def recall(self, past: Past, count: CountTokens) -> list[Part]:
         """See `Memory`."""
         from model_adapters.hf.vectors import nearest
 
@@ -168,14 +167,14 @@ class TopFrames:
 
 
 def memory_named(text: str, retriever: str | None = None) -> Memory:
-    """The memory that `--history` names.
+    """Return the memory of a value of `--history`.
 
     Args:
         text: "full", "last:N" (N tokens), "text", or "frames:K" (K frames).
-        retriever: CLIP model of memories that retrieve frames; the published one where None.
+        retriever: CLIP model for memories that retrieve frames; None for the published one.
 
     Raises:
-        UsageError: there is none such, or a retriever that nothing looks at.
+        UsageError: there is no such memory, or a retriever is given that it does not use.
     """
     kind, _, number = text.partition(":")
     size = int(number) if number.isdecimal() else 0

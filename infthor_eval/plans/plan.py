@@ -1,4 +1,4 @@
-"""The plans of a trajectory: what an agent is asked to do, one after the other."""
+"""The plans of a trajectory: the instructions that an agent is given, one after the other."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,11 +9,7 @@ from infthor_eval.formats.trajectory import HighAction, SubTask, TaskInfo, Traje
 from infthor_eval.household.sequence_text import goal_text, plan_text
 from infthor_eval.household.tasks import Task, task_of
 
-__all__ = ["Plan", "PlanKind", "TrajectoryTask", "UnfitPlanError", "plans_of", "tasks_of"]
-
-
-class UnfitPlanError(DataError):
-    """Nobody can carry a plan out here, so it counts for nobody."""
+__all__ = ["Plan", "PlanKind", "TrajectoryTask", "plans_of", "tasks_of"]
 
 
 class PlanKind(StrEnum):
@@ -37,9 +33,9 @@ class TrajectoryTask:
 
     Attributes:
         text: its goal in words.
-        task: what must hold in the end.
-        first_high: its first sub-goal.
-        end_high: the sub-goal behind its last one.
+        task: its goal condition.
+        first_high: index of its first sub-goal.
+        end_high: index after its last sub-goal.
     """
 
     text: str
@@ -53,14 +49,14 @@ class Plan:
     """One plan.
 
     Attributes:
-        index: its place among the trajectory's plans.
-        kind: what is to be done.
-        text: in words ("pick up the mug").
-        task: index of the task that it belongs to; the one before where it stands between two tasks.
-        low: the expert's low-level actions of it, [first, end).
-        object_id: what it is about, as recorded; None where the recording names none.
-        receptacle_id: where to, as recorded; None likewise.
-        location: for GotoLocation the pose to reach, "loc|x|z|turn|horizon": cells of 0.25 m, quarter turns, degrees.
+        index: place among the trajectory's plans.
+        kind: kind of the plan.
+        text: the plan in words ("pick up the mug").
+        task: index of the task that it belongs to; the earlier one if it is between two tasks.
+        low: indices of the expert's low-level actions, [first, end).
+        object_id: recorded id of its object; None if the recording names none.
+        receptacle_id: recorded id of its receptacle; None if the recording names none.
+        location: pose to reach by GotoLocation, "loc|x|z|turn|horizon": cells of 0.25 m, quarter turns, degrees.
         is_final: whether it belongs to the final long-horizon task.
     """
 
@@ -76,15 +72,15 @@ class Plan:
 
 
 def tasks_of(trajectory: Trajectory) -> list[TrajectoryTask]:
-    """The tasks of a trajectory, in time order; of ALFRED's demonstrations the one.
+    """Return the tasks of a trajectory, in time order; ALFRED's demonstrations have one.
 
     Raises:
-        DataError: a task without a goal, or its sub-goals are not there.
+        DataError: a task has no goal, or its sub-goals are missing.
     """
     n_high = len(trajectory.plan.high_pddl)
     if not trajectory.sub_trajs:
         return [TrajectoryTask(goal_text(trajectory, None), _task(trajectory, 0, _single_task(trajectory)), 0, n_high)]
-    found = []
+    tasks = []
     for sub_task, span in zip(_sub_tasks(trajectory), trajectory.sub_trajs, strict=True):
         first, end = span.high_pddl_idx
         if not 0 <= first <= end <= n_high:
@@ -92,15 +88,15 @@ def tasks_of(trajectory: Trajectory) -> list[TrajectoryTask]:
                 f"trajectory {trajectory.traj_id}: task {span.sub_traj_idx} has sub-goals {first} to {end} of {n_high}"
             )
         task = _task(trajectory, span.sub_traj_idx, sub_task)
-        found.append(TrajectoryTask(goal_text(trajectory, sub_task), task, first, end))
-    return found
+        tasks.append(TrajectoryTask(goal_text(trajectory, sub_task), task, first, end))
+    return tasks
 
 
 def plans_of(trajectory: Trajectory) -> list[Plan]:
-    """The plans of a trajectory, in time order; sub-goals without an action (ALFRED's last one) are none.
+    """Return the plans of a trajectory, in time order; sub-goals without an action (ALFRED's last one) are left out.
 
     Raises:
-        DataError: a task without a goal, an unknown kind of sub-goal, or actions that belong to none.
+        DataError: a task has no goal, a sub-goal is of an unknown kind, or actions belong to no sub-goal.
     """
     tasks = tasks_of(trajectory)
     spans = _spans(trajectory)
@@ -128,7 +124,7 @@ def plans_of(trajectory: Trajectory) -> list[Plan]:
 
 
 def _sub_tasks(trajectory: Trajectory) -> Sequence[SubTask]:
-    """A task for each part of the trajectory; some files keep the final task apart from the others."""
+    """Return a task for each part of the trajectory; some files have the final task apart from the others."""
     tasks, parts, final = trajectory.sub_tasks, trajectory.sub_trajs, trajectory.long_horizon_task
     if len(parts) == len(tasks) + 1 and final is not None:
         return [*tasks, final]
@@ -145,7 +141,7 @@ def _task(trajectory: Trajectory, number: int, recorded: SubTask) -> Task:
 
 
 def _single_task(trajectory: Trajectory) -> SubTask:
-    """The task of an ALFRED demonstration."""
+    """Return the task of an ALFRED demonstration."""
     params = trajectory.pddl_params or {}
     info = TaskInfo(
         goal=trajectory.task_type or "",
@@ -157,7 +153,7 @@ def _single_task(trajectory: Trajectory) -> SubTask:
 
 
 def _spans(trajectory: Trajectory) -> dict[int, tuple[int, int]]:
-    """The actions of each sub-goal, [first, end)."""
+    """Return the indices of each sub-goal's actions, [first, end)."""
     spans: dict[int, tuple[int, int]] = {}
     previous = -1
     for number, low in enumerate(trajectory.plan.low_actions):

@@ -1,4 +1,4 @@
-"""What the suite of plans writes into a run's journal: plans, each with all that was done for it."""
+"""What the suite of plans writes into a run's journal: plans, each with everything that the agent did."""
 
 import msgspec
 
@@ -13,12 +13,12 @@ class StepRecord(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     """One action of an agent.
 
     Attributes:
-        reply: what a model said; None for baselines.
-        action: the action in words; empty where the reply was none that could be tried.
-        call: what the simulator was asked, as JSON values; None likewise.
-        message: what was wrong with it; empty where nothing was.
-        reward: what it earned.
-        n_context_tokens: length of the request; None where the model does not tell.
+        reply: reply of the model; None for baselines.
+        action: the action in words; empty if the reply could not be executed.
+        call: call of the simulator, as JSON values; None if the reply could not be executed.
+        message: what was wrong with it; empty if nothing was.
+        reward: reward of the action.
+        n_context_tokens: tokens of the request; None if the model does not count.
     """
 
     reply: str | None = None
@@ -30,22 +30,23 @@ class StepRecord(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
 
 
 class PlanRecord(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, tag_field="type", tag="plan"):
-    """One plan, and what an agent did for it.
+    """One plan, and what an agent did in it.
 
     Attributes:
-        index: its place among the trajectory's plans.
-        kind: of the plan ("PickupObject").
-        plan: in words.
-        goal: of its task, in words.
-        task: index of its task.
-        is_final: whether that is the final long-horizon task.
-        first_step: the expert's first low-level action of it.
-        n_expert_steps: how many actions the expert took.
-        steps: what the agent did; empty where the plan was not come to.
-        reward: of all steps.
-        max_reward: the most that the rules allow from its start; None where it was not come to.
-        ended: how it ended ("done", "step limit", ...); "not come to" where an earlier plan ended the episode.
-        goal_reached: whether the task's goal came to hold in it.
+        index: place among the trajectory's plans.
+        kind: kind of the plan ("PickupObject").
+        plan: the plan in words.
+        goal: goal of its task, in words.
+        task: index of its task in the trajectory.
+        first_step: index of the expert's first low-level action of it.
+        n_expert_steps: number of the expert's actions.
+        is_final: whether its task is the final long-horizon task.
+        steps: actions of the agent; empty if the plan was not attempted.
+        reward: reward of all steps.
+        max_reward: highest possible reward from its start; None if it was not attempted.
+        ended: how it ended ("done", "step limit", ...); "not attempted" if an earlier plan ended the trajectory; empty
+            if the subject failed or the plan is excluded.
+        goal_reached: whether the task's goal was reached in it.
     """
 
     index: int

@@ -1,8 +1,8 @@
-"""What an agent is paid for a plan, action by action (docs/plan-rewards.md).
+"""Rewards of an agent for a plan, action by action (docs/plan-rewards.md).
 
-An action is paid by the plan's kind. One that is refused ends the plan and gives nothing; one that the kind has no use
-for gives nothing and ends nothing. On top of that comes, once, the reward of the whole task, when its goal comes to
-hold with an action that neither fails nor is of no use.
+An action is rewarded by the plan's kind. A refused action ends the plan and earns nothing. An action that is not valid
+for the kind earns nothing and ends nothing. The reward of the whole task is added once, with the first valid action
+after which the task's goal holds.
 """
 
 import math
@@ -13,6 +13,7 @@ from typing import Any
 
 import msgspec
 
+from infthor_eval.episodes.errors import InfeasibleError
 from infthor_eval.errors import unknown_name
 from infthor_eval.formats.yaml_files import read_yaml
 from infthor_eval.household.containment import contents_of, is_in
@@ -21,31 +22,31 @@ from infthor_eval.household.navigation import Grid, GridPose
 from infthor_eval.household.scout import grid_pose_of
 from infthor_eval.household.tasks import Task
 from infthor_eval.household.treatments import Treatments
-from infthor_eval.plans.plan import PlanKind, UnfitPlanError
+from infthor_eval.plans.plan import PlanKind
 from infthor_eval.plans.targets import PlanTarget, in_hand, subject_of
 from infthor_eval.thor.view import AgentPose, SimulatorView, ThorObject
 
-__all__ = ["PlanReward", "RewardRules", "StepReward", "max_reward", "n_on_the_way", "reward_rules"]
+__all__ = ["PlanReward", "RewardRules", "StepReward", "count_actions_to_goal", "max_reward", "reward_rules"]
 
 _FILE = Path(__file__).with_name("rewards.yaml")
-_SMALL_ANGLE = 0.01  # of a look; below it the camera is where it should be
+_SMALL_LOOK = 0.01  # share of a look below which the camera's angle is right: simulators report rounded angles
 _TREATMENTS = {PlanKind.CLEAN, PlanKind.HEAT, PlanKind.COOL}
-_COOLINGS = 3  # cooled, opened again, picked up again
+_COOLING_STAGES = 3  # cooled, opened again, picked up again
 _NOTHING = Treatments()
 
 
 class RewardRules(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A set of rules, as `rewards.yaml` has it.
+    """A set of rules, as in `rewards.yaml`.
 
     Attributes:
-        task_done: once, when the goal of the plan's task comes to hold.
-        per_step: of GotoLocation, per step of the shortest way gained.
-        nearer_than: of GotoLocation, the steps left below which it is done.
-        look_degrees: by which one LookUp or LookDown turns.
-        rewards: per success, by kind.
-        valid_actions: those that a kind has a use for, in AI2-THOR's names.
-        steps_count_once: whether what was gained, lost and gained again on the way is paid once. The published rule
-            pays it each time, so that walking to and fro earns.
+        task_done: reward, once, when the goal of the plan's task is reached.
+        per_step: reward of GotoLocation per step of the shortest path gained.
+        nearer_than: number of remaining steps below which GotoLocation is done.
+        look_degrees: angle of one LookUp or LookDown.
+        rewards: reward per success, by kind.
+        valid_actions: actions that are valid for a kind, by AI2-THOR's names.
+        steps_count_once: whether a step that was gained, lost and gained again is rewarded once. The published rule
+            rewards it each time, so that walking to and fro earns without end.
         treatments_unnoticed: published fault: nothing ever counts as washed, heated or cooled.
         puts_fail: published fault: every PutObject counts as refused.
     """
@@ -61,19 +62,19 @@ class RewardRules(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     puts_fail: bool
 
     def document(self) -> dict[str, Any]:
-        """All of it as JSON values, for fingerprints."""
+        """Return the rules as JSON values, for run configs."""
         document: dict[str, Any] = msgspec.json.decode(msgspec.json.encode(self, order="sorted"))
         return document
 
 
 @dataclass(frozen=True)
 class StepReward:
-    """What one action gave.
+    """The reward of one action.
 
     Attributes:
-        reward: for the plan and for the task.
-        done: whether the plan ended with it, carried out.
-        failed: whether the plan ended with it, not carried out.
+        reward: reward for the plan and for the task.
+        done: whether the plan was completed with it.
+        failed: whether the plan failed with it.
     """
 
     reward: float = 0.0
@@ -82,22 +83,22 @@ class StepReward:
 
 
 def reward_rules(name: str) -> RewardRules:
-    """The rules of a name: "default", or "published-compat", which has the published faults.
+    """Return the rules of a name: "default", or "published-compat", which has the published faults.
 
     Raises:
-        UsageError: there are none of this name.
+        UsageError: there are no rules of this name.
     """
-    known = read_yaml(_FILE, "install the package anew")
-    if name not in known:
-        raise unknown_name("reward rules", name, known)
-    return msgspec.convert(known[name], RewardRules)
+    by_name = read_yaml(_FILE, "install the package again")
+    if name not in by_name:
+        raise unknown_name("reward rules", name, by_name)
+    return msgspec.convert(by_name[name], RewardRules)
 
 
 class PlanReward:
     """The rewards of one plan, from its start on.
 
     Attributes:
-        treatments: what was washed, heated and cooled up to now; nothing where the rules take no notice of it.
+        treatments: what was washed, heated and cooled in the task so far; nothing if the rules do not notice it.
     """
 
     def __init__(
@@ -112,35 +113,36 @@ class PlanReward:
         """Begin a plan.
 
         Args:
-            rules: what is paid.
-            target: what the plan asks for.
-            task: the task that the plan is part of.
+            rules: reward rules.
+            target: target of the plan.
+            task: task that the plan is part of.
             start: the world at the plan's start.
             treatments: what was washed, heated and cooled in this task before.
-            grid: the cells that can be reached; GotoLocation needs it.
+            grid: reachable cells; GotoLocation needs it.
 
         Raises:
-            UnfitPlanError: the plan lacks what its kind needs, or the scene does.
+            InfeasibleError: the plan lacks what its kind needs, or the scene lacks its objects.
             ValueError: GotoLocation without a grid.
         """
-        _check(target, start)
+        _require_feasible(target, start)
         self._rules, self._target, self._task, self._start = rules, target, task, start
         self.treatments = Treatments() if rules.treatments_unnoticed else treatments
-        self._in_plan = Treatments()  # a thing washed before is to be washed again where a plan says so
+        # The plan's own treatments are apart: an object that was washed before is to be washed again by this plan.
+        self._in_plan = Treatments()
         self._subject = subject_of(target, start)
-        self._way = _way(rules, target, grid)
-        self._closest = math.inf if self._way is None else self._way.left(start.agent)
+        self._paths = _paths_to_goal(rules, target, grid)
+        self._closest = math.inf if self._paths is None else self._paths.remaining(start.agent)
         self._stages: set[str] = set()
         self._task_open = not goal_holds(task, start, self.treatments)
-        self._goal_reached = self._over = False
+        self._goal_reached = self._is_over = False
 
     @property
     def goal_reached(self) -> bool:
-        """Whether the task's goal came to hold in this plan."""
+        """Whether the task's goal has been reached in this plan."""
         return self._goal_reached
 
     def after(self, call: Mapping[str, Any], before: SimulatorView, after: SimulatorView) -> StepReward:
-        """What an action gave.
+        """Return the reward of an action.
 
         Args:
             call: the action, as `Simulator.step(**call)` takes it.
@@ -150,77 +152,78 @@ class PlanReward:
         Raises:
             ValueError: the plan is over.
         """
-        if self._over:
+        if self._is_over:
             raise ValueError("the plan is over; begin the next one")
         action, object_id = call["action"], call.get("objectId")
         rules, kind = self._rules, self._target.kind
-        self._follow(action, object_id, after)
+        # Before validity is looked at: an action that is not valid can treat an object nevertheless.
+        if not rules.treatments_unnoticed:
+            self.treatments = self.treatments.after(action, object_id, after)
+            self._in_plan = self._in_plan.after(action, object_id, after)
         if not after.success or (rules.puts_fail and action == "PutObject"):
             step = StepReward(failed=True)
         elif action not in rules.valid_actions[kind]:
             step = StepReward()
         else:
-            step = _KINDS[kind](self, action, object_id, before, after)
+            step = _BY_KIND[kind](self, action, object_id, before, after)
             step = step if step.failed else self._with_task(step, after)
-        self._over = step.done or step.failed
+        self._is_over = step.done or step.failed
         return step
 
-    def _follow(self, action: str, object_id: str | None, after: SimulatorView) -> None:
-        if not self._rules.treatments_unnoticed:
-            self.treatments = self.treatments.after(action, object_id, after)
-            self._in_plan = self._in_plan.after(action, object_id, after)
-
     def _with_task(self, step: StepReward, after: SimulatorView) -> StepReward:
-        """The same, and the task's reward where its goal holds for the first time."""
+        """Add the task's reward if its goal holds for the first time."""
         if not self._task_open or not goal_holds(self._task, after, self.treatments):
             return step
         self._task_open, self._goal_reached = False, True
         return StepReward(step.reward + self._rules.task_done, step.done, step.failed)
 
-    # -- the kinds
+    # -- the kinds; what each rewards follows the published functions, the rules' departures are in `rewards.yaml`
 
     def _goto(self, action: str, object_id: str | None, before: SimulatorView, after: SimulatorView) -> StepReward:
-        assert self._way is not None  # as of every GotoLocation
-        left = self._way.left(after.agent)
-        reference = self._closest if self._rules.steps_count_once else self._way.left(before.agent)
+        assert self._paths is not None  # as checked when the plan began
+        left = self._paths.remaining(after.agent)
+        reference = self._closest if self._rules.steps_count_once else self._paths.remaining(before.agent)
         self._closest = min(self._closest, left)
+        # From where there is no path nothing is gained: infinity less a finite distance would be.
         gained = max(0.0, reference - left) if math.isfinite(reference) else 0.0
         arrived = left < self._rules.nearer_than
-        return StepReward(gained * self._rules.per_step + arrived * self._worth, done=arrived)
+        return StepReward(gained * self._rules.per_step + arrived * self._per_success, done=arrived)
 
     def _pickup(self, action: str, object_id: str | None, before: SimulatorView, after: SimulatorView) -> StepReward:
         if action != "PickupObject":
             return StepReward()
-        return self._success() if in_hand(self._wanted, after) else StepReward(failed=True)
+        return self._success() if in_hand(self._object_id, after) else StepReward(failed=True)
 
     def _put(self, action: str, object_id: str | None, before: SimulatorView, after: SimulatorView) -> StepReward:
         receptacle = self._target.receptacle_id or ""
-        there = is_in(self._wanted, receptacle, after)
-        if action == "PutObject" and not there:
+        is_there = is_in(self._object_id, receptacle, after)
+        if action == "PutObject" and not is_there:
             return StepReward(failed=True)
-        around = _is_closed(self._start.objects[receptacle])
+        # A receptacle that was closed is to be opened and closed around the put, each with a reward of its own.
+        was_closed = _is_closed(self._start.objects[receptacle])
         if action == "PutObject":
-            return self._stage("put", last=not around)
-        if not around or object_id != receptacle:
+            return self._complete_stage("put", last=not was_closed)
+        if not was_closed or object_id != receptacle:
             return StepReward()
         if action == "OpenObject":
-            return self._stage("open")
-        return self._stage("close", last=True) if there and "put" in self._stages else StepReward()
+            return self._complete_stage("open")
+        return self._complete_stage("close", last=True) if is_there and "put" in self._stages else StepReward()
 
     def _open(self, action: str, object_id: str | None, before: SimulatorView, after: SimulatorView) -> StepReward:
-        return self._success() if object_id == self._wanted and after.objects[object_id].is_open else StepReward()
+        return self._success() if object_id == self._object_id and after.objects[object_id].is_open else StepReward()
 
     def _close(self, action: str, object_id: str | None, before: SimulatorView, after: SimulatorView) -> StepReward:
-        return self._success() if object_id == self._wanted and not after.objects[object_id].is_open else StepReward()
+        is_closed = object_id == self._object_id and not after.objects[object_id].is_open
+        return self._success() if is_closed else StepReward()
 
     def _toggle(self, action: str, object_id: str | None, before: SimulatorView, after: SimulatorView) -> StepReward:
-        if object_id != self._wanted:
+        if object_id != self._object_id:
             return StepReward()
         changed = after.objects[object_id].is_toggled != self._start.objects[object_id].is_toggled
         return self._success() if changed else StepReward()
 
     def _slice(self, action: str, object_id: str | None, before: SimulatorView, after: SimulatorView) -> StepReward:
-        return self._success() if action == "SliceObject" and object_id == self._wanted else StepReward()
+        return self._success() if action == "SliceObject" and object_id == self._object_id else StepReward()
 
     def _clean(self, action: str, object_id: str | None, before: SimulatorView, after: SimulatorView) -> StepReward:
         return self._success() if self._subject in self._in_plan.clean else StepReward()
@@ -229,36 +232,37 @@ class PlanReward:
         return self._success() if self._subject in self._in_plan.hot else StepReward()
 
     def _cool(self, action: str, object_id: str | None, before: SimulatorView, after: SimulatorView) -> StepReward:
+        """Reward three stages in their order: an object in the closed fridge is cold, but still to be taken out."""
         subject = self._subject or ""
         if subject not in self._in_plan.cold:
             return StepReward()
         if "cooled" not in self._stages:
-            return self._stage("cooled")
+            return self._complete_stage("cooled")
         fridge = before.objects.get(object_id or "")
         if action == "OpenObject" and fridge is not None and fridge.object_type == "Fridge":
             holds = subject in contents_of(fridge.object_id, before.objects)
-            return self._stage("reopened") if holds else StepReward()
+            return self._complete_stage("reopened") if holds else StepReward()
         picked = action == "PickupObject" and subject in after.inventory and "reopened" in self._stages
-        return self._stage("picked up", last=True) if picked else StepReward()
+        return self._complete_stage("picked up", last=True) if picked else StepReward()
 
     # -- their parts
 
     @property
-    def _worth(self) -> float:
+    def _per_success(self) -> float:
         return self._rules.rewards[self._target.kind]
 
     @property
-    def _wanted(self) -> str:
+    def _object_id(self) -> str:
         return self._target.object_id or ""
 
     def _success(self) -> StepReward:
-        return StepReward(self._worth, done=True)
+        return StepReward(self._per_success, done=True)
 
-    def _stage(self, name: str, last: bool = False) -> StepReward:
-        """One of several successes, each paid once."""
-        new = name not in self._stages
+    def _complete_stage(self, name: str, last: bool = False) -> StepReward:
+        """Return the reward of one of several stages; it is paid once."""
+        is_new = name not in self._stages
         self._stages.add(name)
-        return StepReward(self._worth * new, done=last)
+        return StepReward(self._per_success * is_new, done=last)
 
 
 def max_reward(
@@ -268,104 +272,111 @@ def max_reward(
     grid: Grid | None = None,
     completes: Task | None = None,
 ) -> float:
-    """The most that a plan can give from its start.
+    """Return the highest possible reward of a plan from its start.
 
-    Where steps do not count once, there is no most: walking to and fro earns without end. Then too it is that of the
-    shortest way.
+    Under rules where steps do not count once, GotoLocation's reward is unbounded, as walking to and fro earns without
+    end. Then too the reward of the shortest path is returned.
 
     Args:
-        rules: what is paid.
-        target: what the plan asks for.
+        rules: reward rules.
+        target: target of the plan.
         start: the world at the plan's start.
-        grid: the cells that can be reached; GotoLocation needs it.
-        completes: the task, where the plan can make its goal hold; None where it cannot, or the goal holds already.
+        grid: reachable cells; GotoLocation needs it.
+        completes: the task if its goal can be reached in the plan; None if it cannot, or holds already.
     """
-    kind, worth = target.kind, rules.rewards[target.kind]
+    kind, per_success = target.kind, rules.rewards[target.kind]
     puts, treats = kind == PlanKind.PUT, kind in _TREATMENTS
-    most = worth
+    most = per_success
     if kind == PlanKind.GOTO:
-        most = _most_on_the_way(rules, target, start, grid)
+        most = _max_path_reward(rules, target, start, grid)
     elif treats:
-        times = _COOLINGS if kind == PlanKind.COOL else 1
-        most = 0.0 if rules.treatments_unnoticed or rules.puts_fail else worth * times
+        stages = _COOLING_STAGES if kind == PlanKind.COOL else 1
+        # An object is put into the appliance, which ends the plan if every put fails.
+        most = 0.0 if rules.treatments_unnoticed or rules.puts_fail else per_success * stages
     elif puts:
+        # Opening counts before the put fails; the put itself and closing do not any more.
         closed = _is_closed(start.objects[target.receptacle_id or ""])
-        most = worth * (closed + (0 if rules.puts_fail else 1 + closed))
+        most = per_success * (closed + (0 if rules.puts_fail else 1 + closed))
     if completes is None or (rules.puts_fail and puts):
         return most
     unnoticed = rules.treatments_unnoticed and completes.task_type in APPLIANCE
     return most if unnoticed else most + rules.task_done
 
 
-def n_on_the_way(rules: RewardRules, target: PlanTarget, poses: Sequence[AgentPose], grid: Grid | None = None) -> int:
-    """How many of some actions GotoLocation takes: it is done some steps before the end of a way. Other plans take all.
+def count_actions_to_goal(
+    rules: RewardRules, target: PlanTarget, poses: Sequence[AgentPose], grid: Grid | None = None
+) -> int:
+    """Return how many of some actions a plan takes: GotoLocation is done some steps before the end of a path.
 
     Args:
-        rules: what is paid.
-        target: what the plan asks for.
-        poses: after each of the actions.
-        grid: the cells that can be reached; GotoLocation needs it.
+        rules: reward rules.
+        target: target of the plan; plans of other kinds than GotoLocation take all actions.
+        poses: poses after each of the actions.
+        grid: reachable cells; GotoLocation needs it.
     """
-    way = _way(rules, target, grid)
-    lefts = [math.inf if way is None else way.left(pose) for pose in poses]
-    return next((number for number, left in enumerate(lefts, 1) if left < rules.nearer_than), len(poses))
+    paths = _paths_to_goal(rules, target, grid)
+    left = [math.inf if paths is None else paths.remaining(pose) for pose in poses]
+    return next((number for number, steps in enumerate(left, 1) if steps < rules.nearer_than), len(poses))
 
 
-def _most_on_the_way(rules: RewardRules, target: PlanTarget, start: SimulatorView, grid: Grid | None) -> float:
-    """Every step of the shortest way up to where it is done, and arriving; at least one step has to be made."""
-    way = _way(rules, target, grid)
-    left = math.inf if way is None else way.left(start.agent)
+def _max_path_reward(rules: RewardRules, target: PlanTarget, start: SimulatorView, grid: Grid | None) -> float:
+    """Return the reward of the shortest path up to where the plan is done, and of arriving.
+
+    At least one step has to be taken, even from where the plan is done already: rewards are given with actions.
+    """
+    paths = _paths_to_goal(rules, target, grid)
+    left = math.inf if paths is None else paths.remaining(start.agent)
     if math.isinf(left):
         return 0.0
     gained = max(left - (rules.nearer_than - 1), min(left, 1))
     return gained * rules.per_step + rules.rewards[PlanKind.GOTO]
 
 
-class _Way:
-    """The shortest ways to a pose."""
+class _PathsToGoal:
+    """The shortest paths to a pose."""
 
     def __init__(self, goal: GridPose, horizon: float, grid: Grid, look_degrees: float) -> None:
-        self._grid, self._horizon, self._look = grid, horizon, look_degrees
+        self._grid, self._horizon, self._look_degrees = grid, horizon, look_degrees
         self._distances = grid.distances_to(goal)
 
-    def left(self, pose: AgentPose) -> float:
-        """Number of actions left; a look begun counts whole. Infinite where there is no way."""
+    def remaining(self, pose: AgentPose) -> float:
+        """Return the number of remaining actions; a partial look counts as one. Infinite if there is no path."""
         steps = self._distances.get(grid_pose_of(pose, self._grid), math.inf)
-        looks = abs(self._horizon - pose.horizon) / self._look
-        return steps + math.ceil(looks - _SMALL_ANGLE)
+        looks = abs(self._horizon - pose.horizon) / self._look_degrees
+        return steps + math.ceil(looks - _SMALL_LOOK)
 
 
-def _way(rules: RewardRules, target: PlanTarget, grid: Grid | None) -> _Way | None:
-    """The ways to where a plan leads; None where it leads nowhere."""
+def _paths_to_goal(rules: RewardRules, target: PlanTarget, grid: Grid | None) -> _PathsToGoal | None:
+    """Return the paths to a plan's pose; None if it has none."""
     if target.goal_stand is None:
         return None
     if grid is None:
         raise ValueError("a GotoLocation plan needs the grid")
-    return _Way(target.goal_stand, target.goal_horizon, grid, rules.look_degrees)
+    return _PathsToGoal(target.goal_stand, target.goal_horizon, grid, rules.look_degrees)
 
 
 def _is_closed(item: ThorObject) -> bool:
     return item.openable and not item.is_open
 
 
-def _check(target: PlanTarget, start: SimulatorView) -> None:
-    """Refuse a plan that nobody can carry out for want of what it is about."""
+def _require_feasible(target: PlanTarget, start: SimulatorView) -> None:
+    """Refuse a plan whose pose or objects are missing."""
     kind = target.kind
     if kind == PlanKind.GOTO:
         if target.goal_stand is None:
-            raise UnfitPlanError(f"this {kind} plan has no pose to reach; leave it out")
+            raise InfeasibleError(f"this {kind} plan has no pose to reach; leave it out")
         return
     subject = subject_of(target, start)
     if subject not in start.objects:
-        named = "has no object" if subject is None else f"is about {subject}, which the scene has not"
-        raise UnfitPlanError(f"this {kind} plan {named}; leave it out")
+        problem = "has no object" if subject is None else f"is about {subject}, which the scene does not have"
+        raise InfeasibleError(f"this {kind} plan {problem}; leave it out")
     if kind == PlanKind.PUT and target.receptacle_id not in start.objects:
-        raise UnfitPlanError(
-            f"the {kind} plan's receptacle is {target.receptacle_id}, which the scene has not; leave it out"
+        raise InfeasibleError(
+            f"the {kind} plan's receptacle is {target.receptacle_id}, which the scene does not have; leave it out"
         )
 
 
-_KINDS: dict[PlanKind, Callable[[PlanReward, str, str | None, SimulatorView, SimulatorView], StepReward]] = {
+_BY_KIND: dict[PlanKind, Callable[[PlanReward, str, str | None, SimulatorView, SimulatorView], StepReward]] = {
     PlanKind.GOTO: PlanReward._goto,
     PlanKind.PICKUP: PlanReward._pickup,
     PlanKind.PUT: PlanReward._put,

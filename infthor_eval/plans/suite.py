@@ -1,4 +1,4 @@
-"""Plans as a suite: an agent carries out a long trajectory plan by plan."""
+"""Plans as a suite: an agent follows a long trajectory plan by plan."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import ClassVar
@@ -7,8 +7,8 @@ from infthor_eval.plans.baselines import BASELINES
 from infthor_eval.plans.evaluation import PlansEvaluation
 from infthor_eval.plans.options import PlansOptions
 from infthor_eval.plans.records import RECORDS, PlanRecord
-from infthor_eval.plans.summary import PlansSummary, summarise
-from infthor_eval.plans.tables import overview, tables
+from infthor_eval.plans.summary import PlansSummary, summarise_plans
+from infthor_eval.plans.tables import overview_table, result_tables
 from infthor_eval.rates import Rate
 from infthor_eval.runs import RecordTypes, RunHeader, RunSummary, TaskRequest, UnitRecord
 from infthor_eval.runs.suite import Need
@@ -19,7 +19,7 @@ __all__ = ["PlansSuite"]
 
 
 class PlansSuite:
-    """The suite."""
+    """The suite; see `infthor_eval.runs.Suite`."""
 
     name: ClassVar[str] = "plans"
     needs: ClassVar[Need] = "conversation"
@@ -27,27 +27,27 @@ class PlansSuite:
     baselines: ClassVar[Mapping[str, Callable[[int], Subject]]] = BASELINES
     records: ClassVar[RecordTypes[PlanRecord]] = RECORDS
 
-    def prepare(self, request: TaskRequest[PlansOptions]) -> "PlansEvaluation":
+    def prepare(self, request: TaskRequest[PlansOptions]) -> PlansEvaluation:
         """See `Suite.prepare`."""
         return PlansEvaluation(request)
 
     def summarise(self, header: RunHeader, records: Sequence[UnitRecord[PlanRecord]]) -> PlansSummary:
         """See `Suite.summarise`."""
-        return summarise(header.config, records)
+        return summarise_plans(header.config, records)
 
     def scores(self, record: UnitRecord[PlanRecord]) -> Mapping[str, float]:
-        """See `Suite.scores`: whether the plan was carried out, and what it earned."""
+        """See `Suite.scores`: whether the plan was completed, and its reward."""
         payload = record.payload
-        return {"success": float(payload.done), "reward": payload.reward} if payload.steps else {}
+        return {"success": float(payload.done), "reward": payload.reward} if payload.attempted else {}
 
     def primary_metrics(self, summary: PlansSummary) -> Mapping[str, Rate]:
-        """See `Suite.primary_metrics`: plans carried out."""
+        """See `Suite.primary_metrics`: share of completed plans."""
         return {name: task.success["total"] for name, task in summary.tasks.items() if "total" in task.success}
 
     def overview(self, runs: Sequence[RunSummary]) -> list[Table]:
         """See `Suite.overview`."""
-        return overview(runs)
+        return [overview_table(runs)]
 
     def tables(self, runs: Sequence[RunSummary]) -> list[Table]:
         """See `Suite.tables`."""
-        return tables(runs)
+        return result_tables(runs)

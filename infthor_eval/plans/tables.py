@@ -1,100 +1,63 @@
-"""Results on plans as tables: success beside the published rows, rewards, and how plans ended."""
+"""Results of plans as tables: success beside the published rows, rewards, and how plans ended."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
+from infthor_eval.episodes.tables import NAME_COLUMNS, endings_table, named_tasks, result_notes
 from infthor_eval.formats.published import published_tables
-from infthor_eval.plans.summary import FINAL_COLUMNS, PlansSummary, TaskSummary
+from infthor_eval.plans.summary import FINAL_COLUMNS, PlansSummary, PlanTaskSummary
 from infthor_eval.rates import format_number, format_percent
 from infthor_eval.runs import RunSummary
-from infthor_eval.tables import Column, Row, Table, left_out_notes
+from infthor_eval.tables import Column, Row, Table
 
-__all__ = ["overview", "tables"]
-
-_NAMES = (Column("model", False), Column("task", False))
-_EMBEDDED = (
-    "Made in the embedded simulator: not comparable with the published rows, which are of AI2-THOR's own trajectories."
-)
+__all__ = ["overview_table", "result_tables"]
 
 
-def overview(runs: Sequence[RunSummary]) -> list[Table]:
-    """Plans carried out and reward in one number a task."""
+def overview_table(runs: Sequence[RunSummary]) -> Table:
+    """Return completed plans and reward, one number a task."""
     rows = [
-        Row(
-            (
-                name,
-                task_name,
-                format_percent(task.success.get("total")),
-                format_percent(task.reward_share),
-                *_sizes(task)[:2],
-            )
-        )
-        for name, task_name, task in _tasks(runs)
+        Row((*names, format_percent(task.success.get("total")), format_percent(task.reward_share), *_sizes(task)[:2]))
+        for *names, task in named_tasks(runs, PlansSummary)
     ]
-    columns = (*_NAMES, *map(Column, ("carried out, %", "reward, % of the most", "plans", "trajectories")))
-    return [Table("Plans, 95 % interval in brackets", columns, tuple(rows), tuple(_notes(runs)))]
+    columns = (*NAME_COLUMNS, *map(Column, ("completed, %", "reward, % of the most", "plans", "trajectories")))
+    return Table("Plans, 95 % interval in brackets", columns, tuple(rows), result_notes(runs))
 
 
-def tables(runs: Sequence[RunSummary]) -> list[Table]:
-    """The tables of some runs."""
-    return [_success_table(runs), _reward_table(runs), _endings_table(runs)]
+def result_tables(runs: Sequence[RunSummary]) -> list[Table]:
+    """Return all tables of some runs."""
+    tasks = list(named_tasks(runs, PlansSummary))
+    endings = endings_table("How plans ended", tasks, "actions", lambda task: task.n_actions)
+    return [_success_table(runs, tasks), _reward_table(tasks), endings]
 
 
-def _tasks(runs: Sequence[RunSummary]) -> Iterator[tuple[str, str, TaskSummary]]:
-    """Run's name, task's name and the task, of all runs."""
-    for run in runs:
-        assert isinstance(run.summary, PlansSummary)
-        frames = run.header.config["frames"]
-        name = run.header.name if frames == "shown" else f"{run.header.name}, {frames} frames"
-        for task_name, task in run.summary.tasks.items():
-            yield name, task_name, task
-
-
-def _success_table(runs: Sequence[RunSummary]) -> Table:
-    """Plans carried out, by the columns of the published table of final tasks."""
+def _success_table(runs: Sequence[RunSummary], tasks: Sequence[tuple[str, str, PlanTaskSummary]]) -> Table:
+    """Return completed plans, by the columns of the published table of final tasks."""
     rows = [
-        Row((name, task_name, *(format_percent(task.success.get(column)) for column in FINAL_COLUMNS), *_sizes(task)))
-        for name, task_name, task in _tasks(runs)
+        Row((*names, *(format_percent(task.success.get(column)) for column in FINAL_COLUMNS), *_sizes(task)))
+        for *names, task in tasks
     ]
-    notes = _notes(runs)
-    if any(_is_final(run) for run in runs):
+    if any(_has_final_task(run) for run in runs):
         for table in published_tables("plans"):
             for row in table.rows:
                 values = (f"{value:.1f}" for value in row.values)
                 rows.append(Row((row.name, f"published, {table.title}", *values), is_published=True))
-    columns = (*_NAMES, *map(Column, (*FINAL_COLUMNS, "plans", "trajectories", "excluded", "skipped", "failed")))
-    return Table("Plans carried out, %", columns, tuple(rows), tuple(notes))
+    columns = (*NAME_COLUMNS, *map(Column, (*FINAL_COLUMNS, "plans", "trajectories", "excluded", "skipped", "failed")))
+    return Table("Plans completed, %", columns, tuple(rows), result_notes(runs))
 
 
-def _reward_table(runs: Sequence[RunSummary]) -> Table:
+def _reward_table(tasks: Sequence[tuple[str, str, PlanTaskSummary]]) -> Table:
     rows = []
-    for name, task_name, task in _tasks(runs):
+    for *names, task in tasks:
         of_trajectory = format_number(task.reward), format_number(task.max_reward), format_percent(task.reward_share)
-        rows.append(Row((name, task_name, *of_trajectory, format_percent(task.goals))))
-    columns = (*_NAMES, *map(Column, ("reward", "at most", "% of it", "goals reached, %")))
+        rows.append(Row((*names, *of_trajectory, format_percent(task.goals))))
+    columns = (*NAME_COLUMNS, *map(Column, ("reward", "at most", "% of it", "goals reached, %")))
     return Table("Reward of a trajectory, 95 % interval in brackets", columns, tuple(rows))
 
 
-def _endings_table(runs: Sequence[RunSummary]) -> Table:
-    """How plans ended: faults of replies among it."""
-    found = list(_tasks(runs))
-    endings = list(dict.fromkeys(ending for _, _, task in found for ending in task.endings))
-    rows = [
-        Row((name, task_name, *(str(task.endings.get(ending, 0)) for ending in endings), str(task.n_actions)))
-        for name, task_name, task in found
-    ]
-    return Table("How plans ended", (*_NAMES, *map(Column, (*endings, "actions"))), tuple(rows))
-
-
-def _sizes(task: TaskSummary) -> tuple[str, ...]:
+def _sizes(task: PlanTaskSummary) -> tuple[str, ...]:
     counts = (task.n_plans, task.n_trajectories, sum(task.excluded.values()), sum(task.skipped.values()), task.n_failed)
     return tuple(map(str, counts))
 
 
-def _notes(runs: Sequence[RunSummary]) -> list[str]:
-    notes = [_EMBEDDED] if any(run.summary.simulator == "embedded" for run in runs) else []
-    return notes + left_out_notes([[(t.excluded, t.skipped) for t in run.summary.tasks.values()] for run in runs])
-
-
-def _is_final(run: RunSummary) -> bool:
+def _has_final_task(run: RunSummary) -> bool:
     tasks = run.header.config["tasks"].values()
     return any(task["config"]["dataset_kwargs"].get("plans") == "final" for task in tasks)

@@ -1,9 +1,10 @@
-"""What a plan is about, in the simulator at hand."""
+"""The objects and poses of a plan in this simulator."""
 
 from dataclasses import dataclass
 
+from infthor_eval.episodes.errors import InfeasibleError
 from infthor_eval.household.navigation import GridPose
-from infthor_eval.plans.plan import Plan, PlanKind, UnfitPlanError
+from infthor_eval.plans.plan import Plan, PlanKind
 from infthor_eval.thor.grounding import Grounding
 from infthor_eval.thor.view import SimulatorView
 
@@ -17,11 +18,11 @@ class PlanTarget:
     """What a plan asks for.
 
     Attributes:
-        kind: what is to be done.
-        object_id: with what, as this simulator names it.
-        receptacle_id: where to, likewise; PutObject alone needs it.
-        goal_stand: for GotoLocation, where to stand, in the cells of the plan's grid.
-        goal_horizon: for GotoLocation, the camera's angle there, degrees downwards.
+        kind: kind of the plan.
+        object_id: id of its object in this simulator.
+        receptacle_id: id of its receptacle; PutObject alone needs it.
+        goal_stand: cell and direction to reach by GotoLocation, in the plan's grid.
+        goal_horizon: angle of the camera there, degrees downwards.
     """
 
     kind: PlanKind
@@ -32,30 +33,30 @@ class PlanTarget:
 
 
 def target_of(plan: Plan, grounding: Grounding, view: SimulatorView) -> PlanTarget:
-    """What a recorded plan asks for here; where GotoLocation leads the environment alone can tell.
+    """Return the target of a recorded plan; GotoLocation's needs a grid, see `PlanEnvironment`.
 
     Args:
         plan: the plan.
-        grounding: the episode's ids.
+        grounding: ids of the trajectory's objects.
         view: the world at the plan's start.
 
     Raises:
-        UnfitPlanError: the scene has no object for an id.
+        InfeasibleError: the scene has no object for an id.
     """
     return PlanTarget(plan.kind, _here(plan.object_id, grounding, view), _here(plan.receptacle_id, grounding, view))
 
 
 def subject_of(target: PlanTarget, start: SimulatorView) -> str | None:
-    """The object that a plan is about.
+    """Return the id of the object that a plan changes.
 
-    ALFRED's plans of washing, heating and cooling name the appliance: there it is what is in the hand at the start.
+    ALFRED's plans of washing, heating and cooling name the appliance; their object is the one held at the start.
 
     Args:
-        target: the plan's.
+        target: target of the plan.
         start: the world at its start.
 
     Returns:
-        None where nothing is named, and nothing held.
+        The id; None if no object is named and none is held.
     """
     if target.kind in _TREATMENTS:
         named = start.objects.get(target.object_id or "")
@@ -65,7 +66,7 @@ def subject_of(target: PlanTarget, start: SimulatorView) -> str | None:
 
 
 def in_hand(wanted: str, view: SimulatorView) -> bool:
-    """Whether an object is held, or another slice of the same thing: words do not tell slices apart."""
+    """Return whether an object is held, or another slice of it: an agent's words cannot tell slices apart."""
     return any(held == wanted or _are_slices_of_one(held, wanted) for held in view.inventory)
 
 
@@ -77,7 +78,7 @@ def _are_slices_of_one(one: str, other: str) -> bool:
 def _here(recorded: str | None, grounding: Grounding, view: SimulatorView) -> str | None:
     if recorded is None:
         return None
-    found = grounding.ground(recorded, view)
-    if found is None:
-        raise UnfitPlanError(f"the scene has no object for {recorded!r:.80}")
-    return found
+    object_id = grounding.ground(recorded, view)
+    if object_id is None:
+        raise InfeasibleError(f"the scene has no object for {recorded!r:.80}")
+    return object_id

@@ -1,37 +1,40 @@
-"""A task of plans: what its file says, and whom it leads through which trajectories."""
+"""A task of plans: the settings of its file, and its trajectories."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from infthor_eval.episodes.task_settings import task_settings
+from infthor_eval.episodes.tasks import EpisodeTask
+from infthor_eval.errors import UsageError
 from infthor_eval.plans.environment import MAX_STEPS
-from infthor_eval.plans.memory import Memory, memory_named
-from infthor_eval.plans.model_actor import Manner
+from infthor_eval.plans.memory import memory_named
+from infthor_eval.plans.model_actor import AgentConfig
 from infthor_eval.plans.options import PlansOptions
 from infthor_eval.plans.plan import Plan
-from infthor_eval.plans.rewards import RewardRules, reward_rules
-from infthor_eval.plans.trajectories import Course, Courses, find_courses
+from infthor_eval.plans.rewards import reward_rules
+from infthor_eval.plans.trajectories import PlanTrajectory, read_plan_trajectory
 from infthor_eval.runs import TaskFile, TaskRequest
 from infthor_eval.runs.generation_kwargs import decoding_of
 from infthor_eval.runs.limiting import limited
-from model_adapters import Decoding
 
-__all__ = ["PlansTask", "TaskSettings"]
+__all__ = ["PlanTaskSettings", "PlansTask"]
+
+_CHOICES = {"plans": ("all", "final"), "after_failure": ("continue", "stop")}
 
 
 @dataclass(frozen=True, kw_only=True)
-class TaskSettings:
-    """What `dataset_kwargs` of a task can say.
+class PlanTaskSettings:
+    """`dataset_kwargs` of a task file.
 
     Attributes:
-        plans: "all" of them, or those of the "final" long-horizon task.
-        bundled: name of a set of trajectories that comes with the package.
-        rewards: name of the rules.
-        history: what a model is given of the past.
-        after_failure: whether an episode is to "continue" from the true state after a failed plan, or to "stop".
-        max_steps: of one plan.
-        preamble: what a model is told before everything else.
+        plans: "all" plans, or those of the "final" long-horizon task.
+        bundled: name of a set of trajectories in the package.
+        rewards: name of the reward rules.
+        history: how much of the history a model is given.
+        after_failure: whether to "continue" from the true state after a failed plan, or to "stop".
+        max_steps: maximum number of steps of one plan.
+        preamble: text before everything else that a model is given.
     """
 
     plans: str = "all"
@@ -43,45 +46,46 @@ class TaskSettings:
     preamble: str = ""
 
 
-_CHOICES = {"plans": ("all", "final"), "after_failure": ("continue", "stop")}
+class PlansTask(EpisodeTask[PlanTaskSettings, PlanTrajectory]):
+    """A task file that was read, with its trajectories.
 
-
-class PlansTask:
-    """A task file, read."""
+    Attributes:
+        rules: reward rules.
+        decoding: decoding of each action.
+        memory: the part of the history that a model is given.
+        used: trajectories that are evaluated.
+    """
 
     def __init__(self, file: TaskFile, request: TaskRequest[PlansOptions]) -> None:
         """Check the file and find its trajectories.
 
         Raises:
-            UsageError: a setting that does not fit, or there are no trajectories.
-            DataError: the file or all of its trajectories are not what they should be.
+            UsageError: a setting does not fit, or no trajectory has such plans.
+            DataError: the file is malformed, or none of its trajectories can be used.
         """
         file.require("dataset_kwargs", "generation_kwargs")
-        self.file = file
-        self.name = file.name
         self._options = request.options
-        told = {name: getattr(self._options, name) for name in ("rewards", "history", "after_failure")}
-        self.settings = task_settings(file, TaskSettings, told, _CHOICES)
-        self.rules: RewardRules = reward_rules(self.settings.rewards)
-        self.decoding: Decoding = self._decoding(request.seed)
-        self.memory: Memory = memory_named(self.settings.history, self._options.retriever)
-        data = str(request.data) if request.data is not None else None
-        self.courses: Courses = find_courses(data, self.settings.bundled)
-        self._limit, self._seed = request.limit, request.seed
+        given = {name: getattr(self._options, name) for name in ("rewards", "history", "after_failure")}
+        settings = task_settings(file, PlanTaskSettings, given, _CHOICES)
+        self.rules = reward_rules(settings.rewards)
+        kwargs = file.settings["generation_kwargs"]
+        if self._options.greedy and isinstance(kwargs, Mapping):
+            kwargs = {**kwargs, "do_sample": False, "temperature": 0.0}
+        self.decoding = decoding_of(kwargs, request.seed, file.name)
+        self.memory = memory_named(settings.history, self._options.retriever)
+        super().__init__(file, request, settings, read_plan_trajectory)
+        having_plans = [trajectory for trajectory in self.trajectories.trajectories if self.plans(trajectory)]
+        self.used = limited(having_plans, lambda trajectory: trajectory.traj_id, request.seed, request.limit)
+        if not self.used:
+            raise UsageError(f"{self.name}: no trajectory there has a final task; make some with --test-set")
 
-    @property
-    def limited(self) -> list[Course]:
-        """The trajectories that are gone through."""
-        having = [course for course in self.courses.found if self.plans(course)]
-        return limited(having, lambda course: course.traj_id, self._seed, self._limit)
+    def plans(self, trajectory: PlanTrajectory) -> list[Plan]:
+        """Return the plans of a trajectory that are evaluated."""
+        return [plan for plan in trajectory.plans if plan.is_final or self.settings.plans == "all"]
 
-    def plans(self, course: Course) -> list[Plan]:
-        """The plans of a trajectory that are evaluated."""
-        return [plan for plan in course.plans if plan.is_final or self.settings.plans == "all"]
-
-    def manner(self) -> Manner:
-        """How a model is led."""
-        return Manner(
+    def agent_config(self) -> AgentConfig:
+        """Return how a model is prompted."""
+        return AgentConfig(
             decoding=self.decoding,
             memory=self.memory,
             preamble=self.settings.preamble,
@@ -89,20 +93,12 @@ class PlansTask:
             blank=self._options.frames == "blank",
         )
 
-    def identity(self) -> dict[str, Any]:
-        """What its numbers depend on, as JSON values."""
-        return {
-            "config": dict(self.file.settings),
-            "history": self.settings.history,
-            "after_failure": self.settings.after_failure,
-            "rewards": self.rules.document(),
-            "decoding": self.decoding.document(),
-            "trajectories": {course.traj_id: course.digest for course in self.limited},
-            "broken": [list(item) for item in self.courses.broken],
-        }
-
-    def _decoding(self, seed: int) -> Decoding:
-        given: Mapping[str, Any] = self.file.settings["generation_kwargs"]
-        if self._options.greedy and isinstance(given, Mapping):
-            given = {**given, "do_sample": False, "temperature": 0.0}
-        return decoding_of(given, seed, self.name)
+    def config(self) -> dict[str, Any]:
+        """See `EpisodeTask`."""
+        return self._config(
+            self.used,
+            history=self.settings.history,
+            after_failure=self.settings.after_failure,
+            rewards=self.rules.document(),
+            decoding=self.decoding.document(),
+        )

@@ -130,7 +130,7 @@ class ReplayFrame(Protocol):
     """A state of a replayed episode: its start, or the result of a step."""
 
     @property
-    def sight(self) -> Any:
+    def observation(self) -> Any:
         """The world at that state, with an image `frame` (uint8 RGB array); None if nobody acted in the episode."""
         ...
 
@@ -199,7 +199,7 @@ class Replay(Protocol):
         """
         ...
 
-    def draw_map(self, sight: Any, size: int) -> Image.Image:
+    def draw_map(self, observation: Any, size: int) -> Image.Image:
         """Draw an observation from above, as a square of `size` pixels."""
         ...
 

@@ -5,18 +5,15 @@ from collections.abc import Mapping
 from typing import Any, TypeVar
 
 import infthor_eval
-from infthor_eval.formats.digests import fingerprint
 from infthor_eval.runs.records import RunHeader, Unit
 from infthor_eval.runs.request import PreparedRun
 from infthor_eval.runs.suite import Workload
 from model_adapters import Subject, adapter_identity
 
-__all__ = ["episode_fingerprint", "header_of", "run_config"]
+__all__ = ["header_of", "run_config"]
 
 P = TypeVar("P")
 U = TypeVar("U", bound=Unit[Any])
-
-_OF_ALL_TRAJECTORIES = ("trajectories", "broken")
 
 
 def header_of(run: PreparedRun[U, P], subject: Subject, workload: Workload[U]) -> RunHeader:
@@ -53,16 +50,3 @@ def run_config(
     }
     # Round trip, so that it equals the one that is read back from a journal: tuples become lists, keys strings.
     return dict(json.loads(json.dumps(config)))
-
-
-def episode_fingerprint(config: Mapping[str, Any], task: str, **inputs: Any) -> str:
-    """Hash everything that an episode in a simulator depends on.
-
-    Args:
-        config: config of the workload; what its tasks list of all trajectories is left out.
-        task: name of the episode's task.
-        inputs: inputs of the episode itself: its trajectory, its place there, the seed.
-    """
-    shared = {name: value for name, value in config.items() if name != "tasks"}
-    settings = {name: value for name, value in config["tasks"][task].items() if name not in _OF_ALL_TRAJECTORIES}
-    return fingerprint({"task": settings, **shared, **inputs})

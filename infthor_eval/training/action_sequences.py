@@ -10,16 +10,16 @@ from infthor_eval.errors import DataError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.step_log import Step
 from infthor_eval.formats.trajectory import Trajectory
-from infthor_eval.plans.history import Chapter, chapter_parts, opened
 from infthor_eval.plans.plan import plans_of, tasks_of
+from infthor_eval.plans.segments import PlanSegment, restart_at, segment_parts
 from infthor_eval.training.encoding import Encoder, SkippedItem, TrainingSequence
 from model_adapters.hf.prompt import n_tokens
 
-__all__ = ["recorded_chapters", "single_plans", "windows"]
+__all__ = ["recorded_segments", "single_plans", "windows"]
 
 
-def recorded_chapters(trajectory: Trajectory, steps: Sequence[Step], frames: Sequence[FrameRef]) -> list[Chapter]:
-    """A trajectory's true history from its replay, a chapter a plan.
+def recorded_segments(trajectory: Trajectory, steps: Sequence[Step], frames: Sequence[FrameRef]) -> list[PlanSegment]:
+    """A trajectory's true history from its replay, a segment per plan.
 
     Args:
         trajectory: has goals and plans.
@@ -39,27 +39,27 @@ def recorded_chapters(trajectory: Trajectory, steps: Sequence[Step], frames: Seq
             after[step.step] = (step.action, frame)
     if before is None:
         raise DataError(f"trajectory {trajectory.traj_id}: no frame before the first action; replay it again")
-    chapters: list[Chapter] = []
+    segments: list[PlanSegment] = []
     for plan in plans:
         missing = next((number for number in range(*plan.low) if number not in after), None)
         if missing is not None:
             raise DataError(f"trajectory {trajectory.traj_id}: no frame of action {missing}; replay it again")
-        begins = not chapters or plans[plan.index - 1].task != plan.task
+        begins = not segments or plans[plan.index - 1].task != plan.task
         goal = tasks[plan.task].text if begins else None
-        chapters.append(Chapter(plan.text, goal, before, tuple(after[number] for number in range(*plan.low))))
-        before = chapters[-1].steps[-1][1]
-    return chapters
+        segments.append(PlanSegment(plan.text, goal, before, tuple(after[number] for number in range(*plan.low))))
+        before = segments[-1].steps[-1][1]
+    return segments
 
 
 def windows(
-    encoder: Encoder, name: str, chapters: Sequence[Chapter], limit: int
+    encoder: Encoder, name: str, segments: Sequence[PlanSegment], limit: int
 ) -> Iterator[TrainingSequence | SkippedItem]:
     """A history as sequences, each with as many whole plans as fit; together they have every plan once.
 
     Args:
         encoder: makes the sequences.
         name: of the trajectory.
-        chapters: its history.
+        segments: its history.
         limit: tokens of a sequence, frames expanded.
 
     Yields:
@@ -70,45 +70,45 @@ def windows(
         ModelError: the template refuses the history.
     """
     first = 0
-    while first < len(chapters):
-        end = _end(encoder, chapters, first, limit)
+    while first < len(segments):
+        end = _end(encoder, segments, first, limit)
         if end == first:
             yield SkippedItem(f"{name}, plan {first + 1}", f"longer than {limit} tokens by itself")
             first += 1
             continue
         numbers = f"plan {end}" if end == first + 1 else f"plans {first + 1} to {end}"
-        yield encoder.actions(f"{name}, {numbers}", opened(chapters, first, end))
+        yield encoder.actions(f"{name}, {numbers}", restart_at(segments, first, end))
         first = end
 
 
-def single_plans(encoder: Encoder, name: str, chapters: Sequence[Chapter]) -> Iterator[TrainingSequence]:
+def single_plans(encoder: Encoder, name: str, segments: Sequence[PlanSegment]) -> Iterator[TrainingSequence]:
     """A history as sequences of one plan each, behind the goal that it serves and the frame that it begins with.
 
     Args:
         encoder: makes the sequences.
         name: of the trajectory.
-        chapters: its history.
+        segments: its history.
 
     Raises:
         DataError: a frame cannot be read, or a text of the history holds a mark.
         ModelError: the template refuses the history.
     """
-    for number, chapter in enumerate(chapters):
-        if chapter.steps:
-            yield encoder.actions(f"{name}, plan {number + 1}", opened(chapters, number, number + 1))
+    for number, segment in enumerate(segments):
+        if segment.steps:
+            yield encoder.actions(f"{name}, plan {number + 1}", restart_at(segments, number, number + 1))
 
 
-def _end(encoder: Encoder, chapters: Sequence[Chapter], first: int, limit: int) -> int:
-    """The chapter behind the last one that fits; found by doubling and bisection, as each count takes a rendering."""
+def _end(encoder: Encoder, segments: Sequence[PlanSegment], first: int, limit: int) -> int:
+    """The index after the last segment that fits; found by doubling and bisection, as each count takes a rendering."""
 
     def fits(end: int) -> bool:
-        return n_tokens(encoder.pieces(chapter_parts(opened(chapters, first, end)))) <= limit
+        return n_tokens(encoder.pieces(segment_parts(restart_at(segments, first, end)))) <= limit
 
     fitting, stride = first, 1
-    while fitting + stride <= len(chapters) and fits(fitting + stride):
+    while fitting + stride <= len(segments) and fits(fitting + stride):
         fitting, stride = fitting + stride, 2 * stride
     while stride:
-        if fitting + stride <= len(chapters) and fits(fitting + stride):
+        if fitting + stride <= len(segments) and fits(fitting + stride):
             fitting += stride
         stride //= 2
     return fitting

@@ -11,8 +11,8 @@ from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.step_log import read_steps
 from infthor_eval.formats.trajectory import Trajectory, iter_trajectories
 from infthor_eval.nieh.samples import find_samples
-from infthor_eval.plans.history import Chapter
-from infthor_eval.training.action_sequences import recorded_chapters, windows
+from infthor_eval.plans.segments import PlanSegment
+from infthor_eval.training.action_sequences import recorded_segments, windows
 from infthor_eval.training.encoding import Encoder, SkippedItem, TrainingSequence
 from infthor_eval.training.question_sequences import question_sequences
 from infthor_eval.training.recipe import Recipe
@@ -106,7 +106,7 @@ def trajectory_names(data: NiehSet) -> list[str]:
     return sorted(path.name for path in (data.root / "metadata").iterdir() if path.is_dir())
 
 
-def read_history(data: NiehSet, name: str) -> tuple[Trajectory, list[Chapter]]:
+def read_history(data: NiehSet, name: str) -> tuple[Trajectory, list[PlanSegment]]:
     """A trajectory of a set, and its true history.
 
     Args:
@@ -121,7 +121,7 @@ def read_history(data: NiehSet, name: str) -> tuple[Trajectory, list[Chapter]]:
         raise DataError("its trajectory is not in the set")
     trajectory = next(iter(iter_trajectories(path)))
     steps = sorted(read_steps(data.folder(name)), key=lambda step: step.img_idx)
-    return trajectory, recorded_chapters(trajectory, steps, data.frames(name))
+    return trajectory, recorded_segments(trajectory, steps, data.frames(name))
 
 
 def _share(

@@ -9,7 +9,7 @@ from typing import Any
 
 from infthor_eval.errors import DataError
 from infthor_eval.household.sequence_text import ACT, action_part, plan_part
-from infthor_eval.plans.history import Chapter, chapter_parts
+from infthor_eval.plans.segments import PlanSegment, segment_parts
 from model_adapters import Part, Turn
 from model_adapters.hf.loaded import Loaded
 from model_adapters.hf.prompt import Frame, Piece, Prompter, n_tokens
@@ -83,14 +83,14 @@ class Encoder:
         """
         return self._prompter.pieces([Turn("user", tuple(parts))])
 
-    def actions(self, name: str, chapters: Sequence[Chapter]) -> TrainingSequence:
+    def actions(self, name: str, segments: Sequence[PlanSegment]) -> TrainingSequence:
         """A history; loss is taken on its actions and the marks around them (appendix B).
 
         Raises:
             DataError: a frame cannot be read, or a text of the history holds a mark.
             ModelError: the template refuses them.
         """
-        return self._acted(name, chapter_parts(chapters), sum(len(chapter.steps) for chapter in chapters))
+        return self._acted(name, segment_parts(segments), sum(len(segment.steps) for segment in segments))
 
     def order(self, name: str, plan: str, actions: Sequence[str]) -> TrainingSequence:
         """A plan and its actions without a frame; loss is taken as on a history.

@@ -1,4 +1,4 @@
-"""Episodes of one trajectory, played by baselines without a run: its history is made once."""
+"""Episodes of one trajectory, run by baselines outside a run: its expert is replayed once."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -8,10 +8,13 @@ from infthor_eval.formats.trajectory import iter_trajectories
 from infthor_eval.manipulation.actors import ArmActor, ArmSituation, Step
 from infthor_eval.manipulation.conversion import Conversion
 from infthor_eval.manipulation.environment import ArmEnvironment, ArmOutcome, Grasp
-from infthor_eval.manipulation.episodes import ArmStage, Played
-from infthor_eval.manipulation.history import Errand, ManipulationKind, errands_of, history_of
+from infthor_eval.manipulation.expert import replay_expert
+from infthor_eval.manipulation.kinds import ManipulationKind
 from infthor_eval.manipulation.options import ManipulationOptions
+from infthor_eval.manipulation.records import ArmRecord
+from infthor_eval.manipulation.runner import ArmRunner
 from infthor_eval.manipulation.task import ManipulationTask
+from infthor_eval.manipulation.trajectories import ArmEpisode, arm_episodes
 from infthor_eval.runs import TaskFile, TaskRequest
 from infthor_eval.thor.frames import NoFrames
 from infthor_eval.thor.simulator import Simulator
@@ -23,8 +26,8 @@ def task_of(data: Path, options: ManipulationOptions | None = None, **settings: 
     return ManipulationTask(file, TaskRequest([file], options or ManipulationOptions(), data))
 
 
-class _Whoever:
-    """Drives as whoever is on turn does."""
+class _AnyActor:
+    """Drives the arm as the actor that is set."""
 
     def __init__(self) -> None:
         self.actor: ArmActor | None = None
@@ -39,41 +42,42 @@ class _Whoever:
 
 
 class Arena:
-    """A trajectory whose expert's history is known, and an arm in its scene."""
+    """A trajectory whose true states are known, and an arm in its scene."""
 
     def __init__(self, data: Path, expert: Simulator, simulator: Simulator) -> None:
         self._data = data
         (self.trajectory,) = iter_trajectories(data)
-        self.errands = {errand.index: errand for errand in errands_of(self.trajectory)}
-        self.history = history_of(self.trajectory, expert)
-        assert not self.history.refusal
+        self.episodes = {episode.index: episode for episode in arm_episodes(self.trajectory)}
+        self.states = replay_expert(self.trajectory, expert)
+        assert not self.states.refusal
         self.simulator = simulator
-        self._whoever = _Whoever()
-        self._stages: dict[int, ArmStage] = {}
+        self._any_actor = _AnyActor()
+        self._runners: dict[int, ArmRunner] = {}
         self._environment: ArmEnvironment | None = None
 
-    def of(self, kind: ManipulationKind) -> list[Errand]:
-        return [errand for errand in self.errands.values() if errand.kind == kind]
+    def of(self, kind: ManipulationKind) -> list[ArmEpisode]:
+        return [episode for episode in self.episodes.values() if episode.kind == kind]
 
-    def play(self, actor: ArmActor, index: int, seed: int = 0, **settings: Any) -> Played:
-        """An episode."""
-        errand = self.errands[index]
-        if seed not in self._stages:
-            self._stages = {seed: self._stage(seed)}  # one world at a time: they share the simulator
+    def play(self, actor: ArmActor, index: int, seed: int = 0, **settings: Any) -> ArmRecord:
+        """Run an episode."""
+        episode = self.episodes[index]
+        if seed not in self._runners:
+            self._runners = {seed: self._runner(seed)}  # one world at a time: they share the simulator
             self._environment = None
-        self._whoever.actor = actor
-        return self._stages[seed].play(task_of(self._data, **{"kind": str(errand.kind), **settings}), errand)
+        self._any_actor.actor = actor
+        task = task_of(self._data, **{"kind": str(episode.kind), **settings})
+        return self._runners[seed].run(task, episode).payload
 
     def begin(
         self, index: int, grasp: Grasp | None = None, conversion: Conversion | None = None
     ) -> tuple[ArmEnvironment, ArmOutcome]:
-        """An episode that is begun."""
+        """Begin an episode."""
         if self._environment is None:
-            self._environment, self._stages = ArmEnvironment(self.trajectory, self.simulator), {}
-        errand = self.errands[index]
-        moment = self.history.moment(errand)
-        begun = self._environment.reset(errand, moment, conversion or Conversion(), grasp or Grasp(), NoFrames())
+            self._environment, self._runners = ArmEnvironment(self.trajectory, self.simulator), {}
+        episode = self.episodes[index]
+        start = self.states.before(episode)
+        begun = self._environment.reset(episode, start, conversion or Conversion(), grasp or Grasp(), NoFrames())
         return self._environment, begun
 
-    def _stage(self, seed: int) -> ArmStage:
-        return ArmStage(self.trajectory, self.history, self.simulator, self._whoever, sees=False, seed=seed)
+    def _runner(self, seed: int) -> ArmRunner:
+        return ArmRunner(self.trajectory, self.states, self.simulator, self._any_actor, sees=False, seed=seed)

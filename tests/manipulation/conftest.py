@@ -30,7 +30,7 @@ def pool() -> Iterator[Pool]:
 @pytest.fixture
 def shared_simulators(pool: Pool, monkeypatch: pytest.MonkeyPatch) -> None:
     """Has runs of manipulation use the shared processes instead of starting their own."""
-    monkeypatch.setattr("infthor_eval.manipulation.evaluation.Simulators", pool.kind())
+    monkeypatch.setattr("infthor_eval.episodes.evaluation.Simulators", pool.kind())
 
 
 @pytest.fixture(scope="session")

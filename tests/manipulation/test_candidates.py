@@ -3,31 +3,31 @@
 import numpy as np
 import pytest
 
-from infthor_eval.manipulation.candidates import Goal, ends_of, passed
+from infthor_eval.manipulation.candidates import PutGoal, passing_poses, release_poses
 from infthor_eval.manipulation.geometry import Corners
+from infthor_eval.manipulation.obstacles import obstacles_of
 from infthor_eval.manipulation.places import Entry, Places, support
 from infthor_eval.manipulation.roadmap import Contact, Terrain
-from infthor_eval.manipulation.solids import solids_of
-from infthor_eval.manipulation.stand import Stand
+from infthor_eval.manipulation.stand import ArmStand
 
 from .test_places import lattice
 from .test_roadmap import linkage
 
 __all__ = ["linkage"]
 
-STAND = Stand(0.451, 1.801, 0.0)
+STAND = ArmStand(0.451, 1.801, 0.0)
 ACROSS, AHEAD = np.arange(-0.275, 0.3, 0.05), np.arange(0.825, 1.1, 0.05)
 
 
 def goal(others=(), entry=None, **changes):
     """A board 0.6 m wide before the arm, at 0.8 m."""
     places = {"points": lattice(ACROSS, AHEAD, (0.8,)), "spacing": 0.05, "top": 0.8, **changes}
-    return Goal(Places(**places), entry, list(others))
+    return PutGoal(Places(**places), entry, list(others))
 
 
-def ends(linkage, asked, contacts=(), solids=()):
-    terrain = Terrain(linkage, solids_of(solids), list(contacts))
-    found = ends_of(asked, terrain, STAND, np.random.default_rng(0))
+def ends(linkage, asked, contacts=(), obstacles=()):
+    terrain = Terrain(linkage, obstacles_of(obstacles), list(contacts))
+    found = release_poses(asked, terrain, STAND, np.random.default_rng(0))
     return found, linkage.held(found.poses)
 
 
@@ -55,7 +55,7 @@ def test_things_are_let_go_above_a_rim_and_in_what_is_entered_below_its_ceiling(
 
 def test_the_higher_things_are_around_the_higher_it_is_let_go(linkage):
     wall = [("Sofa|1", Corners((-2.0, 0.0, 0.6), (2.0, 1.0, 1.4)))]
-    _, held = ends(linkage, goal(), solids=wall)
+    _, held = ends(linkage, goal(), obstacles=wall)
     assert len(held.center) and bottoms(held).min() >= 1.0
 
 
@@ -84,9 +84,9 @@ def test_places_that_are_too_far_have_no_ends(linkage):
 def test_poses_to_pass_are_free_and_some_are_before_the_opening(linkage):
     asked = goal(top=1.3, entered=True, entry=Entry(2, -1, 0.8))
     below = [("Floor|1", Corners((-5.0, -1.0, -5.0), (5.0, 0.9, 5.0)))]
-    terrain = Terrain(linkage, solids_of(below), [])
-    found, _ = ends(linkage, asked, solids=below)
-    others = passed(asked, terrain, STAND, found.poses, 50, np.random.default_rng(0))
+    terrain = Terrain(linkage, obstacles_of(below), [])
+    found, _ = ends(linkage, asked, obstacles=below)
+    others = passing_poses(asked, terrain, STAND, found.poses, 50, np.random.default_rng(0))
     assert len(others) > 100 and terrain.free(others).all()
     before = found.poses.wrists[0] + np.array([0.0, 0.02, -0.12])
     assert (np.abs(others.wrists - before).max(axis=1) < 1e-9).any()

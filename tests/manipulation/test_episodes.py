@@ -5,12 +5,13 @@ from dataclasses import replace
 
 import pytest
 
+from infthor_eval.episodes.errors import InfeasibleError
 from infthor_eval.household.containment import is_in
 from infthor_eval.manipulation.actors import BASELINES
 from infthor_eval.manipulation.conversion import Conversion
 from infthor_eval.manipulation.environment import ArmEnvironment, Grasp
-from infthor_eval.manipulation.geometry import gap, middle_of, point_of
-from infthor_eval.manipulation.history import ManipulationKind, UnfitEpisodeError
+from infthor_eval.manipulation.geometry import distance_to, middle_of, point_of
+from infthor_eval.manipulation.kinds import ManipulationKind
 from infthor_eval.manipulation.records import ArmEnded
 from infthor_eval.thor.frames import NoFrames
 from model_adapters import ArmDelta
@@ -37,27 +38,27 @@ def gripper(value):
 
 
 def test_who_stands_still_gets_just_what_lies_in_the_sphere_at_the_start(room):
-    played = [room.play(actor("still"), errand.index).record for errand in room.of(ManipulationKind.PICKUP)]
+    played = [room.play(actor("still"), episode.index) for episode in room.of(ManipulationKind.PICKUP)]
     assert [record.done for record in played] == [record.starts_inside for record in played]
     assert [record.starts_inside for record in played] == [record.start_distance <= 0.5 for record in played]
     assert [record.index for record in played if record.done] == [28, 33]  # alarm clocks on the dresser before it
     assert all(len(record.steps) == 1 for record in played)
     assert {record.ended for record in played} == {"done", "gave up"}
-    (refused,) = room.play(actor("still"), BOOK).record.steps[0].refusals
+    (refused,) = room.play(actor("still"), BOOK).steps[0].refusals
     assert "refused" not in refused  # the simulator's own words
 
 
 def test_the_planner_picks_up_all_and_puts_nearly_all(room):
-    picked = [room.play(actor("planner-arm"), errand.index).record for errand in room.of(ManipulationKind.PICKUP)]
+    picked = [room.play(actor("planner-arm"), episode.index) for episode in room.of(ManipulationKind.PICKUP)]
     assert [record.ended for record in picked] == ["done"] * 7
     assert all(record.reward == record.max_reward == 2 for record in picked)
-    put = [room.play(actor("planner-arm"), errand.index).record for errand in room.of(ManipulationKind.PUT)]
+    put = [room.play(actor("planner-arm"), episode.index) for episode in room.of(ManipulationKind.PUT)]
     assert [record.index for record in put if not record.done] == [79]  # the cloth into a bowl that is too far off
 
 
 def test_the_planner_puts_into_open_drawers(arena):
     kitchen = arena("kitchen-2-seed4", 99)
-    put = [kitchen.play(actor("planner-arm"), errand.index).record for errand in kitchen.of(ManipulationKind.PUT)]
+    put = [kitchen.play(actor("planner-arm"), episode.index) for episode in kitchen.of(ManipulationKind.PUT)]
     assert [record.ended for record in put] == ["done"] * 3
     assert all(len(record.steps) < 10 for record in put)
 
@@ -65,8 +66,8 @@ def test_the_planner_puts_into_open_drawers(arena):
 def test_a_larger_sphere_takes_no_success_from_the_planner(room):
     radii = (0.06, 0.1, 0.2, 0.35, 0.5)
     found = {
-        radius: [room.play(actor("planner-arm"), errand.index, radius=radius).record.done
-                 for errand in room.of(ManipulationKind.PICKUP)]
+        radius: [room.play(actor("planner-arm"), episode.index, radius=radius).done
+                 for episode in room.of(ManipulationKind.PICKUP)]
         for radius in radii
     }  # fmt: skip
     rates = [sum(found[radius]) for radius in radii]
@@ -76,7 +77,7 @@ def test_a_larger_sphere_takes_no_success_from_the_planner(room):
 
 def test_equal_seeds_move_alike_and_other_seeds_and_episodes_do_not(room):
     def moved(index, seed):
-        return [step.delta for step in room.play(actor("random-arm"), index, seed, max_steps=4).record.steps]
+        return [step.delta for step in room.play(actor("random-arm"), index, seed, max_steps=4).steps]
 
     first = moved(PHONE, 7)
     assert len(first) == 4 and len(set(first)) == 4
@@ -86,7 +87,7 @@ def test_equal_seeds_move_alike_and_other_seeds_and_episodes_do_not(room):
 
 
 def test_a_random_arm_keeps_within_the_longest_step_and_ten_degrees(room):
-    steps = room.play(actor("random-arm"), PHONE, max_step=0.03, max_steps=20).record.steps
+    steps = room.play(actor("random-arm"), PHONE, max_step=0.03, max_steps=20).steps
     moves = [step.delta[:3] for step in steps]
     assert 0.015 < max(abs(part) for move in moves for part in move) <= 0.03
     assert 0.08 < max(abs(part) for step in steps for part in step.delta[3:6]) <= math.radians(10)
@@ -99,13 +100,13 @@ def test_a_random_arm_keeps_within_the_longest_step_and_ten_degrees(room):
 @pytest.mark.parametrize("index", [BOOK, CLOCK, INTO_BOX, ON_DRESSER])
 def test_an_episode_begins_in_the_experts_pose_with_the_arm_at_rest(room, index):
     _, begun = room.begin(index)
-    wanted, agent = room.history.moments[index].view.agent, begun.view.agent
+    wanted, agent = room.states.starts[index].view.agent, begun.view.agent
     assert (agent.position.x, agent.position.z) == (wanted.position.x, wanted.position.z)
     assert (agent.rotation, agent.horizon) == (wanted.rotation, wanted.horizon)
     arm = begun.view.arm
     assert arm.sphere_radius == 0.5
-    moment = room.history.moments[index]
-    assert list(arm.held) == ([moment.object_id] if moment.receptacle_id else [])
+    start = room.states.starts[index]
+    assert list(arm.held) == ([start.object_id] if start.receptacle_id else [])
     level = math.hypot(arm.wrist.x - agent.position.x, arm.wrist.z - agent.position.z)
     assert level == pytest.approx(0.4, abs=1e-3)  # ahead, as at rest
 
@@ -113,8 +114,8 @@ def test_an_episode_begins_in_the_experts_pose_with_the_arm_at_rest(room, index)
 @pytest.mark.parametrize("index", [INTO_BOX, ON_DRESSER, INTO_DRAWER])
 def test_of_a_put_the_wrist_is_as_high_as_the_experts_hand(room, index):
     _, begun = room.begin(index)
-    moment = room.history.moments[index]
-    hand = moment.view.objects[moment.object_id].position.y
+    start = room.states.starts[index]
+    hand = start.view.objects[start.object_id].position.y
     assert begun.view.arm.wrist.y == pytest.approx(hand, abs=0.01)  # the range of 1.35 m, halved eight times
 
 
@@ -130,20 +131,20 @@ def test_an_episode_begins_alike_whatever_was_done_before(room):
 
 @pytest.mark.parametrize("index", [INTO_BOX, ON_DRESSER, INTO_DRAWER])
 def test_what_is_held_before_the_palm_is_nearer_to_it_than_in_the_middle(room, index):
-    def away(at_palm):
+    def distance(at_palm):
         _, begun = room.begin(index, Grasp(at_palm=at_palm))
-        held = begun.view.objects[room.history.moments[index].object_id]
+        held = begun.view.objects[room.states.starts[index].object_id]
         return math.dist(middle_of(held), point_of(begun.view.arm.wrist))
 
-    assert away(at_palm=True) < away(at_palm=False) <= 0.51 + 0.01  # the middle is radius and palm away
+    assert distance(at_palm=True) < distance(at_palm=False) <= 0.51 + 0.01  # the middle is radius and palm away
 
 
 def test_the_agent_needs_an_arm(room, pool):
     with pool.one(image=False, instances=False) as without:
         environment = ArmEnvironment(room.trajectory, without)
-        with pytest.raises(UnfitEpisodeError, match="the episode cannot be begun: SetHandSphereRadius: "):
+        with pytest.raises(InfeasibleError, match="the episode cannot be begun: SetHandSphereRadius: "):
             environment.reset(
-                room.errands[BOOK], room.history.moments[BOOK], Conversion(), Grasp(), NoFrames()
+                room.episodes[BOOK], room.states.starts[BOOK], Conversion(), Grasp(), NoFrames()
             )  # fmt: skip
 
 
@@ -166,8 +167,8 @@ def test_no_step_without_an_episode(room):
 def test_below_the_threshold_the_hand_closes(room, threshold, value, taken):
     environment, begun = room.begin(CLOCK, Grasp(threshold=threshold))
     outcome = environment.step(gripper(value))
-    target = environment.moment.object_id
-    assert environment.inside and target in begun.view.arm.pickupable
+    target = environment.start.object_id
+    assert environment.starts_inside and target in begun.view.arm.pickupable
     assert (outcome.ended == ArmEnded.DONE) == taken == (target in outcome.view.inventory)
     assert [call["action"] for call in outcome.calls] == ["PickupObject"] * taken
 
@@ -188,7 +189,7 @@ def test_a_hand_that_closes_around_nothing_does_nothing(room):
 
 def test_a_hand_takes_the_target_alone_or_all_that_is_in_the_sphere(room):
     environment, begun = room.begin(CLOCK)
-    target, near = environment.moment.object_id, set(begun.view.arm.pickupable)
+    target, near = environment.start.object_id, set(begun.view.arm.pickupable)
     assert len(near) > 1
     assert environment.step(gripper(0.0)).view.inventory == (target,)
     environment, _ = room.begin(CLOCK, Grasp(takes_all=True))
@@ -200,9 +201,9 @@ def test_a_hand_takes_the_target_alone_or_all_that_is_in_the_sphere(room):
 def test_other_things_in_the_hand_are_no_success(room):
     """The sphere holds something, but not the target."""
     found = 0
-    for errand in room.of(ManipulationKind.PICKUP):
-        environment, begun = room.begin(errand.index, Grasp(takes_all=True))
-        if environment.inside or not begun.view.arm.pickupable:
+    for episode in room.of(ManipulationKind.PICKUP):
+        environment, begun = room.begin(episode.index, Grasp(takes_all=True))
+        if environment.starts_inside or not begun.view.arm.pickupable:
             continue
         outcome = environment.step(gripper(0.0))
         assert outcome.view.inventory and outcome.ended is None
@@ -216,7 +217,7 @@ def test_other_things_in_the_hand_are_no_success(room):
 
 def over(environment, item, aside=0.0):
     """Calls that bring what is held over an object's middle, or beside it."""
-    held = environment.view.objects[environment.moment.object_id]
+    held = environment.view.objects[environment.start.object_id]
     wrist = environment.view.arm.wrist
     goal, now = middle_of(item), middle_of(held)
     top = goal[1] + item.axis_aligned_bounding_box.size.y / 2
@@ -230,7 +231,7 @@ def over(environment, item, aside=0.0):
 
 def test_released_over_the_receptacle_counts(room):
     environment, _ = room.begin(INTO_BOX)
-    target, box = environment.moment.object_id, environment.moment.receptacle_id
+    target, box = environment.start.object_id, environment.start.receptacle_id
     moved = environment.step([over(environment, environment.view.objects[box])])
     assert moved.ended is None  # over it is not in it
     outcome = environment.step([{"action": "ReleaseObject"}])
@@ -241,20 +242,20 @@ def test_released_over_the_receptacle_counts(room):
 
 def test_released_elsewhere_does_not_count(room):
     environment, _ = room.begin(INTO_BOX)
-    target, box = environment.moment.object_id, environment.moment.receptacle_id
+    target, box = environment.start.object_id, environment.start.receptacle_id
     outcome = environment.step(gripper(1.0))
     assert outcome.ended == ArmEnded.ELSEWHERE
     assert not is_in(target, box, outcome.view)
-    record = room.play(actor("still"), INTO_BOX).record
+    record = room.play(actor("still"), INTO_BOX)
     assert (record.ended, record.reward, record.done) == ("released elsewhere", 0, False)
 
 
 def test_the_last_step_that_there_is_counts_and_one_fewer_is_too_few(room):
-    whole = room.play(actor("planner-arm"), BOOK).record
+    whole = room.play(actor("planner-arm"), BOOK)
     n = len(whole.steps)
     assert n > 1
-    assert room.play(actor("planner-arm"), BOOK, max_steps=n).record == whole
-    short = room.play(actor("planner-arm"), BOOK, max_steps=n - 1).record
+    assert room.play(actor("planner-arm"), BOOK, max_steps=n) == whole
+    short = room.play(actor("planner-arm"), BOOK, max_steps=n - 1)
     assert (short.ended, short.reward, len(short.steps)) == ("step limit", 0, n - 1)
     assert short.steps == whole.steps[:-1]
 
@@ -262,7 +263,7 @@ def test_the_last_step_that_there_is_counts_and_one_fewer_is_too_few(room):
 def test_distances_are_from_the_spheres_centre_to_the_targets_box(room):
     for index in (BOOK, INTO_BOX):
         environment, begun = room.begin(index)
-        target = environment.moment.receptacle_id or environment.moment.object_id
+        target = environment.start.receptacle_id or environment.start.object_id
         for outcome in (begun, environment.step(ArmDelta((0.05, 0, 0.02), (0, 0.1, 0), 0.49))):
             box, center = outcome.view.objects[target].axis_aligned_bounding_box, outcome.view.arm.sphere_center
             nearest = (
@@ -271,17 +272,17 @@ def test_distances_are_from_the_spheres_centre_to_the_targets_box(room):
                 for axis in "xyz"
             )  # fmt: skip
             assert outcome.distance == pytest.approx(math.dist(point_of(center), tuple(nearest)))
-            assert outcome.distance == gap(point_of(center), outcome.view.objects[target])
+            assert outcome.distance == distance_to(point_of(center), outcome.view.objects[target])
 
 
 def test_an_egg_that_cracks_before_it_is_taken_ends_nothing(arena):
     """Its id is gone then; the distance is to where it was, and nobody can pick it up any more."""
     kitchen = arena("kitchen-2-seed4", 99)
-    moment = kitchen.history.moments[13]
-    (egg, *_) = (key for key, item in moment.view.objects.items() if item.object_type == "Egg")
+    start = kitchen.states.starts[13]
+    (egg, *_) = (key for key, item in start.view.objects.items() if item.object_type == "Egg")
     environment = ArmEnvironment(kitchen.trajectory, kitchen.simulator)
     begun = environment.reset(
-        kitchen.errands[13], replace(moment, object_id=egg), Conversion(), Grasp(), NoFrames()
+        kitchen.episodes[13], replace(start, object_id=egg), Conversion(), Grasp(), NoFrames()
     )  # fmt: skip
     outcome = environment.step([{"action": "BreakObject", "objectId": egg, "forceAction": True}])
     assert egg not in outcome.view.objects
@@ -291,7 +292,7 @@ def test_an_egg_that_cracks_before_it_is_taken_ends_nothing(arena):
 
 def test_closest_is_the_smallest_of_the_start_and_all_steps(room):
     for name, index in (("planner-arm", BOOK), ("random-arm", BOOK), ("still", BOOK), ("random-arm", INTO_DRAWER)):
-        record = room.play(actor(name), index, max_steps=6).record
+        record = room.play(actor(name), index, max_steps=6)
         assert record.closest == min([record.start_distance, *(step.distance for step in record.steps)])
-    still = room.play(actor("still"), BOOK).record
+    still = room.play(actor("still"), BOOK)
     assert still.closest == still.start_distance == still.steps[0].distance

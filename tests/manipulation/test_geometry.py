@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from infthor_eval.manipulation.geometry import along, away, gap, middle_of, size_of, xyz
+from infthor_eval.manipulation.geometry import distance_to, interpolate, middle_of, offset, size_of, xyz
 from infthor_eval.thor.view import Box, ThorObject, Vector
 
 BOX = Box(Vector(1.0, 2.0, 3.0), Vector(2.0, 0.5, 4.0))  # 0..2, 1.75..2.25, 1..5
@@ -24,19 +24,19 @@ def thing(box):
     ((-1.0, 4.25, 7.0), 3.0),  # off a corner: 1, 2 and 2
 ])  # fmt: skip
 def test_the_gap_is_to_the_nearest_point_of_the_box(point, metres):
-    assert gap(point, thing(BOX)) == pytest.approx(metres)
+    assert distance_to(point, thing(BOX)) == pytest.approx(metres)
 
 
 def test_a_thing_without_a_box_is_a_point():
     bare = thing(None)
     assert middle_of(bare) == (1.0, 1.7, 3.0)
     assert size_of(bare) == (0.0, 0.0, 0.0)
-    assert gap((1.0, 1.7, 0.0), bare) == 3.0
-    assert gap((2.0, 2.7, 4.0), bare) == pytest.approx(math.sqrt(3))
+    assert distance_to((1.0, 1.7, 0.0), bare) == 3.0
+    assert distance_to((2.0, 2.7, 4.0), bare) == pytest.approx(math.sqrt(3))
 
 
 def test_ways():
-    assert away((1, 2, 3), (2, 4, 6)) == (1, 2, 3)
-    assert along((1, 2, 3), (2, 4, 6), 0.5) == (1.5, 3, 4.5)
-    assert along((1, 2, 3), (2, 4, 6), 0) == (1, 2, 3)
+    assert offset((1, 2, 3), (2, 4, 6)) == (1, 2, 3)
+    assert interpolate((1, 2, 3), (2, 4, 6), 0.5) == (1.5, 3, 4.5)
+    assert interpolate((1, 2, 3), (2, 4, 6), 0) == (1, 2, 3)
     assert xyz((1.0, 2.0, 3.0)) == {"x": 1.0, "y": 2.0, "z": 3.0}

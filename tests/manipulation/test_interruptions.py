@@ -136,7 +136,7 @@ def test_an_episode_is_begun_anew_where_the_simulator_fails_for_good(prepared, t
     step, failures = ArmEnvironment.step, []
 
     def failing(environment, action):
-        if environment.errand.index == 9 and len(failures) < n_failures:
+        if environment.episode.index == 9 and len(failures) < n_failures:
             failures.append(f"it hangs ({len(failures)})")
             raise SimulatorError(failures[-1])
         return step(environment, action)
@@ -180,7 +180,7 @@ def test_two_trajectories_at_once_find_what_one_after_the_other_finds(prepared, 
     one_by_one = Capabilities(counts_tokens=False, token_ids=False)
     assert BASELINES["random-arm"](0).capabilities.max_in_flight == 2
     monkeypatch.setattr(BASELINES["random-arm"], "capabilities", one_by_one)
-    monkeypatch.setattr("infthor_eval.manipulation.evaluation.Simulators", pool.kind())
+    monkeypatch.setattr("infthor_eval.episodes.evaluation.Simulators", pool.kind())
     alone = execute(prepared("random-arm", data=data, output=tmp_path / "alone"))
     assert same(together.records) == same(alone.records)
     assert together.summary == alone.summary

@@ -5,7 +5,7 @@ import pytest
 
 from infthor_eval.manipulation.geometry import corners_of
 from infthor_eval.manipulation.linkage import Parts
-from infthor_eval.manipulation.places import Entry, Places, entry_of, firmness, others_on, support, taken
+from infthor_eval.manipulation.places import Entry, Places, entry_of, firmness, occupancy, others_on, support
 from infthor_eval.thor.view import AgentPose, Box, SimulatorView, ThorObject, Vector
 
 BOARD = 0.8  # metres above the floor
@@ -65,18 +65,18 @@ def box(x, y, z, size=(0.1, 0.1, 0.1)):
 
 @pytest.mark.parametrize(("x", "share"), [(0.0, 1.0), (0.04, 1.0), (0.08, 0.5), (0.11, 0.0)])
 def test_a_place_is_taken_most_where_the_middle_would_fall_on_another_thing(x, share):
-    assert taken(held(x, 0.95, 0.0), board(), [box(0.0, 0.85, 0.0)])[0] == share
+    assert occupancy(held(x, 0.95, 0.0), board(), [box(0.0, 0.85, 0.0)])[0] == share
 
 
 def test_what_is_above_the_hand_or_below_the_board_takes_no_place():
-    assert taken(held(0, 0.9, 0), board(), [box(0.0, 1.2, 0.0), box(0.0, 0.7, 0.0)])[0] == 0
-    assert taken(held(0, 0.9, 0), board(), [])[0] == 0
+    assert occupancy(held(0, 0.9, 0), board(), [box(0.0, 1.2, 0.0), box(0.0, 0.7, 0.0)])[0] == 0
+    assert occupancy(held(0, 0.9, 0), board(), [])[0] == 0
 
 
 def test_what_covers_a_drawer_takes_its_places_but_not_the_sink_around_a_basin():
     over, around = box(0, 0.88, 0, (0.4, 0.04, 0.4)), box(0, 0.8, 0, (0.6, 0.3, 0.6))
-    assert taken(held(0, 1.0, 0), board(), [over])[0] == 1
-    assert taken(held(0, 1.0, 0), board(), [around])[0] == 0
+    assert occupancy(held(0, 1.0, 0), board(), [over])[0] == 1
+    assert occupancy(held(0, 1.0, 0), board(), [around])[0] == 0
 
 
 def test_loose_things_count_wherever_they_belong_but_not_what_the_receptacle_is_in():

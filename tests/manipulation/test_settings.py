@@ -4,13 +4,14 @@ import pytest
 
 from infthor_eval.errors import DataError, UsageError
 from infthor_eval.manipulation.environment import Grasp
-from infthor_eval.manipulation.history import Errand, ManipulationKind
+from infthor_eval.manipulation.kinds import ManipulationKind
 from infthor_eval.manipulation.options import ManipulationOptions
+from infthor_eval.manipulation.trajectories import ArmEpisode
 
 from .arena import task_of
 
-PICK = Errand(4, ManipulationKind.PICKUP, "AppleSliced")
-PUT = Errand(9, ManipulationKind.PUT, "ButterKnife", "SinkBasin")
+PICK = ArmEpisode(4, ManipulationKind.PICKUP, "AppleSliced")
+PUT = ArmEpisode(9, ManipulationKind.PUT, "ButterKnife", "SinkBasin")
 
 
 def one_line(caught):
@@ -21,7 +22,7 @@ def one_line(caught):
 # -- what a policy is told
 
 
-@pytest.mark.parametrize(("kind", "template", "errand", "said"), [
+@pytest.mark.parametrize(("kind", "template", "episode", "said"), [
     ("pickup", None, PICK, "pick up the sliced apple"),
     ("put", None, PUT, "put the butter knife in the sink"),
     ("pickup", "short", PICK, "Pick-up"),
@@ -31,10 +32,10 @@ def one_line(caught):
     ("put", "put the {object} down", PUT, "put the butter knife down"),
     ("pickup", "{{{object}}}", PICK, "{sliced apple}"),
 ])  # fmt: skip
-def test_what_a_policy_is_told(data, kind, template, errand, said):
+def test_what_a_policy_is_told(data, kind, template, episode, said):
     given = {} if template is None else {"instruction": template}
-    assert task_of(data, kind=kind, **given).instruction(errand) == said
-    assert task_of(data, ManipulationOptions(instruction=template), kind=kind).instruction(errand) == said
+    assert task_of(data, kind=kind, **given).instruction(episode) == said
+    assert task_of(data, ManipulationOptions(instruction=template), kind=kind).instruction(episode) == said
 
 
 @pytest.mark.parametrize("template", [
@@ -72,14 +73,14 @@ def test_nor_may_a_task_file_have_it(data, radius):
 
 
 def test_the_command_line_goes_before_the_file(data):
-    assert task_of(data, radius=0.1).grasp.radius == 0.1
+    assert task_of(data, radius=0.1).settings.grasp.radius == 0.1
     for typed, metres in (("0.04", 0.04), ("0.5", 0.5), ("6e-2", 0.06)):
-        assert task_of(data, ManipulationOptions(radius=typed), radius=0.1).grasp.radius == metres
+        assert task_of(data, ManipulationOptions(radius=typed), radius=0.1).settings.grasp.radius == metres
 
 
 @pytest.mark.parametrize("frames", ["", "Blank", "black", "shown,blank"])
 def test_stand_ins_for_frames_that_do_not_exist_are_refused(frames):
-    with pytest.raises(UsageError, match="tasks of manipulation have shown, blank"):
+    with pytest.raises(UsageError, match="tasks in a simulator have shown, blank"):
         ManipulationOptions(frames=frames)
 
 
@@ -88,19 +89,19 @@ def test_stand_ins_for_frames_that_do_not_exist_are_refused(frames):
 
 def test_settings_have_defaults_and_all_of_them_act(data):
     plain = task_of(data)
-    assert plain.grasp == Grasp(0.5, takes_all=False, at_palm=False, threshold=0.5)
-    assert (plain.conversion.translation_scale, plain.conversion.max_step) == (1.0, 0.1)
-    assert plain.conversion.rotation and plain.conversion.return_to_start
-    assert plain.camera == (300, 60.0)
+    assert plain.settings.grasp == Grasp(0.5, takes_all=False, at_palm=False, threshold=0.5)
+    assert (plain.settings.conversion.translation_scale, plain.settings.conversion.max_step) == (1.0, 0.1)
+    assert plain.settings.conversion.rotation and plain.settings.conversion.return_to_start
+    assert plain.settings.camera == (300, 60.0)
     assert (plain.settings.max_steps, plain.settings.reward) == (60, 2.0)
     changed = task_of(
         data, radius=0.06, grasps="all", hold="palm", gripper_threshold=0.7, translation_scale=2, max_step=0.05,
         rotation=False, return_to_start=False, image_size=224, field_of_view=90, max_steps=9, reward=1,
     )  # fmt: skip
-    assert changed.grasp == Grasp(0.06, takes_all=True, at_palm=True, threshold=0.7)
-    assert (changed.conversion.translation_scale, changed.conversion.max_step) == (2, 0.05)
-    assert not changed.conversion.rotation and not changed.conversion.return_to_start
-    assert changed.camera == (224, 90)
+    assert changed.settings.grasp == Grasp(0.06, takes_all=True, at_palm=True, threshold=0.7)
+    assert (changed.settings.conversion.translation_scale, changed.settings.conversion.max_step) == (2, 0.05)
+    assert not changed.settings.conversion.rotation and not changed.settings.conversion.return_to_start
+    assert changed.settings.camera == (224, 90)
     assert (changed.settings.max_steps, changed.settings.reward) == (9, 1)
 
 
@@ -133,8 +134,8 @@ def test_a_setting_that_would_not_act_is_refused(data, settings, said):
 
 
 def test_a_tasks_episodes_are_of_its_kind(data):
-    assert [errand.index for _, errand in task_of(data, kind="pickup").episodes] == [9]
-    assert [errand.index for _, errand in task_of(data, kind="put").episodes] == [21]
+    assert [episode.index for _, episode in task_of(data, kind="pickup").episodes] == [9]
+    assert [episode.index for _, episode in task_of(data, kind="put").episodes] == [21]
     (_, put), *_ = task_of(data, kind="put").episodes
     assert (put.object_type, put.receptacle_type) == ("Mug", "Desk")
 

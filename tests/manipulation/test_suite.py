@@ -300,7 +300,7 @@ def test_nothing_to_evaluate_is_refused_in_one_line(prepared, tmp_path):
 @pytest.mark.parametrize(("option", "value", "said"), [
     ("radius", "0.7", "--radius 0.7: is a length of 0.04 to 0.5 metres"),
     ("radius", "wide", "--radius wide: is a length"),
-    ("frames", "black", "--frames black: tasks of manipulation have shown, blank"),
+    ("frames", "black", "--frames black: tasks in a simulator have shown, blank"),
     ("instruction", "do it", "must have {object}"),
     ("scenes", "/nowhere/at/all", "/nowhere/at/all"),
 ])  # fmt: skip

@@ -4,12 +4,12 @@ import pytest
 
 from infthor_eval.manipulation.records import ArmRecord, ArmStep
 from infthor_eval.manipulation.suite import ManipulationSuite
-from infthor_eval.manipulation.summary import summarise
+from infthor_eval.manipulation.summary import summarise_manipulation
 from infthor_eval.runs import RunHeader, RunSummary, UnitRecord
 
 PICK, PUT = "manipulathor_pickup", "manipulathor_put"
 COLLIDED = "Collided with static sim object: 'Table|1', could not reach target: 'x'."
-EMBEDDED = "Made in the embedded simulator: not comparable with the published rows, which are of AI2-THOR's own."
+EMBEDDED = "Made in the embedded simulator: not comparable with the published rows, which are of AI2-THOR in Unity."
 
 
 def about(kind, radius=0.5, broken=()):
@@ -46,7 +46,7 @@ RECORDS = [
 
 
 def summed(records=RECORDS, **changes):
-    return summarise(identity(**changes), records)
+    return summarise_manipulation(identity(**changes), records)
 
 
 def run(name="a policy", records=RECORDS, **changes):
@@ -72,7 +72,10 @@ def test_the_numbers_of_pick_ups():
     assert (task.kind, task.radius, task.n_trajectories, task.n_failed) == ("pickup", 0.5, 2, 1)
     assert task.excluded == {"no such scene": 1}
     assert (task.success.mean, task.success.n) == (0.25, 4)  # a failure of the policy's is no success
-    assert (task.inside.mean, task.inside.n) == (pytest.approx(2 / 3), 3)  # it is not known of the failed one
+    assert (task.inside.mean, task.inside.n) == (
+        pytest.approx(2 / 3),
+        3,
+    )  # it is not known of the failed one
     assert task.closest == pytest.approx((0.1 + 0.4 + 0.7) / 3)
     assert task.steps == pytest.approx((2 + 4 + 0) / 3)
     assert task.collisions == pytest.approx((2 + 4 + 0) / 3)  # an empty grasp is none

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from infthor_eval.manipulation.linkage import Parts
-from infthor_eval.manipulation.solids import gaps
+from infthor_eval.manipulation.obstacles import clearances
 from infthor_eval.manipulation.surroundings import Belief, Surroundings
 from infthor_eval.thor.view import Vector
 
@@ -17,6 +17,7 @@ __all__ = ["linkage"]
 
 ACROSS, DEEP = np.arange(-0.175, 0.2, 0.05), np.arange(1.5, 1.8, 0.05)
 MUG = thing("Mug|1", 0.0, 1.0, 0.9)
+MESSAGE = "Collided with static sim object: '{}', could not reach target: '(0, 0, 0)'."
 
 
 def cupboard(kind="Fridge", origin=0.0):
@@ -35,8 +36,8 @@ def surroundings(linkage, item, *others, places=None):
         assert (action, anywhere) == ("GetSpawnCoordinatesAboveReceptacle", True)
         return [dict(zip("xyz", point, strict=True)) for point in found.get(objectId, [])] or None
 
-    moment = SimpleNamespace(object_id=MUG.object_id, receptacle_id=item.object_id)
-    return Surroundings(SimpleNamespace(view=view_of(item, MUG, *others), moment=moment, query=query), linkage, 0.0)
+    start = SimpleNamespace(object_id=MUG.object_id, receptacle_id=item.object_id)
+    return Surroundings(SimpleNamespace(view=view_of(item, MUG, *others), start=start, query=query), linkage, 0.0)
 
 
 def at(x, y, z):
@@ -44,7 +45,7 @@ def at(x, y, z):
 
 
 def is_solid(around, belief, *point):
-    found = gaps(at(*point), around.solids(belief))
+    found = clearances(at(*point), around.obstacles(belief))
     return found.size > 0 and bool(found.min() < 0)
 
 
@@ -61,9 +62,9 @@ def test_a_door_hangs_where_the_origin_is_or_where_such_doors_do(linkage, kind, 
 
 def test_what_is_met_where_there_should_be_nothing_tells_of_the_other_side(linkage):
     around = surroundings(linkage, cupboard())
-    assert around.met(at(*LEFT), "Collided with static sim object: 'Fridge|1', could not reach target: '(0, 0, 0)'.")
+    assert around.add_collision(at(*LEFT), MESSAGE.format("Fridge|1"))
     assert is_solid(around, Belief.RECEPTACLE, *LEFT) and not is_solid(around, Belief.RECEPTACLE, *RIGHT)
-    assert not around.met(at(*RIGHT), "Collided with static sim object: 'Sofa|1', could not reach target: '(0, 0, 0)'.")
+    assert not around.add_collision(at(*RIGHT), MESSAGE.format("Sofa|1"))
     assert is_solid(around, Belief.RECEPTACLE, *LEFT)
 
 
@@ -82,9 +83,9 @@ def test_the_less_is_believed_the_less_is_in_the_way(linkage):
 def test_what_was_met_fills_its_box(linkage):
     sofa = thing("Sofa|1", 0.8, 0.5, 0.9, (0.4, 1.0, 0.4), pickupable=False)
     around = surroundings(linkage, cupboard(), sofa)
-    assert not is_solid(around, Belief.MET, 0.8, 0.5, 0.9)
-    around.met(at(0.6, 0.5, 0.9), "Collided with static sim object: 'Sofa|1', could not reach target: '(0, 0, 0)'.")
-    assert is_solid(around, Belief.MET, 0.8, 0.5, 0.9) and not is_solid(around, Belief.RECEPTACLE, 0.8, 0.5, 0.9)
+    assert not is_solid(around, Belief.COLLIDED, 0.8, 0.5, 0.9)
+    around.add_collision(at(0.6, 0.5, 0.9), MESSAGE.format("Sofa|1"))
+    assert is_solid(around, Belief.COLLIDED, 0.8, 0.5, 0.9) and not is_solid(around, Belief.RECEPTACLE, 0.8, 0.5, 0.9)
 
 
 def test_what_the_arm_or_the_places_are_in_is_not_filled(linkage):

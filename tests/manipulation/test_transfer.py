@@ -6,7 +6,7 @@ from dataclasses import replace
 import msgspec
 import pytest
 
-from infthor_eval.manipulation.history import UnfitEpisodeError
+from infthor_eval.episodes.errors import InfeasibleError
 from infthor_eval.thor.restore import restore
 from infthor_eval.thor.transfer import transfer
 
@@ -55,37 +55,37 @@ def differences(here, wanted, held):
 def test_after_it_every_thing_is_where_and_as_it_should_be(name, request):
     arena = request.getfixturevalue(name)
     start = start_of(arena)
-    assert len(arena.history.moments) == len(arena.errands) > 5
-    for moment in arena.history.moments.values():
+    assert len(arena.states.starts) == len(arena.episodes) > 5
+    for start in arena.states.starts.values():
         view = arena.simulator.rewind(start, exactly=True)
         agent = view.agent
-        assert transfer(arena.simulator, moment.view) == []
-        assert differences(arena.simulator.view, moment.view, moment.view.inventory) == []
+        assert transfer(arena.simulator, start.view) == []
+        assert differences(arena.simulator.view, start.view, start.view.inventory) == []
         assert arena.simulator.view.agent == agent
 
 
 def test_the_moments_have_what_makes_it_hard(kitchen, drawers):
     """Slices, open and shut doors, things shut in, and things in the hand."""
-    views = [moment.view for moment in (*kitchen.history.moments.values(), *drawers.history.moments.values())]
-    first = kitchen.history.moments[12].view
+    views = [start.view for start in (*kitchen.states.starts.values(), *drawers.states.starts.values())]
+    first = kitchen.states.starts[12].view
     assert any(key not in first.objects for view in views for key in view.objects if "TomatoSliced" in key)
     assert {item.object_type for view in views for item in view.objects.values() if item.is_open} >= {
         "Drawer", "Fridge", "Microwave",
     }  # fmt: skip
     assert any(view.inventory for view in views)
     for number, opened in ((59, False), (87, True)):
-        view = drawers.history.moments[number].view
+        view = drawers.states.starts[number].view
         (drawer,) = view.objects[FORK].parent_receptacles
         assert (view.objects[drawer].object_type, view.objects[drawer].is_open) == ("Drawer", opened)
 
 
 def test_it_can_be_done_again_and_from_any_moment_to_any_other_later_one(kitchen):
     start = start_of(kitchen)
-    moments = list(kitchen.history.moments.values())
+    starts = list(kitchen.states.starts.values())
     kitchen.simulator.rewind(start, exactly=True)
-    for moment in moments:
-        assert transfer(kitchen.simulator, moment.view) == []
-        assert differences(kitchen.simulator.view, moment.view, moment.view.inventory) == []
+    for start in starts:
+        assert transfer(kitchen.simulator, start.view) == []
+        assert differences(kitchen.simulator.view, start.view, start.view.inventory) == []
 
 
 def test_states_are_set_either_way(drawers):
@@ -132,15 +132,15 @@ def test_what_is_missing_is_named(drawers):
 
 
 def test_an_episode_whose_things_are_missing_counts_for_nobody(drawers):
-    moment = drawers.history.moments[13]
-    unknown = msgspec.structs.replace(moment.view.objects[moment.object_id], object_id="Elephant|+01.00|+00.00|+02.00")
-    view = replace(moment.view, objects=moment.view.objects | {unknown.object_id: unknown})
+    start = drawers.states.starts[13]
+    unknown = msgspec.structs.replace(start.view.objects[start.object_id], object_id="Elephant|+01.00|+00.00|+02.00")
+    view = replace(start.view, objects=start.view.objects | {unknown.object_id: unknown})
     for changes in ({"object_id": unknown.object_id}, {"receptacle_id": unknown.object_id}):
-        missing = replace(moment, view=view, **changes)
-        real = drawers.history.moments
-        drawers.history.moments[13] = missing
+        missing = replace(start, view=view, **changes)
+        real = drawers.states.starts
+        drawers.states.starts[13] = missing
         try:
-            with pytest.raises(UnfitEpisodeError, match=r"^Elephant\|.* cannot be brought to where it was$"):
+            with pytest.raises(InfeasibleError, match=r"^Elephant\|.* cannot be brought to where it was$"):
                 drawers.begin(13)
         finally:
-            real[13] = moment
+            real[13] = start

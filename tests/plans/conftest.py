@@ -55,7 +55,7 @@ def shared_simulator(simulators: SharedSimulators, monkeypatch: pytest.MonkeyPat
         def close(self) -> None:
             """They go on for other tests."""
 
-    monkeypatch.setattr("infthor_eval.plans.evaluation.Simulators", Shared)
+    monkeypatch.setattr("infthor_eval.episodes.evaluation.Simulators", Shared)
 
 
 @pytest.fixture

@@ -121,7 +121,7 @@ def test_the_history_is_the_sequence_that_models_are_trained_on(simulator, tmp_p
     environment.reset(last)
     play(environment, last)
     past = environment.past(last)
-    text = "".join(part if isinstance(part, str) else "<image>" for chapter in past.all for part in chapter.parts())
+    text = "".join(part if isinstance(part, str) else "<image>" for segment in past.all for part in segment.parts())
     whole = (SET / "metadata" / found.traj_id / "traj.txt").read_text().strip()
     assert whole.startswith(text)
     assert whole[len(text) :].startswith("<|act|>")
@@ -160,7 +160,7 @@ def test_a_disk_that_was_full_in_between_changes_nothing_that_is_remembered(segm
         pasts.append(environment.past(1))
     sound, full = pasts
     assert sound.state == full.state
-    assert [len(chapter.steps) for chapter in sound.all] == [len(chapter.steps) for chapter in full.all]
+    assert [len(segment.steps) for segment in sound.all] == [len(segment.steps) for segment in full.all]
 
 
 def test_an_expert_that_is_refused_here_is_named_and_the_plans_before_go_on(simulator):

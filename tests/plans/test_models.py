@@ -220,8 +220,8 @@ def test_the_last_plans_that_fit_are_whole_and_begin_with_their_goal(acting, tmp
             # No more would have fitted: one plan more is too much.
             if window != whole:
                 n_shown = window.count("<|plan|>Plan: ")
-                chapters = whole.split("<|plan|>Plan: ")
-                more = f"{FIRST}<image><|plan|>Plan: " + "<|plan|>Plan: ".join(chapters[-n_shown - 1 :])
+                segments = whole.split("<|plan|>Plan: ")
+                more = f"{FIRST}<image><|plan|>Plan: " + "<|plan|>Plan: ".join(segments[-n_shown - 1 :])
                 assert len(more.replace("<image>", " image ").split()) > limit
     assert [text(parts) for parts, _ in model.asked] == wholes
 

@@ -10,10 +10,10 @@ from infthor_eval.errors import DataError, UsageError
 from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.plans.recorded_runs import PlansRun
 from infthor_eval.plans.records import RECORDS, StepRecord
-from infthor_eval.plans.replaying import recorded_plans, replay
+from infthor_eval.plans.replaying import recorded_plans, replay_plans
 from infthor_eval.runs import read_run
 
-SET = str(packaged_folder("sets/nieh_mini"))
+SET = packaged_folder("sets/nieh_mini")
 NAME = "bedroom-1-seed7"
 
 
@@ -23,9 +23,9 @@ def recorded(scripted_run):
 
 
 @pytest.fixture(scope="module")
-def stage(recorded):
-    with replay(recorded, SET, None) as stage:
-        yield stage
+def session(recorded):
+    with replay_plans(recorded, SET, None) as session:
+        yield session
 
 
 def changed(record, **fields):
@@ -42,90 +42,94 @@ def with_identity(recorded, change):
 
 
 def opened(recorded, data=SET):
-    with replay(recorded, data, None):
+    with replay_plans(recorded, data, None):
         pass
 
 
-def test_a_plan_is_its_start_and_its_actions_as_they_were_recorded(recorded, stage):
+def test_a_plan_is_its_start_and_its_actions_as_they_were_recorded(recorded, session):
     plans = recorded.between(1, 2)
-    found = list(stage.frames(plans))
-    assert [moment.number for moment in found] == [n for plan in plans for n in range(len(plan.payload.steps) + 1)]
-    assert [moment.note for moment in found] == [""] * len(found)  # the world went where it went then
-    assert all(moment.sight.frame.shape == (300, 300, 3) for moment in found)
+    found = list(session.frames(plans))
+    assert [frame.number for frame in found] == [n for plan in plans for n in range(len(plan.payload.steps) + 1)]
+    assert [frame.note for frame in found] == [""] * len(found)  # the world went where it went then
+    assert all(frame.observation.frame.shape == (300, 300, 3) for frame in found)
     first, walk, end = found[0], found[1 : len(plans[0].payload.steps)], found[-1]
     assert (first.title.number, first.title.n_plans, first.title.text) == (1, 12, "go to the mug")
-    assert (first.action, first.rewards.step, first.rewards.most_of_plan) == ("", None, plans[0].payload.max_reward)
-    assert [len(moment.sight.walked) for moment in walk] == list(range(2, len(walk) + 2))  # MoveAhead each time
-    assert (end.action, end.ending, end.done, end.sight.held) == ("PickupObject Mug", "done", True, ("Mug",))
+    assert (first.action, first.rewards.step, first.rewards.max_of_plan) == ("", None, plans[0].payload.max_reward)
+    assert [len(frame.observation.walked) for frame in walk] == list(range(2, len(walk) + 2))  # MoveAhead each time
+    assert (end.action, end.ending, end.done, end.observation.held) == ("PickupObject Mug", "done", True, ("Mug",))
     refused = found[len(plans[0].payload.steps)]
     assert (refused.ending, refused.done) == ("refused by the simulator", False)
     assert refused.wrong.startswith("Wall is blocking")
 
 
-def test_the_map_has_what_the_plan_is_about_and_where_it_leads(recorded, stage):
-    going, putting = (next(stage.frames(recorded.between(number, number))).sight.room for number in (3, 4))
-    assert [thing.name for thing in going.things if thing.is_named] == ["Desk"]
+def test_the_map_has_what_the_plan_is_about_and_where_it_leads(recorded, session):
+    going, putting = (next(session.frames(recorded.between(number, number))).observation.room for number in (3, 4))
+    assert [thing.name for thing in going.objects if thing.is_named] == ["Desk"]
     assert going.goal.at in going.floor
     assert putting.goal is None
-    assert {"Bed", "Dresser", "ArmChair"} <= {thing.name for thing in putting.things}
-    assert not {"Floor", "Pillow", "Mug"} & {thing.name for thing in putting.things}  # the mug is in the hand
+    assert {"Bed", "Dresser", "ArmChair"} <= {thing.name for thing in putting.objects}
+    assert not {"Floor", "Pillow", "Mug"} & {thing.name for thing in putting.objects}  # the mug is in the hand
 
 
-def test_rewards_add_up_over_the_trajectory(recorded, stage):
-    last = list(stage.frames(recorded.plans[3:4]))[-1]
-    before = recorded.plans[:4]
+def test_rewards_add_up_over_the_trajectory(recorded, session):
+    last = list(session.frames(recorded.records[3:4]))[-1]
+    before = recorded.records[:4]
     assert last.rewards.so_far == pytest.approx(sum(plan.payload.reward for plan in before))
-    assert last.rewards.most == pytest.approx(sum(plan.payload.max_reward for plan in before))
+    assert last.rewards.max_so_far == pytest.approx(sum(plan.payload.max_reward for plan in before))
     assert (last.rewards.plan, last.goal_reached) == (7.0, True)
 
 
 def test_excluded_plans_count_for_nothing(recorded):
-    left_out = msgspec.structs.replace(recorded.plans[1], excluded="the expert is refused")
-    plans = (recorded.plans[0], left_out, *recorded.plans[2:])
-    assert replace(recorded, plans=plans).earned_before(plans[2]) == recorded.plans[0].payload.reward
+    left_out = msgspec.structs.replace(recorded.records[1], excluded="the expert is refused")
+    plans = (recorded.records[0], left_out, changed(recorded.records[2], steps=()))
+    with replay_plans(replace(recorded, records=plans), SET, None) as session:
+        (frame,) = session.frames(plans[2:])
+    first, _, third = (plan.payload for plan in recorded.records[:3])
+    assert frame.rewards.so_far == first.reward
+    assert frame.rewards.max_so_far == first.max_reward + third.max_reward
 
 
-def test_what_differs_is_told_once_and_it_goes_on(recorded, stage):
-    plan = recorded.plans[0]
+def test_what_differs_is_told_once_and_it_goes_on(recorded, session):
+    plan = recorded.records[0]
     steps = plan.payload.steps
     paid = tuple(msgspec.structs.replace(step, reward=step.reward + 1) for step in steps)
-    notes = [moment.note for moment in stage.frames([changed(plan, steps=paid)])]
+    notes = [frame.note for frame in session.frames([changed(plan, steps=paid)])]
     assert notes == ["", "plan 1, action 1: MoveAhead earns 0.2 now, and 1.2 in the run", *[""] * (len(steps) - 1)]
     ended = (*steps[:-1], msgspec.structs.replace(steps[-1], message=""))
-    *_, last = stage.frames([changed(plan, steps=ended)])
+    *_, last = session.frames([changed(plan, steps=ended)])
     assert last.note.startswith("plan 1, action 7: MoveAhead is refused (Wall is blocking")
     longer = (*steps, steps[0])  # here the plan is over before
-    found = list(stage.frames([changed(plan, steps=longer)]))
+    found = list(session.frames([changed(plan, steps=longer)]))
     assert len(found) == len(longer) + 1
     assert found[-2].note == "plan 1, action 7: the plan ends now, and goes on in the run"
 
 
-def test_a_reply_that_could_not_be_tried_shows_the_world_as_it_was(recorded, stage):
+def test_a_reply_that_could_not_be_tried_shows_the_world_as_it_was(recorded, session):
     step = StepRecord(reply="jump high", message="unknown action 'jump'")
-    start, end = stage.frames([changed(recorded.plans[0], steps=(step,), ended="no action")])
+    start, end = session.frames([changed(recorded.records[0], steps=(step,), ended="no action")])
     assert (end.action, end.reply, end.wrong, end.ending) == ("", "jump high", "unknown action 'jump'", "no action")
-    assert np.array_equal(start.sight.frame, end.sight.frame)
-    said = msgspec.structs.replace(recorded.plans[0].payload.steps[0], reply=" MoveAhead ")
-    _, moment = stage.frames([changed(recorded.plans[0], steps=(said,))])
-    assert moment.reply == ""  # it is the action
+    assert np.array_equal(start.observation.frame, end.observation.frame)
+    said = msgspec.structs.replace(recorded.records[0].payload.steps[0], reply=" MoveAhead ")
+    _, frame = session.frames([changed(recorded.records[0], steps=(said,))])
+    assert frame.reply == ""  # it is the action
 
 
-def test_an_action_recorded_as_a_call_names_its_object(recorded, stage):
-    plan = recorded.plans[1]
+def test_an_action_recorded_as_a_call_names_its_object(recorded, session):
+    plan = recorded.records[1]
     bare = tuple(msgspec.structs.replace(step, action="PickupObject") for step in plan.payload.steps)
-    assert list(stage.frames([changed(plan, steps=bare)]))[1].action == "PickupObject Mug"
+    assert list(session.frames([changed(plan, steps=bare)]))[1].action == "PickupObject Mug"
 
 
-def test_of_plans_that_were_never_begun_only_the_words_are_there(recorded, stage):
-    idle = changed(recorded.plans[0], steps=(), ended="not come to")
+def test_of_plans_that_were_never_begun_only_the_words_are_there(recorded, session):
+    idle = changed(recorded.records[0], steps=(), ended="not attempted")
     failed = msgspec.structs.replace(idle, failure="the model broke")
     excluded = msgspec.structs.replace(idle, excluded="the expert is refused")
-    found = list(stage.frames([idle, failed, excluded]))
-    assert [moment.sight for moment in found] == [None] * 3
-    assert [moment.ending for moment in found] == [
-        "not come to",
+    found = list(session.frames([idle, failed, excluded]))
+    assert [frame.observation for frame in found] == [None] * 3
+    assert [frame.ending for frame in found] == [
+        "not attempted",
         "failed: the model broke",
-        "left out: the expert is refused",
+        "excluded: the expert is refused",
     ]
 
 
@@ -141,7 +145,7 @@ def test_plans_tasks_and_trajectories_that_are_not_there_are_named(recorded):
     other = [msgspec.structs.replace(record, cluster="kitchen-1") for record in run.records]
     with pytest.raises(UsageError, match=f"more than one trajectory; give one of them with --trajectory: {NAME}, kit"):
         recorded_plans(PlansRun("scripted", run.header, [*run.records, *other]), None, None)
-    with pytest.raises(DataError, match="no record of a plan yet"):
+    with pytest.raises(DataError, match="no record of an episode yet"):
         recorded_plans(PlansRun("scripted", run.header, []), None, None)
 
 
@@ -149,11 +153,11 @@ def test_only_the_runs_own_trajectory_will_do(recorded):
     def change(identity):
         identity["tasks"]["infthor_plans"]["trajectories"][NAME] = "0123"
 
-    with pytest.raises(DataError, match=f"{NAME}: is not what it was when the run was made; give the run's own"):
+    with pytest.raises(DataError, match=f"{NAME}: changed since the run; give the run's own"):
         opened(with_identity(recorded, change))
     with pytest.raises(UsageError, match="give them as --data FILE or FOLDER"):
         opened(recorded, None)
-    kitchen = f"{SET}/metadata/kitchen-2-seed4/traj_data.json"
+    kitchen = SET / "metadata/kitchen-2-seed4/traj_data.json"
     with pytest.raises(DataError, match=f"{NAME}: not among the trajectories of --data \\(kitchen-2-seed4\\)"):
         opened(recorded, kitchen)
 
@@ -170,5 +174,8 @@ def test_rewards_of_another_version_are_an_error(recorded):
         identity["tasks"]["infthor_plans"]["rewards"] = {"per_smile": 1}
 
     strange = with_identity(recorded, change)
-    with replay(strange, SET, None) as stage, pytest.raises(DataError, match="rewards that this version does not know"):
-        list(stage.frames(strange.plans[:1]))
+    with (
+        replay_plans(strange, SET, None) as session,
+        pytest.raises(DataError, match="rewards that this version does not know"),
+    ):
+        list(session.frames(strange.records[:1]))

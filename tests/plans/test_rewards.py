@@ -8,7 +8,7 @@ from infthor_eval.household.navigation import GridPose
 from infthor_eval.household.tasks import Task, TaskType
 from infthor_eval.household.treatments import Treatments
 from infthor_eval.plans.plan import PlanKind
-from infthor_eval.plans.rewards import PlanReward, StepReward, max_reward, n_on_the_way, reward_rules
+from infthor_eval.plans.rewards import PlanReward, StepReward, count_actions_to_goal, max_reward, reward_rules
 from infthor_eval.plans.targets import PlanTarget
 
 from .building import (
@@ -492,9 +492,9 @@ def test_the_most_that_a_plan_gives(target, start, completes, most, published):
 def test_a_way_is_over_before_its_end_and_other_plans_go_on():
     poses = [kitchen(at=(0, z)).agent for z in range(1, 8)]
     ahead = PlanTarget(PlanKind.GOTO, goal_stand=GridPose((0, 7), 0), goal_horizon=30.0)
-    assert n_on_the_way(DEFAULT, ahead, poses, CORRIDOR) == 5  # two steps are left
-    assert n_on_the_way(DEFAULT, ahead, poses[:4], CORRIDOR) == 4
-    assert n_on_the_way(DEFAULT, PICKUP, poses) == len(poses)
+    assert count_actions_to_goal(DEFAULT, ahead, poses, CORRIDOR) == 5  # two steps are left
+    assert count_actions_to_goal(DEFAULT, ahead, poses[:4], CORRIDOR) == 4
+    assert count_actions_to_goal(DEFAULT, PICKUP, poses) == len(poses)
 
 
 # -- the rules, and what does not fit

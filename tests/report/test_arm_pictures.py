@@ -8,8 +8,8 @@ import pytest
 from PIL import Image
 
 from infthor_eval.manipulation.curves import arm_curves
-from infthor_eval.manipulation.moments import ArmMoment, ArmSight, EpisodeTitle, Reach, Solid
 from infthor_eval.manipulation.radii import success_by_radius
+from infthor_eval.manipulation.replay_frames import ArmFrame, ArmObservation, EpisodeTitle, NearbyObject, Reach
 from infthor_eval.report.figures.curve_tables import curves_table, one_panel
 from infthor_eval.report.figures.curves import draw_curves
 from infthor_eval.report.figures.radius import draw_radii, radii_table
@@ -22,17 +22,22 @@ from ..manipulation.made_runs import episode, made_run, planner_run
 
 GREEN, RED = (26, 127, 55), (193, 39, 45)
 NAMED, HAND = (213, 94, 0), (0, 114, 178)
-MUG = Solid("Mug", ((0.1, 0.6), (0.1, 0.7), (0.2, 0.7), (0.2, 0.6)), 0.8, 0.9, is_named=True)
-TABLE = Solid("SideTable", ((-0.3, 0.5), (-0.3, 1.2), (0.4, 1.2), (0.4, 0.5)), 0.0, 0.8)
-FAR = Solid("Sofa", ((3.0, 0.5), (3.0, 1.2), (4.0, 1.2), (4.0, 0.5)), 0.0, 0.8, is_named=False)
+MUG = NearbyObject("Mug", ((0.1, 0.6), (0.1, 0.7), (0.2, 0.7), (0.2, 0.6)), 0.8, 0.9, is_named=True)
+TABLE = NearbyObject("SideTable", ((-0.3, 0.5), (-0.3, 1.2), (0.4, 1.2), (0.4, 0.5)), 0.0, 0.8)
+FAR = NearbyObject("Sofa", ((3.0, 0.5), (3.0, 1.2), (4.0, 1.2), (4.0, 0.5)), 0.0, 0.8, is_named=False)
 WAY = ((0.0, 0.3, 0.8), (0.1, 0.5, 0.9))
 JOINTS = ((0.0, 0.0, 0.8), (0.0, 0.2, 0.9))
 REACH = Reach(JOINTS, WAY[-1], 0.2, WAY, (TABLE, MUG, FAR), (-0.4, -0.1, 0.5), (0.5, 0.9, 1.2))
-SIGHT = ArmSight(np.full((300, 300, 3), 90, np.uint8), REACH)
+SIGHT = ArmObservation(np.full((300, 300, 3), 90, np.uint8), REACH)
 TITLE = EpisodeTitle(2, 7, 57, "Pick-up", "pick up the mug", 1, 0.2)
-START = ArmMoment(TITLE, SIGHT, distance=0.5, closest=0.5, most=2.0)
+START = ArmFrame(title=TITLE, observation=SIGHT, distance=0.5, closest=0.5, max_reward=2.0)
 END = replace(
-    START, number=1, asked=("delta: x +1.0", "MoveArmRelative"), actions=("MoveArmRelative",), ending="done", done=True
+    START,
+    number=1,
+    requests=("delta: x +1.0", "MoveArmRelative"),
+    actions=("MoveArmRelative",),
+    ending="done",
+    done=True,
 )
 
 
@@ -96,7 +101,7 @@ def test_an_episode_has_its_title_its_start_and_its_end_held():
     found = list(arm_pictures([START, END], "a run"))
     assert len(found) == TITLE_HELD + 1 + END_HELD
     assert {(picture.size, picture.mode) for picture in found} == {(SIZE, "RGB")}
-    idle = replace(START, sight=None, ending="left out: no room")
+    idle = replace(START, observation=None, ending="left out: no room")
     assert len(list(arm_pictures([idle], "a run"))) == TITLE_HELD
     assert RED in colours(draw_arm_title(idle, ""))
     with pytest.raises(ValueError, match="nothing to be seen"):
@@ -109,7 +114,7 @@ def test_the_ending_is_green_or_red_and_what_is_told_is_written():
     assert RED in colours(draw_arm_moment(lost, ""))
     assert not {GREEN, RED} & colours(draw_arm_moment(START, ""))
     plain = draw_arm_moment(END, "").tobytes()
-    for change in ({"refusals": ("Collided",)}, {"note": "differs"}, {"asked": ("other",)}, {"n_collisions": 3}):
+    for change in ({"refusals": ("Collided",)}, {"note": "differs"}, {"requests": ("other",)}, {"n_collisions": 3}):
         assert draw_arm_moment(replace(END, **change), "").tobytes() != plain
 
 
@@ -117,7 +122,7 @@ def test_the_reach_shows_hand_and_target_and_not_what_lies_beside():
     picture = draw_reach(REACH, 400)
     assert picture.size == (400, 400)
     assert {NAMED, HAND} <= colours(picture)
-    without = draw_reach(replace(REACH, solids=(TABLE, MUG)), 400)
+    without = draw_reach(replace(REACH, objects=(TABLE, MUG)), 400)
     rows = slice(200, 370)  # the view from the side, which the sofa would stand in
     assert np.array_equal(np.asarray(picture)[rows], np.asarray(without)[rows])
 
@@ -131,7 +136,7 @@ def test_a_row_has_its_start_and_its_end(n_steps):
 
 def test_a_sheet_has_a_row_for_each_episode():
     lost = replace(END, ending="step limit", done=False, refusals=("Collided with a wall",))
-    idle = replace(START, sight=None, ending="failed: broken")
+    idle = replace(START, observation=None, ending="failed: broken")
     one = draw_sheet([[START, END]], "a run")
     three = draw_sheet([[START, END], [START, lost], [idle]], "a run")
     assert three.size[0] == one.size[0]

@@ -5,17 +5,26 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from infthor_eval.plans.moments import Moment, PlanTitle, Pose, Rewards, Room, Sight, Thing
+from infthor_eval.plans.replay_frames import (
+    FloorPose,
+    MapObject,
+    PlanFrame,
+    PlanObservation,
+    PlanRewards,
+    PlanTitle,
+    RoomMap,
+)
 from infthor_eval.report.recordings.fonts import fitted, font, lines_of, one_line
 from infthor_eval.report.recordings.plan_pictures import END_HELD, SIZE, TITLE_HELD, draw_moment, draw_title, pictures
 from infthor_eval.report.recordings.room_map import draw_map
 
 FLOOR = tuple((x * 0.25, z * 0.25) for x in range(8) for z in range(8))
-TABLE, MUG = Thing("SideTable", (2.0, 0.0), (2.6, 1.0)), Thing("Mug", (2.2, 0.4), (2.3, 0.5), is_named=True)
-ROOM = Room(FLOOR, (TABLE, MUG), Pose((1.75, 0.5), 90))
-SIGHT = Sight(np.full((300, 300, 3), 90, np.uint8), ROOM, Pose((0.5, 0.5), 90), ((0.25, 0.5), (0.5, 0.5)))
+TABLE, MUG = MapObject("SideTable", (2.0, 0.0), (2.6, 1.0)), MapObject("Mug", (2.2, 0.4), (2.3, 0.5), is_named=True)
+ROOM = RoomMap(FLOOR, (TABLE, MUG), FloorPose((1.75, 0.5), 90))
+FRAME = np.full((300, 300, 3), 90, np.uint8)
+SIGHT = PlanObservation(FRAME, ROOM, FloorPose((0.5, 0.5), 90), ((0.25, 0.5), (0.5, 0.5)))
 TITLE = PlanTitle(7, 24, "pick up the mug", "put a mug on the desk", 4, 1)
-START = Moment(TITLE, SIGHT, Rewards(None, 0.0, 2.0, 3.0, 9.0))
+START = PlanFrame(title=TITLE, observation=SIGHT, rewards=PlanRewards(None, 0.0, 2.0, 3.0, 9.0))
 END = replace(START, number=1, action="PickupObject Mug", ending="done", done=True)
 GREEN, RED = (26, 127, 55), (193, 39, 45)
 BADGE = (900, 808)  # a place of it that has no letters
@@ -39,7 +48,7 @@ def test_a_plan_has_its_title_its_start_and_its_end_held():
 
 
 def test_of_a_plan_that_was_never_begun_the_title_alone_is_shown():
-    idle = Moment(TITLE, None, START.rewards, ending="not come to")
+    idle = PlanFrame(title=TITLE, observation=None, rewards=START.rewards, ending="not attempted")
     assert len(list(pictures([idle], "a run"))) == TITLE_HELD
     assert RED in colours(draw_title(idle, "a run"))
     assert RED not in colours(draw_title(START, "a run"))
@@ -94,7 +103,7 @@ def test_lines_are_broken_between_words_and_cut():
 def test_the_map_shows_where_the_agent_is_and_walked():
     size = 400
     there = np.asarray(draw_map(SIGHT, size))
-    moved = np.asarray(draw_map(replace(SIGHT, agent=Pose((1.5, 0.5), 90)), size))
+    moved = np.asarray(draw_map(replace(SIGHT, agent=FloorPose((1.5, 0.5), 90)), size))
     still = np.asarray(draw_map(replace(SIGHT, walked=((0.5, 0.5),)), size))
     assert there.shape == (size, size, 3)
     assert all(not np.array_equal(there, other) for other in (moved, still))
@@ -105,11 +114,11 @@ def test_the_map_shows_where_the_agent_is_and_walked():
 
 def test_goal_and_named_things_stand_out():
     size = 400
-    plain = replace(SIGHT, room=Room(FLOOR, (TABLE,)))
+    plain = replace(SIGHT, room=RoomMap(FLOOR, (TABLE,)))
     goal, named = (0, 158, 115), (213, 94, 0)
     assert {goal, named} <= colours(draw_map(SIGHT, size))
     assert not {goal, named} & colours(draw_map(plain, size))
 
 
 def test_a_room_without_a_cell_is_drawn():
-    assert draw_map(replace(SIGHT, room=Room((), ()), walked=()), 200).size == (200, 200)
+    assert draw_map(replace(SIGHT, room=RoomMap((), ()), walked=()), 200).size == (200, 200)

@@ -13,8 +13,8 @@ from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.step_log import read_steps
 from infthor_eval.formats.trajectory import iter_trajectories
 from infthor_eval.household.sequence_text import ACT
-from infthor_eval.plans.history import Chapter, chapter_parts
-from infthor_eval.training.action_sequences import recorded_chapters, single_plans, windows
+from infthor_eval.plans.segments import PlanSegment, segment_parts
+from infthor_eval.training.action_sequences import recorded_segments, single_plans, windows
 from infthor_eval.training.encoding import SkippedItem, TrainingSequence
 from model_adapters.hf.prompt import Frame
 
@@ -24,7 +24,7 @@ _ACTION = re.compile(r"<\|act\|>(.*?)<\|act\|>")
 def chapters_of(root, name):
     data, folder = NiehSet(root), root / "metadata" / name
     (trajectory,) = iter_trajectories(folder / "traj_data.json")
-    return recorded_chapters(trajectory, read_steps(folder), data.frames(name))
+    return recorded_segments(trajectory, read_steps(folder), data.frames(name))
 
 
 def names_in(root):
@@ -47,7 +47,7 @@ def trained_text(encoder, sequence):
 
 def test_a_recorded_history_says_what_the_replay_wrote(bundled_set):
     for name in names_in(bundled_set):
-        parts = chapter_parts(chapters_of(bundled_set, name))
+        parts = segment_parts(chapters_of(bundled_set, name))
         assert text_of(parts) == (bundled_set / "metadata" / name / "traj.txt").read_text().strip()
         frames = [part for part in parts if isinstance(part, FrameRef)]
         shown = NiehSet(bundled_set).frames(name)
@@ -59,7 +59,7 @@ def test_a_recorded_history_says_what_the_replay_wrote(bundled_set):
 def test_windows_have_every_action_once_and_each_begins_as_a_trajectory_does(bundled_set, encoder):
     for name in names_in(bundled_set)[:3]:
         history = chapters_of(bundled_set, name)
-        goals = {chapter.goal for chapter in history}
+        goals = {segment.goal for segment in history}
         made = list(windows(encoder, name, history, 5000))
         assert len(made) > 1
         assert all(window.n_tokens <= 5000 for window in made)
@@ -68,16 +68,16 @@ def test_windows_have_every_action_once_and_each_begins_as_a_trajectory_does(bun
             goal = re.match(r"<\|goal\|>Your main goal: (.*?)<\|goal\|>", text)
             assert goal[1] in goals
         actions = [text for window in made for text in trained_text(encoder, window)]
-        assert actions == [f"{ACT}{action}{ACT}" for chapter in history for action, _ in chapter.steps]
+        assert actions == [f"{ACT}{action}{ACT}" for segment in history for action, _ in segment.steps]
 
 
 def test_single_plans_have_every_action_once_and_each_begins_as_a_trajectory_does(bundled_set, encoder):
     for name in names_in(bundled_set):
-        chapters = chapters_of(bundled_set, name)
-        alone = list(single_plans(encoder, name, chapters))
-        assert len(alone) == sum(bool(chapter.steps) for chapter in chapters)
+        segments = chapters_of(bundled_set, name)
+        alone = list(single_plans(encoder, name, segments))
+        assert len(alone) == sum(bool(segment.steps) for segment in segments)
         found = [_ACTION.findall(said(encoder, [one for one in plan.pieces if isinstance(one, int)])) for plan in alone]
-        assert found == [[action for action, _ in chapter.steps] for chapter in chapters if chapter.steps]
+        assert found == [[action for action, _ in segment.steps] for segment in segments if segment.steps]
         assert all(said(encoder, plan.pieces[:1]) == "<|goal|>" for plan in alone)
 
 
@@ -99,7 +99,7 @@ def window_plans(window):
 def test_a_plan_that_is_too_long_is_left_out_and_told(bundled_set, encoder):
     name = names_in(bundled_set)[0]
     history = chapters_of(bundled_set, name)
-    least = min(len(chapter.steps) for chapter in history)
+    least = min(len(segment.steps) for segment in history)
     limit = 150 + least * 130
     made = list(windows(encoder, name, history, limit))
     left = [item for item in made if isinstance(item, SkippedItem)]
@@ -115,7 +115,7 @@ def test_an_agent_is_asked_with_what_it_was_trained_on(bundled_set, encoder):
     history = chapters_of(bundled_set, name)[:3]
     window = encoder.actions(name, history)
     opens = [at for at, piece in enumerate(window.pieces) if piece == encoder._mark][::2]
-    parts = chapter_parts(history)
+    parts = segment_parts(history)
     asked = [at for at, part in enumerate(parts) if isinstance(part, str) and part.startswith(ACT)]
     assert len(opens) == len(asked)
     for place, at in zip(opens, asked, strict=True):
@@ -124,7 +124,7 @@ def test_an_agent_is_asked_with_what_it_was_trained_on(bundled_set, encoder):
 
 def test_ids_and_labels_of_a_short_history(tmp_path, encoder, bundled_set):
     first, second = NiehSet(bundled_set).frames(names_in(bundled_set)[0])[:2]
-    window = encoder.actions("one", [Chapter("go to the sink", "wash a mug", first, (("MoveAhead", second),))])
+    window = encoder.actions("one", [PlanSegment("go to the sink", "wash a mug", first, (("MoveAhead", second),))])
     ids = encoder._tokenizer
     goal, plan, act = ids.convert_tokens_to_ids(["<|goal|>", "<|plan|>", ACT])
     start, end = ids.convert_tokens_to_ids(["<|vision_start|>", "<|vision_end|>"])
@@ -148,7 +148,7 @@ def test_ids_and_labels_of_a_short_history(tmp_path, encoder, bundled_set):
 def test_a_text_that_holds_a_mark_is_refused(encoder, bundled_set):
     first, second = NiehSet(bundled_set).frames(names_in(bundled_set)[0])[:2]
     with pytest.raises(DataError, match=r"bad: a goal, a plan or an action holds <\|act\|>"):
-        encoder.actions("bad", [Chapter(f"go {ACT}", "goal", first, (("MoveAhead", second),))])
+        encoder.actions("bad", [PlanSegment(f"go {ACT}", "goal", first, (("MoveAhead", second),))])
 
 
 @settings(max_examples=20, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -156,7 +156,7 @@ def test_a_text_that_holds_a_mark_is_refused(encoder, bundled_set):
 def test_windows_of_any_history(lengths, limit, encoder, bundled_set):
     frame = NiehSet(bundled_set).frames(names_in(bundled_set)[0])[0]
     history = [
-        Chapter(
+        PlanSegment(
             f"plan {number}", f"goal {number}" if number % 3 == 0 else None, frame, (("MoveAhead", frame),) * length
         )
         for number, length in enumerate(lengths)
@@ -172,13 +172,13 @@ def test_a_sequence_of_130k_tokens_is_built_and_its_labels_are_right(bundled_set
     actions = ("MoveAhead", "RotateLeft", "PickupObject Mug", "PutObject Mug Fridge", "LookDown")
     cycle = zip(itertools.cycle(actions), itertools.cycle(frames))
     history = [
-        Chapter(f"plan {number}", "goal" if number == 0 else None, frames[0], tuple(itertools.islice(cycle, 11)))
+        PlanSegment(f"plan {number}", "goal" if number == 0 else None, frames[0], tuple(itertools.islice(cycle, 11)))
         for number in range(100)
     ]
     window, *rest = windows(encoder, "long", history, 131_072)
     assert 128_000 < window.n_tokens <= 131_072
     assert len(rest) == 1
-    text = text_of(chapter_parts(history[: window_plans(window)]))
+    text = text_of(segment_parts(history[: window_plans(window)]))
     assert trained_text(encoder, window) == [f"{ACT}{action}{ACT}" for action in _ACTION.findall(text)]
     assert not any(
         trained for piece, trained in zip(window.pieces, window.trained, strict=True) if not isinstance(piece, int)

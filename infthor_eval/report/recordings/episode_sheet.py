@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from PIL import Image, ImageDraw
 
-from infthor_eval.manipulation.moments import ArmMoment
+from infthor_eval.manipulation.replay_frames import ArmFrame
 from infthor_eval.report.recordings.canvas import BAD, FAINT, GOOD, INK, WARN
 from infthor_eval.report.recordings.fonts import fitted, font, lines_of, one_line
 
@@ -23,7 +23,7 @@ def shown_steps(n_steps: int) -> list[int]:
     return sorted({round(number * n_steps / last) for number in range(COLUMNS)})
 
 
-def draw_sheet(episodes: Sequence[Sequence[ArmMoment]], heading: str) -> Image.Image:
+def draw_sheet(episodes: Sequence[Sequence[ArmFrame]], heading: str) -> Image.Image:
     """The page.
 
     Args:
@@ -45,9 +45,9 @@ def draw_sheet(episodes: Sequence[Sequence[ArmMoment]], heading: str) -> Image.I
     return picture
 
 
-def sheet_rows(moments: Iterable[ArmMoment]) -> Iterator[list[ArmMoment]]:
+def sheet_rows(moments: Iterable[ArmFrame]) -> Iterator[list[ArmFrame]]:
     """Yield the moments of each episode that have a place; a difference between two places goes to the later one."""
-    row: list[ArmMoment] = []
+    row: list[ArmFrame] = []
     note = ""
     for moment in moments:
         note = moment.note or note
@@ -59,23 +59,23 @@ def sheet_rows(moments: Iterable[ArmMoment]) -> Iterator[list[ArmMoment]]:
             row, note = [], ""
 
 
-def _write_side(pen: ImageDraw.ImageDraw, end: ArmMoment, top: float) -> None:
+def _write_side(pen: ImageDraw.ImageDraw, end: ArmFrame, top: float) -> None:
     """What the episode asks for, and how it ended."""
     title = end.title
     _write(pen, (_EDGE, top), [f"{title.kind}, action {title.action}"], 14, "", FAINT)
     y = _write(pen, (_EDGE, top + 24), [title.instruction], 18, "-Bold", INK, most=4)
     facts = [f"radius {title.radius:g} m"]
-    if end.sight is not None:
+    if end.observation is not None:
         facts += [f"steps: {title.n_steps}", f"collisions: {end.n_collisions}"]
         facts += [f"closest: {end.closest:.2f} m"] if end.closest is not None else []
     y = _write(pen, (_EDGE, y + 8), facts, 14, "", INK)
     _write(pen, (_EDGE, y + 8), [end.ending], 17, "-Bold", GOOD if end.done else BAD, most=4)
 
 
-def _draw_cell(picture: Image.Image, moment: ArmMoment, left: int, top: int) -> None:
-    if moment.sight is None:
+def _draw_cell(picture: Image.Image, moment: ArmFrame, left: int, top: int) -> None:
+    if moment.observation is None:
         return
-    frame = Image.fromarray(moment.sight.frame).resize((_CELL, _CELL), Image.Resampling.BICUBIC)
+    frame = Image.fromarray(moment.observation.frame).resize((_CELL, _CELL), Image.Resampling.BICUBIC)
     picture.paste(frame, (left, top))
     when = "start" if not moment.number else f"step {moment.number}"
     where = "" if moment.distance is None else f", {moment.distance:.2f} m off"

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator
 
 from PIL import Image
 
-from infthor_eval.plans.moments import Moment, PlanTitle
+from infthor_eval.plans.replay_frames import PlanFrame, PlanTitle
 from infthor_eval.report.recordings.canvas import (
     BAD,
     END_HELD,
@@ -28,7 +28,7 @@ from infthor_eval.report.recordings.room_map import draw_map
 __all__ = ["END_HELD", "SIZE", "TITLE_HELD", "draw_moment", "draw_title", "pictures"]
 
 
-def pictures(moments: Iterable[Moment], heading: str) -> Iterator[Image.Image]:
+def pictures(moments: Iterable[PlanFrame], heading: str) -> Iterator[Image.Image]:
     """All pictures of some moments: before each plan its title, and its end held.
 
     Args:
@@ -39,15 +39,15 @@ def pictures(moments: Iterable[Moment], heading: str) -> Iterator[Image.Image]:
         if moment.number == 0:
             title = draw_title(moment, heading)
             yield from [title] * TITLE_HELD
-        if moment.sight is not None:
+        if moment.observation is not None:
             yield from held(draw_moment(moment, heading), is_end=bool(moment.ending))
 
 
-def draw_title(moment: Moment, heading: str) -> Image.Image:
+def draw_title(moment: PlanFrame, heading: str) -> Image.Image:
     """The card before a plan; of one that was never begun it says why."""
     title = moment.title
     expert = f"the expert took {_counted(title.n_expert, 'action')}"
-    most = moment.rewards.most_of_plan
+    most = moment.rewards.max_of_plan
     lines = [
         Line("", _place(title), 26, colour=FAINT),
         Line("", one_line(title.text), 46, "-Bold", most=2),
@@ -58,27 +58,29 @@ def draw_title(moment: Moment, heading: str) -> Image.Image:
     return card(heading, lines)
 
 
-def draw_moment(moment: Moment, heading: str) -> Image.Image:
+def draw_moment(moment: PlanFrame, heading: str) -> Image.Image:
     """A moment that there is something to be seen of.
 
     Raises:
         ValueError: there is not.
     """
-    if moment.sight is None:
+    if moment.observation is None:
         raise ValueError("there is nothing to be seen of this moment")
-    picture, pen = page(heading, Image.fromarray(moment.sight.frame), draw_map(moment.sight, PANE))
+    picture, pen = page(heading, Image.fromarray(moment.observation.frame), draw_map(moment.observation, PANE))
     write_lines(pen, _lines(moment))
     rewards = moment.rewards
     step = "-" if rewards.step is None else f"{rewards.step:+.1f}"
-    plan = _share(rewards.plan, rewards.most_of_plan)
-    write_numbers(pen, [("this action", step), ("this plan", plan), ("so far", _share(rewards.so_far, rewards.most))])
-    write_bar(pen, min(max(rewards.so_far / rewards.most, 0.0), 1.0) if rewards.most > 0 else 0.0)
+    plan = _share(rewards.plan, rewards.max_of_plan)
+    write_numbers(
+        pen, [("this action", step), ("this plan", plan), ("so far", _share(rewards.so_far, rewards.max_so_far))]
+    )
+    write_bar(pen, min(max(rewards.so_far / rewards.max_so_far, 0.0), 1.0) if rewards.max_so_far > 0 else 0.0)
     ending = one_line(moment.ending) + (", and the goal is reached" if moment.goal_reached else "")
-    write_in_hand(pen, moment.sight.held, ending if moment.ending else "", is_good=moment.done)
+    write_in_hand(pen, moment.observation.held, ending if moment.ending else "", is_good=moment.done)
     return picture
 
 
-def _lines(moment: Moment) -> list[Line]:
+def _lines(moment: PlanFrame) -> list[Line]:
     title = moment.title
     lines = [
         Line("goal", title.goal, 17, most=2),

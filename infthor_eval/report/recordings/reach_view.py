@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from PIL import Image, ImageDraw
 
-from infthor_eval.manipulation.moments import Place, Reach, Solid
+from infthor_eval.manipulation.replay_frames import NearbyObject, Place, Reach
 from infthor_eval.report.recordings.fonts import Font, font
 
 __all__ = ["draw_reach"]
@@ -36,7 +36,7 @@ class _Pane:
     def __init__(self, reach: Reach, wide: int, high: int, *, is_above: bool) -> None:
         self._reach, self._size, self._is_above = reach, (wide, high), is_above
         # What lies beside what is looked at would hide it.
-        self._solids = [solid for solid in reach.solids if _meets(solid, reach, is_above=is_above)]
+        self._solids = [solid for solid in reach.objects if _meets(solid, reach, is_above=is_above)]
         corners = [self._flat(reach.low), self._flat(reach.high)]
         (left, right), (bottom, top) = (sorted(values) for values in zip(*corners, strict=True))
         # One scale in both views, so that lengths can be compared.
@@ -64,8 +64,8 @@ class _Pane:
         x, y = self._fine(reach.hand)
         radius = reach.radius * self._per_metre * _FINER
         pen.ellipse((x - radius, y - radius, x + radius, y + radius), fill=_SPHERE, outline=_HAND, width=_FINER)
-        if len(reach.way) > 1:
-            pen.line([self._fine(place) for place in reach.way], fill=_WAY, width=4 * _FINER, joint="curve")
+        if len(reach.path) > 1:
+            pen.line([self._fine(place) for place in reach.path], fill=_WAY, width=4 * _FINER, joint="curve")
         joints = [self._fine(joint) for joint in reach.joints]
         pen.line([*joints, (x, y)], fill=_ARM, width=3 * _FINER, joint="curve")
         for place in joints:
@@ -83,7 +83,7 @@ class _Pane:
             taken.append(place)
             pen.text(place, solid.name, font=face, fill=_INK, anchor="mm", stroke_width=2, stroke_fill="white")
 
-    def _name_place(self, solid: Solid, face: Font) -> tuple[float, float] | None:
+    def _name_place(self, solid: NearbyObject, face: Font) -> tuple[float, float] | None:
         xs, ys = zip(*((x / _FINER, y / _FINER) for x, y in self._outline(solid)), strict=True)
         left, right = max(min(xs), 0), min(max(xs), self._size[0])
         top, bottom = max(min(ys), _HEAD), min(max(ys), self._size[1])
@@ -95,7 +95,7 @@ class _Pane:
             return x, (top + bottom) / 2
         return x, top - 10 if top > _HEAD + 20 else bottom + 10
 
-    def _outline(self, solid: Solid) -> list[tuple[float, float]]:
+    def _outline(self, solid: NearbyObject) -> list[tuple[float, float]]:
         if self._is_above:
             return [self._fine((*corner, 0.0)) for corner in solid.corners]
         near, far = (choose(ahead for _, ahead in solid.corners) for choose in (min, max))
@@ -115,7 +115,7 @@ class _Pane:
         return across * _FINER, down * _FINER
 
 
-def _meets(solid: Solid, reach: Reach, *, is_above: bool) -> bool:
+def _meets(solid: NearbyObject, reach: Reach, *, is_above: bool) -> bool:
     """Whether a thing is as deep in the picture as what it must hold."""
     if is_above:
         return solid.low <= reach.high[2] and reach.low[2] <= solid.high
@@ -128,12 +128,12 @@ def _draw_dot(pen: ImageDraw.ImageDraw, place: tuple[float, float], half: float,
     pen.ellipse((x - half, y - half, x + half, y + half), fill=colour)
 
 
-def _in_order(solids: Sequence[Solid]) -> list[Solid]:
+def _in_order(solids: Sequence[NearbyObject]) -> list[NearbyObject]:
     """The large ones below the small ones, and what the instruction is about on top."""
     return sorted(solids, key=lambda solid: (solid.is_named, -_size(solid)))
 
 
-def _size(solid: Solid) -> float:
+def _size(solid: NearbyObject) -> float:
     spans = (max(values) - min(values) for values in zip(*solid.corners, strict=True))
     return (solid.high - solid.low) * sum(spans)
 

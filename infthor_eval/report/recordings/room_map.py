@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from PIL import Image, ImageDraw
 
-from infthor_eval.plans.moments import Point, Pose, Room, Sight, Thing
+from infthor_eval.plans.replay_frames import FloorPose, MapObject, PlanObservation, Point, RoomMap
 from infthor_eval.report.recordings.fonts import Font, font
 
 __all__ = ["draw_map"]
@@ -24,29 +24,29 @@ _INK = "#222222"
 _PARTS = re.compile(r"[A-Z]?[^A-Z]+|[A-Z]+")  # of a type's name: "SideTable"
 
 
-def draw_map(sight: Sight, size: int) -> Image.Image:
+def draw_map(observation: PlanObservation, size: int) -> Image.Image:
     """The map of a moment, a square of so many pixels."""
-    scale = _Scale(sight.room, (sight.agent.at, *sight.walked), size)
+    scale = _Scale(observation.room, (observation.agent.at, *observation.walked), size)
     large = Image.new("RGB", (size * _FINER, size * _FINER), _OUTSIDE)
     pen = ImageDraw.Draw(large, "RGBA")
-    _draw_room(pen, sight.room, scale)
-    _draw_way(pen, sight.walked, scale)
-    if sight.room.goal is not None:
-        _draw_arrow(pen, sight.room.goal, scale, fill=None, edge=_GOAL, width=3)
-    _draw_agent(pen, sight.agent, scale)
-    _draw_legend(pen, sight, size)
+    _draw_room(pen, observation.room, scale)
+    _draw_way(pen, observation.walked, scale)
+    if observation.room.goal is not None:
+        _draw_arrow(pen, observation.room.goal, scale, fill=None, edge=_GOAL, width=3)
+    _draw_agent(pen, observation.agent, scale)
+    _draw_legend(pen, observation, size)
     picture = large.resize((size, size), Image.Resampling.BOX)
     words = ImageDraw.Draw(picture)
-    _write_names(words, sight, scale, size)
-    _write_legend(words, sight, size)
+    _write_names(words, observation, scale, size)
+    _write_legend(words, observation, size)
     return picture
 
 
 class _Scale:
     """Metres to the pixels of the large picture; +z is up."""
 
-    def __init__(self, room: Room, points: Iterable[Point], size: int) -> None:
-        corners = [*points, *(corner for thing in room.things for corner in (thing.low, thing.high))]
+    def __init__(self, room: RoomMap, points: Iterable[Point], size: int) -> None:
+        corners = [*points, *(corner for thing in room.objects for corner in (thing.low, thing.high))]
         corners += [(x + off, z + off) for x, z in room.floor for off in (-_CELL / 2, _CELL / 2)]
         xs, zs = [x for x, _ in corners], [z for _, z in corners]
         wide, high = size - 2 * _MARGIN, size - 2 * _MARGIN - _LEGEND
@@ -71,27 +71,27 @@ class _Scale:
         return left, top, right, bottom
 
 
-def _draw_room(pen: ImageDraw.ImageDraw, room: Room, scale: _Scale) -> None:
+def _draw_room(pen: ImageDraw.ImageDraw, room: RoomMap, scale: _Scale) -> None:
     for x, z in room.floor:
         corners = (x - _CELL / 2, z - _CELL / 2), (x + _CELL / 2, z + _CELL / 2)
         pen.rectangle(scale.box(*corners), fill=_FLOOR, outline=_GRID)
-    for thing in _in_order(room.things):
+    for thing in _in_order(room.objects):
         fill, edge, width = (_NAMED, _NAMED_EDGE, 3) if thing.is_named else (_FURNITURE, _EDGE, 1)
         pen.rectangle(scale.box(thing.low, thing.high), fill=fill, outline=edge, width=width * _FINER)
         if thing.is_named:
             _draw_ring(pen, thing, scale)
 
 
-def _in_order(things: Sequence[Thing]) -> list[Thing]:
+def _in_order(things: Sequence[MapObject]) -> list[MapObject]:
     """The large ones below the small ones, and what the plan is about on top."""
     return sorted(things, key=lambda thing: (thing.is_named, -_area(thing)))
 
 
-def _area(thing: Thing) -> float:
+def _area(thing: MapObject) -> float:
     return (thing.high[0] - thing.low[0]) * (thing.high[1] - thing.low[1])
 
 
-def _draw_ring(pen: ImageDraw.ImageDraw, thing: Thing, scale: _Scale) -> None:
+def _draw_ring(pen: ImageDraw.ImageDraw, thing: MapObject, scale: _Scale) -> None:
     """Around a thing too small to be found."""
     half = _RING * _FINER
     left, top, right, bottom = scale.box(thing.low, thing.high)
@@ -109,7 +109,7 @@ def _draw_way(pen: ImageDraw.ImageDraw, walked: Sequence[Point], scale: _Scale) 
         pen.ellipse((x - half, y - half, x + half, y + half), fill=_WAY)
 
 
-def _draw_agent(pen: ImageDraw.ImageDraw, agent: Pose, scale: _Scale) -> None:
+def _draw_agent(pen: ImageDraw.ImageDraw, agent: FloorPose, scale: _Scale) -> None:
     x, y = scale.fine(agent.at)
     reach = _REACH * scale.per_metre * _FINER
     ahead = agent.facing - 90  # Pillow counts from the right, downwards
@@ -119,7 +119,9 @@ def _draw_agent(pen: ImageDraw.ImageDraw, agent: Pose, scale: _Scale) -> None:
     _draw_arrow(pen, agent, scale, fill=_AGENT, edge="white", width=1)
 
 
-def _draw_arrow(pen: ImageDraw.ImageDraw, pose: Pose, scale: _Scale, fill: str | None, edge: str, width: int) -> None:
+def _draw_arrow(
+    pen: ImageDraw.ImageDraw, pose: FloorPose, scale: _Scale, fill: str | None, edge: str, width: int
+) -> None:
     x, y = scale.fine(pose.at)
     pen.polygon(_arrow(x, y, pose.facing, 17 * _FINER), fill=fill, outline=edge, width=width * _FINER)
 
@@ -131,12 +133,12 @@ def _arrow(x: float, y: float, facing: float, size: float) -> list[Point]:
     return [(x + length * math.sin(angle), y - length * math.cos(angle)) for angle, length in turned]
 
 
-def _write_names(pen: ImageDraw.ImageDraw, sight: Sight, scale: _Scale, size: int) -> None:
+def _write_names(pen: ImageDraw.ImageDraw, observation: PlanObservation, scale: _Scale, size: int) -> None:
     """Names of what the plan is about, and of furniture as far as there is room; what stands on it has none."""
-    agent = scale.at(sight.agent.at)
+    agent = scale.at(observation.agent.at)
     taken: list[_Area] = [(agent[0] - 16, agent[1] - 16, agent[0] + 16, agent[1] + 16)]
-    told: list[Thing] = []
-    for thing in sorted(sight.room.things, key=lambda thing: (thing.is_named, _area(thing)), reverse=True):
+    told: list[MapObject] = []
+    for thing in sorted(observation.room.objects, key=lambda thing: (thing.is_named, _area(thing)), reverse=True):
         if not thing.is_named and any(_is_on(thing, other) for other in told):
             continue
         words = _name(thing, scale, size)
@@ -167,7 +169,7 @@ class _Name(NamedTuple):
     is_inside: bool
 
 
-def _name(thing: Thing, scale: _Scale, size: int) -> _Name | None:
+def _name(thing: MapObject, scale: _Scale, size: int) -> _Name | None:
     """In the thing's box, in one line or in several; beside it where it is too small and the plan names it."""
     face = font(14, "-Bold") if thing.is_named else font(12)
     x, y = scale.at(_middle(thing))
@@ -186,7 +188,7 @@ def _name(thing: Thing, scale: _Scale, size: int) -> _Name | None:
     return _Name(thing.name, face, (x - half, y - 8, x + half, y + 8), False)
 
 
-def _is_on(thing: Thing, other: Thing) -> bool:
+def _is_on(thing: MapObject, other: MapObject) -> bool:
     middle = _middle(thing)
     return all(low <= place <= high for low, place, high in zip(other.low, middle, other.high, strict=True))
 
@@ -195,29 +197,29 @@ def _overlap(one: _Area, other: _Area) -> bool:
     return one[0] < other[2] and other[0] < one[2] and one[1] < other[3] and other[1] < one[3]
 
 
-def _middle(thing: Thing) -> Point:
+def _middle(thing: MapObject) -> Point:
     return (thing.low[0] + thing.high[0]) / 2, (thing.low[1] + thing.high[1]) / 2
 
 
-def _legend(sight: Sight) -> list[tuple[str, str]]:
+def _legend(observation: PlanObservation) -> list[tuple[str, str]]:
     """What the colours mean."""
     entries = [("agent", _AGENT), ("way in this plan", _WAY)]
-    entries += [("where the expert ended", _GOAL)] if sight.room.goal is not None else []
+    entries += [("where the expert ended", _GOAL)] if observation.room.goal is not None else []
     return entries + (
-        [("what the plan names", _NAMED_EDGE)] if any(thing.is_named for thing in sight.room.things) else []
+        [("what the plan names", _NAMED_EDGE)] if any(thing.is_named for thing in observation.room.objects) else []
     )
 
 
-def _draw_legend(pen: ImageDraw.ImageDraw, sight: Sight, size: int) -> None:
+def _draw_legend(pen: ImageDraw.ImageDraw, observation: PlanObservation, size: int) -> None:
     """The marks; the words follow in the picture as it is in the end."""
     fine, y = size * _FINER, (size - _LEGEND / 2) * _FINER
     pen.rectangle((0, fine - _LEGEND * _FINER, fine, fine), fill="white")
-    for x, _, colour in _places(_legend(sight)):
+    for x, _, colour in _places(_legend(observation)):
         pen.ellipse((x * _FINER, y - 6 * _FINER, (x + 12) * _FINER, y + 6 * _FINER), fill=colour)
 
 
-def _write_legend(pen: ImageDraw.ImageDraw, sight: Sight, size: int) -> None:
-    for x, text, _ in _places(_legend(sight)):
+def _write_legend(pen: ImageDraw.ImageDraw, observation: PlanObservation, size: int) -> None:
+    for x, text, _ in _places(_legend(observation)):
         pen.text((x + 18, size - _LEGEND / 2), text, font=font(13), fill=_INK, anchor="lm")
 
 

@@ -25,7 +25,7 @@ from infthor_eval.report.web.sections import Section
 from infthor_eval.runs import UnitRecord
 
 if TYPE_CHECKING:
-    from infthor_eval.manipulation.moments import ArmMoment, ArmSight
+    from infthor_eval.manipulation.replay_frames import ArmFrame, ArmObservation
     from infthor_eval.manipulation.replaying import RecordedEpisodes
 
 __all__ = ["ManipulationPresenter"]
@@ -47,21 +47,21 @@ class ArmEpisodesReplay:
         recorded = recorded_episodes(_arm_run(run), selection.task, selection.trajectory)
         return Recording(
             trajectory=recorded.trajectory,
-            tasks=sorted({record.task for record in recorded.episodes}),
+            tasks=recorded.tasks,
             records=_select_episodes(recorded, selection),
             simulator=recorded.run.config.simulator,
-            open=lambda data, scenes: replay_episodes(recorded, None if data is None else str(data), scenes),
+            open=lambda data, scenes: replay_episodes(recorded, data, scenes),
         )
 
-    def draw_map(self, sight: "ArmSight", size: int) -> Image.Image:
+    def draw_map(self, observation: "ArmObservation", size: int) -> Image.Image:
         """See `Replay.draw_map`: the arm's reach, from above and from the side."""
-        return draw_reach(sight.reach, size)
+        return draw_reach(observation.reach, size)
 
-    def pictures(self, frames: Iterable["ArmMoment"], heading: str) -> Iterator[Image.Image]:
+    def pictures(self, frames: Iterable["ArmFrame"], heading: str) -> Iterator[Image.Image]:
         """See `Replay.pictures`."""
         return arm_pictures(frames, heading)
 
-    def draw_sheet(self, frames: Iterable["ArmMoment"], heading: str) -> Image.Image:
+    def draw_sheet(self, frames: Iterable["ArmFrame"], heading: str) -> Image.Image:
         """See `Replay.draw_sheet`."""
         return draw_sheet(list(sheet_rows(frames)), heading)
 
@@ -69,13 +69,13 @@ class ArmEpisodesReplay:
 def _select_episodes(recorded: "RecordedEpisodes", selection: Selection) -> Sequence[Record]:
     most = selection.most
     if selection.episode is None:
-        every = recorded.episodes
+        every = recorded.records
         if most is None or len(every) <= most:
             return every
         return [every[round(number * (len(every) - 1) / (most - 1))] for number in range(most)]
     if re.fullmatch(r"\s*\d{1,9}\s*(,\s*\d{1,9}\s*)*", selection.episode, re.ASCII) is None:
         raise UsageError(f"--episode {selection.episode!r:.60}: is no number of an action; write 17, or 17,75")
-    chosen = recorded.standing_for([int(number) for number in selection.episode.split(",")])
+    chosen = recorded.at_actions([int(number) for number in selection.episode.split(",")])
     if most is not None and len(chosen) > most:
         raise UsageError(f"--episode: {len(chosen)} episodes, and a sheet has room for {most}; give fewer")
     return chosen

@@ -22,8 +22,8 @@ from infthor_eval.report.web.sections import Section
 from infthor_eval.runs import UnitRecord
 
 if TYPE_CHECKING:
-    from infthor_eval.plans.moments import Moment, Sight
-    from infthor_eval.plans.replaying import Recorded
+    from infthor_eval.plans.replay_frames import PlanFrame, PlanObservation
+    from infthor_eval.plans.replaying import RecordedPlans
 
 __all__ = ["PlansPresenter"]
 
@@ -39,33 +39,33 @@ class PlansReplay:
 
     def select(self, run: ReportRun, selection: Selection) -> Recording:
         """See `Replay.select`."""
-        from infthor_eval.plans.replaying import recorded_plans, replay
+        from infthor_eval.plans.replaying import recorded_plans, replay_plans
 
         recorded = recorded_plans(_plans_run(run), selection.task, selection.trajectory)
         return Recording(
             trajectory=recorded.trajectory,
-            tasks=(recorded.task,),
+            tasks=(recorded.tasks,),
             records=_select_plans(recorded, selection.plans),
             simulator=recorded.run.config.simulator,
-            open=lambda data, scenes: replay(recorded, None if data is None else str(data), scenes),
+            open=lambda data, scenes: replay_plans(recorded, data, scenes),
         )
 
-    def draw_map(self, sight: "Sight", size: int) -> Image.Image:
+    def draw_map(self, observation: "PlanObservation", size: int) -> Image.Image:
         """See `Replay.draw_map`."""
-        return draw_map(sight, size)
+        return draw_map(observation, size)
 
-    def pictures(self, frames: Iterable["Moment"], heading: str) -> Iterator[Image.Image]:
+    def pictures(self, frames: Iterable["PlanFrame"], heading: str) -> Iterator[Image.Image]:
         """See `Replay.pictures`."""
         return pictures(frames, heading)
 
-    def draw_sheet(self, frames: Iterable["Moment"], heading: str) -> Image.Image:
+    def draw_sheet(self, frames: Iterable["PlanFrame"], heading: str) -> Image.Image:
         """See `Replay.draw_sheet`: plans have none."""
         raise NotImplementedError
 
 
-def _select_plans(recorded: "Recorded", plans: str | None) -> Sequence[Record]:
+def _select_plans(recorded: "RecordedPlans", plans: str | None) -> Sequence[Record]:
     if plans is None:
-        return recorded.plans
+        return recorded.records
     numbers = re.fullmatch(r"(\d{1,9})(?:-(\d{1,9}))?", plans.strip())
     if numbers is None:
         raise UsageError(f"--plans {plans!r:.60}: is neither a plan's number nor two of them; write 7, or 3-7")

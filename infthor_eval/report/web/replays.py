@@ -107,13 +107,13 @@ class EpisodeReplays:
 
     def _draw(self, replay: Replay, session: ReplaySession, run: ReportRun, record: Record) -> EpisodePictures:
         frames = list(session.frames([record]))
-        seen = [frame.sight for frame in frames if frame.sight is not None]
+        seen = [frame.observation for frame in frames if frame.observation is not None]
         if not seen:
             return EpisodePictures()
         name = f"{run.folder}/{record.key.task}/{record.key}"
         numbers = [
-            self._thumbnails.add(f"{name}/{number}", lambda frame=sight.frame: Image.fromarray(frame))  # type: ignore[misc]
-            for number, sight in enumerate(seen)
+            self._thumbnails.add(f"{name}/{number}", lambda frame=observation.frame: Image.fromarray(frame))  # type: ignore[misc]
+            for number, observation in enumerate(seen)
         ]
         at_end = self._thumbnails.add(f"{name}/map", lambda: replay.draw_map(seen[-1], _DRAWN), _SHOWN)
         return EpisodePictures(numbers, at_end, next((frame.note for frame in frames if frame.note), ""))

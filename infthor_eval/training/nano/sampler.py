@@ -12,7 +12,7 @@ from infthor_eval.household.wording import noun, with_article
 from infthor_eval.nieh.contexts import CONTEXTS
 from infthor_eval.nieh.prompts import question_text
 from infthor_eval.nieh.samples import find_samples
-from infthor_eval.plans.history import Chapter
+from infthor_eval.plans.segments import PlanSegment
 from infthor_eval.training.action_sequences import single_plans, windows
 from infthor_eval.training.data import read_history, trajectory_names
 from infthor_eval.training.encoding import Encoder, SkippedItem, TrainingSequence
@@ -84,8 +84,8 @@ class SequenceSampler:
         for folder in folders:
             asked = find_samples({"data": str(folder), "context": "clues"})
             self._questions += self._kept(question_sequences(encoder, asked, window_tokens))
-            for chapters in self._histories(NiehSet(folder)):
-                carried_out += [(chapter.plan, [action for action, _ in chapter.steps]) for chapter in chapters]
+            for segments in self._histories(NiehSet(folder)):
+                carried_out += [(segment.plan, [action for action, _ in segment.steps]) for segment in segments]
         self._orders = SyntheticPlans(carried_out)
         for what, pool in (("question", self._questions), ("history", self._windows), ("plan", self._orders)):
             if not pool:
@@ -94,19 +94,19 @@ class SequenceSampler:
         often = {name: count for name, count in zip(dataset.types, counts, strict=True) if count >= _LEAST_SEEN}
         self._names, self._weights = list(often), list(often.values())
 
-    def _histories(self, data: NiehSet) -> Iterator[list[Chapter]]:
+    def _histories(self, data: NiehSet) -> Iterator[list[PlanSegment]]:
         """Read the histories of a set; one that cannot be read is left out."""
         for name in trajectory_names(data):
             try:
-                _, chapters = read_history(data, name)
-                cut = [*windows(self._encoder, name, chapters, self._limit)]
-                alone = [*single_plans(self._encoder, name, chapters)]
+                _, segments = read_history(data, name)
+                cut = [*windows(self._encoder, name, segments, self._limit)]
+                alone = [*single_plans(self._encoder, name, segments)]
             except DataError as error:
                 self.left_out.append(SkippedItem(name, str(error)))
                 continue
             self._windows += self._kept(cut)
             self._plans += [plan for plan in alone if plan.n_tokens <= self._limit]
-            yield chapters
+            yield segments
 
     def _kept(self, made: Iterable[TrainingSequence | SkippedItem]) -> Iterator[TrainingSequence]:
         for item in made:

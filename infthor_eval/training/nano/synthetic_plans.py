@@ -5,7 +5,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Sequence
 
 from infthor_eval.plans.habits import fill_action, open_action
-from infthor_eval.plans.script import about, read_plan
+from infthor_eval.plans.script import read_plan, replace_objects
 
 __all__ = ["SyntheticPlans"]
 
@@ -34,5 +34,5 @@ class SyntheticPlans:
         """A plan and its actions, kinds as often as experts had them."""
         ((opened, plans),) = draw.choices(self._kinds, [len(plans) for _, plans in self._kinds])
         columns = zip(*(read_plan(plan)[1] for plan in plans), strict=True)
-        plan = about(plans[0], [draw.choice(column) for column in columns])
+        plan = replace_objects(plans[0], [draw.choice(column) for column in columns])
         return plan, [fill_action(action, plan) for action in opened]

@@ -107,8 +107,6 @@ def test_a_trajectory_that_is_not_the_runs_is_one_line(scripted_run, tmp_path, r
     content = json.loads((SET / "metadata" / name / "traj_data.json").read_text())
     content["more"] = 1
     (tmp_path / "changed.json").write_text(json.dumps(content))
-    said = (
-        "is not what it was when the run was made" if name == NAME else f"not among the trajectories of --data ({name}"
-    )
+    said = "changed since the run" if name == NAME else f"not among the trajectories of --data ({name}"
     refused(run("watch", scripted_run, "--data", tmp_path / "changed.json", "--out", tmp_path / "a.gif"), NAME, said)
     assert not (tmp_path / "a.gif").exists()

@@ -5,40 +5,40 @@ import pytest
 
 from infthor_eval.manipulation.geometry import Corners
 from infthor_eval.manipulation.linkage import Parts
+from infthor_eval.manipulation.obstacles import cavity, clearances, columns, obstacles_of
 from infthor_eval.manipulation.places import Entry, Places
-from infthor_eval.manipulation.solids import cavity, columns, gaps, solids_of
 
 from .test_places import board, lattice, thing
 
 
 def part(x, y, z, axes=None, half=(0.1, 0.1, 0.1)):
-    turned = np.eye(3) if axes is None else axes
-    return Parts(np.array([[(x, y, z)]]), np.array([[turned]]), np.array([[half]]))
+    rotations_about = np.eye(3) if axes is None else axes
+    return Parts(np.array([[(x, y, z)]]), np.array([[rotations_about]]), np.array([[half]]))
 
 
 def holds(boxes, x, y, z):
     return any(all(a < v < b for a, v, b in zip(box.low, (x, y, z), box.high, strict=True)) for box in boxes)
 
 
-CUBE = solids_of([("Cube", Corners((-0.1, -0.1, -0.1), (0.1, 0.1, 0.1)))])
+CUBE = obstacles_of([("Cube", Corners((-0.1, -0.1, -0.1), (0.1, 0.1, 0.1)))])
 
 
 @pytest.mark.parametrize(("x", "gap"), [(0.25, 0.05), (0.2, 0.0), (0.15, -0.05), (0.0, -0.2), (3.0, np.inf)])
 def test_gaps_between_level_boxes(x, gap):
-    assert gaps(part(x, 0.0, 0.0), CUBE)[0, 0, 0] == pytest.approx(gap)
+    assert clearances(part(x, 0.0, 0.0), CUBE)[0, 0, 0] == pytest.approx(gap)
 
 
 def test_a_turned_box_reaches_as_far_as_its_corner():
     half = np.sqrt(0.5)
-    turned = np.array([(half, 0.0, half), (0.0, 1.0, 0.0), (-half, 0.0, half)])
-    assert gaps(part(0.26, 0.0, 0.0, turned), CUBE)[0, 0, 0] == pytest.approx(0.16 - 0.1 * np.sqrt(2))
+    rotations_about = np.array([(half, 0.0, half), (0.0, 1.0, 0.0), (-half, 0.0, half)])
+    assert clearances(part(0.26, 0.0, 0.0, rotations_about), CUBE)[0, 0, 0] == pytest.approx(0.16 - 0.1 * np.sqrt(2))
 
 
 def test_of_a_thing_the_nearest_box_counts():
     boxes = [("A", Corners((1, 0, 0), (2, 1, 1))), ("A", Corners((0.3, -1, -1), (1, 1, 1))),
              ("B", Corners((0.2, -1, -1), (1, 1, 1)))]  # fmt: skip
-    assert gaps(part(0.19, 0.0, 0.0), solids_of(boxes))[0, 0] == pytest.approx([0.01, -0.09])
-    assert gaps(part(0.0, 0.0, 0.0), solids_of(())).shape == (1, 1, 0)
+    assert clearances(part(0.19, 0.0, 0.0), obstacles_of(boxes))[0, 0] == pytest.approx([0.01, -0.09])
+    assert clearances(part(0.0, 0.0, 0.0), obstacles_of(())).shape == (1, 1, 0)
 
 
 def test_under_a_corner_counter_there_is_room():

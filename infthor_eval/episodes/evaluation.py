@@ -1,0 +1,153 @@
+"""Evaluation of episodes in simulators: what plans and manipulation have in common."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from importlib.metadata import version
+from itertools import groupby
+from pathlib import Path
+from typing import Any, Generic, Self, TypeVar
+
+from infthor_eval.episodes.options import SimulatorOptions
+from infthor_eval.episodes.recorded_runs import EpisodePayload
+from infthor_eval.episodes.simulators import Simulators
+from infthor_eval.episodes.tasks import EpisodeTask
+from infthor_eval.episodes.trajectory_sets import TaskTrajectory
+from infthor_eval.formats.digests import fingerprint
+from infthor_eval.formats.floor_plans import floor_plans_digest
+from infthor_eval.runs import Group, Session, Skipped, TaskFile, TaskRequest, Unit, UnitKey, UnitRecord, Workload
+
+__all__ = ["BoundEpisodes", "EpisodeEvaluation", "EpisodeUnit"]
+
+P = TypeVar("P", bound=EpisodePayload)
+T = TypeVar("T", bound=TaskTrajectory)
+E = TypeVar("E")
+K = TypeVar("K", bound=EpisodeTask[Any, Any])
+Options = TypeVar("Options", bound=SimulatorOptions)
+
+_OF_ALL_TRAJECTORIES = ("trajectories", "broken")  # parts of a task's config that one episode does not depend on
+
+
+@dataclass(frozen=True)
+class EpisodeUnit(Unit[P], Generic[P, T, E]):
+    """A unit that is an episode.
+
+    Attributes:
+        trajectory: its trajectory.
+        episode: the episode.
+    """
+
+    trajectory: T
+    episode: E
+
+    @classmethod
+    def of(cls, task: str, trajectory: T, episode: E, payload: P) -> Self:
+        """Return the unit of an episode of a task; `payload` is its record before anybody acts."""
+        key = UnitKey(task, f"{trajectory.traj_id}/{payload.index:04d}")
+        return cls(key, trajectory.traj_id, payload, trajectory, episode)
+
+
+U = TypeVar("U", bound=EpisodeUnit[Any, Any, Any])
+
+
+class EpisodeEvaluation(ABC, Generic[Options, K, U]):
+    """A suite of episodes set up for a run; see `infthor_eval.runs.Evaluation`.
+
+    Attributes:
+        tasks: tasks by name.
+    """
+
+    def __init__(self, request: TaskRequest[Options], read_task: Callable[[TaskFile, TaskRequest[Options]], K]) -> None:
+        """Read the tasks and their trajectories.
+
+        Raises:
+            UsageError: a task has no trajectories or no episodes, or an option does not fit.
+            DataError: a task file is malformed, or none of its trajectories can be used.
+        """
+        self._seed, self._options = request.seed, request.options
+        self.tasks: Mapping[str, K] = {file.name: read_task(file, request) for file in request.tasks}
+        self._scenes = Path(self._options.scenes) if self._options.scenes is not None else None
+        self._floor_plans = floor_plans_digest(self._scenes) if self._scenes is not None else None
+        trajectories = {item.traj_id: item for task in self.tasks.values() for item in task.trajectories.trajectories}
+        # All that were found, used or not: with --limit baselines learn from the same ones, and simulators complete
+        # floor plans from the same ones.
+        self._trajectories = [item.data for item in trajectories.values()]
+
+    @property
+    @abstractmethod
+    def units(self) -> list[U]:
+        """The episodes of all tasks, task by task, in the order of trajectories and time."""
+
+    def _workload(self, groups: Iterable[Iterable[U]], **settings: Any) -> Workload[U]:
+        """Return the workload, given the episodes in groups and the suite's own settings."""
+        listed = [list(units) for units in groups]
+        return Workload(
+            groups=[Group(units, frames=len(units[0].trajectory.data.plan.low_actions)) for units in listed],
+            skipped=[
+                Skipped(UnitKey(name, place), reason)
+                for name, task in self.tasks.items()
+                for place, reason in task.trajectories.broken
+            ],
+            config={
+                "tasks": {name: task.config() for name, task in self.tasks.items()},
+                "simulator": self._options.simulator,
+                "ai2thor": version("ai2thor"),
+                "floor_plans": self._floor_plans,
+                "frames": self._options.frames,
+                **settings,
+            },
+        )
+
+    def _simulators(self, **options: Any) -> Simulators:
+        return Simulators(self._options.simulator, self._scenes, self._trajectories, **options)
+
+
+class BoundEpisodes(ABC, Generic[U, P]):
+    """Episodes for one subject; see `infthor_eval.runs.BoundEvaluation`.
+
+    Attributes:
+        workload: all the work.
+    """
+
+    def __init__(self, workload: Workload[U], units: Sequence[U], simulators: Sequence[Simulators], seed: int) -> None:
+        """Take the work.
+
+        Args:
+            workload: all the work.
+            units: its units, task by task.
+            simulators: simulators that the episodes are run in; closed with this.
+            seed: seed of the run.
+        """
+        self.workload = workload
+        by_task = groupby(units, key=lambda unit: unit.key.task)
+        self._numbers = {unit.key: number for _, of_task in by_task for number, unit in enumerate(of_task)}
+        self._to_close = simulators
+        self._seed = seed
+
+    def close(self) -> None:
+        """See `infthor_eval.runs.BoundEvaluation.close`."""
+        with ExitStack() as stack:  # which closes the others too if one fails
+            for simulators in self._to_close:
+                stack.callback(simulators.close)
+
+    def _fingerprint(self, unit: U) -> str:
+        """Return the hash of everything that an episode depends on."""
+        config = {name: value for name, value in self.workload.config.items() if name != "tasks"}
+        of_task = self.workload.config["tasks"][unit.key.task].items()
+        return fingerprint(
+            {
+                **config,
+                "task": {name: value for name, value in of_task if name not in _OF_ALL_TRAJECTORIES},
+                "trajectory": unit.trajectory.digest,
+                "index": unit.payload.index,
+                "seed": self._seed,
+            }
+        )
+
+    def _find_records(
+        self, group: Group[U], session: Session[P]
+    ) -> tuple[dict[UnitKey, str], dict[UnitKey, UnitRecord[P] | None]]:
+        """Return the fingerprints of a group's units, and the records of those that have a result already."""
+        fingerprints = {unit.key: self._fingerprint(unit) for unit in group.units}
+        return fingerprints, {unit.key: session.find_record(unit, fingerprints[unit.key]) for unit in group.units}

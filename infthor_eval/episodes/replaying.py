@@ -1,0 +1,192 @@
+"""Recorded episodes replayed, so that they can be looked at: a journal has every action, and no frame.
+
+Actions, rewards and endings are shown as the run recorded them. What the subject saw is recomputed: the environment is
+reset to each episode and the recorded calls are repeated, which leads to the same states if the simulator is
+deterministic. Where it does not, a frame notes the first difference.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Collection, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Generic, Protocol, TypeVar
+
+from infthor_eval.episodes.recorded_runs import EpisodePayload, RecordedRun
+from infthor_eval.episodes.replay_frames import EpisodeFrame
+from infthor_eval.episodes.shared_units import only_name
+from infthor_eval.episodes.simulators import Simulators
+from infthor_eval.episodes.trajectory_sets import TaskTrajectory, find_recorded_trajectory
+from infthor_eval.errors import DataError
+from infthor_eval.formats.trajectory import TrajectorySource
+from infthor_eval.runs.records import UnitRecord
+from infthor_eval.thor.simulator import Simulator
+
+__all__ = [
+    "EpisodeInReplay",
+    "RecordedTrajectory",
+    "ReplaySession",
+    "ending_of",
+    "records_of_trajectory",
+    "restore_trajectory",
+]
+
+P = TypeVar("P", bound=EpisodePayload)
+R = TypeVar("R", bound=RecordedRun[Any, Any])
+T = TypeVar("T", bound=TaskTrajectory)
+F = TypeVar("F", bound=EpisodeFrame[Any, Any])
+
+
+@dataclass(frozen=True)
+class RecordedTrajectory(Generic[R, P]):
+    """What a run recorded of one trajectory.
+
+    Attributes:
+        run: the run.
+        trajectory: name of the trajectory.
+        records: records of its episodes, in time order.
+    """
+
+    run: R
+    trajectory: str
+    records: tuple[UnitRecord[P], ...]
+
+    @property
+    def tasks(self) -> list[str]:
+        """Names of the tasks that the records belong to, sorted."""
+        return sorted({record.task for record in self.records})
+
+
+def records_of_trajectory(
+    run: RecordedRun[P, Any], tasks: Collection[str], trajectory: str | None
+) -> tuple[str, tuple[UnitRecord[P], ...]]:
+    """Find a run's records of a trajectory.
+
+    Args:
+        run: the run.
+        tasks: names of the tasks whose records are looked at.
+        trajectory: name of the trajectory; None for the only one.
+
+    Returns:
+        The name and the records in time order.
+
+    Raises:
+        UsageError: there is no such trajectory, or none is given and there are several.
+        DataError: the run has no record yet.
+    """
+    by_trajectory = run.by_trajectory(tasks)
+    if not by_trajectory:
+        raise DataError(f"{run.label}: the run has no record of an episode yet; continue it first")
+    name = only_name("trajectory", "--trajectory", trajectory, sorted(by_trajectory))
+    return name, tuple(by_trajectory[name][place] for place in sorted(by_trajectory[name]))
+
+
+@contextmanager
+def restore_trajectory(
+    recorded: RecordedTrajectory[Any, Any],
+    read: Callable[[TrajectorySource], T],
+    data: Path | None,
+    scenes: Path | None,
+) -> Iterator[tuple[T, Callable[..., Simulator]]]:
+    """Find the trajectory of some records, with a function that starts a simulator like the run's.
+
+    The function takes the options of `Simulator`. Simulators are stopped at the end of the context.
+
+    Args:
+        recorded: the records.
+        read: reads a trajectory of the suite.
+        data: file or folder of the trajectories; None for the set in the package.
+        scenes: folder of recorded floor plans, for the embedded simulator.
+
+    Raises:
+        UsageError: there is no set in the package, and `data` is not given or does not exist.
+        DataError: the trajectory is not among them, or differs from the run's.
+    """
+    task = recorded.records[0].task
+    config = recorded.run.config.tasks[task]
+    digest, bundled = config.trajectories.get(recorded.trajectory), config.settings.get("bundled")
+    available, trajectory = find_recorded_trajectory(task, recorded.trajectory, digest, data, bundled, read)
+    with ExitStack() as stack:
+
+        def start_simulator(**options: Any) -> Simulator:
+            # With all trajectories, as in the run: the embedded simulator completes floor plans from each of them.
+            every = [item.data for item in available.trajectories]
+            simulators = Simulators(recorded.run.config.simulator, scenes, every, instances=False, **options)
+            stack.callback(simulators.close)
+            return stack.enter_context(simulators.one())
+
+        yield trajectory, start_simulator
+
+
+class EpisodeInReplay(Protocol):
+    """An episode that is being replayed."""
+
+    def repeat(self, step: Any, *, is_last: bool) -> str:
+        """Repeat a recorded step; do nothing if the episode is over already.
+
+        Returns:
+            How the result differs from the record; empty if it does not.
+        """
+        ...
+
+    def observe(self) -> Any:
+        """Return what is to be seen now.
+
+        Raises:
+            DataError: the simulator sent no frame.
+        """
+        ...
+
+
+class ReplaySession(ABC, Generic[P, F]):
+    """A simulator in which recorded episodes of one trajectory are replayed."""
+
+    @property
+    @abstractmethod
+    def n_episodes(self) -> int:
+        """Number of episodes of the trajectory."""
+
+    @abstractmethod
+    def _begin(self, record: UnitRecord[P]) -> EpisodeInReplay:
+        """Reset the world to the start of an episode."""
+
+    @abstractmethod
+    def _frame(self, record: UnitRecord[P], number: int, observation: Any, note: str) -> F:
+        """Return the frame after a number of steps; `observation` is None if nobody acted in the episode."""
+
+    @abstractmethod
+    def _place(self, record: UnitRecord[P], number: int) -> str:
+        """Describe a step of an episode."""
+
+    def frames(self, records: Sequence[UnitRecord[P]]) -> Iterator[F]:
+        """Replay some episodes and yield their frames: the start of each, then one per step.
+
+        Raises:
+            DataError: an episode cannot be restored here.
+            SimulatorError: the simulator fails.
+        """
+        for record in records:
+            if record.payload.attempted:
+                yield from self._replay(record)
+            else:
+                yield self._frame(record, 0, None, "")
+
+    def _replay(self, record: UnitRecord[P]) -> Iterator[F]:
+        episode = self._begin(record)
+        yield self._frame(record, 0, episode.observe(), "")
+        steps, differs = record.payload.steps, False
+        for number, step in enumerate(steps, 1):
+            difference = episode.repeat(step, is_last=number == len(steps))
+            # Once the worlds differ all later steps may differ too, so the first difference alone is noted.
+            note = f"{self._place(record, number)}: {difference}" if difference and not differs else ""
+            differs = differs or bool(difference)
+            yield self._frame(record, number, episode.observe(), note)
+
+
+def ending_of(record: UnitRecord[P], number: int) -> str:
+    """Return how an episode ended if it did with that step, or why nobody acted in it; else an empty text."""
+    if record.excluded is not None:
+        return f"excluded: {record.excluded}"
+    if not record.payload.attempted and record.failure is not None:
+        return f"failed: {record.failure}"
+    return record.payload.ended if number == len(record.payload.steps) else ""

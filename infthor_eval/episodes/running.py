@@ -1,0 +1,90 @@
+"""Running the episodes of one trajectory in a simulator, and recording them."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Generic, TypeVar
+
+from infthor_eval.episodes.errors import InfeasibleError
+from infthor_eval.episodes.retries import with_retries
+from infthor_eval.errors import InfthorError, SceneError
+from infthor_eval.runs import NOTHING, Tokens, Unit, UnitRecord, Usage
+from infthor_eval.thor.simulator import Simulator
+
+__all__ = ["EpisodeResult", "EpisodeRunner"]
+
+P = TypeVar("P")
+E = TypeVar("E")
+
+
+@dataclass(frozen=True)
+class EpisodeResult(Generic[P]):
+    """The result of an episode.
+
+    Attributes:
+        payload: payload of its record.
+        tokens: tokens of its requests.
+        faults: faults of the model that were retried.
+    """
+
+    payload: P
+    tokens: Tokens = field(default_factory=Tokens)
+    faults: tuple[str, ...] = ()
+
+
+class EpisodeRunner(Generic[E, P]):
+    """A trajectory's environment, in which one episode is run after the other.
+
+    Attributes:
+        begun: payload of the present episode once it has begun, without steps; recorded if the subject fails.
+        usage: usage of all requests for the present episode, with those of tries that were retried.
+    """
+
+    begun: P | None
+    usage: Usage
+
+    def __init__(self, simulator: Simulator, build: Callable[[], E]) -> None:
+        """Take a simulator.
+
+        Args:
+            simulator: simulator of the trajectory.
+            build: builds the environment, which restores the scene.
+        """
+        self._simulator, self._build = simulator, build
+        self._environment: E | None = None
+
+    @property
+    def environment(self) -> E:
+        """The environment. It is built for the first episode, and again after the simulator failed for good."""
+        if self._environment is None:
+            self._environment = self._build()
+        return self._environment
+
+    def record(self, unit: Unit[P], fingerprint: str, run: Callable[[], EpisodeResult[P]]) -> UnitRecord[P]:
+        """Run an episode and return its record; errors become a record too.
+
+        Args:
+            unit: unit of the episode.
+            fingerprint: fingerprint of its inputs.
+            run: runs the episode in `environment`; called again if the simulator fails for good.
+        """
+        self.begun, self.usage = None, NOTHING
+        start = time.perf_counter()
+        try:
+            result, faults = with_retries(self._simulator, run, self._drop_environment)
+        except (InfeasibleError, SceneError) as error:
+            return unit.excluded(str(error), fingerprint)
+        except InfthorError as error:
+            begun = unit if self.begun is None else replace(unit, payload=self.begun)
+            return begun.failed(str(error), fingerprint, usage=self.usage)
+        return unit.record(
+            fingerprint,
+            result.payload,
+            faults=(*faults, *result.faults),
+            seconds=round(time.perf_counter() - start, 4),
+            tokens=result.tokens,
+            usage=self.usage,
+        )
+
+    def _drop_environment(self) -> None:
+        self._environment = None

@@ -1,0 +1,100 @@
+"""Results of a run of episodes: a pure function of its journal, without times."""
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, Generic, TypeVar
+
+import msgspec
+
+from infthor_eval.episodes.recorded_runs import EpisodePayload
+from infthor_eval.rates import Rate, clustered_rate
+from infthor_eval.runs import UnitRecord
+
+__all__ = [
+    "EpisodeTaskSummary",
+    "EpisodesSummary",
+    "common_results",
+    "counted_records",
+    "success_rate",
+    "summarise_tasks",
+]
+
+P = TypeVar("P", bound=EpisodePayload)
+
+
+class EpisodeTaskSummary(msgspec.Struct, frozen=True, kw_only=True):
+    """Results of one task, as far as plans and arms have them alike.
+
+    Attributes:
+        n_trajectories: trajectories of the episodes that count.
+        n_failed: episodes in which the subject itself failed; they count as no success.
+        excluded: episodes that do not count, by reason.
+        skipped: trajectories that could not be read, by reason.
+        endings: number of episodes by how they ended.
+    """
+
+    n_trajectories: int
+    n_failed: int
+    excluded: dict[str, int]
+    skipped: dict[str, int]
+    endings: dict[str, int]
+
+
+T = TypeVar("T", bound=EpisodeTaskSummary)
+
+
+class EpisodesSummary(msgspec.Struct, Generic[T], frozen=True):
+    """Results of a run.
+
+    Attributes:
+        simulator: simulator of the run.
+        tasks: results of the tasks, by name.
+    """
+
+    simulator: str
+    tasks: dict[str, T]
+
+
+def summarise_tasks(
+    config: Mapping[str, Any],
+    records: Sequence[UnitRecord[P]],
+    summarise_task: Callable[[Mapping[str, Any], list[UnitRecord[P]]], T],
+) -> dict[str, T]:
+    """Return the results of a run's tasks, by name.
+
+    Args:
+        config: config of the run.
+        records: records of all its episodes.
+        summarise_task: returns the results of a task, given its config and its records in order.
+    """
+    ordered = sorted(records, key=lambda record: record.key)
+    return {
+        name: summarise_task(of_task, [record for record in ordered if record.task == name])
+        for name, of_task in config["tasks"].items()
+    }
+
+
+def counted_records(records: Sequence[UnitRecord[P]]) -> list[UnitRecord[P]]:
+    """Return the records that count: those that are not excluded."""
+    return [record for record in records if record.excluded is None]
+
+
+def common_results(config: Mapping[str, Any], records: Sequence[UnitRecord[P]]) -> dict[str, Any]:
+    """Return the fields of `EpisodeTaskSummary`, given a task's config and its records."""
+    counted = counted_records(records)
+    return {
+        "n_trajectories": len({record.cluster for record in counted}),
+        "n_failed": sum(record.failure is not None for record in counted),
+        "excluded": _count(record.excluded for record in records if record.excluded is not None),
+        "skipped": _count(reason for _, reason in config["broken"]),
+        "endings": _count(record.payload.ended or "failed" for record in counted),
+    }
+
+
+def success_rate(records: Sequence[UnitRecord[P]]) -> Rate | None:
+    """Return the share of successes, clustered by trajectory; None if there are no records."""
+    return clustered_rate([float(record.payload.done) for record in records], [record.cluster for record in records])
+
+
+def _count(items: Iterable[str]) -> dict[str, int]:
+    return dict(sorted(Counter(items).items()))

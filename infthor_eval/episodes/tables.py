@@ -1,0 +1,56 @@
+"""Tables of runs of episodes: what plans and manipulation have in common."""
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, TypeVar
+
+from infthor_eval.episodes.summary import EpisodesSummary, EpisodeTaskSummary
+from infthor_eval.runs import RunHeader, RunSummary
+from infthor_eval.tables import Column, Row, Table, left_out_notes
+
+__all__ = ["NAME_COLUMNS", "endings_table", "named_tasks", "result_notes", "run_name"]
+
+NAME_COLUMNS = (Column("model", False), Column("task", False))
+_EMBEDDED = "Made in the embedded simulator: not comparable with the published rows, which are of AI2-THOR in Unity."
+
+T = TypeVar("T", bound=EpisodeTaskSummary)
+
+
+def run_name(header: RunHeader) -> str:
+    """Return the name of a run, with its frames if they are not the actual ones."""
+    frames = header.config["frames"]
+    return header.name if frames == "shown" else f"{header.name}, {frames} frames"
+
+
+def named_tasks(runs: Sequence[RunSummary], kind: type[EpisodesSummary[T]]) -> Iterator[tuple[str, str, T]]:
+    """Yield the run's name, the task's name and the task's results, for all runs."""
+    for run in runs:
+        assert isinstance(run.summary, kind)
+        for task_name, task in run.summary.tasks.items():
+            yield run_name(run.header), task_name, task
+
+
+def endings_table(
+    title: str, tasks: Sequence[tuple[str, str, T]], column: str = "", value: Callable[[T], Any] = str
+) -> Table:
+    """Return the table of how episodes ended.
+
+    Args:
+        title: title of the table.
+        tasks: tasks, see `named_tasks`.
+        column: heading of a further column; empty for none.
+        value: value of a task in it.
+    """
+    endings = list(dict.fromkeys(ending for _, _, task in tasks for ending in task.endings))
+    further = [column] if column else []
+    rows = [
+        Row((*names, *(str(task.endings.get(ending, 0)) for ending in endings), *(str(value(task)) for _ in further)))
+        for *names, task in tasks
+    ]
+    return Table(title, (*NAME_COLUMNS, *map(Column, (*endings, *further))), tuple(rows))
+
+
+def result_notes(runs: Sequence[RunSummary]) -> tuple[str, ...]:
+    """Return the notes below tables of results: on the embedded simulator, and on what was left out."""
+    notes = [_EMBEDDED] if any(run.summary.simulator == "embedded" for run in runs) else []
+    left_out = left_out_notes([[(t.excluded, t.skipped) for t in run.summary.tasks.values()] for run in runs])
+    return (*notes, *left_out)

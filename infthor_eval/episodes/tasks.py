@@ -1,0 +1,56 @@
+"""Task files of suites whose tasks are episodes in trajectories."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable
+from typing import Any, Generic, Protocol, TypeVar
+
+from infthor_eval.episodes.trajectory_sets import TaskTrajectory, TrajectorySet, find_trajectories
+from infthor_eval.formats.trajectory import TrajectorySource
+from infthor_eval.runs import TaskFile, TaskRequest
+
+__all__ = ["EpisodeTask"]
+
+
+class _Settings(Protocol):
+    @property
+    def bundled(self) -> str | None: ...
+
+
+S = TypeVar("S", bound=_Settings)
+T = TypeVar("T", bound=TaskTrajectory)
+
+
+class EpisodeTask(ABC, Generic[S, T]):
+    """A task file that was read, with its trajectories.
+
+    Attributes:
+        file: the task file.
+        name: name of the task.
+        settings: its `dataset_kwargs`, with what the command line gives instead.
+        trajectories: all its trajectories.
+    """
+
+    def __init__(
+        self, file: TaskFile, request: TaskRequest[Any], settings: S, read: Callable[[TrajectorySource], T]
+    ) -> None:
+        """Find the trajectories of a task file.
+
+        Raises:
+            UsageError: there are no trajectories.
+            DataError: none of them can be used.
+        """
+        self.file, self.name, self.settings = file, file.name, settings
+        self.trajectories: TrajectorySet[T] = find_trajectories(request.data, settings.bundled, read)
+
+    @abstractmethod
+    def config(self) -> dict[str, Any]:
+        """Return everything that the task's numbers depend on, as JSON values."""
+
+    def _config(self, used: Iterable[T], **settings: Any) -> dict[str, Any]:
+        """Return the config, given the trajectories that are used and the suite's own settings."""
+        return {
+            "config": dict(self.file.settings),
+            "trajectories": {trajectory.traj_id: trajectory.digest for trajectory in used},
+            "broken": [list(item) for item in self.trajectories.broken],
+            **settings,
+        }

@@ -1,0 +1,90 @@
+"""The true states in which episodes of an arm begin: before each pick-up and put of a trajectory's expert."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from infthor_eval.episodes.errors import InfeasibleError
+from infthor_eval.formats.trajectory import LowAction, Trajectory
+from infthor_eval.manipulation.kinds import ManipulationKind
+from infthor_eval.manipulation.trajectories import EXPERT_ACTIONS, ArmEpisode
+from infthor_eval.thor.grounding import Grounding
+from infthor_eval.thor.recorded import MissingObjectError, translate
+from infthor_eval.thor.restore import restore
+from infthor_eval.thor.simulator import Simulator
+from infthor_eval.thor.view import SimulatorView
+
+__all__ = ["EpisodeStart", "ExpertStates", "replay_expert"]
+
+
+@dataclass(frozen=True)
+class EpisodeStart:
+    """The true state before an episode.
+
+    Attributes:
+        view: the world at that time.
+        object_id: id of the object that is picked up or put, in this simulator.
+        receptacle_id: id of the receptacle that it is put into; None for pick-ups.
+    """
+
+    view: SimulatorView
+    object_id: str
+    receptacle_id: str | None = None
+
+
+@dataclass(frozen=True)
+class ExpertStates:
+    """The true states of a trajectory, up to the first expert action that this simulator refuses.
+
+    Attributes:
+        starts: states by the low-level action that follows.
+        refusal: what was refused; empty if nothing was.
+    """
+
+    starts: Mapping[int, EpisodeStart]
+    refusal: str = ""
+
+    def before(self, episode: ArmEpisode) -> EpisodeStart:
+        """Return the state before an episode.
+
+        Raises:
+            InfeasibleError: this simulator refuses an action of the expert up to its end.
+        """
+        start = self.starts.get(episode.index)
+        if start is None:
+            raise InfeasibleError(self.refusal)
+        return start
+
+
+def replay_expert(trajectory: Trajectory, simulator: Simulator) -> ExpertStates:
+    """Replay the expert's actions, and keep the state before each pick-up and put that succeeds.
+
+    Args:
+        trajectory: the trajectory.
+        simulator: simulator with AI2-THOR's default agent; it is left in the trajectory's last state.
+
+    Raises:
+        SceneError: the simulator has no such scene.
+        SimulatorError: the simulator fails.
+    """
+    restore(simulator, trajectory.scene)
+    grounding = Grounding(simulator.view)
+    starts: dict[int, EpisodeStart] = {}
+    for number, low in enumerate(trajectory.plan.low_actions):
+        before = simulator.view
+        try:
+            call = translate(low, grounding, before)
+        except MissingObjectError as error:
+            return ExpertStates(starts, _refusal(number, low, str(error)))
+        after = simulator.step(**call)
+        if not after.success:
+            return ExpertStates(starts, _refusal(number, low, after.error or "refused without a message"))
+        kind = EXPERT_ACTIONS.get(low.api_action.action)
+        if kind == ManipulationKind.PICKUP:
+            starts[number] = EpisodeStart(before, call["objectId"])
+        elif kind == ManipulationKind.PUT:
+            starts[number] = EpisodeStart(before, before.inventory[0], call["objectId"])
+    return ExpertStates(starts)
+
+
+def _refusal(number: int, low: LowAction, why: str) -> str:
+    return f"the expert's action {number} ({low.api_action.action}) is refused here: {why}"

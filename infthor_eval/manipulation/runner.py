@@ -1,0 +1,131 @@
+"""Running an arm's episodes of one trajectory."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import msgspec
+
+from infthor_eval.episodes.running import EpisodeResult, EpisodeRunner
+from infthor_eval.formats.scratch import ScratchFolder
+from infthor_eval.formats.trajectory import Trajectory
+from infthor_eval.manipulation.actors import ArmActor, ArmSituation, Step
+from infthor_eval.manipulation.environment import ArmEnvironment, ArmOutcome, arm_of
+from infthor_eval.manipulation.expert import ExpertStates
+from infthor_eval.manipulation.geometry import point_of
+from infthor_eval.manipulation.records import ArmEnded, ArmRecord, ArmStep
+from infthor_eval.manipulation.task import ManipulationTask
+from infthor_eval.manipulation.trajectories import ArmEpisode
+from infthor_eval.thor.frames import FrameFolder, FrameKeeper, NoFrames
+from infthor_eval.thor.simulator import Simulator
+from model_adapters import ArmDelta
+
+__all__ = ["ArmRunner", "arm_record"]
+
+_DIGITS = 6  # of metres and rewards; more would be rounding noise
+
+
+def arm_record(task: ManipulationTask, episode: ArmEpisode) -> ArmRecord:
+    """Return the record of an episode before anybody acts."""
+    return ArmRecord(
+        index=episode.index,
+        kind=str(episode.kind),
+        instruction=task.instruction(episode),
+        max_reward=task.settings.reward,
+    )
+
+
+class ArmRunner(EpisodeRunner[ArmEnvironment, ArmRecord]):
+    """A trajectory with an arm in it."""
+
+    def __init__(
+        self,
+        trajectory: Trajectory,
+        states: ExpertStates,
+        simulator: Simulator,
+        actor: ArmActor,
+        *,
+        sees: bool,
+        seed: int,
+    ) -> None:
+        """Take a trajectory.
+
+        Args:
+            trajectory: the trajectory.
+            states: the true states that its episodes begin in.
+            simulator: simulator of an agent with an arm.
+            actor: actor that drives the arm.
+            sees: whether the actor looks at frames.
+            seed: seed of the run.
+        """
+        super().__init__(simulator, lambda: ArmEnvironment(trajectory, simulator))
+        self._states, self._actor, self._sees = states, actor, sees
+        self._seed = f"{seed}/{trajectory.traj_id}"
+
+    def run(self, task: ManipulationTask, episode: ArmEpisode) -> EpisodeResult[ArmRecord]:
+        """Run an episode.
+
+        Raises:
+            InfeasibleError: this simulator refuses an action of the expert before it, or cannot restore its start.
+            DataError: a frame cannot be written or read.
+            ModelError: the policy fails.
+            SimulatorError: the simulator fails.
+        """
+        start = self._states.before(episode)
+        with self._frames() as frames:
+            environment = self.environment
+            outcome = environment.reset(episode, start, task.settings.conversion, task.settings.grasp, frames)
+            self.begun = msgspec.structs.replace(
+                arm_record(task, episode),
+                object_id=start.object_id,
+                receptacle_id=start.receptacle_id,
+                starts_inside=environment.starts_inside,
+                start_distance=round(outcome.distance, _DIGITS),
+            )
+            seed = f"{self._seed}/{task.name}/{episode.index}"
+            self._actor.begin(ArmSituation(environment, self.begun.instruction, seed, task.settings.max_step))
+            steps, ended = self._act(environment, outcome, task.settings.max_steps)
+        closest = min([outcome.distance, *(step.distance for step in steps)])
+        reward = task.settings.reward if ended == ArmEnded.DONE else 0.0
+        return EpisodeResult(
+            msgspec.structs.replace(
+                self.begun, steps=tuple(steps), closest=round(closest, _DIGITS), reward=reward, ended=str(ended)
+            )
+        )
+
+    def _act(self, environment: ArmEnvironment, outcome: ArmOutcome, max_steps: int) -> tuple[list[ArmStep], ArmEnded]:
+        """Let the actor act until the episode is over; the steps of a chunk are executed before it is asked again."""
+        steps: list[ArmStep] = []
+        chunk: list[Step] = []
+        while outcome.ended is None:
+            if len(steps) >= max_steps:
+                return steps, ArmEnded.LIMIT
+            chunk = chunk or list(self._actor.act(outcome.frame))
+            if not chunk:
+                return steps, ArmEnded.GAVE_UP
+            step = chunk.pop(0)
+            outcome = environment.step(step)
+            steps.append(_arm_step(step, outcome))
+        return steps, outcome.ended
+
+    @contextmanager
+    def _frames(self) -> Iterator[FrameKeeper]:
+        """Keep frames for the length of an episode."""
+        if not self._sees:
+            yield NoFrames()
+            return
+        with ScratchFolder() as folder:
+            yield FrameFolder(folder)
+
+
+def _arm_step(step: Step, outcome: ArmOutcome) -> ArmStep:
+    x, y, z = (round(value, _DIGITS) for value in point_of(arm_of(outcome.view).sphere_center))
+    delta = None
+    if isinstance(step, ArmDelta):
+        delta = tuple(round(number, _DIGITS) for number in (*step.translation, *step.rotation, step.gripper))
+    return ArmStep(
+        delta=delta,
+        calls=outcome.calls,
+        hand=(x, y, z),
+        distance=round(outcome.distance, _DIGITS),
+        refusals=outcome.refusals,
+    )

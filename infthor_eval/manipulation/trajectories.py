@@ -1,0 +1,77 @@
+"""The trajectories of a task of manipulation, and the episodes in them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from infthor_eval.episodes.trajectory_sets import TaskTrajectory
+from infthor_eval.errors import DataError
+from infthor_eval.formats.digests import digest
+from infthor_eval.formats.trajectory import LowAction, Trajectory, TrajectorySource
+from infthor_eval.manipulation.kinds import ManipulationKind
+from infthor_eval.thor.actions import object_type_of
+
+__all__ = ["EXPERT_ACTIONS", "ArmEpisode", "ArmTrajectory", "arm_episodes", "read_arm_trajectory"]
+
+EXPERT_ACTIONS = {"PickupObject": ManipulationKind.PICKUP, "PutObject": ManipulationKind.PUT}
+
+
+@dataclass(frozen=True)
+class ArmEpisode:
+    """A pick-up or put of the expert, which an arm does instead.
+
+    Attributes:
+        index: index of the expert's low-level action.
+        kind: kind of the episode.
+        object_type: type of the object that is picked up or put.
+        receptacle_type: type of the receptacle that it is put into; None for pick-ups.
+    """
+
+    index: int
+    kind: ManipulationKind
+    object_type: str
+    receptacle_type: str | None = None
+
+
+@dataclass(frozen=True)
+class ArmTrajectory(TaskTrajectory):
+    """A trajectory with its episodes.
+
+    Attributes:
+        episodes: its episodes, in time order.
+    """
+
+    episodes: Sequence[ArmEpisode]
+
+
+def arm_episodes(trajectory: Trajectory) -> list[ArmEpisode]:
+    """Return the pick-ups and puts of a trajectory, in time order.
+
+    Raises:
+        DataError: one of them names no object.
+    """
+    numbered = enumerate(trajectory.plan.low_actions)
+    return [_episode(number, low) for number, low in numbered if low.api_action.action in EXPERT_ACTIONS]
+
+
+def read_arm_trajectory(source: TrajectorySource) -> ArmTrajectory:
+    """Read a trajectory and its episodes.
+
+    Raises:
+        DataError: it cannot be used.
+    """
+    trajectory = source.read()
+    try:
+        episodes = arm_episodes(trajectory)
+    except DataError as error:
+        raise DataError(f"{source.place}: {error}") from error
+    return ArmTrajectory(trajectory, digest(source.raw.strip()), episodes)
+
+
+def _episode(number: int, low: LowAction) -> ArmEpisode:
+    recorded = low.api_action
+    if recorded.object_id is None or (recorded.action == "PutObject" and recorded.receptacle_id is None):
+        raise DataError(f"action {number} ({recorded.action}) names no object; restore the file")
+    receptacle = None if recorded.receptacle_id is None else object_type_of(recorded.receptacle_id)
+    kind = EXPERT_ACTIONS[recorded.action]
+    where = receptacle if kind == ManipulationKind.PUT else None
+    return ArmEpisode(number, kind, object_type_of(recorded.object_id), where)

@@ -1,0 +1,43 @@
+"""The actors of a subject: a model that is prompted as the task says, or a baseline."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from infthor_eval.formats.trajectory import Trajectory
+from infthor_eval.plans.actors import PlanActor, PlanBaseline
+from infthor_eval.plans.model_actor import ModelActor
+from infthor_eval.plans.task import PlansTask
+from model_adapters import Model, Subject
+
+__all__ = ["ActorFactory", "actor_factory"]
+
+
+@dataclass(frozen=True)
+class ActorFactory:
+    """Creates the actors of a subject.
+
+    Attributes:
+        sees: whether they look at frames.
+        create: creates the actor of a task's trajectory.
+    """
+
+    sees: bool
+    create: Callable[[PlansTask, Trajectory], PlanActor]
+
+
+def actor_factory(subject: Subject, trajectories: Sequence[Trajectory]) -> ActorFactory:
+    """Return the factory of a subject.
+
+    Args:
+        subject: a model, or a baseline, which is fitted to the trajectories.
+        trajectories: all trajectories of the run.
+
+    Raises:
+        TypeError: it is neither a model nor a baseline; runs refuse that before.
+    """
+    if isinstance(subject, PlanBaseline):
+        subject.fit(trajectories)
+        return ActorFactory(False, lambda _, trajectory: subject.actor(trajectory))
+    if isinstance(subject, Model):
+        return ActorFactory(True, lambda task, _: ModelActor(subject, task.agent_config()))
+    raise TypeError(f"{subject.name} is neither a model nor a baseline of plans")

@@ -1,0 +1,152 @@
+"""Leading an actor through a trajectory, plan by plan (Algorithm 2)."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import msgspec
+
+from infthor_eval.episodes.running import EpisodeResult, EpisodeRunner
+from infthor_eval.plans.actor_factory import ActorFactory
+from infthor_eval.plans.actors import Act, PlanSituation
+from infthor_eval.plans.environment import PlanEnvironment, StepOutcome
+from infthor_eval.plans.plan import Plan
+from infthor_eval.plans.records import NOT_ATTEMPTED, PlanRecord, StepRecord
+from infthor_eval.plans.task import PlansTask
+from infthor_eval.plans.trajectories import PlanTrajectory
+from infthor_eval.runs import Tokens, Usage
+from infthor_eval.thor.frames import FrameFolder, NoFrames
+from infthor_eval.thor.simulator import Simulator
+from model_adapters import Reply
+
+__all__ = ["PlanRunner", "plan_record"]
+
+_DIGITS = 6  # of rewards; more would be rounding noise
+
+
+def plan_record(trajectory: PlanTrajectory, plan: Plan) -> PlanRecord:
+    """Return the record of a plan before anybody acts."""
+    first, end = plan.low
+    return PlanRecord(
+        index=plan.index,
+        kind=str(plan.kind),
+        plan=plan.text,
+        goal=trajectory.tasks[plan.task].text,
+        task=plan.task,
+        first_step=first,
+        n_expert_steps=end - first,
+        is_final=plan.is_final,
+    )
+
+
+class PlanRunner(EpisodeRunner[PlanEnvironment, PlanRecord]):
+    """A trajectory with an actor in it."""
+
+    def __init__(
+        self,
+        task: PlansTask,
+        trajectory: PlanTrajectory,
+        factory: ActorFactory,
+        simulator: Simulator,
+        folder: Path,
+        seed: int,
+    ) -> None:
+        """Take a trajectory.
+
+        Args:
+            task: the task.
+            trajectory: its trajectory.
+            factory: creates the actor.
+            simulator: simulator of the trajectory.
+            folder: empty folder for frames.
+            seed: seed of the run.
+        """
+        frames = FrameFolder(folder) if factory.sees else NoFrames()
+        super().__init__(
+            simulator,
+            lambda: PlanEnvironment(
+                trajectory.data,
+                simulator,
+                rules=task.rules,
+                max_steps=task.settings.max_steps,
+                frames=frames,
+                in_words=factory.sees and task.memory.needs_state,
+            ),
+        )
+        self._trajectory, self._actor = trajectory, factory.create(task, trajectory.data)
+        self._seed = f"{seed}/{task.name}/{trajectory.traj_id}"
+
+    def run(self, plan: Plan) -> EpisodeResult[PlanRecord]:
+        """Run a plan from its true start.
+
+        Raises:
+            InfeasibleError: this simulator refuses an action of the expert before the plan's end, or lacks an object of
+                the plan.
+            DataError: a frame cannot be written or read.
+            ModelError: the model fails.
+            SceneError: the simulator has no such scene.
+            SimulatorError: the simulator fails.
+        """
+        environment = self.environment
+        observation, info = environment.reset(plan.index)
+        record = plan_record(self._trajectory, plan)
+        self.begun = msgspec.structs.replace(record, max_reward=round(info["max_reward"], _DIGITS))
+        self._actor.begin(PlanSituation(environment, plan, f"{self._seed}/{plan.index}", observation))
+        acts: list[tuple[Act, StepOutcome]] = []
+        while not acts or not (acts[-1][1].terminated or acts[-1][1].truncated):
+            if acts:
+                self._actor.observe(acts[-1][1])
+            act = self._actor.act()
+            if act.reply is not None:
+                self.usage = Usage.total([self.usage, Usage.of([act.reply])])
+            acts.append((act, environment.step(act.action)))
+        replies = [act.reply for act, _ in acts if act.reply is not None]
+        faults = tuple(fault for reply in replies for fault in reply.faults)
+        return EpisodeResult(_completed_record(self.begun, acts), _tokens(replies), faults)
+
+    def pass_over(self, plan: Plan) -> EpisodeResult[PlanRecord]:
+        """Leave out a plan after an earlier one ended the trajectory.
+
+        The expert's actions are replayed nevertheless: an infeasible plan is excluded for every subject, attempted or
+        not, so that all have the same denominator.
+
+        Raises:
+            InfeasibleError: as `run`.
+            SimulatorError: as `run`.
+        """
+        self.environment.expert_actions(plan.index)
+        return EpisodeResult(msgspec.structs.replace(plan_record(self._trajectory, plan), ended=NOT_ATTEMPTED))
+
+
+def _completed_record(begun: PlanRecord, acts: Sequence[tuple[Act, StepOutcome]]) -> PlanRecord:
+    _, last = acts[-1]
+    return msgspec.structs.replace(
+        begun,
+        steps=tuple(_step_record(act, outcome) for act, outcome in acts),
+        reward=round(sum(outcome.reward for _, outcome in acts), _DIGITS),
+        ended=str(last.info.ended),
+        goal_reached=any(outcome.info.goal_reached for _, outcome in acts),
+    )
+
+
+def _step_record(act: Act, outcome: StepOutcome) -> StepRecord:
+    info, reply = outcome.info, act.reply
+    return StepRecord(
+        reply=None if reply is None else reply.text,
+        action=info.action,
+        call=None if info.call is None else dict(info.call),
+        message=info.message,
+        reward=round(outcome.reward, _DIGITS),
+        n_context_tokens=None if reply is None else reply.n_context_tokens,
+    )
+
+
+def _tokens(replies: Sequence[Reply]) -> Tokens:
+    """Return the context of the last request, which holds those before it, and the tokens of all replies."""
+    if not replies:
+        return Tokens()
+    counts = [reply.n_reply_tokens for reply in replies]
+    return Tokens(
+        context=replies[-1].n_context_tokens,
+        cached=replies[-1].n_cached_tokens,
+        reply=None if None in counts else sum(count for count in counts if count is not None),
+    )
