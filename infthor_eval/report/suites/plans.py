@@ -44,7 +44,7 @@ class PlansReplay:
         recorded = recorded_plans(_plans_run(run), selection.task, selection.trajectory)
         return Recording(
             trajectory=recorded.trajectory,
-            tasks=(recorded.tasks,),
+            tasks=recorded.tasks,
             records=_select_plans(recorded, selection.plans),
             simulator=recorded.run.config.simulator,
             open=lambda data, scenes: replay_plans(recorded, data, scenes),
