@@ -1,40 +1,51 @@
-"""Two runs of one suite on the same units: by how much the second is better, and how surely."""
+"""Two runs of one suite on the same units: the difference of their scores, with interval and p value."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from infthor_eval.errors import DataError
+from infthor_eval.report.presenter import Presenter
 from infthor_eval.runs import Suite, UnitRecord
 from infthor_eval.statistics import Difference, paired_difference
-from infthor_eval.tables import Column, Row, Table
+from infthor_eval.tables import Column, Row, Table, interval_cell
 
 __all__ = ["Comparison", "compare", "comparison_table"]
+
+Record = UnitRecord[Any]
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """One task, one metric.
+    """A metric of a task in two runs.
 
     Attributes:
-        task: the task.
-        metric: which metric of the suite.
+        task: name of the task.
+        metric: name of the metric.
+        is_share: whether the metric is a share, which is shown in percent.
         first: mean score of the first run on the shared units.
-        second: that of the second run.
+        second: mean score of the second run on them.
         difference: second minus first, paired by unit and clustered.
-        n_unshared: units that only one of the runs evaluated; they are not compared.
+        n_unshared: number of units that only one of the runs evaluated; they are not compared.
     """
 
     task: str
     metric: str
+    is_share: bool
     first: float
     second: float
     difference: Difference
     n_unshared: int
 
 
-def compare(suite: Suite, first: Iterable[UnitRecord[Any]], second: Iterable[UnitRecord[Any]]) -> list[Comparison]:
+def compare(suite: Suite, presenter: Presenter, first: Iterable[Record], second: Iterable[Record]) -> list[Comparison]:
     """Compare two runs on the units that both evaluated.
+
+    Args:
+        suite: suite of the runs.
+        presenter: presenter of the suite.
+        first: records of the first run.
+        second: records of the second run.
 
     Raises:
         DataError: they share no unit.
@@ -42,46 +53,50 @@ def compare(suite: Suite, first: Iterable[UnitRecord[Any]], second: Iterable[Uni
     ours, theirs = ({record.key: record for record in records} for records in (first, second))
     if not ours.keys() & theirs.keys():
         raise DataError("the two runs share no unit of the same task; compare runs on the same data")
-    found = []
+    comparisons: list[Comparison] = []
     for task in sorted({key.task for key in ours.keys() & theirs.keys()}):
         pairs = [(ours[key], theirs[key]) for key in ours if key in theirs and key.task == task]
-        unshared = sum(key.task == task for key in ours.keys() ^ theirs.keys())
-        found += _of_task(suite, task, pairs, unshared)
-    return found
+        n_unshared = sum(key.task == task for key in ours.keys() ^ theirs.keys())
+        comparisons += _compare_task(suite, presenter, task, pairs, n_unshared)
+    return comparisons
 
 
-def _of_task(
-    suite: Suite, task: str, pairs: Sequence[tuple[UnitRecord[Any], UnitRecord[Any]]], unshared: int
-) -> list[Comparison]:
-    scores = [(suite.scores(a), suite.scores(b)) for a, b in pairs]
-    clusters = [a.cluster for a, _ in pairs]
-    found = []
-    for metric in dict.fromkeys(name for a, b in scores for name in (*a, *b)):
-        first, second = [a.get(metric, 0.0) for a, _ in scores], [b.get(metric, 0.0) for _, b in scores]
-        difference = paired_difference(first, second, clusters)
+def _compare_task(
+    suite: Suite, presenter: Presenter, task: str, pairs: Sequence[tuple[Record, Record]], n_unshared: int
+) -> Iterator[Comparison]:
+    scores = [(suite.scores(ours), suite.scores(theirs)) for ours, theirs in pairs]
+    clusters = [ours.cluster for ours, _ in pairs]
+    for metric in dict.fromkeys(name for pair in scores for of_run in pair for name in of_run):
+        first, second = ([pair[place].get(metric, 0.0) for pair in scores] for place in (0, 1))
+        is_share = presenter.is_share(metric, [*first, *second])
         means = sum(first) / len(first), sum(second) / len(second)
-        found.append(Comparison(task, metric, *means, difference, unshared))
-    return found
+        yield Comparison(task, metric, is_share, *means, paired_difference(first, second, clusters), n_unshared)
 
 
-def comparison_table(rows: Sequence[Comparison], first: str, second: str) -> Table:
-    """Differences in percentage points: a row per task and metric.
+def comparison_table(comparisons: Sequence[Comparison], first: str, second: str) -> Table:
+    """Return a table with a row per task and metric, each in its own unit.
 
     Args:
-        rows: what `compare` found.
-        first: the first run's name.
-        second: the second run's name.
+        comparisons: result of `compare`.
+        first: name of the first run.
+        second: name of the second run.
     """
     numbers = ("first", "second", "difference", "95 % interval", "p", "units", "only in one")
-    columns = (Column("task", False), Column("metric", False), *map(Column, numbers))
-    return Table(f"{second} against {first}, in %", columns, tuple(map(_row, rows)))
+    columns = (Column("task", False), Column("metric", False), Column("unit", False), *map(Column, numbers))
+    return Table(f"{second} against {first}", columns, tuple(map(_row, comparisons)))
 
 
-def _row(found: Comparison) -> Row:
-    estimate, p = found.difference.estimate, found.difference.p
-    interval = significance = "-"  # one cluster alone tells nothing about others
-    if estimate.low is not None and estimate.high is not None and p is not None:
-        interval, significance = f"[{100 * estimate.low:+.2f}, {100 * estimate.high:+.2f}]", f"{p:.4f}"
-    means = (f"{100 * found.first:.2f}", f"{100 * found.second:.2f}", f"{100 * estimate.mean:+.2f}")
-    counts = (str(estimate.n), str(found.n_unshared))
-    return Row((found.task, found.metric, *means, interval, significance, *counts))
+def _row(comparison: Comparison) -> Row:
+    unit, factor = ("%", 100.0) if comparison.is_share else ("points", 1.0)
+    estimate, p = comparison.difference.estimate, comparison.difference.p
+    low, high = (None if end is None else factor * end for end in (estimate.low, estimate.high))
+    numbers = (
+        f"{factor * comparison.first:.2f}",
+        f"{factor * comparison.second:.2f}",
+        f"{factor * estimate.mean:+.2f}",
+        interval_cell(low, high, "+.2f"),
+        "-" if p is None else f"{p:.4f}",  # a single cluster has neither interval nor p
+        str(estimate.n),
+        str(comparison.n_unshared),
+    )
+    return Row((comparison.task, comparison.metric, unit, *numbers))

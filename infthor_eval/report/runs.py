@@ -11,13 +11,14 @@ import msgspec
 from infthor_eval.errors import UsageError
 from infthor_eval.runs import RunHeader, RunSummary, Suite, UnitKey, UnitRecord, Usage, read_header
 from infthor_eval.runs.configuration import read_configuration
+from infthor_eval.runs.run_labels import label_runs
 from infthor_eval.runs.run_search import read_results
 from infthor_eval.runs.shards import read_shards
 
 if TYPE_CHECKING:
     from infthor_eval.report.presenter import Presenter
 
-__all__ = ["ReportRun", "model_names", "read_report_runs", "records_by_unit", "run_labels"]
+__all__ = ["ReportRun", "label_report_runs", "read_report_runs", "records_by_unit"]
 
 
 @dataclass(frozen=True)
@@ -27,10 +28,10 @@ class ReportRun:
     Attributes:
         folder: folder of the run.
         label: name of the run beside the others.
-        model: name of the model, the same for runs that differ in other settings.
+        model: name of the model, the same for runs that differ in other settings; with what replaces the frames.
         suite: suite of the run.
         presenter: presenter of the suite.
-        header: first line of the journal; its name is `label` where names alone would be ambiguous.
+        header: first line of the journal; its name has the options that tell runs of one name apart.
         records: records of all units.
         usage: tokens and requests of the whole run.
         n_missing: number of units that were not attempted; None if unknown.
@@ -91,26 +92,22 @@ def read_report_runs(
     if len({folder.resolve() for folder in folders}) < len(folders):
         raise UsageError("one run is given twice; give each once")
     headers = [read_header(folder) for folder in folders]
-    models = model_names(headers)
     return [
-        _read(folder, label, model, header, suite_named(header.suite), presenter_of(header.suite))
-        for folder, label, model, header in zip(folders, run_labels(folders, models), models, headers, strict=True)
+        _read(folder, header, name, suite_named(header.suite), presenter_of(header.suite))
+        for folder, header, name in zip(folders, headers, _distinct_names(folders, headers), strict=True)
     ]
 
 
-def _read(folder: Path, label: str, model: str, header: RunHeader, suite: Suite, presenter: "Presenter") -> ReportRun:
-    log, results, configuration = (
-        read_shards(folder, suite.records.decoder()),
-        read_results(folder),
-        read_configuration(folder),
-    )
+def _read(folder: Path, header: RunHeader, name: str, suite: Suite, presenter: "Presenter") -> ReportRun:
+    log = read_shards(folder, suite.records.decoder())
+    results, configuration = read_results(folder), read_configuration(folder)
     return ReportRun(
         folder=folder,
-        label=label,
-        model=model,
+        label=_with_frames(name, header),
+        model=_with_frames(header.name, header),
         suite=suite,
         presenter=presenter,
-        header=header if label == model else msgspec.structs.replace(header, name=label),
+        header=msgspec.structs.replace(header, name=name),
         records=tuple(log.records),
         usage=log.usage,
         n_missing=results.n_missing if results else None,
@@ -119,21 +116,28 @@ def _read(folder: Path, label: str, model: str, header: RunHeader, suite: Suite,
     )
 
 
-def run_labels(folders: Sequence[Path], names: Sequence[str]) -> list[str]:
-    """Return a label per run: its name, with its folder where several runs have one name."""
-    places = [f"{name} ({folder.name})" for name, folder in zip(names, folders, strict=True)]
-    labels = [place if names.count(name) > 1 else name for name, place in zip(names, places, strict=True)]
-    return [str(folder) if labels.count(name) > 1 else name for name, folder in zip(labels, folders, strict=True)]
+def label_report_runs(folders: Sequence[Path], headers: Sequence[RunHeader]) -> list[str]:
+    """Return a label per run: its name, with the options that tell runs of one name apart, or with its folder.
+
+    Raises:
+        DataError: the `run.yaml` of a run is not what it should be.
+    """
+    return [_with_frames(*named) for named in zip(_distinct_names(folders, headers), headers, strict=True)]
 
 
-def model_names(headers: Sequence[RunHeader]) -> list[str]:
-    """Return the name of each run's model, the same for runs that differ in other settings."""
-    return [_model_name(header) for header in headers]
+def _distinct_names(folders: Sequence[Path], headers: Sequence[RunHeader]) -> list[str]:
+    """Return a name per run; the frames are not part of it, since tables add them to the name."""
+    names = label_runs(list(zip(folders, headers, strict=True)), ignore={"frames"})
+    keys = [(name, header.suite, header.config.get("frames")) for name, header in zip(names, headers, strict=True)]
+    return [
+        f"{name} ({folder.name})" if keys.count(key) > 1 else name
+        for name, key, folder in zip(names, keys, folders, strict=True)
+    ]
 
 
-def _model_name(header: RunHeader) -> str:
+def _with_frames(name: str, header: RunHeader) -> str:
     frames = header.config.get("frames", "shown")
-    return header.name if frames == "shown" else f"{header.name}, {frames} frames"
+    return name if frames == "shown" else f"{name}, {frames} frames"
 
 
 def records_by_unit(runs: Sequence[ReportRun]) -> Mapping[UnitKey, list[UnitRecord[Any] | None]]:

@@ -3,6 +3,7 @@ from rich.console import Console
 from infthor_eval.nieh.suite import NiehSuite
 from infthor_eval.nieh.tables import clues_table, tables
 from infthor_eval.report.comparison import compare
+from infthor_eval.report.suites.nieh import NiehPresenter
 from infthor_eval.report.terminal import print_table
 
 from .made import identity, record, run_of
@@ -142,7 +143,7 @@ def test_a_run_is_set_against_the_same_models_run_on_blank_frames():
 def test_the_interval_of_a_gain_is_that_of_the_comparison_of_both_runs():
     ours, theirs = ([*right_but_every(nth, 37), record(40, None, failure="too long")] for nth in (5, 3))
     (table,) = gains(run_of(identity(), ours[::-1]), run_of(identity(frames="blank"), theirs))
-    for compared in compare(NiehSuite(), theirs, ours):
+    for compared in compare(NiehSuite(), NiehPresenter(), theirs, ours):
         (row,) = [row for row in table.rows if row.cells[2] == compared.metric]
         estimate = compared.difference.estimate
         assert row.cells[6:8] == (

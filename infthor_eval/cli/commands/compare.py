@@ -13,22 +13,23 @@ __all__ = ["command"]
 @click.argument("first", type=click.Path(path_type=Path))
 @click.argument("second", type=click.Path(path_type=Path))
 def command(first: Path, second: Path) -> None:
-    """Say by how much the run in folder SECOND is better than that in FIRST.
+    """Print by how much the run in folder SECOND is better than that in FIRST.
 
-    What both evaluated is paired; intervals and p values are clustered by trajectory.
+    Units that both evaluated are paired; intervals and p values are clustered by trajectory.
     """
     from infthor_eval.errors import UsageError
     from infthor_eval.report.comparison import compare, comparison_table
+    from infthor_eval.report.runs import label_report_runs
     from infthor_eval.report.terminal import print_table, table_console
     from infthor_eval.runs import read_header, read_run
-    from infthor_eval.suites import suite_named
+    from infthor_eval.suites import presenter_of, suite_named
 
-    headers = [read_header(folder) for folder in (first, second)]
-    if headers[0].suite != headers[1].suite:
-        raise UsageError(f"{first} is a run of {headers[0].suite}, {second} of {headers[1].suite}; compare like runs")
-    suite = suite_named(headers[0].suite)
-    records = [read_run(folder, suite.records)[1] for folder in (first, second)]
-    names = [header.name for header in headers]
-    if names[0] == names[1]:  # the folders' names tell them apart
-        names = [f"{name} ({folder.name})" for name, folder in zip(names, (first, second), strict=True)]
-    print_table(comparison_table(compare(suite, *records), *names), table_console())
+    folders = (first, second)
+    headers = [read_header(folder) for folder in folders]
+    name, other = (header.suite for header in headers)
+    if name != other:
+        raise UsageError(f"{first} is a run of {name}, {second} of {other}; compare runs of one suite")
+    suite = suite_named(name)
+    records = [read_run(folder, suite.records)[1] for folder in folders]
+    comparisons = compare(suite, presenter_of(name), *records)
+    print_table(comparison_table(comparisons, *label_report_runs(folders, headers)), table_console())

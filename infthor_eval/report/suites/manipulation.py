@@ -12,14 +12,12 @@ from infthor_eval.manipulation.curves import arm_curves
 from infthor_eval.manipulation.radii import success_by_radius
 from infthor_eval.manipulation.recorded_runs import ArmRun, label_by_radius
 from infthor_eval.manipulation.records import ArmRecord
-from infthor_eval.report.figures.radius import draw_radii, radii_figure, radii_table
 from infthor_eval.report.plain import PlainPresenter
 from infthor_eval.report.presenter import Description, Figure, FigureRequest, FigureResult, Recording, Selection
 from infthor_eval.report.recordings.arm_pictures import arm_pictures
 from infthor_eval.report.recordings.episode_sheet import MOST_ROWS, draw_sheet, sheet_rows
 from infthor_eval.report.recordings.reach_view import draw_reach
-from infthor_eval.report.runs import ReportRun, run_labels
-from infthor_eval.report.suites.reward_curves import DrawnFigure, curves_on_page, curves_result, figure_section
+from infthor_eval.report.runs import ReportRun
 from infthor_eval.report.web.samples import StepRow
 from infthor_eval.report.web.sections import Section
 from infthor_eval.runs import UnitRecord
@@ -90,21 +88,23 @@ def _model_runs(runs: Sequence[ReportRun]) -> list[ArmRun]:
     return [replace(_arm_run(run), label=run.model) for run in runs]
 
 
-def _build_figure_6(runs: Sequence[ReportRun], request: FigureRequest) -> FigureResult:
+def _runs_by_radius(runs: Sequence[ReportRun]) -> list[ArmRun]:
+    """Runs named after their models and radii, or by all options that differ if that is ambiguous."""
     named = label_by_radius(_model_runs(runs))
-    labels = run_labels([run.folder for run in runs], [run.label for run in named])
-    labelled = [replace(run, label=label) for run, label in zip(named, labels, strict=True)]
-    return curves_result(arm_curves(labelled, request.task), request.panels)
+    return named if len({run.label for run in named}) == len(named) else [_arm_run(run) for run in runs]
+
+
+def _build_figure_6(runs: Sequence[ReportRun], request: FigureRequest) -> FigureResult:
+    from infthor_eval.report.suites.reward_curves import curves_result
+
+    return curves_result(arm_curves(_runs_by_radius(runs), request.task), request.panels)
 
 
 def _build_radius_figure(runs: Sequence[ReportRun], request: FigureRequest) -> FigureResult:
+    from infthor_eval.report.figures.radius import draw_radii, radii_table
+
     by_radius = success_by_radius(_model_runs(runs), request.task)
     return FigureResult(radii_table(by_radius), lambda folder, name: draw_radii(by_radius, folder, name))
-
-
-def _radii_on_page(runs: Sequence[ReportRun]) -> DrawnFigure:
-    by_radius = success_by_radius(_model_runs(runs))
-    return DrawnFigure(lambda: radii_figure(by_radius), radii_table(by_radius), "the numbers are in the table")
 
 
 class ManipulationPresenter(PlainPresenter):
@@ -127,11 +127,18 @@ class ManipulationPresenter(PlainPresenter):
 
     def sections(self, runs: Sequence[ReportRun]) -> Iterator[Section]:
         """See `Presenter.sections`: reward along trajectories, and success by radius where there are several radii."""
-        arm_runs = [_arm_run(run) for run in runs]
+        from infthor_eval.report.figures.radius import radii_figure, radii_table
+        from infthor_eval.report.suites.reward_curves import DrawnFigure, curves_on_page, figure_section
+
+        def radii_on_page() -> DrawnFigure:
+            by_radius = success_by_radius(_model_runs(runs))
+            return DrawnFigure(lambda: radii_figure(by_radius), radii_table(by_radius), "the numbers are in the table")
+
+        arm_runs = _runs_by_radius(runs)
         title = "Reward of pick-ups and puts"
-        yield figure_section("arm-rewards", title, lambda: curves_on_page(arm_curves(label_by_radius(arm_runs))))
+        yield figure_section("arm-rewards", title, lambda: curves_on_page(arm_curves(arm_runs)))
         if len({task.radius for run in arm_runs for task in run.config.tasks.values()}) > 1:
-            yield figure_section("arm-radius", "Success by the hand's radius", lambda: _radii_on_page(runs))
+            yield figure_section("arm-radius", "Success by the hand's radius", radii_on_page)
 
     def describe(self, record: Record) -> Description:
         """See `Presenter.describe`."""

@@ -8,8 +8,6 @@ from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.report.plain import PlainPresenter
 from infthor_eval.report.presenter import Description, Timelines
 from infthor_eval.report.runs import ReportRun
-from infthor_eval.report.suites.nieh_charts import nieh_charts
-from infthor_eval.report.suites.nieh_frames import find_timelines
 from infthor_eval.report.web.sections import Chart
 from infthor_eval.report.web.thumbnails import Thumbnails
 from infthor_eval.runs import UnitRecord
@@ -34,6 +32,8 @@ class NiehPresenter(PlainPresenter):
 
     def charts(self, runs: Sequence[ReportRun]) -> list[Chart]:
         """See `Presenter.charts`."""
+        from infthor_eval.report.suites.nieh_charts import nieh_charts
+
         return nieh_charts(runs)
 
     def describe(self, record: Record) -> Description:
@@ -52,4 +52,6 @@ class NiehPresenter(PlainPresenter):
 
     def timelines(self, runs: Sequence[ReportRun], data: Path | None, thumbnails: Thumbnails) -> Timelines:
         """See `Presenter.timelines`."""
+        from infthor_eval.report.suites.nieh_frames import find_timelines
+
         return find_timelines(runs, data, thumbnails)

@@ -16,7 +16,6 @@ from infthor_eval.report.presenter import Description, Figure, FigureRequest, Fi
 from infthor_eval.report.recordings.plan_pictures import pictures
 from infthor_eval.report.recordings.room_map import draw_map
 from infthor_eval.report.runs import ReportRun
-from infthor_eval.report.suites.reward_curves import DrawnFigure, curves_on_page, curves_result, figure_section
 from infthor_eval.report.web.samples import StepRow
 from infthor_eval.report.web.sections import Section
 from infthor_eval.runs import UnitRecord
@@ -77,11 +76,9 @@ def _plans_run(run: ReportRun) -> PlansRun:
 
 
 def _build_figure_7(runs: Sequence[ReportRun], request: FigureRequest) -> FigureResult:
+    from infthor_eval.report.suites.reward_curves import curves_result
+
     return curves_result(plan_curves([_plans_run(run) for run in runs], request.task), request.panels)
-
-
-def _task_curves(runs: Sequence[PlansRun], task: str) -> DrawnFigure:
-    return curves_on_page(plan_curves(runs, task))
 
 
 class PlansPresenter(PlainPresenter):
@@ -103,11 +100,15 @@ class PlansPresenter(PlainPresenter):
 
     def sections(self, runs: Sequence[ReportRun]) -> Iterator[Section]:
         """See `Presenter.sections`: curves of reward for each task that all runs have."""
-        plans_runs = [_plans_run(run) for run in runs]
+        from infthor_eval.report.suites.reward_curves import DrawnFigure, curves_on_page, figure_section
+
+        def task_curves(task: str) -> DrawnFigure:
+            return curves_on_page(plan_curves([_plans_run(run) for run in runs], task))
+
         for task in runs[0].tasks:
             if all(task in run.tasks for run in runs):
                 title = f"{task}: reward over steps and context"
-                yield figure_section(f"rewards-{task}", title, partial(_task_curves, plans_runs, task))
+                yield figure_section(f"rewards-{task}", title, partial(task_curves, task))
 
     def describe(self, record: Record) -> Description:
         """See `Presenter.describe`."""

@@ -101,7 +101,7 @@ def _comparisons(suites: Iterable[Sequence[ReportRun]]) -> Iterator[Section]:
         pairs = combinations(runs, 2) if len(runs) <= _FEW else ((runs[0], other) for other in runs[1:])
         for first, second in pairs:
             try:
-                rows = compare(first.suite, first.records, second.records)
+                rows = compare(first.suite, first.presenter, first.records, second.records)
             except DataError as error:
                 notes.append(f"{second.label} against {first.label}: {error}")
                 continue

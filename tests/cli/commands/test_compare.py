@@ -1,6 +1,11 @@
 import json
 
 import pytest
+from msgspec.structs import replace
+
+from infthor_eval.plans.records import StepRecord
+
+from ...plans.made_runs import made_run, plan, write_run
 
 
 def test_two_runs_are_compared_question_by_question(make_nieh_set, tmp_path, run):
@@ -11,8 +16,8 @@ def test_two_runs_are_compared_question_by_question(make_nieh_set, tmp_path, run
     rows = [line.split() for line in out.splitlines()]
     assert code == 0
     (row,) = [row for row in rows if row[:2] == ["nieh_gt", "strict"]]
-    assert row[3] == "100.00"
-    assert float(row[4]) == pytest.approx(100 - float(row[2]), abs=0.01)
+    assert (row[2], row[4]) == ("%", "100.00")
+    assert float(row[5]) == pytest.approx(100 - float(row[3]), abs=0.01)
     assert row[-2:] == ["5", "0"]
     code, out, _ = run("compare", oracle, oracle)
     assert "+0.00" in out
@@ -44,12 +49,35 @@ def test_a_run_of_an_earlier_version_is_refused_in_one_line(make_nieh_set, tmp_p
         assert f"{old}: its journal is of format 1, this version reads 3; run the evaluation again" in err
 
 
-def test_runs_of_one_name_are_told_apart_by_their_folders(make_nieh_set, tmp_path, run):
+def test_rewards_are_points_and_shares_are_percent(tmp_path, run):
+    """Mean rewards of 4.4 and 2.2, of which every plan or none is a success."""
+    steps = (StepRecord(),)
+    records = [plan(name, index, (index, index + 1), 4.4) for name in "ab" for index in range(2)]
+    better = [replace(it, payload=replace(it.payload, steps=steps)) for it in records]
+    worse = [replace(it, payload=replace(it.payload, reward=2.2, ended="step limit")) for it in better]
+    folders = [write_run(made_run(label, of_run), tmp_path) for label, of_run in (("w", worse), ("b", better))]
+    code, out, err = run("compare", *folders)
+    assert (code, err) == (0, "")
+    rows = {line.split()[1]: line.split()[2:] for line in out.splitlines() if line.split()[:1] == ["infthor_plans"]}
+    assert rows["success"][:4] == ["%", "0.00", "100.00", "+100.00"]
+    assert rows["reward"] == ["points", "2.20", "4.40", "+2.20", "[+2.20,", "+2.20]", "0.0000", "4", "0"]
+
+
+def test_runs_of_one_name_are_told_apart_by_the_options_that_differ(make_nieh_set, tmp_path, run):
     data = make_nieh_set(size=56)
     for seed in (0, 1):
         arguments = ["--model", "random", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path, "--seed", seed]
         assert run(*arguments)[0] == 0
-    first, second = sorted((tmp_path / "random").iterdir())
-    code, out, _ = run("compare", first, second)
+    folders = sorted((tmp_path / "random").iterdir(), key=lambda folder: "seed: 1" in (folder / "run.yaml").read_text())
+    code, out, _ = run("compare", *folders)
     assert code == 0
-    assert f"random ({second.name}) against random ({first.name})" in " ".join(out.split())
+    assert "random (seed=1) against random (seed=0)" in " ".join(out.split())
+
+
+def test_blank_frames_are_part_of_the_name(make_nieh_set, tmp_path, run):
+    words = ("--tasks", "nieh_gt", "--data", make_nieh_set(size=56), "--output", tmp_path, "--frames", "shown,blank")
+    assert run("--model", "oracle", *words)[0] == 0
+    folders = sorted(
+        (tmp_path / "oracle").iterdir(), key=lambda folder: "frames: blank" in (folder / "run.yaml").read_text()
+    )
+    assert "oracle, blank frames against oracle" in run("compare", *folders)[1]
