@@ -1,4 +1,4 @@
-"""Simulator processes for episodes that run at the same time: each has one to itself, and they are used again."""
+"""Simulator processes for episodes that run at the same time: each has its own, and they are used again."""
 
 import weakref
 from collections.abc import Iterator, Sequence
@@ -19,27 +19,27 @@ _COPIES = 512  # of the simulator's state: one for each plan of a long trajector
 
 
 class Simulators:
-    """Starts simulators as they are needed; they are stopped with `close`, or when nobody holds this any more."""
+    """Starts simulators as they are needed. They are stopped by `close`, or when nobody holds this any more."""
 
     def __init__(self, name: str, scenes: Path | None, trajectories: Sequence[Trajectory], **options: Any) -> None:
-        """Say which.
+        """Describe the simulators.
 
         Args:
             name: "embedded", "unity", or the path of a Unity executable.
-            scenes: folder with recorded floor plans, for the embedded one.
-            trajectories: what they tell of their floor plans is added to the recorded ones.
-            options: of each simulator, see `Simulator`.
+            scenes: folder of recorded floor plans, for the embedded one.
+            trajectories: trajectories whose objects complete the recorded floor plans.
+            options: options of each simulator, see `Simulator`.
         """
-        self._name, self._scenes, self._options = name, scenes, options
+        self._options = options
         self._open = ExitStack()
-        weakref.finalize(self, self._open.close)  # where nobody closes this
+        weakref.finalize(self, self._open.close)
         self._idle: SimpleQueue[Simulator] = SimpleQueue()
         supplement = self._open.enter_context(supplement_file(trajectories)) if scenes is not None else None
-        self._launch = self._described(supplement)
+        self._launch = _launch_of(name, scenes, supplement)
 
     @contextmanager
     def one(self) -> Iterator[Simulator]:
-        """A simulator that nobody else has, for as long as the context lasts."""
+        """Lend a simulator that nobody else has, for as long as the context lasts."""
         try:
             simulator = self._idle.get_nowait()
         except Empty:
@@ -54,7 +54,8 @@ class Simulators:
         """Stop them all; safe to call again."""
         self._open.close()
 
-    def _described(self, supplement: Path | None) -> Launch:
-        if self._name == "embedded":
-            return launch.embedded(self._scenes, supplement)
-        return launch.unity(None if self._name == "unity" else Path(self._name))
+
+def _launch_of(name: str, scenes: Path | None, supplement: Path | None) -> Launch:
+    if name == "embedded":
+        return launch.embedded(scenes, supplement)
+    return launch.unity(None if name == "unity" else Path(name))

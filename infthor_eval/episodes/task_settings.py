@@ -1,4 +1,4 @@
-"""What `dataset_kwargs` of a task file can say, for suites that have a dataclass of it."""
+"""`dataset_kwargs` of task files, for suites that describe them by a dataclass."""
 
 import difflib
 import math
@@ -11,7 +11,7 @@ from infthor_eval.runs.catalog import TaskFile
 __all__ = ["task_settings"]
 
 T = TypeVar("T")
-_FORMS: dict[type, str] = {
+_TYPES: dict[type, str] = {
     bool: "true or false",
     int: "a whole number above 0",
     float: "a number above 0",
@@ -20,42 +20,43 @@ _FORMS: dict[type, str] = {
 
 
 def task_settings(
-    file: TaskFile, kind: type[T], told: Mapping[str, Any], choices: Mapping[str, Sequence[str]] | None = None
+    file: TaskFile, kind: type[T], given: Mapping[str, Any], choices: Mapping[str, Sequence[str]] | None = None
 ) -> T:
-    """The settings of a task, with what the command line tells instead.
+    """Return the settings of a task file, with those that are given instead.
 
     Args:
-        file: the task.
+        file: the task file.
         kind: dataclass of all settings, with defaults; numbers are above 0, and a text may be optional.
-        told: by name what the run was told beside the file; None for nothing.
-        choices: by name the texts that a setting can be.
+        given: settings by name that replace the file's; None keeps the file's.
+        choices: allowed texts of settings, by name.
 
     Raises:
-        DataError: a setting that would not act, or not as it was meant.
+        DataError: a setting is unknown, or has a value that is not allowed.
     """
-    given = file.settings["dataset_kwargs"]
-    if not isinstance(given, Mapping):
+    settings = file.settings["dataset_kwargs"]
+    if not isinstance(settings, Mapping):
         raise DataError(f"{file.path}: dataset_kwargs must be a mapping of settings")
     hints = get_type_hints(kind)
-    for key, value in given.items():
+    for key, value in settings.items():
         where = f"{file.path}: dataset_kwargs: {key}"
         if key not in hints:
             near = difflib.get_close_matches(str(key), hints, n=1)
             hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(hints)}"
             raise DataError(f"{where} is not known; {hint}")
-        wanted = hints[key] if hints[key] in _FORMS else str
-        if not _fits(value, wanted):
-            raise DataError(f"{where} is {value!r:.60}; it is {_FORMS[wanted]}")
+        expected = hints[key] if hints[key] in _TYPES else str
+        if not _fits(value, expected):
+            raise DataError(f"{where} is {value!r:.60}; it is {_TYPES[expected]}")
         allowed = (choices or {}).get(str(key), (value,))
         if value not in allowed:
             raise DataError(f"{where} is {value!r:.60}; there are {', '.join(allowed)}")
-    return kind(**{**given, **{name: value for name, value in told.items() if value is not None}})
+    return kind(**{**settings, **{name: value for name, value in given.items() if value is not None}})
 
 
-def _fits(value: object, wanted: type) -> bool:
-    if wanted is bool or isinstance(value, bool):
-        return wanted is bool and isinstance(value, bool)
-    if wanted is str:
-        return isinstance(value, str)
-    whole = isinstance(value, int)
-    return (whole if wanted is int else whole or isinstance(value, float)) and math.isfinite(value) and value > 0  # type: ignore[arg-type,operator]
+def _fits(value: object, expected: type) -> bool:
+    if isinstance(value, bool):  # which Python counts among the integers
+        return expected is bool
+    if isinstance(value, int) and expected in (int, float):
+        return value > 0
+    if isinstance(value, float) and expected is float:
+        return math.isfinite(value) and value > 0
+    return expected is str and isinstance(value, str)

@@ -69,9 +69,9 @@ class ReleasePoses:
 def release_poses(goal: PutGoal, terrain: Terrain, stand: ArmStand, draw: Generator) -> ReleasePoses:
     """Return the best of many poses in which the held object would come to rest in or on a receptacle."""
     poses, costs = _draw_above(goal, terrain.linkage, stand, draw)
-    reached = np.flatnonzero(terrain.linkage.reached(poses))[:_RATED]
+    reached = np.flatnonzero(terrain.linkage.can_reach(poses))[:_RATED]
     poses, costs = poses[reached], costs[reached]
-    held = terrain.linkage.held(poses)
+    held = terrain.linkage.held_box(poses)
     over = support(held, goal.places)
     costs = costs + _LOOSE * (1.0 - over) + _EDGE * (1.0 - firmness(held, goal.places))
     costs = costs + _OCCUPIED * occupancy(held, goal.places, goal.others)
@@ -102,7 +102,7 @@ def _draw_above(goal: PutGoal, linkage: Linkage, stand: ArmStand, draw: Generato
     aloft = draw.choice(_ABOVE, size=_DRAWN)
     grounds, more = _grounds(goal, spots, draw)
     costs = _PITCHED * np.abs(pitches) + _TURNED * np.abs(yaws) + _DROP * aloft + more
-    held = linkage.held(Poses(np.zeros((_DRAWN, 3)), np.zeros(_DRAWN), turns))
+    held = linkage.held_box(Poses(np.zeros((_DRAWN, 3)), np.zeros(_DRAWN), turns))
     lower = (np.abs(held.axes[:, 0, :, 1]) * held.half[:, 0]).sum(axis=1)
     wrists = np.stack([spots[:, 0], grounds + aloft + lower, spots[:, 2]], axis=1) - held.center[:, 0]
     bases = np.clip(wrists[:, 1] + draw.choice(_BASES, size=_DRAWN), stand.low, stand.high)
@@ -138,8 +138,11 @@ def _within_reach(points: Array, linkage: Linkage) -> Array:
 
 def passing_poses(goal: PutGoal, terrain: Terrain, stand: ArmStand, ends: Poses, count: int, draw: Generator) -> Poses:
     """Return free poses to pass: before and above release poses, with a folded arm, near the present one, anywhere."""
-    known = Poses.join([*_approaches(ends, goal.entry, stand), _folded(terrain.linkage, stand)])
-    drawn = [_anywhere(terrain.linkage, stand, _WASTE * count, draw), _around(terrain.linkage, stand, count, draw)]
+    known = Poses.join([*_approaches(ends, goal.entry, stand), _folded_poses(terrain.linkage, stand)])
+    drawn = [
+        _random_poses(terrain.linkage, stand, _WASTE * count, draw),
+        _nearby_poses(terrain.linkage, stand, count, draw),
+    ]
     return Poses.join([known[terrain.free(known)], *(poses[terrain.free(poses)][:count] for poses in drawn)])
 
 
@@ -149,10 +152,10 @@ def _approaches(ends: Poses, entry: Entry | None, stand: ArmStand) -> Iterator[P
         yield Poses(ends.wrists + np.array([0.0, up, 0.0]), ends.bases, ends.turns)
     if entry is not None:
         for out in _OUT:
-            yield Poses(ends.wrists + entry.out(out) + np.array([0.0, _CLEAR, 0.0]), ends.bases, ends.turns)
+            yield Poses(ends.wrists + entry.vector_out(out) + np.array([0.0, _CLEAR, 0.0]), ends.bases, ends.turns)
 
 
-def _folded(linkage: Linkage, stand: ArmStand) -> Poses:
+def _folded_poses(linkage: Linkage, stand: ArmStand) -> Poses:
     """Return poses with a folded arm, at some heights, with the hand turned to some sides."""
     heights = np.linspace(stand.low, stand.high, _N_HEIGHTS)
     choices = np.array(list(itertools.product(_FOLDED_REACHES, heights, _FOLDED_YAWS)))
@@ -164,7 +167,7 @@ def _folded(linkage: Linkage, stand: ArmStand) -> Poses:
     )
 
 
-def _anywhere(linkage: Linkage, stand: ArmStand, count: int, draw: Generator) -> Poses:
+def _random_poses(linkage: Linkage, stand: ArmStand, count: int, draw: Generator) -> Poses:
     ways = draw.normal(size=(count, 3))
     ways *= (draw.uniform(0.05, linkage.reach, size=count) / np.linalg.norm(ways, axis=1))[:, None]
     yaws = stand.heading + draw.uniform(_YAWS[0], _YAWS[-1], size=count)
@@ -172,7 +175,7 @@ def _anywhere(linkage: Linkage, stand: ArmStand, count: int, draw: Generator) ->
     return Poses(linkage.shoulder + ways, draw.uniform(stand.low, stand.high, size=count), heading(yaws, pitches))
 
 
-def _around(linkage: Linkage, stand: ArmStand, count: int, draw: Generator) -> Poses:
+def _nearby_poses(linkage: Linkage, stand: ArmStand, count: int, draw: Generator) -> Poses:
     """Draw poses near the present one: where it is narrow, the path out begins with small movements."""
     now = linkage.now
     wrists = now.wrists + draw.normal(scale=_AROUND, size=(count, 3))

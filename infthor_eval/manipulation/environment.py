@@ -151,7 +151,7 @@ class ArmEnvironment:
             gripper_calls, gripper_refusals = self._run(self._gripper(action))
             calls, refusals = [*calls, *gripper_calls], [*refusals, *gripper_refusals]
         released = any(call["action"] == "ReleaseObject" for call in calls)
-        ended = self._ended(released)
+        ended = self._ending(released)
         self._is_over = ended is not None
         view = self._simulator.view
         return ArmOutcome(view, self._frames.keep(view), tuple(calls), tuple(refusals), self._distance(view), ended)
@@ -185,7 +185,7 @@ class ArmEnvironment:
         target = self.start.object_id
         return [{"action": "PickupObject", "objectIdCandidates": [target]}] if target in arm.pickupable else []
 
-    def _ended(self, released: bool) -> ArmEnded | None:
+    def _ending(self, released: bool) -> ArmEnded | None:
         target = self.start.object_id
         if self.episode.kind == ManipulationKind.PICKUP:
             return ArmEnded.DONE if target in arm_of(self._simulator.view).held else None

@@ -109,7 +109,7 @@ class Linkage:
         self._held_axes = turn
         self._held_half = np.array(size_of(held)) / 2
 
-    def reached(self, poses: Poses) -> NDArray[np.bool_]:
+    def can_reach(self, poses: Poses) -> NDArray[np.bool_]:
         """Return whether the arm reaches the wrist of each pose (n,)."""
         near: NDArray[np.bool_] = np.linalg.norm(poses.wrists - self._shoulder, axis=1) <= self.reach
         return near
@@ -124,7 +124,7 @@ class Linkage:
         """Position of the shoulder in the world, with the height above the base, metres (3,)."""
         return self._shoulder
 
-    def held(self, poses: Poses) -> Parts:
+    def held_box(self, poses: Poses) -> Parts:
         """Return the box of the held object (n, 1)."""
         center = poses.world() + poses.turns @ self.lever
         axes = self._held_axes @ poses.turns.transpose(0, 2, 1)
@@ -139,7 +139,7 @@ class Linkage:
             poses.wrists[:, None], poses.turns.transpose(0, 2, 1)[:, None], np.full((len(poses), 1, 3), _THICK)
         )
         lifted = [Parts(p.center + (poses.bases[:, None] * _UP)[:, None], p.axes, p.half) for p in (*rods, palm)]
-        parts = [*lifted, self.held(poses)]
+        parts = [*lifted, self.held_box(poses)]
         return Parts(
             *(np.concatenate([getattr(p, name) for p in parts], axis=1) for name in ("center", "axes", "half"))
         )

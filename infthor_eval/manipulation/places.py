@@ -85,7 +85,7 @@ class Entry:
     sign: int
     position: float
 
-    def out(self, metres: float) -> Array:
+    def vector_out(self, metres: float) -> Array:
         """Return a vector out of the opening (3,)."""
         vector = np.zeros(3)
         vector[self.axis] = self.sign * metres

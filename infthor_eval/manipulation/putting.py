@@ -37,7 +37,7 @@ def put_steps(environment: ArmEnvironment) -> Steps:
             continue
         for move in moves:
             yield [task.call(move)]
-            if not task.reached(move):
+            if not task.has_reached(move):
                 break
         else:
             yield [{"action": "ReleaseObject"}]
@@ -83,7 +83,7 @@ class _PutTask:
         pitch, yaw, roll = angles_of(self._linkage.now.turns[0].T @ move.pose.turns[0])
         return {"action": "RotateWristRelative", "pitch": pitch, "yaw": yaw, "roll": roll, "returnToStart": False}
 
-    def reached(self, move: ArmMove) -> bool:
+    def has_reached(self, move: ArmMove) -> bool:
         """Return whether the arm is where a movement was to bring it; a collision is remembered."""
         self._linkage = self._measure()
         now = self._linkage.now

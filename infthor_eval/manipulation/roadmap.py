@@ -98,7 +98,7 @@ class Terrain:
         self.linkage = linkage
         self._obstacles = obstacles
         self.contacts = contacts
-        self._least = _tolerated(self._clearances(linkage.now)[0])
+        self._least = _tolerance(self._clearances(linkage.now)[0])
         self._start = self._from_contacts(linkage.now)
 
     def free(self, poses: Poses) -> NDArray[np.bool_]:
@@ -106,7 +106,7 @@ class Terrain:
 
         Boxes are larger than the things that they stand for, so the present pose may be in one.
         """
-        clear = self.linkage.reached(poses)
+        clear = self.linkage.can_reach(poses)
         if clear.any():
             clear[clear] = (self._clearances(poses[clear]) >= self._least).all(axis=(1, 2))
         return clear & (self._from_contacts(poses) >= _NEAR).all(axis=1)
@@ -126,15 +126,17 @@ class Terrain:
         spans = _spans(start, end, sizes)
         orders = [list(_moves(start, order, spans)) for order in itertools.permutations(kinds)]
         leaving = start is self.linkage.now
-        promising, collisions = self._promising(orders, leaving=leaving)
+        promising, collisions = self._promising_orders(orders, leaving=leaving)
         for moves in promising:
-            blocked = self._blocked(start, [stances for _, stances in moves], leaving=leaving)
+            blocked = self._first_collision(start, [stances for _, stances in moves], leaving=leaving)
             if blocked is None:
                 return [ArmMove(kind, stances[-1:]) for kind, stances in moves], end[:0]
             collisions.append(blocked)
         return None, Poses.join(collisions)
 
-    def _promising(self, orders: list[list[_Stretch]], *, leaving: bool) -> tuple[list[list[_Stretch]], list[Poses]]:
+    def _promising_orders(
+        self, orders: list[list[_Stretch]], *, leaving: bool
+    ) -> tuple[list[list[_Stretch]], list[Poses]]:
         """Return the orders of which a few poses are free, and the first colliding pose of each other order.
 
         All orders are tested in one call, as numpy's overhead is a large share of the time for so few poses.
@@ -154,7 +156,7 @@ class Terrain:
                 collisions.append(part[first : first + 1])
         return promising, collisions
 
-    def _blocked(self, start: Poses, moves: list[Poses], *, leaving: bool) -> Poses | None:
+    def _first_collision(self, start: Poses, moves: list[Poses], *, leaving: bool) -> Poses | None:
         """Return the first colliding pose (1) of movements, one after the other; None if they are free.
 
         A part that touches a thing at the start of a movement may not get deeper into it. A part that is in a thing may
@@ -162,12 +164,12 @@ class Terrain:
         """
         path = Poses.join([start, *moves])
         least = np.minimum(_NEAR, self._start - _SAME) if leaving else _NEAR
-        bad = ~self.linkage.reached(path) | (self._from_contacts(path) < least).any(axis=1)
+        bad = ~self.linkage.can_reach(path) | (self._from_contacts(path) < least).any(axis=1)
         clearance = self._clearances(path)
         first = 0
         for move in moves:
             last = first + len(move)
-            lowest = _tolerated(clearance[first])
+            lowest = _tolerance(clearance[first])
             on_the_way = np.where(lowest < self._deepest, -np.inf, lowest)
             bad[first + 1 : last] |= (clearance[first + 1 : last] < on_the_way).any(axis=(1, 2))
             bad[last] |= bool((clearance[last] < lowest).any())
@@ -183,7 +185,7 @@ class Terrain:
         """Return how far (n, contacts) poses are from earlier collisions, metres."""
         if not self.contacts:
             return np.zeros((len(poses), 0))
-        wrists, held = poses.world(), self.linkage.held(poses).center[:, 0]
+        wrists, held = poses.world(), self.linkage.held_box(poses).center[:, 0]
         return np.stack(
             [
                 np.maximum(np.linalg.norm(wrists - c.wrist, axis=1), np.linalg.norm(held - c.held, axis=1))
@@ -193,7 +195,7 @@ class Terrain:
         )
 
 
-def _tolerated(clearance: Array) -> Array:
+def _tolerance(clearance: Array) -> Array:
     """Return how near parts may come to things, or how deep they may be in them, given their clearance at the start."""
     tolerated: Array = np.minimum(_MARGIN, clearance - _SAME)
     return tolerated
@@ -218,7 +220,7 @@ def _spans(start: Poses, end: Poses, sizes: Array) -> list[Array]:
     ]
     bases = start.bases + shares[0] * (end.bases - start.bases)
     wrists = start.wrists + shares[1][:, None] * (end.wrists - start.wrists)
-    return [bases, wrists, _between(start.turns[0], end.turns[0], shares[2])]
+    return [bases, wrists, _interpolate_rotations(start.turns[0], end.turns[0], shares[2])]
 
 
 def _sizes(start: Poses, end: Poses) -> Array:
@@ -230,7 +232,7 @@ def _sizes(start: Poses, end: Poses) -> Array:
     ])  # fmt: skip
 
 
-def _between(start: Array, end: Array, shares: Array) -> Array:
+def _interpolate_rotations(start: Array, end: Array, shares: Array) -> Array:
     """Return rotations (n, 3, 3) on the shortest path from one to another."""
     turn = start.T @ end
     skew = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
@@ -290,7 +292,7 @@ class Roadmap:
                 return None
             blocked = next((edge for edge in itertools.pairwise(path) if self._edge(*edge) is None), None)
             if blocked is None:
-                return self._shortened(path)
+                return self._shorten(path)
             self._lengths[blocked] = self._lengths[blocked[::-1]] = np.inf
         return None
 
@@ -312,7 +314,7 @@ class Roadmap:
 
     def _spots_of(self, poses: Poses) -> Array:
         """Return the positions (n, 6) of the wrist and of the middle of the held object in poses, metres."""
-        return np.concatenate([poses.world(), self._terrain.linkage.held(poses).center[:, 0]], axis=1)
+        return np.concatenate([poses.world(), self._terrain.linkage.held_box(poses).center[:, 0]], axis=1)
 
     def _pose(self, index: int) -> Poses:
         # `Terrain` knows the present pose by identity, see `leaving`.
@@ -339,7 +341,7 @@ class Roadmap:
                 heapq.heappush(queue, (float(sums[after]), int(after), False))
         return None
 
-    def _shortened(self, path: list[int]) -> list[ArmMove]:
+    def _shorten(self, path: list[int]) -> list[ArmMove]:
         """Return the movements of a path, without detours that can be skipped."""
         moves: list[ArmMove] = []
         at = 0

@@ -205,7 +205,7 @@ class PlanEnvironment:
         """
         return self._expert.actions(plan)
 
-    def named(self, plan: int) -> Sequence[str]:
+    def named_objects(self, plan: int) -> Sequence[str]:
         """Return the ids of the objects that a plan names and that the scene has; for pictures, not for rewards.
 
         Raises:
@@ -226,7 +226,7 @@ class PlanEnvironment:
         after = self._simulator.step(**call)
         self._n_steps += 1
         earned = self._reward.after(call, before, after)
-        ended = _ended(earned, after)
+        ended = _ending(earned, after)
         truncated = ended is None and self._n_steps >= self._max_steps
         if ended is not None or truncated:
             self._plan = None
@@ -251,7 +251,7 @@ class PlanEnvironment:
         return reachable_grid(self._simulator).with_positions((pose.position.x, pose.position.z) for pose in walked)
 
 
-def _ended(earned: StepReward, after: SimulatorView) -> Ended | None:
+def _ending(earned: StepReward, after: SimulatorView) -> Ended | None:
     if earned.done:
         return Ended.DONE
     if not earned.failed:

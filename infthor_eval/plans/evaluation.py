@@ -34,7 +34,7 @@ class PlansEvaluation(EpisodeEvaluation[PlansOptions, PlansTask, PlanUnit]):
         return [
             PlanUnit.of(name, trajectory, plan, plan_record(trajectory, plan))
             for name, task in self.tasks.items()
-            for trajectory in task.used
+            for trajectory in task.evaluated_trajectories
             for plan in task.plans(trajectory)
         ]
 

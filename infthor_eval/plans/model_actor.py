@@ -76,13 +76,13 @@ class ModelActor:
         frame = outcome.observation.frame
         if frame is None:
             raise ModelError("the environment keeps no frames, which a model needs")
-        self._conversation.append(f"{outcome.info.action}{ACT}", *self._shown([frame]), ACT)
+        self._conversation.append(f"{outcome.info.action}{ACT}", *self._visible_parts([frame]), ACT)
 
     def _restart(self, parts: Sequence[Part]) -> None:
         self._conversation.rewind(self._start)
-        self._conversation.append(self._config.preamble, *self._shown(parts), ACT)
+        self._conversation.append(self._config.preamble, *self._visible_parts(parts), ACT)
 
-    def _shown(self, parts: Sequence[Part]) -> list[Part]:
+    def _visible_parts(self, parts: Sequence[Part]) -> list[Part]:
         if not self._config.blank:
             return list(parts)
         return [blank_like(part) if isinstance(part, FrameRef) else part for part in parts]

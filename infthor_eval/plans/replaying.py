@@ -161,7 +161,7 @@ class _PlanInReplay:
         observation, _ = environment.reset(plan)
         self._view, self._is_over = observation.view, False
         self._walked = [_point(self._view.agent)]
-        self._named = frozenset(environment.named(plan))
+        self._named = frozenset(environment.named_objects(plan))
         grid = reachable_grid(simulator)
         self._floor = tuple(grid.position(cell) for cell in sorted(grid.cells))
         leads_somewhere = environment.plans[plan].kind == PlanKind.GOTO

@@ -53,7 +53,7 @@ class PlansTask(EpisodeTask[PlanTaskSettings, PlanTrajectory]):
         rules: reward rules.
         decoding: decoding of each action.
         memory: the part of the history that a model is given.
-        used: trajectories that are evaluated.
+        evaluated_trajectories: trajectories that are evaluated.
     """
 
     def __init__(self, file: TaskFile, request: TaskRequest[PlansOptions]) -> None:
@@ -75,8 +75,10 @@ class PlansTask(EpisodeTask[PlanTaskSettings, PlanTrajectory]):
         self.memory = memory_named(settings.history, self._options.retriever)
         super().__init__(file, request, settings, read_plan_trajectory)
         having_plans = [trajectory for trajectory in self.trajectories.trajectories if self.plans(trajectory)]
-        self.used = limited(having_plans, lambda trajectory: trajectory.traj_id, request.seed, request.limit)
-        if not self.used:
+        self.evaluated_trajectories = limited(
+            having_plans, lambda trajectory: trajectory.traj_id, request.seed, request.limit
+        )
+        if not self.evaluated_trajectories:
             raise UsageError(f"{self.name}: no trajectory there has a final task; make some with --test-set")
 
     def plans(self, trajectory: PlanTrajectory) -> list[Plan]:
@@ -96,7 +98,7 @@ class PlansTask(EpisodeTask[PlanTaskSettings, PlanTrajectory]):
     def config(self) -> dict[str, Any]:
         """See `EpisodeTask`."""
         return self._config(
-            self.used,
+            self.evaluated_trajectories,
             history=self.settings.history,
             after_failure=self.settings.after_failure,
             rewards=self.rules.document(),

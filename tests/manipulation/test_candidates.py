@@ -28,7 +28,7 @@ def goal(others=(), entry=None, **changes):
 def ends(linkage, asked, contacts=(), obstacles=()):
     terrain = Terrain(linkage, obstacles_of(obstacles), list(contacts))
     found = release_poses(asked, terrain, STAND, np.random.default_rng(0))
-    return found, linkage.held(found.poses)
+    return found, linkage.held_box(found.poses)
 
 
 def bottoms(held):

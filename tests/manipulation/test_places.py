@@ -91,7 +91,7 @@ def test_an_open_door_tells_where_an_opening_is_and_the_agent_where_there_is_no_
     fridge = thing("Fridge|1", 0.3, 0.9, 0.0, openable=True, is_open=True)  # the door widens its box towards +x
     entry = entry_of(view_of(fridge), fridge, places)
     assert entry == Entry(0, 1, pytest.approx(0.225))
-    assert entry.out(0.2).tolist() == [0.2, 0.0, 0.0]
+    assert entry.vector_out(0.2).tolist() == [0.2, 0.0, 0.0]
     shelf = thing("Shelf|1", 0.0, 0.9, 0.0)
     assert entry_of(view_of(shelf), shelf, places) == Entry(2, -1, pytest.approx(-0.175))
     table = thing("DiningTable|1", 0.0, 0.4, 0.0)

@@ -62,7 +62,7 @@ def test_links_keep_their_length_and_what_is_held_turns_with_the_hand(linkage):
     parts = linkage.parts(pose(x=0.3, y=0.1, z=0.5, base=1.4, yaw=90))
     assert parts.half[0, 1:3, 2] == pytest.approx([UPPER / 2, FORE / 2])
     assert parts.center[0, 4] == pytest.approx([0.5, 1.5, 0.5])  # 0.2 m to the right of the wrist
-    assert linkage.reached(pose(z=FOOT + 0.59)) and not linkage.reached(pose(z=FOOT + 0.61))
+    assert linkage.can_reach(pose(z=FOOT + 0.59)) and not linkage.can_reach(pose(z=FOOT + 0.61))
 
 
 def test_angles_are_those_that_a_hand_is_turned_by():
@@ -87,7 +87,7 @@ def test_movements_are_made_in_an_order_in_which_nothing_is_met(linkage):
     assert [move.kind for move in moves] == [MoveKind.LIFT, MoveKind.REACH]
     none, met = terrain.movements(linkage.now, pose(z=0.88))
     assert none is None
-    assert linkage.held(met).center[0, 0, 2] == pytest.approx(0.95, abs=0.09)  # where it comes to the wall
+    assert linkage.held_box(met).center[0, 0, 2] == pytest.approx(0.95, abs=0.09)  # where it comes to the wall
 
 
 def test_a_roadmap_goes_around_what_is_straight_ahead(linkage):
@@ -122,9 +122,9 @@ def test_there_is_no_way_into_what_is_shut(linkage):
 def test_what_was_met_is_not_tried_again(linkage):
     goal, free = pose(x=0.3, z=0.75), obstacles_of(())
     assert Terrain(linkage, free, []).free(goal).all()
-    on_it = Contact(goal.world()[0], linkage.held(goal).center[0, 0])
+    on_it = Contact(goal.world()[0], linkage.held_box(goal).center[0, 0])
     assert not Terrain(linkage, free, [on_it]).free(goal).any()
-    elsewhere = Contact(goal.world()[0], linkage.held(pose(x=0.3, z=0.75, yaw=90)).center[0, 0])
+    elsewhere = Contact(goal.world()[0], linkage.held_box(pose(x=0.3, z=0.75, yaw=90)).center[0, 0])
     assert Terrain(linkage, free, [elsewhere]).free(goal).all()  # the hand was rotations_about otherwise there
 
 
