@@ -27,9 +27,9 @@ from infthor_eval.cli.options.values import (
 from infthor_eval.cli.options.workers import parse_worker_settings, worker_options
 from infthor_eval.errors import UsageError
 from infthor_eval.runs import Catalog, RunRequest, Suite, TaskRequest
-from infthor_eval.suites import split_by_suite, suite_identity, suite_named
+from infthor_eval.suites import baseline_names, split_by_suite, suite_identity, suite_named
 from infthor_eval.workers import WorkerSettings
-from model_adapters import name_on_engine
+from model_adapters import is_known, name_on_engine
 
 __all__ = ["RunOptions", "run_options"]
 
@@ -40,7 +40,8 @@ _OPTIONS = (
         type=ModelList(),
         required=True,
         metavar="MODEL,...",
-        help="Model name, or several with commas (see `ls models`); MODEL:K=V,... gives a model its own options.",
+        help="Model name, or several with commas (see `ls models`); MODEL:K=V,... gives a model its own options, "
+        "and it may be named again with others.",
     ),
     click.option(
         "--engine",
@@ -171,7 +172,8 @@ class RunOptions:
         """Return the runs, each with its suite: one for each model, suite, and value of an option that takes several.
 
         Raises:
-            UsageError: an unknown task, a name that cannot be a folder's, or an option of a suite that is not used.
+            UsageError: an unknown task, a name that cannot be a folder's, or a baseline or an option of a suite that
+                has none of the tasks.
             DataError: a task file is not what it should be.
         """
         if self.name is not None and not re.fullmatch(r"\w[\w.@+ -]*", self.name):
@@ -182,6 +184,7 @@ class RunOptions:
         requests = []
         for model in self.models:
             for suite, tasks in by_suite.items():
+                _refuse_baseline_of_others(model.name, suite, tasks[0].name)
                 for options in expand_suite_options(suite, self.suite_options, by_suite.keys()):
                     request = RunRequest(
                         model=model.name,
@@ -199,6 +202,12 @@ class RunOptions:
                     )
                     requests.append((request, suite_named(suite)))
         return requests
+
+
+def _refuse_baseline_of_others(model: str, suite: str, task: str) -> None:
+    suites = baseline_names().get(model)
+    if suites is not None and suite not in suites.split(", ") and not is_known(model):
+        raise UsageError(f"{model} is a baseline of {suites}, and {task} is a task of {suite}; see `ls models`")
 
 
 def _options_of_all_models(given: Mapping[str, Any]) -> dict[str, str]:

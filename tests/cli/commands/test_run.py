@@ -173,6 +173,10 @@ def test_a_killed_run_goes_on_and_ends_as_an_undisturbed_one(make_nieh_set, tmp_
 
 BAD = [
     (["--model", "orcle", "--tasks", "nieh", "--data", "SET"], "did you mean 'oracle'?"),
+    (
+        ["--model", "planner", "--tasks", "nieh_mini"],
+        "a baseline of plans, and nieh_mini_gt is a task of nieh",
+    ),
     (["--model", "oracle", "--tasks", "nieh_ful", "--data", "SET"], "did you mean 'nieh_full'?"),
     (["--model", "oracle", "--tasks", "nieh"], "give its folder with --data"),
     (["--model", "oracle", "--tasks", "nieh", "--data", "nowhere"], "nowhere: no such folder"),
