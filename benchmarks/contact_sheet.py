@@ -16,13 +16,14 @@ from infthor_eval.sim.actions import bind
 from infthor_eval.sim.default_objects import default_object
 from infthor_eval.sim.geometry import euler_matrix
 from infthor_eval.sim.objects import SimObject
-from infthor_eval.sim.render.camera import Camera
+from infthor_eval.sim.render.camera import PinholeCamera
 from infthor_eval.sim.render.lighting import Lights
 from infthor_eval.sim.render.picture import cast_picture, choose_rasterizer, colour_picture
 from infthor_eval.sim.render.primitives import Form, Material, ShapePart, rows
 from infthor_eval.sim.render.shapes import shape
 from infthor_eval.sim.scenes.catalogue import Catalogue
 from infthor_eval.sim.simulation import Simulation
+from infthor_eval.sim.views import Display
 
 _ROOMS = ("kitchen", "living-room", "bedroom", "bathroom")
 _SEEDS = (1, 2, 3)
@@ -43,12 +44,12 @@ def do(sim: Simulation, action: str, **arguments: object) -> None:
 
 def picture(sim: Simulation) -> Image.Image:
     """The agent's frame."""
-    return Image.fromarray(np.ascontiguousarray(sim.colours(sim.agent_picture())[::-1]))
+    return Image.fromarray(np.ascontiguousarray(sim.views.colours(sim.views.agent_frame())[::-1]))
 
 
 def interest(sim: Simulation) -> float:
     """How much a view shows: objects by the logarithm of their pixels, so that many middling ones beat one large."""
-    seen = sim.view()
+    seen = sim.views.agent_view()
     counts = np.bincount(seen.instances.ravel() + 1, minlength=len(seen.names) + 1)[1:]
     shown = [c for c, name in zip(counts, seen.names, strict=True) if "|" in name and c > 40]
     crowding = float((seen.depth < 0.7).mean())
@@ -79,7 +80,7 @@ def close_up(object_type: str) -> Image.Image:
     under = np.array([0.0, float(item.bounds()[0][1]), 0.0])
     prims = np.concatenate([rows([ground], under, np.eye(3), 0), rows(shape(item), item.position, item.matrix, 1)])
     view = euler_matrix((34.0, 205.0, 0.0))
-    camera = Camera(item.center - view[:, 2] * reach * 2.5, view, 28.0, _NEAR, _NEAR)
+    camera = PinholeCamera(item.center - view[:, 2] * reach * 2.5, view, 28.0, _NEAR, _NEAR)
     rasterizer = choose_rasterizer()
     seen = cast_picture(prims, ("ground", object_type), camera, rasterizer)
     return Image.fromarray(np.ascontiguousarray(colour_picture(seen, Lights.none(), rasterizer)[::-1]))
@@ -97,7 +98,7 @@ def in_hand(sim: Simulation, name: str, object_type: str) -> Image.Image:
 def main() -> None:
     """Draws the sheet."""
     out = Path(sys.argv[1] if len(sys.argv) > 1 else "docs/contact_sheet.png")
-    sim = Simulation(Catalogue(), _SIZE, _SIZE)
+    sim = Simulation(Catalogue(), Display(_SIZE, _SIZE))
     tiles = [
         (f"{room}-{seed}", best_view(sim, f"{room}-{seed}")) for seed in _SEEDS for room in _ROOMS
     ]  # fmt: skip

@@ -54,12 +54,12 @@ def memory(client: Any) -> float:
 
 def echo(scene: str, full: bool) -> None:
     """Answers every action with one ready-made reply: what the transport and the client cost by themselves."""
-    from infthor_eval.sim.fifo import FifoPeer
-    from infthor_eval.sim.peer import Peer
+    from infthor_eval.sim.fifo import FifoPipes
     from infthor_eval.sim.scenes.catalogue import Catalogue
+    from infthor_eval.sim.server import SimulatorServer
     from infthor_eval.sim.simulation import Simulation
 
-    peer = Peer(Simulation(Catalogue()))
+    peer = SimulatorServer(Simulation(Catalogue()))
     peer.answer({"action": "Reset", "sceneName": scene, "sequenceId": 0})
     peer.answer({"action": "Initialize", "sequenceId": 1, "fieldOfView": 60, **(_FULL if full else {})})
     replies = {n: peer.answer({"action": "Pass", "sequenceId": n}) for n in (0, 1)}
@@ -67,7 +67,7 @@ def echo(scene: str, full: bool) -> None:
     marker = b"\xaasequenceId\x01"
     assert bytes(metadata).count(marker) == 1
     server, client = (Path(os.environ[f"AI2THOR_FIFO_{side}_PIPE_PATH"]) for side in ("SERVER", "CLIENT"))
-    with FifoPeer(server, client) as pipes:
+    with FifoPipes(server, client) as pipes:
         pipes.send(replies[0])
         while (message := pipes.receive()) is not None:
             if message["action"] in {"GetScenesInBuild", "Initialize"}:

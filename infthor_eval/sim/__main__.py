@@ -1,7 +1,7 @@
 """`python -m infthor_eval.sim [--data DIR] [--supplement FILE] <arguments of a Unity player>`.
 
 The Controller starts this process as if it were Unity and names the pipes in the environment. Of Unity's own
-arguments only the screen's size and the quality matter.
+arguments only the screen's size and the quality have an effect.
 """
 
 import os
@@ -14,18 +14,22 @@ __all__ = ["main"]
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the simulator until the controller hangs up; return the exit code."""
-    # OpenMP's threads must not spin between frames: the controller needs the core meanwhile.
+    # Both must be set before numba is imported, hence the imports below. OpenMP's threads must not spin between frames:
+    # the controller needs the core meanwhile. At most four threads, as several simulators often share a machine.
     os.environ.setdefault("OMP_WAIT_POLICY", "passive")
     os.environ.setdefault("NUMBA_NUM_THREADS", str(min(4, os.cpu_count() or 1)))
     from infthor_eval.errors import InfthorError
-    from infthor_eval.sim.fifo import FifoPeer
-    from infthor_eval.sim.peer import Peer
+    from infthor_eval.sim.fifo import FifoPipes
     from infthor_eval.sim.scenes.catalogue import Catalogue
+    from infthor_eval.sim.server import SimulatorServer
     from infthor_eval.sim.settings import SMOOTH_LEVELS
     from infthor_eval.sim.simulation import Simulation
+    from infthor_eval.sim.views import Display
 
     parser = ArgumentParser(
-        prog="python -m infthor_eval.sim", description="AI2-THOR's embedded stand-in", add_help=False
+        prog="python -m infthor_eval.sim",
+        description="The embedded simulator that takes the place of AI2-THOR's Unity build",
+        add_help=False,
     )
     parser.add_argument("--data", type=Path)
     parser.add_argument("--supplement", type=Path)
@@ -34,11 +38,11 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("-screen-quality", dest="quality", type=int, default=max(SMOOTH_LEVELS))
     options, _ = parser.parse_known_args(arguments)
     try:
-        pipes = FifoPeer(_pipe("AI2THOR_FIFO_SERVER_PIPE_PATH"), _pipe("AI2THOR_FIFO_CLIENT_PIPE_PATH"))
+        pipes = FifoPipes(_pipe("AI2THOR_FIFO_SERVER_PIPE_PATH"), _pipe("AI2THOR_FIFO_CLIENT_PIPE_PATH"))
         with pipes:
-            sim = Simulation(Catalogue(options.data, options.supplement), options.width, options.height)
-            sim.antialias = options.quality in SMOOTH_LEVELS
-            Peer(sim).serve(pipes)
+            display = Display(options.width, options.height, antialias=options.quality in SMOOTH_LEVELS)
+            sim = Simulation(Catalogue(options.data, options.supplement), display)
+            SimulatorServer(sim).serve(pipes)
     except BrokenPipeError:
         return 0  # the controller went away while a reply was under way
     except InfthorError as error:
@@ -53,8 +57,8 @@ def _pipe(variable: str) -> Path:
     path = os.environ.get(variable)
     if not path:
         raise UsageError(
-            f"{variable} is not set: this process is started by ai2thor's Controller"
-            " (local_executable_path, FIFO server), not by hand"
+            f"{variable} is not set: ai2thor's Controller starts this process (local_executable_path, FIFO server);"
+            " it cannot be started by hand"
         )
     return Path(path)
 

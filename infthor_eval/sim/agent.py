@@ -1,4 +1,4 @@
-"""The agent's body: where it stands, which way it looks, and how it holds a thing."""
+"""The agent's body: its position, the direction it looks in, and its grip on an object."""
 
 from dataclasses import dataclass
 
@@ -16,11 +16,15 @@ CROUCH = 0.35  # metres that crouching lowers the camera
 
 @dataclass
 class Agent:
-    """The agent: where it stands, which way it and its camera look (degrees, horizon down positive).
+    """The agent.
 
     Attributes:
-        eye: the camera from the agent's position (right, up, ahead), metres; the stretch robot's is not in the middle.
-        crouch: metres that crouching lowers it; a robot cannot.
+        position: metres (3,).
+        yaw: direction, degrees clockwise from +z.
+        horizon: tilt of the camera below the horizon, degrees.
+        standing: not crouching.
+        eye: camera relative to the agent's position (right, up, ahead), metres; the stretch robot's is off centre.
+        crouch: metres that crouching lowers the camera; 0 for a robot that cannot crouch.
     """
 
     position: Array
@@ -31,19 +35,19 @@ class Agent:
     crouch: float = CROUCH
 
     def camera_position(self) -> Array:
-        """Position of the camera in the world, metres (3,)."""
+        """Return the position of the camera in the world, metres (3,)."""
         lift = self.eye[1] if self.standing else self.eye[1] - self.crouch
         aside = yaw_matrix(self.yaw) @ np.array([self.eye[0], 0.0, self.eye[2]])
         return self.position + aside + np.array([0.0, lift, 0.0])
 
     def camera_matrix(self) -> Array:
-        """Rotation matrix (3, 3) of the camera."""
+        """Return the rotation matrix (3, 3) of the camera."""
         return euler_matrix((self.horizon, self.yaw, 0.0))
 
 
 @dataclass(frozen=True)
 class Grip:
-    """How a thing is held: its pose in the frame of what holds it, the camera or the wrist of an arm.
+    """Pose of a held object relative to what holds it: the camera, or the wrist of an arm.
 
     Attributes:
         offset: the object's origin, metres (3,).

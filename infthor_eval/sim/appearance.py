@@ -1,4 +1,4 @@
-"""How a scene's colours differ from its usual ones: other materials and colours, and other light."""
+"""Randomized looks of a scene: materials, colours and light that differ from the usual ones."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -12,7 +12,12 @@ __all__ = ["Appearance", "Finish"]
 
 @dataclass(frozen=True)
 class Finish:
-    """The surface of one object or of the walls: factors of its colours (3,), and another pattern where it has one."""
+    """A randomized surface, of one object or of a part of the shell.
+
+    Attributes:
+        tint: factors of its colours (3,).
+        pattern: pattern in place of the usual one; None keeps that.
+    """
 
     tint: Array
     pattern: int | None = None
@@ -20,10 +25,10 @@ class Finish:
 
 @dataclass
 class Appearance:
-    """What the randomizing actions change; as it is made, everything looks as usual.
+    """The looks that the randomizing actions change; the defaults are the usual looks.
 
     Attributes:
-        finishes: by object id or name of a part of the shell.
+        finishes: randomized surfaces, by object id or name of a part of the shell.
         brightness: factor of the daylight.
         light: colour of the light, factors (3,).
     """
@@ -33,6 +38,6 @@ class Appearance:
     light: Array = field(default_factory=lambda: np.ones(3))
 
     @property
-    def usual(self) -> bool:
-        """Whether no surface looks other than usual."""
+    def is_default(self) -> bool:
+        """Whether all surfaces look as usual; brightness does not count, as it changes the lights and not a surface."""
         return not self.finishes and bool(np.all(self.light == 1.0))

@@ -1,4 +1,4 @@
-"""Why an action failed, in AI2-THOR's own terms."""
+"""Failures of actions, with AI2-THOR's error codes."""
 
 from enum import StrEnum
 
@@ -6,7 +6,7 @@ __all__ = ["ActionError", "ErrorCode"]
 
 
 class ErrorCode(StrEnum):
-    """`errorCode` of AI2-THOR's metadata; the first four make the client raise ValueError."""
+    """`errorCode` of AI2-THOR's metadata; the client raises ValueError on the first four."""
 
     INVALID_ACTION = "InvalidAction"
     MISSING_ARGUMENTS = "MissingArguments"

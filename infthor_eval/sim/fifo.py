@@ -17,14 +17,14 @@ from typing import Any
 
 from infthor_eval.errors import SimulatorError
 
-__all__ = ["FieldType", "FifoPeer"]
+__all__ = ["FieldType", "FifoPipes"]
 
 _HEADER = struct.Struct("!BI")
-_PAUSE = 0.01  # seconds between looks at a pipe that the other side has not opened yet
+_PAUSE = 0.01  # seconds between two attempts at a pipe that the other side has not opened yet
 
 
 class FieldType(IntEnum):
-    """What a frame carries; the numbers are ai2thor's."""
+    """The content of a frame; the numbers are ai2thor's."""
 
     METADATA = 1
     ACTION = 2
@@ -45,21 +45,22 @@ class FieldType(IntEnum):
 _END = _HEADER.pack(FieldType.END_OF_MESSAGE, 0)
 
 
-class FifoPeer:
-    """Sends states and receives actions over the pipes that the Controller made.
+class FifoPipes:
+    """Sends states and receives actions over the pipes that the Controller created.
 
     Args:
         server_pipe: path of the pipe that states are written to.
-        client_pipe: path of the pipe that actions are read from; opened after the first state only, as Unity does.
+        client_pipe: path of the pipe that actions are read from.
     """
 
     def __init__(self, server_pipe: Path, client_pipe: Path) -> None:
         self._parent = os.getppid()
+        # Opened only after the first state is sent, as Unity does.
         self._client_path = client_pipe
         self._out = self._open_out(server_pipe)
         self._in: int | None = None
 
-    def __enter__(self) -> "FifoPeer":
+    def __enter__(self) -> "FifoPipes":
         return self
 
     def __exit__(
@@ -78,7 +79,7 @@ class FifoPeer:
         self._write(_END)
 
     def receive(self) -> dict[str, Any] | None:
-        """The next action, or None when the Controller has closed the pipe.
+        """Return the next action, or None when the Controller has closed the pipe.
 
         Raises:
             SimulatorError: what arrives is not an action message.
@@ -106,41 +107,40 @@ class FifoPeer:
         return action
 
     def _open_out(self, path: Path) -> int:
-        """Open the pipe of states when the controller reads from it.
-
-        A plain open would wait for ever for a controller that has died meanwhile.
-        """
+        """Open the pipe of states when the controller reads from it."""
+        # A blocking open would wait for ever for a controller that has died meanwhile. A non-blocking one fails with
+        # ENXIO as long as nobody reads.
         while True:
             try:
                 pipe = os.open(path, os.O_WRONLY | os.O_NONBLOCK)
             except OSError as error:
                 if error.errno != errno.ENXIO:
                     raise SimulatorError(f"{path}: the pipe of states cannot be opened ({error.strerror})") from error
-                self._check_parent()
+                if not self._parent_lives():
+                    raise SimulatorError("the controller died before it opened its pipe") from error
                 time.sleep(_PAUSE)
             else:
                 os.set_blocking(pipe, True)
                 return pipe
 
     def _open_in(self) -> int | None:
-        """Open the pipe of actions and wait for the controller to write to it; None if it dies before."""
+        """Open the pipe of actions and wait until the controller writes to it; return None if it dies before."""
         pipe = os.open(self._client_path, os.O_RDONLY | os.O_NONBLOCK)
         poll = select.poll()
         poll.register(pipe, select.POLLIN)
         while not poll.poll(_PAUSE * 1000):
-            if os.getppid() != self._parent:
+            if not self._parent_lives():
                 os.close(pipe)
                 return None
         os.set_blocking(pipe, True)
         return pipe
 
-    def _check_parent(self) -> None:
-        if os.getppid() != self._parent:
-            raise SimulatorError("the controller died before it opened its pipe")
+    def _parent_lives(self) -> bool:
+        return os.getppid() == self._parent  # an orphan is given another parent
 
     def _write(self, data: bytes | memoryview) -> None:
         view = memoryview(data)
-        while view:
+        while view:  # a pipe takes only as much at once as its buffer has room for
             view = view[os.write(self._out, view) :]
 
     def _read(self, size: int) -> bytes | None:

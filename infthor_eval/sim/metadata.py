@@ -1,4 +1,4 @@
-"""The metadata of AI2-THOR 5.x, of one object and of the agent, as plain values."""
+"""The metadata of AI2-THOR 5.x, for one object and for the agent, as plain values."""
 
 import re
 from typing import Any
@@ -6,15 +6,16 @@ from typing import Any
 import numpy as np
 
 from infthor_eval.sim.arm.metadata import arm_metadata
-from infthor_eval.sim.geometry import corners, matrix_euler, rounded, to_xyz
+from infthor_eval.sim.cameras import ThirdPartyCamera
+from infthor_eval.sim.geometry import corners, matrix_euler, round_vector, to_xyz
 from infthor_eval.sim.objects import SimObject
 from infthor_eval.sim.obstacles import door_leaf
-from infthor_eval.sim.simulation import Simulation, ThirdPartyCamera
+from infthor_eval.sim.simulation import Simulation
 from infthor_eval.sim.world import World
 
 __all__ = ["Outcome", "agent_metadata", "object_metadata", "third_party_metadata"]
 
-_DIGITS = 6
+_DIGITS = 6  # of positions and angles; corners of boxes have 4
 _ITHOR = re.compile(r"FloorPlan\d+")
 _LEGACY: dict[str, Any] = {
     "colorBounds": None, "visibleRange": None, "flatSurfacesOnGrid": [], "distances": [], "normals": [],
@@ -25,26 +26,33 @@ _LEGACY: dict[str, Any] = {
 
 
 class Outcome:
-    """How the last action ended, as the metadata reports it."""
+    """The outcome of the last action.
+
+    Args:
+        action: name of the action.
+        error: message of the failure; empty for success.
+        code: error code; empty where Unity has none.
+        value: what the action returned.
+    """
 
     def __init__(self, action: str, error: str = "", code: str = "", value: Any = None) -> None:
         self.action, self.error, self.code, self.value = action, error, code, value
 
     def fields(self) -> dict[str, Any]:
-        """The part of the metadata that tells of the last action."""
+        """Return the metadata's fields about the last action."""
         return {
             "lastAction": self.action,
             "lastActionSuccess": not self.error,
             "errorMessage": self.error,
-            "errorCode": self.code or None,
+            "errorCode": self.code or None,  # Unity sends null and not an empty text
             "actionReturn": self.value,
         }
 
 
 def object_metadata(item: SimObject) -> dict[str, Any]:
-    """All fields of one object but those that change with the agent: `visible`, `isInteractable`, `distance`."""
+    """Return all fields of one object but those that depend on the agent: `visible`, `isInteractable`, `distance`."""
     abilities, state = item.type, item.state
-    oriented = abilities.pickupable or abilities.moveable
+    movable = abilities.pickupable or abilities.moveable
     return {
         "name": item.name,
         "position": _xyz(item.position),
@@ -75,7 +83,7 @@ def object_metadata(item: SimObject) -> dict[str, Any]:
         "isPickedUp": state.picked_up,
         "moveable": abilities.moveable,
         "mass": abilities.mass,
-        "salientMaterials": list(abilities.materials) if abilities.pickupable or abilities.moveable else None,
+        "salientMaterials": list(abilities.materials) if movable else None,
         "receptacleObjectIds": list(item.contents) if abilities.receptacle else None,
         "objectType": item.object_type,
         "objectId": item.object_id,
@@ -84,16 +92,18 @@ def object_metadata(item: SimObject) -> dict[str, Any]:
         "controlledObjects": list(item.controls) or None,
         "isMoving": False,
         "axisAlignedBoundingBox": _axis_aligned(item),
-        "objectOrientedBoundingBox": _oriented(item) if oriented else None,
+        # Null for fixed things, as in Unity.
+        "objectOrientedBoundingBox": {"cornerPoints": [round_vector(c) for c in item.oriented_corners()]}
+        if movable
+        else None,
     }
 
 
 def agent_metadata(sim: Simulation, outcome: Outcome) -> dict[str, Any]:
-    """The fields of the agent, of the scene and of the last action; all but `objects` and `colors`."""
+    """Return the fields of the agent, of the scene and of the last action: all but `objects` and `colors`."""
     world, agent = sim.world, sim.world.agent
     held = None if world.held is None else world.objects[world.held]
     low, high = world.scene_bounds()
-    view = sim.width, sim.height
     pose = _held_pose(world)
     return {
         **_LEGACY,
@@ -117,9 +127,10 @@ def agent_metadata(sim: Simulation, outcome: Outcome) -> dict[str, Any]:
         "collided": False,
         "collidedObjects": [],
         "inventoryObjects": [] if held is None else [{"objectId": held.object_id, "objectType": held.object_type}],
-        "sceneName": _scene_name(world),
-        "screenWidth": view[0],
-        "screenHeight": view[1],
+        # As in Unity, iTHOR's floor plans go by the name of their physics scene.
+        "sceneName": f"{world.scene}_physics" if _ITHOR.fullmatch(world.scene) else world.scene,
+        "screenWidth": sim.display.width,
+        "screenHeight": sim.display.height,
         "agentId": 0,
         "depthFormat": "Meters",
         "currentTime": 0.0,
@@ -128,7 +139,7 @@ def agent_metadata(sim: Simulation, outcome: Outcome) -> dict[str, Any]:
 
 
 def third_party_metadata(index: int, camera: ThirdPartyCamera) -> dict[str, Any]:
-    """Pose of one third-party camera."""
+    """Return the pose of one third-party camera."""
     return {
         "thirdPartyCameraId": index,
         "position": _xyz(camera.position),
@@ -137,13 +148,8 @@ def third_party_metadata(index: int, camera: ThirdPartyCamera) -> dict[str, Any]
     }
 
 
-def _scene_name(world: World) -> str:
-    """The scene as Unity calls it: the kitchens and so on of iTHOR by the name of their physics scene."""
-    return f"{world.scene}_physics" if _ITHOR.fullmatch(world.scene) else world.scene
-
-
 def _held_pose(world: World) -> dict[str, Any]:
-    """Pose of the held object in the world and in the camera's frame; all zeros where nothing is held."""
+    """Return the held object's pose in the world and in the camera's frame; all zeros where nothing is held."""
     if world.held is None:
         return dict.fromkeys(("position", "rotation", "localPosition", "localRotation"), _xyz(np.zeros(3)))
     item, agent = world.objects[world.held], world.agent
@@ -157,7 +163,7 @@ def _held_pose(world: World) -> dict[str, Any]:
 
 
 def _axis_aligned(item: SimObject) -> dict[str, Any]:
-    """The box around an object and the door or drawer that it has open."""
+    """Return the box around an object and its open door or drawer."""
     low, high = item.bounds()
     leaf = door_leaf(item) if item.state.openness > 0 else None
     if leaf is not None:
@@ -166,13 +172,9 @@ def _axis_aligned(item: SimObject) -> dict[str, Any]:
 
 
 def _box(center: Any, size: Any) -> dict[str, Any]:
-    points = [rounded(point) for point in corners(center, size)]
+    points = [round_vector(point) for point in corners(center, size)]
     return {"cornerPoints": points, "center": _xyz(center), "size": _xyz(size)}
 
 
-def _oriented(item: SimObject) -> dict[str, Any]:
-    return {"cornerPoints": [rounded(point) for point in item.oriented_corners()]}
-
-
 def _xyz(vector: Any) -> dict[str, float]:
-    return to_xyz(rounded(vector, _DIGITS))
+    return to_xyz(round_vector(vector, _DIGITS))

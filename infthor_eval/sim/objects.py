@@ -16,7 +16,7 @@ DRAWER_SLIDE = 0.8  # share of its depth that a drawer comes out
 
 @dataclass
 class SimObjectState:
-    """What actions change beside the pose; the names follow AI2-THOR's metadata."""
+    """What actions change of an object beside its pose; the names follow AI2-THOR's metadata."""
 
     openness: float = 0.0
     toggled: bool = False
@@ -35,18 +35,25 @@ class SimObject:
     """An object, its pose and its state.
 
     Attributes:
-        object_id: fixed for the object's life, however it is moved.
+        object_id: id; it stays the same when the object moves, though it names the first position.
+        name: AI2-THOR's name of the object, unlike the id not made of its position.
+        type: record of the object's type.
         position: origin of the object in the world, metres (3,).
         rotation: Unity's Euler angles in degrees (3,).
         box_center: centre of the box in the object's own frame, metres (3,).
         box_size: extents of the box in the object's own frame, metres (3,).
+        asset_id: AI2-THOR's name of the model; empty for procedural objects.
         front: yaw in degrees of the object's front relative to its own frame; doors and drawers open that way.
         support: height in metres above the bottom of the box where things stand on it; None: the top of the box.
-        hinge: -1 or 1, the side of the door's hinge seen from the front; 0 where there is none.
-        pieces: rectangles that make up the object's plan where it is not the whole box, metres from the box's middle
-            in the object's own frame; empty for the whole.
-        hollow: its front is left to drawers and the like that are objects of their own.
+        hinge: -1 or 1, the side of the door's hinge seen from the front; 0 without a hinge.
+        pieces: rectangles that the object covers seen from above, metres from the box's middle in the object's own
+            frame; empty if it covers its whole box.
+        hollow: its front is drawn open, as drawers or doors that are separate objects fill it.
         style: index that varies colours between objects of one type.
+        parent: id of the receptacle that contains it.
+        controls: ids of the objects that its switch controls, as a knob its burner.
+        contents: ids of the objects that it contains directly.
+        version: number of its last change, see `World.mark_changed`.
     """
 
     object_id: str
@@ -87,15 +94,17 @@ class SimObject:
 
     @property
     def front_size(self) -> Array:
-        """Width, height and depth of the box as one sees it from its front, metres (3,)."""
+        """Width, height and depth of the box seen from its front, metres (3,)."""
         return self.box_size[[2, 1, 0]] if round(self.front / 90) % 2 else self.box_size
 
     def oriented_corners(self) -> Array:
-        """The 8 corners (8, 3) of the box, turned with the object."""
+        """Return the 8 corners (8, 3) of the box, turned with the object."""
         return corners(self.center, self.box_size, self.matrix)
 
     def bounds(self) -> tuple[Array, Array]:
-        """Low and high corner of the axis-aligned box in the world, metres."""
+        """Return the low and high corner of the axis-aligned box in the world, metres."""
+        # Nearly every rule asks for bounds, and poses are replaced in many places. The arrays' bytes are the key, so
+        # that no setter can be forgotten.
         key = b"".join(a.tobytes() for a in (self.position, self.rotation, self.box_center, self.box_size))
         if self._bounds is None or self._bounds[0] != key:
             points = self.oriented_corners()
@@ -103,7 +112,7 @@ class SimObject:
         return self._bounds[1], self._bounds[2]
 
     def surface_height(self) -> float:
-        """World height in metres of the surface that things stand on."""
+        """Return the world height in metres of the surface that things stand on."""
         low, high = self.bounds()
         return float(high[1] if self.support is None else low[1] + self.support)
 
@@ -114,7 +123,7 @@ class SimObject:
         self.position = self.position + np.array([point[0] - middle[0], point[1] - low[1], point[2] - middle[2]])
 
     def duplicate(self, object_id: str) -> "SimObject":
-        """A copy of this object with its own state and another id."""
+        """Return a copy of this object with a state of its own, another id, and neither parent nor contents."""
         return replace(
             self,
             object_id=object_id,

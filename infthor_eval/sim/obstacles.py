@@ -1,4 +1,4 @@
-"""What stands in the agent's way beside the fixed furniture that the navigation grid knows: doors and held things."""
+"""Obstacles for the agent that the navigation grid does not know: open doors and drawers, and what it holds."""
 
 import numpy as np
 
@@ -9,13 +9,13 @@ from infthor_eval.sim.world import World
 __all__ = ["blocking_object", "door_leaf", "held_object_blocks", "nearest_name"]
 
 _RADIUS = 0.2  # of the agent's capsule, metres
-_KNEE, _HEAD = 0.15, 1.5
+_KNEE, _HEAD = 0.15, 1.5  # heights in metres between which a door stops the agent
 
 
 def blocking_object(world: World, target: Array) -> str | None:
-    """Name of the open door or drawer that keeps the agent from standing at `target` (3,); None: none does.
+    """Return the name of the open door or drawer that keeps the agent from standing at `target` (3,), or None.
 
-    What already touches the agent does not hold it: it could not get away otherwise.
+    One that already touches the agent does not count, as the agent could not get away from it otherwise.
     """
     for item in world.objects.values():
         if item.object_id in world.open_at_start or item.state.openness <= 0:
@@ -29,7 +29,7 @@ def blocking_object(world: World, target: Array) -> str | None:
 
 
 def door_leaf(item: SimObject) -> tuple[Array, Array] | None:
-    """Low and high corner of the axis-aligned box around an open door or drawer; None for other things."""
+    """Return the low and high corner of the axis-aligned box around an open door or drawer; None for other objects."""
     if not (item.type.hinged or item.type.slides):
         return None
     width, height, depth = item.front_size
@@ -49,7 +49,7 @@ def door_leaf(item: SimObject) -> tuple[Array, Array] | None:
 
 
 def held_object_blocks(world: World, target: Array) -> bool:
-    """Whether what the agent holds would go through a wall if the agent stood at `target`."""
+    """Return whether what the agent holds would be outside the outer walls if the agent stood at `target`."""
     if world.held is None:
         return False
     held = world.objects[world.held]
@@ -60,8 +60,9 @@ def held_object_blocks(world: World, target: Array) -> bool:
 
 
 def nearest_name(world: World, point: Array) -> str:
-    """Name of the standing thing nearest to `point`, which is what the agent ran into."""
-    best = ("Wall", 0.6)
+    """Return the name of the furniture nearest to `point`, for messages about what stopped the agent."""
+    # The grid knows only that a cell is not free, and not what stands there.
+    best = ("Wall", 0.6)  # beyond so many metres a wall is the likelier obstacle
     for item in world.objects.values():
         low, high = item.bounds()
         if item.type.pickupable or item.object_type == "Floor" or low[1] > 1.6 or high[1] < 0.2:

@@ -1,4 +1,4 @@
-"""Where things stand: the surfaces of receptacles, what lies on them, and where there is room for one thing more."""
+"""The surfaces of receptacles, free places on them, and the receptacle that an object is in or on."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -11,12 +11,12 @@ from infthor_eval.sim.geometry import Array, yaw_matrix
 from infthor_eval.sim.objects import DRAWER_SLIDE, SimObject
 from infthor_eval.sim.world import World
 
-__all__ = ["PointFilter", "Surface", "find_place", "has_within", "owner_of", "surfaces"]
+__all__ = ["PointFilter", "Surface", "contains_box", "find_parent", "find_place", "surfaces"]
 
 _WALL = 0.02  # thickness in metres of the sides and floors of hollow receptacles
-_STEP = 0.05
-_BELOW_HAND = 0.15  # metres below the agent's own height at which it likes best to put things
-_CLEARANCE = 0.008
+_STEP = 0.05  # metres between the places that are tried
+_BELOW_HAND = 0.15  # metres below the agent's own height of the surface that is tried first
+_CLEARANCE = 0.008  # metres between neighbours
 _ON_IT = 0.05  # metres between a surface and the underside of what stands on it
 
 
@@ -28,12 +28,13 @@ class Surface:
     """A horizontal rectangle that things stand on.
 
     Attributes:
-        center: its middle in the world, metres (3,).
-        half: half extents along the receptacle's own x and z (2,).
+        center: middle in the world, metres (3,).
+        half: half extents along the receptacle's own x and z, metres (2,).
         yaw: rotation of the receptacle in degrees.
         headroom: free height above, metres.
-        overhang: how far in metres a thing may stick out beyond the edge.
-        from_middle: the first choice is the middle, as walls hide what stands near them; else the agent's side.
+        overhang: metres that a thing may stick out beyond the edge.
+        from_middle: places are tried from the middle outwards, as walls hide what stands near them; else from the
+            agent's side.
     """
 
     center: Array
@@ -45,13 +46,13 @@ class Surface:
 
 
 def surfaces(receptacle: SimObject) -> list[Surface]:
-    """The surfaces of a receptacle, lowest first."""
+    """Return the surfaces of a receptacle, lowest first."""
     if receptacle.type.levels:
-        return _levels_inside(receptacle)
+        return _shelves(receptacle)
     low, high = receptacle.bounds()
     middle, half = (low + high) / 2, (receptacle.box_size[0] / 2, receptacle.box_size[2] / 2)
     yaw, overhang = float(receptacle.rotation[1]), math.inf if receptacle.type.overhang else 0.03
-    if receptacle.type.open_top:
+    if receptacle.type.open_top:  # a vessel, whose only surface is its bottom
         base = float(low[1]) + min(_WALL, (high[1] - low[1]) * 0.3)
         if receptacle.support is not None:
             base = max(base, float(low[1]) + receptacle.support)
@@ -60,15 +61,15 @@ def surfaces(receptacle: SimObject) -> list[Surface]:
     level = receptacle.surface_height()
     if not receptacle.pieces:
         return [Surface(np.array([middle[0], level, middle[2]]), half, yaw, math.inf, overhang)]
-    found = []
+    tops = []
     for x0, z0, x1, z1 in receptacle.pieces:
         at = receptacle.center + receptacle.matrix @ np.array([(x0 + x1) / 2, 0.0, (z0 + z1) / 2])
-        found.append(Surface(np.array([at[0], level, at[2]]), ((x1 - x0) / 2, (z1 - z0) / 2), yaw, math.inf, overhang))
-    return found
+        tops.append(Surface(np.array([at[0], level, at[2]]), ((x1 - x0) / 2, (z1 - z0) / 2), yaw, math.inf, overhang))
+    return tops
 
 
-def _levels_inside(receptacle: SimObject) -> list[Surface]:
-    """The floor and shelves of a cabinet, a fridge or the like, or of a drawer as far as it has come out."""
+def _shelves(receptacle: SimObject) -> list[Surface]:
+    """Return the floor and shelves inside a cabinet, fridge or the like, or the floor of a drawer where it is now."""
     low, high = receptacle.bounds()
     inner = (max(receptacle.box_size[0] / 2 - _WALL, 0.02), max(receptacle.box_size[2] / 2 - _WALL, 0.02))
     heights = [low[1] + share * (high[1] - low[1]) for share in receptacle.type.levels]
@@ -81,20 +82,20 @@ def _levels_inside(receptacle: SimObject) -> list[Surface]:
 
 
 def drawer_offset(receptacle: SimObject) -> Array:
-    """How far (3,), in metres, an open drawer's tray has come out of its box; zero for all else."""
+    """Return how far an open drawer has come out of its box, metres (3,); zeros for other objects."""
     if not receptacle.type.slides or receptacle.state.openness == 0:
         return np.zeros(3)
     matrix = yaw_matrix(float(receptacle.rotation[1]) + receptacle.front)
     return matrix @ np.array([0.0, 0.0, DRAWER_SLIDE * receptacle.front_size[2] * receptacle.state.openness])
 
 
-def has_within(vessel: SimObject, low: Array, high: Array) -> bool:
-    """Whether a box, given by its corners, is within the walls of an open vessel and above its floor; not its rim."""
+def contains_box(vessel: SimObject, low: Array, high: Array) -> bool:
+    """Return whether a box, given by its corners, is within the walls of an open vessel and above its floor."""
     if not vessel.type.open_top or (vessel.type.encloses and vessel.state.openness == 0):
         return False
     (cavity,) = surfaces(vessel)
     middle, half = (low + high) / 2, (high - low) / 2
-    # The middles of its sides, not its corners: most of what lies in vessels is round.
+    # The middles of its sides, not its corners, must be inside: most of what lies in vessels is round.
     sides = np.array([[half[0], 0, 0], [-half[0], 0, 0], [0, 0, half[2]], [0, 0, -half[2]]])
     points = (middle + sides - cavity.center) @ yaw_matrix(cavity.yaw)
     beside = np.abs(points[:, [0, 2]]).max(axis=0) > cavity.half
@@ -105,29 +106,29 @@ def find_place(
     world: World,
     item: SimObject,
     receptacle: SimObject,
-    crowd: float = 0.0,
+    overlap: float = 0.0,
     random: np.random.Generator | None = None,
-    seen: PointFilter | None = None,
+    point_filter: PointFilter | None = None,
     among_fixed: bool = False,
 ) -> SimObject | None:
-    """A copy of `item` standing in the free place of `receptacle` that is nearest to the agent; None if it is full.
+    """Return a copy of `item` at the first free place of `receptacle`; None if it is full.
 
     Args:
         world: the world; not changed.
-        item: what is to be put, e.g. the held object.
-        receptacle: where.
-        crowd: how far, as a share of their size, neighbours may overlap.
-        random: picks any free place instead of the nearest.
-        seen: tells which of some points (n, 3) come into question; None: all.
-        among_fixed: it may stand in lamps, appliances and taps, whose boxes in recordings are coarser than they are.
+        item: object to place, e.g. the held one.
+        receptacle: receptacle to place it in or on.
+        overlap: share of their size by which neighbours may overlap.
+        random: random numbers that choose among the free places; None for the nearest.
+        point_filter: function that marks which of some points (n, 3) may be used; None: all.
+        among_fixed: allow places within lamps, appliances and taps, whose recorded boxes are larger than they are.
     """
     boxes = [o.bounds() for o in _neighbours(world, item, receptacle)]
     ghost = item.duplicate(item.object_id)
-    for surface in _by_reach(world, surfaces(receptacle)):
-        fixed = [] if among_fixed else [o.bounds() for o in _standing(world, receptacle, surface)]
+    for surface in _sort_by_reach(world, surfaces(receptacle)):
+        fixed = [] if among_fixed else [o.bounds() for o in _fixed_on(world, receptacle, surface)]
         for turn in (0.0, 90.0):
             ghost.rotation = np.array([0.0, (surface.yaw + turn) % 360, 0.0])
-            place = _free_point(world, ghost, surface, boxes + fixed, crowd, random, seen)
+            place = _free_point(world, ghost, surface, boxes + fixed, overlap, random, point_filter)
             if place is not None:
                 ghost.place_bottom(place)
                 return ghost
@@ -135,17 +136,19 @@ def find_place(
 
 
 def _neighbours(world: World, item: SimObject, receptacle: SimObject) -> Iterator[SimObject]:
-    """What could be in the way: things in this receptacle, and loose ones of others that reach into it."""
+    """Yield the loose objects that could be in the way: those in this receptacle, and those of other receptacles."""
     inside = {o.object_id for o in world.descendants(item)} | {item.object_id}
     for other in world.objects.values():
         if other.object_id in inside or other is receptacle or not other.type.pickupable:
             continue
+        # Left out: objects on nothing, and those that share the receptacle's own parent. These stand beside it, as
+        # plates on the table that a bowl is on.
         if other.parent == receptacle.object_id or (other.parent is not None and receptacle.parent != other.parent):
             yield other
 
 
-def _standing(world: World, receptacle: SimObject, surface: Surface) -> Iterator[SimObject]:
-    """What stands on the surface for good: lamps, screens, appliances, taps, burners."""
+def _fixed_on(world: World, receptacle: SimObject, surface: Surface) -> Iterator[SimObject]:
+    """Yield what stands on the surface and cannot be picked up: lamps, screens, appliances, taps, burners."""
     for other in world.objects.values():
         if other.type.pickupable or other.type.furniture or other.type.stacked or other is receptacle:
             continue
@@ -153,7 +156,8 @@ def _standing(world: World, receptacle: SimObject, surface: Surface) -> Iterator
             yield other
 
 
-def _by_reach(world: World, found: list[Surface]) -> list[Surface]:
+def _sort_by_reach(world: World, listed: list[Surface]) -> list[Surface]:
+    """Return surfaces, the easiest for the agent to reach first: near its hand's height, then near it, then low."""
     agent = world.agent.position
 
     def cost(surface: Surface) -> tuple[float, float, float]:
@@ -165,7 +169,7 @@ def _by_reach(world: World, found: list[Surface]) -> list[Surface]:
             float(surface.center[1]),
         )
 
-    return sorted(found, key=cost)
+    return sorted(listed, key=cost)
 
 
 def _free_point(
@@ -173,10 +177,11 @@ def _free_point(
     ghost: SimObject,
     surface: Surface,
     boxes: list[tuple[Array, Array]],
-    crowd: float,
+    overlap: float,
     random: np.random.Generator | None,
-    seen: PointFilter | None,
+    point_filter: PointFilter | None,
 ) -> Array | None:
+    """Return the point (3,) of a surface for the underside of `ghost`, clear of `boxes`; None if there is none."""
     low, high = ghost.bounds()
     height = high[1] - low[1]
     if height > surface.headroom + 0.02:
@@ -186,15 +191,15 @@ def _free_point(
     points = _grid(world, surface, (local[0] / 2, local[2] / 2), turn)
     if not len(points):
         return None
-    if seen is not None:
-        points = points[seen(points + np.array([0.0, height / 2, 0.0]))]
-    half = (high - low) / 2 * (1 - crowd)
-    gap = _CLEARANCE * (1 - crowd)
+    if point_filter is not None:
+        points = points[point_filter(points + np.array([0.0, height / 2, 0.0]))]
+    half = (high - low) / 2 * (1 - overlap)
+    gap = _CLEARANCE * (1 - overlap)
     free = np.ones(len(points), dtype=bool)
     for other_low, other_high in boxes:
         if other_low[1] > surface.center[1] + height or other_high[1] < surface.center[1] + 0.004:
-            continue
-        middle, other = (other_low + other_high) / 2, (other_high - other_low) / 2 * (1 - crowd)
+            continue  # above or below what is to stand here
+        middle, other = (other_low + other_high) / 2, (other_high - other_low) / 2 * (1 - overlap)
         free &= (np.abs(points[:, 0] - middle[0]) > half[0] + other[0] + gap) | (
             np.abs(points[:, 2] - middle[2]) > half[2] + other[2] + gap
         )
@@ -205,7 +210,7 @@ def _free_point(
 
 
 def _grid(world: World, surface: Surface, half: tuple[float, float], turn: Array) -> Array:
-    """Points (n, 3) of the surface at which something of this half size stands wholly on it, nearest first."""
+    """Return points (n, 3) of the surface at which something of this half size fits on it, nearest first."""
     spans = [surface.half[i] - half[i] for i in range(2)]
     if min(spans) < -surface.overhang:
         return np.zeros((0, 3))
@@ -217,12 +222,14 @@ def _grid(world: World, surface: Surface, half: tuple[float, float], turn: Array
     flat = np.stack([xs.ravel(), np.zeros(xs.size), zs.ravel()], axis=1) @ turn.T + surface.center
     origin = surface.center if surface.from_middle else world.agent.position
     away = np.hypot(flat[:, 0] - origin[0], flat[:, 2] - origin[2])
+    # Places within 6 cm of the edge count as farther away than they are: things stand safer, and look so, inside.
     edge = np.maximum(0.0, 0.06 - np.minimum(axes[0].max() - np.abs(xs.ravel()), axes[1].max() - np.abs(zs.ravel())))
+    # Rounding and a stable sort make ties independent of the last bits of the agent's position.
     return flat[np.argsort(np.round(away + 3 * edge, 6), kind="stable")]
 
 
-def owner_of(world: World, item: SimObject) -> SimObject | None:
-    """The receptacle that `item`, by its position alone, stands in or on; None for one in mid-air or on the floor."""
+def find_parent(world: World, item: SimObject) -> SimObject | None:
+    """Return the receptacle that an object is in or on, judged by its position alone; None in mid-air."""
     low, high = item.bounds()
     point = np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
     best: tuple[float, SimObject] | None = None
@@ -230,14 +237,17 @@ def owner_of(world: World, item: SimObject) -> SimObject | None:
     for other in world.objects.values():
         if other is item or not other.type.receptacle or other.object_id in inside:
             continue
-        cost = _holding_cost(other, point, item)
+        cost = _parent_cost(other, point, item)
         if cost is not None and (best is None or cost < best[0]):
             best = (cost, other)
     return None if best is None else best[1]
 
 
-def _holding_cost(receptacle: SimObject, point: Array, item: SimObject) -> float | None:
-    """How far-fetched it is that a thing whose underside is at `point` stands in `receptacle`; None: it does not."""
+def _parent_cost(receptacle: SimObject, point: Array, item: SimObject) -> float | None:
+    """Return how unlikely it is that an object whose underside is at `point` is in a receptacle; None: it is not.
+
+    Hollow receptacles come before surfaces, small before large ones, and the floor last.
+    """
     low, high = (corner + drawer_offset(receptacle) for corner in receptacle.bounds())
     if not (low[0] - 0.01 <= point[0] <= high[0] + 0.01 and low[2] - 0.01 <= point[2] <= high[2] + 0.01):
         return None
@@ -246,7 +256,7 @@ def _holding_cost(receptacle: SimObject, point: Array, item: SimObject) -> float
     volume = float(np.prod(np.maximum(high - low, 0.02)))
     if receptacle.type.encloses or receptacle.type.open_top:
         top = (low[1] + high[1]) / 2 if receptacle.type.slides else high[1] - 0.005
-        inside = low[1] - _sinking(receptacle) <= point[1] <= top
+        inside = low[1] - _depth_below(receptacle) <= point[1] <= top
         if receptacle.type.pickupable and float(np.prod(item.box_size)) > volume:
             return None
         return 0.01 * volume if inside else None
@@ -256,8 +266,8 @@ def _holding_cost(receptacle: SimObject, point: Array, item: SimObject) -> float
     return 1.0 + abs(gap) if low[1] <= point[1] <= high[1] + 0.05 else None
 
 
-def _sinking(receptacle: SimObject) -> float:
-    """How far below the box of a hollow receptacle, in metres, the underside of its contents may be recorded."""
+def _depth_below(receptacle: SimObject) -> float:
+    """Return metres below the box of a hollow receptacle at which the underside of its contents may be recorded."""
     if receptacle.type.encloses:
         return 0.12
     return 0.03 if receptacle.type.pickupable else 0.08

@@ -1,10 +1,11 @@
-"""What `Initialize` sets (how the agent moves and sees, which pictures are sent), and AI2-THOR's quality levels."""
+"""The settings of `Initialize`, and AI2-THOR's quality levels and agent modes."""
 
 from dataclasses import dataclass
 
-__all__ = ["AGENT_MODES", "SMOOTH_LEVELS", "SMOOTH_QUALITIES", "SimulatorSettings"]
+__all__ = ["AGENT_MODES", "ARM_MODES", "SMOOTH_LEVELS", "SMOOTH_QUALITIES", "SimulatorSettings"]
 
-AGENT_MODES = ("default", "arm", "stretch")
+ARM_MODES = ("arm", "stretch")
+AGENT_MODES = ("default", *ARM_MODES)
 SMOOTH_QUALITIES = {"High": 5, "Very High": 6, "Ultra": 7, "High WebGL": 8}
 """The `quality` values whose pictures are anti-aliased, with the numbers that the Controller passes to the player."""
 SMOOTH_LEVELS = frozenset(SMOOTH_QUALITIES.values())
@@ -12,9 +13,21 @@ SMOOTH_LEVELS = frozenset(SMOOTH_QUALITIES.values())
 
 @dataclass(frozen=True)
 class SimulatorSettings:
-    """Parameters of the agent and of the pictures; names and defaults are those of AI2-THOR 5.
+    """Settings of the agent and of the pictures, with AI2-THOR 5's defaults; metres, degrees, kilograms.
 
-    Lengths in metres, angles in degrees, masses in kilograms.
+    Attributes:
+        agent_mode: one of `AGENT_MODES`.
+        mass_threshold: mass above which a loose object stops an arm; None: none does.
+        grid_size: length of a step without `moveMagnitude`.
+        snap_to_grid: keep positions free of rounding noise after whole steps.
+        rotate_step: degrees of a turn without `degrees`.
+        visibility_distance: horizontal distance within which objects are visible.
+        field_of_view: vertical field of view of the agent's camera.
+        depth: replies have depth pictures.
+        normals: replies have pictures of surface normals.
+        instances: replies have instance segmentation.
+        classes: replies have semantic segmentation.
+        fast_emit: replies to queries have no new state.
     """
 
     agent_mode: str = "default"

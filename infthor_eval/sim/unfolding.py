@@ -1,4 +1,4 @@
-"""What opening does to the box of a thing that has no door or drawer: lids rise, flaps spread, blinds come down."""
+"""Boxes that change with opening, of objects without door or drawer: lids rise, flaps spread, blinds come down."""
 
 import numpy as np
 
@@ -9,10 +9,11 @@ __all__ = ["unfold"]
 
 
 def unfold(item: SimObject, openness: float) -> None:
-    """Give an object the box that it has when it is open so far; its present one belongs to its present openness."""
+    """Change an object's box from that at its present openness to that at `openness`."""
     turn, before = yaw_matrix(item.front), item.state.openness
     for way in item.type.unfolds:
-        step = turn @ np.eye(3)[way.axis]  # of the object's own frame, along the axis as one sees it from its front
+        # The axis is given as seen from the front; `step` is its direction in the object's own frame.
+        step = turn @ np.eye(3)[way.axis]
         own = int(np.argmax(np.abs(step)))
         size = way.extent(float(item.box_size[own]), before, openness)
         grown = size - item.box_size[own]

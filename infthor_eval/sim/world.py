@@ -1,4 +1,4 @@
-"""The state of one scene: its objects, its agent, and who contains whom."""
+"""The state of one scene: its objects, its agent, and which object contains which."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
@@ -34,7 +34,20 @@ class Wall:
 
 @dataclass(frozen=True)
 class RoomShell:
-    """The shell of one room: a rectangle on the floor with walls around, metres; else see `Wall`."""
+    """The shell of one room: a rectangular floor, ceiling and walls, metres.
+
+    Attributes:
+        x_min: west edge of the floor.
+        x_max: east edge.
+        z_min: south edge.
+        z_max: north edge.
+        height: height of the ceiling.
+        floor: height of the floor.
+        floor_style: one of `FLOOR_STYLES`.
+        style: index that varies the colour of the walls.
+        walled: it has walls along all its edges; False if the world lists its walls one by one.
+        openings: doorways, as (side "x-", "x+", "z-" or "z+", from, to).
+    """
 
     x_min: float
     x_max: float
@@ -45,7 +58,7 @@ class RoomShell:
     floor_style: str = "wood"
     style: int = 0
     walled: bool = True
-    openings: tuple[tuple[str, float, float], ...] = ()  # (side "x-", "x+", "z-" or "z+", from, to) of doorways
+    openings: tuple[tuple[str, float, float], ...] = ()
 
 
 @dataclass
@@ -53,16 +66,23 @@ class World:
     """A scene as it is now.
 
     Attributes:
-        objects: by id, in the order of the metadata.
-        version: grows with every change, so that views can be cached.
-        templates: copies of the loose objects as the scene first had them, by type.
-        open_at_start: doors that are open in the recording; its cells already go around them.
+        scene: name of the scene.
+        objects: objects by id, in the order of the metadata.
+        rooms: the rooms.
+        nav: cells where the agent can stand.
+        agent: the agent.
+        seed: seed of the scene's random numbers.
+        held: id of the object in the agent's hand; None for an empty hand.
+        version: number that grows with every change; cached views compare it.
         coarse: the shapes of its furniture are only known as boxes, as in recordings.
-        grip: how the held object is held; None for as one holds what was just picked up.
+        walls: walls of rooms that are not `walled`.
+        open_at_start: ids of the objects that are open in the recording; its cells already go around them.
+        templates: copies of the loose objects as the scene first had them, by type.
+        grip: pose of the held object in the hand; None for the usual one after a pick-up.
         arm: the agent's arm; None for an agent that holds things in front of its camera.
-        disabled: objects that are taken out for a time, by id.
+        disabled: objects that are out of the scene until they are enabled again, by id.
         unbreakable: types of objects that no fall breaks.
-        appearance: what changes the colours of the scene.
+        appearance: randomized looks.
         standing_height: height in metres of the agent's position on the floor.
     """
 
@@ -89,21 +109,20 @@ class World:
         self.standing_height = float(self.agent.position[1])
 
     def get(self, object_id: str) -> SimObject:
-        """The object with this id.
+        """Return the object with this id.
 
         Raises:
             ActionError: there is none.
         """
-        found = self.objects.get(object_id)
-        if found is None:
+        item = self.objects.get(object_id)
+        if item is None:
             raise ActionError(f"objectId: {object_id} is not the objectId on any object in the scene!")
-        return found
+        return item
 
-    def touch(self, *changed: SimObject) -> None:
-        """Record that these objects (and the view) changed.
-
-        No two states of an object have the same version, be it another object that took its id.
-        """
+    def mark_changed(self, *changed: SimObject) -> None:
+        """Record that the view and these objects changed; with none, that only the view did."""
+        # Objects take the world's number. So no two states under one id ever have the same version, not even when a
+        # new object gets the id of a removed one, and caches by id and version are safe.
         self.version += 1
         for item in changed:
             item.version = self.version
@@ -111,52 +130,52 @@ class World:
     def add(self, item: SimObject) -> None:
         """Add an object; its id must be new."""
         self.objects[item.object_id] = item
-        self.touch(item)
+        self.mark_changed(item)
 
     def remove(self, item: SimObject) -> None:
-        """Take an object out of the scene; its contents stay where they are, on nothing."""
+        """Take an object out of the scene; its contents stay where they are, without a parent."""
         self.detach(item)
         for content in self.children(item):
             content.parent = None
-            self.touch(content)
+            self.mark_changed(content)
         if self.held == item.object_id:
             self.held = None
         if self.arm is not None:
             self.arm.let_go(item.object_id)
             for content_id in item.contents:
-                self.arm.freight.pop(content_id, None)
+                self.arm.held_contents.pop(content_id, None)
         del self.objects[item.object_id]
-        self.touch()
+        self.mark_changed()
 
     def attach(self, item: SimObject, receptacle: SimObject) -> None:
         """Put `item` among the contents of `receptacle`."""
         self.detach(item)
         item.parent = receptacle.object_id
         receptacle.contents.append(item.object_id)
-        self.touch(item, receptacle)
+        self.mark_changed(item, receptacle)
 
     def detach(self, item: SimObject) -> None:
         """Take `item` out of whatever contains it."""
         if self.arm is not None:
-            self.arm.freight.pop(item.object_id, None)
+            self.arm.held_contents.pop(item.object_id, None)
         if item.parent is not None:
             receptacle = self.objects[item.parent]
             receptacle.contents.remove(item.object_id)
             item.parent = None
-            self.touch(item, receptacle)
+            self.mark_changed(item, receptacle)
 
     def children(self, item: SimObject) -> list[SimObject]:
-        """What `item` contains directly."""
+        """Return what `item` contains directly."""
         return [self.objects[content] for content in item.contents]
 
     def descendants(self, item: SimObject) -> Iterator[SimObject]:
-        """Everything inside or on `item`, at any depth."""
+        """Yield everything inside or on `item`, at any depth."""
         for child in self.children(item):
             yield child
             yield from self.descendants(child)
 
     def ancestors(self, item: SimObject) -> Iterator[SimObject]:
-        """What contains `item`, from the nearest outwards."""
+        """Yield what contains `item`, from the nearest outwards."""
         while item.parent is not None:
             item = self.objects[item.parent]
             yield item
@@ -166,48 +185,46 @@ class World:
         for item in items:
             for part in (item, *self.descendants(item)):
                 part.position = part.position + offset
-                self.touch(part)
+                self.mark_changed(part)
 
     def carry(self, keep_grip: bool = False) -> None:
-        """Take what the agent holds, and all it contains, along in the agent's hand.
+        """Move what the agent holds, and all it contains, along with the agent.
 
         Args:
-            keep_grip: it stays as it was moved and turned in the hand; else the hand goes back to its usual place.
+            keep_grip: leave the object as it was moved in the hand; else the hand returns to its usual place.
         """
         if not keep_grip:
             self.grip = None
         if self.held is not None:
             self.set_pose(self.objects[self.held], *self._held_pose(self.objects[self.held]))
         if self.arm is not None:
-            self._carry_with(self.arm)
+            wrist = self.arm.wrist(self.agent)
+            # Contents have grips of their own: an arm tilts what it holds, which `set_pose` would not do to contents.
+            for object_id, grip in self.arm.grips():
+                item = self.objects[object_id]
+                item.position, item.rotation = wrist.point(grip.offset), matrix_euler(wrist.turn @ grip.turn)
+                self.mark_changed(item)
 
-    def _carry_with(self, arm: Arm) -> None:
-        """Put what an arm holds, with its contents, where the wrist is."""
-        wrist = arm.wrist(self.agent)
-        for object_id, grip in arm.grips():
-            item = self.objects[object_id]
-            item.position, item.rotation = wrist.point(grip.offset), matrix_euler(wrist.turn @ grip.turn)
-            self.touch(item)
-
-    def carried(self) -> list[str]:
-        """Ids of what the agent holds itself, in its hand or with its arm; not of what is in it."""
+    def held_ids(self) -> list[str]:
+        """Return the ids of what the agent holds in its hand or with its arm, without contents."""
         by_arm = [] if self.arm is None else list(self.arm.held)
         return by_arm if self.held is None else [self.held, *by_arm]
 
     def _held_pose(self, item: SimObject) -> tuple[Array, Array]:
-        if self.grip is None:
+        if self.grip is None:  # upright, turned with the agent, the middle of its box at the hand
             turn = np.array([item.rotation[0], self.agent.yaw, item.rotation[2]])
-            return self.hand_pose() - euler_matrix(turn) @ item.box_center, turn
+            hand = self.agent.camera_position() + self.agent.camera_matrix() @ _HAND
+            return hand - euler_matrix(turn) @ item.box_center, turn
         camera = self.agent.camera_matrix()
         return self.agent.camera_position() + camera @ self.grip.offset, matrix_euler(camera @ self.grip.turn)
 
     def release(self) -> None:
-        """Let go of all that the agent holds; it stays where it is."""
-        for object_id in self.carried():
+        """Let go of everything that the agent holds; it stays where it is."""
+        for object_id in self.held_ids():
             self.let_go(self.objects[object_id])
 
     def let_go(self, item: SimObject) -> None:
-        """Let go of one thing, if it is held, with all that is in it; it stays where it is."""
+        """Let go of one object, if it is held, with its contents; it stays where it is."""
         if item.object_id == self.held:
             self.held = self.grip = None
         if self.arm is not None:
@@ -215,54 +232,52 @@ class World:
                 part.state.picked_up = part.state.picked_up and part.object_id not in self.arm.held
                 self.arm.let_go(part.object_id)
         item.state.picked_up = False
-        self.touch(item)
+        self.mark_changed(item)
 
-    def regrip(self, position: Array, matrix: Array) -> None:
-        """Move and turn the held object in the hand, to a position (3,) and rotation (3, 3) in the world."""
+    def move_in_hand(self, position: Array, matrix: Array) -> None:
+        """Move the held object in the hand to a position (3,) and rotation (3, 3) in the world."""
         assert self.held is not None
         camera = self.agent.camera_matrix()
         self.grip = Grip(camera.T @ (position - self.agent.camera_position()), camera.T @ matrix)
         self.carry(keep_grip=True)
 
     def set_pose(self, item: SimObject, position: Array, rotation: Array) -> None:
-        """Move and turn an object; what it contains comes along as if fixed to it."""
+        """Move and turn an object; its contents keep their places in it."""
+        # Positions of contents follow the whole rotation, their own rotations only its yaw: they stay upright in a bowl
+        # that is tilted.
         turn = euler_matrix(rotation) @ item.matrix.T
         yaw = float(rotation[1] - item.rotation[1])
         pivot = item.position.copy()
         for part in self.descendants(item):
             part.position = position + turn @ (part.position - pivot)
             part.rotation = np.array([part.rotation[0], (part.rotation[1] + yaw) % 360, part.rotation[2]])
-            self.touch(part)
+            self.mark_changed(part)
         item.position, item.rotation = np.asarray(position, dtype=float), np.asarray(rotation, dtype=float)
-        self.touch(item)
+        self.mark_changed(item)
 
     def keep_templates(self) -> None:
-        """Remember what its loose objects are like, for poses that name objects which are gone by then."""
+        """Keep copies of the loose objects, for SetObjectPoses with names of objects that were removed meanwhile."""
         self.templates = {}
         for item in self.objects.values():
             if item.type.pickupable:
                 self.templates.setdefault(item.object_type, []).append(item.duplicate(item.object_id))
 
-    def hidden(self, item: SimObject) -> bool:
-        """Whether something closed encloses the object."""
+    def is_hidden(self, item: SimObject) -> bool:
+        """Return whether the object is inside something closed."""
         return any(outer.type.encloses and outer.type.openable and outer.state.openness == 0
                    for outer in self.ancestors(item))  # fmt: skip
 
-    def hand_pose(self) -> Array:
-        """World position (3,) at which the agent holds an object."""
-        return self.agent.camera_position() + self.agent.camera_matrix() @ _HAND
-
     def distance(self, item: SimObject) -> float:
-        """Metres from the agent to the object's origin, as the metadata reports it."""
+        """Return metres from the agent to the object's origin, as the metadata reports it."""
         return float(np.linalg.norm(item.position - self.agent.position))
 
     def reach(self, item: SimObject) -> float:
-        """Horizontal metres from the agent to the nearest point of the object's box."""
+        """Return horizontal metres from the agent to the nearest point of the object's box."""
         low, high = item.bounds()
         return aabb_gap(self.agent.position[[0, 2]], low[[0, 2]], high[[0, 2]])
 
     def scene_bounds(self) -> tuple[Array, Array]:
-        """Low and high corner of all rooms, metres."""
+        """Return the low and high corner of the box around all rooms, metres."""
         low = [min(r.x_min for r in self.rooms), min(r.floor for r in self.rooms), min(r.z_min for r in self.rooms)]
         high = [max(r.x_max for r in self.rooms), max(r.height for r in self.rooms), max(r.z_max for r in self.rooms)]
         return np.array(low), np.array(high)

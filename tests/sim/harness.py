@@ -6,9 +6,10 @@ import msgpack
 import numpy as np
 
 from infthor_eval.sim.fifo import FieldType
-from infthor_eval.sim.peer import Peer
 from infthor_eval.sim.scenes.catalogue import Catalogue
+from infthor_eval.sim.server import SimulatorServer
 from infthor_eval.sim.simulation import Simulation
+from infthor_eval.sim.views import Display
 
 INIT = {"gridSize": 0.25, "visibilityDistance": 1.5, "fieldOfView": 60}
 
@@ -17,8 +18,8 @@ class Bench:
     """Steps a simulator in this process; what it returns went through the wire's encoding."""
 
     def __init__(self, catalogue: Catalogue | None = None, size: int = 100) -> None:
-        self.sim = Simulation(catalogue or Catalogue(), size, size)
-        self.peer = Peer(self.sim)
+        self.sim = Simulation(catalogue or Catalogue(), Display(size, size))
+        self.server = SimulatorServer(self.sim)
         self.metadata: dict[str, Any] = {}
         self.frames: dict[FieldType, bytes] = {}
 
@@ -27,7 +28,7 @@ class Bench:
         return self.step("Initialize", **{**INIT, "fastActionEmit": False, **init})
 
     def step(self, action: str, **arguments: Any) -> dict[str, Any]:
-        reply = self.peer.answer({"action": action, "sequenceId": 1, **arguments})
+        reply = self.server.answer({"action": action, "sequenceId": 1, **arguments})
         self.frames = {field_type: bytes(body) for field_type, body in reply}
         self.metadata = msgpack.unpackb(self.frames[FieldType.METADATA])["agents"][0]
         return self.metadata

@@ -93,7 +93,7 @@ def test_a_supplement_adds_cells_height_and_objects(folder):
     ]
     path = supplement(folder, cells=[[5.0, 5.0]], floor_y=1.25, objects=wanted)
     world = Catalogue(folder, path).load("FloorPlan901")
-    assert world.nav.stands(5.0, 5.0)
+    assert world.nav.can_stand(5.0, 5.0)
     assert world.agent.position[1] == 1.25
     assert wanted[0] in world.objects
     assert fridge.object_id not in world.objects

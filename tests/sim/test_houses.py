@@ -72,7 +72,7 @@ def test_a_house_through_the_controller(launch):
 def test_without_its_doorway_the_rooms_are_apart():
     closed = house() | {"doors": []}
     world = Catalogue().house(closed)
-    reached = world.nav.reachable(world.agent.position[0], world.agent.position[2])
+    reached = world.nav.reachable_cells(world.agent.position[0], world.agent.position[2])
     assert all(x < 5 for x, _ in reached)
 
 

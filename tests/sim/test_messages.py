@@ -2,7 +2,7 @@
 
 import pytest
 
-from infthor_eval.sim.actions import names
+from infthor_eval.sim.actions import action_names
 
 from .harness import Bench
 
@@ -53,7 +53,7 @@ def test_unknown_arguments_are_named_with_those_that_are_taken(kitchen):
         kitchen.step("MoveAhead", noise=1, pace=2)
 
 
-@pytest.mark.parametrize("name", names())
+@pytest.mark.parametrize("name", action_names())
 def test_no_message_speaks_of_python(bench, name):
     message = bench.step(name, nonsense=None)["errorMessage"] if name != "Initialize" else ""
     assert not any(word in message for word in ("NoneType", "<class", "typing", " str ", " bool ", "dict"))

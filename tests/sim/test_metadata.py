@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from infthor_eval.sim.actions import names
+from infthor_eval.sim.actions import action_names
 from infthor_eval.sim.scenes.catalogue import Catalogue
 from infthor_eval.sim.settings import AGENT_MODES
 
@@ -111,4 +111,4 @@ def test_old_keys_are_there_and_empty(kitchen):
 
 def test_every_action_is_described():
     text = (Path(__file__).resolve().parents[2] / "docs" / "simulator.md").read_text(encoding="utf-8")
-    assert [name for mode in AGENT_MODES for name in names(mode) if f"`{name}`" not in text] == []
+    assert [name for mode in AGENT_MODES for name in action_names(mode) if f"`{name}`" not in text] == []

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from infthor_eval.sim.actions import bind, names
+from infthor_eval.sim.actions import action_names, bind
 from infthor_eval.sim.errors import ActionError
 
 from .harness import Bench
@@ -16,7 +16,7 @@ NONSENSE: list[Any] = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize("name", names())
+@pytest.mark.parametrize("name", action_names())
 def test_every_argument_of_every_action(name):
     bench = Bench(size=20)
     bench.reset("bathroom-1")
@@ -36,9 +36,9 @@ def test_every_argument_of_every_action(name):
         if {"objectId", "position"} & set(given):  # an action of two forms takes the other instead
             given = {key: value for key, value in given.items() if key not in {"x", "y", "z"}}
         for value in NONSENSE:
-            bench.peer.act({"action": name, **given, parameter: value})
-            if bench.sim.width * bench.sim.height > 10**6:
-                bench.peer.act({"action": "ChangeResolution", "x": 20, "y": 20})
+            bench.server.run({"action": name, **given, parameter: value})
+            if bench.sim.display.width * bench.sim.display.height > 10**6:
+                bench.server.run({"action": "ChangeResolution", "x": 20, "y": 20})
             del bench.sim.cameras[1:]
         metadata = bench.step(name, **(given | {parameter: "a"}))
         assert metadata["lastActionSuccess"] or metadata["errorMessage"]
@@ -49,5 +49,5 @@ def test_every_argument_of_every_action(name):
 @pytest.mark.parametrize("message", [{}, {"action": 3}, {"action": None}, {"action": "reset"}, {"action": "__init__"}])
 def test_messages_without_a_known_action(message):
     bench = Bench(size=20)
-    outcome, _ = bench.peer.act(message)
+    outcome, _ = bench.server.run(message)
     assert outcome.code == "InvalidAction"

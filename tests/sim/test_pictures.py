@@ -8,7 +8,7 @@ from infthor_eval.sim.fifo import FieldType
 from infthor_eval.sim.geometry import euler_matrix
 from infthor_eval.sim.instances import instance_color
 from infthor_eval.sim.object_types import OBJECT_TYPES, type_named
-from infthor_eval.sim.render.camera import Camera, project
+from infthor_eval.sim.render.camera import PinholeCamera, project
 from infthor_eval.sim.render.lighting import Lights
 from infthor_eval.sim.render.picture import cast_picture, choose_rasterizer, colour_picture
 from infthor_eval.sim.render.primitives import Form, Material, ShapePart, rows
@@ -20,8 +20,8 @@ RASTERIZERS = pytest.mark.parametrize("name", ["numba", "numpy"])
 STRAIGHT = np.eye(3)
 
 
-def camera(size: int = 101, **more: float) -> Camera:
-    return Camera(np.zeros(3), STRAIGHT, 60.0, size, size, **more)
+def camera(size: int = 101, **more: float) -> PinholeCamera:
+    return PinholeCamera(np.zeros(3), STRAIGHT, 60.0, size, size, **more)
 
 
 def one(form: Form, distance: float, half: float = 0.5, **more: float) -> np.ndarray:
@@ -46,7 +46,7 @@ def test_depth_is_that_of_geometry(name, form, depth):
 
 @RASTERIZERS
 def test_one_looks_into_a_cup_from_above(name):
-    above = Camera(np.array([0.0, 2.0, 0.0]), euler_matrix((90, 0, 0)), 60.0, 101, 101)
+    above = PinholeCamera(np.array([0.0, 2.0, 0.0]), euler_matrix((90, 0, 0)), 60.0, 101, 101)
     for form, depth in ((Form.CYLINDER, 1.5), (Form.CUP, 2.5), (Form.BOWL, 2.5)):
         drawn = rows([ShapePart(form, (0, 0, 0), (0.5,) * 3, (1, 1, 1))], np.zeros(3), STRAIGHT, 0)
         picture = cast_picture(drawn, ("a",), above, choose_rasterizer(name))

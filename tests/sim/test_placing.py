@@ -166,7 +166,7 @@ def in_the_open(bench: Bench) -> tuple[str, dict[str, float]]:
     """An apple on the free floor, and where it lies."""
     apple = bench.first("Apple")
     world = bench.sim.world
-    x, z = max(world.nav, key=lambda c: sum(world.nav.freedom(*c, yaw) for yaw in (0.0, 90.0, 180.0, 270.0)))
+    x, z = max(world.nav, key=lambda c: sum(world.nav.count_free_ahead(*c, yaw) for yaw in (0.0, 90.0, 180.0, 270.0)))
     still = {"x": 0, "y": 0, "z": 0}
     bench.ok("TeleportObject", objectId=apple, x=x, y=1.0, z=z, rotation=still, forceAction=True)
     return apple, bench.object(apple)["position"]
@@ -208,7 +208,7 @@ def test_what_cannot_be_pushed(bench):
 
 def test_a_push_leaves_things_in_what_is_closed(bench):
     world = bench.sim.world
-    inside = next(o for o in world.objects.values() if world.hidden(o) and o.type.pickupable)
+    inside = next(o for o in world.objects.values() if world.is_hidden(o) and o.type.pickupable)
     outer = inside.parent
     bench.ok("PushObject", objectId=inside.object_id, moveMagnitude=500, forceAction=True)
     assert bench.object(inside.object_id)["parentReceptacles"] == [outer]

@@ -25,7 +25,7 @@ def test_furniture_of_the_room_type(room_type, seed):
     missing = set(NEEDED[room_type].split()) - {o.object_type for o in world.objects.values()}
     assert not missing
     assert 35 <= len(world.objects) <= 80
-    assert len(world.nav.reachable(world.agent.position[0], world.agent.position[2])) == len(world.nav)
+    assert len(world.nav.reachable_cells(world.agent.position[0], world.agent.position[2])) == len(world.nav)
 
 
 STANDING = {"DeskLamp", "Television", "Microwave", "CoffeeMachine", "Toaster", "Faucet", "StoveBurner"}
@@ -34,7 +34,7 @@ STANDING = {"DeskLamp", "Television", "Microwave", "CoffeeMachine", "Toaster", "
 @pytest.mark.parametrize("scene", ["living-room-2", "bedroom-2", "kitchen-1", "kitchen-2", "bathroom-1"])
 def test_nothing_stands_in_another_thing(scene):
     world = Catalogue().load(scene)
-    loose = [o for o in world.objects.values() if o.type.pickupable and not world.hidden(o)]
+    loose = [o for o in world.objects.values() if o.type.pickupable and not world.is_hidden(o)]
     for item in loose:
         for other in world.objects.values():
             apart = other is item or other.object_id == item.parent or item.object_id == other.parent
@@ -80,7 +80,7 @@ def pick(bench: Bench, object_type: str) -> str:
     """Picks up the first object of a type that the agent gets to see."""
     for item in [o["objectId"] for o in bench.metadata["objects"] if o["objectType"] == object_type]:
         parent = bench.sim.world.objects[item].parent
-        if bench.sim.world.hidden(bench.sim.world.objects[item]):
+        if bench.sim.world.is_hidden(bench.sim.world.objects[item]):
             bench.stand_before(parent)
             bench.ok("OpenObject", objectId=parent)
         bench.stand_before(item)
@@ -142,7 +142,7 @@ def clean(bench: Bench, object_type: str) -> None:
 def cut(bench: Bench, object_type: str) -> None:
     target = bench.first(object_type)
     parent = bench.sim.world.objects[target].parent
-    if bench.sim.world.hidden(bench.sim.world.objects[target]):
+    if bench.sim.world.is_hidden(bench.sim.world.objects[target]):
         bench.stand_before(parent)
         bench.ok("OpenObject", objectId=parent)
     bench.stand_before(target)

@@ -66,7 +66,7 @@ def test_interactable_poses_are_those_whose_whole_picture_shows_the_object(rende
     pytest.importorskip(renderer)
     bench = Bench(size=40)
     bench.reset(scene)
-    bench.sim.rasterizer = choose_rasterizer(renderer)
+    bench.sim.display.rasterizer = choose_rasterizer(renderer)
     world = bench.sim.world
     places = bench.ok("GetReachablePositions")["actionReturn"][::24]
     for target in map(bench.first, kinds):
@@ -75,7 +75,7 @@ def test_interactable_poses_are_those_whose_whole_picture_shows_the_object(rende
         for pose in product(places, (-30.0, 0.0, 30.0, 60.0), (0.0, 90.0, 180.0, 270.0), (True, False)):
             place, tilt, turn, standing = pose
             world.agent = Agent(to_array(place), turn, tilt, standing)
-            if target in bench.sim.visible():
+            if target in bench.sim.vision.visible_ids():
                 slow.append({**place, "rotation": turn, "standing": standing, "horizon": tilt})
         assert told == slow
         assert slow
@@ -93,7 +93,7 @@ def test_interactable_poses_can_be_narrowed(bench):
     here = bench.ok("GetInteractablePoses", objectId=fridge, positions=[place])["actionReturn"]
     assert here
     assert all({key: p[key] for key in "xyz"} == place for p in here)
-    inside = next(o.object_id for o in bench.sim.world.objects.values() if bench.sim.world.hidden(o))
+    inside = next(o.object_id for o in bench.sim.world.objects.values() if bench.sim.world.is_hidden(o))
     assert bench.ok("GetInteractablePoses", objectId=inside)["actionReturn"] == []
 
 
@@ -115,7 +115,7 @@ def test_points_that_the_frame_shows(bench):
     fridge = bench.first("Fridge")
     bench.stand_before(fridge)
     camera = bench.metadata["cameraPosition"]
-    picture = bench.sim.view()
+    picture = bench.sim.views.agent_view()
     for x, y in ((0.5, 0.5), (0.2, 0.7), (0.8, 0.3)):
         point = bench.ok("GetCoordinateFromRaycast", x=x, y=y)["actionReturn"]
         away = np.array([point[k] - camera[k] for k in "xyz"]) @ picture.camera.matrix

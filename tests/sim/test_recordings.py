@@ -67,7 +67,7 @@ def overlap(a: list[int], b: list[int]) -> float:
 
 
 def drawn_box(bench: Bench, object_id: str) -> list[int] | None:
-    picture = bench.sim.view()
+    picture = bench.sim.views.agent_view()
     if object_id not in picture.names:
         return None
     mask = picture.instances[::-1] == picture.names.index(object_id)
@@ -86,7 +86,7 @@ def modern(pose: dict[str, Any], known: set[str]) -> dict[str, Any]:
 
 def start(bench: Bench, scene: dict[str, Any]) -> None:
     init = scene["init_action"]
-    outcome = bench.peer.act({"action": "Reset", "sceneName": scene["floor_plan"]})[0]
+    outcome = bench.server.run({"action": "Reset", "sceneName": scene["floor_plan"]})[0]
     assert not outcome.error, outcome.error
     known = {item.name for item in bench.sim.world.objects.values()}
     calls: list[dict[str, Any]] = [
@@ -97,7 +97,7 @@ def start(bench: Bench, scene: dict[str, Any]) -> None:
          "horizon": init["horizon"], "standing": True, "forceAction": True},
     ]  # fmt: skip
     for call in calls:
-        outcome = bench.peer.act(call)[0]
+        outcome = bench.server.run(call)[0]
         assert not outcome.error, outcome.error
 
 
@@ -119,7 +119,7 @@ def test_expert_trajectories_replay(tmp_path):
             if box and group:
                 drawn = drawn_box(bench, call["objectId"])
                 overlaps[group].append(0.0 if drawn is None else overlap(box, drawn))
-            done = not bench.peer.act(call)[0].error
+            done = not bench.server.run(call)[0].error
             name = "move" if step["api_action"]["action"] in MOVES else "interaction"
             (accepted if done else refused)[name] += 1
         whole += sum(refused.values()) == before

@@ -18,14 +18,14 @@ def bench() -> Bench:
 
 
 def act(bench: Bench, **call: Any) -> Any:
-    outcome = bench.peer.act(call)[0]
+    outcome = bench.server.run(call)[0]
     assert not outcome.error, outcome.error
     return outcome
 
 
 def state(bench: Bench) -> tuple[str, bytes, bytes]:
     """Everything that a reply would show: metadata and both pictures."""
-    picture = bench.sim.full_view()
+    picture = bench.sim.views.agent_frame()
     objects = {
         name: (item.position.tolist(), item.rotation.tolist(), item.parent, repr(item.state))
         for name, item in bench.sim.world.objects.items()
@@ -34,7 +34,7 @@ def state(bench: Bench) -> tuple[str, bytes, bytes]:
     text = json.dumps(
         [objects, agent.position.tolist(), agent.yaw, agent.horizon, bench.sim.world.held], sort_keys=True
     )
-    return text, bench.sim.colours(picture).tobytes(), picture.instances.tobytes()
+    return text, bench.sim.views.colours(picture).tobytes(), picture.instances.tobytes()
 
 
 def change(bench: Bench) -> None:
@@ -67,10 +67,10 @@ def test_after_coming_back_the_same_actions_have_the_same_outcome(bench: Bench) 
 
 
 def test_nothing_saved_and_a_saved_state_of_another_scene_are_refused(bench: Bench) -> None:
-    assert "no saved state" in bench.peer.act({"action": "RestoreState"})[0].error
+    assert "no saved state" in bench.server.run({"action": "RestoreState"})[0].error
     act(bench, action="SaveState")
     act(bench, action="Reset", sceneName="kitchen-3")
-    assert "no saved state" in bench.peer.act({"action": "RestoreState"})[0].error
+    assert "no saved state" in bench.server.run({"action": "RestoreState"})[0].error
 
 
 def test_slots_are_kept_apart(bench: Bench) -> None:
@@ -84,4 +84,4 @@ def test_slots_are_kept_apart(bench: Bench) -> None:
     assert state(bench) == first
     act(bench, action="RestoreState", slot=1)
     assert state(bench) == second
-    assert "no saved state" in bench.peer.act({"action": "RestoreState", "slot": 2})[0].error
+    assert "no saved state" in bench.server.run({"action": "RestoreState", "slot": 2})[0].error

@@ -65,7 +65,7 @@ def test_a_receptacle_fills_up(bench):
 
 
 def test_far_and_hidden_things_are_out_of_reach(bench):
-    inside = next(o for o in bench.sim.world.objects.values() if bench.sim.world.hidden(o))
+    inside = next(o for o in bench.sim.world.objects.values() if bench.sim.world.is_hidden(o))
     bench.stand_before(inside.parent)
     message = "Target object not found within the specified visibility."
     assert bench.refused("PickupObject", objectId=inside.object_id) == message

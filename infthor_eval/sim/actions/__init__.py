@@ -1,6 +1,8 @@
-"""What the agent and the user can do, one module per theme; importing this package registers them all."""
+"""The actions of the protocol, one module per theme; importing this package registers them all."""
 
 from infthor_eval.sim.actions import (  # noqa: F401 - imported to be registered
+    agent_poses,
+    appearance,
     arm,
     arm_physics,
     arm_teleport,
@@ -8,19 +10,17 @@ from infthor_eval.sim.actions import (  # noqa: F401 - imported to be registered
     cameras,
     hand,
     interaction,
-    looks,
     movement,
+    object_filter,
     placing,
     pushes,
     queries,
-    restoring,
+    scene_state,
     scenes,
     snapshots,
-    standing,
     states,
     teleport,
-    telling,
 )
-from infthor_eval.sim.actions.registry import Action, bind, names
+from infthor_eval.sim.actions.registry import Action, action_names, bind
 
-__all__ = ["Action", "bind", "names"]
+__all__ = ["Action", "action_names", "bind"]

@@ -5,26 +5,26 @@ from dataclasses import replace
 
 import numpy as np
 
-from infthor_eval.sim.actions.arm_motion import follow, place_text, the_arm, turn_text
+from infthor_eval.sim.actions.arm_motion import agent_arm, follow, position_text, quaternion_text
 from infthor_eval.sim.actions.registry import Vector3, action
 from infthor_eval.sim.arm.arm import Arm
-from infthor_eval.sim.arm.holding import drop_all, pick_up, touched
-from infthor_eval.sim.arm.paths import STEP, away_steps, shares, turning
+from infthor_eval.sim.arm.holding import drop_all, pick_up, touched_objects
+from infthor_eval.sim.arm.paths import STEP, path_distances, rotation_steps, shares
 from infthor_eval.sim.arm.rig import ArmPose
 from infthor_eval.sim.arm.sweep import Stance, stance
 from infthor_eval.sim.errors import ActionError
-from infthor_eval.sim.geometry import Array, euler_matrix, to_array
+from infthor_eval.sim.geometry import Array, euler_matrix, to_array, wrap_degrees
+from infthor_eval.sim.settings import ARM_MODES
 from infthor_eval.sim.simulation import Simulation
 
 __all__: list[str] = []
 
-_ARMS = ("arm", "stretch")
 _KINOVA = ("arm",)
 _SMALLEST, _LARGEST = 0.04, 0.5  # radii of the hand's sphere, metres
-_TURN_STEP, _ELBOW_STEP = 3.0, 2.0  # degrees from one look at what is in the way to the next
+_TURN_STEP, _ELBOW_STEP = 3.0, 2.0  # degrees between two collision checks
 
 
-@action("MoveArm", modes=_ARMS)
+@action("MoveArm", modes=ARM_MODES)
 def move_arm(
     sim: Simulation,
     position: Vector3,
@@ -35,7 +35,7 @@ def move_arm(
     disableRendering: bool = True,
 ) -> None:
     """Bring the wrist to a position, or as near as the arm reaches."""
-    agent, arm = sim.world.agent, the_arm(sim)
+    agent, arm = sim.world.agent, agent_arm(sim)
     point = to_array(position)
     if coordinateSpace == "armBase":
         point = arm.base(agent).point(point)
@@ -46,7 +46,7 @@ def move_arm(
     _reach(sim, arm, point, (to_array(position), coordinateSpace), restrictMovement, returnToStart)
 
 
-@action("MoveArmRelative", modes=_ARMS)
+@action("MoveArmRelative", modes=ARM_MODES)
 def move_arm_relative(
     sim: Simulation,
     offset: Vector3,
@@ -57,7 +57,7 @@ def move_arm_relative(
     disableRendering: bool = True,
 ) -> None:
     """Move the wrist by an offset along the axes of a space."""
-    agent, arm = sim.world.agent, the_arm(sim)
+    agent, arm = sim.world.agent, agent_arm(sim)
     turns = {"armBase": arm.base(agent).turn, "wrist": arm.wrist(agent).turn, "world": np.eye(3)}
     if coordinateSpace not in turns:
         raise ActionError(f"Invalid coordinateSpace: {coordinateSpace}")
@@ -66,22 +66,33 @@ def move_arm_relative(
 
 
 def _reach(
-    sim: Simulation, arm: Arm, point: Array, told: tuple[Array, str], restricted: bool, return_to_start: bool
+    sim: Simulation, arm: Arm, point: Array, requested: tuple[Array, str], restricted: bool, return_to_start: bool
 ) -> None:
-    """Move the wrist straight towards a point of the world; beyond its reach the arm is stretched out towards it."""
+    """Move the wrist straight towards a point of the world; beyond its reach the arm is stretched out towards it.
+
+    Args:
+        sim: the simulation.
+        arm: the agent's arm.
+        point: target of the wrist in the world, metres (3,).
+        requested: the same target as the message names it, and its coordinate space.
+        restricted: refuse targets behind the shoulder or out of reach.
+        return_to_start: go back after a collision.
+    """
     base = arm.base(sim.world.agent)
     target = base.local(point)
     if restricted and not arm.rig.allows(target):
-        raise ActionError(f"Invalid target: Position '{place_text(told[0])}' in space '{told[1]}' is behind shoulder.")
+        place, space = requested
+        raise ActionError(f"Invalid target: Position '{position_text(place)}' in space '{space}' is behind shoulder.")
     start = arm.pose.wrist
     distance = float(np.linalg.norm(target - start))
     ahead = (target - start) / max(distance, 1e-9)
-    targets = np.vstack([start + ahead * away_steps(distance)[:-1, None], target])
-    poses = arm.rig.reaching([arm.pose] * len(targets), targets)
-    _bend(sim, arm, poses, place_text(point), return_to_start)
+    # The target itself ends the path, and not start + distance * ahead, which differs from it by rounding.
+    targets = np.vstack([start + ahead * path_distances(distance)[:-1, None], target])
+    poses = arm.rig.reach([arm.pose] * len(targets), targets)
+    _bend(sim, arm, poses, position_text(point), return_to_start)
 
 
-@action("MoveArmBase", modes=_ARMS)
+@action("MoveArmBase", modes=ARM_MODES)
 def move_arm_base(
     sim: Simulation,
     y: float,
@@ -100,16 +111,16 @@ def move_arm_base(
     _lift(sim, height, returnToStart)
 
 
-@action("MoveArmBaseUp", modes=_ARMS)
+@action("MoveArmBaseUp", modes=ARM_MODES)
 def move_arm_base_up(
     sim: Simulation, distance: float, speed: float = 1.0, returnToStart: bool = True, disableRendering: bool = True
 ) -> None:
     """Move the arm up, metres, as far as it goes."""
-    height = sim.world.agent.position[1] + the_arm(sim).rig.lift(the_arm(sim).pose) + distance
+    height = sim.world.agent.position[1] + agent_arm(sim).rig.lift(agent_arm(sim).pose) + distance
     _lift(sim, float(np.clip(height, *_heights(sim))), returnToStart)
 
 
-@action("MoveArmBaseDown", modes=_ARMS)
+@action("MoveArmBaseDown", modes=ARM_MODES)
 def move_arm_base_down(
     sim: Simulation, distance: float, speed: float = 1.0, returnToStart: bool = True, disableRendering: bool = True
 ) -> None:
@@ -118,21 +129,21 @@ def move_arm_base_down(
 
 
 def _heights(sim: Simulation) -> tuple[float, float]:
-    low, high = the_arm(sim).rig.lifts
+    low, high = agent_arm(sim).rig.lifts
     floor = float(sim.world.agent.position[1])
     return floor + low, floor + high
 
 
 def _lift(sim: Simulation, height: float, return_to_start: bool) -> None:
-    arm = the_arm(sim)
+    arm = agent_arm(sim)
     start, end = arm.rig.lift(arm.pose), height - float(sim.world.agent.position[1])
     heights = start + shares(abs(end - start), STEP) * (end - start)
-    poses = [arm.rig.lifted(arm.pose, float(h)) for h in heights]
+    poses = [arm.rig.with_lift(arm.pose, float(h)) for h in heights]
     origin = arm.base(sim.world.agent).origin
-    _bend(sim, arm, poses, place_text(np.array([origin[0], height, origin[2]])), return_to_start)
+    _bend(sim, arm, poses, position_text(np.array([origin[0], height, origin[2]])), return_to_start)
 
 
-@action("RotateWristRelative", modes=_ARMS)
+@action("RotateWristRelative", modes=ARM_MODES)
 def rotate_wrist_relative(
     sim: Simulation,
     pitch: float = 0.0,
@@ -145,10 +156,10 @@ def rotate_wrist_relative(
     """Turn the wrist about its own axes, degrees, the shortest way; the stretch robot's about the vertical alone."""
     if sim.settings.agent_mode == "stretch" and (pitch or roll):
         raise ActionError("Pitch and roll are not supported for the stretch agent.")
-    arm = the_arm(sim)
-    turn = euler_matrix((pitch, yaw, -roll))
-    poses = [replace(arm.pose, turn=arm.pose.turn @ part) for part in turning(turn, _TURN_STEP)]
-    _bend(sim, arm, poses, turn_text(arm.wrist(sim.world.agent).turn @ turn), returnToStart)
+    arm = agent_arm(sim)
+    turn = _wrist_turn(pitch, yaw, roll)
+    poses = [replace(arm.pose, turn=arm.pose.turn @ part) for part in rotation_steps(turn, _TURN_STEP)]
+    _bend(sim, arm, poses, quaternion_text(arm.wrist(sim.world.agent).turn @ turn), returnToStart)
 
 
 @action("RotateWristAroundHeldObject", modes=_KINOVA)
@@ -162,12 +173,12 @@ def rotate_wrist_around_held_object(
     disableRendering: bool = True,
 ) -> None:
     """Turn the one held object about its origin, moving the wrist around it."""
-    held = list(the_arm(sim).held)
+    held = list(agent_arm(sim).held)
     if len(held) != 1:
         raise ActionError(
             f"Cannot RotateWristAroundHeldObject when holding != 1 objects, currently holding {len(held)} objects."
         )
-    _turn_around(sim, sim.world.objects[held[0]].position, euler_matrix((pitch, yaw, -roll)), returnToStart)
+    _turn_around(sim, sim.world.objects[held[0]].position, _wrist_turn(pitch, yaw, roll), returnToStart)
 
 
 @action("RotateWristAroundPoint", modes=_KINOVA)
@@ -182,16 +193,21 @@ def rotate_wrist_around_point(
     disableRendering: bool = True,
 ) -> None:
     """Turn the wrist and move it, as if a point of the world were fixed to it."""
-    _turn_around(sim, to_array(point), euler_matrix((pitch, yaw, -roll)), returnToStart)
+    _turn_around(sim, to_array(point), _wrist_turn(pitch, yaw, roll), returnToStart)
+
+
+def _wrist_turn(pitch: float, yaw: float, roll: float) -> Array:
+    """Return the rotation (3, 3) of angles in degrees; Unity's roll is the reverse of its rotation about z."""
+    return euler_matrix((pitch, yaw, -roll))
 
 
 def _turn_around(sim: Simulation, pivot: Array, turn: Array, return_to_start: bool) -> None:
-    arm = the_arm(sim)
+    arm = agent_arm(sim)
     around = arm.base(sim.world.agent).local(pivot)
     lever = arm.pose.turn.T @ (arm.pose.wrist - around)
-    turned = [replace(arm.pose, turn=arm.pose.turn @ part) for part in turning(turn, _TURN_STEP)]
-    poses = arm.rig.reaching(turned, np.stack([around + pose.turn @ lever for pose in turned]))
-    _bend(sim, arm, poses, turn_text(arm.wrist(sim.world.agent).turn @ turn), return_to_start)
+    turned = [replace(arm.pose, turn=arm.pose.turn @ part) for part in rotation_steps(turn, _TURN_STEP)]
+    poses = arm.rig.reach(turned, np.stack([around + pose.turn @ lever for pose in turned]))
+    _bend(sim, arm, poses, quaternion_text(arm.wrist(sim.world.agent).turn @ turn), return_to_start)
 
 
 @action("RotateElbowRelative", modes=_KINOVA)
@@ -199,11 +215,11 @@ def rotate_elbow_relative(
     sim: Simulation, degrees: float, speed: float = 10.0, returnToStart: bool = True, disableRendering: bool = True
 ) -> None:
     """Turn the elbow about the line from shoulder to wrist, the shortest way."""
-    arm = the_arm(sim)
-    way = (degrees + 180.0) % 360.0 - 180.0
-    angles = arm.pose.elbow + shares(abs(way), _ELBOW_STEP) * way
+    arm = agent_arm(sim)
+    turn = wrap_degrees(degrees)
+    angles = arm.pose.elbow + shares(abs(turn), _ELBOW_STEP) * turn
     poses = [replace(arm.pose, elbow=float(angle) % 360.0) for angle in angles]
-    _bend(sim, arm, poses, turn_text(euler_matrix((0.0, 0.0, arm.pose.elbow + way))), returnToStart)
+    _bend(sim, arm, poses, quaternion_text(euler_matrix((0.0, 0.0, arm.pose.elbow + turn))), returnToStart)
 
 
 @action("RotateElbow", modes=_KINOVA)
@@ -211,16 +227,16 @@ def rotate_elbow(
     sim: Simulation, degrees: float, speed: float = 10.0, returnToStart: bool = True, disableRendering: bool = True
 ) -> None:
     """Turn the elbow to an angle."""
-    rotate_elbow_relative(sim, degrees - the_arm(sim).pose.elbow, speed, returnToStart, disableRendering)
+    rotate_elbow_relative(sim, degrees - agent_arm(sim).pose.elbow, speed, returnToStart, disableRendering)
 
 
 def _bend(sim: Simulation, arm: Arm, poses: list[ArmPose], target: str, return_to_start: bool) -> None:
-    """Bend the arm through some poses."""
+    """Bend the arm through some poses while the agent stands still."""
     now = stance(sim.world, arm)
     follow(sim, [Stance(now.position, now.yaw, pose) for pose in poses], target, return_to_start)
 
 
-@action("PickupObject", modes=_ARMS)
+@action("PickupObject", modes=ARM_MODES)
 def pick_up_in_sphere(
     sim: Simulation,
     objectIdCandidates: list[str] | None = None,
@@ -230,12 +246,12 @@ def pick_up_in_sphere(
     forceAction: bool = False,
     manualInteract: bool = False,
 ) -> None:
-    """Hold all that can be picked up within the hand's sphere, or those of some candidates that are."""
+    """Hold everything within the hand's sphere that can be picked up, or those candidates that are."""
     given = "objectId" if objectId is not None else "x, y" if x is not None or y is not None else ""
     if given:
         raise ActionError(f"You are passing in iTHOR PickupObject parameters ({given}) to the arm agent!")
-    arm = the_arm(sim)
-    things = touched(sim.world, arm).pickupable
+    arm = agent_arm(sim)
+    things = touched_objects(sim.world, arm).pickupable
     if objectIdCandidates is not None:
         things = [o for o in things if o.object_id in objectIdCandidates]
     if not things:
@@ -244,20 +260,20 @@ def pick_up_in_sphere(
     pick_up(sim.world, arm, things)
 
 
-@action("ReleaseObject", modes=_ARMS)
+@action("ReleaseObject", modes=ARM_MODES)
 def release_object(sim: Simulation) -> None:
-    """Let go of all that is held: it falls onto what is below it."""
-    drop_all(sim.world, the_arm(sim))
+    """Let go of everything held: it falls onto what is below it."""
+    drop_all(sim.world, agent_arm(sim))
 
 
-@action("SetHandSphereRadius", modes=_ARMS)
+@action("SetHandSphereRadius", modes=ARM_MODES)
 def set_hand_sphere_radius(sim: Simulation, radius: float) -> None:
-    """Make the hand's sphere larger or smaller, metres; it begins at the palm."""
+    """Set the radius of the hand's sphere, metres; the sphere begins at the palm."""
     if not _SMALLEST <= radius <= _LARGEST:
         raise ActionError(f"radius={radius} of hand cannot be less than {_SMALLEST}m nor greater than {_LARGEST}m")
-    the_arm(sim).radius = float(radius)
+    agent_arm(sim).radius = float(radius)
 
 
-@action("ToggleMagnetVisibility", modes=_ARMS)
+@action("ToggleMagnetVisibility", modes=ARM_MODES)
 def toggle_magnet_visibility(sim: Simulation, visible: bool | None = None) -> None:
-    """Nothing: the hand's sphere is never shown."""
+    """Do nothing: the hand's sphere is never shown."""

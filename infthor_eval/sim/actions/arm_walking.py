@@ -1,29 +1,29 @@
 # ruff: noqa: ARG001 - the wire's arguments are accepted even where nothing depends on them
-"""How the arm agents walk and turn: in small steps, with their arm, until something is in the way."""
+"""Walking and turning of the arm agents: in small steps, with their arm, until something is in the way."""
 
 from collections.abc import Callable
 
 import numpy as np
 
-from infthor_eval.sim.actions.arm_motion import follow, place_text, the_arm, turn_text
+from infthor_eval.sim.actions.arm_motion import Contact, agent_arm, follow, position_text, quaternion_text
 from infthor_eval.sim.actions.registry import action
 from infthor_eval.sim.arm.paths import STEP, shares
 from infthor_eval.sim.arm.sweep import Stance, stance
 from infthor_eval.sim.errors import ActionError
-from infthor_eval.sim.geometry import Array, yaw_matrix
+from infthor_eval.sim.geometry import Array, wrap_degrees, yaw_matrix
 from infthor_eval.sim.obstacles import blocking_object, nearest_name
+from infthor_eval.sim.settings import ARM_MODES
 from infthor_eval.sim.simulation import Simulation
 from infthor_eval.sim.world import World
 
 __all__: list[str] = []
 
-_ARMS = ("arm", "stretch")
-_TURN_STEP = 1.15  # degrees: Unity's radian a second in a fiftieth of one
-_MOST = 2000  # steps of one walk: 40 m
-_SIDES = {"Ahead": (1.0, 0.0), "Back": (-1.0, 0.0), "Right": (0.0, 1.0), "Left": (0.0, -1.0)}
+_TURN_STEP = 1.15  # degrees: Unity turns by a radian a second, in frames of a fiftieth of a second
+_MAX_STEPS = 2000  # of one walk, 40 m; the collision check holds all stances of a path in memory
+_DIRECTIONS = {"Ahead": (1.0, 0.0), "Back": (-1.0, 0.0), "Right": (0.0, 1.0), "Left": (0.0, -1.0)}  # ahead, right
 
 
-@action("MoveAgent", modes=_ARMS)
+@action("MoveAgent", modes=ARM_MODES)
 def move_agent(
     sim: Simulation,
     ahead: float = 0.0,
@@ -35,32 +35,31 @@ def move_agent(
     """Walk, metres ahead and to the right at once."""
     if ahead == 0 and right == 0:
         raise ActionError("Must specify ahead or right!")
-    now = stance(sim.world, the_arm(sim))
+    now = stance(sim.world, agent_arm(sim))
     way = yaw_matrix(now.yaw) @ np.array([right, 0.0, ahead])
     distance = float(np.linalg.norm(way))
-    if distance > _MOST * STEP:
-        raise ActionError(f"The agent walks at most {_MOST * STEP:g} m at once, not {distance:.4g}")
+    if distance > _MAX_STEPS * STEP:
+        raise ActionError(f"The agent walks at most {_MAX_STEPS * STEP:g} m at once, not {distance:.4g}")
     path = [Stance(now.position + way * share, now.yaw, now.pose) for share in shares(distance, STEP)]
-    met = _body_contact(sim.world, [s.position for s in path])
-    follow(sim, path, place_text(now.position + way), returnToStart, met)
+    contact = _body_contact(sim.world, [s.position for s in path])
+    follow(sim, path, position_text(now.position + way), returnToStart, contact)
 
 
-def _body_contact(world: World, places: list[Array]) -> tuple[int, str] | None:
-    """The first of some places at which the agent cannot be, and what is there.
-
-    From where it cannot be either, as after a forced teleport, it may walk to where it can.
-    """
-    stood = world.nav.stands(world.agent.position[0], world.agent.position[2])
+def _body_contact(world: World, places: list[Array]) -> Contact | None:
+    """Return the first of some places at which the agent cannot be, and what is there; None if all are free."""
+    # After a forced teleport the agent may be where it cannot stand. It may leave then: places count as blocked only
+    # once it has been at a free one, and the last place in any case.
+    was_free = world.nav.can_stand(world.agent.position[0], world.agent.position[2])
     for step, place in enumerate(places):
         obstacle = blocking_object(world, place)
-        stands = obstacle is None and world.nav.stands(place[0], place[2])
-        if not stands and (stood or step == len(places) - 1):
+        is_free = obstacle is None and world.nav.can_stand(place[0], place[2])
+        if not is_free and (was_free or step == len(places) - 1):
             return step, obstacle or nearest_name(world, place)
-        stood = stood or stands
+        was_free = was_free or is_free
     return None
 
 
-def _walker(side: tuple[float, float]) -> Callable[..., None]:
+def _walker(direction: tuple[float, float]) -> Callable[..., None]:
     def walk(
         sim: Simulation,
         moveMagnitude: float | None = None,
@@ -74,16 +73,16 @@ def _walker(side: tuple[float, float]) -> Callable[..., None]:
         disableRendering: bool = True,
     ) -> None:
         size = sim.settings.grid_size if moveMagnitude is None else moveMagnitude
-        move_agent(sim, side[0] * size, side[1] * size, speed, returnToStart, disableRendering)
+        move_agent(sim, direction[0] * size, direction[1] * size, speed, returnToStart, disableRendering)
 
     return walk
 
 
-for _name, _side in _SIDES.items():
-    action(f"Move{_name}", modes=_ARMS)(_walker(_side))
+for _name, _direction in _DIRECTIONS.items():
+    action(f"Move{_name}", modes=ARM_MODES)(_walker(_direction))
 
 
-@action("RotateAgent", modes=_ARMS)
+@action("RotateAgent", modes=ARM_MODES)
 def rotate_agent(
     sim: Simulation,
     degrees: float,
@@ -93,12 +92,12 @@ def rotate_agent(
     disableRendering: bool = True,
 ) -> None:
     """Turn clockwise, degrees, the shortest way."""
-    now = stance(sim.world, the_arm(sim))
-    way = (degrees + 180.0) % 360.0 - 180.0
-    end = round((now.yaw + way) % 360.0, 6) % 360.0
-    yaws = [(now.yaw + way * share) % 360.0 for share in shares(abs(way), _TURN_STEP)[:-1]]
+    now = stance(sim.world, agent_arm(sim))
+    turn = wrap_degrees(degrees)
+    end = round((now.yaw + turn) % 360.0, 6) % 360.0
+    yaws = [(now.yaw + turn * share) % 360.0 for share in shares(abs(turn), _TURN_STEP)[:-1]]
     path = [Stance(now.position, yaw, now.pose) for yaw in (*yaws, end)]
-    follow(sim, path, turn_text(yaw_matrix(end)), returnToStart)
+    follow(sim, path, quaternion_text(yaw_matrix(end)), returnToStart)
 
 
 def _turner(sign: float) -> Callable[..., None]:
@@ -119,4 +118,4 @@ def _turner(sign: float) -> Callable[..., None]:
 
 
 for _name, _sign in (("RotateRight", 1.0), ("RotateLeft", -1.0)):
-    action(_name, modes=_ARMS)(_turner(_sign))
+    action(_name, modes=ARM_MODES)(_turner(_sign))

@@ -6,29 +6,30 @@ from typing import Any
 import numpy as np
 
 from infthor_eval.sim.actions.registry import Vector3, action
+from infthor_eval.sim.cameras import ThirdPartyCamera
 from infthor_eval.sim.errors import ActionError
 from infthor_eval.sim.geometry import Array, to_array
 from infthor_eval.sim.settings import SMOOTH_QUALITIES
-from infthor_eval.sim.simulation import Simulation, ThirdPartyCamera
+from infthor_eval.sim.simulation import Simulation
 
 __all__: list[str] = []
 
-_LARGEST = 4096
-_USUAL_SIZE = 5.0  # metres from the middle of an orthographic picture to its upper edge
+_LARGEST = 4096  # pixels
+_DEFAULT_SIZE = 5.0  # metres from the middle of an orthographic picture to its upper edge
 
 
 @action("ChangeResolution")
 def change_resolution(sim: Simulation, x: int, y: int) -> None:
-    """Changes the size of all pictures, pixels."""
+    """Change the size of all pictures, pixels."""
     if not (1 <= x <= _LARGEST and 1 <= y <= _LARGEST):
         raise ActionError(f"The resolution must be within 1 to {_LARGEST}, not {x}x{y}")
-    sim.width, sim.height = int(x), int(y)
+    sim.display.width, sim.display.height = int(x), int(y)
 
 
 @action("ChangeQuality")
 def change_quality(sim: Simulation, quality: str) -> None:
-    """From `High` on edges are smoothed; below they are not, which is faster."""
-    sim.antialias = quality in SMOOTH_QUALITIES
+    """Smooth edges from `High` on; below, pictures are drawn faster without."""
+    sim.display.antialias = quality in SMOOTH_QUALITIES
 
 
 @action("AddThirdPartyCamera")
@@ -38,7 +39,7 @@ def add_third_party_camera(
     rotation: Vector3 | None = None,
     fieldOfView: float = 90.0,
     orthographic: bool = False,
-    orthographicSize: float = _USUAL_SIZE,
+    orthographicSize: float = _DEFAULT_SIZE,
     skyboxColor: Any = None,
 ) -> None:
     """Add a camera; its frames come with every reply from now on."""
@@ -62,29 +63,28 @@ def update_third_party_camera(
         raise ActionError(f"There is no third party camera with id {thirdPartyCameraId}")
     old = sim.cameras[thirdPartyCameraId]
     sim.cameras[thirdPartyCameraId] = _camera(
-        _merged(old.position, position),
-        _merged(old.rotation, rotation),
+        _update_vector(old.position, position),
+        _update_vector(old.rotation, rotation),
         old.field_of_view if fieldOfView is None else fieldOfView,
-        _lens_size(old, orthographic, orthographicSize),
+        _update_size(old, orthographic, orthographicSize),
     )
 
 
-def _merged(old: Array, given: Vector3 | None) -> Array:
+def _update_vector(old: Array, given: Vector3 | None) -> Array:
     return np.array([float((given or Vector3()).get(axis, was)) for axis, was in zip("xyz", old, strict=True)])
 
 
-def _lens_size(old: ThirdPartyCamera, orthographic: bool | None, size: float | None) -> float | None:
-    """Orthographic size of the changed camera; None for one in perspective."""
-    wanted = old.orthographic_size is not None if orthographic is None else orthographic
-    if not wanted:
+def _update_size(old: ThirdPartyCamera, orthographic: bool | None, size: float | None) -> float | None:
+    """Return the orthographic size of a changed camera; None for one in perspective."""
+    if not (old.orthographic_size is not None if orthographic is None else orthographic):
         return None
-    return size if size is not None else old.orthographic_size or _USUAL_SIZE
+    return size if size is not None else old.orthographic_size or _DEFAULT_SIZE
 
 
 @action("ToggleMapView")
 def toggle_map_view(sim: Simulation) -> None:
-    """Switches the agent's own picture between its camera and a map of the scene from above."""
-    sim.map_view = not sim.map_view
+    """Switch the agent's frame between its camera and a map of the scene from above."""
+    sim.display.map_view = not sim.display.map_view
 
 
 def _camera(position: Array, rotation: Array, angle: float, size: float | None) -> ThirdPartyCamera:

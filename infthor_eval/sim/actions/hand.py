@@ -1,5 +1,5 @@
 # ruff: noqa: ARG001 - the wire's arguments are accepted even where nothing depends on them
-"""What the agent does with the object in its hand: move it, turn it, drop it, throw it."""
+"""Moving, turning, dropping and throwing the object in the hand."""
 
 from collections.abc import Callable
 
@@ -8,16 +8,15 @@ import numpy as np
 from infthor_eval.sim.actions.registry import Vector3, action
 from infthor_eval.sim.actions.targets import held_object
 from infthor_eval.sim.clearance import obstacle_at
-from infthor_eval.sim.errors import ActionError, ErrorCode
+from infthor_eval.sim.errors import ActionError
 from infthor_eval.sim.falling import let_fall
 from infthor_eval.sim.geometry import Array, euler_matrix, to_array
-from infthor_eval.sim.objects import SimObject
 from infthor_eval.sim.simulation import Simulation
 
 __all__: list[str] = []
 
 _THROW_REACH = 0.9  # metres in front of the agent at which a thrown thing lands
-_SIDES = {
+_DIRECTIONS = {
     "Ahead": (0.0, 0.0, 1.0),
     "Back": (0.0, 0.0, -1.0),
     "Right": (1.0, 0.0, 0.0),
@@ -40,7 +39,7 @@ def throw(sim: Simulation, moveMagnitude: float = 0.0, forceAction: bool = False
 
 
 def _let_go(sim: Simulation, ahead: float) -> None:
-    held = _in_hand(sim, "Nothing in agent's hand to drop!")
+    held = held_object(sim, "Nothing in agent's hand to drop!")
     forward = sim.world.agent.camera_matrix()[:, 2] * (1.0, 0.0, 1.0)
     sim.world.release()
     let_fall(sim.world, held, held.center + forward * ahead)
@@ -54,53 +53,43 @@ def move_held_object(
     _move_held(sim, np.array([right, up, ahead]), forceVisible)
 
 
-def _mover(side: Array) -> Callable[..., None]:
+def _mover(direction: Array) -> Callable[..., None]:
     def move(sim: Simulation, moveMagnitude: float, forceVisible: bool = False) -> None:
-        _move_held(sim, side * moveMagnitude, forceVisible)
+        _move_held(sim, direction * moveMagnitude, forceVisible)
 
     return move
 
 
-for _name, _side in _SIDES.items():
-    action(f"MoveHeldObject{_name}", f"MoveHand{_name}")(_mover(np.array(_side)))
+for _name, _direction in _DIRECTIONS.items():
+    action(f"MoveHeldObject{_name}", f"MoveHand{_name}")(_mover(np.array(_direction)))
 
 
 @action("RotateHeldObject", forms=((), ("rotation",)))
 def rotate_held_object(
-    sim: Simulation,
-    pitch: float = 0.0,
-    yaw: float = 0.0,
-    roll: float = 0.0,
-    rotation: Vector3 | None = None,
+    sim: Simulation, pitch: float = 0.0, yaw: float = 0.0, roll: float = 0.0, rotation: Vector3 | None = None
 ) -> None:
-    """Turn the held object by angles about its own axes, roll positive to the right, or to a rotation in the hand."""
-    held = _in_hand(sim, "Need to be holding something to rotate it!")
+    """Turn the held object by angles about its own axes, or to a rotation relative to the camera."""
+    held = held_object(sim, "Need to be holding something to rotate it!")
     if rotation is None:
+        # Unity's roll is positive to the right, the reverse of its rotation about z.
         turned = held.matrix @ euler_matrix((pitch, yaw, -roll))
     else:
         turned = sim.world.agent.camera_matrix() @ euler_matrix(to_array(rotation))
-    sim.world.regrip(held.position, turned)
-    sim.world.touch()
+    sim.world.move_in_hand(held.position, turned)
+    sim.world.mark_changed()
 
 
 def _move_held(sim: Simulation, step: Array, force_visible: bool) -> None:
     """Move the held object by `step` (right, up, ahead), unless it would leave reach or view, or go into something."""
-    held = _in_hand(sim, "Agent can only move hand if holding an item")
+    held = held_object(sim, "Agent can only move hand if holding an item")
     world = sim.world
     offset = world.agent.camera_matrix() @ step
     if np.linalg.norm(held.position + offset - world.agent.camera_position()) > sim.settings.visibility_distance:
         raise ActionError("The target position is out of range- object cannot move outside of max visibility distance.")
-    if not force_visible and not sim.in_view((held.center + offset)[None])[0]:
+    if not force_visible and not sim.vision.in_frame((held.center + offset)[None])[0]:
         raise ActionError("The target position is not in the Agent's Viewport!")
     obstacle = obstacle_at(world, held, offset)
     if obstacle is not None:
         raise ActionError(f"{obstacle} is blocking the held object from moving there.")
-    world.regrip(held.position + offset, held.matrix)
-    world.touch()
-
-
-def _in_hand(sim: Simulation, otherwise: str) -> SimObject:
-    held = held_object(sim)
-    if held is None:
-        raise ActionError(otherwise, ErrorCode.NOT_IN_INVENTORY)
-    return held
+    world.move_in_hand(held.position + offset, held.matrix)
+    world.mark_changed()

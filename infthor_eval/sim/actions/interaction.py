@@ -1,10 +1,10 @@
 # ruff: noqa: ARG001 - the wire's arguments are accepted even where nothing depends on them
 """Picking up, putting, opening, closing, toggling and slicing."""
 
-from typing import Any
+from functools import partial
 
 from infthor_eval.sim.actions.registry import action
-from infthor_eval.sim.actions.targets import BY_ID_OR_PIXEL, held_object, interactable
+from infthor_eval.sim.actions.targets import BY_ID_OR_PIXEL, held_object, interactable, object_action
 from infthor_eval.sim.effects import slice_object, toggle
 from infthor_eval.sim.errors import ActionError, ErrorCode
 from infthor_eval.sim.object_types import allowed_in
@@ -15,7 +15,7 @@ from infthor_eval.sim.unfolding import unfold
 
 __all__: list[str] = []
 
-_CROWDED = (0.12, 0.24, 0.35)  # overlaps that `forceAction` tolerates, the least that will do, in a full receptacle
+_CROWDED = (0.12, 0.24, 0.35)  # overlaps that `forceAction` tolerates in a full receptacle, smallest first
 
 
 @action("PickupObject", forms=BY_ID_OR_PIXEL)
@@ -57,28 +57,28 @@ def put(
     putNearXY: bool = False,
 ) -> None:
     """Put the held object into or onto the receptacle `objectId`."""
-    held = held_object(sim)
-    if held is None:
-        raise ActionError(
-            "Can't place an object if Agent isn't holding anything in their hand.", ErrorCode.NOT_IN_INVENTORY
-        )
+    held = held_object(sim, "Can't place an object if Agent isn't holding anything in their hand.")
     target = interactable(sim, objectId, forceAction, x, y)
     _check_receptacle(held, target)
-    placed = _place(sim, held, target, forceAction)
+    placed = _find_place(sim, held, target, forceAction)
     if placed is None:
         raise ActionError("No valid positions to place object found", ErrorCode.RECEPTACLE_FULL)
     sim.world.set_pose(held, placed.position, placed.rotation)
     sim.world.release()
     sim.world.attach(held, target)
-    sim.world.touch()
+    sim.world.mark_changed()
 
 
-def _place(sim: Simulation, held: SimObject, target: SimObject, force: bool) -> SimObject | None:
-    """A free place: one that the agent sees if there is one; a forced put squeezes in where it is crowded."""
-    for crowd in (0.0, *_CROWDED) if force else (0.0,):
+def _find_place(sim: Simulation, held: SimObject, target: SimObject, force: bool) -> SimObject | None:
+    """Return the held object at the best free place; a forced put squeezes in where it is crowded."""
+    # Best first: without overlap, clear of fixed things, in view. Recorded boxes of fixed things are too large, so a
+    # place within one is better than none; Unity, which has the meshes, would find room there.
+    for overlap in (0.0, *_CROWDED) if force else (0.0,):
         for among_fixed in (False, True):
-            for seen in (sim.in_view, None):
-                placed = find_place(sim.world, held, target, crowd, seen=seen, among_fixed=among_fixed)
+            for point_filter in (sim.vision.in_frame, None):
+                placed = find_place(
+                    sim.world, held, target, overlap, point_filter=point_filter, among_fixed=among_fixed
+                )
                 if placed is not None:
                     return placed
     return None
@@ -104,12 +104,9 @@ def open_object(
     openness: float = 1.0,
     moveMagnitude: float | None = None,
 ) -> None:
-    """Open a door, drawer or lid to `openness`, 0 (closed) to 1.
-
-    `moveMagnitude` is its old name, of which 0 meant wide open.
-    """
+    """Open a door, drawer or lid to `openness`, 0 (closed) to 1."""
     if moveMagnitude is not None:
-        openness = moveMagnitude or 1.0
+        openness = moveMagnitude or 1.0  # the old name of `openness`, of which 0 meant wide open
     if not 0 <= openness <= 1:
         raise ActionError(f"openness must be in [0:1], not {openness}")
     target = interactable(sim, objectId, forceAction, x, y)
@@ -122,16 +119,9 @@ def open_object(
     set_openness(sim, target, openness)
 
 
-@action("CloseObject", forms=BY_ID_OR_PIXEL)
-def close_object(
-    sim: Simulation,
-    objectId: str | None = None,
-    x: float | None = None,
-    y: float | None = None,
-    forceAction: bool = False,
-) -> None:
+@object_action("CloseObject")
+def close_object(sim: Simulation, target: SimObject) -> None:
     """Close a door, drawer or lid."""
-    target = interactable(sim, objectId, forceAction, x, y)
     if not target.type.openable:
         raise ActionError(f"{target.object_id} is not an Openable object")
     if target.state.openness == 0:
@@ -140,36 +130,12 @@ def close_object(
 
 
 def set_openness(sim: Simulation, target: SimObject, openness: float) -> None:
-    """Open or close; what lies in a drawer comes along."""
+    """Open or close an object; the contents of a drawer move with it."""
     before = drawer_offset(target)
     unfold(target, openness)
     target.state.openness = float(openness)
     sim.world.shift(sim.world.children(target), drawer_offset(target) - before)
-    sim.world.touch(target)
-
-
-@action("ToggleObjectOn", forms=BY_ID_OR_PIXEL)
-def toggle_on(
-    sim: Simulation,
-    objectId: str | None = None,
-    x: float | None = None,
-    y: float | None = None,
-    forceAction: bool = False,
-) -> None:
-    """Switches an object on."""
-    _toggle(sim, interactable(sim, objectId, forceAction, x, y), True)
-
-
-@action("ToggleObjectOff", forms=BY_ID_OR_PIXEL)
-def toggle_off(
-    sim: Simulation,
-    objectId: str | None = None,
-    x: float | None = None,
-    y: float | None = None,
-    forceAction: bool = False,
-) -> None:
-    """Switches an object off."""
-    _toggle(sim, interactable(sim, objectId, forceAction, x, y), False)
+    sim.world.mark_changed(target)
 
 
 def _toggle(sim: Simulation, target: SimObject, on: bool) -> None:
@@ -186,18 +152,15 @@ def _toggle(sim: Simulation, target: SimObject, on: bool) -> None:
     toggle(sim.world, target, on)
 
 
-@action("SliceObject", forms=BY_ID_OR_PIXEL)
-def cut(
-    sim: Simulation,
-    objectId: str | None = None,
-    x: float | None = None,
-    y: float | None = None,
-    forceAction: bool = False,
-) -> Any:
+for _name, _on in (("ToggleObjectOn", True), ("ToggleObjectOff", False)):
+    object_action(_name)(partial(_toggle, on=_on))
+
+
+@object_action("SliceObject")
+def slice_target(sim: Simulation, target: SimObject) -> None:
     """Cut an object into slices, which are new objects."""
-    target = interactable(sim, objectId, forceAction, x, y)
     if not target.type.sliceable:
         raise ActionError(f"{target.object_id} Does not have the CanBeSliced property!")
-    if target.object_id in sim.world.carried():
+    if target.object_id in sim.world.held_ids():
         raise ActionError("target object is in the agent's hand; put it down to slice it")
     slice_object(sim.world, target)

@@ -1,5 +1,7 @@
 """Pushing and pulling loose things: each slides till friction stops it, something is in its way, or it falls."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from infthor_eval.sim.actions.registry import action
@@ -15,34 +17,26 @@ __all__: list[str] = []
 _FRAME = 0.02  # seconds that Unity applies the force
 _FRICTION = 0.5
 _GRAVITY = 9.81
-_LIGHTEST = 0.05  # kilograms; records may have 0
-_USUAL_PUSH = 200.0  # newtons
+_LIGHTEST = 0.05  # kilograms; some recorded objects have a mass of 0
+_DEFAULT_FORCE = 200.0  # newtons
 
 
-@action("PushObject", forms=BY_ID_OR_PIXEL)
-def push(
-    sim: Simulation,
-    objectId: str | None = None,
-    x: float | None = None,
-    y: float | None = None,
-    moveMagnitude: float = _USUAL_PUSH,
-    forceAction: bool = False,
-) -> None:
-    """Push an object away from the agent with a force, newtons."""
-    _push(sim, interactable(sim, objectId, forceAction, x, y), moveMagnitude, 0.0)
+def _pusher(angle: float) -> Callable[..., None]:
+    def push(
+        sim: Simulation,
+        objectId: str | None = None,
+        x: float | None = None,
+        y: float | None = None,
+        moveMagnitude: float = _DEFAULT_FORCE,
+        forceAction: bool = False,
+    ) -> None:
+        _push(sim, interactable(sim, objectId, forceAction, x, y), moveMagnitude, angle)
+
+    return push
 
 
-@action("PullObject", forms=BY_ID_OR_PIXEL)
-def pull(
-    sim: Simulation,
-    objectId: str | None = None,
-    x: float | None = None,
-    y: float | None = None,
-    moveMagnitude: float = _USUAL_PUSH,
-    forceAction: bool = False,
-) -> None:
-    """Pull an object towards the agent."""
-    _push(sim, interactable(sim, objectId, forceAction, x, y), moveMagnitude, 180.0)
+for _name, _angle in (("PushObject", 0.0), ("PullObject", 180.0)):
+    action(_name, forms=BY_ID_OR_PIXEL)(_pusher(_angle))
 
 
 @action("DirectionalPush", forms=BY_ID_OR_PIXEL)
@@ -60,18 +54,14 @@ def directional_push(
 
 
 def _push(sim: Simulation, target: SimObject, force: float, angle: float) -> None:
-    if target.object_id in sim.world.carried():
+    if target.object_id in sim.world.held_ids():
         raise ActionError("Please use Throw for an item in the Agent's Hand")
     if not (target.type.pickupable or target.type.moveable):
         raise ActionError("Target object must be either Pickupable or Moveable to have force applied to it!")
     if force <= 0:
         raise ActionError(f"moveMagnitude must be > 0, not {force}")
     direction: Array = yaw_matrix(sim.world.agent.yaw + angle)[:, 2]
-    slide(sim.world, target, direction, _way(target, force))
-    sim.world.touch()
-
-
-def _way(target: SimObject, force: float) -> float:
-    """Metres till friction stops what a force has set in motion."""
+    # The force acts for one frame; the speed it gives is then lost to friction: v^2 = 2 * friction * g * distance.
     speed = force * _FRAME / max(target.type.mass, _LIGHTEST)
-    return float(np.square(speed) / (2 * _FRICTION * _GRAVITY))
+    slide(sim.world, target, direction, float(np.square(speed) / (2 * _FRICTION * _GRAVITY)))
+    sim.world.mark_changed()

@@ -1,13 +1,13 @@
 # ruff: noqa: ARG001 - the wire's arguments are accepted even where nothing depends on them
-"""Questions about the scene: where the agent can stand, what it would see, the way to an object."""
+"""Questions about the scene: what is at a pixel, outlines from above, the way to an object."""
 
 from typing import Any
 
 from infthor_eval.sim.actions.registry import Vector3, action
-from infthor_eval.sim.actions.standing import reachable_positions
 from infthor_eval.sim.actions.targets import check_in_frame, object_at
+from infthor_eval.sim.cameras import map_camera
 from infthor_eval.sim.errors import ActionError
-from infthor_eval.sim.geometry import convex_hull, rounded, to_array, to_xyz
+from infthor_eval.sim.geometry import convex_hull, round_vector, to_array, to_xyz
 from infthor_eval.sim.objects import SimObject
 from infthor_eval.sim.simulation import Simulation
 
@@ -16,19 +16,8 @@ __all__: list[str] = []
 
 @action("GetScenesInBuild", query=True)
 def get_scenes_in_build(sim: Simulation) -> list[str]:
-    """Names that Reset takes; empty, which tells the client not to check, as procedural names are unlimited."""
+    """Return no names: an empty list makes the client accept every name, and procedural names are unlimited."""
     return []
-
-
-@action("GetReachablePositions", query=True)
-def get_reachable_positions(
-    sim: Simulation,
-    maxStepCount: int = 10000,
-    directionsRelativeAgent: bool = False,
-    gridSize: float | None = None,
-) -> list[dict[str, float]]:
-    """Positions that the agent can reach by steps of `gridSize` along the axes, or ahead, aside and back."""
-    return reachable_positions(sim, gridSize, directionsRelativeAgent, maxStepCount)
 
 
 @action("GetShortestPath", "GetShortestPathToPoint", query=True)
@@ -40,7 +29,7 @@ def get_shortest_path(
     target: Vector3 | None = None,
     allowedError: float = 0.05,
 ) -> dict[str, Any]:
-    """Corners of a shortest way over the grid to the standing place nearest to an object or point."""
+    """Return the corners of a shortest way over the grid to the standing place nearest to an object or point."""
     world = sim.world
     goal = _goal(sim, objectId, objectType, target)
     start = world.agent.position if position is None else to_array(position)
@@ -56,28 +45,28 @@ def _goal(sim: Simulation, object_id: str | None, object_type: str | None, targe
         return to_array(target)
     if object_id is not None:
         return sim.world.get(object_id).center
-    named = [o for o in sim.world.objects.values() if o.object_type == object_type]
-    if not named:
+    candidates = [o for o in sim.world.objects.values() if o.object_type == object_type]
+    if not candidates:
         raise ActionError(f"No object of type {object_type!r} is in the scene")
-    return min(named, key=lambda o: (sim.world.distance(o), o.object_id)).center
+    return min(candidates, key=lambda o: (sim.world.distance(o), o.object_id)).center
 
 
 @action("GetObjectInFrame", query=True)
 def get_object_in_frame(sim: Simulation, x: float, y: float, checkVisible: bool = False) -> str:
-    """Id of the object at (x, y), shares of the frame from its top left."""
-    found = object_at(sim, x, y)
-    if found is None:
+    """Return the id of the object at (x, y), shares of the frame from its top left."""
+    object_id = object_at(sim, x, y)
+    if object_id is None:
         raise ActionError(f"no sim objects found at ({x},{y})")
-    if checkVisible and found not in sim.visible():
-        raise ActionError(f"target hit ({found}) at ({x}, {y}) is not currently Visible to Agent")
-    return found
+    if checkVisible and object_id not in sim.vision.visible_ids():
+        raise ActionError(f"target hit ({object_id}) at ({x}, {y}) is not currently Visible to Agent")
+    return object_id
 
 
 @action("GetCoordinateFromRaycast", query=True)
 def get_coordinate_from_raycast(sim: Simulation, x: float, y: float) -> dict[str, float]:
-    """World position of what is seen at (x, y), shares of the frame from its top left."""
+    """Return the world position of what is seen at (x, y), shares of the frame from its top left."""
     check_in_frame(x, y)
-    point = sim.hit(x, 1.0 - y)
+    point = sim.vision.point_at(x, 1.0 - y)
     if point is None:
         raise ActionError(f"Nothing is at (x: {x}, y: {y})")
     return to_xyz(point)
@@ -85,7 +74,7 @@ def get_coordinate_from_raycast(sim: Simulation, x: float, y: float) -> dict[str
 
 @action("Get2DSemanticHull", query=True)
 def get_semantic_hull(sim: Simulation, objectId: str) -> list[list[float]]:
-    """Corners (x, z) of the outline of an object seen from above."""
+    """Return the corners (x, z) of the outline of an object seen from above."""
     return _hull(sim.world.get(objectId))
 
 
@@ -93,35 +82,35 @@ def get_semantic_hull(sim: Simulation, objectId: str) -> list[list[float]]:
 def get_semantic_hulls(
     sim: Simulation, objectIds: list[str] | None = None, objectTypes: list[str] | None = None
 ) -> dict[str, list[list[float]]]:
-    """Outlines from above of all objects, of those of some types, or of some ids."""
+    """Return outlines from above of all objects, of those of some types, or of some ids."""
     if objectIds is not None and objectTypes is not None:
         raise ActionError("Only one of objectTypes and objectIds can have a non-null value.")
     if objectIds is not None:
         return {object_id: _hull(sim.world.get(object_id)) for object_id in objectIds}
-    wanted = sim.world.objects.values()
-    return {o.object_id: _hull(o) for o in wanted if objectTypes is None or o.object_type in objectTypes}
+    objects = sim.world.objects.values()
+    return {o.object_id: _hull(o) for o in objects if objectTypes is None or o.object_type in objectTypes}
 
 
 def _hull(item: SimObject) -> list[list[float]]:
-    return [rounded(point, 6) for point in convex_hull(item.oriented_corners()[:, [0, 2]])]
+    return [round_vector(point, 6) for point in convex_hull(item.oriented_corners()[:, [0, 2]])]
 
 
 @action("TestFastEmit", query=True)
 def fast_emit(sim: Simulation, rvalue: str) -> str:
-    """Give the argument back without a new state; AI2-THOR tests its transport with it."""
+    """Return the argument without a new state; AI2-THOR tests its transport with it."""
     return rvalue
 
 
 @action("TestActionReflectParam")
 def reflect(sim: Simulation, rvalue: str) -> str:
-    """Give the argument back with a new state; AI2-THOR tests its transport with it."""
+    """Return the argument with a new state; AI2-THOR tests its transport with it."""
     return rvalue
 
 
 @action("GetMapViewCameraProperties", query=True)
 def get_map_view_camera_properties(sim: Simulation) -> dict[str, Any]:
-    """Arguments of AddThirdPartyCamera for a view of the whole scene from above."""
-    camera = sim.map_camera()
+    """Return arguments of AddThirdPartyCamera for a view of the whole scene from above."""
+    camera = map_camera(sim.world)
     return {
         "position": to_xyz(camera.position),
         "rotation": to_xyz(camera.rotation),

@@ -4,7 +4,6 @@ from typing import Any
 
 from infthor_eval.errors import DataError
 from infthor_eval.sim.actions.registry import action
-from infthor_eval.sim.arm.equipment import equip
 from infthor_eval.sim.errors import ActionError, ErrorCode
 from infthor_eval.sim.render.camera import FAR, NEAR
 from infthor_eval.sim.settings import AGENT_MODES, SimulatorSettings
@@ -23,7 +22,7 @@ def reset(sim: Simulation, sceneName: str) -> None:
         raise ActionError(str(error)) from error
     sim.failed_reset = ""
     sim.settings = SimulatorSettings()
-    sim.map_view = False
+    sim.display.map_view = False
     sim.load(world)
 
 
@@ -46,7 +45,8 @@ def initialize(
     agentCount: int = 1,
     massThreshold: float | None = None,
 ) -> dict[str, float]:
-    """Set up the agent; arguments that only Unity knows are passed over, as Unity does."""
+    """Set up the agent; arguments that only Unity knows are ignored, as Unity ignores unknown ones here."""
+    # The client does not look at the reply to Reset, but raises on the reply to Initialize that it sends next.
     if sim.failed_reset:
         raise ActionError(sim.failed_reset)
     if agentMode.lower() not in AGENT_MODES:
@@ -60,7 +60,7 @@ def initialize(
     _check(visibilityDistance >= 0, f"visibilityDistance must be at least 0, not {visibilityDistance}")
     if massThreshold is not None and massThreshold <= 0:
         raise ActionError(f"massThreshold must have nonzero value - invalid value: {massThreshold}")
-    sim.configure(
+    settings = SimulatorSettings(
         agent_mode=agentMode.lower(),
         mass_threshold=massThreshold,
         grid_size=float(gridSize),
@@ -74,7 +74,7 @@ def initialize(
         classes=renderSemanticSegmentation or renderClassImage,
         fast_emit=fastActionEmit,
     )
-    equip(sim.world, sim.settings.agent_mode)
+    sim.configure(settings)
     return {"cameraNearPlane": NEAR, "cameraFarPlane": FAR}
 
 

@@ -1,4 +1,4 @@
-"""Keeping a state and coming back to it, which Unity cannot: generation discards what fails and repeats nothing."""
+"""Saving and restoring the scene's state, which Unity cannot: generation undoes failed subtasks without a replay."""
 
 from infthor_eval.sim.actions.registry import action
 from infthor_eval.sim.errors import ActionError
@@ -9,12 +9,12 @@ __all__: list[str] = []
 
 @action("SaveState", query=True)
 def save_state(sim: Simulation, slot: int = 0) -> None:
-    """Keep the present state; an earlier one of the same slot is forgotten."""
+    """Keep the present state in a slot, in place of an earlier one."""
     sim.save(slot)
 
 
 @action("RestoreState")
 def restore_state(sim: Simulation, slot: int = 0) -> None:
-    """Bring the state kept in a slot back; it stays kept."""
+    """Bring back the state kept in a slot; it stays kept."""
     if not sim.restore(slot):
         raise ActionError("There is no saved state of this scene")

@@ -1,7 +1,10 @@
-"""Direct changes of an object's state: cook, clean, dirty, break, fill, empty, use up."""
+"""Actions that set one state of an object: cook, clean, dirty, break, fill, empty, use up."""
+
+from functools import partial
+from typing import Any, NamedTuple
 
 from infthor_eval.sim.actions.registry import action
-from infthor_eval.sim.actions.targets import BY_ID_OR_PIXEL, interactable
+from infthor_eval.sim.actions.targets import BY_ID_OR_PIXEL, interactable, object_action
 from infthor_eval.sim.effects import break_object
 from infthor_eval.sim.errors import ActionError
 from infthor_eval.sim.objects import SimObject
@@ -10,76 +13,53 @@ from infthor_eval.sim.simulation import Simulation
 __all__: list[str] = []
 
 _LIQUIDS = ("coffee", "wine", "water")
+_ABILITIES = {  # attribute of `ObjectType`, by AI2-THOR's name of the property
+    "CanBeCooked": "cookable",
+    "CanBeDirty": "dirtyable",
+    "CanBeFilled": "fillable",
+    "CanBeUsedUp": "usable_up",
+    "CanBreak": "breakable",
+}
 
 
-@action("CookObject", forms=BY_ID_OR_PIXEL)
-def cook(
-    sim: Simulation,
-    objectId: str | None = None,
-    x: float | None = None,
-    y: float | None = None,
-    forceAction: bool = False,
-) -> None:
-    """Cook an object."""
-    target = interactable(sim, objectId, forceAction, x, y)
-    _require(target, target.type.cookable, "CanBeCooked")
-    if target.state.cooked:
-        raise ActionError(f"{target.object_id} is already Cooked!")
-    target.state.cooked = True
-    target.state.temperature = "Hot"
-    sim.world.touch(target)
+class _StateAction(NamedTuple):
+    """An action that gives one attribute of an object's state a value.
+
+    Attributes:
+        name: name of the action.
+        ability: AI2-THOR's name of the property that the object must have.
+        values: attributes of `SimObjectState` and their new values; the first must change.
+        refusal: what the message says of an object that is so already.
+    """
+
+    name: str
+    ability: str
+    values: dict[str, Any]
+    refusal: str
 
 
-@action("CleanObject", forms=BY_ID_OR_PIXEL)
-def clean(
-    sim: Simulation,
-    objectId: str | None = None,
-    x: float | None = None,
-    y: float | None = None,
-    forceAction: bool = False,
-) -> None:
-    """Clean a dirty object."""
-    target = interactable(sim, objectId, forceAction, x, y)
-    _require(target, target.type.dirtyable, "CanBeDirty")
-    if not target.state.dirty:
-        raise ActionError(f"{target.object_id} is already Clean!")
-    target.state.dirty = False
-    sim.world.touch(target)
+_ACTIONS = (
+    _StateAction("CookObject", "CanBeCooked", {"cooked": True, "temperature": "Hot"}, "is already Cooked!"),
+    _StateAction("CleanObject", "CanBeDirty", {"dirty": False}, "is already Clean!"),
+    _StateAction("DirtyObject", "CanBeDirty", {"dirty": True}, "is already dirty!"),
+    _StateAction("EmptyLiquidFromObject", "CanBeFilled", {"fill_liquid": None}, "is already empty"),
+    _StateAction("UseUpObject", "CanBeUsedUp", {"used_up": True}, "is already used up"),
+)
 
 
-@action("DirtyObject", forms=BY_ID_OR_PIXEL)
-def make_dirty(
-    sim: Simulation,
-    objectId: str | None = None,
-    x: float | None = None,
-    y: float | None = None,
-    forceAction: bool = False,
-) -> None:
-    """Make an object dirty."""
-    target = interactable(sim, objectId, forceAction, x, y)
-    _require(target, target.type.dirtyable, "CanBeDirty")
-    if target.state.dirty:
-        raise ActionError(f"{target.object_id} is already dirty!")
-    target.state.dirty = True
-    sim.world.touch(target)
+def _set_state(sim: Simulation, target: SimObject, spec: _StateAction) -> None:
+    _require(target, spec.ability)
+    attribute, value = next(iter(spec.values.items()))
+    # By truth and not by value: a vessel full of one liquid is not filled with another.
+    if bool(getattr(target.state, attribute)) == bool(value):
+        raise ActionError(f"{target.object_id} {spec.refusal}")
+    for name, new in spec.values.items():
+        setattr(target.state, name, new)
+    sim.world.mark_changed(target)
 
 
-@action("BreakObject", forms=BY_ID_OR_PIXEL)
-def smash(
-    sim: Simulation,
-    objectId: str | None = None,
-    x: float | None = None,
-    y: float | None = None,
-    forceAction: bool = False,
-) -> None:
-    """Break an object."""
-    target = interactable(sim, objectId, forceAction, x, y)
-    _require(target, target.type.breakable, "CanBreak")
-    if target.state.broken:
-        raise ActionError(f"{target.object_id} is already broken")
-    if target.object_id in sim.world.carried() and target.type.cracks:
-        raise ActionError("target object is in the agent's hand; put it down to crack it")
-    break_object(sim.world, target)
+for _spec in _ACTIONS:
+    object_action(_spec.name)(partial(_set_state, spec=_spec))
 
 
 @action("FillObjectWithLiquid", forms=BY_ID_OR_PIXEL)
@@ -95,47 +75,21 @@ def fill(
     target = interactable(sim, objectId, forceAction, x, y)
     if fillLiquid not in _LIQUIDS:
         raise ActionError(f"{fillLiquid} is not a valid Liquid; use one of {', '.join(_LIQUIDS)}")
-    _require(target, target.type.fillable, "CanBeFilled")
-    if target.state.fill_liquid is not None:
-        raise ActionError(f"{target.object_id} is already Filled!")
-    target.state.fill_liquid = fillLiquid
-    sim.world.touch(target)
+    spec = _StateAction("FillObjectWithLiquid", "CanBeFilled", {"fill_liquid": fillLiquid}, "is already Filled!")
+    _set_state(sim, target, spec)
 
 
-@action("EmptyLiquidFromObject", forms=BY_ID_OR_PIXEL)
-def empty(
-    sim: Simulation,
-    objectId: str | None = None,
-    x: float | None = None,
-    y: float | None = None,
-    forceAction: bool = False,
-) -> None:
-    """Empty a vessel."""
-    target = interactable(sim, objectId, forceAction, x, y)
-    _require(target, target.type.fillable, "CanBeFilled")
-    if target.state.fill_liquid is None:
-        raise ActionError(f"{target.object_id} is already empty")
-    target.state.fill_liquid = None
-    sim.world.touch(target)
+@object_action("BreakObject")
+def smash(sim: Simulation, target: SimObject) -> None:
+    """Break an object."""
+    _require(target, "CanBreak")
+    if target.state.broken:
+        raise ActionError(f"{target.object_id} is already broken")
+    if target.object_id in sim.world.held_ids() and target.type.cracks:
+        raise ActionError("target object is in the agent's hand; put it down to crack it")
+    break_object(sim.world, target)
 
 
-@action("UseUpObject", forms=BY_ID_OR_PIXEL)
-def use_up(
-    sim: Simulation,
-    objectId: str | None = None,
-    x: float | None = None,
-    y: float | None = None,
-    forceAction: bool = False,
-) -> None:
-    """Use an object up, e.g. a soap bottle."""
-    target = interactable(sim, objectId, forceAction, x, y)
-    _require(target, target.type.usable_up, "CanBeUsedUp")
-    if target.state.used_up:
-        raise ActionError(f"{target.object_id} is already used up")
-    target.state.used_up = True
-    sim.world.touch(target)
-
-
-def _require(target: SimObject, capable: bool, property_name: str) -> None:
-    if not capable:
-        raise ActionError(f"{target.object_id} does not have {property_name} property!")
+def _require(target: SimObject, ability: str) -> None:
+    if not getattr(target.type, _ABILITIES[ability]):
+        raise ActionError(f"{target.object_id} does not have {ability} property!")

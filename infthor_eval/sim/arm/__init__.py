@@ -1,1 +1,1 @@
-"""The robot arms of agent modes `arm` (ManipulaTHOR) and `stretch`: their geometry, what they touch, what they hold."""
+"""The robot arms of agent modes `arm` (ManipulaTHOR) and `stretch`: geometry, collisions, and what they hold."""

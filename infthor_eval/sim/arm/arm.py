@@ -1,4 +1,4 @@
-"""The state of an arm: how it is bent, how large the sphere of its hand is, and what it holds."""
+"""The state of an arm: its pose, the sphere of its hand, and what it holds."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -10,42 +10,48 @@ from infthor_eval.sim.agent import Agent, Grip
 from infthor_eval.sim.arm.rig import ArmPose, Rig
 from infthor_eval.sim.geometry import Array
 
-__all__ = ["Arm", "Frame", "base_frames"]
+__all__ = ["Arm", "Transform", "base_transforms"]
 
-_RADIUS = 0.06  # metres, of the hand's sphere when the agent is made
+_RADIUS = 0.06  # of the hand's sphere after Initialize, metres
 
 
-class Frame(NamedTuple):
-    """A place (3,) in metres and a rotation (3, 3)."""
+class Transform(NamedTuple):
+    """A local frame in the world.
+
+    Attributes:
+        origin: position of its origin, metres (3,).
+        turn: its rotation (3, 3).
+    """
 
     origin: Array
     turn: Array
 
     def point(self, local: Array) -> Array:
-        """A point (3,) of this frame, in the world."""
+        """Return a point (3,) of this frame in the world."""
         return self.origin + self.turn @ local
 
     def local(self, point: Array) -> Array:
-        """A point (3,) of the world, in this frame."""
+        """Return a point (3,) of the world in this frame."""
         inside: Array = self.turn.T @ (point - self.origin)
         return inside
 
 
-def base_frames(rig: Rig, positions: Array, yaws: Array, poses: Sequence[ArmPose]) -> tuple[Array, Array]:
-    """Origins (n, 3) and rotations (n, 3, 3) of the arm's base in the world.
+def base_transforms(rig: Rig, positions: Array, yaws: Array, poses: Sequence[ArmPose]) -> tuple[Array, Array]:
+    """Return origins (n, 3) and rotations (n, 3, 3) of the arm's base in the world.
 
     Args:
-        rig: the arm's.
-        positions: where the agent is, metres (n, 3).
-        yaws: which way it looks, degrees (n,).
-        poses: how the arm is bent.
+        rig: geometry of the arm.
+        positions: positions of the agent, metres (n, 3).
+        yaws: directions of the agent, degrees (n,).
+        poses: poses of the arm (n).
     """
+    # All stances of a path at once: a path has up to thousands, and numpy's calls would take longer than the sums.
     offsets = np.stack([rig.origin(pose) for pose in poses])[:, :, None]
     return positions + (_upright(yaws) @ offsets)[:, :, 0], _upright(yaws + rig.heading)
 
 
 def _upright(yaws: Array) -> Array:
-    """Rotations (n, 3, 3) about the vertical."""
+    """Return rotations (n, 3, 3) about the vertical."""
     sines, cosines = np.sin(np.radians(yaws)), np.cos(np.radians(yaws))
     turns = np.zeros((len(yaws), 3, 3))
     turns[:, 0, 0] = turns[:, 2, 2] = cosines
@@ -58,49 +64,51 @@ class Arm:
     """An arm.
 
     Attributes:
-        radius: of the hand's sphere, metres.
-        held: how each thing that the hand holds is held, in the wrist's frame, by id, in the order of picking up.
-        freight: likewise the contents of what is held.
-        version: grows with every change, so that pictures can be kept.
+        rig: geometry.
+        pose: present pose.
+        radius: radius of the hand's sphere, metres.
+        held: poses of the held objects in the wrist's frame, by id, in the order of picking up.
+        held_contents: poses of the contents of held objects, likewise.
+        version: number that grows with every change; cached pictures compare it.
     """
 
     rig: Rig
     pose: ArmPose
     radius: float = _RADIUS
     held: dict[str, Grip] = field(default_factory=dict)
-    freight: dict[str, Grip] = field(default_factory=dict)
+    held_contents: dict[str, Grip] = field(default_factory=dict)
     version: int = 0
 
     @classmethod
     def at_rest(cls, rig: Rig) -> "Arm":
-        """An arm as it is when the agent is made."""
+        """Return an arm in its resting pose that holds nothing."""
         return cls(rig, rig.rest())
 
-    def base(self, agent: Agent) -> Frame:
-        """The frame of the base in the world."""
-        origins, turns = base_frames(self.rig, agent.position[None], np.array([agent.yaw]), [self.pose])
-        return Frame(origins[0], turns[0])
+    def base(self, agent: Agent) -> Transform:
+        """Return the frame of the base in the world."""
+        origins, turns = base_transforms(self.rig, agent.position[None], np.array([agent.yaw]), [self.pose])
+        return Transform(origins[0], turns[0])
 
-    def wrist(self, agent: Agent) -> Frame:
-        """The frame of the wrist in the world."""
+    def wrist(self, agent: Agent) -> Transform:
+        """Return the frame of the wrist in the world."""
         base = self.base(agent)
-        return Frame(base.point(self.pose.wrist), base.turn @ self.pose.turn)
+        return Transform(base.point(self.pose.wrist), base.turn @ self.pose.turn)
 
     def sphere(self, agent: Agent) -> Array:
-        """Centre (3,) of the hand's sphere in the world, metres."""
+        """Return the centre (3,) of the hand's sphere in the world, metres."""
         return self.wrist(agent).point(self.rig.palm + np.array([0.0, 0.0, self.radius]))
 
     def change(self, pose: ArmPose) -> None:
-        """Bend the arm; what it holds is to be carried along."""
+        """Give the arm another pose; the caller moves what it holds."""
         self.pose = pose
         self.version += 1
 
     def grips(self) -> Iterator[tuple[str, Grip]]:
-        """How all that moves with the hand is held, by id."""
+        """Yield ids and poses in the wrist's frame of all that moves with the hand: held objects, then contents."""
         yield from self.held.items()
-        yield from self.freight.items()
+        yield from self.held_contents.items()
 
     def let_go(self, object_id: str) -> None:
-        """Forget one thing, whether it was held, in what is held, or neither."""
+        """Forget one object, whether it was held, a content of what is held, or neither."""
         self.held.pop(object_id, None)
-        self.freight.pop(object_id, None)
+        self.held_contents.pop(object_id, None)

@@ -1,4 +1,4 @@
-"""Turned boxes in bulk, and how far apart pairs of them are."""
+"""Arrays of oriented boxes, and distances between pairs of them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
@@ -10,17 +10,17 @@ from infthor_eval.sim.geometry import Array
 
 __all__ = ["Boxes", "join", "separations", "sphere_gaps"]
 
-_PARALLEL = 1e-4  # sine of an angle below which the normal of two edges is left out: the faces' normals suffice
-_NEXT, _LAST = [1, 2, 0], [2, 0, 1]
+_PARALLEL = 1e-4  # sine of an angle below which two edges count as parallel
+_NEXT, _LAST = [1, 2, 0], [2, 0, 1]  # the other two axes of each axis, in the order of cross products
 
 
 @dataclass(frozen=True)
 class Boxes:
-    """Some turned boxes, (n,) of them or, in groups of equal size, (k, n).
+    """Oriented boxes, (n,) of them or, in groups of equal size, (k, n).
 
     Attributes:
-        center: metres (..., n, 3).
-        axes: unit axes (..., n, 3, 3), one axis of the box a row.
+        center: centres, metres (..., n, 3).
+        axes: unit axes (..., n, 3, 3), an axis of the box per row.
         half: half extents along them, metres (..., n, 3).
     """
 
@@ -32,20 +32,20 @@ class Boxes:
         return Boxes(self.center[index], self.axes[index], self.half[index])
 
     def flat(self) -> "Boxes":
-        """The boxes without their groups (k * n), group after group."""
+        """Return the boxes without their groups (k * n), group after group."""
         return Boxes(self.center.reshape(-1, 3), self.axes.reshape(-1, 3, 3), self.half.reshape(-1, 3))
 
     def bounds(self) -> tuple[Array, Array]:
-        """Low and high corners (..., n, 3) of the axis-aligned boxes around them."""
+        """Return the low and high corners (..., n, 3) of the axis-aligned boxes around them."""
         reach = (np.abs(self.axes) * self.half[..., None]).sum(axis=-2)
         return self.center - reach, self.center + reach
 
-    def moved(self, origins: Array, frames: Array) -> "Boxes":
-        """Groups (k, n) of the boxes in the world, from a frame that stands at some places.
+    def transform(self, origins: Array, frames: Array) -> "Boxes":
+        """Return the boxes (k, n) in the world, from a local frame with k poses.
 
         Args:
-            origins: where the frame stands, metres (k, 3); one place for each group, or many for boxes of one group.
-            frames: its rotations (k, 3, 3).
+            origins: positions of the frame, metres (k, 3): one for each group, or many for a single group.
+            frames: rotations of the frame (k, 3, 3).
         """
         back = frames.transpose(0, 2, 1)
         center = origins[:, None] + self.center @ back
@@ -53,26 +53,33 @@ class Boxes:
 
 
 def join(parts: Sequence[Boxes], axis: int = 0) -> Boxes:
-    """All boxes of some collections, in order; with `axis` 1, the groups of each beside those of the others."""
+    """Return all boxes of some collections, in order; with `axis` 1, join their groups one by one."""
     return Boxes(*(np.concatenate([getattr(p, f.name) for p in parts], axis=axis) for f in fields(Boxes)))
 
 
 def separations(first: Boxes, second: Boxes) -> Array:
-    """Gaps (n, m) in metres between each of n boxes and each of m others, ungrouped; negative: how deep they overlap.
+    """Return gaps (n, m) in metres between each of n boxes and each of m others; negative: depth of the overlap.
 
-    A gap is that along the best separating direction (of the faces and of pairs of edges), so it is at most the true
-    distance, and negative exactly where the boxes overlap. Pairs that are far apart have infinity.
+    A gap is measured along the best separating direction. It is at most the true distance, and negative exactly where
+    the boxes overlap. Pairs that are far apart have infinity.
+
+    Args:
+        first: n boxes without groups.
+        second: m boxes without groups.
     """
+    # Spheres around the boxes sort out most pairs cheaply.
     gaps = np.full((len(first.center), len(second.center)), np.inf)
     apart = np.linalg.norm(first.center[:, None] - second.center[None], axis=2)
     near = np.nonzero(apart < np.linalg.norm(first.half, axis=1)[:, None] + np.linalg.norm(second.half, axis=1))
     if len(near[0]):
-        gaps[near] = _paired(first[near[0]], second[near[1]])
+        gaps[near] = _pair_gaps(first[near[0]], second[near[1]])
     return gaps
 
 
-def _paired(a: Boxes, b: Boxes) -> Array:
-    """Gaps (k,) between the boxes of two collections, pair by pair: the theorem of separating axes."""
+def _pair_gaps(a: Boxes, b: Boxes) -> Array:
+    """Return gaps (k,) between the boxes of two collections, pair by pair, by the separating axis theorem."""
+    # Two boxes are apart exactly if they are along one of 15 directions: the 3 + 3 axes of the boxes, and the cross
+    # products of each pair of them. `cosines` holds the dot products of the axes, from which all projections follow.
     cosines = a.axes @ b.axes.transpose(0, 2, 1)
     size = np.abs(cosines)
     between = b.center - a.center
@@ -83,6 +90,8 @@ def _paired(a: Boxes, b: Boxes) -> Array:
     away = np.abs(of_a[:, _LAST, None] * cosines[:, _NEXT] - of_a[:, _NEXT, None] * cosines[:, _LAST])
     reach_a = a.half[:, _NEXT, None] * size[:, _LAST] + a.half[:, _LAST, None] * size[:, _NEXT]
     reach_b = b.half[:, None, _NEXT] * size[:, :, _LAST] + b.half[:, None, _LAST] * size[:, :, _NEXT]
+    # Cross products have the length of the sine, by which gaps along them are divided. Nearly parallel edges are left
+    # out: the division would blow up rounding, and the axes themselves suffice then.
     sine = np.sqrt(np.maximum(1.0 - cosines**2, 0.0))
     edges = np.where(sine > _PARALLEL, (away - reach_a - reach_b) / np.maximum(sine, _PARALLEL), -np.inf)
     gaps: Array = np.maximum(np.maximum(faces_a, faces_b).max(axis=1), edges.max(axis=(1, 2)))
@@ -90,7 +99,7 @@ def _paired(a: Boxes, b: Boxes) -> Array:
 
 
 def sphere_gaps(boxes: Boxes, center: Array) -> Array:
-    """Distances (n,) in metres from a point (3,) to the boxes; 0 inside."""
+    """Return distances (n,) in metres from a point (3,) to the boxes; 0 inside."""
     local = np.abs(np.einsum("nij,nj->ni", boxes.axes, center - boxes.center))
     gaps: Array = np.linalg.norm(np.maximum(local - boxes.half, 0.0), axis=1)
     return gaps

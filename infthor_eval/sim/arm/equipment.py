@@ -1,4 +1,4 @@
-"""Which body and arm the agent has in each mode."""
+"""The agent's camera and arm in each agent mode."""
 
 from infthor_eval.sim.agent import CAMERA_HEIGHT, CROUCH
 from infthor_eval.sim.arm.arm import Arm
@@ -12,11 +12,11 @@ from infthor_eval.sim.world import World
 __all__ = ["equip"]
 
 _RIGS: dict[str, type[Kinova] | type[Stretch]] = {"arm": Kinova, "stretch": Stretch}
-_EYES = {"stretch": (0.00192, 0.5447, 0.06788)}  # read in Unity's sources, metres; the others have the usual one
+_EYES = {"stretch": (0.00192, 0.5447, 0.06788)}  # metres, from Unity's sources; other modes have the usual camera
 
 
 def equip(world: World, agent_mode: str) -> None:
-    """Give the agent of a world the camera and the arm, at rest, of an agent mode; what another arm held falls."""
+    """Give a world's agent the camera of an agent mode and its arm, at rest; what the agent held falls."""
     if world.arm is not None:
         drop_all(world, world.arm)
     rig: Rig | None = _RIGS[agent_mode]() if agent_mode in _RIGS else None
@@ -27,4 +27,4 @@ def equip(world: World, agent_mode: str) -> None:
     world.arm = None if rig is None else Arm.at_rest(rig)
     world.agent.eye = _EYES.get(agent_mode, (0.0, CAMERA_HEIGHT, 0.0))
     world.agent.crouch = 0.0 if agent_mode in _EYES else CROUCH
-    world.touch()
+    world.mark_changed()

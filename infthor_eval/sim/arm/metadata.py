@@ -1,13 +1,13 @@
-"""`metadata.arm`: joints, sphere, what is held and what is within the sphere."""
+"""`metadata.arm`: joints, the hand's sphere, and the objects that are held or touched."""
 
 from typing import Any
 
 import numpy as np
 
 from infthor_eval.sim.arm.arm import Arm
-from infthor_eval.sim.arm.holding import touched
-from infthor_eval.sim.arm.turns import axis_angle
-from infthor_eval.sim.geometry import Array, rounded, to_xyz
+from infthor_eval.sim.arm.holding import touched_objects
+from infthor_eval.sim.arm.rotations import axis_angle
+from infthor_eval.sim.geometry import Array, round_vector, to_xyz
 from infthor_eval.sim.world import World
 
 __all__ = ["arm_metadata"]
@@ -16,8 +16,8 @@ _DIGITS = 6
 
 
 def arm_metadata(world: World, arm: Arm) -> dict[str, Any]:
-    """The arm as AI2-THOR tells of it; positions in metres, rotations as axis and angle (`w`, degrees)."""
-    near = touched(world, arm)
+    """Return the arm as AI2-THOR reports it; positions in metres, rotations as axis and angle (`w`, degrees)."""
+    near = touched_objects(world, arm)
     return {
         "joints": _joints(world, arm),
         "heldObjects": list(arm.held),
@@ -30,10 +30,10 @@ def arm_metadata(world: World, arm: Arm) -> dict[str, Any]:
 
 def _joints(world: World, arm: Arm) -> list[dict[str, Any]]:
     base, joints = arm.base(world.agent), arm.rig.joints([arm.pose])
-    told: list[dict[str, Any]] = []
+    listed: list[dict[str, Any]] = []
     parent = np.eye(3)
     for name, position, turn in zip(arm.rig.joint_names, joints.positions[0], joints.turns[0], strict=True):
-        told.append({
+        listed.append({
             "name": name,
             "position": _xyz(base.point(position)),
             "rootRelativePosition": _xyz(position),
@@ -44,16 +44,18 @@ def _joints(world: World, arm: Arm) -> list[dict[str, Any]]:
             "elbowOrientation": None,
         })  # fmt: skip
         parent = turn
-    if arm.rig.has_elbow:
-        told[0] |= {"armBaseHeight": round(arm.pose.base, _DIGITS), "elbowOrientation": round(arm.pose.elbow, _DIGITS)}
-    return told
+    if arm.rig.has_elbow:  # Unity reports these with the first joint alone
+        listed[0] |= {
+            "armBaseHeight": round(arm.pose.base, _DIGITS),
+            "elbowOrientation": round(arm.pose.elbow, _DIGITS),
+        }
+    return listed
 
 
 def _axis_angle(turn: Array) -> dict[str, float]:
-    """Axis and angle of a rotation (3, 3); no rotation is one of 0 degrees about x."""
     axis, degrees = axis_angle(turn)
     return {**_xyz(axis), "w": round(degrees, _DIGITS)}
 
 
 def _xyz(vector: Array) -> dict[str, float]:
-    return to_xyz(rounded(vector, _DIGITS))
+    return to_xyz(round_vector(vector, _DIGITS))

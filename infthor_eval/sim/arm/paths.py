@@ -1,26 +1,27 @@
-"""Paths of small steps for the arm and for the agent that carries it."""
+"""Subdivision of movements into the small steps at which collisions are checked."""
 
 import math
 
 import numpy as np
 
-from infthor_eval.sim.arm.turns import axis_angle, rotation
+from infthor_eval.sim.arm.rotations import axis_angle, rotation
 from infthor_eval.sim.geometry import Array
 
-__all__ = ["STEP", "away_steps", "shares", "turning"]
+__all__ = ["STEP", "path_distances", "rotation_steps", "shares"]
 
-STEP = 0.02  # metres from one look at what is in the way to the next, as Unity's usual speed and frame have it
-_GROWTH, _FINE = 1.1, 1.0  # beyond so many metres steps grow: the arm is stretched out by then
+STEP = 0.02  # metres between two collision checks: Unity's usual speed of 1 m/s in frames of 1/50 s
+_FINE = 1.0  # metres of a path that are checked by such steps; the arm is stretched out by then and hardly moves
+_GROWTH = 1.1  # factor by which steps grow beyond
 
 
 def shares(length: float, step: float) -> Array:
-    """Where along a path of some length (metres or degrees) to look, as shares of it; its end at least."""
-    count = max(1, math.ceil(length / step - 1e-9))
+    """Return the shares of a path, of some length in metres or degrees, at which to check it; at least its end, 1."""
+    count = max(1, math.ceil(length / step - 1e-9))  # without the margin, rounding could add a step
     return np.arange(1, count + 1) / count
 
 
-def away_steps(distance: float) -> Array:
-    """Distances at which to look on a way of some length that may be much longer than an arm, metres."""
+def path_distances(distance: float) -> Array:
+    """Return distances at which to check a path that may be much longer than an arm, metres; the last is its end."""
     if distance <= _FINE:
         return shares(distance, STEP) * distance
     fine = shares(_FINE, STEP) * _FINE
@@ -28,7 +29,8 @@ def away_steps(distance: float) -> Array:
     return np.append(fine, np.minimum(_FINE * _GROWTH ** np.arange(1, count + 1), distance))
 
 
-def turning(turn: Array, step: float) -> list[Array]:
-    """Rotations (3, 3) on the shortest way from none to `turn`, at most `step` degrees from one to the next."""
+def rotation_steps(turn: Array, step: float) -> list[Array]:
+    """Return rotations (3, 3) on the shortest way from none to `turn`, at most `step` degrees apart."""
     axis, angle = axis_angle(turn)
+    # `turn` itself ends the list, as the last part of the way differs from it by rounding.
     return [*(rotation(axis, angle * share) for share in shares(angle, step)[:-1]), turn]

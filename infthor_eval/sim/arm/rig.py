@@ -1,4 +1,4 @@
-"""What an arm is to the rest of the simulator: a pose, and a rig that turns it into joints and boxes."""
+"""The interface of an arm: a pose, and a rig that computes joints and boxes from it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,13 +12,13 @@ __all__ = ["ArmPose", "Joints", "Rig"]
 
 @dataclass(frozen=True)
 class ArmPose:
-    """How an arm is bent, in the frame of its base, which turns with the agent.
+    """The pose of an arm in the frame of its base, which turns with the agent.
 
     Attributes:
-        wrist: where the wrist is, metres (3,).
+        wrist: position of the wrist, metres (3,).
         turn: rotation of the wrist (3, 3).
-        base: height of the base above the agent's position, metres; arms whose base is fixed leave it.
-        elbow: degrees that the elbow is turned about the line from shoulder to wrist.
+        base: height of the base above the agent's position, metres; unused by arms with a fixed base.
+        elbow: angle of the elbow about the line from shoulder to wrist, degrees.
     """
 
     wrist: Array
@@ -32,8 +32,8 @@ class Joints:
     """The joints of an arm in some poses (n), in the frame of its base.
 
     Attributes:
-        positions: metres (n, joints, 3), from the base to the wrist.
-        turns: rotations (n, joints, 3, 3); a joint looks along the link that begins at it.
+        positions: positions from the base to the wrist, metres (n, joints, 3).
+        turns: rotations (n, joints, 3, 3); a joint's z points along the link that begins at it.
     """
 
     positions: Array
@@ -49,40 +49,40 @@ class Rig(Protocol):
 
     @property
     def heading(self) -> float:
-        """Degrees by which the base is turned from the agent's forward direction."""
+        """Yaw of the base relative to the agent, degrees."""
 
     @property
     def has_elbow(self) -> bool:
-        """Whether it has an elbow that can be turned, and a base that moves up and down."""
+        """Whether the arm has an elbow that can be turned, and a base that moves up and down."""
 
     @property
     def palm(self) -> Array:
-        """Where the sphere of the hand begins, in the wrist's frame, metres (3,); it lies along the wrist's z."""
+        """Point of the wrist's frame at which the hand's sphere begins, metres (3,); the sphere lies along its z."""
 
     @property
     def lifts(self) -> tuple[float, float]:
         """Lowest and highest height of the base, or of the lift, above the agent's position, metres."""
 
     def rest(self) -> ArmPose:
-        """How the arm is held when the agent is made."""
+        """Return the resting pose."""
 
     def origin(self, pose: ArmPose) -> Array:
-        """Where the base is in the agent's frame (right, up, ahead), metres (3,)."""
+        """Return the position of the base in the agent's frame (right, up, ahead), metres (3,)."""
 
-    def lifted(self, pose: ArmPose, height: float) -> ArmPose:
-        """The pose with its base, or its lift, at a height above the agent's position, metres."""
+    def with_lift(self, pose: ArmPose, height: float) -> ArmPose:
+        """Return the pose with its base, or its lift, at a height above the agent's position, metres."""
 
     def lift(self, pose: ArmPose) -> float:
-        """Height above the agent's position of the base, or of the lift, metres."""
+        """Return the height above the agent's position of the base, or of the lift, metres."""
 
-    def reaching(self, poses: Sequence[ArmPose], targets: Array) -> list[ArmPose]:
-        """Poses (n) with the wrist at targets (n, 3) in the frame of the base, or as near as it gets."""
+    def reach(self, poses: Sequence[ArmPose], targets: Array) -> list[ArmPose]:
+        """Return poses (n) with the wrist at targets (n, 3) in the frame of the base, or as near as it gets."""
 
     def joints(self, poses: Sequence[ArmPose]) -> Joints:
-        """Where the joints of some poses (n) are."""
+        """Return the joints of some poses (n)."""
 
     def boxes(self, poses: Sequence[ArmPose]) -> Boxes:
-        """The links and the hand of some poses (n, m), the hand last, in the frame of the base."""
+        """Return the links and the hand of some poses (n, m), the hand last, in the frame of the base."""
 
     def allows(self, target: Array) -> bool:
-        """Whether `restrictMovement` lets the wrist be sent to a target (3,) in the frame of the base."""
+        """Return whether `restrictMovement` allows a target (3,) of the wrist in the frame of the base."""

@@ -1,8 +1,8 @@
 """The stretch robot's arm: a lift, a telescope that goes out to the agent's right, and a wrist that turns about the
 vertical.
 
-Places of the joints were read off the metadata of a Unity build that somebody published, limits off Unity's solver;
-thicknesses are ours.
+The positions of the joints are from published metadata of a Unity build, the limits from Unity's solver. Thicknesses
+are ours.
 """
 
 from collections.abc import Sequence
@@ -16,12 +16,13 @@ from infthor_eval.sim.geometry import Array, yaw_matrix
 
 __all__ = ["Stretch"]
 
+# All lengths in metres.
 _ORIGIN = (0.1438, -0.8132, -0.0239)  # of the base, in the agent's frame
-_LIFTS, _OUT = (-0.056, 1.045), 0.516  # of the wrist's height above the base, and how far it comes out
+_LIFTS, _OUT = (-0.056, 1.045), 0.516  # limits of the wrist's height above the base; longest extension
 _REST = (0.0, 0.1645, 0.0)
-_MAST = (0.0461, 0.163, -0.2788)  # the lift from the wrist's height at z = 0, in the frame of the base
+_MAST = (0.0461, 0.163, -0.2788)  # the lift's joint relative to the wrist's height, in the frame of the base
 _TUBE = (0.083, 0.163, -0.0241)  # the first section of the telescope, likewise
-_SECTIONS = (0.0, 0.0130003, 0.0130005, 0.0130003, 0.0117463)  # of a section from the one before, drawn in
+_SECTIONS = (0.0, 0.0130003, 0.0130005, 0.0130003, 0.0117463)  # each section from the one before, telescope drawn in
 _YAW_JOINT, _HAND_JOINT = 0.1494, 0.0987  # heights of the wrist's two joints above the hand
 _PALM = 0.2047 - 0.06  # the sphere's centre in the recorded pose, less its radius there
 _HALVES: Array = np.array([(0.03, 0.03, 0.0), (0.025, 0.05, 0.025), (0.03, 0.02, _PALM / 2)])
@@ -44,33 +45,33 @@ class Stretch:
 
     @property
     def palm(self) -> Array:
-        """Where the sphere of the hand begins, in the wrist's frame, metres (3,)."""
+        """Point of the wrist's frame at which the hand's sphere begins, metres (3,)."""
         return np.array([0.0, 0.0, _PALM])
 
     def rest(self) -> ArmPose:
-        """The telescope drawn in, the gripper pointing back across the robot."""
+        """Return the resting pose: the telescope drawn in, the gripper pointing back across the robot."""
         return ArmPose(np.array(_REST), yaw_matrix(180.0))
 
     def origin(self, pose: ArmPose) -> Array:
-        """Where the base is in the agent's frame, metres (3,)."""
+        """Return the position of the base in the agent's frame, metres (3,)."""
         return np.array(_ORIGIN)
 
-    def lifted(self, pose: ArmPose, height: float) -> ArmPose:
-        """The pose with its wrist at a height above the agent's position, metres."""
-        return self.reaching([pose], np.array([[0.0, height - _ORIGIN[1], pose.wrist[2]]]))[0]
+    def with_lift(self, pose: ArmPose, height: float) -> ArmPose:
+        """Return the pose with its wrist at a height above the agent's position, metres."""
+        return self.reach([pose], np.array([[0.0, height - _ORIGIN[1], pose.wrist[2]]]))[0]
 
     def lift(self, pose: ArmPose) -> float:
-        """Height of the wrist above the agent's position, metres."""
+        """Return the height of the wrist above the agent's position, metres."""
         return float(_ORIGIN[1] + pose.wrist[1])
 
-    def reaching(self, poses: Sequence[ArmPose], targets: Array) -> list[ArmPose]:
-        """Poses (n) with the wrist at targets (n, 3), of which only height and distance count, within its limits."""
+    def reach(self, poses: Sequence[ArmPose], targets: Array) -> list[ArmPose]:
+        """Return poses (n) with the wrist as near to targets (n, 3) as lift and telescope bring it."""
         wrists = np.zeros_like(targets)
         wrists[:, 1], wrists[:, 2] = np.clip(targets[:, 1], *_LIFTS), np.clip(targets[:, 2], 0.0, _OUT)
         return [replace(pose, wrist=wrist) for pose, wrist in zip(poses, wrists, strict=True)]
 
     def joints(self, poses: Sequence[ArmPose]) -> Joints:
-        """Where the joints are: the lift, five sections of the telescope, the wrist's two."""
+        """Return the joints: the lift, five sections of the telescope, the wrist's two."""
         wrists = np.stack([p.wrist for p in poses])
         positions = np.zeros((len(poses), 8, 3))
         positions[:, 0] = _MAST
@@ -83,7 +84,7 @@ class Stretch:
         return Joints(positions, turns)
 
     def boxes(self, poses: Sequence[ArmPose]) -> Boxes:
-        """The telescope, the wrist and the gripper of each pose (n, 3), in the frame of the base."""
+        """Return the telescope, the wrist and the gripper of each pose (n, 3), in the frame of the base."""
         joints = self.joints(poses)
         mast, out, wrist, turns = joints.positions[:, 0], joints.positions[:, 5], joints.positions[:, 7], joints.turns
         tube = (np.stack([out[:, 0], out[:, 1], mast[:, 2]], axis=1) + out) / 2
@@ -97,5 +98,5 @@ class Stretch:
         )
 
     def allows(self, target: Array) -> bool:
-        """Every target: Unity restricts nothing here."""
+        """Return True: Unity restricts no target of this arm."""
         return True

@@ -1,7 +1,7 @@
 """The types of objects: one record each, in tables by theme.
 
-Adding a type is adding a record. One without a `shape` is drawn as a plain box; a new shape is one function in
-`render/shapes` under `@draws`, which the record names.
+To add a type, add a record. A type without a `shape` is drawn as a plain box. A new shape is a function in
+`render/shapes` with `@draws`, whose name the record gives.
 """
 
 from infthor_eval.sim.object_types.catalogue import OBJECT_TYPES, allowed_in, type_named

@@ -1,4 +1,4 @@
-"""All types by name, and which of them may be put into or onto which."""
+"""All types by name, and which may be put into or onto which."""
 
 from infthor_eval.sim.object_types import appliances, fixtures, food, furniture, household, kitchenware
 from infthor_eval.sim.object_types.record import ObjectType
@@ -13,10 +13,10 @@ OBJECT_TYPES: dict[str, ObjectType] = {
 
 
 def type_named(name: str) -> ObjectType:
-    """The record of a type; a type without one is inert, a plain box."""
+    """Return the record of a type; a type without one has no abilities and is a plain box."""
     return OBJECT_TYPES.get(name) or ObjectType(name)
 
 
 def allowed_in(item: str, receptacle: str) -> bool:
-    """Whether AI2-THOR lets an object of type `item` be put into or onto a receptacle of type `receptacle`."""
+    """Return whether AI2-THOR lets an object of type `item` be put into or onto a receptacle of type `receptacle`."""
     return type_named(receptacle).accepts(type_named(item))

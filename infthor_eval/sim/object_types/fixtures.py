@@ -1,4 +1,4 @@
-"""What is built into rooms: sinks, taps, baths, toilets, windows, pictures, switches, rails, floors."""
+"""Fixtures of rooms: sinks, taps, baths, toilets, windows, pictures, switches, rails, floors."""
 
 from functools import partial
 
@@ -12,7 +12,7 @@ _picture = partial(ObjectType, faces_room=True, flat=True, centered=True)
 TYPES = (
     ObjectType("Bathtub", (1.35, 0.60, 1.78), shape="bathtub", receptacle=True, takes=(), basin=True),
     ObjectType("BathtubBasin", (1.20, 0.42, 1.02), shape="bathtub_basin", receptacle=True, takes=("washing", "Towel"),
-               support=0.01, open_top=1.0, basin=True, stock=1),
+               support=0.01, open_top=1.0, basin=True, capacity=1),
     ObjectType("Blinds", (1.01, 0.20, 0.03), shape="blinds", openable=True, centered=True, faces_room=True,
                beyond_room=True, unfolds=(Unfolding(1, stays=1, reach=0.75),)),
     ObjectType("Curtains", (0.96, 2.17, 0.19), shape="curtains", materials=("Fabric",), faces_room=True,
@@ -20,7 +20,7 @@ TYPES = (
     ObjectType("DoorFrame"),
     ObjectType("Doorway", (1.00, 2.10, 0.15), shape="doorway"),
     ObjectType("Faucet", (0.27, 0.21, 0.24), shape="faucet", toggleable=True, runs_water=True),
-    ObjectType("Floor", (4.98, 0.44, 5.09), shape="floor", receptacle=True, takes=(), beyond_room=True, stock=None),
+    ObjectType("Floor", (4.98, 0.44, 5.09), shape="floor", receptacle=True, takes=(), beyond_room=True, capacity=None),
     _rail("HandTowelHolder", (0.17, 0.21, 0.05), shape="rail", takes=("HandTowel",), support=-1.59),
     ObjectType("LightSwitch", (0.12, 0.15, 0.02), shape="light_switch", toggleable=True, centered=True),
     _picture("Mirror", (0.54, 0.85, 0.07), shape="mirror", breakable=True, dirtyable=True, materials=("Glass",)),
@@ -33,12 +33,12 @@ TYPES = (
     ObjectType("ShowerHead", (0.20, 1.41, 0.25), shape="shower_head", toggleable=True, runs_water=True),
     ObjectType("Sink", (0.66, 0.16, 0.50), shape="sink", receptacle=True, materials=("Ceramic",),
                takes=("food", "dishes", "cutlery", "bottles", "washing", "Kettle"), open_top=1.0, basin=True,
-               cut_out=True, faces_room=True, stock=0),
+               has_cutouts=True, faces_room=True, capacity=0),
     ObjectType("SinkBasin", (0.53, 0.13, 0.35), shape="sink_basin", receptacle=True, materials=("Ceramic",),
                takes=("food", "dishes", "cutlery", "bottles", "washing", "Kettle"), support=0.01, open_top=1.0,
-               basin=True, stock=0),
+               basin=True, capacity=0),
     ObjectType("Toilet", (0.53, 1.04, 0.97), shape="toilet", receptacle=True, openable=True, materials=("Ceramic",),
-               takes=("toiletries",), overhang=True, stock=2),
+               takes=("toiletries",), overhang=True, capacity=2),
     _rail("ToiletPaperHanger", (0.23, 0.08, 0.10), shape="paper_hanger", takes=("ToiletPaper",), support=-0.35),
     _rail("TowelHolder", (0.66, 0.04, 0.11), shape="rail", takes=("Towel",), support=-13.0),
     _picture("Window", (1.04, 1.55, 0.11), shape="window", breakable=True, materials=("Glass",), beyond_room=True),

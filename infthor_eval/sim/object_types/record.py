@@ -1,7 +1,7 @@
-"""What the simulator knows of one type of object: a record that declares everything, so that a new type is one entry.
+"""The record of one type of object, which declares everything the simulator knows of it.
 
-The abilities bear the names of AI2-THOR's documentation. Scenes read from recordings bring the abilities of their own
-objects; the record serves procedural scenes, objects that a recording names without describing, and all other rules.
+Abilities have the names of AI2-THOR's documentation. Recorded scenes override them with those of their own objects.
+The record serves procedural scenes, objects that a recording names without describing, and all other rules.
 """
 
 from dataclasses import KW_ONLY, dataclass
@@ -13,13 +13,13 @@ __all__ = ["ObjectType", "Unfolding", "portable"]
 
 @dataclass(frozen=True)
 class Unfolding:
-    """How opening changes the box of a thing along one of its axes, in proportion to the openness.
+    """A change of an object's box along one of its axes with opening, in proportion to the openness.
 
     Attributes:
-        axis: 0, 1 or 2: across, up, or towards its front.
-        stays: the end of the box that stays where it is, -1 or 1; 0: its middle.
+        axis: 0, 1 or 2: across, up, or towards the front.
+        stays: end of the box that stays in place, -1 or 1; 0: its middle.
         closed: extent when closed, as a share of that when wide open.
-        reach: metres that wide opening adds whatever the extent.
+        reach: metres that wide opening adds, whatever the extent.
     """
 
     axis: int
@@ -28,20 +28,20 @@ class Unfolding:
     reach: float = 0.0
 
     def extent(self, size: float, before: float, after: float) -> float:
-        """Extent in metres at openness `after` of what measures `size` at openness `before`."""
+        """Return the extent in metres at openness `after` of what measures `size` at openness `before`."""
         share = (self.closed + (1 - self.closed) * after) / (self.closed + (1 - self.closed) * before)
         return (size - self.reach * before) * share + self.reach * after
 
 
 @dataclass(frozen=True)
 class ObjectType:
-    """One type of object; what is not declared is not so.
+    """One type of object; the defaults are those of a thing without abilities.
 
     Attributes:
         name: AI2-THOR's `objectType`.
         size: usual width, height and depth in metres, front towards z: medians over AI2-THOR's rooms.
         shape: name of the function in `render/shapes` that draws it.
-        categories: what it counts as where receptacles tell what they take.
+        categories: categories that receptacles may name in `takes` and `refuses`.
         takes: categories and types that may be put into or onto it; None: everything that can be picked up.
         refuses: categories and types that may not be.
         encloses: it hides its contents while it is closed.
@@ -50,30 +50,30 @@ class ObjectType:
         centered: its origin is in the middle of its box, not of its underside.
         open_top: share of its width that is open at the top; 0: nothing stands inside its box.
         levels: shares of its height at which things stand inside it.
-        overhang: things may stick out beyond its edge however far.
-        hinged: it opens a door that stands in the agent's way.
+        overhang: things may stick out beyond its edge any distance.
+        hinged: it opens a door that can block the agent.
         slides: it slides out with its contents, as drawers do.
-        unfolds: how its box changes as it opens, where it has no door and does not slide.
+        unfolds: changes of its box with opening, for types without door or drawer.
         runs_closed: it must be closed to be switched on, and switched off to be opened.
-        switched_by: type of what switches it; it has no switch of its own.
-        slice_type: what it falls into when cut.
-        slices: into how many, the highest number seen in ALFRED's recordings, or above.
+        switched_by: type of the object that switches it; it has no switch of its own.
+        slice_type: type of its slices.
+        slices: number of its slices: the highest number seen in ALFRED's recordings, or above.
         cracks: it breaks into its slices, which do not count as sliced.
-        pours: liquid that it fills the vessels on it with.
+        pours: liquid that it fills vessels on it with.
         runs_water: it cleans and fills what stands in the basin below it.
         basin: water gathers in it.
         light: brightness of its lamp.
         furniture: recordings of other versions may know it as another type of furniture.
-        fitted: it stands inside furniture, whose front it is.
-        stacked: others of its type stand right above it.
-        cut_out: its plan is cut out where a sink or basin is.
-        tall: it stands through counters.
-        faces_room: the axes of its box do not tell its front; other things face +z of their own frame.
+        built_in: it is part of a piece of furniture, as its door, drawer or shelf.
+        stacked: others of its type are right above it.
+        has_cutouts: sinks and basins are cut out of it.
+        tall: it reaches from the floor through counters.
+        faces_room: its front cannot be told from the axes of its box; other types face +z of their own frame.
         flat: its front is its thin side.
-        yields: what lies on it tells how high its surface is, as its box does not.
+        infer_support: its surface height is inferred from what lies on it, as its box includes backs and the like.
         beyond_room: it reaches beyond the room's walls or floor.
-        starts_open: rooms have it open, and its size is measured so.
-        stock: loose things that a procedural room puts into or onto it at most; None: it is not even considered.
+        starts_open: rooms have it open, and its size is measured open.
+        capacity: loose objects that a procedural room puts into or onto it at most; None: it is never considered.
     """
 
     name: str
@@ -81,7 +81,7 @@ class ObjectType:
     _: KW_ONLY
     shape: str = "box"
     categories: tuple[str, ...] = ()
-    # as AI2-THOR's metadata has it
+    # abilities, as in AI2-THOR's metadata
     pickupable: bool = False
     moveable: bool = False
     receptacle: bool = False
@@ -97,7 +97,7 @@ class ObjectType:
     cold_source: bool = False
     mass: float = 0.0
     materials: tuple[str, ...] = ()
-    # what stands in or on it, and where
+    # as a receptacle
     takes: tuple[str, ...] | None = None
     refuses: tuple[str, ...] = ()
     encloses: bool = False
@@ -107,7 +107,7 @@ class ObjectType:
     open_top: float = 0.0
     levels: tuple[float, ...] = ()
     overhang: bool = False
-    # what it does
+    # behaviour
     hinged: bool = False
     slides: bool = False
     unfolds: tuple[Unfolding, ...] = ()
@@ -120,39 +120,39 @@ class ObjectType:
     runs_water: bool = False
     basin: bool = False
     light: float = 0.0
-    # its part in a scene
+    # in scenes
     furniture: bool = False
-    fitted: bool = False
+    built_in: bool = False
     stacked: bool = False
-    cut_out: bool = False
+    has_cutouts: bool = False
     tall: bool = False
     faces_room: bool = False
     flat: bool = False
-    yields: bool = False
+    infer_support: bool = False
     beyond_room: bool = False
     starts_open: bool = False
-    stock: int | None = 99
+    capacity: int | None = 99
 
     def __deepcopy__(self, memo: dict[int, Any]) -> "ObjectType":
-        """Itself, as nothing changes it: saved states share the records."""
+        """Return the record itself: it is never changed, so saved states can share it."""
         return self
 
     def support_height(self, height: float) -> float | None:
-        """Height in metres above the underside of a box `height` metres high at which things stand; None: its top."""
+        """Return the height above the underside of a box `height` metres high at which things stand; None: its top."""
         if height < self.space_below:
             return 0.0
         return None if self.support is None else self.support * height
 
     def counts_as(self, words: tuple[str, ...]) -> bool:
-        """Whether one of these words is its name or one of its categories."""
+        """Return whether one of these words is its name or one of its categories."""
         return self.name in words or any(category in words for category in self.categories)
 
     def accepts(self, item: "ObjectType") -> bool:
-        """Whether AI2-THOR lets an object of type `item` be put into or onto one of this type."""
+        """Return whether AI2-THOR lets an object of type `item` be put into or onto one of this type."""
         if not (self.receptacle and item.pickupable) or item.counts_as(self.refuses):
             return False
         return self.takes is None or item.counts_as(self.takes)
 
 
 portable = partial(ObjectType, pickupable=True, mass=0.5)
-"""A type that can be picked up; half a kilogram unless told."""
+"""A type that can be picked up, by default of half a kilogram."""

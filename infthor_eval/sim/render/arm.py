@@ -1,4 +1,4 @@
-"""How an arm looks: links, joints, palm and fingers."""
+"""The primitives of an arm: links, joints, palm and fingers."""
 
 import numpy as np
 
@@ -10,20 +10,20 @@ from infthor_eval.sim.render.primitives import Color, Form, Material, ShapePart,
 
 __all__ = ["ARM", "arm_rows"]
 
-ARM = "Arm"  # what segmentation frames call it
+ARM = "Arm"  # its name in segmentation frames
 _SHELL: Color = (0.86, 0.87, 0.88)
 _JOINT: Color = (0.16, 0.17, 0.19)
 _HAND: Color = (0.24, 0.25, 0.27)
 _FINGER = (0.006, 0.014, FINGERS / 2)  # half extents, metres
-_ALONG = euler_matrix((90.0, 0.0, 0.0))  # turns a cylinder's axis, y, to the z of a link
+_ALONG = euler_matrix((90.0, 0.0, 0.0))  # turns a cylinder, whose axis is y, along the z of a link
 
 
 def arm_rows(arm: Arm, agent: Agent, instance: int) -> Array:
-    """Rows (n, COLUMNS) of the arm in the world; the hand's sphere is not shown.
+    """Return the primitives (n, COLUMNS) of the arm in the world, without the hand's sphere.
 
     Args:
         arm: the arm.
-        agent: whose arm it is.
+        agent: the agent, at whose pose it is drawn.
         instance: index of the arm in the picture's table of instances.
     """
     boxes, base = arm.rig.boxes([arm.pose]).flat(), arm.base(agent)

@@ -1,7 +1,7 @@
-"""Pinhole cameras and what they prepare for the ray caster.
+"""Pinhole cameras, and the projection of primitives for the ray caster.
 
 A ray through pixel (column, row) leaves the camera along `forward + us[column] * right + vs[row] * up`, so its
-parameter t is the depth along the camera's forward axis in metres. Rows count from the bottom, as the wire wants.
+parameter t is the depth along the camera's forward axis in metres. Rows count from the bottom, as in the protocol.
 """
 
 import math
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from infthor_eval.sim.geometry import Array
 from infthor_eval.sim.render.primitives import AXES, CENTER, HALF
 
-__all__ = ["FAR", "NEAR", "Camera", "Projection", "project"]
+__all__ = ["FAR", "NEAR", "PinholeCamera", "Projection", "project"]
 
 NEAR, FAR = 0.1, 20.0  # clipping planes of AI2-THOR's cameras, metres
 _SIGNS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
@@ -21,8 +21,18 @@ _EDGES = np.array([(a, b) for a in range(8) for b in range(a + 1, 8) if bin(a ^ 
 
 
 @dataclass(frozen=True)
-class Camera:
-    """A camera: world position (3,), rotation (3, 3), vertical field of view in degrees, and its picture's size."""
+class PinholeCamera:
+    """A pinhole camera.
+
+    Attributes:
+        position: position in the world, metres (3,).
+        matrix: rotation (3, 3).
+        field_of_view: vertical, degrees.
+        width: width of its pictures, pixels.
+        height: height of its pictures, pixels.
+        near: depth of the near clipping plane, metres.
+        far: depth of the far clipping plane, metres.
+    """
 
     position: Array
     matrix: Array
@@ -33,7 +43,7 @@ class Camera:
     far: float = FAR
 
     def rays(self) -> tuple[Array, Array]:
-        """Horizontal (width,) and vertical (height,) components of the rays; row 0 is the bottom one."""
+        """Return the horizontal (width,) and vertical (height,) components of the rays; row 0 is the bottom one."""
         focal = self.height / 2 / math.tan(math.radians(self.field_of_view) / 2)
         us: Array = (np.arange(self.width, dtype=np.float64) + 0.5 - self.width / 2) / focal
         vs: Array = (np.arange(self.height, dtype=np.float64) + 0.5 - self.height / 2) / focal
@@ -42,14 +52,14 @@ class Camera:
 
 @dataclass(frozen=True)
 class Projection:
-    """Primitives as one camera sees them, nearest first.
+    """The primitives in one camera's view, roughly nearest first.
 
     Attributes:
-        index: row of each primitive in the scene (n,).
-        origin: camera in each primitive's scaled frame (n, 3).
-        steps: what forward, right and up add there per unit (n, 3, 3).
+        index: row of each primitive in the scene's array (n,).
+        origin: camera's position in each primitive's scaled frame (n, 3).
+        steps: camera's forward, right and up vectors in each primitive's scaled frame (n, 3, 3).
         box: first and last column, first and last row of each primitive's picture, both inclusive (n, 4).
-        near: a depth that no point of the primitive is nearer than (n,).
+        near: lower bound of each primitive's depth, metres (n,).
     """
 
     index: NDArray[np.int64]
@@ -59,8 +69,8 @@ class Projection:
     near: Array
 
 
-def project(prims: Array, camera: Camera) -> Projection:
-    """Culls, sorts and transforms the primitives (n, COLUMNS) for `camera`."""
+def project(prims: Array, camera: PinholeCamera) -> Projection:
+    """Cull, sort and transform the primitives (n, COLUMNS) for a camera."""
     axes = prims[:, AXES : AXES + 9].reshape(-1, 3, 3)
     half = prims[:, HALF : HALF + 3]
     offset = prims[:, CENTER : CENTER + 3] - camera.position
@@ -81,6 +91,9 @@ def project(prims: Array, camera: Camera) -> Projection:
         & (last_row >= 0)
     )
     index = np.nonzero(seen)[0]
+    # Nearest first, so that near primitives hide far ones before these are computed. The nearest corner alone would put
+    # walls and floors, which pass under the camera, before everything; half the depth of the middle corrects that.
+    # The order also breaks ties between coinciding surfaces, so the sort must be stable.
     index = index[np.argsort(np.maximum(near[index], center[index, 2] * 0.5), kind="stable")]
     box = np.stack([first_column, last_column, first_row, last_row], axis=1)[index]
     box[:, :2] = np.clip(box[:, :2], 0, camera.width - 1)
@@ -93,13 +106,15 @@ def project(prims: Array, camera: Camera) -> Projection:
 
 
 def _screen_bounds(points: Array, limit: float) -> tuple[Array, Array]:
-    """Low and high (u, v) of boxes by their corners (n, 8, 3) in the camera's frame, clipped at `limit`."""
+    """Return the low and high (u, v) of boxes, by their corners (n, 8, 3) in the camera's frame, clipped at `limit`."""
     depth = points[:, :, 2]
     front = depth >= limit
     safe = np.where(front, depth, 1.0)
     flat = points[:, :, :2] / safe[:, :, None]
     low = np.where(front[:, :, None], flat, np.inf).min(axis=1)
     high = np.where(front[:, :, None], flat, -np.inf).max(axis=1)
+    # Boxes that reach behind the camera: corners there project to the wrong side. The points where edges cross the
+    # clipping plane take the corners' place.
     cut = np.nonzero(front.any(axis=1) & ~front.all(axis=1))[0]
     if cut.size:
         a, b = points[cut][:, _EDGES[:, 0]], points[cut][:, _EDGES[:, 1]]

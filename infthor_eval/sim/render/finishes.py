@@ -1,4 +1,4 @@
-"""Other colours and patterns than the usual ones, laid over a scene's primitives."""
+"""Applying randomized colours and patterns to a scene's primitives."""
 
 from collections.abc import Sequence
 
@@ -8,15 +8,15 @@ from infthor_eval.sim.appearance import Appearance
 from infthor_eval.sim.geometry import Array
 from infthor_eval.sim.render.primitives import COLOR, INSTANCE, MATERIAL, Material
 
-__all__ = ["PATTERNS", "refinished"]
+__all__ = ["PATTERNS", "apply_finishes"]
 
 PATTERNS = tuple(int(m) for m in Material if m not in (Material.GLASS, Material.PLAIN))
-"""Patterns that a surface may be given for its own."""
+"""Patterns that a randomized surface may have."""
 
 
-def refinished(prims: Array, names: Sequence[str], look: Appearance) -> Array:
-    """The primitives (n, COLUMNS) as they look now; `names` are those of the instances."""
-    if look.usual:
+def apply_finishes(prims: Array, names: Sequence[str], look: Appearance) -> Array:
+    """Return the primitives (n, COLUMNS) with the looks of `look`; `names` are those of the instances."""
+    if look.is_default:
         return prims
     tints, patterns = np.tile(look.light, (len(names), 1)), np.full(len(names), -1)
     for index, name in enumerate(names):
@@ -27,6 +27,7 @@ def refinished(prims: Array, names: Sequence[str], look: Appearance) -> Array:
     instance = prims[:, INSTANCE].astype(int)
     out = prims.copy()
     out[:, COLOR : COLOR + 3] = np.minimum(prims[:, COLOR : COLOR + 3] * tints[instance], 1.0)
+    # Glass keeps its pattern: the picture has no transparency, and only the pattern makes a pane look like one.
     solid = (prims[:, MATERIAL] != Material.GLASS) & (patterns[instance] >= 0)
     out[solid, MATERIAL] = patterns[instance][solid]
     return out

@@ -1,7 +1,7 @@
-"""Keeps numba's cache of compiled kernels true to the sources.
+"""Invalidation of numba's cache of compiled kernels.
 
-Numba recompiles a kernel when its own file changes, but not when a function or constant that it takes from another
-file does. A stamp of all the kernels' sources beside the cache tells when it is stale.
+Numba recompiles a kernel when its own file changes, but not when a function or constant changes that it takes from
+another file. A digest of all the kernels' sources beside the cache shows when the cache is stale.
 """
 
 from pathlib import Path
@@ -10,15 +10,15 @@ from infthor_eval.formats.digests import digest
 
 __all__ = ["drop_stale_kernels"]
 
-_SOURCES = (
-    "camera.py", "glimpse_numba.py", "lighting.py", "patterns.py", "primitives.py", "raster_numba.py",
+_SOURCES = (  # every file that compiled code comes from
+    "camera.py", "probe_numba.py", "lighting.py", "patterns.py", "primitives.py", "raster_numba.py",
     "shading_numba.py", "smoothing.py", "smoothing_numba.py",
 )  # fmt: skip
 _HERE = Path(__file__).parent
 
 
 def drop_stale_kernels(folder: Path = _HERE) -> bool:
-    """Remove compiled kernels that were made from other sources than those in `folder`; whether there were any."""
+    """Remove kernels that were compiled from other sources than those in `folder`; return whether there were any."""
     sources = digest(b"".join((folder / name).read_bytes() for name in _SOURCES))
     cache = folder / "__pycache__"
     stamp = cache / "kernels.stamp"
@@ -30,6 +30,6 @@ def drop_stale_kernels(folder: Path = _HERE) -> bool:
             path.unlink(missing_ok=True)
         cache.mkdir(exist_ok=True)
         stamp.write_text(sources, encoding="ascii")
-    except OSError:  # a read-only installation: its files change together, with an upgrade
+    except OSError:  # a read-only installation, whose files change all together
         return False
     return bool(stale)

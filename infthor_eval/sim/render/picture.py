@@ -1,4 +1,4 @@
-"""Pictures of a world from a camera: colours, depth and which object each pixel shows."""
+"""Pictures from a camera: colours, depth, and the object that each pixel shows."""
 
 import os
 from collections.abc import Callable
@@ -8,32 +8,40 @@ import numpy as np
 from numpy.typing import NDArray
 
 from infthor_eval.sim.geometry import Array
-from infthor_eval.sim.render.camera import Camera, Projection, project
+from infthor_eval.sim.render.camera import PinholeCamera, Projection, project
+from infthor_eval.sim.render.creases import crease_factors
 from infthor_eval.sim.render.kernel_cache import drop_stale_kernels
 from infthor_eval.sim.render.lighting import Lights
-from infthor_eval.sim.render.primitives import COLUMNS, INSTANCE
-from infthor_eval.sim.render.relief import relief
-from infthor_eval.sim.render.smoothing import jagged
+from infthor_eval.sim.render.primitives import INSTANCE
+from infthor_eval.sim.render.smoothing import find_jagged
 
 __all__ = ["Picture", "Rasterizer", "cast_picture", "choose_rasterizer", "colour_picture"]
 
-Cast = Callable[[Array, Projection, Camera], tuple[Array, NDArray[np.int32]]]
+Cast = Callable[[Array, Projection, PinholeCamera], tuple[Array, NDArray[np.int32]]]
 Pixels = NDArray[np.uint8]
 Places = tuple[NDArray[np.int64], NDArray[np.int64]]
-Shade = Callable[[Array, Projection, Camera, Array, NDArray[np.int32], Array, Lights], Pixels]
-Shows = Callable[[Array, Projection, Camera, NDArray[np.bool_], int], bool]
-Smooth = Callable[[Array, Projection, Camera, NDArray[np.int32], Array, Lights, Places, Pixels], None]
+Shade = Callable[[Array, Projection, PinholeCamera, Array, NDArray[np.int32], Array, Lights], Pixels]
+IsVisible = Callable[[Array, Projection, PinholeCamera, NDArray[np.bool_], int], bool]
+Smooth = Callable[[Array, Projection, PinholeCamera, NDArray[np.int32], Array, Lights, Places, Pixels], None]
 
 
 @dataclass(frozen=True)
 class Rasterizer:
-    """One implementation of casting, shading, smoothing, and looking for one thing."""
+    """One implementation of the renderer.
+
+    Attributes:
+        name: `numba` or `numpy`.
+        cast: function that returns depth and nearest primitive of each pixel.
+        shade: function that returns the colours of cast pixels.
+        smooth: function that smooths jagged pixels of an RGB picture in place.
+        is_visible: function that returns whether enough pixels show some of the primitives.
+    """
 
     name: str
     cast: Cast
     shade: Shade
     smooth: Smooth
-    shows: Shows
+    is_visible: IsVisible
 
 
 @dataclass(frozen=True)
@@ -41,14 +49,18 @@ class Picture:
     """What a camera sees, bottom row first.
 
     Attributes:
-        names: object ids (or names of walls) that `instances` indexes.
+        camera: the camera.
+        prims: the primitives (n, COLUMNS).
+        projection: the primitives in the camera's view.
+        nearest: nearest primitive by order in `projection`, -1 for nothing (h, w).
         depth: metres along the camera's forward axis (h, w).
         instances: index into `names`, -1 for nothing (h, w).
+        names: ids of objects, and names of the parts of the shell.
     """
 
-    camera: Camera
+    camera: PinholeCamera
     prims: Array
-    seen: Projection
+    projection: Projection
     nearest: NDArray[np.int32]
     depth: Array
     instances: NDArray[np.int32]
@@ -56,50 +68,55 @@ class Picture:
 
 
 def choose_rasterizer(name: str | None = None) -> Rasterizer:
-    """The rasterizer: `numba`, or `numpy` where numba is not installed or INFTHOR_SIM_RENDERER asks for it."""
+    """Return the rasterizer: `numba`, or `numpy` if numba is not installed or INFTHOR_SIM_RENDERER asks for it."""
     chosen = name or os.environ.get("INFTHOR_SIM_RENDERER", "")
     if chosen != "numpy":
-        drop_stale_kernels()
+        drop_stale_kernels()  # before the imports, which load cached kernels
         try:
-            from infthor_eval.sim.render import glimpse_numba, raster_numba, shading_numba, smoothing_numba
+            from infthor_eval.sim.render import probe_numba, raster_numba, shading_numba, smoothing_numba
         except ModuleNotFoundError:
             if chosen == "numba":
                 raise
         else:
             return Rasterizer(
-                "numba", raster_numba.cast, shading_numba.shade, smoothing_numba.smooth, glimpse_numba.shows
+                "numba", raster_numba.cast, shading_numba.shade, smoothing_numba.smooth, probe_numba.is_visible
             )
-    from infthor_eval.sim.render import glimpse_numpy, raster_numpy, shading_numpy, smoothing_numpy
+    from infthor_eval.sim.render import probe_numpy, raster_numpy, shading_numpy, smoothing_numpy
 
-    return Rasterizer("numpy", raster_numpy.cast, shading_numpy.shade, smoothing_numpy.smooth, glimpse_numpy.shows)
+    return Rasterizer("numpy", raster_numpy.cast, shading_numpy.shade, smoothing_numpy.smooth, probe_numpy.is_visible)
 
 
 def cast_picture(
-    prims: Array, names: tuple[str, ...], camera: Camera, rasterizer: Rasterizer, base: Picture | None = None
+    prims: Array, names: tuple[str, ...], camera: PinholeCamera, rasterizer: Rasterizer, base: Picture | None = None
 ) -> Picture:
-    """Casts primitives (n, COLUMNS); over `base`, where given, keeping its pixels that are nearer.
+    """Return the picture of some primitives.
 
-    `base` must be cast with the same camera.
+    Args:
+        prims: the primitives (n, COLUMNS).
+        names: ids of objects and names of the parts of the shell, by instance.
+        camera: the camera.
+        rasterizer: implementation of the renderer.
+        base: picture of the same camera to draw over; its pixels that are nearer stay. None for an empty one.
     """
-    seen = project(prims, camera) if len(prims) else _nothing()
-    depth, nearest = rasterizer.cast(prims, seen, camera)
-    lookup = np.append(prims[seen.index, INSTANCE], -1).astype(np.int32)
-    instances = lookup[nearest]
+    projection = project(prims, camera)
+    depth, nearest = rasterizer.cast(prims, projection, camera)
+    lookup = np.append(prims[projection.index, INSTANCE], -1).astype(np.int32)
+    instances = lookup[nearest]  # -1, nothing, takes the last entry, which is -1 too
     if base is None:
-        return Picture(camera, prims, seen, nearest, depth, instances, names)
+        return Picture(camera, prims, projection, nearest, depth, instances, names)
     over = (nearest >= 0) & (depth < base.depth)
     merged = Projection(
-        np.append(base.seen.index, seen.index + len(base.prims)),
-        np.concatenate([base.seen.origin, seen.origin]),
-        np.concatenate([base.seen.steps, seen.steps]),
-        np.concatenate([base.seen.box, seen.box]),
-        np.append(base.seen.near, seen.near),
+        np.append(base.projection.index, projection.index + len(base.prims)),
+        np.concatenate([base.projection.origin, projection.origin]),
+        np.concatenate([base.projection.steps, projection.steps]),
+        np.concatenate([base.projection.box, projection.box]),
+        np.append(base.projection.near, projection.near),
     )
     return Picture(
         camera,
         np.concatenate([base.prims, prims]),
         merged,
-        np.where(over, nearest + len(base.seen.index), base.nearest).astype(np.int32),
+        np.where(over, nearest + len(base.projection.index), base.nearest).astype(np.int32),
         np.where(over, depth, base.depth),
         np.where(over, instances, base.instances),
         names,
@@ -107,14 +124,10 @@ def cast_picture(
 
 
 def colour_picture(picture: Picture, lights: Lights, rasterizer: Rasterizer, antialias: bool = True) -> Pixels:
-    """RGB (h, w, 3) of a cast picture; with `antialias`, its jagged places smoothed."""
-    factors = relief(picture.depth)
-    prims, seen, camera, nearest = picture.prims, picture.seen, picture.camera, picture.nearest
-    rgb = rasterizer.shade(prims, seen, camera, picture.depth, nearest, factors, lights)
+    """Return RGB (h, w, 3) of a picture; with `antialias`, its jagged pixels smoothed."""
+    factors = crease_factors(picture.depth)
+    prims, projection, camera, nearest = picture.prims, picture.projection, picture.camera, picture.nearest
+    rgb = rasterizer.shade(prims, projection, camera, picture.depth, nearest, factors, lights)
     if antialias:
-        rasterizer.smooth(prims, seen, camera, nearest, factors, lights, jagged(rgb), rgb)
+        rasterizer.smooth(prims, projection, camera, nearest, factors, lights, find_jagged(rgb), rgb)
     return rgb
-
-
-def _nothing() -> Projection:
-    return project(np.zeros((0, COLUMNS)), Camera(np.zeros(3), np.eye(3), 60.0, 1, 1))

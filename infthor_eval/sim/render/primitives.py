@@ -1,9 +1,11 @@
-"""What the ray caster draws: boxes, ellipsoids, (tapered) cylinders and bowls, one row of numbers each.
+"""The primitives of the ray caster: boxes, ellipsoids, (tapered) cylinders and bowls, a row of numbers each.
 
-A row holds the primitive's world pose, half extents, colour and material; see the column constants. In the
-primitive's own frame, scaled by its half extents, a box is [-1, 1]^3, an ellipsoid the unit sphere and a cylinder has
-its axis along y with radius `BOTTOM` at y = -1 and `TOP` at y = 1. A bowl is the lower half of an ellipsoid, its rim
-the unit circle at y = 1.
+A row holds the primitive's world pose, half extents, colour and material; see the column constants. Plain arrays, as
+numba compiles loops over them and one numpy call transforms them all.
+
+In the primitive's own frame, scaled by its half extents, a box is [-1, 1]^3 and an ellipsoid the unit sphere. A
+cylinder has its axis along y, with radius `BOTTOM` at y = -1 and `TOP` at y = 1. A bowl is the lower half of an
+ellipsoid with its rim, the unit circle, at y = 1.
 """
 
 from collections.abc import Iterable, Sequence
@@ -35,7 +37,7 @@ __all__ = [
 
 FORM, CENTER, HALF, AXES, BOTTOM, TOP, COLOR, MATERIAL, EMISSION, INSTANCE = 0, 1, 4, 7, 16, 17, 18, 21, 22, 23
 COLUMNS = 24
-_MIN_HALF = 5e-4  # thinner than half a millimetre is drawn half a millimetre thick
+_MIN_HALF = 5e-4  # metres; half extents are divided by, so thinner parts are drawn this thick
 
 Color = tuple[float, float, float]
 
@@ -46,7 +48,7 @@ class Form(IntEnum):
     BOX = 0
     ELLIPSOID = 1
     CYLINDER = 2
-    CUP = 3  # a cylinder without its top: one sees its inside
+    CUP = 3  # a cylinder without its top, so that its inside shows
     BOWL = 4  # the lower half of an ellipsoid, open at the top
 
 
@@ -70,12 +72,15 @@ class ShapePart:
     """One primitive of an object, in the object's frame.
 
     Attributes:
-        center: metres (3,).
-        half: half extents in metres (3,).
-        matrix: rotation (3, 3), None for none.
+        form: form.
+        center: centre, metres (3,).
+        half: half extents, metres (3,).
+        color: red, green and blue, 0 to 1.
+        material: surface pattern.
+        matrix: rotation (3, 3); None for none.
         bottom: radius at the bottom of a cylinder, relative to its half extents.
-        top: radius at the top.
-        emission: 0 lit by the lights only, 1 shines by itself.
+        top: radius at its top, likewise.
+        emission: share of light of its own, from 0 (lit by the lights only) to 1.
     """
 
     form: Form
@@ -90,11 +95,11 @@ class ShapePart:
 
 
 def rows(parts: Iterable[ShapePart], position: Array, matrix: Array, instance: int) -> Array:
-    """World rows (n, COLUMNS) of an object's parts.
+    """Return the rows (n, COLUMNS) of an object's parts in the world.
 
     Args:
         parts: the parts, in the object's frame.
-        position: origin of the object in the world (3,).
+        position: origin of the object in the world, metres (3,).
         matrix: rotation of the object (3, 3).
         instance: index of the object in the picture's table of instances.
     """
@@ -105,7 +110,7 @@ def rows(parts: Iterable[ShapePart], position: Array, matrix: Array, instance: i
         row[FORM] = part.form
         row[CENTER : CENTER + 3] = position + matrix @ np.asarray(part.center, dtype=float)
         row[HALF : HALF + 3] = np.maximum(part.half, _MIN_HALF)
-        row[AXES : AXES + 9] = axes.T.reshape(9)  # one axis of the primitive after the other
+        row[AXES : AXES + 9] = axes.T.reshape(9)  # the primitive's x axis, its y axis, its z axis
         row[BOTTOM], row[TOP] = part.bottom, part.top
         row[COLOR : COLOR + 3] = part.color
         row[MATERIAL], row[EMISSION], row[INSTANCE] = part.material, part.emission, instance

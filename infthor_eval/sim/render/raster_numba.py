@@ -1,4 +1,8 @@
-"""The ray caster compiled by numba: for each primitive, nearest first, the pixels of its box on the screen."""
+"""The ray caster compiled by numba: for each primitive, nearest first, the pixels of its box on the screen.
+
+`raster_numpy` computes the same picture to the last bit. So all numbers are float64, sums are in the same order (hence
+some parentheses), and numba's `fastmath`, which would reorder them, stays off.
+"""
 
 import math
 
@@ -7,40 +11,53 @@ from numba import njit, prange
 from numpy.typing import NDArray
 
 from infthor_eval.sim.geometry import Array
-from infthor_eval.sim.render.camera import Camera, Projection
+from infthor_eval.sim.render.camera import PinholeCamera, Projection
 from infthor_eval.sim.render.primitives import BOTTOM, FORM, TOP, Form
 
 __all__ = ["cast", "hit"]
 
-_TINY = 1e-12
-_BANDS = 8
+_TINY = 1e-12  # takes the place of smaller components of directions, which are divided by
+_BANDS = 8  # of rows, drawn in parallel
 _BOX, _ELLIPSOID, _CUP, _BOWL = int(Form.BOX), int(Form.ELLIPSOID), int(Form.CUP), int(Form.BOWL)
 
 
-def cast(prims: Array, seen: Projection, camera: Camera) -> tuple[Array, NDArray[np.int32]]:
-    """Depth (h, w) in metres and, per pixel, the nearest primitive's position in `seen` (h, w), -1 for none."""
+def cast(prims: Array, projection: Projection, camera: PinholeCamera) -> tuple[Array, NDArray[np.int32]]:
+    """Return depth in metres (h, w), and each pixel's nearest primitive, by order in `projection`, or -1 (h, w)."""
     us, vs = camera.rays()
     depth = np.empty((len(vs), len(us)))
     nearest = np.empty((len(vs), len(us)), dtype=np.int32)
-    profiles = prims[seen.index][:, [FORM, BOTTOM, TOP]]
-    _cast(profiles, seen.origin, seen.steps, seen.box, seen.near, us, vs, camera.near, camera.far, depth, nearest)
+    profiles = prims[projection.index][:, [FORM, BOTTOM, TOP]]
+    _cast(
+        profiles,
+        projection.origin,
+        projection.steps,
+        projection.box,
+        projection.near,
+        us,
+        vs,
+        camera.near,
+        camera.far,
+        depth,
+        nearest,
+    )
     return depth, nearest
 
 
 @njit(cache=True, inline="always")
-def _steady(d: float) -> float:
+def _nonzero(d: float) -> float:
     return _TINY if -_TINY < d < _TINY else d
 
 
 @njit(cache=True, inline="always")
 def _hit_box(ox: float, oy: float, oz: float, dx: float, dy: float, dz: float) -> float:
-    inverse = 1.0 / _steady(dx)
+    # Slab method: the ray is inside the box where it is between all three pairs of faces.
+    inverse = 1.0 / _nonzero(dx)
     t1, t2 = (-1.0 - ox) * inverse, (1.0 - ox) * inverse
     enter, leave = min(t1, t2), max(t1, t2)
-    inverse = 1.0 / _steady(dy)
+    inverse = 1.0 / _nonzero(dy)
     t1, t2 = (-1.0 - oy) * inverse, (1.0 - oy) * inverse
     enter, leave = max(enter, min(t1, t2)), min(leave, max(t1, t2))
-    inverse = 1.0 / _steady(dz)
+    inverse = 1.0 / _nonzero(dz)
     t1, t2 = (-1.0 - oz) * inverse, (1.0 - oz) * inverse
     enter, leave = max(enter, min(t1, t2)), min(leave, max(t1, t2))
     return enter if enter <= leave else math.inf
@@ -57,6 +74,8 @@ def _hit_sphere(ox: float, oy: float, oz: float, dx: float, dy: float, dz: float
 
 @njit(cache=True)
 def _hit_bowl(ox: float, oy: float, oz: float, dx: float, dy: float, dz: float, clip: float) -> float:
+    # In this frame a bowl is the lower half of the unit sphere. Where the near side is cut off the far side counts, as
+    # one sees the inside through the opening.
     oy, dy = (oy - 1.0) * 0.5, dy * 0.5
     a = dx * dx + dy * dy + dz * dz
     b = ox * dx + oy * dy + oz * dz
@@ -85,9 +104,10 @@ def _hit_cylinder(
     is_open: bool,
     clip: float,
 ) -> float:
+    # The side is x^2 + z^2 = (m + k * y)^2, of which m + k * y >= 0 excludes the mirrored cone beyond the apex.
     m, k = (bottom + top) * 0.5, (top - bottom) * 0.5
     radius = m + k * oy
-    a = _steady(dx * dx + dz * dz - k * k * dy * dy)
+    a = _nonzero(dx * dx + dz * dz - k * k * dy * dy)
     b = ox * dx + oz * dz - k * dy * radius
     c = ox * ox + oz * oz - radius * radius
     disc = b * b - a * c
@@ -99,7 +119,7 @@ def _hit_cylinder(
             y = oy + t * dy
             if -1.0 <= y <= 1.0 and m + k * y >= 0.0 and clip < t < best:
                 best = t
-    inverse = 1.0 / _steady(dy)
+    inverse = 1.0 / _nonzero(dy)
     t = (-1.0 - oy) * inverse
     x, z = ox + t * dx, oz + t * dz
     if x * x + z * z <= bottom * bottom and clip < t < best:
@@ -125,7 +145,7 @@ def hit(
     dz: float,
     clip: float,
 ) -> float:
-    """Depth at which a ray from o along d meets a primitive, in its scaled frame; infinity where it does not."""
+    """Return the depth at which a ray from o along d meets a primitive, in its scaled frame; infinity for a miss."""
     if form == _BOX:
         return _hit_box(ox, oy, oz, dx, dy, dz)
     if form == _ELLIPSOID:
@@ -150,6 +170,7 @@ def _cast(
     nearest: NDArray[np.int32],
 ) -> None:
     height = len(vs)
+    # Threads share out rows and not primitives: each pixel has one writer, so their number does not change the picture.
     for band in prange(_BANDS):
         low, high = band * height // _BANDS, (band + 1) * height // _BANDS
         depth[low:high] = far
@@ -162,13 +183,14 @@ def _cast(
                 v = vs[y]
                 for x in range(box[order, 0], box[order, 1] + 1):
                     limit = depth[y, x]
-                    if limit <= near[order]:
+                    if limit <= near[order]:  # hidden for sure, as most pixels of far primitives are
                         continue
                     u = us[x]
                     dx = (step[0, 0] + u * step[1, 0]) + v * step[2, 0]
                     dy = (step[0, 1] + u * step[1, 1]) + v * step[2, 1]
                     dz = (step[0, 2] + u * step[1, 2]) + v * step[2, 2]
                     t = hit(form, bottom, top, ox, oy, oz, dx, dy, dz, clip)
+                    # Strictly nearer: where surfaces coincide the earlier primitive stays.
                     if clip < t < limit:
                         depth[y, x] = t
                         nearest[y, x] = order

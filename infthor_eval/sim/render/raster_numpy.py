@@ -1,13 +1,13 @@
-"""The ray caster in numpy: the same picture as `raster_numba`, for machines without numba.
+"""The ray caster in numpy, for machines without numba; draws the same picture as `raster_numba`, bit for bit.
 
-Every formula has the order of operations of its twin, so the two agree bit for bit.
+Every formula has the order of operations of its counterpart there, which has the comments.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
 from infthor_eval.sim.geometry import Array
-from infthor_eval.sim.render.camera import Camera, Projection
+from infthor_eval.sim.render.camera import PinholeCamera, Projection
 from infthor_eval.sim.render.primitives import BOTTOM, FORM, TOP, Form
 
 __all__ = ["cast", "hit"]
@@ -15,17 +15,17 @@ __all__ = ["cast", "hit"]
 _TINY = 1e-12
 
 
-def cast(prims: Array, seen: Projection, camera: Camera) -> tuple[Array, NDArray[np.int32]]:
-    """Depth (h, w) in metres and, per pixel, the nearest primitive's position in `seen` (h, w), -1 for none."""
+def cast(prims: Array, projection: Projection, camera: PinholeCamera) -> tuple[Array, NDArray[np.int32]]:
+    """Return depth in metres (h, w), and each pixel's nearest primitive, by order in `projection`, or -1 (h, w)."""
     us, vs = camera.rays()
     depth = np.full((len(vs), len(us)), camera.far)
     nearest = np.full((len(vs), len(us)), -1, dtype=np.int32)
-    for order, (row, box) in enumerate(zip(seen.index, seen.box, strict=True)):
+    for order, (row, box) in enumerate(zip(projection.index, projection.box, strict=True)):
         x0, x1, y0, y1 = box[0], box[1] + 1, box[2], box[3] + 1
         u, v = us[None, x0:x1], vs[y0:y1, None]
-        steps = seen.steps[order]
+        steps = projection.steps[order]
         d = [(steps[0, i] + u * steps[1, i]) + v * steps[2, i] for i in range(3)]
-        t = hit(prims[row], seen.origin[order], d, camera.near)
+        t = hit(prims[row], projection.origin[order], d, camera.near)
         window = depth[y0:y1, x0:x1]
         closer = (t > camera.near) & (t < window)
         window[closer] = t[closer]
@@ -34,7 +34,7 @@ def cast(prims: Array, seen: Projection, camera: Camera) -> tuple[Array, NDArray
 
 
 def hit(prim: Array, o: Array, d: list[Array], near: float) -> Array:
-    """Depths at which rays from `o` along `d` meet a primitive, in its scaled frame; infinity where they do not."""
+    """Return depths at which rays from `o` along `d` meet a primitive, in its scaled frame; infinity if they do not."""
     form = prim[FORM]
     if form == Form.BOX:
         return _hit_box(o, d)
@@ -45,7 +45,7 @@ def hit(prim: Array, o: Array, d: list[Array], near: float) -> Array:
     return _hit_cylinder(o, d, prim[BOTTOM], prim[TOP], form == Form.CUP, near)
 
 
-def _steady(d: Array) -> Array:
+def _nonzero(d: Array) -> Array:
     return np.where((d > -_TINY) & (d < _TINY), _TINY, d)
 
 
@@ -53,7 +53,7 @@ def _hit_box(o: Array, d: list[Array]) -> Array:
     enter: Array = np.array(-np.inf)
     leave: Array = np.array(np.inf)
     for i in range(3):
-        inverse = 1.0 / _steady(d[i])
+        inverse = 1.0 / _nonzero(d[i])
         t1, t2 = (-1.0 - o[i]) * inverse, (1.0 - o[i]) * inverse
         enter = np.maximum(enter, np.minimum(t1, t2))
         leave = np.minimum(leave, np.maximum(t1, t2))
@@ -76,17 +76,17 @@ def _hit_bowl(o: Array, d: list[Array], near: float) -> Array:
     c = o[0] * o[0] + oy * oy + o[2] * o[2] - 1.0
     disc = b * b - a * c
     root = np.sqrt(np.maximum(disc, 0.0))
-    found = np.full(disc.shape, np.inf)
-    for sign in (1.0, -1.0):  # the nearer one last, so that it stays
+    best = np.full(disc.shape, np.inf)
+    for sign in (1.0, -1.0):  # the nearer one last, so that it replaces the other
         t = (-b + sign * root) / a
-        found = np.where((disc >= 0.0) & (t > near) & (oy + t * dy <= 0.0), t, found)
-    return found
+        best = np.where((disc >= 0.0) & (t > near) & (oy + t * dy <= 0.0), t, best)
+    return best
 
 
 def _hit_cylinder(o: Array, d: list[Array], bottom: float, top: float, is_open: bool, near: float) -> Array:
     m, k = (bottom + top) * 0.5, (top - bottom) * 0.5
     radius = m + k * o[1]
-    a = _steady(d[0] * d[0] + d[2] * d[2] - k * k * d[1] * d[1])
+    a = _nonzero(d[0] * d[0] + d[2] * d[2] - k * k * d[1] * d[1])
     b = o[0] * d[0] + o[2] * d[2] - k * d[1] * radius
     c = o[0] * o[0] + o[2] * o[2] - radius * radius
     disc = b * b - a * c
@@ -97,7 +97,7 @@ def _hit_cylinder(o: Array, d: list[Array], bottom: float, top: float, is_open: 
         y = o[1] + t * d[1]
         good = (disc >= 0.0) & (y >= -1.0) & (y <= 1.0) & (m + k * y >= 0.0) & (t > near) & (t < best)
         best = np.where(good, t, best)
-    inverse = 1.0 / _steady(d[1])
+    inverse = 1.0 / _nonzero(d[1])
     for y, limit in ((-1.0, bottom), (1.0, top)):
         if is_open and y > 0:
             continue

@@ -1,10 +1,10 @@
-"""A world as primitives: the rooms' shell and every object's shape, kept until the object changes."""
+"""A world as primitives: the rooms' shell, and every object's shape, cached until the object changes."""
 
 import numpy as np
 
 from infthor_eval.sim.geometry import Array
 from infthor_eval.sim.objects import SimObject
-from infthor_eval.sim.render.finishes import refinished
+from infthor_eval.sim.render.finishes import apply_finishes
 from infthor_eval.sim.render.lighting import Lights
 from infthor_eval.sim.render.primitives import COLUMNS, rows
 from infthor_eval.sim.render.shapes import shape
@@ -13,11 +13,11 @@ from infthor_eval.sim.world import World
 
 __all__ = ["SceneModel"]
 
-_DARK = 0.55  # share of light that is left when every light switch is off
+_DARK = 0.55  # factor of the daylight when every light switch is off
 
 
 class SceneModel:
-    """The primitives of one world; remembers each object's rows by the object's version."""
+    """The primitives of one world; caches each object's rows by the object's version."""
 
     def __init__(self, world: World) -> None:
         self._world = world
@@ -29,13 +29,13 @@ class SceneModel:
         self._held: Array = np.zeros((0, COLUMNS))
 
     def primitives(self) -> tuple[Array, Array, tuple[str, ...]]:
-        """Rows of all that is seen but the held object (n, COLUMNS), rows of what is held, names of instances."""
+        """Return the primitives of everything but the held object (n, COLUMNS), those of it, and names of instances."""
         if self._version != self._world.version:
             self._rebuild()
         return self._all, self._held, self._names
 
     def lights(self) -> Lights:
-        """The lamps that are on, and daylight by the state of the light switches."""
+        """Return the lamps that are on, and the daylight by the state of the light switches."""
         lamps, switches = [], []
         for item in self._world.objects.values():
             if item.type.light and item.state.toggled:
@@ -51,23 +51,23 @@ class SceneModel:
         world = self._world
         names = [*SHELL_NAMES, *world.objects]
         parts, held = [self._shell], [np.zeros((0, COLUMNS))]
+        # What the hand holds is drawn apart: it hides nothing from the agent's sight, and the frame shows it smaller.
         in_hand = set() if world.held is None else {world.held}
         if world.held is not None:
             in_hand |= {o.object_id for o in world.descendants(world.objects[world.held])}
         for index, item in enumerate(world.objects.values(), start=len(SHELL_NAMES)):
-            if world.hidden(item):
+            if world.is_hidden(item):  # nobody sees into a closed fridge, so its contents need not be drawn
                 continue
             (held if item.object_id in in_hand else parts).append(self._object_rows(item, index))
         self._rows = {key: value for key, value in self._rows.items() if key in world.objects}
         look = world.appearance
-        self._all = refinished(np.concatenate(parts), names, look)
-        self._held = refinished(np.concatenate(held), names, look)
+        self._all = apply_finishes(np.concatenate(parts), names, look)
+        self._held = apply_finishes(np.concatenate(held), names, look)
         self._names, self._version = tuple(names), world.version
 
     def _object_rows(self, item: SimObject, index: int) -> Array:
-        known = self._rows.get(item.object_id)
-        if known is None or known[:2] != (item.version, index):
-            made = rows(shape(item), item.position, item.matrix, index)
-            known = (item.version, index, made)
-            self._rows[item.object_id] = known
-        return known[2]
+        entry = self._rows.get(item.object_id)
+        if entry is None or entry[:2] != (item.version, index):
+            entry = (item.version, index, rows(shape(item), item.position, item.matrix, index))
+            self._rows[item.object_id] = entry
+        return entry[2]

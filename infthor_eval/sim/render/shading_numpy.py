@@ -1,45 +1,47 @@
-"""Colours of the cast pixels in numpy; the twin of `shading_numba`, formula for formula."""
+"""Colours of the cast pixels in numpy: the formulas of `shading_numba`, in the same order of operations."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from infthor_eval.sim.geometry import Array
-from infthor_eval.sim.render.camera import Camera, Projection
+from infthor_eval.sim.render.camera import PinholeCamera, Projection
 from infthor_eval.sim.render.lighting import AMBIENT, HEADLIGHT, LAMP_REACH, SKY, SUN, SUN_DIRECTION, Lights
 from infthor_eval.sim.render.patterns import PATTERNS
 from infthor_eval.sim.render.primitives import AXES, BOTTOM, COLOR, EMISSION, FORM, HALF, MATERIAL, TOP, Form
 
-__all__ = ["level_at", "shade", "surface_normals"]
+__all__ = ["brightness_at", "shade", "surface_normals"]
 
 _RIM = 1.0 - 1e-6
 
 
 def shade(
     prims: Array,
-    seen: Projection,
-    camera: Camera,
+    projection: Projection,
+    camera: PinholeCamera,
     depth: Array,
     nearest: NDArray[np.int32],
     factors: Array,
     lights: Lights,
 ) -> NDArray[np.uint8]:
-    """RGB picture (h, w, 3), bottom row first, of what `cast` found, each pixel's brightness times its factor."""
+    """Return RGB (h, w, 3), bottom row first, of the pixels that `cast` hit, each brightness times its factor."""
     us, vs = camera.rays()
     rgb = np.zeros((*nearest.shape, 3), dtype=np.uint8)
     ys, xs = np.nonzero(nearest >= 0)
     if not len(ys):
         return rgb
     order = nearest[ys, xs]
-    p = prims[seen.index[order]]
+    p = prims[projection.index[order]]
     rays = us[xs], vs[ys], depth[ys, xs]
-    level = level_at(p, seen.origin[order], seen.steps[order], rays, camera, lights) * factors[ys, xs]
+    level = brightness_at(p, projection.origin[order], projection.steps[order], rays, camera, lights) * factors[ys, xs]
     for i in range(3):
         rgb[ys, xs, i] = np.minimum(p[:, COLOR + i] * level * 255.0, 255.0).astype(np.uint8)
     return rgb
 
 
-def level_at(p: Array, o: Array, s: Array, rays: tuple[Array, Array, Array], camera: Camera, lights: Lights) -> Array:
-    """Brightness (n,) of what the primitives `p` (n, COLUMNS) show at depth t on the rays (u, v, t)."""
+def brightness_at(
+    p: Array, o: Array, s: Array, rays: tuple[Array, Array, Array], camera: PinholeCamera, lights: Lights
+) -> Array:
+    """Return the brightness (n,) of primitives `p` (n, COLUMNS) at depth t on the rays (u, v, t)."""
     u, v, t = rays
     local = [o[:, i] + t * ((s[:, 0, i] + u * s[:, 1, i]) + v * s[:, 2, i]) for i in range(3)]
     normal, a, b = _surface(p, local)
@@ -56,21 +58,21 @@ def level_at(p: Array, o: Array, s: Array, rays: tuple[Array, Array, Array], cam
 
 
 def surface_normals(
-    prims: Array, seen: Projection, camera: Camera, depth: Array, nearest: NDArray[np.int32]
+    prims: Array, projection: Projection, camera: PinholeCamera, depth: Array, nearest: NDArray[np.int32]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
-    """Rows, columns and world normals (n, 3), either way, of the pixels that `cast` found something at."""
+    """Return rows, columns and world normals (n, 3), of either sign, of the pixels that `cast` hit."""
     us, vs = camera.rays()
     ys, xs = np.nonzero(nearest >= 0)
     order = nearest[ys, xs]
     u, v, t = us[xs], vs[ys], depth[ys, xs]
-    o, s = seen.origin[order], seen.steps[order]
+    o, s = projection.origin[order], projection.steps[order]
     local = [o[:, i] + t * (s[:, 0, i] + u * s[:, 1, i] + v * s[:, 2, i]) for i in range(3)]
-    normal, _, _ = _surface(prims[seen.index[order]], local)
+    normal, _, _ = _surface(prims[projection.index[order]], local)
     return ys, xs, np.stack(normal, axis=1)
 
 
 def _surface(p: Array, local: list[Array]) -> tuple[list[Array], Array, Array]:
-    """World normals (3 arrays) and the two metric surface coordinates of hit points in scaled local frames."""
+    """Return world normals (3 arrays) and two surface coordinates in metres of hit points in scaled frames."""
     x, y, z = local
     form = p[:, FORM]
     ax, ay, az = np.abs(x), np.abs(y), np.abs(z)

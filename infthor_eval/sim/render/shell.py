@@ -17,34 +17,35 @@ FLOORS: dict[str, tuple[Color, Material]] = {
     "tiles": ((0.78, 0.76, 0.72), Material.TILES),
     "carpet": ((0.60, 0.56, 0.52), Material.CARPET),
 }
-_THICK = 0.05
-_DOOR = 2.05
+_THICK = 0.05  # half thickness of walls, metres
+_DOOR = 2.05  # height of doorways, metres
 
 
 def shell_rows(world: World) -> Array:
-    """Rows (n, COLUMNS) of all rooms; instance 0 are walls, 1 ceilings, 2 the ground where no Floor object is."""
+    """Return the primitives (n, COLUMNS) of all rooms; their instances index `SHELL_NAMES`."""
     origin, straight = np.zeros(3), np.eye(3)
-    made = []
+    parts = []
     for room in world.rooms:
         if room.walled:
-            made.append(rows(_walls(room), origin, straight, 0))
+            parts.append(rows(_walls(room), origin, straight, 0))
         width, length = (room.x_max - room.x_min) / 2, (room.z_max - room.z_min) / 2
         middle = ((room.x_max + room.x_min) / 2, (room.z_max + room.z_min) / 2)
         ceiling = ShapePart(
             Form.BOX, (middle[0], room.height + _THICK, middle[1]), (width, _THICK, length), (0.9, 0.9, 0.88)
         )
-        made.append(rows([ceiling], origin, straight, 1))
+        parts.append(rows([ceiling], origin, straight, 1))
         color, material = FLOORS[room.floor_style]
-        made.append(rows(_thresholds(room, color, material), origin, straight, 2))
+        parts.append(rows(_thresholds(room, color, material), origin, straight, 2))
+        # The ground shows where no Floor object is. It is 2 mm lower, so that the two do not coincide.
         ground = ShapePart(
             Form.BOX, (middle[0], room.floor - _THICK - 0.002, middle[1]), (width, _THICK, length), color, material
         )
-        made.append(rows([ground], origin, straight, 2))
-    made.append(rows([_standing(wall) for wall in world.walls], origin, straight, 0))
-    return np.concatenate(made)
+        parts.append(rows([ground], origin, straight, 2))
+    parts.append(rows([_wall_part(wall) for wall in world.walls], origin, straight, 0))
+    return np.concatenate(parts)
 
 
-def _standing(wall: Wall) -> ShapePart:
+def _wall_part(wall: Wall) -> ShapePart:
     along = np.array([wall.x1 - wall.x0, wall.z1 - wall.z0])
     length = float(np.hypot(*along))
     yaw = float(np.degrees(np.arctan2(along[0], along[1])))
@@ -54,60 +55,50 @@ def _standing(wall: Wall) -> ShapePart:
 
 
 def _walls(room: RoomShell) -> list[ShapePart]:
+    """Return the four walls of a room, with doorways and skirting boards."""
     color = _WALLS[room.style % len(_WALLS)]
     trim: Color = (0.93, 0.92, 0.9)
+    at = {"x-": room.x_min - _THICK, "x+": room.x_max + _THICK, "z-": room.z_min - _THICK, "z+": room.z_max + _THICK}
     parts = []
     for side in ("x-", "x+", "z-", "z+"):
         along_x = side[0] == "z"
         start, end = (room.x_min, room.x_max) if along_x else (room.z_min, room.z_max)
-        at = {
-            "x-": room.x_min - _THICK,
-            "x+": room.x_max + _THICK,
-            "z-": room.z_min - _THICK,
-            "z+": room.z_max + _THICK,
-        }
         doors = sorted((a, b) for s, a, b in room.openings if s == side)
         for low, high, bottom in _pieces(start, end, doors, room.floor):
             if high - low < 1e-6:
                 continue
             middle, half = (low + high) / 2, (high - low) / 2
             level, rise = (bottom + room.height) / 2, (room.height - bottom) / 2
-            parts.append(_slab(along_x, middle, at[side[0] + side[1]], half, level, rise, _THICK, color))
+            parts.append(_slab(along_x, middle, at[side], half, level, rise, _THICK, color))
             if bottom == room.floor:
-                parts.append(
-                    _slab(along_x, middle, at[side[0] + side[1]], half, room.floor + 0.05, 0.05, _THICK + 0.008, trim)
-                )
+                parts.append(_slab(along_x, middle, at[side], half, room.floor + 0.05, 0.05, _THICK + 0.008, trim))
     return parts
 
 
 def _thresholds(room: RoomShell, color: Color, material: Material) -> list[ShapePart]:
-    """The floor within the thickness of the walls, in doorways."""
+    """Return the floor within the thickness of the walls, in doorways."""
     level = room.floor - _THICK - 0.001
-    made = []
+    parts = []
     for side, low, high in room.openings:
         middle, half = (low + high) / 2, (high - low) / 2
         at = {"x-": room.x_min, "x+": room.x_max, "z-": room.z_min, "z+": room.z_max}[side]
-        made.append(ShapePart(Form.BOX, *_laid(side[0] == "z", middle, at, half, level), color, material))
-    return made
-
-
-def _laid(
-    along_x: bool, middle: float, at: float, half: float, level: float
-) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-    if along_x:
-        return (middle, level, at), (half, _THICK, 2 * _THICK)
-    return (at, level, middle), (2 * _THICK, _THICK, half)
+        if side[0] == "z":
+            part = ShapePart(Form.BOX, (middle, level, at), (half, _THICK, 2 * _THICK), color, material)
+        else:
+            part = ShapePart(Form.BOX, (at, level, middle), (2 * _THICK, _THICK, half), color, material)
+        parts.append(part)
+    return parts
 
 
 def _pieces(
     start: float, end: float, doors: list[tuple[float, float]], floor: float
 ) -> list[tuple[float, float, float]]:
-    """Stretches of wall as (from, to, bottom): whole ones between doorways, and those above them."""
-    made, at = [], start
+    """Return the stretches of a wall as (from, to, bottom): whole ones between doorways, and those above them."""
+    stretches, at = [], start
     for low, high in doors:
-        made += [(at, low, floor), (low, high, floor + _DOOR)]
+        stretches += [(at, low, floor), (low, high, floor + _DOOR)]
         at = high
-    return [*made, (at, end, floor)]
+    return [*stretches, (at, end, floor)]
 
 
 def _slab(

@@ -1,23 +1,25 @@
-"""Where a picture is jagged, and how its pixels are divided to smooth it; what both implementations share.
+"""Anti-aliasing: which pixels are jagged, and the rays that smooth them; shared by both implementations.
 
-Only pixels at a jump of brightness are worked over. Four rays through such a pixel meet what the pixel and its
-neighbours show, and nothing else: what no pixel near shows is not looked for, which makes this cheap.
+Only pixels at a jump of brightness are smoothed. Four rays through such a pixel are tested against the primitives that
+the pixel and its neighbours show, and no others. That misses what no pixel near shows, but costs little.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["AROUND", "PARTS", "jagged"]
+__all__ = ["NEIGHBOURS", "SUBPIXELS", "find_jagged"]
 
-_JUMP = 48  # of the three channels' sum of 765
-PARTS = ((-0.125, -0.375), (0.375, -0.125), (-0.375, 0.125), (0.125, 0.375))
-"""Where the rays go through a pixel, from its middle, as shares of its width and height."""
-AROUND = ((0, 0), (0, -1), (0, 1), (-1, 0), (1, 0), (-1, -1), (-1, 1), (1, -1), (1, 1))
-"""The pixel and its neighbours, as rows and columns from it."""
+_JUMP = 48  # of brightness between neighbours, as the sum of three channels (of 765)
+# A rotated grid: no two rays share a row or column, so that nearly level and nearly upright edges get all four steps.
+SUBPIXELS = ((-0.125, -0.375), (0.375, -0.125), (-0.375, 0.125), (0.125, 0.375))
+"""Points of a pixel that the rays go through, from its middle, as shares of its width and height."""
+NEIGHBOURS = ((0, 0), (0, -1), (0, 1), (-1, 0), (1, 0), (-1, -1), (-1, 1), (1, -1), (1, 1))
+"""The pixel and its neighbours, as offsets of row and column."""
 
 
-def jagged(rgb: NDArray[np.uint8]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Rows and columns of the pixels that differ much from a neighbour."""
+def find_jagged(rgb: NDArray[np.uint8]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return rows and columns of the pixels that differ much from a neighbour."""
+    # int16 holds sums up to 765 and their differences, in a quarter of the memory of numpy's default.
     total = np.add(rgb[:, :, 0], rgb[:, :, 1], dtype=np.int16)
     total += rgb[:, :, 2]
     marked = np.zeros(total.shape, dtype=bool)

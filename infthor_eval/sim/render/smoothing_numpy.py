@@ -1,65 +1,69 @@
-"""Smoothing of jagged pixels in numpy; the twin of `smoothing_numba`, formula for formula."""
+"""Smoothing of jagged pixels in numpy: the formulas of `smoothing_numba`, in the same order of operations."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from infthor_eval.sim.geometry import Array
-from infthor_eval.sim.render.camera import Camera, Projection
+from infthor_eval.sim.render.camera import PinholeCamera, Projection
 from infthor_eval.sim.render.lighting import Lights
 from infthor_eval.sim.render.primitives import COLOR
 from infthor_eval.sim.render.raster_numpy import hit
-from infthor_eval.sim.render.shading_numpy import level_at
-from infthor_eval.sim.render.smoothing import AROUND, PARTS
+from infthor_eval.sim.render.shading_numpy import brightness_at
+from infthor_eval.sim.render.smoothing import NEIGHBOURS, SUBPIXELS
 
 __all__ = ["smooth"]
 
-_AROUND, _PARTS = np.array(AROUND), np.array(PARTS)
+_NEIGHBOURS, _SUBPIXELS = np.array(NEIGHBOURS), np.array(SUBPIXELS)
 
 
 def smooth(
     prims: Array,
-    seen: Projection,
-    camera: Camera,
+    projection: Projection,
+    camera: PinholeCamera,
     nearest: NDArray[np.int32],
     factors: Array,
     lights: Lights,
     places: tuple[NDArray[np.int64], NDArray[np.int64]],
     rgb: NDArray[np.uint8],
 ) -> None:
-    """Give the pixels at `places` (rows, columns) of `rgb` the mean colour of their parts, in place."""
+    """Give the pixels at `places` (rows, columns) of `rgb` the mean colour of their rays, in place."""
     ys, xs = places
     if not len(ys):
         return
     us, vs = camera.rays()
     pixel = vs[1] - vs[0] if len(vs) > 1 else 0.0
-    around_y, around_x = ys[:, None] + _AROUND[:, 0], xs[:, None] + _AROUND[:, 1]
+    around_y, around_x = ys[:, None] + _NEIGHBOURS[:, 0], xs[:, None] + _NEIGHBOURS[:, 1]
     inside = (around_y >= 0) & (around_x >= 0) & (around_y < rgb.shape[0]) & (around_x < rgb.shape[1])
     around_y, around_x = np.where(inside, around_y, ys[:, None]), np.where(inside, around_x, xs[:, None])
     orders = np.where(inside, nearest[around_y, around_x], -1)
     total = np.zeros((len(ys), 3))
-    for dx, dy in _PARTS:
+    for dx, dy in _SUBPIXELS:
         u, v = us[xs] + dx * pixel, vs[ys] + dy * pixel
-        depths = _depths(prims, seen, camera, orders, u, v)
+        depths = _depths(prims, projection, camera, orders, u, v)
         chosen = depths.argmin(axis=1)
         best = depths[np.arange(len(ys)), chosen]
         at = np.isfinite(best)
         total[~at] += rgb[ys[~at], xs[~at]]
         near_y, near_x = around_y[at, chosen[at]], around_x[at, chosen[at]]
         order = nearest[near_y, near_x]
-        p = prims[seen.index[order]]
-        level = level_at(p, seen.origin[order], seen.steps[order], (u[at], v[at], best[at]), camera, lights)
+        p = prims[projection.index[order]]
+        level = brightness_at(
+            p, projection.origin[order], projection.steps[order], (u[at], v[at], best[at]), camera, lights
+        )
         level = level * factors[near_y, near_x]
         total[at] += np.minimum(p[:, COLOR : COLOR + 3] * level[:, None] * 255.0, 255.0)
-    rgb[ys, xs] = (total / len(_PARTS)).astype(np.uint8)
+    rgb[ys, xs] = (total / len(_SUBPIXELS)).astype(np.uint8)
 
 
-def _depths(prims: Array, seen: Projection, camera: Camera, orders: NDArray[np.int32], u: Array, v: Array) -> Array:
-    """Depth of each candidate (n, m) on the rays (u, v) (n,); infinity where it is not met."""
+def _depths(
+    prims: Array, projection: Projection, camera: PinholeCamera, orders: NDArray[np.int32], u: Array, v: Array
+) -> Array:
+    """Return the depth of each candidate (n, m) on the rays (u, v) (n,); infinity where it is missed."""
     depths = np.full(orders.shape, np.inf)
     for order in np.unique(orders[orders >= 0]):
         rows, columns = np.nonzero(orders == order)
-        steps = seen.steps[order]
+        steps = projection.steps[order]
         d = [(steps[0, i] + u[rows] * steps[1, i]) + v[rows] * steps[2, i] for i in range(3)]
-        t = hit(prims[seen.index[order]], seen.origin[order], d, camera.near)
+        t = hit(prims[projection.index[order]], projection.origin[order], d, camera.near)
         depths[rows, columns] = np.where((t > camera.near) & (t < camera.far), t, np.inf)
     return depths

@@ -1,3 +1,3 @@
-"""Where worlds come from: procedural rooms, recorded floor plans, ProcTHOR houses."""
+"""Building worlds: procedural rooms, recorded floor plans, ProcTHOR houses."""
 
 __all__: list[str] = []

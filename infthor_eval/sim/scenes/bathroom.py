@@ -1,7 +1,7 @@
 # ruff: noqa: SIM905 - tables of names read best as words
-"""Procedural bathrooms: a washstand, a toilet, a tub, rails and what belongs to them."""
+"""Procedural bathrooms: a washstand, a toilet, a tub, towel rails and small things."""
 
-from infthor_eval.sim.scenes.basins import around, name_after
+from infthor_eval.sim.scenes.basins import name_after, rim_pieces
 from infthor_eval.sim.scenes.roomplan import RoomPlan
 
 __all__ = ["furnish_bathroom"]
@@ -10,11 +10,11 @@ _LOOSE = (
     "Candle Candle Cloth Cloth DishSponge SoapBar SoapBar SoapBottle SoapBottle SprayBottle SprayBottle TissueBox"
     " ToiletPaper ToiletPaper HandTowel Towel"
 ).split()
-_TOP = 0.85
+_TOP = 0.85  # of the washstand, metres
 
 
 def furnish_bathroom(plan: RoomPlan, loose: int = 16) -> None:
-    """Furnishes a room as a bathroom with about `loose` small things."""
+    """Furnish a room as a bathroom with up to `loose` small things."""
     room = plan.room
     _washstand(plan, round(room.x_min + 0.95, 2))
     at = round(room.x_max - 0.6, 2)
@@ -33,11 +33,11 @@ def furnish_bathroom(plan: RoomPlan, loose: int = 16) -> None:
         ("LaundryHamper", (0.4, 0.6, 0.4)),
     ):
         if object_type == "GarbageCan" or plan.random.random() < 0.6:
-            plan.try_against(object_type, plan.shuffled(["x-", "z-"]), size)
+            plan.try_against(object_type, plan.shuffle(["x-", "z-"]), size)
     plan.try_against("Plunger", ["z+", "x-"], (0.14, 0.5, 0.14))
     plan.try_against("ScrubBrush", ["z+", "x-"], (0.12, 0.45, 0.12))
     plan.try_against("Window", ["z-", "x-"], (0.8, 0.8, 0.06), y=1.35)
-    plan.loose += plan.shuffled(_LOOSE)[:loose]
+    plan.loose += plan.shuffle(_LOOSE)[:loose]
 
 
 def _washstand(plan: RoomPlan, at: float) -> None:
@@ -47,7 +47,7 @@ def _washstand(plan: RoomPlan, at: float) -> None:
     sink = plan.against("z+", "Sink", at, y=_TOP - 0.15, size=(0.5, 0.152, 0.4), gap=0.08)
     basin = plan.against("z+", "SinkBasin", at, y=_TOP - 0.145, size=(0.44, 0.14, 0.34), gap=0.1)
     name_after(sink, basin)
-    top.pieces, sink.pieces = around(top, sink), around(sink, basin)
+    top.pieces, sink.pieces = rim_pieces(top, sink), rim_pieces(sink, basin)
     plan.against("z+", "Faucet", at, y=_TOP, size=(0.14, 0.2, 0.16), gap=0.03)
     plan.against("z+", "Mirror", at, y=1.2, size=(1.0, 0.8, 0.04))
     for column in (-1, 0, 1):

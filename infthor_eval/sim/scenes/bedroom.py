@@ -1,5 +1,5 @@
 # ruff: noqa: SIM905 - tables of names read best as words
-"""Procedural bedrooms: a bed, a dresser, a desk with a chair, and what lies about."""
+"""Procedural bedrooms: a bed, a dresser, a desk with a chair, and small things."""
 
 from infthor_eval.sim.scenes.living_room import drawers_in, lamp
 from infthor_eval.sim.scenes.roomplan import RoomPlan
@@ -13,7 +13,7 @@ _LOOSE = (
 
 
 def furnish_bedroom(plan: RoomPlan, loose: int = 22) -> None:
-    """Furnishes a room as a bedroom with about `loose` small things."""
+    """Furnish a room as a bedroom with up to `loose` small things."""
     room = plan.room
     at = round(room.x_min + 1.75, 2)
     plan.against("z+", "Bed", at, size=(1.5, 0.95, 2.0), gap=0.02)
@@ -37,8 +37,8 @@ def furnish_bedroom(plan: RoomPlan, loose: int = 22) -> None:
         ("ShelvingUnit", (0.9, 1.5, 0.35)),
     ):
         if object_type != "ArmChair" or plan.random.random() < 0.6:
-            plan.try_against(object_type, plan.shuffled(sides), size_of)
+            plan.try_against(object_type, plan.shuffle(sides), size_of)
     if plan.random.random() < 0.5:
         plan.try_against("Safe", sides, (0.45, 0.45, 0.4))
     plan.try_against("Painting", ["x-", "z-", "x+"], (0.8, 0.6, 0.05), y=1.45)
-    plan.loose += plan.shuffled(_LOOSE)[:loose]
+    plan.loose += plan.shuffle(_LOOSE)[:loose]

@@ -1,4 +1,4 @@
-"""Scene names and what makes the worlds of that name."""
+"""Scene names, and the builders of their worlds."""
 
 import re
 from collections.abc import Mapping
@@ -23,11 +23,11 @@ _FLOOR_PLAN = re.compile(r"FloorPlan(_[A-Za-z0-9_]+|\d+)")
 
 
 class Catalogue:
-    """Makes a fresh world for a scene name.
+    """Builds a new world for a scene name.
 
     Args:
         data: folder with recorded floor plans, see `FloorPlanData`; None for none.
-        supplement: file with what trajectories add to them, see `Supplement`; None for none.
+        supplement: file with additions from trajectories, see `Supplement`; None for none.
     """
 
     def __init__(self, data: Path | None = None, supplement: Path | None = None) -> None:
@@ -38,13 +38,13 @@ class Catalogue:
         self._supplement: Mapping[str, Supplement] | None = None if supplement is not None else {}
 
     def load(self, name: str) -> World:
-        """The world of a scene name.
+        """Return the world of a scene name.
 
         Raises:
-            DataError: the name means nothing, or its data are missing; the message says which.
+            DataError: the name is unknown, or its data are missing; the message says which.
         """
         name = name.removesuffix("_physics")
-        if name == "Procedural":
+        if name == "Procedural":  # which the client loads before it creates a house
             return self.empty()
         if _FLOOR_PLAN.fullmatch(name):
             return self._floor_plan(name)
@@ -55,13 +55,13 @@ class Catalogue:
         raise DataError(f"Scene {name!r} is unknown; use {names}, or FloorPlan<N> with --data")
 
     def empty(self) -> World:
-        """A bare room, the state before the first Reset and before CreateHouse."""
+        """Return a bare room, the state before the first Reset and before CreateHouse."""
         room = RoomShell(-1.5, 1.5, -1.5, 1.5)
         cells = [(x * 0.25, z * 0.25) for x in range(-4, 5) for z in range(-4, 5)]
         return World("Procedural", {}, (room,), NavGrid(cells), Agent(np.array([0.0, AGENT_HEIGHT, 0.0])))
 
     def house(self, house: Mapping[str, Any]) -> World:
-        """The world of a ProcTHOR house.
+        """Return the world of a ProcTHOR house.
 
         Raises:
             DataError: it does not have ProcTHOR's form.

@@ -19,22 +19,26 @@ __all__ = ["FloorPlanData"]
 
 _OBJECTS = Path("thor_scenes/objects.jsonl.gz")
 _LAYOUTS = Path("alfred/layouts")
-_KEY = '{"scene":"'
+_KEY = '{"scene":"'  # the usual start of a line
 
 
 class FloorPlanData:
-    """Reads floor plans from a data folder; only the wanted line of the big file is parsed."""
+    """Reads floor plans from a data folder.
+
+    Args:
+        root: the folder.
+    """
 
     def __init__(self, root: Path) -> None:
         self._root = root
         self._lines: dict[str, str] | None = None
 
     def names(self) -> list[str]:
-        """Floor plans that the folder has objects for."""
+        """Return the names of the floor plans that the folder has objects of."""
         return list(self._index())
 
     def objects(self, scene: str) -> list[dict[str, Any]]:
-        """Metadata of every object of a floor plan.
+        """Return the metadata of every object of a floor plan.
 
         Raises:
             DataError: the file or the floor plan is not there, or its line is not JSON.
@@ -44,13 +48,13 @@ class FloorPlanData:
         if line is None:
             raise DataError(f"{path}: has no {scene}; it has {len(self._index())} other floor plans")
         try:
-            found: list[dict[str, Any]] = json.loads(line)["objects"]
+            objects: list[dict[str, Any]] = json.loads(line)["objects"]
         except (ValueError, KeyError) as error:
             raise DataError(f"{path}: the line of {scene} is not of the form scene, objects ({error})") from error
-        return found
+        return objects
 
     def cells(self, scene: str) -> Array | None:
-        """Reachable (x, z) of a floor plan, (n, 2) metres; None where the folder has no layout of it.
+        """Return the reachable (x, z) of a floor plan, metres (n, 2); None if the folder has no layout of it.
 
         Raises:
             DataError: the layout is not an array of that form.
@@ -67,7 +71,8 @@ class FloorPlanData:
         return cells
 
     def _index(self) -> dict[str, str]:
-        """Unparsed lines by scene: parsing one of them takes 2 ms, all of them 0.2 s."""
+        """Return unparsed lines by scene."""
+        # Only the requested line is parsed: one takes 2 ms, all of them 0.2 s.
         if self._lines is None:
             path = self._root / _OBJECTS
             try:
@@ -82,6 +87,7 @@ class FloorPlanData:
 
 
 def _scene_of(path: Path, number: int, line: str) -> str:
+    """Return the scene of a line, without parsing it if it starts as usual."""
     compact = line[:80].replace('": "', '":"')
     if compact.startswith(_KEY):
         return compact[len(_KEY) :].split('"', 1)[0]

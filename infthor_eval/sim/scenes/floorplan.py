@@ -1,4 +1,4 @@
-"""Worlds from recorded floor plans."""
+"""Building worlds from recorded floor plans."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -10,30 +10,30 @@ from infthor_eval.sim.agent import AGENT_HEIGHT, Agent
 from infthor_eval.sim.geometry import Array
 from infthor_eval.sim.navigation import NavGrid
 from infthor_eval.sim.objects import SimObject
-from infthor_eval.sim.restore import settle_parents
-from infthor_eval.sim.scenes.adoption import adopt
-from infthor_eval.sim.scenes.arrangement import arrange
+from infthor_eval.sim.rearrange import assign_parents
+from infthor_eval.sim.scenes.layout_inference import infer_layout
 from infthor_eval.sim.scenes.recorded import recorded_object
 from infthor_eval.sim.scenes.supplement import Supplement
+from infthor_eval.sim.scenes.trajectory_ids import use_trajectory_ids
 from infthor_eval.sim.world import FLOOR_STYLES, RoomShell, World
 
 __all__ = ["build_floor_plan"]
 
-_CEILING = 2.6
-_STYLES = {0: "tiles", 2: "wood", 3: "carpet", 4: "tiles"}
+_CEILING = 2.6  # metres
+_STYLES = {0: "tiles", 2: "wood", 3: "carpet", 4: "tiles"}  # of floors, by the hundreds of the floor plan
 
 
 def build_floor_plan(name: str, entries: Sequence[Mapping[str, Any]], layout: Array | None, extra: Supplement) -> World:
-    """The world of a recorded floor plan.
+    """Return the world of a recorded floor plan.
 
     Args:
-        name: e.g. `FloorPlan10`.
+        name: name of the scene, e.g. `FloorPlan10`.
         entries: `metadata["objects"]` of the floor plan.
-        layout: reachable (x, z), (n, 2) metres; None where it is not known.
-        extra: what trajectories add.
+        layout: reachable (x, z), metres (n, 2); None if unknown.
+        extra: additions from trajectories.
 
     Raises:
-        DataError: neither a layout nor trajectories tell where the agent can stand, or an entry is malformed.
+        DataError: neither a layout nor trajectories give a cell to stand on, or an entry is malformed.
     """
     cells = [] if layout is None else [(float(x), float(z)) for x, z in layout]
     cells += extra.cells
@@ -42,7 +42,7 @@ def build_floor_plan(name: str, entries: Sequence[Mapping[str, Any]], layout: Ar
     nav = NavGrid(cells)
     objects = {item.object_id: item for item in map(recorded_object, entries)}
     floor = max((float(o.bounds()[1][1]) for o in objects.values() if o.object_type == "Floor"), default=0.0)
-    objects = adopt(objects, extra.objects, nav, floor)
+    objects = use_trajectory_ids(objects, extra.objects, nav, floor)
     room = _room(name, list(objects.values()), cells, floor)
     height = floor + AGENT_HEIGHT if extra.floor_y is None else extra.floor_y
     middle = nav.nearest((room.x_min + room.x_max) / 2, (room.z_min + room.z_max) / 2)
@@ -57,16 +57,18 @@ def build_floor_plan(name: str, entries: Sequence[Mapping[str, Any]], layout: Ar
         coarse=True,
     )
     world.open_at_start = frozenset(o.object_id for o in objects.values() if o.state.openness > 0)
-    arrange(world)
+    infer_layout(world)
     for item in objects.values():
         if item.object_type == "Floor":
             item.style = FLOOR_STYLES.index(room.floor_style)
-    _settle(world, entries)
+    _assign_recorded_parents(world, entries)
+    assign_parents(world)
+    world.keep_templates()
     return world
 
 
-def _settle(world: World, entries: Sequence[Mapping[str, Any]]) -> None:
-    """Find the parents of loose objects: as recorded where one is known, by position else."""
+def _assign_recorded_parents(world: World, entries: Sequence[Mapping[str, Any]]) -> None:
+    """Attach loose objects to the receptacles that the recording names: the innermost, which is the smallest."""
     for entry in entries:
         item = world.objects.get(str(entry["objectId"]))
         if item is None or not item.type.pickupable:
@@ -75,12 +77,10 @@ def _settle(world: World, entries: Sequence[Mapping[str, Any]]) -> None:
         inner = [p for p in parents if p.object_type != "Floor" and p.type.receptacle and p is not item]
         if inner:
             world.attach(item, min(inner, key=lambda p: (float(np.prod(p.box_size)), p.object_id)))
-    settle_parents(world)
-    world.keep_templates()
 
 
 def _room(name: str, objects: list[SimObject], cells: list[tuple[float, float]], floor: float) -> RoomShell:
-    """A rectangle around all that the room holds."""
+    """Return a rectangular room around all its objects and cells: recordings have no walls."""
     lows = [np.array([x - 0.25, floor, z - 0.25]) for x, z in cells]
     highs = [np.array([x + 0.25, floor, z + 0.25]) for x, z in cells]
     for item in objects:
@@ -97,5 +97,6 @@ def _room(name: str, objects: list[SimObject], cells: list[tuple[float, float]],
 
 
 def _number(name: str) -> int:
+    """Return the number in a scene's name, 0 without one: the seed of the scene, and its style."""
     digits = "".join(letter for letter in name if letter.isdigit())
     return int(digits[:9]) if digits else 0

@@ -1,16 +1,16 @@
 # ruff: noqa: SIM905 - tables of names read best as words
-"""Procedural kitchens: a counter with sink, stove and appliances along one wall, a table, and what belongs to them."""
+"""Procedural kitchens: a counter with sink, stove and appliances along one wall, a table with chairs, small things."""
 
 import numpy as np
 
 from infthor_eval.sim.objects import SimObject
-from infthor_eval.sim.scenes.basins import around, name_after
+from infthor_eval.sim.scenes.basins import name_after, rim_pieces
 from infthor_eval.sim.scenes.roomplan import RoomPlan
 
 __all__ = ["furnish_kitchen"]
 
 _HEIGHT, _DEPTH = 0.92, 0.65  # of the counter, metres
-_MODULE = 0.6
+_MODULE = 0.6  # width of a part of the counter, metres
 _APPLIANCES = (("Microwave", (0.52, 0.32, 0.4)), ("CoffeeMachine", (0.25, 0.36, 0.3)), ("Toaster", (0.2, 0.2, 0.3)))
 _TOOLS = (
     "Apple Bread ButterKnife Bowl Cup DishSponge Egg Fork Knife Lettuce Mug Pan PepperShaker Plate Pot Potato"
@@ -20,18 +20,18 @@ _MORE = "Bottle Book Kettle Ladle Mug PaperTowelRoll Plate Statue Vase WineBottl
 
 
 def furnish_kitchen(plan: RoomPlan, loose: int = 34) -> None:
-    """Furnishes a room as a kitchen with about `loose` small things."""
+    """Furnish a room as a kitchen with up to `loose` small things."""
     _counter(plan)
     _table(plan)
-    plan.try_against("GarbageCan", plan.shuffled(("x-", "x+", "z-")))
-    plan.try_against("HousePlant", plan.shuffled(("x-", "x+", "z-")), (0.34, 0.7, 0.34))
+    plan.try_against("GarbageCan", plan.shuffle(("x-", "x+", "z-")))
+    plan.try_against("HousePlant", plan.shuffle(("x-", "x+", "z-")), (0.34, 0.7, 0.34))
     if plan.random.random() < 0.6:
-        plan.try_against("SideTable", plan.shuffled(("x-", "x+", "z-")))
-    plan.loose += [*_TOOLS, *plan.shuffled(_MORE)][:loose]
+        plan.try_against("SideTable", plan.shuffle(("x-", "x+", "z-")))
+    plan.loose += [*_TOOLS, *plan.shuffle(_MORE)][:loose]
 
 
 def _counter(plan: RoomPlan) -> None:
-    """The fridge and a counter of modules along the z+ wall, cabinets above."""
+    """Put a fridge and a counter of modules along the z+ wall, with cabinets above."""
     start, end = plan.span("z+")
     plan.against("z+", "Fridge", start + 0.5, size=(0.9, 1.85, 0.75), gap=0.02)
     first = start + 1.0
@@ -74,7 +74,7 @@ def _sink(plan: RoomPlan, top: SimObject, at: float) -> None:
     name_after(sink, basin)
     faucet = plan.against("z+", "Faucet", at, y=_HEIGHT, size=(0.16, 0.28, 0.2), gap=0.04)
     faucet.style = 0
-    top.pieces, sink.pieces = around(top, sink), around(sink, basin)
+    top.pieces, sink.pieces = rim_pieces(top, sink), rim_pieces(sink, basin)
     plan.against("z+", "Window", at, y=1.25, size=(0.8, 0.9, 0.06), gap=-0.02)
 
 
@@ -91,15 +91,15 @@ def _stove(plan: RoomPlan, at: float) -> None:
 
 
 def _table(plan: RoomPlan) -> None:
-    """A dining table with two chairs in a corner away from the counter, clear of doorways."""
+    """Put a dining table with two chairs into a corner away from the counter, clear of doorways."""
     room = plan.room
     length = round(float(plan.random.uniform(1.1, 1.4)), 2)
     z = room.z_min + length / 2 + 0.15
-    for side in plan.shuffled(("x-", "x+")):
+    for side in plan.shuffle(("x-", "x+")):
         inward = 1.0 if side == "x-" else -1.0
         x = (room.x_min if side == "x-" else room.x_max) + 0.5 * inward
         ends = np.array([[x - 0.45 * inward, 0.0, z - length / 2], [x + 0.95 * inward, 1.0, z + length / 2]])
-        if plan.clear(ends.min(axis=0), ends.max(axis=0)):
+        if plan.is_clear(ends.min(axis=0), ends.max(axis=0)):
             plan.place("DiningTable", x, z, 90.0, size=(length, 0.78, 0.85))
             for share in (-0.25, 0.25):
                 yaw = 270.0 if side == "x-" else 90.0

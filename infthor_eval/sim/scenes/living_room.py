@@ -13,7 +13,7 @@ _LOOSE = (
 
 
 def furnish_living_room(plan: RoomPlan, loose: int = 24) -> None:
-    """Furnishes a room as a living room with about `loose` small things."""
+    """Furnish a room as a living room with up to `loose` small things."""
     room = plan.room
     middle = (room.x_min + room.x_max) / 2
     stand = plan.against("z+", "TVStand", round(middle, 2), size=(1.4, 0.5, 0.42), gap=0.02)
@@ -27,13 +27,13 @@ def furnish_living_room(plan: RoomPlan, loose: int = 24) -> None:
     sides = ["x-", "x+", "z-"]
     for object_type in _ALONG_WALLS:
         if object_type in {"ArmChair", "FloorLamp", "SideTable", "GarbageCan"} or plan.random.random() < 0.5:
-            made = plan.try_against(object_type, plan.shuffled(sides), _SIZES.get(object_type))
-            if made is not None and object_type == "SideTable":
-                lamp(plan, made.center[0], made.center[2], float(made.bounds()[1][1]))
+            item = plan.try_against(object_type, plan.shuffle(sides), _SIZES.get(object_type))
+            if item is not None and object_type == "SideTable":
+                lamp(plan, item.center[0], item.center[2], float(item.bounds()[1][1]))
     plan.try_against("HousePlant", sides, (0.4, 0.9, 0.4))
     plan.try_against("Painting", ["z+", "x-", "x+"], (0.9, 0.7, 0.05), y=1.4)
     plan.try_against("Window", ["x+", "x-"], (1.3, 1.3, 0.06), y=0.95)
-    plan.loose += plan.shuffled(_LOOSE)[:loose]
+    plan.loose += plan.shuffle(_LOOSE)[:loose]
 
 
 _SIZES = {"DiningTable": (1.1, 0.75, 0.8), "Desk": (1.2, 0.76, 0.6), "ShelvingUnit": (0.9, 1.5, 0.35),
@@ -41,14 +41,14 @@ _SIZES = {"DiningTable": (1.1, 0.75, 0.8), "Desk": (1.2, 0.76, 0.6), "ShelvingUn
 
 
 def lamp(plan: RoomPlan, x: float, z: float, y: float) -> None:
-    """A desk lamp on a piece of furniture."""
+    """Put a desk lamp on a piece of furniture."""
     plan.place("DeskLamp", round(float(x), 3), round(float(z), 3), 0.0, y=y, size=(0.22, 0.42, 0.22))
 
 
 def drawers_in(
     plan: RoomPlan, owner_id: str, side: str, at: float, size: tuple[float, float, float], rows: int
 ) -> None:
-    """Fill the front of a chest with two columns of drawers and leave the front to them."""
+    """Fill the front of a chest with two columns of drawers; the chest itself is drawn without a front."""
     owner = next(o for o in plan.objects if o.object_id == owner_id)
     owner.hollow = True
     width, height, depth = size

@@ -1,4 +1,4 @@
-"""Rooms and houses made from a seed: the same name is always the same scene."""
+"""Building rooms and houses from a seed: the same name is always the same scene."""
 
 import zlib
 from collections.abc import Callable
@@ -30,19 +30,20 @@ _SIZES = {  # metres: least and most width, least and most length
     "bathroom": (3.4, 4.2, 3.2, 4.0),
 }
 _DOOR = 0.5  # half of a doorway's width, metres
-_DRAWS = 20
-_MOST = 0.85  # of a room's free floor
-_REACH = 0.75  # metres from a place to stand to a thing's box
+_DRAWS = 20  # attempts at a scene
+_REACHABLE_SHARE = 0.85  # of a room's free floor that the agent must get to
+_REACH = 0.75  # metres from a place to stand to a receptacle's box
 SCENE_TYPES = (*_FURNISH, "house")
 
 
 def build_scene(scene_type: str, seed: int) -> World:
-    """The world of `<scene_type>-<seed>`: the first draw of furniture that leaves every room open.
+    """Return the world of `<scene_type>-<seed>`: the first draw of furniture that leaves every room accessible.
 
     Raises:
         SimulatorError: no draw does.
     """
     for attempt in range(_DRAWS):
+        # Each attempt of each scene has a random stream of its own, whatever the attempts before it drew.
         random = np.random.default_rng([zlib.crc32(scene_type.encode()), seed, attempt])
         if scene_type == "house":
             plans, doors = _house_plans(random, seed)
@@ -50,16 +51,16 @@ def build_scene(scene_type: str, seed: int) -> World:
             plans, doors = [RoomPlan(_shell(scene_type, random, seed), random)], []
             _furnish(plans[0], scene_type)
         world = finish(f"{scene_type}-{seed}", seed, plans, doors)
-        if all(_open(world, plan) for plan in plans):
+        if all(_is_accessible(world, plan) for plan in plans):
             return world
-    raise SimulatorError(f"{scene_type}-{seed}: {_DRAWS} draws of furniture all block the way; use another seed")
+    raise SimulatorError(f"{scene_type}-{seed}: all {_DRAWS} draws of furniture block the way; use another seed")
 
 
-def _open(world: World, plan: RoomPlan) -> bool:
-    """Whether the agent gets to most of a room's free floor, and near everything in it that holds things."""
+def _is_accessible(world: World, plan: RoomPlan) -> bool:
+    """Return whether the agent gets to most of a room's free floor, and near all its receptacles."""
     free = plan.free_cells()
-    reached = [cell for cell in free if world.nav.stands(*cell)]
-    if len(reached) < _MOST * len(free):
+    reached = [cell for cell in free if world.nav.can_stand(*cell)]
+    if len(reached) < _REACHABLE_SHARE * len(free):
         return False
     cells = np.array(reached)
     for item in plan.objects:
@@ -70,13 +71,14 @@ def _open(world: World, plan: RoomPlan) -> bool:
 
 
 def _shell(room_type: str, random: np.random.Generator, seed: int) -> RoomShell:
-    """A room of a size that suits its type, around (0, 0)."""
+    """Return a room around (0, 0), of a random size that suits its type."""
     least_x, most_x, least_z, most_z = _SIZES[room_type]
     width, length = round(random.uniform(least_x, most_x) / 2, 2), round(random.uniform(least_z, most_z) / 2, 2)
     return RoomShell(-width, width, -length, length, floor_style=_FLOORS[room_type], style=seed)
 
 
 def _furnish(plan: RoomPlan, room_type: str) -> None:
+    """Put in the floor, the furniture of a type of room, and a light switch that is on."""
     room = plan.room
     floor = plan.place(
         "Floor", (room.x_min + room.x_max) / 2, (room.z_min + room.z_max) / 2, y=room.floor - 0.1,
@@ -90,7 +92,7 @@ def _furnish(plan: RoomPlan, room_type: str) -> None:
 
 
 def _house_plans(random: np.random.Generator, seed: int) -> tuple[list[RoomPlan], list[tuple[float, float]]]:
-    """Four rooms, two by two, joined by doorways between neighbours, and the cells in the doorways."""
+    """Return the plans of four rooms, two by two with doorways between them, and the cells in the doorways."""
     west, east = round(random.uniform(4.6, 5.2), 2), round(random.uniform(4.6, 5.2), 2)
     south, north = round(random.uniform(4.6, 5.2), 2), round(random.uniform(4.4, 5.0), 2)
     gap = 0.1  # the thickness of an inner wall
@@ -116,14 +118,17 @@ def _house_plans(random: np.random.Generator, seed: int) -> tuple[list[RoomPlan]
         plan.keep_doors_free()
         _furnish(plan, room_type)
         plans.append(plan)
-    doors = [(x, z) for x, z in _doorway_cells(door_x, gap / 2, True)]
-    doors += [(x, z) for x, z in _doorway_cells(door_z, gap / 2, False)]
-    doors += [(x, z) for x, z in _doorway_cells(upper_z, gap / 2, False)]
+    doors = _doorway_cells(door_x, gap / 2, True)
+    doors += _doorway_cells(door_z, gap / 2, False)
+    doors += _doorway_cells(upper_z, gap / 2, False)
     return plans, doors
 
 
 def _doorway_cells(at: float, across: float, along_x: bool) -> list[tuple[float, float]]:
-    """Cells in a doorway whose middle is `at` along the wall, which stands `across`."""
+    """Return the cells in a doorway with its middle at `at` along a wall, and the wall at `across`.
+
+    The free floor of each room ends before the wall, so these cells join the rooms.
+    """
     lines = [v for v in np.arange(round((at - _DOOR) * 4), round((at + _DOOR) * 4) + 1) * 0.25 if abs(v - at) < 0.28]
     steps = np.arange(-3, 4) * 0.25
     near = [s for s in steps if abs(s - across) < 0.4]

@@ -1,4 +1,4 @@
-"""Objects from AI2-THOR's own metadata."""
+"""Building objects from AI2-THOR's own metadata."""
 
 import math
 from collections.abc import Mapping
@@ -9,7 +9,7 @@ import numpy as np
 
 from infthor_eval.errors import DataError
 from infthor_eval.sim.default_objects import style_of
-from infthor_eval.sim.geometry import Array, to_array, yaw_matrix
+from infthor_eval.sim.geometry import Array, to_array, wrap_degrees, yaw_matrix
 from infthor_eval.sim.object_types import ObjectType, type_named
 from infthor_eval.sim.objects import SimObject, SimObjectState
 
@@ -19,10 +19,10 @@ _TILTED = 10.0  # degrees of pitch or roll beyond which an object's yaw is taken
 
 
 def recorded_object(entry: Mapping[str, Any]) -> SimObject:
-    """An object from one entry of `metadata["objects"]`, upright: what little it tilts goes into its box.
+    """Return an upright object from one entry of `metadata["objects"]`; a small tilt goes into its box.
 
     Raises:
-        DataError: a needed field is missing or malformed.
+        DataError: a required field is missing or malformed.
     """
     try:
         return _object(entry)
@@ -37,16 +37,16 @@ def _object(entry: Mapping[str, Any]) -> SimObject:
     if oriented and oriented.get("cornerPoints"):
         points = np.array(oriented["cornerPoints"], dtype=float)
         yaw = _yaw(entry["rotation"], points)
-    else:
+    else:  # the world's axes are the best guess for an object that is not turned by a quarter
         box = entry["axisAlignedBoundingBox"]
         center, half = to_array(box["center"]), to_array(box["size"]) / 2
         points = np.array([center - half, center + half])
         yaw = round(float(entry["rotation"]["y"]) / 90) * 90.0
     local = (points - position) @ yaw_matrix(yaw)
     low, high = local.min(axis=0), local.max(axis=0)
-    found = str(entry["objectId"])
+    object_id = str(entry["objectId"])
     return SimObject(
-        object_id=found,
+        object_id=object_id,
         name=str(entry["name"]),
         type=declared,
         position=position,
@@ -55,18 +55,19 @@ def _object(entry: Mapping[str, Any]) -> SimObject:
         box_size=np.maximum(high - low, 1e-3),
         asset_id=str(entry.get("assetId") or ""),
         support=declared.support_height(float(high[1] - low[1])),
-        style=style_of(str(entry.get("assetId") or found)),
+        style=style_of(str(entry.get("assetId") or object_id)),
         state=_state(entry),
     )
 
 
 def _type(entry: Mapping[str, Any]) -> ObjectType:
-    known = type_named(str(entry["objectType"]))
+    """Return the record of the entry's type with the abilities that the entry has: versions of AI2-THOR differ."""
+    declared = type_named(str(entry["objectType"]))
     return replace(
-        known,
+        declared,
         pickupable=bool(entry["pickupable"]),
         moveable=bool(entry["moveable"]),
-        receptacle=bool(entry["receptacle"]) or known.receptacle,
+        receptacle=bool(entry["receptacle"]) or declared.receptacle,
         openable=bool(entry["openable"]),
         toggleable=bool(entry["toggleable"]),
         breakable=bool(entry["breakable"]),
@@ -76,7 +77,7 @@ def _type(entry: Mapping[str, Any]) -> ObjectType:
         cookable=bool(entry["cookable"]),
         sliceable=bool(entry["sliceable"]),
         mass=float(entry.get("mass") or 0.0),
-        materials=tuple(entry.get("salientMaterials") or known.materials),
+        materials=tuple(entry.get("salientMaterials") or declared.materials),
     )
 
 
@@ -95,15 +96,12 @@ def _state(entry: Mapping[str, Any]) -> SimObjectState:
 
 
 def _yaw(rotation: Mapping[str, float], points: Array) -> float:
-    """Yaw in degrees; of a thing that lies on its side, the direction of its longest level edge."""
-    tilt = max(abs(_wrapped(float(rotation["x"]))), abs(_wrapped(float(rotation["z"]))))
+    """Return the yaw in degrees; of an object that lies on its side, the direction of its longest level edge."""
+    tilt = max(abs(wrap_degrees(float(rotation["x"]))), abs(wrap_degrees(float(rotation["z"]))))
     if tilt <= _TILTED:
         return float(rotation["y"])
+    # Three edges that meet at a corner, by AI2-THOR's order of corners.
     edges = [points[1] - points[0], points[3] - points[0], points[4] - points[0]]
     level = [edge for edge in edges if abs(edge[1]) < 0.5 * float(np.linalg.norm(edge)) + 1e-9] or edges
     longest = max(level, key=lambda edge: float(np.linalg.norm(edge)))
     return math.degrees(math.atan2(longest[0], longest[2]))
-
-
-def _wrapped(angle: float) -> float:
-    return (angle + 180.0) % 360.0 - 180.0

@@ -1,4 +1,4 @@
-"""A room while it is being furnished: walls, what stands where, and the floor that stays free."""
+"""Furnishing a room: what stands where, the floor that stays free, and the loose objects."""
 
 from collections.abc import Iterable, Sequence
 
@@ -15,17 +15,22 @@ from infthor_eval.sim.world import RoomShell, World
 
 __all__ = ["RoomPlan", "finish"]
 
-_BODY = 0.23  # the agent's radius and a little, metres
-_KNEE, _HEAD = 0.1, 1.6
-_CLEAR = 0.9  # metres of floor before a doorway
+_BODY = 0.23  # the agent's radius and a margin, metres
+_KNEE, _HEAD = 0.1, 1.6  # heights in metres between which an object takes floor from the agent
+_CLEAR = 0.9  # metres of floor in front of a doorway
 
 
 class RoomPlan:
-    """Furnishes one rectangular room.
+    """The furniture of one rectangular room.
 
     Args:
-        room: the shell.
-        random: decides everything that varies.
+        room: shell of the room.
+        random: random numbers that decide everything that varies.
+
+    Attributes:
+        objects: furniture and fixtures so far.
+        loose: types of the loose objects to scatter.
+        reserved: boxes of floor that must stay free.
     """
 
     def __init__(self, room: RoomShell, random: np.random.Generator) -> None:
@@ -45,6 +50,7 @@ class RoomPlan:
         size: tuple[float, float, float] | None = None,
     ) -> SimObject:
         """Put an object with the middle of its underside at (x, y, z)."""
+        # Two steps, as the id names the object's origin, which follows from its box.
         item = default_object(object_type, np.zeros(3), yaw, None if size is None else np.array(size))
         item.place_bottom(np.array([x, y, z]))
         named = default_object(object_type, np.round(item.position, 4), yaw, item.box_size)
@@ -64,12 +70,12 @@ class RoomPlan:
         """Put an object with its back to a wall.
 
         Args:
-            side: `x-`, `x+`, `z-` or `z+`.
-            object_type: type.
-            at: where along the wall, metres (x for z walls, z for x walls).
-            y: height of its underside.
-            size: width, height, depth; the usual one if None.
-            gap: distance from the wall.
+            side: the wall: `x-`, `x+`, `z-` or `z+`.
+            object_type: type of the object.
+            at: position along the wall, metres (x for z walls, z for x walls).
+            y: height of its underside, metres.
+            size: width, height and depth, metres; None for the type's usual size.
+            gap: distance from the wall, metres.
         """  # fmt: skip
         depth = (type_named(object_type).size if size is None else size)[2] / 2 + gap
         room = self.room
@@ -81,17 +87,17 @@ class RoomPlan:
         }[side]
         return self.place(object_type, x, z, yaw, y, size)
 
-    def shuffled(self, options: Sequence[str]) -> list[str]:
-        """Sides or types in a random order."""
+    def shuffle(self, options: Sequence[str]) -> list[str]:
+        """Return walls or types in a random order."""
         return [str(option) for option in self.random.permutation(options)]
 
     def span(self, side: str) -> tuple[float, float]:
-        """From and to of a wall along its length."""
+        """Return the two ends of a wall along its length, metres."""
         room = self.room
         return (room.x_min, room.x_max) if side[0] == "z" else (room.z_min, room.z_max)
 
-    def clear(self, low: Array, high: Array, margin: float = 0.0) -> bool:
-        """Whether a box touches no furniture and no reserved floor."""
+    def is_clear(self, low: Array, high: Array, margin: float = 0.0) -> bool:
+        """Return whether a box, grown by a margin, touches no furniture and no reserved floor."""
         grown_low, grown_high = low - margin, high + margin
         boxes = [o.bounds() for o in self.objects if o.object_type != "Floor"] + self.reserved
         return not any(aabb_overlap(grown_low, grown_high, a, b) for a, b in boxes)
@@ -99,7 +105,7 @@ class RoomPlan:
     def try_against(
         self, object_type: str, sides: Iterable[str], size: tuple[float, float, float] | None = None, y: float = 0.0
     ) -> SimObject | None:
-        """Put an object somewhere along one of the walls where there is room; None if there is none."""
+        """Put an object at a random free place along one of the walls, tried in order; return None if there is none."""
         width = (type_named(object_type).size if size is None else size)[0]
         for side in sides:
             start, end = self.span(side)
@@ -109,13 +115,13 @@ class RoomPlan:
                 self.objects.pop()
                 low, high = item.bounds()
                 blocked = any(s == side and a - width / 2 < at < b + width / 2 for s, a, b in self.room.openings)
-                if not blocked and self.clear(low, high, 0.05 if y == 0 else 0.01):
+                if not blocked and self.is_clear(low, high, 0.05 if y == 0 else 0.01):
                     self.objects.append(item)
                     return item
         return None
 
     def keep_doors_free(self) -> None:
-        """Reserve the floor before each doorway."""
+        """Reserve the floor in front of each doorway."""
         room = self.room
         for side, low, high in room.openings:
             x0, x1, z0, z1 = {
@@ -127,7 +133,7 @@ class RoomPlan:
             self.reserved.append((np.array([x0, 0.0, z0]), np.array([x1, 2.0, z1])))
 
     def free_cells(self) -> list[tuple[float, float]]:
-        """Cells where the agent fits between what stands on the floor."""
+        """Return the cells where the agent fits between what stands on the floor."""
         room = self.room
         boxes = [
             o.bounds() for o in self.objects
@@ -142,17 +148,18 @@ class RoomPlan:
 
 
 def finish(name: str, seed: int, plans: list[RoomPlan], doors: list[tuple[float, float]] | None = None) -> World:
-    """The world of furnished rooms: free floor, the agent on it, and loose things on and in the furniture.
+    """Return the world of furnished rooms, with the agent on the free floor and loose objects in the furniture.
 
     Args:
-        name: of the scene.
-        seed: of the scene.
+        name: name of the scene.
+        seed: seed of the scene.
         plans: the rooms.
         doors: cells (x, z) in doorways.
     """
+    # Of floor that furniture cuts off from the rest, only the largest part can be walked on.
     grid = NavGrid([cell for plan in plans for cell in plan.free_cells()] + (doors or []))
-    connected = max((grid.reachable(*cell) for cell in _samples(grid)), key=len)
-    nav = NavGrid(connected)
+    largest = max(_connected_parts(grid), key=len)
+    nav = NavGrid(largest)
     objects: dict[str, SimObject] = {}
     for plan in plans:
         for item in plan.objects:
@@ -168,19 +175,17 @@ def finish(name: str, seed: int, plans: list[RoomPlan], doors: list[tuple[float,
     return world
 
 
-def _samples(grid: NavGrid) -> list[tuple[float, float]]:
-    left, found = set(grid), []
+def _connected_parts(grid: NavGrid) -> list[list[tuple[float, float]]]:
+    left, parts = set(grid), []
     while left:
-        cell = min(left)
-        found.append(cell)
-        left -= set(grid.reachable(*cell))
-        left.discard(cell)
-    return found
+        parts.append(grid.reachable_cells(*min(left)))
+        left -= {min(left), *parts[-1]}
+    return parts
 
 
 def _scatter(world: World, plan: RoomPlan) -> None:
-    """Put the plan's loose things into or onto the plan's furniture, where the agent can get at them."""
-    homes = [(o, o.type.stock) for o in plan.objects if o.type.receptacle and o.type.stock is not None]
+    """Put the plan's loose objects into or onto its furniture, at random; towels go to holders first."""
+    homes = [(o, o.type.capacity) for o in plan.objects if o.type.receptacle and o.type.capacity is not None]
     for object_type in plan.loose:
         item = default_object(object_type, np.zeros(3))
         item.style = int(plan.random.integers(1000))
@@ -191,9 +196,10 @@ def _scatter(world: World, plan: RoomPlan) -> None:
             place = find_place(world, item, home, random=plan.random)
             if place is None or len(home.contents) >= stock:
                 continue
-            made = default_object(object_type, np.round(place.position, 4), float(place.rotation[1]))
-            made.style = item.style
-            if made.object_id not in world.objects:
-                world.add(made)
-                world.attach(made, home)
+            # A new object at the place, as its id names its position. Two at the same rounded one would share an id.
+            placed = default_object(object_type, np.round(place.position, 4), float(place.rotation[1]))
+            placed.style = item.style
+            if placed.object_id not in world.objects:
+                world.add(placed)
+                world.attach(placed, home)
                 break

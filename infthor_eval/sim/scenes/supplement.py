@@ -1,4 +1,4 @@
-"""What the trajectories at hand add to recorded floor plans.
+"""Additions to recorded floor plans from trajectories.
 
 The file is JSON, one entry per floor plan:
 
@@ -21,7 +21,13 @@ __all__ = ["Supplement", "read_supplement"]
 
 @dataclass(frozen=True)
 class Supplement:
-    """Additions to one floor plan; see the module."""
+    """Additions to one floor plan; see the module.
+
+    Attributes:
+        cells: positions (x, z) of the agent, metres.
+        floor_y: height of the agent's position, metres; None if unknown.
+        objects: ids of fixed objects.
+    """
 
     cells: tuple[tuple[float, float], ...] = ()
     floor_y: float | None = None
@@ -29,7 +35,7 @@ class Supplement:
 
 
 def read_supplement(path: Path) -> dict[str, Supplement]:
-    """The entries of a supplement file by floor plan.
+    """Return the entries of a supplement file by floor plan.
 
     Raises:
         DataError: the file is missing or not of the documented form.

@@ -29,7 +29,7 @@ def xyz(vector: Any) -> dict[str, float]:
 def loose(bench: Bench, object_type: str) -> str:
     """A thing of a type that is not shut in."""
     world = bench.sim.world
-    return next(o.object_id for o in world.objects.values() if o.object_type == object_type and not world.hidden(o))
+    return next(o.object_id for o in world.objects.values() if o.object_type == object_type and not world.is_hidden(o))
 
 
 def hand_to(bench: Bench, object_id: str) -> None:

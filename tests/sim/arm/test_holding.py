@@ -96,7 +96,7 @@ def test_contents_of_what_is_held_come_along_and_stay_in_it():
     assert bench.metadata["arm"]["heldObjects"] == [bowl, egg]
     bench.ok("ReleaseObject")
     assert not bench.object(bowl)["isPickedUp"] and not bench.object(egg)["isPickedUp"]
-    assert bench.sim.world.arm.freight == {}
+    assert bench.sim.world.arm.held_contents == {}
 
 
 def up(metres: float) -> np.ndarray:
@@ -107,7 +107,7 @@ def drop_over(bench: Bench, object_id: str, point: np.ndarray) -> dict:
     """Let go of a thing with its middle above a point, wherever the agent may be."""
     world = bench.sim.world
     world.agent.position[[0, 2]] += (point - world.arm.sphere(world.agent))[[0, 2]]
-    world.arm.change(world.arm.rig.lifted(world.arm.pose, point[1] - world.agent.position[1]))
+    world.arm.change(world.arm.rig.with_lift(world.arm.pose, point[1] - world.agent.position[1]))
     put_into_hand(bench, object_id)
     bench.ok("ReleaseObject")
     return bench.object(object_id)
@@ -244,7 +244,7 @@ def test_what_falls_far_breaks_unless_its_type_was_made_unbreakable(spared):
     bench.ok("PausePhysicsAutoSim")
     if spared:
         bench.ok("MakeObjectsOfTypeUnbreakable", objectType="Plate")
-    x, z = max(bench.sim.world.nav, key=lambda c: bench.sim.world.nav.freedom(*c, 0.0))
+    x, z = max(bench.sim.world.nav, key=lambda c: bench.sim.world.nav.count_free_ahead(*c, 0.0))
     drop_over(bench, plate, np.array([x, 1.4, z]))
     assert bench.object(plate)["isBroken"] != spared
     bench.ok("AdvancePhysicsStep", simSeconds=1.0)

@@ -6,10 +6,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from infthor_eval.sim.arm.kinova import LINK, SHOULDER, Kinova, forward, inverse
-from infthor_eval.sim.arm.paths import away_steps, turning
+from infthor_eval.sim.arm.paths import path_distances, rotation_steps
 from infthor_eval.sim.arm.rig import ArmPose
+from infthor_eval.sim.arm.rotations import axis_angle, rotation
 from infthor_eval.sim.arm.stretch import Stretch
-from infthor_eval.sim.arm.turns import axis_angle, rotation
 from infthor_eval.sim.geometry import euler_matrix
 
 UNIT = st.tuples(*[st.floats(-1, 1)] * 3).map(np.array).filter(lambda v: np.linalg.norm(v) > 0.1)
@@ -53,15 +53,15 @@ def test_the_elbow_turns_about_the_line_from_shoulder_to_wrist(direction, share,
 @given(st.tuples(*[st.floats(-1.5, 1.5)] * 3).map(np.array))
 def test_the_stretch_robot_reaches_what_is_within_its_limits(target):
     rig = Stretch()
-    (pose,) = rig.reaching([rig.rest()], target[None])
+    (pose,) = rig.reach([rig.rest()], target[None])
     assert pose.wrist[0] == 0 and -0.056 <= pose.wrist[1] <= 1.045 and 0 <= pose.wrist[2] <= 0.516
-    (again,) = rig.reaching([rig.rest()], pose.wrist[None])
+    (again,) = rig.reach([rig.rest()], pose.wrist[None])
     assert again.wrist == pytest.approx(pose.wrist)
 
 
 @pytest.mark.parametrize("rig", [Kinova(), Stretch()])
 def test_many_poses_at_once_are_each_alone(rig):
-    poses = rig.reaching([rig.rest()] * 3, np.array([[0.0, 0.1, 0.5], [0.1, 0.4, 0.3], [0.0, -0.3, 0.6]]))
+    poses = rig.reach([rig.rest()] * 3, np.array([[0.0, 0.1, 0.5], [0.1, 0.4, 0.3], [0.0, -0.3, 0.6]]))
     together = rig.boxes(poses)
     for index, pose in enumerate(poses):
         alone = rig.boxes([pose])
@@ -84,7 +84,7 @@ def test_axis_and_angle_make_the_rotation_again(angles):
     turn = euler_matrix(angles)
     axis, degrees = axis_angle(turn)
     assert rotation(axis, degrees) == pytest.approx(turn, abs=1e-5)
-    steps = turning(turn, 5.0)
+    steps = rotation_steps(turn, 5.0)
     assert steps[-1] is turn
     for before, after in zip([np.eye(3), *steps], steps, strict=False):
         assert axis_angle(before.T @ after)[1] <= 5.0 + 1e-3
@@ -92,7 +92,7 @@ def test_axis_and_angle_make_the_rotation_again(angles):
 
 @given(st.floats(0, 1e9))
 def test_long_ways_are_looked_at_in_few_steps(distance):
-    steps = away_steps(distance)
+    steps = path_distances(distance)
     assert len(steps) < 400
     assert steps[-1] == pytest.approx(distance)
     assert (np.diff(steps) > -1e-9).all()
@@ -101,5 +101,5 @@ def test_long_ways_are_looked_at_in_few_steps(distance):
 
 def test_a_pose_keeps_its_wrist_s_rotation_when_it_reaches():
     turn = euler_matrix((10, 20, 30))
-    (pose,) = Kinova().reaching([ArmPose(SHOULDER, turn, 0.2, 5.0)], np.array([[0.1, 0.1, 0.5]]))
+    (pose,) = Kinova().reach([ArmPose(SHOULDER, turn, 0.2, 5.0)], np.array([[0.1, 0.1, 0.5]]))
     assert (pose.turn is turn, pose.base, pose.elbow) == (True, 0.2, 5.0)

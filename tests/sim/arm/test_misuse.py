@@ -2,13 +2,13 @@
 
 import pytest
 
-from infthor_eval.sim.actions import bind, names
+from infthor_eval.sim.actions import action_names, bind
 from infthor_eval.sim.errors import ActionError
 
 from ..test_misuse import NONSENSE
 from .harness import arm_bench
 
-OWN = [*sorted(set(names("arm")) - set(names())), "PickupObject", "MoveAhead", "RotateLeft"]
+OWN = [*sorted(set(action_names("arm")) - set(action_names())), "PickupObject", "MoveAhead", "RotateLeft"]
 USUAL = {"position": {"x": 0, "y": 0, "z": 0.5}, "offset": {"x": 0.05}, "y": 0.5, "distance": 0.05, "degrees": 10,
          "radius": 0.1, "point": {"x": 0}, "ahead": 0.1}  # fmt: skip
 
@@ -16,7 +16,7 @@ USUAL = {"position": {"x": 0, "y": 0, "z": 0.5}, "offset": {"x": 0.05}, "y": 0.5
 @pytest.mark.parametrize("mode", ["arm", "stretch"])
 @pytest.mark.parametrize("name", OWN)
 def test_every_argument_of_every_action(mode, name):
-    if name not in names(mode):
+    if name not in action_names(mode):
         pytest.skip("the stretch robot has no elbow")
     bench = arm_bench("bathroom-1", size=20, agentMode=mode)
     try:
@@ -27,13 +27,13 @@ def test_every_argument_of_every_action(mode, name):
     for parameter in parameters:
         given = {key: USUAL[key] for key in parameters if key in USUAL}
         for value in NONSENSE:
-            bench.peer.act({"action": name, **given, parameter: value})
+            bench.server.run({"action": name, **given, parameter: value})
         metadata = bench.step(name, **(given | {parameter: "a"}))
         assert metadata["lastActionSuccess"] or metadata["errorMessage"]
         assert not any(word in metadata["errorMessage"] for word in ("NoneType", "<class", "typing", "Traceback"))
 
 
 def test_the_modes_differ_where_unity_s_do():
-    assert set(names()) <= set(names("arm"))
-    assert set(names("stretch")) < set(names("arm"))
-    assert "RotateElbowRelative" not in names("stretch") and "MoveArm" not in names()
+    assert set(action_names()) <= set(action_names("arm"))
+    assert set(action_names("stretch")) < set(action_names("arm"))
+    assert "RotateElbowRelative" not in action_names("stretch") and "MoveArm" not in action_names()

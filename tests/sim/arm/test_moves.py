@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from infthor_eval.sim.actions.arm_motion import obstacles
 from infthor_eval.sim.arm.boxes import separations
 
 from ..harness import Bench
@@ -163,9 +164,9 @@ def test_what_is_touched_already_does_not_lock_the_arm():
     bench = arm_bench()
     facing(bench, "CounterTop")
     world = bench.sim.world
-    world.arm.change(world.arm.rig.lifted(world.arm.pose, -0.1))
+    world.arm.change(world.arm.rig.with_lift(world.arm.pose, -0.1))
     world.agent.position[2] += 0.3  # the hand and a link are in the counter now
-    assert separations(own_boxes(bench), bench.sim.solids().boxes).min() < -0.02
+    assert separations(own_boxes(bench), obstacles(bench.sim).boxes).min() < -0.02
     bench.ok("MoveBack", moveMagnitude=0.45)
     bench.ok("MoveArmBase", y=1.2, normalizedY=False)
 

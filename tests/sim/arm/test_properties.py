@@ -6,6 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from infthor_eval.sim.actions.arm_motion import obstacles
 from infthor_eval.sim.geometry import euler_matrix
 
 from ..harness import Bench
@@ -45,7 +46,7 @@ PROPERTY = settings(max_examples=15)
 
 def deepest(bench: Bench, thing: int) -> tuple[float, str]:
     """How deep points of one box of the arm are in something solid, metres, and what that is; by points alone."""
-    box, solids = own_boxes(bench)[thing : thing + 1], bench.sim.solids()
+    box, solids = own_boxes(bench)[thing : thing + 1], obstacles(bench.sim)
     points = box.center[0] + (GRID * box.half[0]) @ box.axes[0]
     local = np.abs(np.einsum("nij,pnj->pni", solids.boxes.axes, points[:, None] - solids.boxes.center))
     depth = (solids.boxes.half - local).min(axis=2).max(axis=0)
@@ -56,8 +57,8 @@ def at_rest_in_the_open(scene: str) -> Bench:
     """The agent with its arm raised, at a place where the arm is in nothing."""
     bench = arm_bench(scene)
     world = bench.sim.world
-    world.arm.change(world.arm.rig.lifted(world.arm.pose, 0.6))
-    for x, z in sorted(world.nav, key=lambda c: -world.nav.freedom(*c, 0.0)):
+    world.arm.change(world.arm.rig.with_lift(world.arm.pose, 0.6))
+    for x, z in sorted(world.nav, key=lambda c: -world.nav.count_free_ahead(*c, 0.0)):
         world.agent.position, world.agent.yaw = np.array([x, world.agent.position[1], z]), 0.0
         if all(deepest(bench, part)[0] < 0 for part in range(4)):
             return bench
@@ -90,7 +91,7 @@ def test_held_things_keep_their_offset_and_the_world_is_consistent(scene, steps)
         frame = world.arm.wrist(world.agent)
         now = {
             key: (frame.local(world.objects[key].position), frame.turn.T @ euler_matrix(world.objects[key].rotation))
-            for key in (*held, *world.arm.freight)
+            for key in (*held, *world.arm.held_contents)
         }
         for key in now.keys() & offsets.keys():
             if key in held or action != "ReleaseObject":

@@ -11,7 +11,7 @@ from .harness import arm_bench, xyz
 def bench() -> Bench:
     made = arm_bench(agentMode="stretch")
     world = made.sim.world
-    x, z = max(world.nav, key=lambda c: world.nav.freedom(*c, 90.0))
+    x, z = max(world.nav, key=lambda c: world.nav.count_free_ahead(*c, 90.0))
     made.ok("TeleportFull", position={"x": x, "y": 0.9009992, "z": z}, rotation={"y": 0}, horizon=30, standing=False)
     return made
 
@@ -63,7 +63,7 @@ def test_the_wrist_turns_about_the_vertical_alone(bench):
 def test_things_are_picked_up_and_let_go(bench):
     world = bench.sim.world
     bench.ok("MoveArm", position={"x": 0, "y": 0.9, "z": 0})
-    plate = next(o for o in world.objects.values() if o.type.pickupable and not world.hidden(o))
+    plate = next(o for o in world.objects.values() if o.type.pickupable and not world.is_hidden(o))
     world.detach(plate)
     world.shift([plate], sphere(bench) - plate.center)
     bench.ok("PickupObject", objectIdCandidates=[plate.object_id])

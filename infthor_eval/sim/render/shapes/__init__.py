@@ -1,4 +1,4 @@
-"""What each type of object looks like: assemblies of primitives in the object's box."""
+"""The shapes of the types of objects: assemblies of primitives in the object's box."""
 
 from infthor_eval.sim.render.shapes.catalogue import shape
 

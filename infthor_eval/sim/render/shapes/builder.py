@@ -1,4 +1,4 @@
-"""A drawing board for one object: coordinates run from -1 to 1 across the object's box, front towards +z."""
+"""Building the shape of one object: coordinates run from -1 to 1 across the object's box, front towards +z."""
 
 from collections.abc import Sequence
 from typing import TypedDict, Unpack
@@ -15,7 +15,7 @@ Vector = Sequence[float]
 
 
 def shade_of(color: Color, factor: float) -> Color:
-    """A colour made darker (factor below 1) or lighter."""
+    """Return a colour made darker (factor below 1) or lighter."""
     return (min(color[0] * factor, 1.0), min(color[1] * factor, 1.0), min(color[2] * factor, 1.0))
 
 
@@ -32,7 +32,14 @@ class Builder:
     """Collects the parts of one object.
 
     Positions are fractions of the half box from its centre: (0, -1, 0) is the middle of the underside, (0, 0, 1) the
-    middle of the front. `half` are fractions too, so (1, 1, 1) fills the box.
+    middle of the front. Half extents are fractions too, so (1, 1, 1) fills the box. Shapes so fit objects of any size.
+
+    Attributes:
+        item: the object.
+        state: its state, which may change its looks.
+        parts: primitives so far.
+        style: index that varies colours.
+        half: half extents of the object's box seen from its front, metres (3,).
     """
 
     def __init__(self, item: SimObject) -> None:
@@ -44,21 +51,21 @@ class Builder:
         self.half: Array = item.front_size / 2
 
     def thick(self, metres: float, axis: int) -> float:
-        """A length in metres as a fraction of the half box along `axis`, at most 1."""
+        """Return a length in metres as a fraction of the half box along `axis`, at most 1."""
         return min(1.0, metres / max(float(self.half[axis]), 1e-6))
 
     @property
     def slenderness(self) -> float:
-        """The shorter of its two horizontal sides as a share of the longer one."""
+        """The shorter horizontal side as a share of the longer one."""
         sides = float(self.half[0]), float(self.half[2])
         return min(sides) / max(sides)
 
     def lengthwise(self, along: float, y: float, across: float) -> tuple[float, float, float]:
-        """A position or half extents given along and across the longer of the two horizontal sides."""
+        """Return a position or half extents given along and across the longer horizontal side."""
         return (along, y, across) if self.half[0] >= self.half[2] else (across, y, along)
 
     def metric(self, at: Vector) -> Array:
-        """A position given in fractions, as metres in the object's frame (3,)."""
+        """Return a position given in fractions as metres in the object's frame (3,)."""
         return self.item.box_center + self._turn @ (np.asarray(at, dtype=float) * self.half)
 
     def add(
@@ -132,7 +139,7 @@ class Builder:
         return max(range(3), key=lambda i: float(self.half[i]))
 
     def along(self, at: float, axis: int) -> tuple[float, float, float]:
-        """A position on one of the box's middle lines."""
+        """Return a position on one of the box's middle lines."""
         return (at if axis == 0 else 0.0, at if axis == 1 else 0.0, at if axis == 2 else 0.0)
 
     def bar(
@@ -160,20 +167,20 @@ class Builder:
         """Add a box whose half extents are given in metres."""
         self.parts.append(ShapePart(Form.BOX, self.metric(at), tuple(metres), color, material, self._turn))
 
-    def swung(
+    def hinged_box(
         self, hinge: Vector, offset: Vector, metres: Vector, angle: float, color: Color, material: Material,
         glow: float = 0.0,
     ) -> None:  # fmt: skip
-        """Add a box that has turned about an upright hinge.
+        """Add a box that is turned about an upright hinge.
 
         Args:
-            hinge: where the hinge is, in fractions.
+            hinge: position of the hinge, in fractions.
             offset: the box's middle from the hinge before turning, metres.
-            metres: half extents in metres.
-            angle: degrees of turn.
-            color: its colour.
-            material: its surface.
-            glow: 0 lit by the lights only, 1 shines by itself.
+            metres: half extents, metres.
+            angle: turn, degrees.
+            color: colour.
+            material: surface pattern.
+            glow: share of light of its own, 0 to 1.
         """
         turn = self._turn @ yaw_matrix(angle)
         center = self.metric(hinge) + turn @ np.asarray(offset, dtype=float)

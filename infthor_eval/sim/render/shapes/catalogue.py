@@ -1,4 +1,4 @@
-"""What any object looks like: the drawing that its type names, and what dirt does to it."""
+"""The shape of any object: the drawing that its type names, with dirt and variation of colour."""
 
 from dataclasses import replace
 
@@ -30,11 +30,11 @@ _TINTS, _TINT = 5, 0.045  # objects of one colour differ a little in brightness,
 
 
 def shape(item: SimObject) -> list[ShapePart]:
-    """The parts of an object in its own frame, as its type and state make it look."""
+    """Return the primitives of an object in its own frame, by its type and state."""
     board = Builder(item)
     SHAPES[item.type.shape](board)
     if item.state.dirty:
-        return [replace(part, color=_soiled(part.color)) for part in board.parts]
+        return [replace(part, color=_dirty_color(part.color)) for part in board.parts]
     tint = 1.0 + _TINT * (item.style % _TINTS - _TINTS // 2) / (_TINTS // 2)
     return [replace(part, color=shade_of(part.color, tint)) for part in board.parts]
 
@@ -45,6 +45,6 @@ def box(b: Builder) -> None:
     b.box((0, 0, 0), (1, 1, 1), (0.6, 0.55, 0.5))
 
 
-def _soiled(color: Color) -> Color:
+def _dirty_color(color: Color) -> Color:
     r, g, b = (c * (1 - _DIRT_SHARE) + d * _DIRT_SHARE for c, d in zip(color, _DIRT, strict=True))
     return (r, g, b)

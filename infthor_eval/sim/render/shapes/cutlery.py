@@ -1,4 +1,4 @@
-"""Knives, forks, spoons and what else is long and of steel; their handles lie towards +z."""
+"""Knives, forks, spoons, spatulas and ladles; their handles point towards +z."""
 
 from infthor_eval.sim.render.primitives import Color, Form, Material
 from infthor_eval.sim.render.shapes.builder import Builder, shade_of

@@ -1,4 +1,4 @@
-"""What is built into rooms: sinks, taps, baths, toilets, windows, pictures, switches, stoves, rails."""
+"""Fixtures of rooms: sinks, taps, baths, toilets, windows, pictures, switches, stoves, rails."""
 
 from infthor_eval.sim.render.primitives import Color, Form, Material
 from infthor_eval.sim.render.shapes.builder import Builder, shade_of
@@ -23,7 +23,7 @@ def floor(b: Builder) -> None:
 
 @draws
 def sink(b: Builder) -> None:
-    """A rim of steel or stone around the basins; a hollow tub where the basins are not objects of their own."""
+    """A rim of steel or ceramic around the basins; a hollow tub if the basins are no separate objects."""
     color = STEEL if b.style % 2 else _CERAMIC
     if not b.item.pieces:
         b.open_top(color, Material.METAL, 0.02, glow=0.22)
@@ -68,7 +68,7 @@ def faucet(b: Builder) -> None:
 
 @draws
 def bathtub(b: Builder) -> None:
-    """A white tub; its bottom is an object of its own where the recording has one."""
+    """A white tub; its basin may be a separate object."""
     b.open_top(_CERAMIC, Material.PLAIN, 0.07, glow=0.15)
 
 

@@ -50,7 +50,7 @@ def bread(b: Builder) -> None:
 
 
 def loaf(b: Builder, axis: int, share: float, length: float, color: Color, material: Material) -> None:
-    """The outline of a tin loaf across `axis`: `share` of its width and height, `length` of its length."""
+    """Add a tin loaf along `axis`, with a share of its width and height and a share of its length."""
     at, half = (0.0, -0.3 * share, 0.0), [0.86 * share] * 3
     half[1], half[axis] = 0.7 * share, length
     b.box(at, half, shade_of(color, 0.92), material)

@@ -2,18 +2,7 @@
 
 from infthor_eval.sim.render.primitives import Color, Form, Material
 from infthor_eval.sim.render.shapes.builder import Builder, shade_of
-from infthor_eval.sim.render.shapes.palette import (
-    BLACK,
-    BRASS,
-    CERAMICS,
-    DARK,
-    LEAF,
-    PAPER,
-    STEEL,
-    WHITE,
-    WOODS,
-    pick,
-)
+from infthor_eval.sim.render.shapes.palette import BLACK, BRASS, CERAMICS, DARK, LEAF, PAPER, STEEL, WHITE, WOODS, pick
 from infthor_eval.sim.render.shapes.register import draws
 
 __all__: list[str] = []
@@ -126,7 +115,7 @@ def _bottle_with_head(b: Builder, color: Color, head: Color) -> None:
 
 @draws
 def soap_bottle(b: Builder) -> None:
-    """A bottle with a pump; flat when used up."""
+    """A bottle with a pump, grey when used up."""
     color: Color = (
         (0.8, 0.8, 0.8) if b.state.used_up else pick(((0.3, 0.65, 0.7), (0.85, 0.6, 0.25), (0.6, 0.75, 0.4)), b.style)
     )
@@ -155,7 +144,7 @@ def sponge(b: Builder) -> None:
 
 @draws
 def toilet_paper(b: Builder) -> None:
-    """A roll with a core along its axis of equal sides."""
+    """An upright roll with a core, thin when used up."""
     color: Color = (0.7, 0.6, 0.45) if b.state.used_up else WHITE
     width = 0.4 if b.state.used_up else 1.0
     b.tube((0, 0, 0), (width, 1, width), color, Material.FABRIC)

@@ -41,5 +41,5 @@ CLOTHS: tuple[Color, ...] = (
 
 
 def pick(colors: Sequence[Color], style: int) -> Color:
-    """The colour of a style number."""
+    """Return the colour of a style number."""
     return colors[style % len(colors)]

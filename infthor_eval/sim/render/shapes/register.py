@@ -1,4 +1,4 @@
-"""The register of the functions that draw objects; types name theirs."""
+"""The register of the functions that draw objects, by the names that types give."""
 
 from collections.abc import Callable
 

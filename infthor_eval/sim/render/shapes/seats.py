@@ -9,7 +9,7 @@ __all__: list[str] = []
 
 
 def _seat_level(b: Builder, usual: float) -> float:
-    """Height of the seat as a fraction of the half box, from what is known of the object."""
+    """Return the height of the seat as a fraction of the half box: the object's surface height if it is known."""
     if b.item.support is None:
         return usual
     return min(0.9, max(-0.8, b.item.support / float(b.half[1]) - 1))

@@ -1,4 +1,4 @@
-"""Slices of food: its own colour around its flesh, and its own outline across the cut."""
+"""Slices of food, each with the rind, flesh and outline of its food."""
 
 from infthor_eval.sim.object_types import OBJECT_TYPES
 from infthor_eval.sim.render.primitives import Color, Form, Material
@@ -8,6 +8,7 @@ from infthor_eval.sim.render.shapes.register import draws
 
 __all__: list[str] = []
 
+# Number of slices, by the type of slice.
 _COUNTS = {whole.slice_type: whole.slices for whole in OBJECT_TYPES.values() if whole.slices}
 _RUFFLES = ((0.42, 0.42), (0.42, -0.42), (-0.42, 0.42), (-0.42, -0.42))
 _TOAST: Color = (0.55, 0.33, 0.15)
@@ -17,7 +18,7 @@ _CRUMB: Color = (0.95, 0.86, 0.66)
 @draws
 def bread_slice(b: Builder) -> None:
     """The loaf's outline: crust around crumb, or toast."""
-    axis = _thin(b)
+    axis = _thin_axis(b)
     crust, crumb = (shade_of(_TOAST, 0.7), _TOAST) if b.state.cooked else (shade_of(CRUST, 0.8), _CRUMB)
     loaf(b, axis, 1.0, 0.9, crust, Material.PLAIN)
     loaf(b, axis, 0.86, 1.0, crumb, Material.STONE)
@@ -58,20 +59,21 @@ def lettuce_slice(b: Builder) -> None:
 
 def _round(b: Builder, rind: Color, flesh: Color) -> None:
     """A round slice; darker when cooked."""
-    size = _width(b)
+    size = _relative_width(b)
     _disc(b, size, 0.92, shade_of(rind, 0.7) if b.state.cooked else rind, (0.0, 0.0))
     _disc(b, 0.86 * size, 1.0, shade_of(flesh, 0.78) if b.state.cooked else flesh, (0.0, 0.0))
 
 
 def _spots(b: Builder, places: tuple[tuple[float, float], ...], size: float, color: Color) -> None:
     """Round spots on both faces, by their places aside and up."""
-    width = _width(b)
+    width = _relative_width(b)
     for aside, up in places:
         _disc(b, size * width, 1.04 + 0.2 * (0.3 - size), color, (aside * width, up * width))
 
 
-def _width(b: Builder) -> float:
-    """The first and last slices of a round thing are smaller than those of its middle; the id tells which it is."""
+def _relative_width(b: Builder) -> float:
+    """Return the width of a slice as a share of the widest: the first and last slices of a round thing are smaller."""
+    # The id ends with the number of the slice.
     number = b.item.object_id.rsplit("_", 1)[-1]
     count = _COUNTS.get(b.item.object_type, 1)
     if not number.isdigit() or not 1 <= int(number) <= count:
@@ -80,16 +82,17 @@ def _width(b: Builder) -> float:
     return float(max(0.55, (1 - off * off) ** 0.5))
 
 
-def _thin(b: Builder) -> int:
-    """The level axis across which it was cut."""
+def _thin_axis(b: Builder) -> int:
+    """Return the level axis across which it was cut."""
     return min((0, 2), key=lambda axis: float(b.half[axis]))
 
 
 def _disc(b: Builder, radius: float, thick: float, color: Color, at: tuple[float, float]) -> None:
-    """A disc across the thin axis, its middle aside and up; a turned cylinder's halves are those of other axes."""
-    thin = _thin(b)
+    """Add a disc across the thin axis, with its middle aside and up."""
+    thin = _thin_axis(b)
     tilt = (0.0, 0.0, 90.0) if thin == 0 else (90.0, 0.0, 0.0)
     x, y, z = (float(v) for v in b.half)
+    # Half extents are fractions of the object's axes, but the tilted cylinder's axes lie along others: hence ratios.
     half = (radius * y / x, thick * x / y, radius) if thin == 0 else (radius, thick * z / y, radius * y / z)
     middle = (0.0, at[1], at[0]) if thin == 0 else (at[0], at[1], 0.0)
     b.add(Form.CYLINDER, middle, half, color, tilt=tilt)

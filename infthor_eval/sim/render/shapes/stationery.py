@@ -42,7 +42,7 @@ def pencil(b: Builder) -> None:
 
 
 def _thickness(b: Builder) -> float:
-    """Half of its thinner sides' larger one, metres."""
+    """Return half of the second longest side, metres: the thickness of a round thing in a box around it."""
     return sorted(float(v) for v in b.half)[1]
 
 

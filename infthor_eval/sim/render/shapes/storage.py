@@ -1,4 +1,4 @@
-"""Things with an inside: cabinets, drawers, fridges, microwaves, safes, boxes, bins."""
+"""Objects with an inside: cabinets, drawers, fridges, microwaves, safes, boxes, bins."""
 
 from infthor_eval.sim.objects import DOOR_SWING, DRAWER_SLIDE
 from infthor_eval.sim.render.primitives import Color, Form, Material
@@ -9,23 +9,23 @@ from infthor_eval.sim.render.shapes.register import draws
 __all__: list[str] = []
 
 _LEAF = 0.02  # thickness of a door, metres
-_LIT = 0.2  # how much the insides of open things shine, as no light of the room gets there
-_BODY = 0.82  # of a wide open cardboard box's width, the rest being its flaps, as its record has it closed
+_LIT = 0.2  # light of their own of the insides of open things, whose contents would be hard to see otherwise
+_BODY = 0.82  # of a wide open cardboard box's width; the rest is its flaps. The type's `unfolds` has the same share.
 _COLD: Color = (0.93, 0.97, 1.0)
 
 
 def _door(b: Builder, color: Color, material: Material, grip: Color, low: float = -1.0, high: float = 1.0) -> None:
-    """A hinged door over the front from height fraction `low` to `high`, opened as far as the object is."""
+    """Add a hinged door over the front from height fraction `low` to `high`, at the object's openness."""
     side = b.item.hinge or -1
     width, height, depth = (float(v) for v in b.half)
     middle, half = (low + high) / 2 * height, (high - low) / 2 * height
     angle = side * DOOR_SWING * b.state.openness
     leaf = min(_LEAF / 2, depth * 0.3)
     hinge = (side, 0.0, 1.0)
-    b.swung(hinge, (-side * width, middle, -leaf), (width * 0.985, half * 0.985, leaf), angle, color, material)
+    b.hinged_box(hinge, (-side * width, middle, -leaf), (width * 0.985, half * 0.985, leaf), angle, color, material)
     reach = 2 * width * 0.88
     tall = min(half * 0.35, 0.2)
-    b.swung(hinge, (-side * reach, middle, 0.012), (0.008, tall, 0.01), angle, grip, Material.METAL)
+    b.hinged_box(hinge, (-side * reach, middle, 0.012), (0.008, tall, 0.01), angle, grip, Material.METAL)
 
 
 @draws
@@ -94,11 +94,11 @@ def _door_racks(b: Builder) -> None:
     hinge, inward = (side, 0.0, 1.0), -_LEAF
     for low, high in ((-0.93, 0.26), (0.37, 0.96)):
         half, middle = (high - low) / 2 * height, (high + low) / 2 * height
-        b.swung(hinge, (-side * width, middle, inward - 0.006), (width * 0.9, half, 0.006), angle, _COLD,
+        b.hinged_box(hinge, (-side * width, middle, inward - 0.006), (width * 0.9, half, 0.006), angle, _COLD,
                 Material.PLAIN, glow=0.3)  # fmt: skip
         for share in (-0.6, 0.1):
-            b.swung(hinge, (-side * width, middle + share * half, inward - 0.035), (width * 0.8, 0.03, 0.03), angle,
-                    (0.6, 0.72, 0.8), Material.PLAIN, glow=0.15)  # fmt: skip
+            offset = (-side * width, middle + share * half, inward - 0.035)
+            b.hinged_box(hinge, offset, (width * 0.8, 0.03, 0.03), angle, (0.6, 0.72, 0.8), Material.PLAIN, glow=0.15)
 
 
 @draws
@@ -119,9 +119,9 @@ def microwave(b: Builder) -> None:
         b.box((-0.76, 0, 0), (0.22, 0.94, 0.98), shade_of(body, 0.9), Material.METAL)
         wide = float(b.half[0])
         angle = DOOR_SWING * b.state.openness
-        b.swung((1, 0, 1), (-0.74 * wide, 0, -0.012), (0.74 * wide, 0.92 * float(b.half[1]), 0.012), angle,
+        b.hinged_box((1, 0, 1), (-0.74 * wide, 0, -0.012), (0.74 * wide, 0.92 * float(b.half[1]), 0.012), angle,
                 shade_of(body, 0.8), Material.METAL)  # fmt: skip
-        b.swung((1, 0, 1), (-0.72 * wide, 0, 0.002), (0.55 * wide, 0.65 * float(b.half[1]), 0.012), angle,
+        b.hinged_box((1, 0, 1), (-0.72 * wide, 0, 0.002), (0.55 * wide, 0.65 * float(b.half[1]), 0.012), angle,
                 (0.13, 0.14, 0.16), Material.GLASS)  # fmt: skip
     b.box((-0.76, 0.1, 1 - z / 2), (0.18, 0.7, z), BLACK)
     b.box((-0.76, 0.62, 1), (0.14, 0.12, z), (0.2, 0.85, 0.45), glow=0.6)
@@ -159,7 +159,7 @@ def carton(b: Builder) -> None:
 
 
 def _body(b: Builder, color: Color, share: float) -> None:
-    """Four sides and a bottom, as far within the box as the flaps take."""
+    """Add four sides and a bottom, within the share of the box that the flaps leave."""
     y = b.thick(0.004, 1)
     x, z = b.thick(0.006, 0), b.thick(0.006, 2)
     b.box((0, -1 + y, 0), (share, y, share), shade_of(color, 0.88), glow=0.12)

@@ -35,7 +35,7 @@ def counter(b: Builder) -> None:
 
 
 def cut_slab(b: Builder, at: float, half: float, color: Color, material: Material, shrink: float = 1.0) -> None:
-    """A board over the object's plan, its middle at height `at`, `half` thick (fractions)."""
+    """Add a board over the object's outline from above, its middle at height `at`, `half` thick (fractions)."""
     turned = round(b.item.front / 90)
     x, z = float(b.half[0]), float(b.half[2])
     for piece in b.item.pieces or ((-x, -z, x, z),):
@@ -45,7 +45,7 @@ def cut_slab(b: Builder, at: float, half: float, color: Color, material: Materia
 
 
 def _turn(rect: Rect, quarters: int) -> Rect:
-    """A rectangle of the object's frame in the frame of its front, which is turned by quarter turns."""
+    """Return a rectangle of the object's frame in the frame of its front, which is turned by quarter turns."""
     x0, z0, x1, z1 = rect
     for _ in range(quarters % 4):
         x0, z0, x1, z1 = -z1, x0, -z0, x1
@@ -53,7 +53,7 @@ def _turn(rect: Rect, quarters: int) -> Rect:
 
 
 def _carcass(b: Builder, color: Color, top: float) -> None:
-    """Sides and back from the floor up to `top`; the front is left to drawers."""
+    """Add sides and back from the floor up to `top`; the front is left to drawers."""
     x, z = b.thick(0.012, 0), b.thick(0.01, 2)
     middle, half = (top - 1) / 2, (top + 1) / 2
     for side in (-1, 1):
@@ -62,12 +62,12 @@ def _carcass(b: Builder, color: Color, top: float) -> None:
 
 
 def _surface(b: Builder) -> float:
-    """Height of the board's upper side, as a fraction of the half box."""
+    """Return the height of the board's upper side, as a fraction of the half box."""
     return 1.0 if b.item.support is None else b.item.support / float(b.half[1]) - 1
 
 
 def _top(b: Builder, color: Color, edge: float) -> float:
-    """The board, and a raised back where the surface is lower than the box; the height of the board's underside."""
+    """Add the board, and a back where the surface is lower than the box; return the height of the board's underside."""
     surface = _surface(b)
     board = b.thick(0.02, 1)
     b.box((0, surface - board, 0), (1, board, 1), color, Material.WOOD)
@@ -87,7 +87,7 @@ def _legs(b: Builder, under: float, thick: float, color: Color) -> None:
 
 @draws
 def table(b: Builder) -> None:
-    """A board on four square legs: desks and what else has no shape of its own."""
+    """A board on four square legs, for desks."""
     color = pick(WOODS, b.style)
     under = _top(b, color, 0.7)
     if b.item.hollow:

@@ -9,7 +9,7 @@ import numpy as np
 from infthor_eval.sim.actions.interaction import set_openness
 from infthor_eval.sim.actions.registry import action
 from infthor_eval.sim.errors import ActionError
-from infthor_eval.sim.restore import NamedPose, set_poses, spawn_randomly
+from infthor_eval.sim.rearrange import NamedPose, set_poses, spawn_randomly
 from infthor_eval.sim.simulation import Simulation
 
 __all__: list[str] = []
@@ -21,46 +21,40 @@ def set_object_poses(
     forceRigidbodySleep: bool = True, skipMoveable: bool = False,
 ) -> None:  # fmt: skip
     """Place the listed objects by name; a name listed twice is copied, pickupable objects not listed vanish."""
-    set_poses(sim.world, [_pose(entry) for entry in objectPoses], keep_moveable=skipMoveable)
+    set_poses(sim.world, [_named_pose(entry) for entry in objectPoses], keep_moveable=skipMoveable)
+
+
+def _named_pose(entry: Any) -> NamedPose:
+    if not isinstance(entry, Mapping) or not isinstance(entry.get("objectName"), str):
+        raise ActionError(f"objectPoses needs entries with objectName, position and rotation, not {entry!r}")
+    try:
+        return NamedPose.from_wire(entry)
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise ActionError(f"objectPoses: {entry['objectName']} has no usable position or rotation ({error})") from error
 
 
 @action("SetObjectToggles")
 def set_object_toggles(sim: Simulation, objectToggles: list[Any]) -> None:
-    """Switches all objects of the listed types on or off."""
+    """Switch all objects of the listed types on or off."""
     for entry in objectToggles:
         if not isinstance(entry, Mapping) or not isinstance(entry.get("objectType"), str):
             raise ActionError(f"objectToggles needs entries with objectType and isOn, not {entry!r}")
         for item in sim.world.objects.values():
             if item.object_type == entry["objectType"] and item.type.toggleable:
                 item.state.toggled = bool(entry.get("isOn", False))
-                sim.world.touch(item)
+                sim.world.mark_changed(item)
 
 
-@action("SetStateOfAllObjects")
-def set_state_of_all_objects(sim: Simulation, StateChange: str, forceAction: bool = False) -> None:
-    """Make every object that can be so dirty, filled or used up; the contrary without `forceAction`."""
-    change = _ALL_AT_ONCE.get(StateChange)
-    if change is None:
-        raise ActionError(f"{StateChange!r} is not a state change; use one of {', '.join(sorted(_ALL_AT_ONCE))}")
-    _change_all(sim, change, forceAction)
+class _StateChange(NamedTuple):
+    """A state that can be set on many objects at once.
 
-
-@action("SetObjectStates")
-def set_object_states(sim: Simulation, SetObjectStates: Mapping[str, Any]) -> None:
-    """Open, switch, dirty and so on all objects of a type, or all at once.
-
-    `SetObjectStates` holds `objectType` (or none for all), `stateChange` and the new value under its own name
-    (`isOpen`, `isToggled`, `isDirty`, `isBroken`, `isFilledWithLiquid`, `isUsedUp`, `isCooked`).
+    Attributes:
+        ability: attribute of `ObjectType` that an object must have.
+        flag: the metadata's name of the state.
+        state: attribute of `SimObjectState`.
+        on: its value where the flag is true.
+        off: its value where the flag is false.
     """
-    wanted = str(SetObjectStates.get("stateChange", ""))
-    change = _CHANGES.get(wanted)
-    if change is None:
-        raise ActionError(f"{wanted!r} is not a stateChange; use one of {', '.join(sorted(_CHANGES))}")
-    _change_all(sim, change, bool(SetObjectStates.get(change.flag, True)), SetObjectStates.get("objectType"))
-
-
-class _Change(NamedTuple):
-    """What a type must be able to, the metadata's flag of the state, the state itself and its two values."""
 
     ability: str
     flag: str
@@ -69,33 +63,56 @@ class _Change(NamedTuple):
     off: Any = False
 
 
-_CHANGES = {
-    "openable": _Change("openable", "isOpen", "openness", 1.0, 0.0),
-    "toggleable": _Change("toggleable", "isToggled", "toggled"),
-    "dirtyable": _Change("dirtyable", "isDirty", "dirty"),
-    "breakable": _Change("breakable", "isBroken", "broken"),
-    "canFillWithLiquid": _Change("fillable", "isFilledWithLiquid", "fill_liquid", "water", None),
-    "canBeUsedUp": _Change("usable_up", "isUsedUp", "used_up"),
-    "cookable": _Change("cookable", "isCooked", "cooked"),
+_CHANGES = {  # by `stateChange` of SetObjectStates
+    "openable": _StateChange("openable", "isOpen", "openness", 1.0, 0.0),
+    "toggleable": _StateChange("toggleable", "isToggled", "toggled"),
+    "dirtyable": _StateChange("dirtyable", "isDirty", "dirty"),
+    "breakable": _StateChange("breakable", "isBroken", "broken"),
+    "canFillWithLiquid": _StateChange("fillable", "isFilledWithLiquid", "fill_liquid", "water", None),
+    "canBeUsedUp": _StateChange("usable_up", "isUsedUp", "used_up"),
+    "cookable": _StateChange("cookable", "isCooked", "cooked"),
 }
-_ALL_AT_ONCE = {
+_ALL_AT_ONCE = {  # by `StateChange` of SetStateOfAllObjects
     "CanBeDirty": _CHANGES["dirtyable"],
     "CanBeFilled": _CHANGES["canFillWithLiquid"],
     "CanBeUsedUp": _CHANGES["canBeUsedUp"],
 }
 
 
-def _change_all(sim: Simulation, change: _Change, on: bool, only: str | None = None) -> None:
-    """Changes the state of every object that can be so, or of those of type `only`."""
+@action("SetStateOfAllObjects")
+def set_state_of_all_objects(sim: Simulation, StateChange: str, forceAction: bool = False) -> None:
+    """Make every capable object dirty, filled or used up with `forceAction`; clean, empty or unused without it."""
+    change = _ALL_AT_ONCE.get(StateChange)
+    if change is None:
+        raise ActionError(f"{StateChange!r} is not a state change; use one of {', '.join(sorted(_ALL_AT_ONCE))}")
+    _change_all(sim, change, forceAction)
+
+
+@action("SetObjectStates")
+def set_object_states(sim: Simulation, SetObjectStates: Mapping[str, Any]) -> None:
+    """Set one state of all objects of a type, or of all at once.
+
+    `SetObjectStates` holds `objectType` (or none for all), `stateChange` and the new value under its own name
+    (`isOpen`, `isToggled`, `isDirty`, `isBroken`, `isFilledWithLiquid`, `isUsedUp`, `isCooked`).
+    """
+    name = str(SetObjectStates.get("stateChange", ""))
+    change = _CHANGES.get(name)
+    if change is None:
+        raise ActionError(f"{name!r} is not a stateChange; use one of {', '.join(sorted(_CHANGES))}")
+    _change_all(sim, change, bool(SetObjectStates.get(change.flag, True)), SetObjectStates.get("objectType"))
+
+
+def _change_all(sim: Simulation, change: _StateChange, on: bool, only: str | None = None) -> None:
+    """Change the state of every capable object, or of those of type `only`."""
     value = change.on if on else change.off
     for item in sim.world.objects.values():
         if not getattr(item.type, change.ability) or only not in (None, "", item.object_type):
             continue
-        if change.state == "openness":
+        if change.state == "openness":  # which also moves contents and changes boxes
             set_openness(sim, item, value)
         else:
             setattr(item.state, change.state, value)
-            sim.world.touch(item)
+            sim.world.mark_changed(item)
 
 
 @action("RemoveFromScene")
@@ -119,13 +136,13 @@ def initial_random_spawn(
 ) -> None:
     """Spread the pickupable objects over the receptacles, the same way for the same seed.
 
-    Without `randomSeed` it draws on from the numbers that SetRandomSeed started.
+    Without `randomSeed` it continues the random numbers that SetRandomSeed started.
     """
     if numDuplicatesOfType:
         raise ActionError("numDuplicatesOfType is not offered by the embedded simulator; use SetObjectPoses")
     spawn_randomly(
         sim.world,
-        sim.random if randomSeed is None else seeded(randomSeed),
+        sim.random if randomSeed is None else _random_from_seed(randomSeed),
         excluded_types=frozenset(excludedReceptacles or ()),
         kept=frozenset(excludedObjectIds or ()),
         in_open_only=forceVisible,
@@ -134,19 +151,9 @@ def initial_random_spawn(
 
 @action("SetRandomSeed")
 def set_random_seed(sim: Simulation, seed: int) -> None:
-    """Start the simulator's random numbers anew."""
-    sim.random = seeded(seed)
+    """Restart the simulator's random numbers from a seed."""
+    sim.random = _random_from_seed(seed)
 
 
-def seeded(seed: int) -> np.random.Generator:
-    """Random numbers from a seed of Unity's, which may be negative."""
-    return np.random.default_rng(int(seed) % 2**32)
-
-
-def _pose(entry: Any) -> NamedPose:
-    if not isinstance(entry, Mapping) or not isinstance(entry.get("objectName"), str):
-        raise ActionError(f"objectPoses needs entries with objectName, position and rotation, not {entry!r}")
-    try:
-        return NamedPose.from_wire(entry)
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise ActionError(f"objectPoses: {entry['objectName']} has no usable position or rotation ({error})") from error
+def _random_from_seed(seed: int) -> np.random.Generator:
+    return np.random.default_rng(int(seed) % 2**32)  # Unity's seeds are signed, numpy's are not

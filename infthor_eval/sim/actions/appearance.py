@@ -19,7 +19,7 @@ __all__: list[str] = []
 
 _DARKEST, _BRIGHTEST = 0.45, 1.55  # factors of a surface's colour
 _ITHOR = re.compile(r"FloorPlan\d*(\d\d)|FloorPlan(\d)")
-_ROOMS = {"0": "Kitchen", "2": "LivingRoom", "3": "Bedroom", "4": "Bathroom"}
+_ROOMS = {"0": "Kitchen", "2": "LivingRoom", "3": "Bedroom", "4": "Bathroom"}  # by the hundreds of the floor plan
 _PROCEDURAL = {"kitchen": "Kitchen", "living-room": "LivingRoom", "bedroom": "Bedroom", "bathroom": "Bathroom"}
 
 
@@ -34,25 +34,28 @@ def randomize_materials(
 ) -> dict[str, Any]:
     """Give every object, the walls and the ceilings another colour and pattern.
 
-    There is one set of patterns: which sets are used is only checked and told, as Unity does.
+    There is one set of patterns: which of Unity's sets are used is only checked and reported.
     """
-    used = _sets(sim, useTrainMaterials, useValMaterials, useTestMaterials, useExternalMaterials)
-    _check_rooms(sim, inRoomTypes)
-    _finish(sim, PATTERNS)
+    used = _material_sets(sim, useTrainMaterials, useValMaterials, useTestMaterials, useExternalMaterials)
+    room = _room_type(sim.world.scene)
+    if inRoomTypes is not None and room is not None and room not in inRoomTypes:
+        listed = ", ".join(inRoomTypes)
+        raise ActionError(f"inRoomTypes must include the scene's own room type {room}, not only {listed}")
+    _draw_finishes(sim, PATTERNS)
     return {**used, "totalMaterialsConsidered": len(PATTERNS)}
 
 
 @action("RandomizeColors")
 def randomize_colors(sim: Simulation) -> None:
-    """Give every object, the walls and the ceilings another colour, in the patterns that they have."""
-    _finish(sim, ())
+    """Give every object, the walls and the ceilings another colour and leave their patterns."""
+    _draw_finishes(sim, ())
 
 
 @action("ResetMaterials", "ResetColors")
 def reset_materials(sim: Simulation) -> None:
     """Give all surfaces their usual colours and patterns."""
     sim.world.appearance.finishes = {}
-    sim.world.touch()
+    sim.world.mark_changed()
 
 
 @action("RandomizeLighting")
@@ -67,13 +70,14 @@ def randomize_lighting(
     """Draw the brightness of the daylight and its colour from ranges; there is one light, so none to synchronize."""
     if not randomizeColor and (hue is not None or saturation is not None):
         raise ActionError("Cannot pass in randomizeColor=False while also providing hue or saturation.")
+    # All three are drawn whatever is used, so that the draws after this action do not depend on `randomizeColor`.
     factor = _draw(sim, "brightness", brightness or [0.5, 1.5], 100.0)
     tone = _draw(sim, "hue", hue or [0.0, 1.0], 1.0)
     depth = _draw(sim, "saturation", saturation or [0.5, 1.0], 1.0)
     look = sim.world.appearance
     look.brightness = factor
     look.light = np.array(colorsys.hsv_to_rgb(tone, depth, 1.0)) if randomizeColor else np.ones(3)
-    sim.world.touch()
+    sim.world.mark_changed()
 
 
 @action("ResetLighting")
@@ -81,26 +85,26 @@ def reset_lighting(sim: Simulation) -> None:
     """Give the light its usual brightness and colour."""
     look = sim.world.appearance
     look.brightness, look.light = 1.0, np.ones(3)
-    sim.world.touch()
+    sim.world.mark_changed()
 
 
-def _finish(sim: Simulation, patterns: tuple[int, ...]) -> None:
+def _draw_finishes(sim: Simulation, patterns: tuple[int, ...]) -> None:
     """Draw a finish for everything that is seen."""
     finishes = {}
     for name in (*SHELL_NAMES, *sim.world.objects):
         tint: Array = sim.random.uniform(_DARKEST, _BRIGHTEST, 3)
         finishes[name] = Finish(tint, int(sim.random.choice(patterns)) if patterns else None)
     sim.world.appearance.finishes = finishes
-    sim.world.touch()
+    sim.world.mark_changed()
 
 
-def _sets(
+def _material_sets(
     sim: Simulation, train: bool | None, validation: bool | None, test: bool | None, external: bool | None
 ) -> dict[str, bool]:
-    """The sets of materials to draw from, by default those of the scene's own split.
+    """Return which sets of materials are used, by default those of the scene's own split.
 
     Raises:
-        ActionError: there are none.
+        ActionError: none is.
     """
     split = _split(sim.world.scene)
     used = {
@@ -115,22 +119,16 @@ def _sets(
 
 
 def _split(scene: str) -> str:
-    """AI2-THOR's split of a scene: of 30 rooms of a type, 20 to train, 5 to validate, 5 to test."""
-    found = _ITHOR.fullmatch(scene)
-    if found is None:
+    """Return AI2-THOR's split of a scene: of 30 rooms of a type, 20 to train, 5 to validate, 5 to test."""
+    ithor = _ITHOR.fullmatch(scene)
+    if ithor is None:
         return "val" if scene.startswith("FloorPlan_Val") else "test" if scene.startswith("FloorPlan_Test") else "train"
-    number = int(found[1] or found[2])
+    number = int(ithor[1] or ithor[2])
     return "train" if number <= 20 else "val" if number <= 25 else "test"
 
 
-def _check_rooms(sim: Simulation, wanted: list[str] | None) -> None:
-    room = _room_type(sim.world.scene)
-    if wanted is not None and room is not None and room not in wanted:
-        raise ActionError(f"inRoomTypes must include the scene's own room type {room}, not only {', '.join(wanted)}")
-
-
 def _room_type(scene: str) -> str | None:
-    """Type of a scene's room; None for houses."""
+    """Return the type of a scene's room; None for houses."""
     if scene.startswith("FloorPlan_"):
         return "RoboTHOR"
     if scene.startswith("FloorPlan"):
@@ -139,7 +137,7 @@ def _room_type(scene: str) -> str | None:
     return _PROCEDURAL.get(scene.rpartition("-")[0])
 
 
-def _draw(sim: Simulation, name: str, limits: list[float], most: float) -> float:
-    if len(limits) != 2 or min(limits) < 0 or max(limits) > most:
-        raise ActionError(f"{name} must be two numbers within 0 and {most:g}, not {limits}")
+def _draw(sim: Simulation, name: str, limits: list[float], largest: float) -> float:
+    if len(limits) != 2 or min(limits) < 0 or max(limits) > largest:
+        raise ActionError(f"{name} must be two numbers within 0 and {largest:g}, not {limits}")
     return float(sim.random.uniform(min(limits), max(limits)))

@@ -1,26 +1,26 @@
-"""Whether a camera sees one thing, without drawing the picture."""
+"""Checking whether cameras see one object, without drawing their pictures."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from infthor_eval.sim.geometry import Array
-from infthor_eval.sim.render.camera import Camera, project
+from infthor_eval.sim.render.camera import PinholeCamera, project
 from infthor_eval.sim.render.picture import Rasterizer
 from infthor_eval.sim.render.primitives import AXES, CENTER, HALF, INSTANCE
 
-__all__ = ["Glimpse"]
+__all__ = ["VisibilityProbe"]
 
-_SLACK = 1e-6  # metres; what touches the way to the thing counts as being in it
-_PLACES = 2  # that are remembered: one asks for many directions from one place, standing and crouched
+_SLACK = 1e-6  # metres; what touches the region between camera and object counts as in it
+_PLACES = 2  # cached camera positions: callers ask for many directions from one place, standing and crouched
 
 
-class Glimpse:
-    """Looks for one instance among primitives, from many places and in many directions.
+class VisibilityProbe:
+    """Checks whether one instance is visible, from many places and in many directions.
 
     Args:
         prims: the primitives of the scene (n, COLUMNS).
-        instance: what is looked for.
-        rasterizer: casts the rays.
+        instance: index of the instance to look for.
+        rasterizer: implementation of the ray caster.
     """
 
     def __init__(self, prims: Array, instance: int, rasterizer: Rasterizer) -> None:
@@ -30,17 +30,18 @@ class Glimpse:
         self._own: NDArray[np.bool_] = prims[:, INSTANCE] == instance
         self._between: dict[bytes, Array] = {}
 
-    def seen_by(self, camera: Camera, least: int) -> bool:
-        """Whether at least `least` pixels of the camera's picture show the instance."""
+    def is_seen_by(self, camera: PinholeCamera, min_pixels: int) -> bool:
+        """Return whether at least `min_pixels` pixels of the camera's picture show the instance."""
         if not self._own.any():
             return False
-        prims = self._from(camera.position)
-        seen = project(prims, camera)
-        own = prims[seen.index, INSTANCE] == self._instance
-        return bool(own.any()) and self._rasterizer.shows(prims, seen, camera, own, least)
+        prims = self._relevant(camera.position)
+        projection = project(prims, camera)
+        own = prims[projection.index, INSTANCE] == self._instance
+        return bool(own.any()) and self._rasterizer.is_visible(prims, projection, camera, own, min_pixels)
 
-    def _from(self, eye: Array) -> Array:
-        """The instance's primitives and those that could hide it from `eye`: the others lie beside the way to it."""
+    def _relevant(self, eye: Array) -> Array:
+        """Return the instance's primitives and those that could hide it from `eye`."""
+        # Everything that could hide it overlaps the box around the eye and the instance. That leaves few primitives.
         key = eye.tobytes()
         if key not in self._between:
             if len(self._between) == _PLACES:

@@ -1,4 +1,4 @@
-"""Rearranging a scene's loose objects: to recorded poses, or at random."""
+"""Rearranging a scene's loose objects, to recorded poses or at random."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Mapping
@@ -11,18 +11,24 @@ from infthor_eval.sim.default_objects import default_object
 from infthor_eval.sim.geometry import Array, object_id, to_array
 from infthor_eval.sim.object_types import ObjectType, allowed_in, type_named
 from infthor_eval.sim.objects import SimObject
-from infthor_eval.sim.receptacles import find_place, owner_of
+from infthor_eval.sim.receptacles import find_parent, find_place
 from infthor_eval.sim.world import World
 
-__all__ = ["NamedPose", "set_poses", "settle_parents", "spawn_randomly"]
+__all__ = ["NamedPose", "assign_parents", "set_poses", "spawn_randomly"]
 
-_SUNK = 0.2  # metres; what lies deeper is inside
+_SUNK = 0.2  # metres below a surface; what lies deeper is inside the furniture
 _RENAMED = {"Glassbottle": "Bottle"}  # as ALFRED's AI2-THOR 2.1.0 calls it
 
 
 @dataclass(frozen=True)
 class NamedPose:
-    """Where one object is to be: by name, as AI2-THOR's SetObjectPoses takes it."""
+    """A pose for one object, as AI2-THOR's SetObjectPoses takes it.
+
+    Attributes:
+        name: AI2-THOR's name of the object.
+        position: metres (3,).
+        rotation: Unity's Euler angles in degrees (3,).
+    """
 
     name: str
     position: Array
@@ -30,15 +36,17 @@ class NamedPose:
 
     @classmethod
     def from_wire(cls, entry: Mapping[str, Any]) -> "NamedPose":
-        """From `{"objectName", "position", "rotation"}`."""
+        """Read a pose from `{"objectName", "position", "rotation"}`."""
         rotation = entry.get("rotation") or {}
+        # Unity appends "(Clone)" to the names of copies.
         return cls(entry["objectName"].removesuffix("(Clone)"), to_array(entry["position"]), to_array(rotation))
 
 
 def set_poses(world: World, poses: Iterable[NamedPose], keep_moveable: bool = False) -> None:
-    """Give the named objects new poses and new ids made from them; loose objects that are not named vanish.
+    """Give the named objects new poses, and new ids made of the poses; loose objects that are not named vanish.
 
-    Names of other versions of AI2-THOR differ after the type: a name that the scene does not have is taken by type.
+    A name that the scene does not have means any object of its type: the part of a name after the type differs between
+    versions of AI2-THOR.
     """
     chooser = _Templates(world)
     world.release()
@@ -52,16 +60,16 @@ def set_poses(world: World, poses: Iterable[NamedPose], keep_moveable: bool = Fa
             if not keep_moveable:
                 world.set_pose(template, pose.position, pose.rotation)
             continue
-        item = template.duplicate(_unused(world, pose.name.split("_", 1)[0], pose.position))
+        item = template.duplicate(_unused_id(world, pose.name.split("_", 1)[0], pose.position))
         item.name, item.position, item.rotation = pose.name, pose.position.copy(), pose.rotation.copy()
         item.state.picked_up = False
         world.add(item)
-    settle_parents(world)
+    assign_parents(world)
     _lower_supports(world)
 
 
 def _lower_supports(world: World) -> None:
-    """Lowers surfaces that recorded things would be sunk in: where things were put tells how high a table is."""
+    """Lower surfaces that the placed objects would be sunk in: their poses are more exact than recorded boxes."""
     for item in world.objects.values():
         if not _has_surface(item.type):
             continue
@@ -70,27 +78,31 @@ def _lower_supports(world: World) -> None:
         lowest = min(bottoms, default=level)
         if level - _SUNK < lowest < level - 0.002:
             item.support = lowest - 0.002 - float(item.bounds()[0][1])
-            world.touch(item)
+            world.mark_changed(item)
 
 
 def _has_surface(furniture: ObjectType) -> bool:
-    """Whether things stand on it, and not in it."""
+    """Return whether things stand on it, and not in it."""
     hollow = furniture.encloses or furniture.open_top > 0 or furniture.basin
     return furniture.receptacle and not furniture.pickupable and not hollow
 
 
-def settle_parents(world: World) -> None:
-    """Find for every loose object without a parent the receptacle that it stands in or on."""
-    carried = world.carried()
+def assign_parents(world: World) -> None:
+    """Attach every loose object without a parent to the receptacle that it is in or on."""
+    held = world.held_ids()
     for item in world.objects.values():
-        if item.type.pickupable and item.parent is None and item.object_id not in carried:
-            owner = owner_of(world, item)
-            if owner is not None:
-                world.attach(item, owner)
+        if item.type.pickupable and item.parent is None and item.object_id not in held:
+            parent = find_parent(world, item)
+            if parent is not None:
+                world.attach(item, parent)
 
 
 class _Templates:
-    """Finds the object that a name means, by exact name first and by type else."""
+    """Chooses the object that a name means: the one of that name, else one of its type.
+
+    Args:
+        world: the scene as it is now; removed objects are looked for in its templates.
+    """
 
     def __init__(self, world: World) -> None:
         self._world = world
@@ -103,43 +115,47 @@ class _Templates:
         self._count: dict[str, int] = defaultdict(int)
 
     def choose(self, name: str) -> SimObject | None:
+        """Return the object that a name means; the same for the same name, and in turn for different ones."""
         if name in self._named:
             return self._named[name]
         if name not in self._chosen:
             prefix = name.split("_", maxsplit=1)[0]
             object_type = _RENAMED.get(prefix, prefix)
-            known = self._typed.get(object_type) or self._defaults(object_type)
-            if not known:
-                return None
-            self._chosen[name] = known[self._count[object_type] % len(known)]
+            candidates = self._typed.get(object_type)
+            if not candidates:
+                if not type_named(object_type).pickupable:
+                    return None
+                candidates = [default_object(object_type, np.zeros(3))]
+            self._chosen[name] = candidates[self._count[object_type] % len(candidates)]
             self._count[object_type] += 1
         return self._chosen[name]
 
-    def _defaults(self, object_type: str) -> list[SimObject]:
-        return [default_object(object_type, np.zeros(3))] if type_named(object_type).pickupable else []
 
-
-def _unused(world: World, object_type: str, position: Array) -> str:
-    wanted = object_id(object_type, position)
-    number, found = 1, wanted
-    while found in world.objects:
-        found, number = f"{wanted}|{number}", number + 1
-    return found
+def _unused_id(world: World, object_type: str, position: Array) -> str:
+    base = object_id(object_type, position)
+    number, unused = 1, base
+    while unused in world.objects:
+        unused, number = f"{base}|{number}", number + 1
+    return unused
 
 
 def spawn_randomly(
-    world: World,
-    random: np.random.Generator,
-    excluded_types: frozenset[str],
-    kept: frozenset[str],
-    in_open_only: bool,
+    world: World, random: np.random.Generator, excluded_types: frozenset[str], kept: frozenset[str], in_open_only: bool
 ) -> None:
-    """Put every loose object that is not `kept` into a random receptacle that takes its type and has room."""
-    carried = world.carried()
+    """Put every loose object into or onto a random receptacle that takes its type and has room.
+
+    Args:
+        world: the scene.
+        random: random numbers that choose the order of the objects and their receptacles.
+        excluded_types: types of receptacles that get nothing.
+        kept: ids of objects that stay where they are.
+        in_open_only: use no receptacle that hides its contents when closed.
+    """
+    held = world.held_ids()
     loose = [o for o in world.objects.values() if o.type.pickupable and o.object_id not in kept]
     for index in random.permutation(len(loose)):
         item = loose[index]
-        if item.object_id in carried:
+        if item.object_id in held:
             continue
         homes = [
             o for o in world.objects.values()

@@ -1,28 +1,30 @@
-"""Whether a thing is seen at all, compiled by numba: it stops as soon as enough pixels show it."""
+"""Checking whether an object is visible, compiled by numba: it stops as soon as enough pixels show the object."""
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from infthor_eval.sim.geometry import Array
-from infthor_eval.sim.render.camera import Camera, Projection
+from infthor_eval.sim.render.camera import PinholeCamera, Projection
 from infthor_eval.sim.render.primitives import BOTTOM, FORM, TOP
 from infthor_eval.sim.render.raster_numba import hit
 
-__all__ = ["shows"]
+__all__ = ["is_visible"]
 
-_THINNED = 8  # one row and column in so many is tried first: what is in full view is found there
+_COARSE = 8  # every eighth row and column is tried first: an object in full view shows up there already
 
 
-def shows(prims: Array, seen: Projection, camera: Camera, own: NDArray[np.bool_], least: int) -> bool:
-    """Whether at least `least` pixels show one of the primitives that are marked in `own` (n,), by order in `seen`."""
+def is_visible(
+    prims: Array, projection: Projection, camera: PinholeCamera, own: NDArray[np.bool_], min_pixels: int
+) -> bool:
+    """Return whether at least `min_pixels` pixels show a primitive of `projection` that is marked in `own` (n,)."""
     us, vs = camera.rays()
-    profiles = prims[seen.index][:, [FORM, BOTTOM, TOP]]
-    found = _shows(
-        profiles, seen.origin, seen.steps, seen.box, seen.near, us, vs, camera.near, camera.far,
-        np.nonzero(own)[0], np.nonzero(~own)[0], least,
+    profiles = prims[projection.index][:, [FORM, BOTTOM, TOP]]
+    enough = _is_visible(
+        profiles, projection.origin, projection.steps, projection.box, projection.near, us, vs, camera.near, camera.far,
+        np.nonzero(own)[0], np.nonzero(~own)[0], min_pixels,
     )  # fmt: skip
-    return bool(found)
+    return bool(enough)
 
 
 @njit(cache=True, inline="always")
@@ -40,7 +42,7 @@ def _covers(box: NDArray[np.int64], k: int, x: int, y: int) -> bool:
 
 
 @njit(cache=True)
-def _shows(
+def _is_visible(
     profiles: Array,
     origin: Array,
     steps: Array,
@@ -52,15 +54,15 @@ def _shows(
     far: float,
     own: NDArray[np.int64],
     others: NDArray[np.int64],
-    least: int,
+    min_pixels: int,
 ) -> bool:
-    hider = -1  # what hid the last pixel mostly hides the next one too
-    for every in (_THINNED, 1):
-        count = 0
+    hider = -1  # what hid the last pixel is tried first, as it mostly hides the next one too
+    for every in (_COARSE, 1):
+        count = 0  # the fine pass counts all pixels afresh, those of the coarse one among them
         for y in range(box[own, 2].min() + every // 2, box[own, 3].max() + 1, every):
             for x in range(box[own, 0].min() + every // 2, box[own, 1].max() + 1, every):
                 u, v = us[x], vs[y]
-                depth, first = far, -1
+                depth, first = far, -1  # of the object's own nearest primitive
                 for k in own:
                     if _covers(box, k, x, y) and near[k] < depth:
                         t = _depth(profiles, origin, steps, k, u, v, clip)
@@ -73,10 +75,11 @@ def _shows(
                     k = others[n] if n >= 0 else hider
                     if k >= 0 and _covers(box, k, x, y) and near[k] <= depth:
                         t = _depth(profiles, origin, steps, k, u, v, clip)
+                        # Ties go to the earlier primitive, as in the ray caster, with whose picture this must agree.
                         if t > clip and (t < depth or (t == depth and k < first)):
                             hider, hidden = k, True
                             break
                 count += 0 if hidden else 1
-                if count >= least:
+                if count >= min_pixels:
                     return True
     return False
