@@ -1,7 +1,7 @@
 """Evaluation of episodes in simulators: what plans and manipulation have in common."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
 from importlib.metadata import version
@@ -55,7 +55,11 @@ class EpisodeEvaluation(ABC, Generic[Options, K, U]):
     """A suite of episodes set up for a run; see `infthor_eval.runs.Evaluation`.
 
     Attributes:
+        seed: seed of the run.
+        options: options of the suite.
         tasks: tasks by name.
+        trajectories: all trajectories that were found, used or not, so that neither what baselines learn nor the floor
+            plans of the simulators depend on --limit.
     """
 
     def __init__(self, request: TaskRequest[Options], read_task: Callable[[TaskFile, TaskRequest[Options]], K]) -> None:
@@ -65,21 +69,19 @@ class EpisodeEvaluation(ABC, Generic[Options, K, U]):
             UsageError: a task has no trajectories or no episodes, or an option does not fit.
             DataError: a task file is malformed, or none of its trajectories can be used.
         """
-        self._seed, self._options = request.seed, request.options
+        self.seed, self.options = request.seed, request.options
         self.tasks: Mapping[str, K] = {file.name: read_task(file, request) for file in request.tasks}
-        self._scenes = Path(self._options.scenes) if self._options.scenes is not None else None
+        self._scenes = Path(self.options.scenes) if self.options.scenes is not None else None
         self._floor_plans = floor_plans_digest(self._scenes) if self._scenes is not None else None
-        trajectories = {item.traj_id: item for task in self.tasks.values() for item in task.trajectories.trajectories}
-        # All that were found, used or not: with --limit baselines learn from the same ones, and simulators complete
-        # floor plans from the same ones.
-        self._trajectories = [item.data for item in trajectories.values()]
+        by_name = {item.traj_id: item.data for task in self.tasks.values() for item in task.trajectories.trajectories}
+        self.trajectories = list(by_name.values())
 
     @property
     @abstractmethod
     def units(self) -> list[U]:
         """The episodes of all tasks, task by task, in the order of trajectories and time."""
 
-    def _workload(self, groups: Iterable[Iterable[U]], **settings: Any) -> Workload[U]:
+    def workload(self, groups: Iterable[Iterable[U]], **settings: Any) -> Workload[U]:
         """Return the workload, given the episodes in groups and the suite's own settings."""
         listed = [list(units) for units in groups]
         return Workload(
@@ -91,44 +93,39 @@ class EpisodeEvaluation(ABC, Generic[Options, K, U]):
             ],
             config={
                 "tasks": {name: task.config() for name, task in self.tasks.items()},
-                "simulator": self._options.simulator,
+                "simulator": self.options.simulator,
                 "ai2thor": version("ai2thor"),
                 "floor_plans": self._floor_plans,
-                "frames": self._options.frames,
+                "frames": self.options.frames,
                 **settings,
             },
         )
 
-    def _simulators(self, **options: Any) -> Simulators:
-        return Simulators(self._options.simulator, self._scenes, self._trajectories, **options)
+    def simulators(self, **options: Any) -> Simulators:
+        """Return simulators for the episodes, with further options of `Simulator`."""
+        return Simulators(self.options.simulator, self._scenes, self.trajectories, **options)
 
 
-class BoundEpisodes(ABC, Generic[U, P]):
+class BoundEpisodes(Generic[U, P]):
     """Episodes for one subject; see `infthor_eval.runs.BoundEvaluation`.
 
     Attributes:
         workload: all the work.
+        seed: seed of the run.
     """
 
-    def __init__(self, workload: Workload[U], units: Sequence[U], simulators: Sequence[Simulators], seed: int) -> None:
-        """Take the work.
-
-        Args:
-            workload: all the work.
-            units: its units, task by task.
-            simulators: simulators that the episodes are run in; closed with this.
-            seed: seed of the run.
-        """
-        self.workload = workload
-        by_task = groupby(units, key=lambda unit: unit.key.task)
+    def __init__(
+        self, evaluation: EpisodeEvaluation[Any, Any, U], workload: Workload[U], simulators: Iterable[Simulators]
+    ) -> None:
+        """Take the work, and the simulators that it is done in, which are closed with this."""
+        self.workload, self.seed, self._simulators_to_close = workload, evaluation.seed, list(simulators)
+        by_task = groupby(evaluation.units, key=lambda unit: unit.key.task)
         self._numbers = {unit.key: number for _, of_task in by_task for number, unit in enumerate(of_task)}
-        self._to_close = simulators
-        self._seed = seed
 
     def close(self) -> None:
         """See `infthor_eval.runs.BoundEvaluation.close`."""
         with ExitStack() as stack:  # which closes the others too if one fails
-            for simulators in self._to_close:
+            for simulators in self._simulators_to_close:
                 stack.callback(simulators.close)
 
     def _fingerprint(self, unit: U) -> str:
@@ -141,7 +138,7 @@ class BoundEpisodes(ABC, Generic[U, P]):
                 "task": {name: value for name, value in of_task if name not in _OF_ALL_TRAJECTORIES},
                 "trajectory": unit.trajectory.digest,
                 "index": unit.payload.index,
-                "seed": self._seed,
+                "seed": self.seed,
             }
         )
 

@@ -16,7 +16,7 @@ from infthor_eval.manipulation.records import ArmRecord
 from infthor_eval.manipulation.runner import ArmRunner, arm_record
 from infthor_eval.manipulation.task import ManipulationTask
 from infthor_eval.manipulation.trajectories import ArmEpisode, ArmTrajectory
-from infthor_eval.runs import Group, Session, TaskRequest, UnitKey, UnitRecord, UnitSample, Workload
+from infthor_eval.runs import Group, Session, TaskRequest, UnitKey, UnitRecord, UnitSample
 from model_adapters import Policy, Subject
 
 __all__ = ["ArmUnit", "BoundManipulation", "ManipulationEvaluation"]
@@ -49,56 +49,35 @@ class ManipulationEvaluation(EpisodeEvaluation[ManipulationOptions, Manipulation
         if isinstance(subject, ArmBaseline):
             create_actor: Callable[[], ArmActor] = subject.arm_actor
         elif isinstance(subject, Policy):
-            create_actor = partial(PolicyActor, subject, blank=self._options.frames == "blank")
+            create_actor = partial(PolicyActor, subject, blank=self.options.frames == "blank")
         else:
             raise TypeError(f"{subject} is neither a policy nor a baseline of manipulation")
-        units = self.units
-        # The episodes of all tasks by trajectory, in time order: one replay of its expert serves them all.
-        by_trajectory: dict[str, list[ArmUnit]] = {}
-        for unit in sorted(units, key=lambda unit: (unit.episode.index, unit.key)):
-            by_trajectory.setdefault(unit.cluster, []).append(unit)
-        workload = self._workload(by_trajectory[name] for name in dict.fromkeys(unit.cluster for unit in units))
-        sees = isinstance(subject, Policy)
-        arms = {
-            task.settings.camera: self._simulators(
-                image=sees, instances=False, agentMode="arm", **task.settings.camera_options
-            )
-            for task in self.tasks.values()
-        }
-        experts = self._simulators(image=False, instances=False)
-        return BoundManipulation(workload, units, experts, arms, self._seed, self.tasks, create_actor, sees=sees)
+        return BoundManipulation(self, create_actor, sees=isinstance(subject, Policy))
 
 
 class BoundManipulation(BoundEpisodes[ArmUnit, ArmRecord]):
     """Manipulation for one subject; see `infthor_eval.runs.BoundEvaluation`."""
 
-    def __init__(
-        self,
-        workload: Workload[ArmUnit],
-        units: Sequence[ArmUnit],
-        experts: Simulators,
-        arms: Mapping[_Camera, Simulators],
-        seed: int,
-        tasks: Mapping[str, ManipulationTask],
-        create_actor: Callable[[], ArmActor],
-        *,
-        sees: bool,
-    ) -> None:
-        """Take the work, see `BoundEpisodes`.
+    def __init__(self, evaluation: ManipulationEvaluation, create_actor: Callable[[], ArmActor], *, sees: bool) -> None:
+        """Take the work.
 
         Args:
-            workload: all the work.
-            units: its units, task by task.
-            experts: simulators with AI2-THOR's default agent, which replay experts; closed with this.
-            arms: simulators of agents with an arm, by camera; closed with this.
-            seed: seed of the run.
-            tasks: tasks by name.
+            evaluation: the prepared evaluation.
             create_actor: creates the actor of a trajectory.
             sees: whether actors look at frames.
         """
-        super().__init__(workload, units, [experts, *arms.values()], seed)
-        self._experts, self._arms, self._tasks = experts, arms, tasks
-        self._create_actor, self._sees = create_actor, sees
+        self._tasks, self._create_actor, self._sees = evaluation.tasks, create_actor, sees
+        self._experts = evaluation.simulators(image=False, instances=False)
+        by_camera = {task.settings.camera: task.settings.camera_options for task in self._tasks.values()}
+        self._arms = {
+            camera: evaluation.simulators(image=sees, instances=False, agentMode="arm", **options)
+            for camera, options in by_camera.items()
+        }
+        # The episodes of all tasks by trajectory, in time order: one replay of its expert serves them all.
+        by_trajectory: dict[str, list[ArmUnit]] = {unit.cluster: [] for unit in evaluation.units}
+        for unit in sorted(evaluation.units, key=lambda unit: (unit.episode.index, unit.key)):
+            by_trajectory[unit.cluster].append(unit)
+        super().__init__(evaluation, evaluation.workload(by_trajectory.values()), [self._experts, *self._arms.values()])
 
     def run(self, group: Group[ArmUnit], session: Session[ArmRecord]) -> Iterator[UnitRecord[ArmRecord]]:
         """See `infthor_eval.runs.BoundEvaluation.run`."""
@@ -122,7 +101,7 @@ class BoundManipulation(BoundEpisodes[ArmUnit, ArmRecord]):
             yield from (unit.excluded(str(error), fingerprints[unit.key]) for unit in units)
             return
         with arms.one() as simulator:
-            runner = ArmRunner(trajectory, states, simulator, self._create_actor(), sees=self._sees, seed=self._seed)
+            runner = ArmRunner(trajectory, states, simulator, self._create_actor(), sees=self._sees, seed=self.seed)
             for unit in units:
                 run = partial(runner.run, self._tasks[unit.key.task], unit.episode)
                 record = runner.record(unit, fingerprints[unit.key], run)

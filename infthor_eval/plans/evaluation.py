@@ -1,11 +1,10 @@
 """Plans set up for a run, and the run of their trajectories."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from functools import partial
 from itertools import groupby
 
 from infthor_eval.episodes.evaluation import BoundEpisodes, EpisodeEvaluation, EpisodeUnit
-from infthor_eval.episodes.simulators import Simulators
 from infthor_eval.formats.scratch import ScratchFolder
 from infthor_eval.plans.actor_factory import ActorFactory, actor_factory
 from infthor_eval.plans.options import PlansOptions
@@ -14,7 +13,7 @@ from infthor_eval.plans.records import NOT_ATTEMPTED, PlanRecord
 from infthor_eval.plans.runner import PlanRunner, plan_record
 from infthor_eval.plans.task import PlansTask
 from infthor_eval.plans.trajectories import PlanTrajectory
-from infthor_eval.runs import Group, Session, TaskRequest, UnitRecord, UnitSample, Workload
+from infthor_eval.runs import Group, Session, TaskRequest, UnitRecord, UnitSample
 from model_adapters import Subject
 
 __all__ = ["BoundPlans", "PlanUnit", "PlansEvaluation"]
@@ -40,41 +39,22 @@ class PlansEvaluation(EpisodeEvaluation[PlansOptions, PlansTask, PlanUnit]):
 
     def bind(self, subject: Subject) -> "BoundPlans":
         """See `infthor_eval.runs.Evaluation.bind`."""
-        factory = actor_factory(subject, self._trajectories)
-        units = self.units
-        # A trajectory is a group: its plans share the expert's history, in the simulator and in the prefix cache.
-        groups = groupby(units, lambda unit: (unit.key.task, unit.cluster))
-        workload = self._workload((same for _, same in groups), constrained=self._options.constrained)
-        # Nothing is rendered that nobody looks at, and instance masks are needed for the state in words alone.
-        in_words = factory.sees and any(task.memory.needs_state for task in self.tasks.values())
-        simulators = self._simulators(image=factory.sees, instances=in_words)
-        return BoundPlans(workload, units, simulators, self._seed, self.tasks, factory)
+        return BoundPlans(self, actor_factory(subject, self.trajectories))
 
 
 class BoundPlans(BoundEpisodes[PlanUnit, PlanRecord]):
     """Plans for one subject; see `infthor_eval.runs.BoundEvaluation`."""
 
-    def __init__(
-        self,
-        workload: Workload[PlanUnit],
-        units: Sequence[PlanUnit],
-        simulators: Simulators,
-        seed: int,
-        tasks: Mapping[str, PlansTask],
-        factory: ActorFactory,
-    ) -> None:
-        """Take the work, see `BoundEpisodes`.
-
-        Args:
-            workload: all the work.
-            units: its units, task by task.
-            simulators: simulators of the trajectories; closed with this.
-            seed: seed of the run.
-            tasks: tasks by name.
-            factory: creates actors.
-        """
-        super().__init__(workload, units, [simulators], seed)
-        self._simulators, self._tasks, self._factory = simulators, tasks, factory
+    def __init__(self, evaluation: PlansEvaluation, factory: ActorFactory) -> None:
+        """Take the work, and what creates the subject's actors."""
+        self._tasks, self._factory = evaluation.tasks, factory
+        # Nothing is rendered that nobody looks at, and instance masks are needed for the state in words alone.
+        in_words = factory.sees and any(task.memory.needs_state for task in self._tasks.values())
+        self._simulators = evaluation.simulators(image=factory.sees, instances=in_words)
+        # A trajectory is a group: its plans share the expert's history, in the simulator and in the prefix cache.
+        groups = groupby(evaluation.units, lambda unit: (unit.key.task, unit.cluster))
+        workload = evaluation.workload((same for _, same in groups), constrained=evaluation.options.constrained)
+        super().__init__(evaluation, workload, [self._simulators])
 
     def run(self, group: Group[PlanUnit], session: Session[PlanRecord]) -> Iterator[UnitRecord[PlanRecord]]:
         """See `infthor_eval.runs.BoundEvaluation.run`."""
@@ -84,7 +64,7 @@ class BoundPlans(BoundEpisodes[PlanUnit, PlanRecord]):
             return
         task, trajectory = self._tasks[group.units[0].key.task], group.units[0].trajectory
         with self._simulators.one() as simulator, ScratchFolder() as folder:
-            runner = PlanRunner(task, trajectory, self._factory, simulator, folder, self._seed)
+            runner = PlanRunner(task, trajectory, self._factory, simulator, folder, self.seed)
             stopped = False
             for unit in group.units:
                 record = known[unit.key]

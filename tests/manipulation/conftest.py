@@ -3,21 +3,17 @@
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
 
 import pytest
 
-from infthor_eval.cli.options.run import RunOptions
-from infthor_eval.cli.options.values import ModelSpec
-from infthor_eval.runs import PreparedRun, prepare
+from infthor_eval.runs import PreparedRun
 from infthor_eval.thor.launch import embedded
 from infthor_eval.thor.simulator import Simulator
 
+from ..episodes.pool import Pool
+from ..episodes.preparing import preparer
 from ..plans.cut import MUG, cut, write
 from .arena import Arena
-from .pool import Pool
-
-ASKED = ("tasks", "data", "output", "seed", "limit", "fresh", "recover")
 
 
 @pytest.fixture(scope="session")
@@ -30,7 +26,7 @@ def pool() -> Iterator[Pool]:
 @pytest.fixture
 def shared_simulators(pool: Pool, monkeypatch: pytest.MonkeyPatch) -> None:
     """Has runs of manipulation use the shared processes instead of starting their own."""
-    monkeypatch.setattr("infthor_eval.episodes.evaluation.Simulators", pool.kind())
+    monkeypatch.setattr("infthor_eval.episodes.evaluation.Simulators", pool.simulators_type())
 
 
 @pytest.fixture(scope="session")
@@ -60,16 +56,8 @@ def data(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def prepared(data: Path, tmp_path: Path) -> Callable[..., PreparedRun]:
-    """A prepared run; keyword arguments are the model, its options, those of `RunOptions` and those of the suite."""
-
-    def make(model: str = "planner-arm", model_options: dict[str, str] | None = None, **changes: Any) -> PreparedRun:
-        settings = {name: changes.pop(name) for name in ASKED if name in changes}
-        settings = {"tasks": ("manipulathor",), "data": data, "output": tmp_path / "out", **settings}
-        models = (ModelSpec(model, model_options or {}),)
-        ((request, suite),) = RunOptions(models, **settings, suite_options=changes).requests()
-        return prepare(request, suite)
-
-    return make
+    """Prepares a run on that, see `preparer`."""
+    return preparer("planner-arm", tasks=("manipulathor",), data=data, output=tmp_path / "out")
 
 
 @pytest.fixture

@@ -180,7 +180,7 @@ def test_two_trajectories_at_once_find_what_one_after_the_other_finds(prepared, 
     one_by_one = Capabilities(counts_tokens=False, token_ids=False)
     assert BASELINES["random-arm"](0).capabilities.max_in_flight == 2
     monkeypatch.setattr(BASELINES["random-arm"], "capabilities", one_by_one)
-    monkeypatch.setattr("infthor_eval.episodes.evaluation.Simulators", pool.kind())
+    monkeypatch.setattr("infthor_eval.episodes.evaluation.Simulators", pool.simulators_type())
     alone = execute(prepared("random-arm", data=data, output=tmp_path / "alone"))
     assert same(together.records) == same(alone.records)
     assert together.summary == alone.summary

@@ -32,8 +32,8 @@ class Pool:
         finally:
             idle.put(simulator)
 
-    def kind(self) -> type:
-        """What takes the place of `Simulators`."""
+    def simulators_type(self) -> type:
+        """Return a class that takes the place of `Simulators`."""
         pool = self
 
         class Shared:
@@ -44,6 +44,6 @@ class Pool:
                 return pool.one(**self._options)
 
             def close(self) -> None:
-                """They go on for other tests."""
+                """Leave them to other tests."""
 
         return Shared
