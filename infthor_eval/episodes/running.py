@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Generic, TypeVar
 
 from infthor_eval.episodes.errors import InfeasibleError
@@ -23,12 +23,12 @@ class EpisodeResult(Generic[P]):
 
     Attributes:
         payload: payload of its record.
-        tokens: tokens of its requests.
+        tokens: tokens of its requests; None if there were none, which is not recorded.
         faults: faults of the model that were retried.
     """
 
     payload: P
-    tokens: Tokens = field(default_factory=Tokens)
+    tokens: Tokens | None = None
     faults: tuple[str, ...] = ()
 
 
@@ -82,8 +82,8 @@ class EpisodeRunner(Generic[E, P]):
             result.payload,
             faults=(*faults, *result.faults),
             seconds=round(time.perf_counter() - start, 4),
-            tokens=result.tokens,
             usage=self.usage,
+            **({} if result.tokens is None else {"tokens": result.tokens}),
         )
 
     def _drop_environment(self) -> None:
