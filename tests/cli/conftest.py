@@ -1,4 +1,4 @@
-"""What the command line's runs leave."""
+"""The records of runs started by the command line."""
 
 from collections.abc import Callable
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Commands that only tell something import nothing that takes seconds."""
+"""Commands that only print something import nothing that takes seconds."""
 
 import os
 import pkgutil
@@ -29,7 +29,7 @@ print(*sorted({name.partition(".")[0] for name in sys.modules}), file=sys.stderr
 @pytest.mark.parametrize(
     "typed", ["--help", "run --help", "ls", "ls models", "ls tasks", "ls scenes", "ls runs tests", "--version"]
 )
-def test_what_is_told_is_told_at_once(typed: str) -> None:
+def test_listings_and_help_are_printed_at_once(typed: str) -> None:
     done = subprocess.run(
         [sys.executable, "-c", PROGRAM, *typed.split()], capture_output=True, text=True, check=False, timeout=600
     )

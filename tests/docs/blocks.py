@@ -19,7 +19,7 @@ class Block:
 
 def blocks_of(page: str) -> list[Block]:
     """All blocks of a page of the repository."""
-    return [Block(*found) for found in _FENCE.findall((ROOT / page).read_text())]
+    return [Block(*match) for match in _FENCE.findall((ROOT / page).read_text())]
 
 
 def written_files(page: str, folder: Path) -> list[Path]:

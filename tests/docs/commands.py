@@ -1,4 +1,4 @@
-"""The commands of a page, and which of them cannot run here, and why."""
+"""The commands of a page, and the reasons why some cannot run here."""
 
 import re
 import shlex

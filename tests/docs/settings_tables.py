@@ -1,4 +1,4 @@
-"""The tables of settings in docs/own-tasks.md, made of the code: `python -m tests.docs.settings_tables` writes them."""
+"""The tables of settings in docs/own-tasks.md, from the code: `python -m tests.docs.settings_tables` writes them."""
 
 import importlib
 import inspect
@@ -21,7 +21,7 @@ _KINDS = {
 
 def with_tables(page: str) -> str:
     """The page with a table in each place that names a class of settings."""
-    return _PLACE.sub(lambda found: f"{found[1]}{_table(found[2], found[3])}{found[5]}", page)
+    return _PLACE.sub(lambda match: f"{match[1]}{_table(match[2], match[3])}{match[5]}", page)
 
 
 def _table(module: str, name: str) -> str:
@@ -49,8 +49,8 @@ def _shown(default: object) -> str:
 def _attributes(settings: type) -> dict[str, str]:
     """What the docstring says of each attribute."""
     text = inspect.getdoc(settings).partition("Attributes:\n")[2]
-    found = re.findall(r"^    (\w+): (.*(?:\n {8}.*)*)", text, re.MULTILINE)
-    return {name: " ".join(said.split()).replace("|", "\\|") for name, said in found}
+    attributes = re.findall(r"^    (\w+): (.*(?:\n {8}.*)*)", text, re.MULTILINE)
+    return {name: " ".join(said.split()).replace("|", "\\|") for name, said in attributes}
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Every command in the documentation is one: those of README and tutorials run, or are parsed where they cannot."""
+"""The commands in the documentation: those of README and tutorials run, the others are parsed."""
 
 import functools
 import re
@@ -83,9 +83,9 @@ def test_the_options_of_every_command_are_known(command, monkeypatch):
     monkeypatch.setattr(click.Path, "convert", lambda self, value, parameter, context: Path(value))
     context = _infthor_eval.make_context("infthor-eval", list(command.words[1:]))
     while isinstance(context.command, click.Group):
-        name, found, rest = context.command.resolve_command(context, [*context._protected_args, *context.args])
-        assert found is not None
-        context = found.make_context(name, rest, parent=context)
+        name, inner, rest = context.command.resolve_command(context, [*context._protected_args, *context.args])
+        assert inner is not None
+        context = inner.make_context(name, rest, parent=context)
     if context.info_name in ("run", "plan"):
         _check_names(context.params)
 

@@ -1,4 +1,4 @@
-"""docs/own-models.md says what the code says, and its adapter works."""
+"""docs/own-models.md agrees with the code, and its adapter works."""
 
 import dataclasses
 import json
@@ -39,11 +39,11 @@ def test_the_pages_adapter_keeps_the_contract(folder, run):
 
 
 def test_it_is_evaluated_and_a_run_of_its_own_when_it_is_edited(folder, run):
-    asked = ("--model", NAME, "--tasks", "nieh_mini_gt", "--limit", 5)
-    assert run(*asked)[0] == 0
+    typed = ("--model", NAME, "--tasks", "nieh_mini_gt", "--limit", 5)
+    assert run(*typed)[0] == 0
     source = folder / "my_adapter.py"
     source.write_text(source.read_text().replace('"yes" if', '"maybe" if'))
-    assert run(*asked)[0] == 0
+    assert run(*typed)[0] == 0
     assert len(list((folder / "results" / "Brightness").iterdir())) == 2
     identities = [json.loads(path.read_text())["config"] for path in folder.rglob("results.json")]
     assert {identity["adapter"]["file"] for identity in identities} == {"my_adapter.py"}
@@ -93,7 +93,7 @@ def test_a_file_that_is_no_adapter_is_refused_in_one_line(tmp_path, run, monkeyp
     assert "Traceback" not in err
 
 
-def test_a_broken_clause_and_a_fault_are_told_with_the_others(folder, run):
+def test_a_broken_clause_and_an_exception_are_reported_with_the_others(folder, run):
     source = folder / "my_adapter.py"
     source.write_text(
         source.read_text()
@@ -102,10 +102,10 @@ def test_a_broken_clause_and_a_fault_are_told_with_the_others(folder, run):
     )
     code, out, err = run("check-adapter", NAME)
     assert (code, err) == (1, "")
-    found = {line.split()[1]: line for line in out.splitlines() if line.startswith(("holds", "broken"))}
-    assert len(found) == 13
-    assert found["members"].startswith("holds")
-    assert "it raises TypeError in my_adapter.py:" in found["reply"]
+    clauses = {line.split()[1]: line for line in out.splitlines() if line.startswith(("holds", "broken"))}
+    assert len(clauses) == 13
+    assert clauses["members"].startswith("holds")
+    assert "it raises TypeError in my_adapter.py:" in clauses["reply"]
     assert out.splitlines()[-1].endswith("broken")
     source.write_text(source.read_text().replace("def close", "def shut"))
     code, out, err = run("check-adapter", NAME)
@@ -118,7 +118,7 @@ def test_a_policy_is_checked_by_the_same_command(run):
     assert [line.split()[1] for line in out.splitlines()[:-1]] == ["members", "identity", "episodes"]
 
 
-def test_where_the_file_lies_changes_neither_name_nor_identity(folder, monkeypatch):
+def test_the_place_of_the_file_changes_neither_name_nor_fingerprint(folder, monkeypatch):
     here = adapter_identity(NAME), label(NAME, {})
     (folder / "deeper").mkdir()
     monkeypatch.chdir(folder / "deeper")

@@ -1,4 +1,4 @@
-"""docs/own-tasks.md says what the code says, and its tasks run."""
+"""docs/own-tasks.md agrees with the code, and its tasks run."""
 
 import json
 import re
@@ -9,7 +9,7 @@ from .blocks import ROOT, written_files
 from .settings_tables import PAGE, with_tables
 
 
-def test_the_tables_of_settings_are_the_codes_own():
+def test_the_tables_of_settings_are_those_of_the_code():
     page = PAGE.read_text()
     assert page.count("| setting |") == page.count("<!-- end -->") == 3
     assert with_tables(page) == page, "run: python -m tests.docs.settings_tables"
@@ -20,7 +20,7 @@ def test_all_contexts_are_named():
     assert re.findall(r"`(\w+)`", said) == list(CONTEXTS)
 
 
-def test_tasks_of_ones_own_run_with_the_files_that_this_package_shares(tmp_path, run, monkeypatch):
+def test_own_tasks_run_with_the_shared_files_of_this_package(tmp_path, run, monkeypatch):
     written_files("docs/own-tasks.md", tmp_path)
     monkeypatch.chdir(tmp_path)
     options = ("--include-path", "my_tasks", "--limit", 3)
@@ -38,10 +38,10 @@ def test_own_tasks_are_refused_in_one_line(tmp_path, run, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "a").mkdir()
     (tmp_path / "a" / "task.yaml").write_text("include: _nieh.yaml\ntask: nieh_gt\n")
-    asked = ("--model", "oracle", "--tasks", "nieh_gt")
-    code, _, err = run(*asked, "--include-path", "a")
+    typed = ("--model", "oracle", "--tasks", "nieh_gt")
+    code, _, err = run(*typed, "--include-path", "a")
     assert (code, len(err.splitlines())) == (2, 1)
     assert "'nieh_gt' is the name of another task file too" in err
     (tmp_path / "a" / "task.yaml").write_text("include: _none.yaml\ntask: own\n")
-    assert "_none.yaml: cannot be read" in run(*asked, "--include-path", "a")[2]
-    assert "Directory 'b' does not exist" in run(*asked, "--include-path", "b")[2]
+    assert "_none.yaml: cannot be read" in run(*typed, "--include-path", "a")[2]
+    assert "Directory 'b' does not exist" in run(*typed, "--include-path", "b")[2]

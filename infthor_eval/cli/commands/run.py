@@ -73,15 +73,12 @@ def evaluate(
             export(outcomes[-1])
             if outcomes[-1].n_missing:
                 break
-    print_results([_results(outcome) for outcome in outcomes], show)
+    results = [RunResults(run.folder, run.run.suite, run.summary, run.usage, run.n_missing) for run in outcomes]
+    print_results(results, show)
     n_failed = sum(map(_print_failures, outcomes))  # every run prints its failures
     n_void = sum(map(_print_if_void, outcomes))
     n_unsent = sum(not _send(outcome, senders) for outcome in outcomes if not outcome.n_missing)
     return 130 if outcomes[-1].n_missing else int(n_failed + n_void + n_unsent > 0)
-
-
-def _results(outcome: RunOutcome) -> RunResults:
-    return RunResults(outcome.folder, outcome.run.suite, outcome.summary, outcome.usage, outcome.n_missing)
 
 
 def _print_if_void(outcome: RunOutcome) -> bool:

@@ -1,4 +1,4 @@
-"""Models that cannot be run, or fail in mid-run, as their user sees it: one line each, and the right exit code."""
+"""Models that cannot be run, or that fail during a run: one line each, and the exit code."""
 
 import json
 import shutil

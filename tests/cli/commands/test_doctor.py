@@ -1,4 +1,4 @@
-"""`doctor`: what is there and what is not, each with a hint, and no token in it."""
+"""`doctor`: what is installed and what is missing, with a hint, and no token in it."""
 
 import json
 import time
@@ -41,7 +41,7 @@ def test_people_read_lines(run):
     assert "`infthor-eval fetch nieh`" in out
 
 
-def test_what_nothing_will_do_without_is_told_by_the_exit_code(run, monkeypatch):
+def test_a_missing_requirement_sets_the_exit_code(run, monkeypatch):
     monkeypatch.setattr(checks, "_torch", lambda: checks.Check("torch", "wrong", "none", "pip install torch"))
     code, out, _ = run("doctor")
     assert code == 1
@@ -49,6 +49,6 @@ def test_what_nothing_will_do_without_is_told_by_the_exit_code(run, monkeypatch)
 
 
 @pytest.mark.parametrize("url", ["http://localhost:9", "no address"])
-def test_a_hub_that_refuses_is_told_at_once(url, monkeypatch):
+def test_a_hub_that_refuses_is_reported_at_once(url, monkeypatch):
     monkeypatch.undo()
     assert checks._connection_problem(url)

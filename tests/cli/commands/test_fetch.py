@@ -1,4 +1,4 @@
-"""`fetch` against a hub of our own: a local server that speaks the hub's protocol for one data set."""
+"""`fetch` against a local server that speaks the hub's protocol for one data set."""
 
 import hashlib
 import json
@@ -73,7 +73,7 @@ def hub(make_nieh_set, tmp_path, monkeypatch):
     server.server_close()
 
 
-def test_what_was_fetched_is_found_by_the_task_and_not_fetched_again(hub, tmp_path, run):
+def test_fetched_data_are_found_by_the_task_and_not_fetched_again(hub, tmp_path, run):
     endpoint, handler = hub
     code, out, err = run("fetch", "nieh", "--endpoint", endpoint)
     assert code == 0, err
@@ -86,7 +86,7 @@ def test_what_was_fetched_is_found_by_the_task_and_not_fetched_again(hub, tmp_pa
     assert "100.00" in out
 
 
-def test_no_access_and_no_network_are_one_line_with_the_mend(hub, tmp_path, run):
+def test_no_access_and_no_network_are_one_line_with_a_hint(hub, tmp_path, run):
     endpoint, handler = hub
     handler.status = 403
     code, _, err = run("fetch", "nieh", "--endpoint", endpoint, "--dir", tmp_path / "d")

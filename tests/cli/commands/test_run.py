@@ -65,21 +65,21 @@ def test_the_haystack_is_shown_by_depth_and_counts_what_does_not_fit(make_nieh_s
     assert "nieh_haystack_1m: 5 sample(s) skipped: the window reaches outside the trajectory" in err
 
 
-def test_a_context_beyond_the_models_limit_is_told_before_it_is_refused(make_nieh_set, tmp_path, run):
+def test_a_context_beyond_the_models_limit_is_reported_before_it_is_refused(make_nieh_set, tmp_path, run):
     data = make_nieh_set(n_frames=20)
     arguments = ["--model", "qwen2.5-vl-tiny", "--model-args", "max_tokens=1200", "--data", data]
     code, _, err = run(*arguments, "--tasks", "nieh", "--output", tmp_path / "out")
     assert code == 1
-    told, refused = (
+    fits, refused = (
         next(line for line in err.splitlines() if line.startswith(name)) for name in ("nieh_gt", "nieh_full")
     )
-    assert "(limit 1,200): fits" in told
+    assert "(limit 1,200): fits" in fits
     assert "2 of 2 contexts refused" in refused
     assert err.index("2 of 2 contexts refused") < err.index("evaluated now")
     assert "is beyond the 1200 tokens of qwen2.5-vl-tiny" in err
 
 
-def test_limit_asks_only_so_many_of_each_task(make_nieh_set, tmp_path, run):
+def test_limit_evaluates_only_so_many_of_each_task(make_nieh_set, tmp_path, run):
     data = make_nieh_set(size=56)
     run("--model", "oracle", "--tasks", "nieh", "--data", data, "--output", tmp_path / "o", "--limit", 2)
     results = json.loads(only(tmp_path / "o", "results.json").read_text())
@@ -87,9 +87,9 @@ def test_limit_asks_only_so_many_of_each_task(make_nieh_set, tmp_path, run):
 
 
 def test_the_limit_counts_questions_and_what_is_skipped_follows_it(make_nieh_set, tmp_path, run):
-    asked = [Question("t", f"Is there a {name}?", (70,), ("yes",)) for name in ("mug", "cup")]
+    questions = [Question("t", f"Is there a {name}?", (70,), ("yes",)) for name in ("mug", "cup")]
     outside = [Question("t", f"Is there a {name}?", (999,), ("yes",)) for name in ("pan", "pot")]
-    data = make_nieh_set([outside[0], asked[0], outside[1], asked[1]], n_frames=140, size=56)
+    data = make_nieh_set([outside[0], questions[0], outside[1], questions[1]], n_frames=140, size=56)
     arguments = ["--model", "oracle", "--tasks", "nieh_haystack_8k", "--data", data]
     for limit, n in ((1, 5), (2, 10)):
         code, _, err = run(*arguments, "--output", tmp_path / str(limit), "--limit", limit)
@@ -98,8 +98,8 @@ def test_the_limit_counts_questions_and_what_is_skipped_follows_it(make_nieh_set
             "nieh_haystack_8k"
         ]
         assert task["n"] == n
-        told = f"nieh_haystack_8k: {task['skipped']['n']} sample(s) skipped: clue 999 is outside"
-        assert (told in err) == bool(task["skipped"]["n"])
+        line = f"nieh_haystack_8k: {task['skipped']['n']} sample(s) skipped: clue 999 is outside"
+        assert (line in err) == bool(task["skipped"]["n"])
         assert {cell["n"] for cell in task["by_variant"].values()} == {limit}
 
 
@@ -124,8 +124,8 @@ def test_the_metrics_of_a_task_file_are_shown_beside_the_published_ones(make_nie
         "27.00",
     ]
     assert ["oracle", "nieh_gt", "strict", *FULL_MARKS] in rows
-    found = json.loads(only(tmp_path / "out", "results.json").read_text())["summary"]["tasks"]["nieh_own"]
-    assert found["by_clues"]["total"]["scores"]["letters"]["mean"] == pytest.approx(0.27)
+    summary = json.loads(only(tmp_path / "out", "results.json").read_text())["summary"]["tasks"]["nieh_own"]
+    assert summary["by_clues"]["total"]["scores"]["letters"]["mean"] == pytest.approx(0.27)
     samples = [json.loads(line) for line in only(tmp_path / "out", "samples_nieh_own_*.jsonl").read_text().splitlines()]
     assert [sample["letters"] for sample in samples] == [0.15, 0.5, 0.5, 0.1, 0.1]
 
@@ -141,7 +141,7 @@ def test_the_metrics_of_a_task_file_are_shown_beside_the_published_ones(make_nie
     assert "letters is not averaged (aggregation: mean); use lm-eval" in err
 
 
-def test_a_killed_run_goes_on_and_ends_as_an_undisturbed_one(make_nieh_set, tmp_path):
+def test_a_killed_run_resumes_and_ends_as_an_undisturbed_one(make_nieh_set, tmp_path):
     data = make_nieh_set(MANY)
 
     def start(output):
@@ -236,7 +236,7 @@ def test_a_frame_that_breaks_in_mid_run_is_counted_as_failed_and_the_exit_code_s
     assert next(line for line in out.splitlines() if "nieh_gt" in line).split()[-3:] == ["5", "0", "2"]
 
 
-def test_help_names_the_commands_and_the_version_is_told(run):
+def test_help_names_the_commands_and_the_version_is_printed(run):
     code, out, _ = run("--help")
     assert code == 0
     assert all(name in out for name in ("run", "ls", "generate", "replay", "questions"))
@@ -249,13 +249,13 @@ def test_ls_lists_models_and_tasks(run):
     assert "nieh_mini" in run("ls", "tasks")[1]
 
 
-def test_ls_lists_tasks_of_ones_own(run, tmp_path):
+def test_ls_lists_a_users_own_tasks(run, tmp_path):
     (tmp_path / "mine.yaml").write_text("include: _nieh.yaml\ntask: my_own_task\ndataset_kwargs: {context: clues}\n")
     assert "my_own_task" not in run("ls", "tasks")[1]
     assert "my_own_task" in run("ls", "tasks", "--include-path", tmp_path)[1]
 
 
-def test_help_of_a_run_says_each_thing_once(run):
+def test_help_of_a_run_has_each_option_once(run):
     said = " ".join(run("run", "--help")[1].split())
     assert said.count("or the path of a Unity executable") == 1
     assert "[manipulation, plans]" in said
@@ -263,7 +263,7 @@ def test_help_of_a_run_says_each_thing_once(run):
 
 
 @pytest.mark.parametrize(("limit", "reason"), [("0", "0 is less than 1"), (str(2**63), "is more than"), ("x", "'x'")])
-def test_a_number_that_cannot_be_is_refused(run, limit, reason):
+def test_an_invalid_number_is_refused(run, limit, reason):
     code, _, said = run("--model", "oracle", "--tasks", "nieh_mini_gt", "--limit", limit)
     assert code == 2
     assert "--limit" in said

@@ -60,7 +60,7 @@ def kept(folder):
     return [question.text for question in read_questions(folder / "qa_set_validated.csv")]
 
 
-def test_what_one_model_answers_stays_and_the_rest_is_rejected_or_shown_to_a_person(data, tmp_path, run):
+def test_questions_that_one_model_answers_are_kept_and_the_rest_is_rejected_or_inspected(data, tmp_path, run):
     out = tmp_path / "validated"
     code, printed, err = run("validate", data, "--models", "yes,none", "--out", out)
     assert code == 0, err

@@ -1,4 +1,4 @@
-"""One model with several options: a run and a row for each, told apart by what differs."""
+"""One model with several options: a run and a row for each, labelled by what differs."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""`--config`: a run by a file, and the file that every run leaves; models with options of their own."""
+"""`--config`: a run by a file, and the file that every run writes; models with their own options."""
 
 import shlex
 from pathlib import Path
@@ -29,7 +29,7 @@ def config(make_nieh_set, tmp_path):
     data = make_nieh_set(size=56)
 
     def config(**changes: object) -> Path:
-        path = tmp_path / "asked.yaml"
+        path = tmp_path / "typed.yaml"
         options = {"model": "oracle", "tasks": ["nieh_gt"], "data": str(data), "output": str(tmp_path / "out")}
         path.write_text(yaml.safe_dump({**options, **changes}))
         return path
@@ -38,7 +38,7 @@ def config(make_nieh_set, tmp_path):
 
 
 @pytest.mark.parametrize("words", [("run", "--config"), ("--config",)])
-def test_a_run_by_a_file_and_what_is_typed_wins(config, tmp_path, run, words):
+def test_a_run_by_a_file_and_the_command_line_overrides_it(config, tmp_path, run, words):
     code, _, err = run(*words, config(limit=2))
     assert code == 0, err
     assert "oracle: 2 evaluated now" in err
@@ -46,7 +46,7 @@ def test_a_run_by_a_file_and_what_is_typed_wins(config, tmp_path, run, words):
     assert "blind: 3 evaluated now" in err
 
 
-def test_the_file_that_a_run_leaves_goes_on_with_that_very_run(config, tmp_path, run, monkeypatch):
+def test_the_file_of_a_run_resumes_that_run(config, tmp_path, run, monkeypatch):
     monkeypatch.chdir(tmp_path)
     run("--config", config(data="set", output="out", limit=4, frames="blank,shown", seed=3, name="mine"))
     left = sorted((tmp_path / "out" / "mine").rglob("run.yaml"))
@@ -61,15 +61,15 @@ def test_the_file_that_a_run_leaves_goes_on_with_that_very_run(config, tmp_path,
     assert [(path.parent / "results.json").read_bytes() for path in left] == before
 
 
-def test_the_command_that_it_stands_for_is_the_run(config, run):
+def test_the_command_of_the_file_is_the_run(config, run):
     run("--config", config(limit=2, frames="blank"))
-    found = read_configuration(only(config().parent / "out", "run.yaml").parent)
-    _, _, err = run(*shlex.split(found.command)[1:])
+    configuration = read_configuration(only(config().parent / "out", "run.yaml").parent)
+    _, _, err = run(*shlex.split(configuration.command)[1:])
     assert "oracle: 0 evaluated now, 2 resumed" in err
 
 
 @pytest.mark.slow
-def test_several_workers_leave_it_too(config, tmp_path, run):
+def test_several_workers_write_it_too(config, tmp_path, run):
     code, _, err = run("--config", config(workers=2))
     assert code == 0, err
     assert yaml.safe_load(only(tmp_path / "out", "run.yaml").read_text())["workers"] == 2
@@ -85,22 +85,22 @@ def test_no_key_is_written(config, tmp_path, run, monkeypatch):
 
 
 BAD = {
-    "limt": ({"limt": 3}, "asked.yaml: unknown option 'limt'; did you mean 'limit'?"),
-    "config": ({"config": "other.yaml"}, "asked.yaml: unknown option 'config'"),
-    "limit": ({"limit": 0}, "asked.yaml: limit: 0 is less than 1"),
-    "seed": ({"seed": "x"}, "asked.yaml: seed: 'x' is not a valid"),
-    "tasks": ({"tasks": {"a": 1}}, "asked.yaml: tasks is {'a': 1}; write one value"),
-    "model_args": ({"model_args": {"a": [1]}}, "asked.yaml: model_args: a is [1]; write one value"),
-    "model options": ({"model_args": "a"}, "asked.yaml: model_args: --model-args: 'a' is not of the form key=value"),
+    "limt": ({"limt": 3}, "typed.yaml: unknown option 'limt'; did you mean 'limit'?"),
+    "config": ({"config": "other.yaml"}, "typed.yaml: unknown option 'config'"),
+    "limit": ({"limit": 0}, "typed.yaml: limit: 0 is less than 1"),
+    "seed": ({"seed": "x"}, "typed.yaml: seed: 'x' is not a valid"),
+    "tasks": ({"tasks": {"a": 1}}, "typed.yaml: tasks is {'a': 1}; write one value"),
+    "model_args": ({"model_args": {"a": [1]}}, "typed.yaml: model_args: a is [1]; write one value"),
+    "model options": ({"model_args": "a"}, "typed.yaml: model_args: --model-args: 'a' is not of the form key=value"),
     "frames": ({"frames": "none"}, "--frames none: there are shown, blank"),
     "unknown model option": ({"model": "qwen2.5-vl-tiny", "model_args": {"dtpe": "x"}}, "did you mean dtype?"),
-    "choice": ({"engine": "trt"}, "asked.yaml: engine: 'trt' is not one of"),
-    "flag": ({"greedy": "maybe"}, "asked.yaml: greedy: 'maybe' is not a valid boolean"),
+    "choice": ({"engine": "trt"}, "typed.yaml: engine: 'trt' is not one of"),
+    "flag": ({"greedy": "maybe"}, "typed.yaml: greedy: 'maybe' is not a valid boolean"),
 }
 
 
 @pytest.mark.parametrize("name", BAD)
-def test_what_a_file_cannot_say_is_named(config, tmp_path, run, name):
+def test_a_wrong_option_in_a_file_is_named(config, tmp_path, run, name):
     changes, said = BAD[name]
     said_in_one_line(run("--config", config(**changes)), said)
     assert not (tmp_path / "out").exists()
@@ -125,11 +125,11 @@ def requests():
     return requests
 
 
-def test_an_option_that_is_typed_wins_over_the_same_one_of_the_file(config, requests):
-    asked = config(model_args={"rope": "yarn:4", "dtype": "float32"}, max_cost=2)
-    (request,) = requests("--config", asked, "--rope", "linear:2")
+def test_the_command_line_overrides_the_same_option_of_the_file(config, requests):
+    file = config(model_args={"rope": "yarn:4", "dtype": "float32"}, max_cost=2)
+    (request,) = requests("--config", file, "--rope", "linear:2")
     assert request.model_options == {"rope": "linear:2", "dtype": "float32", "max_cost": "2.0"}
-    (request,) = requests("--config", asked, "--model-args", "max_cost=5")
+    (request,) = requests("--config", file, "--model-args", "max_cost=5")
     assert request.model_options == {"max_cost": "5"}
     with pytest.raises(click.UsageError, match="give one of them"):
         requests("--config", config(rope="yarn:4", model_args={"rope": "yarn:2"}))
@@ -137,8 +137,8 @@ def test_an_option_that_is_typed_wins_over_the_same_one_of_the_file(config, requ
 
 def test_each_model_has_its_own_options(config, requests):
     typed = ("--model", "qwen2.5-vl:dtype=float32,max_tokens=1000,pixtral", "--engine", "vllm")
-    found = requests("--config", config(), *typed, "--model-args", "dtype=bfloat16,seed=1")
-    assert {request.model: request.model_options for request in found} == {
+    runs = requests("--config", config(), *typed, "--model-args", "dtype=bfloat16,seed=1")
+    assert {request.model: request.model_options for request in runs} == {
         "qwen2.5-vl@vllm": {"dtype": "float32", "max_tokens": "1000", "seed": "1"},
         "pixtral@vllm": {"dtype": "bfloat16", "seed": "1"},
     }
@@ -181,10 +181,10 @@ def test_models_as_typed_come_back(models):
 @pytest.mark.parametrize(
     ("typed", "said"), [("x=1,A", "comes before any model"), (",", "--model is empty"), ("A:x=1,x=2", "given twice")]
 )
-def test_models_that_cannot_be_meant(run, typed, said):
+def test_invalid_lists_of_models_are_refused(run, typed, said):
     said_in_one_line(run("--model", typed, "--tasks", "nieh_gt"), said)
 
 
-def test_results_do_not_know_of_it(config, tmp_path, run):
+def test_results_do_not_name_the_file(config, tmp_path, run):
     run("--config", config(limit=1))
-    assert "asked.yaml" not in only(tmp_path / "out", "results.json").read_text()
+    assert "typed.yaml" not in only(tmp_path / "out", "results.json").read_text()

@@ -1,4 +1,4 @@
-"""Contexts of a given size, extended contexts, and what is told of both before the first answer."""
+"""Contexts of a given size, extended contexts, and what is reported before the first answer."""
 
 import json
 
@@ -41,7 +41,7 @@ def n_frames(folder, task):
 @pytest.mark.parametrize(
     ("options", "haystack", "truncated"), [((), 66, 67), (("--k-tokens", 1000), 66, 66), (("--k-tokens", 1024), 67, 67)]
 )
-def test_a_kilo_token_is_each_contexts_own_or_the_one_given(make_nieh_set, tmp_path, run, options, haystack, truncated):
+def test_a_kilo_token_has_the_default_or_the_given_value(make_nieh_set, tmp_path, run, options, haystack, truncated):
     data = make_nieh_set(ONE, n_frames=80, size=56)
     tasks = ["nieh_haystack_8k", "nieh_truncate_head_8k"]
     arguments = ["--model", "oracle", "--tasks", ",".join(tasks), "--data", data, "--output", tmp_path / "out"]
@@ -52,7 +52,7 @@ def test_a_kilo_token_is_each_contexts_own_or_the_one_given(make_nieh_set, tmp_p
 
 
 @pytest.mark.parametrize("model", ["oracle", "qwen2.5-vl-tiny"])
-def test_the_tokens_of_a_frame_can_be_told(make_nieh_set, tmp_path, run, model):
+def test_the_tokens_of_a_frame_can_be_given(make_nieh_set, tmp_path, run, model):
     data, out = make_nieh_set(ONE, n_frames=80, size=56), tmp_path / "out"
     tasks = ["nieh_haystack_8k", "nieh_truncate_head_8k"]
     arguments = ["--model", model, "--tasks", ",".join(tasks), "--data", data, "--output", out]
@@ -63,14 +63,16 @@ def test_the_tokens_of_a_frame_can_be_told(make_nieh_set, tmp_path, run, model):
     assert read_header(folder).config["tokens_per_frame"] == 390
 
 
-def test_the_kilo_token_and_the_extension_are_part_of_the_runs_identity(make_nieh_set, tmp_path, run):
+def test_the_kilo_token_and_the_extension_are_part_of_the_run_config(make_nieh_set, tmp_path, run):
     data = make_nieh_set(ONE, n_frames=80, size=56)
     tasks, out = "nieh_gt,nieh_haystack_8k", tmp_path / "out"
     for options in ((), ("--k-tokens", 1024), ("--rope", "yarn:2")):
         assert run("--model", "qwen2.5-vl-tiny", "--tasks", tasks, "--data", data, "--output", out, *options)[0] == 0
-    identities = [read_header(path.parent).config for path in sorted(out.rglob("journal"))]
-    found = {(each["k_tokens"], each["model"]["rope"]["rope_type"], each["model"]["max_tokens"]) for each in identities}
-    assert found == {(None, "default", 128_000), (1024, "default", 128_000), (None, "yarn", 256_000)}
+    configs = [read_header(path.parent).config for path in sorted(out.rglob("journal"))]
+    limits = {
+        (each["k_tokens"], each["model"]["rope"]["rope_type"], each["model"]["max_tokens"]) for each in configs
+    }
+    assert limits == {(None, "default", 128_000), (1024, "default", 128_000), (None, "yarn", 256_000)}
 
 
 def test_the_extension_is_the_same_run_whichever_way_it_is_given(make_nieh_set, tmp_path, run):
@@ -81,7 +83,7 @@ def test_the_extension_is_the_same_run_whichever_way_it_is_given(make_nieh_set, 
     assert "0 evaluated now, 5 resumed from the journal" in err
 
 
-def test_what_fits_by_the_extension_alone_is_told_with_both_limits(make_nieh_set, tmp_path, short, run):
+def test_what_fits_only_with_rope_is_reported_with_both_limits(make_nieh_set, tmp_path, short, run):
     data = make_nieh_set(n_frames=20)
     arguments = ["--model", "qwen2.5-vl", "--model-args", f"pretrained={short},device=cpu", "--tasks", "nieh"]
     arguments += ["--data", data, "--output", tmp_path / "out"]
@@ -98,7 +100,7 @@ def test_what_fits_by_the_extension_alone_is_told_with_both_limits(make_nieh_set
     )
 
 
-def test_an_extension_that_is_too_small_is_told_as_refused(make_nieh_set, tmp_path, short, run):
+def test_an_extension_that_is_too_small_is_reported_as_refused(make_nieh_set, tmp_path, short, run):
     data = make_nieh_set(n_frames=20)
     arguments = ["--model", "qwen2.5-vl", "--model-args", f"pretrained={short},device=cpu", "--rope", "linear:1.5"]
     code, _, err = run(*arguments, "--tasks", "nieh_full", "--data", data, "--output", tmp_path / "out")
@@ -108,7 +110,7 @@ def test_an_extension_that_is_too_small_is_told_as_refused(make_nieh_set, tmp_pa
     assert "extended:" not in full
 
 
-def test_a_context_that_is_cut_to_its_size_is_told_as_truncated(make_nieh_set, tmp_path, run):
+def test_a_context_that_is_cut_to_its_size_is_reported_as_truncated(make_nieh_set, tmp_path, run):
     data = make_nieh_set([*ONE, Question("u", "Is there a mug?", (40,), ("yes",))], n_frames=80)
     for number in range(60, 80):  # one of the two trajectories is short enough
         (data / "metadata" / "u" / "img" / f"{number:09d}.png").unlink()
@@ -117,13 +119,13 @@ def test_a_context_that_is_cut_to_its_size_is_told_as_truncated(make_nieh_set, t
     arguments = ["--model", "qwen2.5-vl-tiny", "--tasks", "nieh_truncate_head_8k", "--data", data]
     code, _, err = run(*arguments, "--output", tmp_path / "out")
     assert code == 0, err
-    told = line_of(err, "nieh_truncate_head_8k: 2 contexts")
-    assert told.endswith("(limit 128,000): 1 of 2 contexts truncated: frames cut off to keep the context's size")
+    line = line_of(err, "nieh_truncate_head_8k: 2 contexts")
+    assert line.endswith("(limit 128,000): 1 of 2 contexts truncated: frames cut off to keep the context's size")
     assert n_frames(tmp_path / "out", "nieh_truncate_head_8k") == [67, 60]
 
 
 @pytest.mark.parametrize("family", ["qwen2.5-vl", "llava-onevision", "deepseek-vl", "pixtral"])
-def test_the_longest_request_that_is_told_is_the_one_that_is_made(make_nieh_set, tmp_path, run, records_in, family):
+def test_the_longest_request_is_reported_as_it_is_sent(make_nieh_set, tmp_path, run, records_in, family):
     data = make_nieh_set()
     arguments = ["--model", f"{family}-tiny", "--tasks", "nieh_full", "--data", data, "--output", tmp_path / "out"]
     _, _, err = run(*arguments)
@@ -148,7 +150,7 @@ BAD = [
 
 
 @pytest.mark.parametrize(("arguments", "said"), BAD, ids=[" ".join(arguments) for arguments, _ in BAD])
-def test_what_does_not_go_together_is_one_line_before_anything_is_run(make_nieh_set, tmp_path, run, arguments, said):
+def test_options_that_exclude_each_other_are_one_line(make_nieh_set, tmp_path, run, arguments, said):
     data = make_nieh_set(size=56)
     code, out, err = run(*arguments, "--tasks", "nieh", "--data", data, "--output", tmp_path / "out")
     assert (code, out, len(err.strip().splitlines())) == (2, "", 1)

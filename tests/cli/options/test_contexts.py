@@ -1,4 +1,4 @@
-"""Contexts that retrieve, watch and remember, by the command as users type it."""
+"""Contexts with retrieval, video and memory, through the command line."""
 
 import json
 import os
@@ -56,7 +56,7 @@ def test_retrieval_runs_through_and_the_retriever_is_part_of_the_run(data, make_
     assert (len(identities), len(retrievers)) == (2, 2)
 
 
-def test_a_retriever_that_cannot_be_had_ends_in_one_line(data, tmp_path, run, monkeypatch):
+def test_a_missing_retriever_ends_in_one_line(data, tmp_path, run, monkeypatch):
     monkeypatch.setattr("huggingface_hub.constants.HF_HUB_OFFLINE", True)
     monkeypatch.setattr("huggingface_hub.constants.HF_HUB_CACHE", str(tmp_path / "hub"))
     arguments = ["--model", "oracle", "--data", data, "--output", tmp_path / "out"]

@@ -1,4 +1,4 @@
-"""`--frames`: the same requests with something else in the frames' places."""
+"""`--frames`: the same requests with other frames."""
 
 import json
 
@@ -13,11 +13,11 @@ def results(folder):
 
 
 def tokens(folder, records_in):
-    found = {}
+    tokens = {}
     for path in folder.rglob("journal"):
         for record in records_in(path.parent):
-            found.setdefault(record.key, set()).add(record.tokens.context)
-    return found
+            tokens.setdefault(record.key, set()).add(record.tokens.context)
+    return tokens
 
 
 @pytest.mark.slow
@@ -36,7 +36,7 @@ def test_a_run_with_each_and_the_gain_between_them(make_nieh_set, tmp_path, run,
     assert "Gain over" not in shown
 
 
-def test_unknown_stand_ins_are_one_line(make_nieh_set, tmp_path, run):
+def test_unknown_frame_ablations_are_one_line(make_nieh_set, tmp_path, run):
     arguments = ["--model", "oracle", "--tasks", "nieh_gt", "--data", make_nieh_set(size=8), "--output", tmp_path / "o"]
     for given, said in (("none", "--frames none: there are shown, blank"), (",", "--frames is empty; give a name")):
         code, out, err = run(*arguments, "--frames", given)

@@ -1,4 +1,4 @@
-"""Runs of real suites by several workers, from the command line: the bytes of one process's results."""
+"""Runs by several workers have the results of one process, byte by byte."""
 
 import pytest
 
@@ -23,7 +23,7 @@ def exported(folder):
         pytest.param("planner-arm", "manipulathor_pickup", marks=pytest.mark.slow),
     ],
 )
-def test_two_workers_find_what_one_process_finds(run, make_nieh_set, tmp_path, model, task):
+def test_two_workers_have_the_results_of_one_process(run, make_nieh_set, tmp_path, model, task):
     data = make_nieh_set(size=56) if task == "nieh_gt" else write(tmp_path / "data", cut(FORK, 3), cut(MUG, 4))
     words = ("--model", model, "--tasks", task, "--data", data)
     for workers in (1, 2):

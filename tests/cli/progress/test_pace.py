@@ -1,4 +1,4 @@
-"""How fast a run goes: in lines where there is no terminal, and in the bar where there is one."""
+"""The pace of a run: in lines without a terminal, and in the bar with one."""
 
 import io
 
@@ -10,7 +10,7 @@ from infthor_eval.cli.progress.pace import Pace, format_duration
 from infthor_eval.terminal import progress_bar
 
 
-def test_what_an_earlier_run_had_done_says_nothing_of_the_pace():
+def test_resumed_units_do_not_count_for_the_pace():
     pace = Pace(100, 0.0)
     for _ in range(40):
         pace.count(True, 5.0)
@@ -21,7 +21,7 @@ def test_what_an_earlier_run_had_done_says_nothing_of_the_pace():
     assert (pace.n_resumed, pace.n_new) == (40, 10)
 
 
-def test_a_slow_model_is_told_in_seconds_for_each():
+def test_the_pace_of_a_slow_model_is_in_seconds_for_each():
     pace = Pace(3, 0.0)
     pace.count(False, 60.0)
     assert pace.speed(60.0) == "60.0 s each"
@@ -38,17 +38,17 @@ def test_a_slow_model_is_told_in_seconds_for_each():
     ],
 )
 def test_lines_come_at_sensible_intervals(n_units, every_s, expected):
-    pace, told = Pace(n_units, 0.0), []
+    pace, lines_at = Pace(n_units, 0.0), []
     for number in range(1, n_units + 1):
         now = round(number * every_s, 6)
         pace.count(False, now)
         if pace.is_due(now):
-            told.append(now)
-    assert told[: len(expected)] == expected
-    assert bool(told) == bool(expected)
+            lines_at.append(now)
+    assert lines_at[: len(expected)] == expected
+    assert bool(lines_at) == bool(expected)
 
 
-def test_work_in_a_pipe_says_lines_with_what_an_earlier_run_had_done_left_out(monkeypatch):
+def test_work_in_a_pipe_prints_lines_without_resumed_units(monkeypatch):
     monkeypatch.setattr("infthor_eval.cli.progress.pace._MIN_INTERVAL_S", 0.0)
     clock = iter(range(100))
     monkeypatch.setattr("infthor_eval.cli.progress.bar.time.monotonic", lambda: float(next(clock)))
@@ -60,7 +60,7 @@ def test_work_in_a_pipe_says_lines_with_what_an_earlier_run_had_done_left_out(mo
     assert said.getvalue().splitlines()[-1] == "replay: 3 of 4 (75 %), 1.0 s left, 1.0 a second"
 
 
-def test_a_training_that_goes_on_tells_its_own_pace(monkeypatch):
+def test_a_resumed_training_prints_its_own_pace(monkeypatch):
     monkeypatch.setattr("infthor_eval.cli.progress.pace._MIN_INTERVAL_S", 0.0)
     clock = iter(range(0, 200, 2))
     monkeypatch.setattr("infthor_eval.cli.progress.bar.time.monotonic", lambda: float(next(clock)))
@@ -83,7 +83,7 @@ def test_where_there_is_no_terminal_no_bar_is_left():
     assert said.getvalue() == ""
 
 
-def test_a_run_in_a_pipe_says_lines_without_colour(make_nieh_set, tmp_path, run, monkeypatch):
+def test_a_run_in_a_pipe_prints_lines_without_colour(make_nieh_set, tmp_path, run, monkeypatch):
     monkeypatch.setattr("infthor_eval.cli.progress.pace._MIN_INTERVAL_S", 0.0)
     arguments = ["--model", "oracle", "--tasks", "nieh_gt", "--data", make_nieh_set(size=56), "--output", tmp_path]
     _, out, err = run(*arguments)
@@ -93,7 +93,7 @@ def test_a_run_in_a_pipe_says_lines_without_colour(make_nieh_set, tmp_path, run,
     assert "\x1b" not in out + err
 
 
-def test_quiet_says_nothing_but_what_failed(make_nieh_set, tmp_path, run):
+def test_quiet_prints_only_failures(make_nieh_set, tmp_path, run):
     data = make_nieh_set(size=56)
     frame = data / "metadata" / "traj_a" / "img" / "000000001.png"
     frame.write_bytes(frame.read_bytes()[:50])
@@ -103,5 +103,5 @@ def test_quiet_says_nothing_but_what_failed(make_nieh_set, tmp_path, run):
     assert err.startswith("nieh_gt: 2 sample(s) failed")
 
 
-def test_a_time_is_told_in_one_unit():
+def test_a_duration_has_one_unit():
     assert [format_duration(seconds) for seconds in (1.5, 119, 240, 7200)] == ["1.5 s", "119.0 s", "4 min", "2.0 h"]

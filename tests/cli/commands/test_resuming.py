@@ -1,4 +1,4 @@
-"""Runs that go on, start anew, or are named, as their user types it."""
+"""Runs that are resumed, restarted, recovered or named."""
 
 import json
 
@@ -30,7 +30,7 @@ def replies(folder):
     return {record.key: record.payload.reply for record in read_run(folder, RECORDS)[1]}
 
 
-def test_a_name_is_the_runs_in_its_folder_its_table_and_its_results(ask, tmp_path):
+def test_a_name_appears_in_the_folder_the_table_and_the_results(ask, tmp_path):
     assert ask(model="oracle")[0] == 0
     code, out, err = ask("--name", "upper bound", model="oracle")
     assert code == 0
@@ -45,21 +45,21 @@ def test_a_name_is_the_runs_in_its_folder_its_table_and_its_results(ask, tmp_pat
 
 
 @pytest.mark.parametrize("name", ["../up", "a/b", "", ".hidden", "-x\n"])
-def test_a_name_that_is_no_folders_is_refused(ask, tmp_path, name):
+def test_a_name_that_cannot_be_a_folders_is_refused(ask, tmp_path, name):
     code, out, err = ask(f"--name={name}", model="oracle")
     assert (code, out, len(err.splitlines())) == (2, "", 1)
     assert "names a folder" in err
     assert not (tmp_path / "out").exists()
 
 
-def test_one_name_is_not_for_two_models(ask, tmp_path):
+def test_one_name_for_two_models_is_refused(ask, tmp_path):
     code, out, err = ask("--name", "both", model="oracle,blind")
     assert (code, out, len(err.splitlines())) == (2, "", 1)
     assert "--name both: names one run, but 2 models are given" in err
     assert not (tmp_path / "out").exists()
 
 
-def test_fresh_starts_anew_and_sets_every_earlier_journal_aside(ask, tmp_path):
+def test_fresh_restarts_and_keeps_every_earlier_journal(ask, tmp_path):
     ask()
     journal = only(tmp_path / "out", "journal")
     folder, first = journal.parent, (journal / "worker-0.jsonl").read_bytes()
@@ -75,7 +75,7 @@ def test_fresh_starts_anew_and_sets_every_earlier_journal_aside(ask, tmp_path):
     assert "0 evaluated now, 5 resumed from the journal" in ask()[2]
 
 
-def test_fresh_is_no_matter_where_nothing_was(ask, tmp_path):
+def test_fresh_without_an_earlier_run_changes_nothing(ask, tmp_path):
     code, _, err = ask("--fresh", "--recover", model="oracle")
     assert code == 0
     assert "5 evaluated now, 0 resumed" in err
@@ -83,7 +83,7 @@ def test_fresh_is_no_matter_where_nothing_was(ask, tmp_path):
 
 
 @pytest.mark.parametrize("option", ["--fresh", "--recover"])
-def test_the_journal_of_a_run_that_is_at_work_is_left_alone(ask, tmp_path, option):
+def test_the_journal_of_an_active_run_is_left_alone(ask, tmp_path, option):
     ask(model="oracle")
     folder = only(tmp_path / "out", "journal").parent
     with Journal(folder, read_header(folder), RECORDS):

@@ -1,4 +1,4 @@
-"""What is listed of runs, and their results shown again: on the first screen, in full, and for other programs."""
+"""`show` and `ls runs`: results on the first screen, in full, and for other programs."""
 
 import csv
 import io
@@ -42,7 +42,7 @@ def test_the_first_screen_has_one_number_a_task_and_fits(ran):
     assert max(len(line) for line in printed.splitlines() if "/" not in line) <= 100
 
 
-def test_a_task_that_asks_nothing_is_a_line(make_nieh_set, tmp_path, run):
+def test_a_task_without_samples_is_a_line(make_nieh_set, tmp_path, run):
     data = make_nieh_set([Question("t", "Is there a mug?", (70,), ("yes",))], n_frames=140, size=56)
     tasks = "nieh_haystack_8k,nieh_haystack_1m"
     code, out, err = run("--model", "oracle", "--tasks", tasks, "--data", data, "--output", tmp_path / "out")
@@ -83,7 +83,7 @@ def test_all_tables_of_csv_have_numbers_in_their_columns_of_numbers(ran):
             assert name in texts or all(cell == "" or math.isfinite(float(cell)) for cell in cells), (name, cells)
 
 
-def test_json_leaves_nothing_to_choose(run, tmp_path):
+def test_json_with_format_or_full_is_refused(run, tmp_path):
     said_in_one_line(run("show", tmp_path, "--json", "--full"), "--json holds everything")
 
 
@@ -94,7 +94,7 @@ def test_a_folder_without_a_run_is_named(run, tmp_path):
 # -- ls
 
 
-def test_runs_are_listed_with_what_was_done_and_what_they_are_known_by(ran, run, tmp_path):
+def test_runs_are_listed_with_counts_and_primary_metrics(ran, run, tmp_path):
     folders, _ = ran()
     code, out, err = run("ls", "runs", tmp_path / "out")
     assert (code, err) == (0, "")
