@@ -69,9 +69,7 @@ def test_the_kilo_token_and_the_extension_are_part_of_the_run_config(make_nieh_s
     for options in ((), ("--k-tokens", 1024), ("--rope", "yarn:2")):
         assert run("--model", "qwen2.5-vl-tiny", "--tasks", tasks, "--data", data, "--output", out, *options)[0] == 0
     configs = [read_header(path.parent).config for path in sorted(out.rglob("journal"))]
-    limits = {
-        (each["k_tokens"], each["model"]["rope"]["rope_type"], each["model"]["max_tokens"]) for each in configs
-    }
+    limits = {(each["k_tokens"], each["model"]["rope"]["rope_type"], each["model"]["max_tokens"]) for each in configs}
     assert limits == {(None, "default", 128_000), (1024, "default", 128_000), (None, "yarn", 256_000)}
 
 
