@@ -4,7 +4,7 @@ Importing this package imports neither torch nor transformers; the first model t
 """
 
 from model_adapters.backend import Backend, BackendConversation
-from model_adapters.check import CheckResult, ContractError, check_adapter, check_policy, run_checks
+from model_adapters.check import CheckResult, ContractError, check_adapter, run_checks
 from model_adapters.protocols import (
     ROLES,
     Adapter,
@@ -61,7 +61,6 @@ __all__ = [
     "check_adapter",
     "check_decoding",
     "check_options",
-    "check_policy",
     "check_turns",
     "cut_at_stop",
     "has_option",

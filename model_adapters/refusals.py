@@ -1,14 +1,12 @@
 """Checks of requests, with the same messages for every model."""
 
-from collections.abc import Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
 
-from infthor_eval.errors import ModelError, wrap_errors
+from infthor_eval.errors import InfthorError, ModelError, describe_exception
 from model_adapters.protocols import Capabilities, Decoding, Turn
 
-__all__ = ["check_decoding", "check_turns", "wrap_request_errors"]
-
-_FAILURES = (RuntimeError, ValueError, TypeError, LookupError, AttributeError, ArithmeticError, OSError, MemoryError)
+__all__ = ["check_decoding", "check_turns", "wrap_adapter_errors", "wrap_request_errors"]
 
 
 def check_decoding(name: str, capabilities: Capabilities, decoding: Decoding) -> None:
@@ -45,10 +43,26 @@ def check_turns(name: str, turns: Sequence[Turn]) -> None:
         raise ModelError(f"{name} has nothing to reply to: {state}; append a user turn")
 
 
-def wrap_request_errors(name: str) -> AbstractContextManager[None]:
-    """Turns what an adapter, anybody's, raises on a request into a failure of that request: the others go on.
+@contextmanager
+def wrap_adapter_errors(problem: str) -> Iterator[None]:
+    """Turn any error in an adapter's code into a `ModelError` of one line.
+
+    The line has the place of the error. The error itself, with its traceback, is the cause of the `ModelError`.
 
     Args:
-        name: of the model, for the message.
+        problem: the model and what it fails to do, for the message.
+
+    Raises:
+        ModelError: the adapter raised an error that is not one of ours.
     """
-    return wrap_errors(f"{name} fails on the request", "report it to who made it", catch=_FAILURES, raise_as=ModelError)
+    try:
+        yield
+    except InfthorError:
+        raise
+    except Exception as error:  # an adapter may be anybody's code and raise anything
+        raise ModelError(f"{problem} ({describe_exception(error)}); fix the adapter, or report it") from error
+
+
+def wrap_request_errors(name: str) -> AbstractContextManager[None]:
+    """Turn any error of an adapter on a request into a failure of this request alone; see `wrap_adapter_errors`."""
+    return wrap_adapter_errors(f"{name} fails on the request")

@@ -1,8 +1,8 @@
-"""Names of models, and how to get from a name to a model.
+"""Names of models, and how to build a model by its name.
 
-Targets are "module:Class" strings that are imported only when a model is asked for, so that listing names, and the
-options of built-in models, costs nothing. Packages add their own through the entry point group `infthor_eval.models`; a
-name may also be that of a file and a class in it, `./my_adapter.py:MyModel`.
+Adapters are "module:Class" strings that are imported only when a model is needed, so that listing names, and the
+options of built-in models, is fast. Packages add theirs by the entry point group `infthor_eval.models`. A name may also
+be a file and a class in it, `./my_adapter.py:MyModel`.
 """
 
 import dataclasses
@@ -16,18 +16,22 @@ from typing import Any, cast
 from infthor_eval.errors import ModelError, UsageError, unknown_name
 from model_adapters.adapter_identity import package_identity
 from model_adapters.built_in import BUILT_IN
+from model_adapters.check.clauses import ContractError, check_members
 from model_adapters.options import describe, parse
-from model_adapters.own_file import class_in_file, class_name, identity_of_file, names_a_file
+from model_adapters.own_file import class_name, file_identity, load_class, names_a_file
 from model_adapters.protocols import Adapter, Model, Policy
+from model_adapters.refusals import wrap_adapter_errors
 
 __all__ = [
     "ENTRY_POINTS",
     "adapter_identity",
+    "build",
     "check_options",
     "has_option",
     "is_known",
     "label",
     "load",
+    "model_description",
     "model_note",
     "name_on_engine",
     "names",
@@ -36,114 +40,136 @@ __all__ = [
 
 ENTRY_POINTS = "infthor_eval.models"
 
-_TRANSFORMERS = "transformers"  # runs what no other engine is named for
+_TRANSFORMERS = "transformers"  # the engine of names without `@ENGINE`
+_HELP = "docs/own-models.md lists what an adapter needs"
 
 
 def names() -> tuple[str, ...]:
-    """All model names, sorted: the built-in ones and those of installed packages."""
+    """Return all model names, sorted: the built-in ones and those of installed packages."""
     return tuple(sorted(_targets()))
 
 
 def is_known(name: str) -> bool:
-    """Whether there is a model of this name, or it is that of a file with one."""
+    """Return whether this is the name of a model, or of a file and a class in it."""
     return name in _targets() or names_a_file(name)
 
 
 def name_on_engine(name: str, engine: str) -> str:
-    """The name of a model where an engine of one's choice is to run it.
+    """Return the name of a model on a given engine.
 
     Args:
-        name: of the model, with its engine or without.
-        engine: `transformers`, or what stands behind the `@` of the names that it runs.
+        name: name of the model, with or without its engine.
+        engine: `transformers`, or an engine that follows the `@` in some model names.
 
     Raises:
-        UsageError: the engine does not run it; the message lists what it runs.
+        UsageError: the engine does not run the model; the message lists the models that it runs.
     """
-    model, _, named = name.partition("@")
-    if named and named != engine:
+    model, _, own_engine = name.partition("@")
+    if own_engine and own_engine != engine:
         raise UsageError(f"{name} names its engine, and it is not {engine}; leave one of them out")
     if engine == _TRANSFORMERS:
         return name
-    known = [known.removesuffix(f"@{engine}") for known in names() if known.endswith(f"@{engine}")]
-    if model not in known:
-        raise UsageError(f"{model} does not run on {engine}; there do: {', '.join(known)}")
+    supported = [known.removesuffix(f"@{engine}") for known in names() if known.endswith(f"@{engine}")]
+    if model not in supported:
+        raise UsageError(f"{model} does not run on {engine}; there do: {', '.join(supported)}")
     return f"{model}@{engine}"
 
 
+def model_description(name: str) -> str:
+    """Return what a model is, in a few words, or an empty text if its name says so."""
+    return BUILT_IN[name].description if name in BUILT_IN else ""
+
+
 def options(name: str) -> str:
-    """The model's options with their defaults, for people.
+    """Return the model's options with their defaults, as one line of text.
 
     Raises:
-        UsageError: there is no model of this name.
+        UsageError: the name is unknown.
         ModelError: the adapter cannot be imported.
     """
     return describe(_options(name))
 
 
 def model_note(name: str) -> str:
-    """What a user must know before running a model; empty for nothing, and for a model of another package."""
+    """Return a warning for users of a model, or an empty text."""
     return BUILT_IN[name].note if name in BUILT_IN else ""
 
 
 def check_options(name: str, options: Mapping[str, str]) -> None:
-    """Refuse at once what `load` would refuse, as far as names and values of options go.
+    """Check names and values of options as `load` does, without loading the model.
 
     Raises:
-        UsageError: an unknown name or option, or a value that does not fit.
+        UsageError: a name is unknown, or a value does not fit its option.
         ModelError: the adapter cannot be imported.
     """
     parse(name, _options(name), options)
 
 
 def load(name: str, options: Mapping[str, str], seed: int) -> Model | Policy:
-    """Build the model or the policy of this name.
+    """Build the model or the policy of this name, and check that it has all members of its protocol.
 
     Args:
         name: one of `names()`, or FILE.py:CLASS.
-        options: the adapter's options as typed, `{"dtype": "float32"}`; what is left out takes its default.
-        seed: for whatever is random in it (random weights).
+        options: values of the adapter's options as typed, `{"dtype": "float32"}`; the others take their defaults.
+        seed: seed of whatever is random in the model (random weights).
 
     Raises:
-        UsageError: an unknown name or option, or a value that does not fit; the message has the nearest name.
-        ModelError: the model cannot be loaded.
+        UsageError: a name is unknown (the message has the nearest one), or a value does not fit its option.
+        ModelError: the model cannot be loaded, or lacks a member.
     """
+    model = build(name, options, seed)
+    if name not in BUILT_IN:
+        with wrap_adapter_errors(f"model {name}: conversation() fails"):
+            try:
+                check_members(model)
+            except ContractError as error:
+                raise ModelError(f"model {name}: {error}; {_HELP}") from error
+    return model
+
+
+def build(name: str, options: Mapping[str, str], seed: int) -> Model | Policy:
+    """Build the model or the policy of this name without checking its members; see `load`."""
     adapter = _adapter(name)
-    return adapter.build(class_name(name) if names_a_file(name) else name, parse(name, adapter.Options, options), seed)
+    given = parse(name, adapter.Options, options)
+    if name in BUILT_IN:
+        return adapter.build(name, given, seed)
+    with wrap_adapter_errors(f"model {name}: build() fails"):
+        return adapter.build(class_name(name) if names_a_file(name) else name, given, seed)
 
 
 def adapter_identity(name: str) -> dict[str, Any]:
-    """What distinguishes this adapter's code from other versions of it, as JSON values.
+    """Return what distinguishes this adapter's code from other versions of it, as JSON values.
 
-    Nothing for a built-in one, whose version is the harness's own; else package (or file), version and a digest of the
-    source.
+    It is empty for a built-in adapter, whose version is that of the harness. For others it has the package (or file),
+    its version and a digest of its source.
 
     Raises:
-        UsageError: there is no model of this name.
+        UsageError: the name is unknown.
         ModelError: the adapter's source cannot be read.
     """
     if names_a_file(name):
-        return identity_of_file(name)
+        return file_identity(name)
     _target(name)
     return {} if name in BUILT_IN else package_identity(_entry_points()[name])
 
 
 def has_option(name: str, option: str) -> bool:
-    """Whether a model has an option.
+    """Return whether a model has an option.
 
     Raises:
-        UsageError: there is no model of this name.
+        UsageError: the name is unknown.
         ModelError: the adapter cannot be imported.
     """
     return option in {field.name for field in dataclasses.fields(_options(name))}
 
 
 def label(name: str, options: Mapping[str, str]) -> str:
-    """What a run of this model is called where nobody named it, fit to be a folder's name.
+    """Return the default name of this model's runs, usable as the name of a folder.
 
     Args:
-        name: of the model.
-        options: as typed; where they name a checkpoint, so does the label: `Qwen2.5-VL-3B-Instruct@main`. A server's
-            model is named as the server does.
+        name: name of the model.
+        options: its options as typed. If they name a checkpoint, so does the label: `Qwen2.5-VL-3B-Instruct@main`. The
+            label of a model behind a server is the server's name of it.
     """
     checkpoint = options.get("pretrained") or options.get("model")
     name = class_name(name) if names_a_file(name) else name
@@ -184,24 +210,25 @@ def _target(name: str) -> str:
 
 
 def _options(name: str) -> type:
-    """The dataclass of a model's options; of a built-in one without its adapter, which may import torch."""
+    """Return the dataclass of a model's options, without importing a built-in adapter, which may import torch."""
     if name not in BUILT_IN:
         return _adapter(name).Options
-    found: type = _imported(BUILT_IN[name].options)
-    return found
+    options_class: type = _import_target(BUILT_IN[name].options)
+    return options_class
 
 
 def _adapter(name: str) -> type[Adapter]:
     target = name if names_a_file(name) else _target(name)
     try:
-        found = class_in_file(name) if names_a_file(name) else _imported(target)
+        adapter = load_class(name) if names_a_file(name) else _import_target(target)
     except (ImportError, AttributeError) as error:
         raise ModelError(f"model {name} cannot be imported from {target} ({error})") from error
-    if not (hasattr(found, "Options") and hasattr(found, "build")):
-        raise ModelError(f"model {name}: {target} has no Options and build; see docs/own-models.md")
-    return cast(type[Adapter], found)
+    missing = [member for member in ("Options", "build") if not hasattr(adapter, member)]
+    if missing:
+        raise ModelError(f"model {name}: {target} has no {' and '.join(missing)}; {_HELP}")
+    return cast(type[Adapter], adapter)
 
 
-def _imported(target: str) -> Any:
+def _import_target(target: str) -> Any:
     module, _, attribute = target.partition(":")
     return getattr(importlib.import_module(module), attribute)

@@ -1,68 +1,70 @@
-"""What a model claims to be able to do: it does it, or refuses it."""
+"""Checks that a model does what its capabilities claim, and refuses what they do not."""
 
 from concurrent.futures import ThreadPoolExecutor
 
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
-from model_adapters.check.asking import NEW_TOKENS, QUESTION, ask, opened, same
 from model_adapters.check.clauses import raises, require
+from model_adapters.check.questions import NEW_TOKENS, QUESTION, ask, same_reply, start_conversation
 from model_adapters.protocols import Decoding, Model, Reply
 
 __all__ = ["check_choices", "check_flight", "check_sampling"]
 
-_THREADS = 4  # of those that a model takes, so many are tried
-_CHOICES = ("bright", "dark", "dark and bright")  # one begins like another
+_MOST_THREADS = 4
+_CHOICES = ("bright", "dark", "dark and bright")  # one is a prefix of another
 
 
 def check_sampling(model: Model, frame: FrameRef) -> None:
-    """Check that replies are drawn where the model says so, by the seed alone where it is deterministic.
+    """Check that replies are sampled if the model claims to, and depend on the seed alone if it is deterministic.
 
     Raises:
-        ContractError: names the clause that does not hold.
+        ContractError: a clause does not hold; the message names it.
     """
-    drawn = [Decoding(max_new_tokens=NEW_TOKENS, temperature=2.0, seed=seed) for seed in range(4)]
-    talk = opened(model, frame, "\nDescribe the picture.")
+    decodings = [Decoding(max_new_tokens=NEW_TOKENS, temperature=2.0, seed=seed) for seed in range(4)]
+    talk = start_conversation(model, frame, "\nDescribe the picture.")
     if not model.capabilities.sampling:
-        require(raises(ModelError, talk.reply, drawn[0]), "a temperature that is not taken does not raise ModelError")
+        refuses = raises(ModelError, talk.reply, decodings[0])
+        require(refuses, "a temperature does not raise ModelError though sampling is false; call check_decoding first")
         return
-    replies = [talk.reply(decoding) for decoding in drawn]
-    require(any(not same(replies[0], other) for other in replies), "no seed changes a reply at temperature 2")
+    replies = [talk.reply(decoding) for decoding in decodings]
+    require(any(not same_reply(replies[0], other) for other in replies), "no seed changes a reply at temperature 2")
     if model.capabilities.deterministic:
-        again = [talk.reply(decoding) for decoding in reversed(drawn)][::-1]
-        require(all(map(same, replies, again)), "the same seed does not draw the same reply")
+        again = [talk.reply(decoding) for decoding in reversed(decodings)][::-1]
+        require(all(map(same_reply, replies, again)), "the same seed does not give the same reply")
 
 
 def check_choices(model: Model, frame: FrameRef) -> None:
-    """Check that replies are held to choices where the model says so.
+    """Check that replies are restricted to choices if the model claims to support them.
 
     Raises:
-        ContractError: names the clause that does not hold.
+        ContractError: a clause does not hold; the message names it.
     """
     decoding = Decoding(max_new_tokens=64, choices=_CHOICES)
-    talk = opened(model, frame, QUESTION)
+    talk = start_conversation(model, frame, QUESTION)
     if not model.capabilities.choices:
-        require(raises(ModelError, talk.reply, decoding), "choices that are not taken do not raise ModelError")
+        refuses = raises(ModelError, talk.reply, decoding)
+        require(refuses, "choices do not raise ModelError though choices is false; call check_decoding first")
         return
-    for chosen in (_CHOICES, _CHOICES[1:], _CHOICES[:1]):
-        text = talk.reply(Decoding(max_new_tokens=64, choices=chosen)).text
-        require(text in chosen, f"a reply is none of its choices: {text!r}")
+    for choices in (_CHOICES, _CHOICES[1:], _CHOICES[:1]):
+        text = talk.reply(Decoding(max_new_tokens=64, choices=choices)).text
+        require(text in choices, f"a reply is none of its choices: {text!r}")
 
 
 def check_flight(model: Model, black: FrameRef, white: FrameRef) -> None:
-    """Check that several conversations can be asked at the same time, where the model says so.
+    """Check that several conversations can be answered at the same time if the model claims so.
 
     Raises:
-        ContractError: a reply differs from that of asking one by one.
+        ContractError: a reply differs from the one to the same question asked alone.
     """
-    n_threads = min(model.capabilities.max_in_flight, _THREADS)
+    n_threads = min(model.capabilities.max_in_flight, _MOST_THREADS)
     if n_threads == 1:
         return
-    asked = [(frame, f"\nWhat is picture {number}?") for number in range(n_threads) for frame in (black, white)]
+    questions = [(frame, f"\nWhat is picture {number}?") for number in range(n_threads) for frame in (black, white)]
 
     def answer(parts: tuple[FrameRef, str]) -> Reply:
         return ask(model, *parts)
 
     with ThreadPoolExecutor(n_threads) as pool:
-        together = list(pool.map(answer, asked))
-    alike = not model.capabilities.deterministic or all(map(same, together, map(answer, asked)))
-    require(alike, "replies that are asked for at the same time differ from those one by one")
+        together = list(pool.map(answer, questions))
+    alike = not model.capabilities.deterministic or all(map(same_reply, together, map(answer, questions)))
+    require(alike, "replies to questions asked at the same time differ from those asked one by one")

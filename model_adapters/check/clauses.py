@@ -1,4 +1,4 @@
-"""What the checks of models and of policies have in common."""
+"""Building blocks that the checks of models and of policies share."""
 
 import json
 import tempfile
@@ -10,27 +10,23 @@ from typing import Any, Generic, Protocol
 from PIL import Image
 
 from infthor_eval.formats.frames import FrameRef
-from model_adapters.protocols import Model, Policy
+from model_adapters.protocols import Conversation, Model, Policy
 
 __all__ = ["ContractError", "check_identity", "check_members", "frames_of_one_colour", "raises", "require"]
 
 
 class ContractError(AssertionError):
-    """An adapter broke a clause of its protocol; the message says which."""
+    """An adapter violates a clause of its protocol; the message says which."""
 
 
 def require(holds: bool, clause: str) -> None:
-    """Have a clause hold.
-
-    Raises:
-        ContractError: it does not.
-    """
+    """Raise `ContractError` with the clause unless it holds."""
     if not holds:
         raise ContractError(clause)
 
 
 def raises(error_type: type[Exception], call: Callable[..., Any], *args: Any, **kwargs: Any) -> bool:
-    """Whether a call raises such an error."""
+    """Return whether a call raises an error of this type."""
     try:
         call(*args, **kwargs)
     except error_type:
@@ -38,23 +34,26 @@ def raises(error_type: type[Exception], call: Callable[..., Any], *args: Any, **
     return False
 
 
-def check_members(found: object, protocol: type) -> None:
-    """Check that an object has all that a protocol has, without asking for any of it.
+def check_members(adapter: Any) -> None:
+    """Check that a model and its conversation, or a policy, have all members of their protocols.
+
+    An object with `act` counts as a policy, any other as a model.
 
     Raises:
-        ContractError: names what is missing.
+        ContractError: a member is missing; the message names it.
     """
-    bases = [base for base in protocol.__mro__ if base not in (Protocol, Generic, object)]
-    names = {name for base in bases for name in vars(base) if not name.startswith("_")}
-    missing = sorted(names - set(dir(found)))
-    require(not missing, f"{type(found).__name__} lacks a member of {protocol.__name__}: {', '.join(missing)}")
+    if hasattr(adapter, "act"):
+        _require_members(adapter, Policy)
+    else:
+        _require_members(adapter, Model)
+        _require_members(adapter.conversation(), Conversation)
 
 
 def check_identity(adapter: Model | Policy) -> None:
     """Check name, identity and capabilities.
 
     Raises:
-        ContractError: names the clause that does not hold.
+        ContractError: a clause does not hold; the message names it.
     """
     identity = adapter.identity()
     try:
@@ -64,19 +63,23 @@ def check_identity(adapter: Model | Policy) -> None:
     require(again == identity, "identity() changes when written as JSON and read back")
     require(adapter.identity() == identity, "identity() differs from call to call")
     require(bool(adapter.name), "the name is empty")
-    able = adapter.capabilities
-    require(able.batch_size >= 1, "batch_size is below 1")
-    require(able.max_in_flight >= 1, "max_in_flight is below 1")
+    require(adapter.capabilities.batch_size >= 1, "batch_size is below 1")
+    require(adapter.capabilities.max_in_flight >= 1, "max_in_flight is below 1")
 
 
 @contextmanager
 def frames_of_one_colour(size: tuple[int, int]) -> Iterator[tuple[FrameRef, FrameRef]]:
-    """A black frame and a white one of this width and height, for as long as they are needed."""
+    """Yield a black and a white frame of this width and height, whose files exist within the context."""
     with tempfile.TemporaryDirectory() as folder:
-        yield _frame(Path(folder), "black", size), _frame(Path(folder), "white", size)
+        black, white = (Path(folder) / f"{colour}.png" for colour in ("black", "white"))
+        for path in (black, white):
+            Image.new("RGB", size, path.stem).save(path)
+        yield FrameRef(black), FrameRef(white)
 
 
-def _frame(folder: Path, colour: str, size: tuple[int, int]) -> FrameRef:
-    path = folder / f"{colour}.png"
-    Image.new("RGB", size, colour).save(path)
-    return FrameRef(path)
+def _require_members(instance: object, protocol: type) -> None:
+    """Raise `ContractError` if an object lacks public members of a protocol; no property is evaluated."""
+    bases = [base for base in protocol.__mro__ if base not in (Protocol, Generic, object)]
+    names = {name for base in bases for name in vars(base) if not name.startswith("_")}
+    missing = sorted(names - set(dir(instance)))
+    require(not missing, f"{type(instance).__name__} lacks a member of {protocol.__name__}: {', '.join(missing)}")

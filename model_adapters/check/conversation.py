@@ -1,36 +1,41 @@
-"""How a conversation has to be kept: parts, turns, marks, and counts where the model counts."""
+"""Checks of conversations: parts, turns, marks and token counts."""
 
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
-from model_adapters.check.asking import GREEDY, QUESTION, opened, same
 from model_adapters.check.clauses import raises, require
+from model_adapters.check.questions import GREEDY, QUESTION, same_reply, start_conversation
 from model_adapters.protocols import Conversation, Model
 
 __all__ = ["check_counts", "check_marks", "check_parts", "check_turns"]
 
 
 def check_parts(model: Model, frame: FrameRef) -> None:
-    """Check what can be appended.
+    """Check that texts and frames can be appended, and nothing else.
 
     Raises:
-        ContractError: names the clause that does not hold.
+        ContractError: a clause does not hold; the message names it.
     """
-    split, whole = opened(model, frame, "\nWhat do", " you see?"), opened(model, frame, "\nWhat do you see?")
+    split = start_conversation(model, frame, "\nWhat do", " you see?")
+    whole = start_conversation(model, frame, "\nWhat do you see?")
     require(_alike(model, split, whole), "a text appended in two pieces differs from the same text in one")
-    require(raises(TypeError, split.append, 3), "append() of something that is no part does not raise TypeError")
+    require(
+        raises(TypeError, split.append, 3),
+        "append() of neither text nor frame does not raise TypeError",
+    )
     require(raises(ValueError, split.append, "x", role="narrator"), "append() in an unknown role does not raise")
     require(_alike(model, split, whole), "a refused append() changes the conversation")
 
 
 def check_counts(model: Model, frame: FrameRef) -> None:
-    """Check that tokens are counted where the model says so, and not told where it does not.
+    """Check that token counts are exact if the model claims so, and None if it does not.
 
     Raises:
-        ContractError: names the clause that does not hold.
+        ContractError: a clause does not hold; the message names it.
     """
     if not model.capabilities.counts_tokens:
-        require(opened(model, frame, QUESTION).n_tokens is None, "n_tokens is not None though it counts no tokens")
-        require(model.tokens_per_frame(frame) is None, "tokens_per_frame() is not None though it counts no tokens")
+        n_tokens = start_conversation(model, frame, QUESTION).n_tokens
+        require(n_tokens is None, "n_tokens is not None though counts_tokens is false")
+        require(model.tokens_per_frame(frame) is None, "tokens_per_frame() is not None though counts_tokens is false")
         return
     talk, sizes = model.conversation(), []
     for parts in ((frame,), (frame,), ("\nThe first frame.",), (frame, frame), (QUESTION,)):
@@ -42,19 +47,19 @@ def check_counts(model: Model, frame: FrameRef) -> None:
 
 
 def check_turns(model: Model, frame: FrameRef) -> None:
-    """Check that turns are told apart, and that only the user's is replied to.
+    """Check that turns are kept apart, and that the model replies to a user turn only.
 
     Raises:
-        ContractError: names the clause that does not hold.
+        ContractError: a clause does not hold; the message names it.
     """
     _check_nothing_to_reply_to(model.conversation(), "an empty conversation")
-    talk = opened(model, frame, QUESTION)
-    one = talk.n_tokens
+    talk = start_conversation(model, frame, QUESTION)
+    one_turn = talk.n_tokens
     talk.append("A table.", role="assistant")
     _check_nothing_to_reply_to(talk, "a conversation whose last turn is the assistant's")
     talk.append("\nAre you sure?")
     talk.reply(GREEDY)
-    require(one is None or one < (talk.n_tokens or 0), "n_tokens of three turns is not above that of the first")
+    require(one_turn is None or one_turn < (talk.n_tokens or 0), "n_tokens of three turns is not above that of one")
     _check_system(model, frame)
 
 
@@ -62,25 +67,26 @@ def check_marks(model: Model, frame: FrameRef) -> None:
     """Check marks and rewinding.
 
     Raises:
-        ContractError: names the clause that does not hold.
+        ContractError: a clause does not hold; the message names it.
     """
-    talk, as_it_was = opened(model, frame, QUESTION), opened(model, frame, QUESTION)
+    talk, unchanged = start_conversation(model, frame, QUESTION), start_conversation(model, frame, QUESTION)
     early = talk.mark()
     talk.append(" More.")
     late = talk.mark()
     talk.rewind(early)
-    require(_alike(model, talk, as_it_was), "rewind() does not bring back n_tokens or the reply")
+    require(_alike(model, talk, unchanged), "rewind() does not bring back n_tokens or the reply")
     talk.append("Yes.", role="assistant")
     talk.append(" More and more.")
     require(raises(ValueError, talk.rewind, late), "rewind() to a mark behind the point rewound to does not raise")
     talk.rewind(early)
-    require(_alike(model, talk, as_it_was), "a mark is good for one rewind() only")
-    foreign = opened(model, frame).mark()
+    require(_alike(model, talk, unchanged), "a second rewind() to the same mark fails")
+    foreign = start_conversation(model, frame).mark()
     require(raises(ValueError, talk.rewind, foreign), "rewind() to another conversation's mark does not raise")
 
 
 def _check_nothing_to_reply_to(talk: Conversation, what: str) -> None:
-    require(raises(ModelError, talk.reply, GREEDY), f"reply() to {what} does not raise ModelError")
+    refuses = raises(ModelError, talk.reply, GREEDY)
+    require(refuses, f"reply() to {what} does not raise ModelError; call check_turns first")
 
 
 def _check_system(model: Model, frame: FrameRef) -> None:
@@ -91,11 +97,11 @@ def _check_system(model: Model, frame: FrameRef) -> None:
     try:
         talk.reply(GREEDY)
     except ModelError:
-        return  # a model without system turns says so
+        return  # the model does not support system turns
 
 
 def _alike(model: Model, one: Conversation, other: Conversation) -> bool:
-    """Whether two conversations are the same, as far as the model lets it be seen."""
+    """Return whether two conversations look the same: by token count, or else by a deterministic reply."""
     if model.capabilities.counts_tokens:
         return one.n_tokens == other.n_tokens
-    return not model.capabilities.deterministic or same(one.reply(GREEDY), other.reply(GREEDY))
+    return not model.capabilities.deterministic or same_reply(one.reply(GREEDY), other.reply(GREEDY))

@@ -1,55 +1,40 @@
-"""The contract of policies."""
+"""Checks of policies."""
 
 import math
 from collections.abc import Callable
 from functools import partial
 
 from infthor_eval.formats.frames import FrameRef
-from model_adapters.check.clauses import check_identity, check_members, frames_of_one_colour, require
+from model_adapters.check.clauses import check_identity, check_members, require
 from model_adapters.protocols import ArmDelta, Policy
 
-__all__ = ["check_policy", "policy_checks"]
+__all__ = ["policy_checks"]
 
 _INSTRUCTION = "pick up the mug"
 
 
-def check_policy(policy: Policy, frame_size: tuple[int, int] = (300, 300)) -> None:
-    """Check a policy against the contract of `Policy`; it acts a few times on frames of one colour.
-
-    Args:
-        policy: the adapter to check; it stays open.
-        frame_size: width and height of the frames to show it, in pixels.
-
-    Raises:
-        ContractError: names the clause that does not hold.
-    """
-    with frames_of_one_colour(frame_size) as (black, white):
-        for check in policy_checks(policy, black, white).values():
-            check()
-
-
 def policy_checks(policy: Policy, black: FrameRef, white: FrameRef) -> dict[str, Callable[[], None]]:
-    """All checks of a policy, by what they are about; each raises ContractError where a clause does not hold.
+    """Return all checks of a policy by name; each raises `ContractError` if a clause does not hold.
 
     Args:
         policy: the adapter to check.
-        black: a frame of that colour.
-        white: likewise.
+        black: a black frame.
+        white: a white frame.
     """
     return {
-        "members": partial(check_members, policy, Policy),
+        "members": partial(check_members, policy),
         "identity": partial(check_identity, policy),
         "episodes": partial(_check_episodes, policy, (black, white)),
     }
 
 
 def _check_episodes(policy: Policy, frames: tuple[FrameRef, ...]) -> None:
-    episodes = [_episode(policy, frames) for _ in range(2)]
+    episodes = [_run_episode(policy, frames) for _ in range(2)]
     alike = episodes[0] == episodes[1] or not policy.capabilities.deterministic
-    require(alike, "after reset() the same frames are not acted on the same way")
+    require(alike, "after reset() the same frames do not give the same actions")
 
 
-def _episode(policy: Policy, frames: tuple[FrameRef, ...]) -> list[tuple[ArmDelta, ...]]:
+def _run_episode(policy: Policy, frames: tuple[FrameRef, ...]) -> list[tuple[ArmDelta, ...]]:
     policy.reset()
     chunks = [policy.act(frame, _INSTRUCTION) for frame in frames]
     for chunk in chunks:
@@ -60,8 +45,8 @@ def _episode(policy: Policy, frames: tuple[FrameRef, ...]) -> list[tuple[ArmDelt
 def _check_chunk(chunk: tuple[ArmDelta, ...]) -> None:
     require(isinstance(chunk, tuple) and len(chunk) > 0, "act() does not return a tuple of at least one ArmDelta")
     for step in chunk:
-        require(isinstance(step, ArmDelta), "a step of act() is no ArmDelta")
-        require(len(step.translation) == len(step.rotation) == 3, "a translation or rotation has not three numbers")
+        require(isinstance(step, ArmDelta), "a step of act() is not an ArmDelta")
+        require(len(step.translation) == len(step.rotation) == 3, "a translation or rotation is not three numbers")
         numbers = (*step.translation, *step.rotation, step.gripper)
         finite = all(isinstance(number, float) and math.isfinite(number) for number in numbers)
         require(finite, f"a step of act() is not made of finite floats: {step}")

@@ -1,8 +1,8 @@
-"""What replies have to be, whatever the model says."""
+"""Checks of replies that hold for every model."""
 
 from infthor_eval.formats.frames import FrameRef
-from model_adapters.check.asking import GREEDY, NEW_TOKENS, QUESTION, ask, opened, same
 from model_adapters.check.clauses import require
+from model_adapters.check.questions import GREEDY, NEW_TOKENS, QUESTION, ask, same_reply, start_conversation
 from model_adapters.protocols import Conversation, Decoding, Model, Part, Reply
 
 __all__ = ["check_continuations", "check_frames", "check_reply", "check_sharing"]
@@ -12,9 +12,9 @@ def check_reply(model: Model, frame: FrameRef) -> None:
     """Check one reply: its counts and ids, its length, its stop strings.
 
     Raises:
-        ContractError: names the clause that does not hold.
+        ContractError: a clause does not hold; the message names it.
     """
-    talk = opened(model, frame, QUESTION)
+    talk = start_conversation(model, frame, QUESTION)
     size = talk.n_tokens
     first = talk.reply(GREEDY)
     require(isinstance(first, Reply), "reply() does not return a Reply")
@@ -23,7 +23,7 @@ def check_reply(model: Model, frame: FrameRef) -> None:
     _check_ids(model, first)
     require(talk.n_tokens == size, "reply() changes the conversation")
     if model.capabilities.deterministic:
-        require(same(first, talk.reply(GREEDY)), "the same question is not answered the same way twice")
+        require(same_reply(first, talk.reply(GREEDY)), "the same question is not answered the same way twice")
         _check_short(talk, first)
     _check_stop(model, talk, first)
 
@@ -32,11 +32,11 @@ def check_frames(model: Model, black: FrameRef, white: FrameRef) -> None:
     """Check that the model sees the frames.
 
     Raises:
-        ContractError: it does not.
+        ContractError: its replies do not depend on them.
     """
-    # One reply could be the same by chance; of several questions on the two frames, one must differ.
-    asked = [QUESTION, "\nIs it bright or dark?", "\nWhat colour is it?", "\nDescribe the picture."]
-    differ = any(not same(ask(model, black, text), ask(model, white, text)) for text in asked)
+    # Equal replies to one question may be chance, so one of several replies has to differ.
+    questions = [QUESTION, "\nIs it bright or dark?", "\nWhat colour is it?", "\nDescribe the picture."]
+    differ = any(not same_reply(ask(model, black, text), ask(model, white, text)) for text in questions)
     require(differ, "a black and a white frame get the same replies: the model does not see the frames")
 
 
@@ -44,36 +44,36 @@ def check_sharing(model: Model, black: FrameRef, white: FrameRef) -> None:
     """Check that a reply does not depend on what was asked before.
 
     Raises:
-        ContractError: it does.
+        ContractError: a reply after a rewind differs from that of a new conversation.
     """
-    talk = opened(model, black, white)
+    talk = start_conversation(model, black, white)
     start = talk.mark()
     shared = []
     for text in (QUESTION, "\nWhat colour was the first frame?"):
         talk.append(text)
         shared.append(talk.reply(GREEDY))
         talk.rewind(start)
-    ask(model, white, "\nSomething else.")  # whatever the back end has kept is of no use after this
+    ask(model, white, "\nSomething else.")  # evicts whatever the back end has cached
     fresh = ask(model, black, white, "\nWhat colour was the first frame?")
-    alike = same(shared[1], fresh) or not model.capabilities.deterministic
-    require(alike, "a reply after a rewind differs from that of a fresh conversation")
+    alike = same_reply(shared[1], fresh) or not model.capabilities.deterministic
+    require(alike, "a reply after a rewind differs from that of a new conversation")
 
 
 def check_continuations(model: Model, black: FrameRef, white: FrameRef) -> None:
-    """Check that several continuations are answered as each of them alone.
+    """Check that several continuations get the replies that each of them gets alone.
 
     Raises:
-        ContractError: names the clause that does not hold.
+        ContractError: a clause does not hold; the message names it.
     """
-    talk = opened(model, black)
+    talk = start_conversation(model, black)
     continuations: list[list[Part]] = [[QUESTION], [white, "\nWhat colours are the frames?"], ["\nWhy?"]]
     size, together = talk.n_tokens, talk.replies(continuations, GREEDY)
     require(talk.n_tokens == size, "replies() changes the conversation")
     require(len(together) == len(continuations), "replies() does not give one reply per continuation")
     alone = [ask(model, black, *parts) for parts in continuations]
-    alike = all(map(same, together, alone)) or not model.capabilities.deterministic
+    alike = all(map(same_reply, together, alone)) or not model.capabilities.deterministic
     require(alike, "replies() differs from asking one by one")
-    require(talk.replies([], GREEDY) == [], "replies() to no continuation are not none")
+    require(talk.replies([], GREEDY) == [], "replies() to no continuations is not an empty list")
 
 
 def _check_counted(reply: Reply, size: int | None) -> None:
@@ -85,7 +85,7 @@ def _check_counted(reply: Reply, size: int | None) -> None:
 
 def _check_ids(model: Model, reply: Reply) -> None:
     if not model.capabilities.token_ids:
-        require(reply.token_ids is None, "a reply has token_ids though the model tells none")
+        require(reply.token_ids is None, "a reply has token_ids though token_ids is false")
         return
     require(reply.token_ids is not None, "a reply has no token_ids")
     n_ids = len(reply.token_ids or ())

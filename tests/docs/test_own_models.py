@@ -3,13 +3,16 @@
 import dataclasses
 import json
 import re
+import traceback
 
 import pytest
 
+from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
-from model_adapters import Capabilities, adapter_identity, label
+from model_adapters import Capabilities, Decoding, adapter_identity, label, load, wrap_request_errors
 from model_adapters.check.model import model_checks
 from model_adapters.check.policy import policy_checks
+from model_adapters.check.questions import start_conversation
 from tests.model_adapters.test_check_policy import Scripted
 
 from .blocks import ROOT, written_files
@@ -110,6 +113,39 @@ def test_a_broken_clause_and_an_exception_are_reported_with_the_others(folder, r
     source.write_text(source.read_text().replace("def close", "def shut"))
     code, out, err = run("check-adapter", NAME)
     assert (code, out.splitlines()[0]) == (1, "broken  members         Brightness lacks a member of Model: close")
+
+
+@pytest.mark.parametrize(
+    ("edit", "said"),
+    [
+        (("def close", "def shut"), "Brightness lacks a member of Model: close"),
+        (("capabilities = CAP", "able = CAP"), "Brightness lacks a member of Model: capabilities"),
+        (("    n_tokens = None", "    count = None"), "Talk lacks a member of Conversation: n_tokens"),
+        (("return Talk(self)", "return Talk(self, 1)"), "conversation() fails (TypeError in my_adapter.py:"),
+        (("return cls(name", "return clas(name"), "build() fails (NameError in my_adapter.py:"),
+    ],
+)
+def test_an_incomplete_adapter_is_refused_by_a_run_in_one_line(folder, run, edit, said):
+    source = folder / "my_adapter.py"
+    assert edit[0] in source.read_text()
+    source.write_text(source.read_text().replace(*edit))
+    code, _, err = run("--model", NAME, "--tasks", "nieh_mini_gt", "--limit", 2)
+    assert (code, len(err.splitlines())) == (2, 1), err
+    assert f"model {NAME}: {said}" in err
+    assert "docs/own-models.md" in err or "fix the adapter" in err
+
+
+def test_an_error_in_an_adapter_says_where_and_keeps_its_traceback(folder, run):
+    source = folder / "my_adapter.py"
+    source.write_text(source.read_text().replace('asked = "".join(', 'asked = None + "".join('))
+    code, _, err = run("--model", NAME, "--tasks", "nieh_mini_gt", "--limit", 2)
+    assert code == 1
+    assert "Brightness fails on the request (TypeError in my_adapter.py:" in err
+    model = load(NAME, {}, seed=0)
+    with pytest.raises(ModelError) as raised, wrap_request_errors(model.name):
+        start_conversation(model, "How many?").reply(Decoding(max_new_tokens=1))
+    assert isinstance(raised.value.__cause__, TypeError)
+    assert "my_adapter.py" in "".join(traceback.format_exception(raised.value))
 
 
 def test_a_policy_is_checked_by_the_same_command(run):

@@ -217,7 +217,7 @@ def _rewind_anywhere(self: Any, mark: Mark) -> None:
         ({"reply": _reply_that_miscounts}, "not the reply's n_context_tokens"),
         (
             {"reply": _reply_that_remembers_what_was_rewound, "rewind": _rewind_that_counts},
-            "after a rewind differs from that of a fresh conversation",
+            "after a rewind differs from that of a new conversation",
         ),
         ({"append": _append_anything}, "does not raise TypeError"),
         ({"rewind": _rewind_anywhere}, "behind the point rewound to"),
@@ -225,12 +225,21 @@ def _rewind_anywhere(self: Any, mark: Mark) -> None:
         ({"n_tokens": 7}, "n_tokens does not grow"),
         ({"append": _append_in_any_role}, "in an unknown role does not raise"),
         ({"turns_with": _turns_without_joints}, "in two pieces differs from the same text in one"),
-        ({"reply": _reply_to_anything}, "reply.. to an empty conversation does not raise ModelError"),
+        (
+            {"reply": _reply_to_anything},
+            "reply.. to an empty conversation does not raise ModelError; call",
+        ),
         ({"reply": _reply_to_the_assistant}, "whose last turn is the assistant's does not raise ModelError"),
         ({"reply": _reply_without_ids}, "a reply has no token_ids"),
         ({"reply": _reply_with_more_ids}, "n_reply_tokens is not the number of token_ids"),
-        ({"reply": _reply_at_any_temperature}, "a temperature that is not taken does not raise ModelError"),
-        ({"reply": _reply_with_any_choices}, "choices that are not taken do not raise ModelError"),
+        (
+            {"reply": _reply_at_any_temperature},
+            "a temperature does not raise ModelError though sampling is false; call",
+        ),
+        (
+            {"reply": _reply_with_any_choices},
+            "choices do not raise ModelError though choices is false; call",
+        ),
         ({"replies": _replies_to_the_first}, "one reply per continuation"),
         ({"replies": _replies_backwards}, "replies.. differs from asking one by one"),
         ({"replies": _replies_that_append}, "replies.. changes the conversation"),
@@ -261,8 +270,8 @@ def test_a_wrong_count_of_a_frames_tokens_is_named(count: int) -> None:
 @pytest.mark.parametrize(
     ("told", "clause"),
     [
-        ({"counts_tokens": False}, "n_tokens is not None though it counts no tokens"),
-        ({"token_ids": False}, "a reply has token_ids though the model tells none"),
+        ({"counts_tokens": False}, "n_tokens is not None though counts_tokens is false"),
+        ({"token_ids": False}, "a reply has token_ids though token_ids is false"),
         ({"batch_size": 0}, "batch_size is below 1"),
         ({"max_in_flight": 0}, "max_in_flight is below 1"),
     ],
@@ -306,7 +315,7 @@ def _text_drawn_anew(self: Any, decoding: Decoding) -> str:
     ("capabilities", "text", "clause"),
     [
         (Capabilities(sampling=True), _text_of_no_seed, "no seed changes a reply at temperature 2"),
-        (Capabilities(sampling=True), _text_drawn_anew, "the same seed does not draw the same reply"),
+        (Capabilities(sampling=True), _text_drawn_anew, "the same seed does not give the same reply"),
         (Capabilities(choices=True), _text_of_no_choice, "a reply is none of its choices"),
     ],
 )

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from infthor_eval.formats.frames import FrameRef
-from model_adapters import ArmDelta, Capabilities, ContractError, Policy, check_policy
+from model_adapters import ArmDelta, Capabilities, ContractError, Policy, check_adapter
 
 STEP = ArmDelta((0.0, 0.1, 0.0), (0.0, 0.0, 0.5), 1.0)
 
@@ -42,15 +42,15 @@ def _acting(*steps: Any) -> Policy:
 
 def test_a_good_policy_passes() -> None:
     assert isinstance(Scripted(), Policy)
-    check_policy(Scripted(), frame_size=(30, 20))
-    check_policy(_acting(STEP, STEP))
+    check_adapter(Scripted(), frame_size=(30, 20))
+    check_adapter(_acting(STEP, STEP))
 
 
 @pytest.mark.parametrize(
     ("step", "clause"),
     [
-        ("left", "no ArmDelta"),
-        (ArmDelta((0.0, 0.0), (0.0, 0.0, 0.0), 0.0), "not three numbers"),  # type: ignore[arg-type]
+        ("left", "is not an ArmDelta"),
+        (ArmDelta((0.0, 0.0), (0.0, 0.0, 0.0), 0.0), "is not three numbers"),  # type: ignore[arg-type]
         (ArmDelta((0.0, math.nan, 0.0), (0.0, 0.0, 0.0), 0.0), "finite floats"),
         (ArmDelta((0, 0, 0), (0.0, 0.0, 0.0), 0.0), "finite floats"),
         (ArmDelta((0.0, 0.0, 0.0), (0.0, 0.0, math.inf), 0.0), "finite floats"),
@@ -59,23 +59,23 @@ def test_a_good_policy_passes() -> None:
 )
 def test_a_step_that_is_none_is_named(step: Any, clause: str) -> None:
     with pytest.raises(ContractError, match=clause):
-        check_policy(_acting(STEP, step))
+        check_adapter(_acting(STEP, step))
 
 
 def test_no_step_is_named() -> None:
     with pytest.raises(ContractError, match="at least one ArmDelta"):
-        check_policy(_acting())
+        check_adapter(_acting())
 
 
 def test_an_episode_that_is_remembered_is_named_unless_chance_is_admitted() -> None:
     remembering = type("Remembering", (Scripted,), {"reset": lambda self: None})
-    with pytest.raises(ContractError, match=r"after reset\(\) the same frames are not acted on the same way"):
-        check_policy(remembering())
-    check_policy(type("Random", (remembering,), {"capabilities": Capabilities(deterministic=False)})())
+    with pytest.raises(ContractError, match=r"after reset\(\) the same frames do not give the same actions"):
+        check_adapter(remembering())
+    check_adapter(type("Random", (remembering,), {"capabilities": Capabilities(deterministic=False)})())
 
 
 def test_a_policy_without_reset_or_with_a_bad_identity_is_named() -> None:
-    with pytest.raises(ContractError, match=r"object lacks a member of Policy: .*reset"):
-        check_policy(object())  # type: ignore[arg-type]
+    with pytest.raises(ContractError, match=r"Lost lacks a member of Policy: .*reset"):
+        check_adapter(type("Lost", (), {"act": None})())  # type: ignore[arg-type]
     with pytest.raises(ContractError, match="JSON values"):
-        check_policy(type("Broken", (Scripted,), {"identity": lambda self: {"a": {1}}})())
+        check_adapter(type("Broken", (Scripted,), {"identity": lambda self: {"a": {1}}})())

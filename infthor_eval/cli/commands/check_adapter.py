@@ -18,17 +18,18 @@ def command(model: str, model_args: str) -> int:
     output; docs/own-models.md explains them. Exit code 1 if a clause is broken.
     """
     from infthor_eval.terminal import print_line
-    from model_adapters import load, run_checks
+    from model_adapters import run_checks
+    from model_adapters.registry import build
 
     n_broken = 0
-    adapter = load(model, parse_model_args(model_args), seed=0)
+    adapter = build(model, parse_model_args(model_args), seed=0)
     try:
-        for finding in run_checks(adapter):
-            state = "holds" if finding.broken is None else "broken"
-            print_line(f"{state:8}{finding.about:16}{finding.broken or ''}".rstrip())
-            n_broken += finding.broken is not None
+        for result in run_checks(adapter):
+            verdict = "holds" if result.violation is None else "broken"
+            print_line(f"{verdict:8}{result.name:16}{result.violation or ''}".rstrip())
+            n_broken += result.violation is not None
     finally:
-        if hasattr(adapter, "close"):  # an adapter without it has broken a clause above
+        if hasattr(adapter, "close"):  # an adapter without it has been reported as broken
             adapter.close()
     print_line(f"{model}: {f'{n_broken} broken' if n_broken else 'keeps the contract'}")
     return int(n_broken > 0)

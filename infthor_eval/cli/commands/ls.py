@@ -18,7 +18,8 @@ from infthor_eval.runs.run_search import BrokenRun, StoredRun, find_runs
 from infthor_eval.suites import baseline_names, split_by_suite
 from infthor_eval.tables import Column, Row, Table
 from infthor_eval.terminal import console, print_line
-from model_adapters import model_note, names, options
+from model_adapters import names, options
+from model_adapters.registry import model_description
 
 __all__ = ["command"]
 
@@ -43,7 +44,7 @@ def _models() -> None:
         table.add_row(name, f"no options; a baseline of {suites}")
     for name in names():
         try:
-            note = model_note(name)
+            note = model_description(name)
             table.add_row(name, f"{note}; {options(name)}" if note else options(name))
         except ModelError as error:  # an installed package's model that does not import: say so, list the others
             table.add_row(name, f"not usable: {error}", style="red")

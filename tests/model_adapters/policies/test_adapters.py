@@ -10,7 +10,7 @@ import torch
 
 from infthor_eval.errors import DataError, InfthorError, ModelError, UsageError
 from infthor_eval.formats.frames import FrameRef
-from model_adapters import Policy, check_policy, load, options
+from model_adapters import Policy, check_adapter, load, options
 from model_adapters.policies.policy import VlaPolicy
 
 from .conftest import FAMILIES, Edit, json_edit, weights_edit
@@ -31,13 +31,13 @@ def tiny() -> dict[str, Any]:
 @pytest.mark.parametrize("name", NAMES)
 def test_the_twins_keep_the_contract(name: str, tiny: dict[str, Any]) -> None:
     assert isinstance(tiny[name], Policy)
-    check_policy(tiny[name])
-    check_policy(tiny[name], frame_size=(320, 240))
+    check_adapter(tiny[name])
+    check_adapter(tiny[name], frame_size=(320, 240))
 
 
 @pytest.mark.parametrize("family", FAMILIES)
 def test_checkpoints_in_the_published_layout_keep_the_contract(family: str, policies: dict[str, VlaPolicy]) -> None:
-    check_policy(policies[family])
+    check_adapter(policies[family])
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -99,7 +99,7 @@ def test_tied_embeddings_are_written_by_what_they_are_read_by(altered: Altered) 
     policy = _load("spatialvla", altered("spatialvla", tie))
     model = policy._network.weights.language_model
     assert model.lm_head.weight is model.model.embed_tokens.weight
-    check_policy(policy)
+    check_adapter(policy)
 
 
 def test_the_published_checkpoints_are_the_defaults() -> None:

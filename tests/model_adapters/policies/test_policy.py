@@ -7,7 +7,7 @@ import pytest
 
 from infthor_eval.errors import DataError, ModelError
 from infthor_eval.formats.frames import FrameRef
-from model_adapters import ArmDelta, Policy, check_policy
+from model_adapters import ArmDelta, Policy, check_adapter
 from model_adapters.options.policies import PolicyOptions
 from model_adapters.policies.policy import VlaPolicy, arm_deltas
 from model_adapters.policies.statistics import ActionStatistics
@@ -43,7 +43,7 @@ def test_actions_are_scaled_and_come_as_steps(plain_frames: tuple[FrameRef, Fram
     assert step.translation == pytest.approx((1.0, -1.0, 0.0))
     assert step.rotation == pytest.approx((0.2, 0.4, 0.6))
     assert step.gripper == 1.0
-    check_policy(policy)
+    check_adapter(policy)
 
 
 @pytest.mark.parametrize(("execute", "n_steps"), [(None, 4), (2, 2), (9, 4)])

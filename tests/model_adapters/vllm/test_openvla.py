@@ -8,7 +8,7 @@ import pytest
 
 from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.formats.frames import FrameRef
-from model_adapters import check_policy, load
+from model_adapters import check_adapter, load
 from model_adapters.tiny.openvla import OpenVLATiny
 
 from .double import Double
@@ -46,7 +46,7 @@ def test_actions_are_those_of_the_native_port(
 
 def test_it_keeps_the_contract_of_policies(policy: Callable[..., Any]) -> None:
     acting = policy()
-    check_policy(acting)
+    check_adapter(acting)
     acting.close()
 
 

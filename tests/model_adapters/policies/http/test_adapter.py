@@ -11,7 +11,7 @@ import pytest
 
 from infthor_eval.errors import DataError, ModelError, UsageError
 from infthor_eval.formats.frames import FrameRef
-from model_adapters import check_policy, load
+from model_adapters import check_adapter, load
 from model_adapters.policies.http import client
 from model_adapters.policies.policy import VlaPolicy
 
@@ -77,7 +77,7 @@ def test_chunks_are_taken_and_cut(plain_frames: Frames) -> None:
 def test_a_policy_behind_a_server_acts_as_it_does_here(policies: dict[str, VlaPolicy], plain_frames: Frames) -> None:
     with serving(policy_answers(policies["openvla"])) as url:
         policy: Any = load("vla-http", {"url": url}, 0)
-        check_policy(policy)
+        check_adapter(policy)
         assert policy.act(plain_frames[1], "close the fridge") == policies["openvla"].act(
             plain_frames[1], "close the fridge"
         )

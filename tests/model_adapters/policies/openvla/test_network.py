@@ -80,7 +80,7 @@ def test_actions_with_a_cache_are_those_of_reading_all_anew(
 
 
 def test_without_the_constraint_a_policy_still_acts(policy_checkpoints: dict[str, Path], plain_frames: Any) -> None:
-    from model_adapters import check_policy, load
+    from model_adapters import check_adapter, load
 
     policy = load("openvla", {"pretrained": str(policy_checkpoints["openvla"]), "constrained": "false"}, 0)
-    check_policy(policy)  # type: ignore[arg-type]
+    check_adapter(policy)  # type: ignore[arg-type]

@@ -8,7 +8,7 @@ from safetensors.torch import load_file
 
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
-from model_adapters import check_policy, load
+from model_adapters import check_adapter, load
 from model_adapters.policies.decoding import embedded
 from model_adapters.policies.policy import VlaPolicy
 from model_adapters.policies.spatialvla.network import SpatialVLANetwork, prompt
@@ -92,4 +92,4 @@ def test_the_camera_changes_what_is_seen(
 
 def test_without_the_constraint_a_policy_still_acts(policy_checkpoints: dict[str, Path]) -> None:
     policy = load("spatialvla", {"pretrained": str(policy_checkpoints["spatialvla"]), "constrained": "false"}, 0)
-    check_policy(policy)  # type: ignore[arg-type]
+    check_adapter(policy)  # type: ignore[arg-type]
