@@ -1,8 +1,7 @@
-"""transformers, imported without scikit-learn and scipy's optimizers, which take a fifth of the time until a model can
-be asked.
+"""Import transformers without scikit-learn and scipy's optimizers, which take a fifth of the start-up time.
 
-Its generation imports one curve of scikit-learn's wherever that is installed (lm-eval needs it), for a threshold of
-assisted generation, and its losses one assignment of scipy's, for the detection of objects; no adapter uses either.
+transformers imports one function of scikit-learn wherever that is installed (lm-eval needs it), for assisted
+generation, and one of scipy, for the losses of object detection. No adapter uses either.
 """
 
 import importlib
@@ -12,21 +11,22 @@ import transformers.utils
 
 __all__: list[str] = []
 
-# What imports it, how transformers asks whether it is there, and what it would import.
-_NEEDLESS = (
+# The importing module, transformers' test for the package, and the package.
+_UNUSED = (
     ("transformers.loss.loss_utils", "is_scipy_available", "scipy.optimize"),
     ("transformers.generation.candidate_generator", "is_sklearn_available", "sklearn"),
 )
 
 
-def _import_without(module: str, question: str, needless: str) -> None:
-    available = getattr(transformers.utils, question)
-    setattr(transformers.utils, question, lambda: needless in sys.modules)
+def _import_without(module: str, test_name: str, package: str) -> None:
+    """Import a module of transformers that takes a package for missing unless it is imported already."""
+    is_available = getattr(transformers.utils, test_name)
+    setattr(transformers.utils, test_name, lambda: package in sys.modules)
     try:
         importlib.import_module(module)
     finally:
-        setattr(transformers.utils, question, available)
+        setattr(transformers.utils, test_name, is_available)
 
 
-for _needless in _NEEDLESS:
-    _import_without(*_needless)
+for _unused in _UNUSED:
+    _import_without(*_unused)

@@ -1,8 +1,8 @@
-"""What a model is to the harness.
+"""Protocols of models and policies.
 
-A conversation is an append-only list of turns with marks. Whoever evaluates appends what the model is to see, asks for
-a reply, and rewinds to a mark; how a back end avoids encoding the same parts twice is its own business. A policy is
-simpler: a frame and an instruction in, a chunk of arm movements out.
+A conversation is an append-only list of turns with marks. The harness appends what the model is to see, requests a
+reply, and rewinds to a mark; each back end decides how it avoids encoding the same parts twice. A policy is simpler: it
+maps a frame and an instruction to a chunk of arm movements.
 """
 
 from collections.abc import Sequence
@@ -36,11 +36,11 @@ ROLES: tuple[Role, ...] = ("system", "user", "assistant")
 
 @dataclass(frozen=True)
 class Turn:
-    """What one side of a conversation says at a time.
+    """One turn of a conversation.
 
     Attributes:
-        role: who speaks.
-        parts: texts and frames; texts that touch are joined to one, empty ones left out.
+        role: speaker of the turn.
+        parts: texts and frames in order; adjacent texts are joined, empty ones dropped.
     """
 
     role: Role
@@ -52,12 +52,12 @@ class Decoding:
     """How a reply is decoded.
 
     Attributes:
-        max_new_tokens: limit of the reply, at least 1.
-        temperature: 0 decodes greedily; above it tokens are drawn.
-        top_p: draw from the most likely tokens that together have this probability; of no account when greedy.
-        seed: of the draws; the same request with the same seed is answered the same way.
-        stop: strings that end the reply; the first to appear is cut off with what follows.
-        choices: where there are any, the reply is one of these texts, whole: no stop string cuts it.
+        max_new_tokens: most tokens of the reply, at least 1.
+        temperature: sampling temperature; 0 decodes greedily.
+        top_p: probability mass of the most likely tokens that are sampled from; ignored when greedy.
+        seed: seed of the samples; the same request with the same seed gets the same reply.
+        stop: strings that end the reply; the reply is cut before the first to appear.
+        choices: allowed replies; if there are any, the reply is one of them, and no stop string cuts it.
     """
 
     max_new_tokens: int
@@ -68,10 +68,10 @@ class Decoding:
     choices: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        """Refuse values that mean nothing.
+        """Check the ranges of all values.
 
         Raises:
-            UsageError: names the value.
+            UsageError: a value is out of its range.
         """
         if self.max_new_tokens < 1:
             raise UsageError(f"max_new_tokens must be at least 1, not {self.max_new_tokens}")
@@ -84,27 +84,27 @@ class Decoding:
 
     @property
     def greedy(self) -> bool:
-        """Whether nothing is drawn."""
+        """Whether decoding is greedy."""
         return self.temperature == 0
 
     def document(self) -> dict[str, Any]:
-        """All of it as JSON values, for fingerprints."""
+        """Return all settings as JSON values, for fingerprints."""
         return {name: list(value) if isinstance(value, tuple) else value for name, value in asdict(self).items()}
 
 
 @dataclass(frozen=True)
 class Reply:
-    """What a model answered.
+    """A model's reply.
 
     Attributes:
-        text: the reply without end-of-turn tokens, cut before the first stop string.
-        n_reply_tokens: length of the reply in tokens; None where the model does not tell.
-        n_context_tokens: tokens of the whole context that the reply was made from, frames expanded; None likewise.
-        n_cached_tokens: how many of them were not encoded again; None likewise.
-        token_ids: the generated ids without the end-of-turn token; where a stop string ended the reply, up to the
-            token that completed it; None where the model does not tell.
-        faults: what went wrong and was survived on the way (a request sent again, say), a line each.
-        cost: what it cost, in US dollars; None where nothing is paid, or no price is known.
+        text: text of the reply without end-of-turn tokens, cut before the first stop string.
+        n_reply_tokens: tokens of the reply, or None if the model does not report them.
+        n_context_tokens: tokens of the context, frames expanded, or None if the model does not report them.
+        n_cached_tokens: tokens of the context that were not encoded again, or None if the model does not report them.
+        token_ids: generated ids without the end-of-turn token, or None if the model does not report them; after a stop
+            string, all up to the token that completed it.
+        faults: faults that were recovered from by a retry, a line each.
+        cost: cost of the reply in US dollars, or None if it is free or its price unknown.
     """
 
     text: str
@@ -118,18 +118,18 @@ class Reply:
 
 @dataclass(frozen=True, kw_only=True)
 class Capabilities:
-    """What a model can do and how it wants to be asked; `check_adapter` holds it to this, and to no more.
+    """What a model supports; `check_adapter` checks that all of it holds.
 
     Attributes:
-        counts_tokens: `n_tokens` and `tokens_per_frame` are exact; None is given for both where not.
-        token_ids: replies have their ids.
-        deterministic: the same request is answered the same way, greedily or with the same seed.
-        sampling: a temperature above 0 is taken.
-        choices: a reply can be held to some texts.
-        batch_size: how many continuations of a conversation are worth handing over at once.
-        max_in_flight: how many conversations may be asked at the same time, from as many threads.
-        max_tokens: limit of context and reply together, in tokens; None where there is none, or none is known.
-        max_tokens_before_extension: the checkpoint's own limit where `max_tokens` extends it, else None.
+        counts_tokens: `n_tokens` and `tokens_per_frame` are exact; if false, both are None.
+        token_ids: replies have token ids.
+        deterministic: the same request gets the same reply, greedily or with the same seed.
+        sampling: temperatures above 0 are supported.
+        choices: replies can be restricted to given texts.
+        batch_size: continuations of a conversation that the model answers together.
+        max_in_flight: conversations that may be asked at the same time, each from its own thread.
+        max_tokens: limit of context and reply together, in tokens, or None if there is none or it is unknown.
+        max_tokens_before_extension: the checkpoint's own limit if `max_tokens` extends it, else None.
     """
 
     counts_tokens: bool = True
@@ -145,10 +145,10 @@ class Capabilities:
 
 @dataclass(frozen=True, eq=False)
 class Mark:
-    """A point of one conversation, handed out by `Conversation.mark` and compared by identity.
+    """A point in one conversation, returned by `Conversation.mark` and compared by identity.
 
     Attributes:
-        n_parts: how many parts the conversation had.
+        n_parts: parts in the conversation at this point.
     """
 
     n_parts: int
@@ -156,93 +156,93 @@ class Mark:
 
 @runtime_checkable
 class Conversation(Protocol):
-    """What a model has seen so far, as turns of texts and frames."""
+    """The turns of texts and frames that a model has seen so far."""
 
     @property
     def n_tokens(self) -> int | None:
-        """Tokens that `reply` would give the model now, chat template included; None where it counts none.
+        """Tokens that `reply` would give the model now, chat template included; None if it does not count them.
 
         Raises:
             DataError: a frame cannot be read.
-            ModelError: the model cannot take the turns as they stand.
+            ModelError: the model does not support these turns.
         """
         ...
 
     def append(self, *parts: Part, role: Role = "user") -> None:
-        """Add parts at the end, to the last turn where the role is the same, else as a turn of their own.
+        """Add parts at the end: to the last turn if it has the same role, else as a new turn.
 
-        Texts of a turn that touch are read as one text, without anything between them.
+        Adjacent texts of a turn are joined without a separator.
 
         Raises:
             TypeError: a part is neither text nor a frame reference.
-            ValueError: there is no such role.
+            ValueError: the role is unknown.
         """
         ...
 
     def mark(self) -> Mark:
-        """The present end, to come back to."""
+        """Return a mark at the current end of the conversation."""
         ...
 
     def rewind(self, mark: Mark) -> None:
-        """Forget all that was appended after the mark; marks set after it die, the mark itself stays good.
+        """Drop everything that was appended after the mark; later marks become invalid, the mark itself stays valid.
 
         Raises:
-            ValueError: the mark is another conversation's, or lies after a point that was rewound to.
+            ValueError: the mark belongs to another conversation, or to a part that was dropped by a rewind.
         """
         ...
 
     def reply(self, decoding: Decoding) -> Reply:
-        """The assistant's next turn; the conversation stays as it was (append the text if it is to be remembered).
+        """Return the assistant's next turn without adding it to the conversation.
 
         Raises:
-            ModelError: the context does not fit (the message gives its tokens and the limit), memory ran out, or the
-                model has no such turns or no such decoding.
+            ModelError: the context does not fit (the message has its tokens and the limit), memory ran out, or the
+                model does not support these turns or this decoding.
             DataError: a frame cannot be read.
         """
         ...
 
     def replies(self, continuations: Sequence[Sequence[Part]], decoding: Decoding) -> list[Reply]:
-        """What append (as user), reply, rewind would give for each continuation; the conversation stays as it was.
+        """Return the reply to each continuation, as append (as user), reply and rewind would; nothing is added.
 
         Args:
             continuations: the parts to append, one sequence per reply.
-            decoding: for each.
+            decoding: decoding of every reply.
 
         Raises:
-            ModelError: as `reply`; nothing is answered then.
-            DataError: as `reply`; nothing is answered then.
+            ModelError: as `reply`; no reply is returned then.
+            DataError: as `reply`; no reply is returned then.
         """
         ...
 
 
 class Subject(Protocol):
-    """What can be evaluated: a model, a policy, or a suite's own baseline."""
+    """Anything that can be evaluated: a model, a policy, or a suite's baseline."""
 
     @property
     def name(self) -> str:
-        """Its name on the command line."""
+        """Name on the command line."""
         ...
 
     @property
     def capabilities(self) -> Capabilities:
-        """What it can do; to a policy only `deterministic` and `max_in_flight` matter."""
+        """Capabilities; of a policy's only `deterministic` and `max_in_flight` are used."""
         ...
 
     def identity(self) -> dict[str, Any]:
-        """All that can change a number, as JSON values; two subjects of equal identity answer or act alike."""
+        """Return everything that can change a result, as JSON values; equal identities give equal results."""
         ...
 
     def close(self) -> None:
-        """Give the memory back; it cannot be used afterwards."""
+        """Free all memory; the subject cannot be used afterwards."""
         ...
 
 
 @runtime_checkable
 class Model(Subject, Protocol):
-    """A model that can be talked to."""
+    """A model that answers in conversations."""
 
     def tokens_per_frame(self, frame: FrameRef) -> int | None:
-        """How many of the model's tokens one frame becomes, its surroundings in the chat template not counted.
+        """Return the tokens of one frame, without its surroundings in the chat template; None if they are not counted.
 
         Raises:
             DataError: the frame cannot be read.
@@ -250,21 +250,20 @@ class Model(Subject, Protocol):
         ...
 
     def conversation(self) -> Conversation:
-        """A new, empty conversation."""
+        """Return a new, empty conversation."""
         ...
 
 
 @dataclass(frozen=True)
 class ArmDelta:
-    """One step of a robot arm's end effector, in the frame of the robot's base.
+    """One step of a robot arm's end effector, in the frame of the robot's base: x forward, y left, z up (right-handed).
 
-    The base's x points forward, y left, z up (right-handed); docs/policies.md says how models' numbers come to be
-    these.
+    docs/policies.md says how the outputs of policies are converted to this.
 
     Attributes:
-        translation: by how much it moves along x, y, z, in metres.
-        rotation: by how much it turns about x, y, z (roll, pitch, yaw), in radians.
-        gripper: where the gripper is to be, not by how much it moves: 0 (closed) to 1 (open).
+        translation: movement along x, y, z, in metres.
+        rotation: rotation about x, y, z (roll, pitch, yaw), in radians.
+        gripper: target opening of the gripper (absolute, not a difference): 0 (closed) to 1 (open).
     """
 
     translation: tuple[float, float, float]
@@ -277,15 +276,15 @@ class Policy(Subject, Protocol):
     """A vision-language-action model that drives an arm."""
 
     def reset(self) -> None:
-        """Begin a new episode: whatever was remembered of the last one is forgotten."""
+        """Start a new episode: drop all state of the last one."""
         ...
 
     def act(self, frame: FrameRef, instruction: str) -> tuple[ArmDelta, ...]:
-        """The next steps, at least one, to be carried out in order.
+        """Return the next steps of the arm, at least one, in order.
 
         Args:
-            frame: the agent's present view.
-            instruction: what is to be done, in words ("pick up the mug").
+            frame: the agent's current view.
+            instruction: the task in words ("pick up the mug").
 
         Raises:
             ModelError: the policy cannot act, or memory ran out.
@@ -295,17 +294,17 @@ class Policy(Subject, Protocol):
 
 
 class Adapter(Protocol):
-    """What a registered "module:Class" must be: options as a dataclass with defaults, and a way to build."""
+    """An adapter class: its options, a dataclass with defaults, and a method that builds the model."""
 
     Options: ClassVar[type]
 
     @classmethod
     def build(cls, name: str, options: Any, seed: int) -> Model | Policy:
-        """Make the model or the policy.
+        """Build the model or the policy.
 
         Args:
-            name: the name it was asked for.
+            name: name of the model as the user gave it.
             options: an instance of `Options`.
-            seed: for whatever is random in it.
+            seed: seed of whatever is random in the model.
         """
         ...

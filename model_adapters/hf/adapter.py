@@ -1,4 +1,4 @@
-"""Adapters of families whose checkpoints are loaded: a class per family with nothing but its settings."""
+"""Base of the adapters of model families, whose classes have nothing but settings."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,9 +13,9 @@ from model_adapters.hf.family import MakeFamily
 from model_adapters.hf.model import TransformersModel
 from model_adapters.options.checkpoints import CheckpointOptions, CheckpointReading
 
-__all__ = ["CheckpointAdapter", "fitting", "load_model"]
+__all__ = ["CheckpointAdapter", "load_model", "wrap_mismatch_errors"]
 
-_SAMPLE = (300, 300)  # a frame's width and height in the published data
+_SAMPLE = (300, 300)  # width and height of frames in the published data
 
 R = TypeVar("R", bound=CheckpointReading)
 
@@ -24,9 +24,9 @@ class CheckpointAdapter:
     """Base of adapters that load a checkpoint of one family.
 
     Attributes:
-        Options: the family's options, with its usual checkpoint as default.
-        family: makes the family of a model, an image processor and a tokenizer.
-        model_types: the `model_type`s of configs that it runs.
+        Options: options of the family, with its default checkpoint.
+        family: builds the family of a model.
+        model_types: supported values of `model_type` in configs.
     """
 
     Options: ClassVar[type] = CheckpointOptions
@@ -35,42 +35,42 @@ class CheckpointAdapter:
 
     @classmethod
     def build(cls, name: str, options: CheckpointOptions, seed: int) -> TransformersModel:  # noqa: ARG003
-        """Load a checkpoint; nothing in it is random.
+        """Load a checkpoint; the seed is not used.
 
         Raises:
-            ModelError: it cannot be loaded, or is not of one piece.
+            ModelError: the checkpoint cannot be loaded, or its parts do not belong together.
         """
         return load_model(name, cls.locate(options), cls.family)
 
     @classmethod
     def locate(cls, options: R) -> LocatedCheckpoint[R]:
-        """Find a checkpoint of this family, for whichever engine.
+        """Find a checkpoint of this family, for any engine.
 
         Raises:
-            ModelError: there is none, or it is another family's.
+            ModelError: the checkpoint does not exist, or is of another family.
         """
         located = locate(options)
-        found = located.config.model_type
-        if found not in cls.model_types:
+        model_type = located.config.model_type
+        if model_type not in cls.model_types:
             raise ModelError(
-                f"{options.pretrained} is a {found} checkpoint, not {' or '.join(cls.model_types)}; try hf-vlm"
+                f"{options.pretrained} is a {model_type} checkpoint, not {' or '.join(cls.model_types)}; try hf-vlm"
             )
         return located
 
 
 def load_model(name: str, located: LocatedCheckpoint[CheckpointOptions], family: MakeFamily) -> TransformersModel:
-    """Load a checkpoint of a known family and try it on one frame.
+    """Load a checkpoint of a known family and test it on one frame.
 
     Args:
-        name: the registry's name.
+        name: name in the registry.
         located: the checkpoint.
-        family: makes the family of a model, an image processor and a tokenizer.
+        family: builds the family of the model.
 
     Raises:
-        ModelError: it cannot be loaded, or its processor makes of a frame what its model does not.
+        ModelError: the checkpoint cannot be loaded, or processor and model disagree on a frame's tokens.
     """
     loaded, pretrained = load_checkpoint(located, family), located.options.pretrained
-    with fitting(pretrained), torch.inference_mode():
+    with wrap_mismatch_errors(pretrained), torch.inference_mode():
         n_slots = loaded.family.frame_ids(_SAMPLE).count(loaded.family.slot_id)
         n_features = len(loaded.family.features([Image.new("RGB", _SAMPLE)])[0])
     if n_slots != n_features:
@@ -82,13 +82,13 @@ def load_model(name: str, located: LocatedCheckpoint[CheckpointOptions], family:
 
 
 @contextmanager
-def fitting(pretrained: str) -> Iterator[None]:
-    """Turn what a model says to the pixels or tokens of another checkpoint's processor into one line.
+def wrap_mismatch_errors(pretrained: str) -> Iterator[None]:
+    """Turn errors of a model on the pixels or tokens of another checkpoint's processor into one line.
 
     Raises:
         ModelError: the model failed on them.
     """
-    # Whatever it raises: settings of the processor come from a file, and end up in arithmetic and shapes.
+    # Any error is possible: the processor's settings come from a file and end up in arithmetic and shapes.
     problem = f"{pretrained}: the model fails on what the processor makes of a frame"
     with wrap_errors(problem, "do they belong to one checkpoint?", catch=Exception, raise_as=ModelError):
         yield

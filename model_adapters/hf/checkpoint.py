@@ -1,13 +1,12 @@
-"""Loading a checkpoint from the hub or a folder, without torchvision and without remote code.
+"""Loading of a checkpoint from the hub or a folder, without torchvision and without remote code.
 
-transformers' processor classes of video-capable families cannot be built without torchvision, so the parts that a
-conversation needs (image processor, tokenizer, chat template) are loaded one by one. Image processors are always the
-PIL ones: torchvision's resize gives other pixels, and the numbers must not depend on what else is installed.
+transformers cannot build the processors of video-capable families without torchvision, so the parts that a conversation
+needs (image processor, tokenizer, chat template) are loaded one by one. Image processors are always those of PIL:
+torchvision's resize gives other pixels, and results must not depend on which packages are installed.
 """
 
 import contextlib
 import json
-import sys
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,6 +24,7 @@ from model_adapters.hf.decoding import read_generation
 from model_adapters.hf.family import Family, MakeFamily
 from model_adapters.hf.hub import fetch
 from model_adapters.hf.loaded import Loaded
+from model_adapters.hf.quiet import hide_transformers_output
 from model_adapters.hf.rope import apply_rope
 from model_adapters.hf.templates import chat_template, plain_template
 from model_adapters.options.checkpoints import CheckpointOptions, CheckpointReading, Placement
@@ -32,15 +32,15 @@ from model_adapters.options.checkpoints import CheckpointOptions, CheckpointRead
 __all__ = [
     "LocatedCheckpoint",
     "assemble",
+    "build_meta_model",
     "load_checkpoint",
-    "loading",
     "locate",
     "origin",
-    "outline",
     "read_checkpoint",
     "resolve_device",
     "resolve_dtype",
     "versions",
+    "wrap_loading_errors",
 ]
 
 _DTYPES = (torch.bfloat16, torch.float16, torch.float32, torch.float64)
@@ -53,13 +53,13 @@ R_co = TypeVar("R_co", bound=CheckpointReading, covariant=True)
 
 @dataclass(frozen=True)
 class LocatedCheckpoint(Generic[R_co]):
-    """A checkpoint that was found, not yet loaded.
+    """A checkpoint on disk.
 
     Attributes:
-        folder: where it lies.
-        commit: of the hub's repository; None for a folder of the user's.
-        config: its config.
-        options: what was asked for.
+        folder: folder of the checkpoint.
+        commit: commit of the hub's repository, or None for a folder of the user's.
+        config: config of the model.
+        options: options of the model.
     """
 
     folder: Path
@@ -69,72 +69,72 @@ class LocatedCheckpoint(Generic[R_co]):
 
 
 def locate(options: R) -> LocatedCheckpoint[R]:
-    """Find a checkpoint and read its config.
+    """Find or download a checkpoint and read its config.
 
     Raises:
-        ModelError: there is none, or it cannot be had.
+        ModelError: the checkpoint does not exist, or cannot be downloaded.
     """
     folder, commit = fetch(options.pretrained, options.revision)
     require_plain_files(folder, "restore the checkpoint")
-    with loading(options.pretrained):
+    with wrap_loading_errors(options.pretrained):
         config = transformers.AutoConfig.from_pretrained(folder, trust_remote_code=options.trust_remote_code)
     return LocatedCheckpoint(folder, commit, config, options)
 
 
 def load_checkpoint(located: LocatedCheckpoint[CheckpointOptions], family: MakeFamily) -> Loaded:
-    """Load everything a conversation needs, its weights too.
+    """Load everything that a conversation needs, including the weights.
 
     Args:
         located: the checkpoint.
-        family: makes the family of a model, an image processor and a tokenizer.
+        family: builds the family of the model.
 
     Raises:
         ModelError: the checkpoint is incomplete or damaged.
-        UsageError: there is no such dtype or device.
+        UsageError: the dtype or the device is unknown.
     """
     return read_checkpoint(located, family, _load_model)
 
 
 def read_checkpoint(
-    located: LocatedCheckpoint[R], family: MakeFamily, make_model: Callable[[LocatedCheckpoint[R]], Any]
+    located: LocatedCheckpoint[R], make_family: MakeFamily, build_model: Callable[[LocatedCheckpoint[R]], Any]
 ) -> Loaded:
-    """Load everything a conversation needs.
+    """Load everything that a conversation needs.
 
     Args:
-        located: the checkpoint; an extension of the context is written into its config.
-        family: makes the family of a model, an image processor and a tokenizer.
-        make_model: makes the model of the config; `outline` does without weights.
+        located: the checkpoint; a context extension is written into its config.
+        make_family: builds the family of the model.
+        build_model: builds the model of the config; `build_meta_model` does so without weights.
 
     Raises:
         ModelError: the checkpoint is incomplete or damaged.
-        UsageError: what making the model raises.
+        UsageError: raised by `build_model`.
     """
     options, folder = located.options, located.folder
     remote = {"trust_remote_code": options.trust_remote_code}
-    with loading(options.pretrained):
+    with wrap_loading_errors(options.pretrained):
         image_processor = transformers.AutoImageProcessor.from_pretrained(
             folder, backend="pil", **remote, **options.image_settings()
         )
         tokenizer = transformers.AutoTokenizer.from_pretrained(folder, **remote)
         template = chat_template(folder, tokenizer) if options.prompt == "chat" else None
         max_tokens = apply_rope(located.config, options.rope)
-        model = make_model(located)
-        made = family(model, image_processor, tokenizer)
+        model = build_model(located)
+        family = make_family(model, image_processor, tokenizer)
         return assemble(
             model,
             tokenizer,
             image_processor,
-            template=plain_template(tokenizer, made) if template is None else template,
-            family=made,
+            template=plain_template(tokenizer, family) if template is None else template,
+            family=family,
             max_tokens=max_tokens,
             origin=origin(located.folder, located.commit, options.pretrained),
         )
 
 
-def outline(located: LocatedCheckpoint[Any]) -> Any:
-    """The model of a checkpoint whose weights another engine holds: shapes alone, which take no memory.
+def build_meta_model(located: LocatedCheckpoint[Any]) -> Any:
+    """Return the model of a checkpoint on torch's meta device: shapes without weights, which take no memory.
 
-    What frames become in tokens can be told by it as by the model itself.
+    It is enough for counting a frame's tokens, if another engine has the weights.
     """
     with torch.device("meta"):
         model = cast(Any, transformers.AutoModelForImageTextToText).from_config(
@@ -155,19 +155,19 @@ def assemble(
     max_tokens: int | None,
     origin: Mapping[str, Any],
 ) -> Loaded:
-    """Put loaded parts together and write down what identifies them.
+    """Combine loaded parts and derive their identity.
 
     Args:
         model: the transformers model.
-        tokenizer: its tokenizer.
-        image_processor: its image processor.
-        template: what writes a conversation (Jinja).
-        family: its family.
-        max_tokens: its context limit.
-        origin: where the weights come from, for the identity.
+        tokenizer: tokenizer of the model.
+        image_processor: image processor of the model.
+        template: template of conversations (Jinja).
+        family: family of the model.
+        max_tokens: context limit of the model.
+        origin: source of the weights, for the identity.
 
     Raises:
-        ModelError: its generation settings are not supported, or its smallest frame is larger than its largest.
+        ModelError: the generation settings are not supported, or min_pixels exceeds max_pixels.
     """
     _check_pixels(image_processor)
     identity = dict(origin) | {
@@ -175,7 +175,7 @@ def assemble(
         "n_parameters": model.num_parameters(),
         "dtype": str(model.dtype).removeprefix("torch."),
         "device": model.device.type,
-        "quantization": _quantized(model),
+        "quantization": _quantization_method(model),
         "attn_implementation": model.config._attn_implementation,
         "rope": getattr(model.config.get_text_config(), "rope_parameters", None),
         "image_processor": json.loads(image_processor.to_json_string()),
@@ -198,25 +198,25 @@ def _check_pixels(image_processor: Any) -> None:
     size = dict(getattr(image_processor, "size", None) or {})
     least, most = size.get("shortest_edge"), size.get("longest_edge")
     if least is not None and most is not None and least > most:
-        raise ModelError(f"frames of {least} pixels at least and {most} at most; set min_pixels and max_pixels to fit")
+        raise ModelError(f"min_pixels is {least} and max_pixels {most}; set both to fit")
 
 
 def origin(folder: Path, commit: str | None, pretrained: str) -> dict[str, Any]:
-    """Where weights come from, for an identity.
+    """Return the source of weights, for an identity.
 
     Args:
-        folder: where the checkpoint lies.
-        commit: of the hub's repository; None for a folder of the user's.
-        pretrained: what was asked for.
+        folder: folder of the checkpoint.
+        commit: commit of the hub's repository, or None for a folder of the user's.
+        pretrained: name of the checkpoint as the user gave it.
     """
     if commit is not None:
         return {"checkpoint": pretrained, "revision": commit}
-    # The folder's name, not its place: a checkpoint that was moved is the same checkpoint.
+    # The folder's name, not its path: a moved checkpoint is the same checkpoint.
     return {"checkpoint": folder.resolve().name, "fingerprint": _fingerprint(folder)}
 
 
 def versions() -> dict[str, str]:
-    """Versions of the libraries that numbers hang on, for an identity."""
+    """Return the versions of the libraries that results depend on, for an identity."""
     return {
         "torch": torch.__version__,
         "transformers": transformers.__version__,
@@ -226,11 +226,11 @@ def versions() -> dict[str, str]:
 
 
 def resolve_device(options: Placement) -> torch.device:
-    """The device asked for; auto is the GPU where there is one.
+    """Return the torch device of the options; auto is the GPU if there is one.
 
     Raises:
-        UsageError: torch knows no such device.
-        ModelError: there is no GPU here.
+        UsageError: torch does not know the device.
+        ModelError: this machine has no such device.
     """
     name = options.device
     if name == "auto":
@@ -243,7 +243,7 @@ def resolve_device(options: Placement) -> torch.device:
         raise UsageError(f"device={name} computes nothing; use cpu, cuda, cuda:1, ...")
     if device.type == "cuda" and not torch.cuda.is_available():
         raise ModelError(f"device={name}: torch {torch.__version__} finds no GPU here; use device=cpu")
-    # Each back end says in its own way that it is not there.
+    # Each back end raises its own error if it is missing.
     with wrap_errors(
         f"device={name}: torch {torch.__version__} has none here", "use cpu", catch=Exception, raise_as=ModelError
     ):
@@ -252,32 +252,32 @@ def resolve_device(options: Placement) -> torch.device:
 
 
 def resolve_dtype(options: Placement) -> torch.dtype | str:
-    """The type asked for, or "auto".
+    """Return the torch type of the options, or "auto".
 
     Raises:
-        UsageError: torch has no such type.
+        UsageError: torch does not have the type.
     """
     dtype = "auto" if options.dtype == "auto" else getattr(torch, options.dtype, None)
     if not (dtype == "auto" or dtype in _DTYPES):
-        raise UsageError(f"dtype={options.dtype} is no type of weights; use auto, bfloat16, float16 or float32")
+        raise UsageError(f"dtype={options.dtype} is not a type of weights; use auto, bfloat16, float16 or float32")
     return dtype
 
 
 @contextlib.contextmanager
-def loading(pretrained: str) -> Iterator[None]:
-    """Turn the errors of transformers' loading into one line, and its bar off where there is no terminal.
+def wrap_loading_errors(pretrained: str) -> Iterator[None]:
+    """Turn errors of transformers' loading into one line, and hide its progress bars and warnings.
+
+    What its warnings say is either an error here (missing weights) or of no concern to users.
 
     Args:
-        pretrained: what was asked for, for the message.
+        pretrained: name of the checkpoint, for the message.
 
     Raises:
-        ModelError: something could not be loaded.
+        ModelError: a part of the checkpoint cannot be loaded.
     """
-    # There is no end to what transformers, tokenizers and safetensors raise on files that somebody damaged.
-    mend = "restore its files, or give another checkpoint"
-    if not sys.stderr.isatty():  # a log would have the bar as a line
-        transformers.utils.logging.disable_progress_bar()
-    with wrap_errors(f"the checkpoint {pretrained} cannot be loaded", mend, catch=Exception, raise_as=ModelError):
+    problem, hint = f"the checkpoint {pretrained} cannot be loaded", "restore its files, or give another checkpoint"
+    # transformers, tokenizers and safetensors raise errors of any type on damaged files.
+    with wrap_errors(problem, hint, catch=Exception, raise_as=ModelError), hide_transformers_output():
         yield
 
 
@@ -296,7 +296,7 @@ def _load_model(located: LocatedCheckpoint[CheckpointOptions]) -> Any:
         output_loading_info=True,
     )
     missing = sorted(report["missing_keys"])
-    if missing:  # transformers would leave them random and only warn
+    if missing:  # transformers would draw them at random and only warn
         raise ModelError(f"{options.pretrained} lacks {len(missing)} weights of its model ({missing[0]}, ...)")
     return model if options.device_map or options.quantization else model.to(device)
 
@@ -308,15 +308,15 @@ def _quantization(options: CheckpointOptions) -> Any:
     return transformers.BitsAndBytesConfig(**{switch: True})
 
 
-def _quantized(model: Any) -> str | None:
-    """Method of quantisation, asked for or the checkpoint's own."""
+def _quantization_method(model: Any) -> str | None:
+    """Return the method of quantisation, of the options or of the checkpoint."""
     settings = getattr(model.config, "quantization_config", None)
     method = settings.get("quant_method") if isinstance(settings, dict) else getattr(settings, "quant_method", None)
     return None if method is None else str(getattr(method, "value", method))
 
 
 def _fingerprint(folder: Path) -> str:
-    """Hash of names and contents of the checkpoint's files (hex, 32 characters)."""
+    """Return a hash of names and contents of the checkpoint's files (hex, 32 characters)."""
     return digest_of_files(
         path for path in sorted(folder.iterdir()) if path.suffix in _FINGERPRINTED and path.is_file()
     )

@@ -1,4 +1,4 @@
-"""Replies that are held to some texts."""
+"""Replies that are restricted to given texts."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -10,42 +10,44 @@ __all__ = ["Choices", "read_choices"]
 
 
 class Choices:
-    """The texts that a reply may be, token by token.
+    """The allowed replies, token by token.
 
     Args:
-        ids: the texts by the ids that spell them.
+        ids: token ids of each allowed reply, with its text.
     """
 
     def __init__(self, ids: dict[tuple[int, ...], str]) -> None:
         self._texts = ids
 
     def after(self, ids: Sequence[int]) -> set[int]:
-        """The tokens that lead on from here towards some text; none where a reply has to end."""
-        begun, n = tuple(ids), len(ids)
-        return {choice[n] for choice in self._texts if len(choice) > n and choice[:n] == begun}
+        """Return the tokens that continue these ids towards an allowed reply; none if the reply has to end."""
+        prefix, n = tuple(ids), len(ids)
+        return {choice[n] for choice in self._texts if len(choice) > n and choice[:n] == prefix}
 
     def text(self, ids: Sequence[int]) -> str | None:
-        """The text that is spelled by these ids, None where there is none."""
+        """Return the allowed reply with these ids, or None."""
         return self._texts.get(tuple(ids))
 
 
 def read_choices(tokenizer: Any, decoding: Decoding) -> Choices | None:
-    """What a reply is held to; None where it is free.
+    """Return the allowed replies as token ids, or None if the reply is free.
+
+    Each text has one spelling, the tokenizer's own: other sequences of tokens with the same text are not allowed.
 
     Args:
-        tokenizer: the checkpoint's.
-        decoding: has the texts.
+        tokenizer: tokenizer of the checkpoint.
+        decoding: decoding with the texts.
 
     Raises:
-        ModelError: a text takes more tokens than the reply may have.
+        ModelError: a text has more tokens than the reply may have.
     """
     ids: dict[tuple[int, ...], str] = {}
     for text in decoding.choices:
-        spelled = tuple(tokenizer(text, add_special_tokens=False)["input_ids"])
-        if len(spelled) > decoding.max_new_tokens:
+        spelling = tuple(tokenizer(text, add_special_tokens=False)["input_ids"])
+        if len(spelling) > decoding.max_new_tokens:
             raise ModelError(
-                f"the choice {text[:40]!r} takes {len(spelled)} tokens and a reply may have {decoding.max_new_tokens}; "
+                f"the choice {text[:40]!r} has {len(spelling)} tokens and a reply may have {decoding.max_new_tokens}; "
                 "raise max_new_tokens"
             )
-        ids.setdefault(spelled, text)
+        ids.setdefault(spelling, text)
     return Choices(ids) if ids else None

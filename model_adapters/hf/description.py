@@ -1,4 +1,4 @@
-"""What is told about a checkpoint, whichever way it is run."""
+"""Capabilities and identity of a checkpoint that transformers runs."""
 
 from typing import Any
 
@@ -10,12 +10,12 @@ __all__ = ["capabilities", "identity"]
 
 
 def capabilities(loaded: Loaded, options: HfOptions, batch_size: int) -> Capabilities:
-    """What a checkpoint can do, run like this.
+    """Return the capabilities of a checkpoint under these options.
 
     Args:
         loaded: the checkpoint.
-        options: how it is run.
-        batch_size: how many continuations are answered together.
+        options: inference options.
+        batch_size: continuations that are answered together.
     """
     text_config = loaded.model.config.get_text_config()
     return Capabilities(
@@ -28,7 +28,7 @@ def capabilities(loaded: Loaded, options: HfOptions, batch_size: int) -> Capabil
 
 
 def identity(name: str, loaded: Loaded, options: HfOptions) -> dict[str, Any]:
-    """What distinguishes this model, run like this, from others, as JSON values."""
+    """Return what distinguishes this model under these options from others, as JSON values."""
     generation = loaded.generation
     return loaded.identity | {
         "adapter": name,
@@ -45,5 +45,5 @@ def identity(name: str, loaded: Loaded, options: HfOptions) -> dict[str, Any]:
 
 
 def _context_limit(loaded: Loaded, options: HfOptions) -> int | None:
-    """The checkpoint's context limit, or the option's; None for none."""
+    """Return the context limit of the options, else of the checkpoint, or None."""
     return (loaded.max_tokens if options.max_tokens is None else options.max_tokens) or None

@@ -1,4 +1,4 @@
-"""From pieces of a prompt to the embeddings and positions that a language model is fed."""
+"""From pieces of a prompt to the embeddings and positions that a language model reads."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,18 +11,18 @@ from model_adapters.hf.family import Family
 from model_adapters.hf.features import FeatureCache
 from model_adapters.hf.prompt import Frame, Piece
 
-__all__ = ["Embedded", "Embedder"]
+__all__ = ["EmbeddedSpan", "Embedder"]
 
 
 @dataclass(frozen=True)
-class Embedded:
-    """A stretch of a prompt, ready to be fed.
+class EmbeddedSpan:
+    """A span of a prompt as input of the language model.
 
     Attributes:
-        embeds: (tokens, hidden), on the embedding layer's device.
-        positions: (1, tokens) or (3, 1, tokens), there too.
-        starts: the position of each piece's first token.
-        end: the position of what follows.
+        embeds: embeddings, (tokens, hidden), on the embedding layer's device.
+        positions: position ids, (1, tokens) or (3, 1, tokens), on the same device.
+        starts: position of the first token of each piece.
+        end: position of the token that follows the span.
     """
 
     embeds: torch.Tensor
@@ -32,12 +32,12 @@ class Embedded:
 
 
 class Embedder:
-    """Embeds stretches of prompts for one model.
+    """Embeds spans of prompts for one model.
 
     Args:
         model: a transformers model.
-        family: its family.
-        features: where the frames' features come from.
+        family: family of the model.
+        features: cache of the frames' features.
     """
 
     def __init__(self, model: Any, family: Family, features: FeatureCache) -> None:
@@ -46,12 +46,12 @@ class Embedder:
         self._embeddings = model.get_input_embeddings()
 
     @torch.inference_mode()
-    def __call__(self, pieces: Sequence[Piece], start: int) -> Embedded:
-        """Embed pieces whose first token takes the position `start`.
+    def __call__(self, pieces: Sequence[Piece], start: int) -> EmbeddedSpan:
+        """Embed pieces whose first token has the position `start`.
 
         Raises:
             DataError: a frame cannot be read.
-            ModelError: processor and model disagree on how many tokens a frame takes.
+            ModelError: processor and model disagree on the number of a frame's tokens.
         """
         frames = [piece for piece in pieces if isinstance(piece, Frame)]
         flat: list[int] = []
@@ -64,10 +64,10 @@ class Embedder:
             else:
                 slots.extend(len(flat) + at for at, token in enumerate(piece.ids) if token == self._family.slot_id)
                 flat.extend(piece.ids)
-        # Features first: their frames are read and scaled here while the device still computes what came before.
-        features = self._features_of(frames, len(slots)) if frames else None
+        # Features first: reading and scaling of frames on the CPU overlaps with the device's previous chunk.
+        features = self._slot_features(frames, len(slots)) if frames else None
         device = self._embeddings.weight.device
-        # Positions are made here, where they can be looked at without waiting for the device.
+        # Positions are computed on the CPU, because reading them below would otherwise wait for the device.
         ids = torch.tensor(flat)
         positions = self._family.positions(ids, [frame.size for frame in frames], start)
         embeds = self._embeddings(ids.to(device))
@@ -76,9 +76,9 @@ class Embedder:
         # A piece's first token has the same position on every axis; the next piece starts behind the largest one.
         axes = positions.reshape(-1, len(flat))
         first = axes[0].tolist()
-        return Embedded(embeds, positions.to(device), tuple(first[at] for at in firsts), int(axes.max()) + 1)
+        return EmbeddedSpan(embeds, positions.to(device), tuple(first[at] for at in firsts), int(axes.max()) + 1)
 
-    def _features_of(self, frames: Sequence[Frame], n_slots: int) -> torch.Tensor:
+    def _slot_features(self, frames: Sequence[Frame], n_slots: int) -> torch.Tensor:
         features = torch.cat(self._features.get(frames))
         if len(features) != n_slots:
             raise ModelError(

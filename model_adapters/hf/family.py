@@ -1,4 +1,4 @@
-"""What has to be known about a model family, and nowhere else."""
+"""Protocol of a model family: everything that differs between families."""
 
 from collections.abc import Sequence
 from typing import Any, Protocol
@@ -12,48 +12,48 @@ Size = tuple[int, int]  # width, height in pixels
 
 
 class Family(Protocol):
-    """A loaded model's family: how frames become tokens, features and positions.
+    """Conversion of frames to tokens, features and positions for a loaded model.
 
     Attributes:
-        placeholder_id: the id that one frame leaves in the tokenised chat template.
-        slot_id: the id whose embeddings the frame's features replace.
+        placeholder_id: token id of a frame in the tokenised chat template.
+        slot_id: token id whose embeddings are replaced by the frame's features.
     """
 
     placeholder_id: int
     slot_id: int
 
     def frame_ids(self, size: Size) -> tuple[int, ...]:
-        """The ids that the placeholder of a frame of this size expands to."""
+        """Return the ids that the placeholder of a frame of this size expands to."""
         ...
 
-    def written_ids(self) -> tuple[int, ...]:
-        """The ids that a chat template writes for a frame: the placeholder and, in some families, markers around it."""
+    def template_ids(self) -> tuple[int, ...]:
+        """Return the ids of a frame in a template: the placeholder and, in some families, markers around it."""
         ...
 
     def features(self, images: Sequence[Image.Image]) -> list[torch.Tensor]:
-        """Embeddings for the slots of each image, (slots, hidden), on the embedding layer's device.
+        """Return the embeddings for the slots of each image, (slots, hidden), on the embedding layer's device.
 
-        They can be trained through; whoever only evaluates asks under `torch.inference_mode`.
+        They carry gradients, for training; inference calls this under `torch.inference_mode`.
         """
         ...
 
     def positions(self, ids: torch.Tensor, sizes: Sequence[Size], start: int) -> torch.Tensor:
-        """Position ids of a stretch of a sequence that has whole frames only.
+        """Return the position ids of a span of a sequence that cuts no frame.
 
         Args:
-            ids: (tokens,), frames expanded, on the CPU.
-            sizes: of the frames in it.
-            start: the position that the first token takes.
+            ids: token ids, (tokens,), frames expanded, on the CPU.
+            sizes: sizes of the frames in the span.
+            start: position of the first token.
 
         Returns:
-            (1, tokens), or (3, 1, tokens) where positions have three axes, on the CPU.
+            Positions, (1, tokens), or (3, 1, tokens) for positions with three axes, on the CPU.
         """
         ...
 
 
 class MakeFamily(Protocol):
-    """A class of families: made of a model, an image processor and a tokenizer."""
+    """A function that builds the family of a model, an image processor and a tokenizer."""
 
     def __call__(self, model: Any, image_processor: Any, tokenizer: Any) -> Family:
-        """Make the family of these loaded parts."""
+        """Build the family of these loaded parts."""
         ...

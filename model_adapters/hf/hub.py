@@ -1,4 +1,4 @@
-"""From the name of a checkpoint to a folder that holds it."""
+"""Location and download of checkpoints."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -15,24 +15,24 @@ _TIMEOUT_S = 10.0
 
 
 def fetch(
-    pretrained: str, revision: str | None, *, option: str = "pretrained=", also: Sequence[str] = ()
+    pretrained: str, revision: str | None, *, option: str = "pretrained=", extra_patterns: Sequence[str] = ()
 ) -> tuple[Path, str | None]:
-    """Find a checkpoint, downloading it where it is not in the hub's cache.
+    """Return the folder of a checkpoint, downloading it unless it is in the hub's cache.
 
-    The hub is asked once, without retries, and only for the commit; where it cannot be reached, the cache serves. So a
-    cached checkpoint needs no network, and a machine without network says so at once.
+    One request, without retries, asks the hub for the commit. If the hub cannot be reached, the cache is used. So a
+    cached checkpoint needs no network, and a missing one without network fails at once.
 
     Args:
         pretrained: a folder, or a hub id.
         revision: branch, tag or commit on the hub; the default branch where None.
-        option: how users write the option that names the checkpoint, for the message.
-        also: patterns of files that are downloaded beside the usual ones.
+        option: the option that names the checkpoint, as users type it, for the message.
+        extra_patterns: patterns of files to download in addition to the usual ones.
 
     Returns:
-        The folder, and the commit it holds (None for a folder of the user's).
+        The folder, and the commit that it holds (None for a folder of the user's).
 
     Raises:
-        ModelError: it is neither a folder nor to be had from hub or cache; the message has the mend.
+        ModelError: the checkpoint is neither a folder nor in the hub or its cache; the message says what to do.
     """
     path = Path(pretrained).expanduser()
     if path.is_dir():
@@ -42,17 +42,17 @@ def fetch(
     at = f"{pretrained} at revision {revision}" if revision else pretrained
     try:
         commit = HfApi().model_info(pretrained, revision=revision, timeout=_TIMEOUT_S).sha
-        folder = Path(snapshot_download(pretrained, revision=commit, allow_patterns=[*_FILES, *also]))
+        folder = Path(snapshot_download(pretrained, revision=commit, allow_patterns=[*_FILES, *extra_patterns]))
     except (HfHubHTTPError, HFValidationError) as error:
         raise ModelError(
-            f"the hub does not give out {at} ({_first_line(error)}); check the name, or log in with `hf auth login`"
+            f"the hub refuses {at} ({_first_line(error)}); check the name, or log in with `hf auth login`"
         ) from error
     except (HTTPError, OSError) as error:
-        folder = _cached(pretrained, revision, at, option, error)
+        folder = _cached_folder(pretrained, revision, at, option, error)
     return folder, folder.name
 
 
-def _cached(pretrained: str, revision: str | None, at: str, option: str, reason: Exception) -> Path:
+def _cached_folder(pretrained: str, revision: str | None, at: str, option: str, reason: Exception) -> Path:
     try:
         return Path(snapshot_download(pretrained, revision=revision, local_files_only=True))
     except LocalEntryNotFoundError as error:

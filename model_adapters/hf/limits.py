@@ -1,4 +1,4 @@
-"""What does not fit, in one line."""
+"""Errors of models on single requests, as one line each."""
 
 import traceback
 from collections.abc import Iterator
@@ -8,25 +8,24 @@ import torch
 
 from infthor_eval.errors import ModelError, wrap_errors
 
-__all__ = ["check_limit", "naming_memory_errors", "naming_model_errors"]
+__all__ = ["check_limit", "wrap_memory_errors", "wrap_model_errors"]
 
-
-# What torch and image processors raise on a request that does not suit them.
+# Errors that torch and image processors raise on unsuitable input.
 _FAILURES = (RuntimeError, ValueError, IndexError, ArithmeticError, MemoryError)
 
 
 def check_limit(name: str, n_context: int, max_new_tokens: int, limit: int | None, option: str = "max_tokens") -> None:
-    """Refuse what does not fit.
+    """Check that context and reply fit.
 
     Args:
-        name: of the model.
+        name: name of the model, for the message.
         n_context: tokens of the context.
-        max_new_tokens: most of the reply.
-        limit: of both together; None for none.
-        option: the model's, that sets the limit.
+        max_new_tokens: most tokens of the reply.
+        limit: limit of both together; None for none.
+        option: the model's option that sets the limit, for the message.
 
     Raises:
-        ModelError: context and reply are beyond the limit.
+        ModelError: context and reply exceed the limit.
     """
     if limit is not None and n_context + max_new_tokens > limit:
         raise ModelError(
@@ -36,23 +35,23 @@ def check_limit(name: str, n_context: int, max_new_tokens: int, limit: int | Non
 
 
 @contextmanager
-def naming_model_errors(name: str) -> Iterator[None]:
-    """Turn what a model or its processor says to one request into one line, so that the others are answered.
+def wrap_model_errors(name: str) -> Iterator[None]:
+    """Turn an error of a model or its processor on one request into one line, so that the run goes on.
 
     Raises:
-        ModelError: it failed on the request.
+        ModelError: the model failed on the request.
     """
     with wrap_errors(
-        f"{name} fails on the request", "ask otherwise, or report it", catch=_FAILURES, raise_as=ModelError
+        f"{name} fails on the request", "change the request, or report it", catch=_FAILURES, raise_as=ModelError
     ):
         yield
 
 
 @contextmanager
-def naming_memory_errors(name: str, n_context: int) -> Iterator[None]:
-    """Turn errors of memory into one line with the size of the context.
+def wrap_memory_errors(name: str, n_context: int) -> Iterator[None]:
+    """Turn a lack of memory into one line with the size of the context.
 
-    Whoever keeps the error keeps no tensors with it: what is asked next finds the memory free.
+    The error keeps no tensors alive, so their memory is free for the next request.
 
     Raises:
         ModelError: memory ran out.
@@ -60,10 +59,10 @@ def naming_memory_errors(name: str, n_context: int) -> Iterator[None]:
     try:
         yield
     except (RuntimeError, MemoryError) as error:
-        traceback.clear_frames(error.__traceback__)  # their variables hold the request's cache and activations
-        # torch has an exception of its own for GPUs only; on CPU the allocator's name in the message tells.
+        traceback.clear_frames(error.__traceback__)  # its local variables hold the request's cache and activations
+        # torch has its own exception for GPUs only; on the CPU, only the allocator's name identifies the error.
         cpu = isinstance(error, MemoryError) or "DefaultCPUAllocator" in str(error)
         if not (cpu or isinstance(error, torch.OutOfMemoryError)):
             raise
-        mend = "use fewer frames, kv_offload=true, or a smaller chunk_tokens"
-        raise ModelError(f"out of memory on a context of {n_context} tokens ({name}); {mend}") from error
+        hint = "use fewer frames, kv_offload=true, or a smaller chunk_tokens"
+        raise ModelError(f"out of memory on a context of {n_context} tokens ({name}); {hint}") from error

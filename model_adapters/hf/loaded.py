@@ -1,4 +1,4 @@
-"""A checkpoint in memory, wherever it came from."""
+"""A checkpoint in memory."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -11,17 +11,17 @@ __all__ = ["Loaded"]
 
 @dataclass(frozen=True)
 class Loaded:
-    """All that is needed to run a model.
+    """A model with everything that is needed to run it.
 
     Attributes:
         model: the transformers model, in evaluation mode.
-        tokenizer: its tokenizer.
-        image_processor: its image processor.
-        template: what writes a conversation (Jinja): its chat template, or a plain one.
-        family: how its frames become tokens, features and positions.
+        tokenizer: tokenizer of the model.
+        image_processor: image processor of the model.
+        template: template of conversations (Jinja): the checkpoint's chat template, or a plain one.
+        family: family of the model.
         generation: end tokens and penalties.
-        max_tokens: its context limit; None where the config names none.
-        identity: what distinguishes it from other checkpoints, as JSON values.
+        max_tokens: context limit, or None if the config has none.
+        identity: what distinguishes this checkpoint from others, as JSON values.
     """
 
     model: Any

@@ -1,4 +1,4 @@
-"""A limit on the memory that a piece of code that comes with a checkpoint may take."""
+"""A limit on the memory of code that comes with a checkpoint (chat templates)."""
 
 import resource
 from collections.abc import Iterator
@@ -6,28 +6,28 @@ from contextlib import contextmanager
 from pathlib import Path
 from threading import Lock
 
-__all__ = ["OutOfMemoryError", "taking_at_most"]
+__all__ = ["OutOfMemoryError", "limit_memory"]
 
-_SIZE = Path("/proc/self/statm")  # its first number: the pages of address space that the process has
+_SIZE = Path("/proc/self/statm")  # its first number is the process's address space in pages
 _MB = 1024 * 1024
-_ALONE = Lock()  # of two at once, the second would restore the first one's limit
+_LOCK = Lock()  # of two nested limits, the second would restore the first as if it were the original
 
 
 class OutOfMemoryError(Exception):
-    """It would have taken more memory than it may."""
+    """Code needed more memory than allowed."""
 
 
 @contextmanager
-def taking_at_most(megabytes: int) -> Iterator[None]:
-    """Refuse what asks for more memory on top of what the process has; where the system does not tell, nothing is.
+def limit_memory(megabytes: int) -> Iterator[None]:
+    """Refuse allocations beyond the process's current memory plus this limit; no limit if the system has no /proc.
 
-    It is the system that refuses, so it does not matter by which of Python's many ways a text becomes large. The limit
-    is the process's: its other threads are held to it meanwhile, and one at a time may set it.
+    The operating system enforces it, because Python has many ways to build a large text. The limit applies to the whole
+    process, other threads included, and one thread at a time may set it.
 
     Raises:
-        OutOfMemoryError: it asked for more.
+        OutOfMemoryError: more memory was needed.
     """
-    with _ALONE:
+    with _LOCK:
         before, highest = resource.getrlimit(resource.RLIMIT_AS)
         bound = _bound(megabytes, [limit for limit in (before, highest) if limit != resource.RLIM_INFINITY])
         resource.setrlimit(resource.RLIMIT_AS, (before if bound is None else bound, highest))
@@ -40,10 +40,10 @@ def taking_at_most(megabytes: int) -> Iterator[None]:
 
 
 def _bound(megabytes: int, others: list[int]) -> int | None:
-    """The address space that the process may have, in bytes; others' limits that are lower stay."""
+    """Return the allowed address space of the process in bytes; lower limits of others are kept."""
     try:
         pages = int(_SIZE.read_text().split()[0])
     except OSError:
         return None
-    # Beyond what the system can count, a limit is none.
+    # setrlimit cannot represent larger values.
     return min(pages * resource.getpagesize() + megabytes * _MB, 2**62, *others)

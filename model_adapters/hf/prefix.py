@@ -1,7 +1,8 @@
-"""The sequence that a model has encoded: its KV cache, and which pieces lie in it.
+"""The sequence that a model has encoded: its KV cache and the pieces in it.
 
-A new prompt is compared with what is there, the cache is cut behind the longest common prefix, and only the rest is
-encoded, in chunks, so that a prefix of any length needs the activations of one chunk only.
+A new prompt is compared with the encoded pieces, the cache is cut behind the longest common prefix, and only the rest
+is encoded. This is done in chunks, so that the activations of one chunk are the most that a long prompt needs. Chunks
+attend to the cache, so the numbers differ from those of one pass only by rounding.
 """
 
 from collections.abc import Iterator, Sequence
@@ -23,11 +24,11 @@ class Prefix:
 
     Args:
         model: a transformers model that takes `inputs_embeds`, `position_ids` and `past_key_values`.
-        family: its family.
-        embed: embeds stretches of prompts.
-        chunk_tokens: most tokens in one forward pass (a frame with more makes a chunk of its own).
-        rope: the model's rotary embeddings where their frequencies depend on the prompt's length.
-        storage: where keys and values are kept; beside the weights where None.
+        family: family of the model.
+        embed: embeds spans of prompts.
+        chunk_tokens: most tokens of one forward pass (a larger frame is a chunk by itself).
+        rope: rotary embeddings of the model if their frequencies depend on the prompt's length, else None.
+        storage: device of keys and values; the device of the weights where None.
     """
 
     def __init__(
@@ -50,31 +51,33 @@ class Prefix:
         self.reset()
 
     def reset(self) -> None:
-        """Forget the sequence and free its memory."""
+        """Drop the sequence and free its memory."""
         self._cache = BufferedCache(self._storage)
         self._pieces: list[Piece] = []
-        self._ends: list[int] = []  # tokens up to and with each piece
-        self._starts: list[int] = [0]  # the position each piece starts at, and that of the next one
+        self._ends: list[int] = []  # tokens up to the end of each piece
+        self._starts: list[int] = [0]  # position of each piece's first token, and of the next token
 
     @property
     def n_tokens(self) -> int:
-        """Tokens encoded at present."""
+        """Tokens in the sequence."""
         return self._ends[-1] if self._ends else 0
 
     @property
     def end(self) -> int:
-        """The position that the next token takes."""
+        """Position of the next token."""
         return self._starts[-1]
 
-    def spread(self, n_rows: int, n_more: int) -> BufferedCache:
-        """A cache of its own with the sequence in each of several rows, and room for more tokens."""
-        return self._cache.spread(n_rows, self.n_tokens + n_more)
+    def expand(self, n_rows: int, n_more: int) -> BufferedCache:
+        """Return a separate cache with the sequence in each of several rows, and capacity for more tokens."""
+        return self._cache.expand(n_rows, self.n_tokens + n_more)
 
     def rewind_to(self, pieces: Sequence[Piece]) -> int:
-        """Cut the sequence behind the pieces it shares with the given ones, which must have one more to be fed.
+        """Cut the sequence behind its longest common prefix with these pieces, of which at least one is left to feed.
+
+        The last piece is never shared: logits of the next token come only from feeding something.
 
         Returns:
-            How many pieces are shared.
+            Number of shared pieces.
         """
         if self._rope is not None:
             self._set_rope(self._rope, pieces)
@@ -87,7 +90,7 @@ class Prefix:
         return shared
 
     def _set_rope(self, rope: LengthRope, pieces: Sequence[Piece]) -> None:
-        """Set the frequencies for a prompt; what was encoded with others cannot be used for it."""
+        """Set the rotary frequencies for a prompt; a sequence that was encoded with others is dropped."""
         ids = torch.tensor(list(token_ids(pieces)))
         sizes = [piece.size for piece in pieces if isinstance(piece, Frame)]
         n_positions = int(self._family.positions(ids, sizes, 0).max()) + 1
@@ -105,15 +108,15 @@ class Prefix:
         """Encode pieces behind the sequence.
 
         Args:
-            pieces: at least one.
-            reserve: tokens that will be fed after them, to allocate memory for.
+            pieces: pieces to append, at least one.
+            reserve: tokens to be fed later, for which memory is allocated at once.
 
         Returns:
             Logits of the token that follows the last piece, (vocabulary,).
 
         Raises:
             DataError: a frame cannot be read.
-            ModelError: processor and model disagree on how many tokens a frame takes.
+            ModelError: processor and model disagree on the number of a frame's tokens.
         """
         self._cache.reserve(self.n_tokens + n_tokens(pieces) + reserve)
         logits = None
@@ -138,24 +141,24 @@ class Prefix:
 
     @torch.inference_mode()
     def _forward(self, chunk: list[Piece]) -> torch.Tensor:
-        stretch = self._embed(chunk, self._starts[-1])
+        span = self._embed(chunk, self._starts[-1])
         done = False
         try:
             output = self._model(
-                inputs_embeds=stretch.embeds[None],
-                position_ids=stretch.positions,
+                inputs_embeds=span.embeds[None],
+                position_ids=span.positions,
                 past_key_values=self._cache,
                 use_cache=True,
                 logits_to_keep=1,
             )
             done = True
         finally:
-            if not done:  # some layers have the chunk and some have not: nothing of it can be used again
+            if not done:  # some layers have cached the chunk and others have not
                 self.reset()
         end = self.n_tokens
         for piece in chunk:
             end += 1 if isinstance(piece, int) else len(piece.ids)
             self._pieces.append(piece)
             self._ends.append(end)
-        self._starts[-1:] = [*stretch.starts, stretch.end]
+        self._starts[-1:] = [*span.starts, span.end]
         return output.logits[0, -1]

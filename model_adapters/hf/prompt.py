@@ -1,8 +1,8 @@
-"""From the turns of a conversation to what the model is fed.
+"""From the turns of a conversation to the prompt of the model.
 
-The checkpoint's own chat template is rendered over the whole conversation and the result is tokenised as a whole, with
-one placeholder per frame; placeholders are expanded afterwards, id by id. So merges over the joints of parts come out
-as the checkpoint means them, and the cost per reply is that of a short text even where frames take 100,000 tokens.
+The checkpoint's chat template is rendered over the whole conversation, and the result is tokenised as a whole with one
+placeholder per frame. Placeholders are expanded afterwards, on token ids. So tokens may span the borders of parts, as
+the checkpoint was trained, and tokenising costs as little as a short text even if frames take 100,000 tokens.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -12,7 +12,7 @@ from typing import Any
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
 from model_adapters.hf.family import Family, Size
-from model_adapters.hf.rendering import begins, render
+from model_adapters.hf.rendering import render, starts_with_bos
 from model_adapters.protocols import Turn
 
 __all__ = ["Frame", "Piece", "Prompter", "n_common", "n_tokens", "token_ids"]
@@ -20,13 +20,13 @@ __all__ = ["Frame", "Piece", "Prompter", "n_common", "n_tokens", "token_ids"]
 
 @dataclass(frozen=True)
 class Frame:
-    """A frame as a piece of a prompt; two are equal when the files' contents are.
+    """A frame as a piece of a prompt; frames with the same file content are equal.
 
     Attributes:
         digest: hash of the file's content.
         size: width and height in pixels.
-        ids: what it expands to.
-        ref: where its pixels are.
+        ids: token ids that the frame expands to.
+        ref: reference to the pixels.
     """
 
     digest: str
@@ -35,16 +35,16 @@ class Frame:
     ref: FrameRef = field(compare=False)
 
 
-Piece = int | Frame  # what is encoded, compared and cut as a whole: a token of text, or a frame with all its tokens
+Piece = int | Frame  # unit of comparing and cutting: a token of text, or a frame with all its tokens
 
 
 def n_tokens(pieces: Sequence[Piece]) -> int:
-    """Tokens of a prompt, frames expanded."""
+    """Return the tokens of a prompt, frames expanded."""
     return sum(1 if isinstance(piece, int) else len(piece.ids) for piece in pieces)
 
 
 def n_common(prompts: Sequence[Sequence[Piece]]) -> int:
-    """Pieces that all prompts begin with; at least one piece of each is left over."""
+    """Return the number of pieces that all prompts begin with; at least one piece of each is left over."""
     first = min(prompts, key=len)
     for at, piece in enumerate(first[:-1]):
         if any(prompt[at] is not piece and prompt[at] != piece for prompt in prompts):
@@ -53,7 +53,7 @@ def n_common(prompts: Sequence[Sequence[Piece]]) -> int:
 
 
 def token_ids(pieces: Iterable[Piece]) -> Iterator[int]:
-    """All ids of a prompt, frames expanded."""
+    """Yield all token ids of a prompt, frames expanded."""
     for piece in pieces:
         if isinstance(piece, int):
             yield piece
@@ -65,9 +65,9 @@ class Prompter:
     """Renders and tokenises conversations for one model.
 
     Args:
-        tokenizer: the checkpoint's tokenizer.
-        template: the checkpoint's chat template (Jinja).
-        family: how frames are expanded.
+        tokenizer: tokenizer of the checkpoint.
+        template: template of conversations (Jinja).
+        family: family that expands frames.
     """
 
     def __init__(self, tokenizer: Any, template: str, family: Family) -> None:
@@ -79,15 +79,16 @@ class Prompter:
         self._ids: dict[Size, tuple[int, ...]] = {}
 
     def pieces(self, turns: Sequence[Turn]) -> list[Piece]:
-        """The prompt that asks for the reply to these turns.
+        """Return the prompt that asks for the reply to these turns.
 
         Raises:
             DataError: a frame cannot be read.
-            ModelError: the template refuses the turns, or does not hold one placeholder per frame.
+            ModelError: the template refuses the turns, or does not write one placeholder per frame.
         """
         frames = [self.frame(part) for turn in turns for part in turn.parts if isinstance(part, FrameRef)]
         text = render(self._tokenizer, self._template, turns, self._image_token)
-        ids: list[int] = self._tokenizer(text, add_special_tokens=not begins(self._tokenizer, text))["input_ids"]
+        needs_bos = not starts_with_bos(self._tokenizer, text)
+        ids: list[int] = self._tokenizer(text, add_special_tokens=needs_bos)["input_ids"]
         placeholder = self._family.placeholder_id
         if ids.count(placeholder) != len(frames):
             raise ModelError(
@@ -99,10 +100,10 @@ class Prompter:
         return [next(rest) if token == placeholder else token for token in ids]
 
     def frame(self, ref: FrameRef) -> Frame:
-        """A frame as a piece of any prompt.
+        """Return a frame as a piece of a prompt.
 
         Raises:
-            DataError: it cannot be read.
+            DataError: the frame cannot be read.
         """
         frame = self._frames.get(ref.digest)
         if frame is None:

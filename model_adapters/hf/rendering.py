@@ -1,4 +1,4 @@
-"""From the turns of a conversation to the text that the checkpoint's own chat template makes of them."""
+"""From the turns of a conversation to the text that the checkpoint's chat template renders."""
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
@@ -10,13 +10,13 @@ from jinja2 import TemplateError
 from infthor_eval.errors import ModelError, wrap_errors
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.limits import TEMPLATE_CHARACTERS, TEMPLATE_MB, TEMPLATE_SECONDS
-from model_adapters.hf.memory_limit import OutOfMemoryError, taking_at_most
-from model_adapters.hf.time_limit import OutOfTimeError, computing_at_most
+from model_adapters.hf.memory_limit import OutOfMemoryError, limit_memory
+from model_adapters.hf.time_limit import OutOfTimeError, limit_time
 from model_adapters.protocols import Turn
 
-__all__ = ["begins", "render"]
+__all__ = ["render", "starts_with_bos"]
 
-# What a template raises that does not fit or is broken: Jinja's own, and those of the Python that it computes.
+# Errors of a template that is broken or does not support the turns: Jinja's, and those of its expressions.
 _REFUSALS = (
     TemplateError,
     TypeError,  # a list where the template joins strings
@@ -26,57 +26,57 @@ _REFUSALS = (
     AttributeError,
     RecursionError,
 )
-_PRINTED = "{'type': 'text'"  # how a content looks where a template that wants a string writes a list
+_PRINTED = "{'type': 'text'"  # appears where a template that expects a string prints a list
 
 
 def render(tokenizer: Any, template: str, turns: Sequence[Turn], image_token: str) -> str:
-    """The chat template over all turns, asking for the reply.
+    """Render the chat template over all turns, asking for the reply.
 
-    Some templates (LLaVA's) write all images of a turn before its texts. Where that would take frames out of the places
-    between texts, the turn is given to them as one text with the image's token in it. Some (Pixtral's) want what the
-    system says as a string instead of a list of texts, and get it so.
+    Some templates (LLaVA's) write all images of a turn before its texts. If that would move frames away from between
+    the texts, the turn is passed as one text that contains the image tokens. Some templates (Pixtral's) accept a system
+    turn only as a string instead of a list of texts.
 
     Args:
-        tokenizer: the checkpoint's.
-        template: its chat template (Jinja).
-        turns: the conversation.
-        image_token: what the template writes for an image.
+        tokenizer: tokenizer of the checkpoint.
+        template: chat template (Jinja).
+        turns: turns of the conversation.
+        image_token: the template's token for an image.
 
     Raises:
-        ModelError: the template refuses the turns, or leaves a text out.
+        ModelError: the template refuses the turns, or drops a text.
     """
-    trials = [_trial(tokenizer, template, turn) for turn in turns]
-    shown = [_in_place(turn, trial, image_token) for turn, trial in zip(turns, trials, strict=True)]
-    if len(turns) == 1 and trials[0] is not None and shown[0] == replace(turns[0], role="user"):
-        return trials[0]  # what was tried is the whole conversation
-    listed = [_message(turn) for turn in shown]
+    trials = [_render_alone(tokenizer, template, turn) for turn in turns]
+    ordered = [_with_frames_in_place(turn, trial, image_token) for turn, trial in zip(turns, trials, strict=True)]
+    if len(turns) == 1 and trials[0] is not None and ordered[0] == replace(turns[0], role="user"):
+        return trials[0]  # the trial rendered the whole conversation
+    with_lists = [_message(turn) for turn in ordered]
     try:
-        return _written(tokenizer, template, shown, listed)
+        return _apply(tokenizer, template, ordered, with_lists)
     except ModelError:
-        strings = [_string_message(turn) for turn in shown]
-        if strings == listed:
+        with_strings = [_string_message(turn) for turn in ordered]
+        if with_strings == with_lists:
             raise
-    return _written(tokenizer, template, shown, strings)
+    return _apply(tokenizer, template, ordered, with_strings)
 
 
-def begins(tokenizer: Any, text: str) -> bool:
-    """Whether the template wrote the token that begins every text; where not, processors let the tokenizer add it."""
+def starts_with_bos(tokenizer: Any, text: str) -> bool:
+    """Return whether the template wrote the beginning-of-sequence token; if not, the tokenizer has to add it."""
     return tokenizer.bos_token is not None and text.startswith(tokenizer.bos_token)
 
 
-def _trial(tokenizer: Any, template: str, turn: Turn) -> str | None:
-    """What is written of a turn of frames and texts alone, as the user's; None for other turns.
+def _render_alone(tokenizer: Any, template: str, turn: Turn) -> str | None:
+    """Return the text of a turn with frames and texts, as a user's only turn; None for other turns.
 
-    It is tried alone so that what comes after it does not change how it is written.
+    It is rendered alone because templates may treat a turn differently when another one follows.
     """
     if len({isinstance(part, FrameRef) for part in turn.parts}) < 2:
         return None
     alone = replace(turn, role="user")
-    return _written(tokenizer, template, [alone], [_message(alone)])
+    return _apply(tokenizer, template, [alone], [_message(alone)])
 
 
-def _in_place(turn: Turn, trial: str | None, image_token: str) -> Turn:
-    """The turn with its image tokens in one text, where the template would not leave frames in their places."""
+def _with_frames_in_place(turn: Turn, trial: str | None, image_token: str) -> Turn:
+    """Return the turn as one text with image tokens if the template would change the order of its parts."""
     parts = [part.strip() if isinstance(part, str) else image_token for part in turn.parts]
     n_frames = sum(isinstance(part, FrameRef) for part in turn.parts)
     if trial is None or trial.count(image_token) != n_frames or _in_order(trial, parts):
@@ -85,7 +85,7 @@ def _in_place(turn: Turn, trial: str | None, image_token: str) -> Turn:
 
 
 def _message(turn: Turn) -> dict[str, Any]:
-    # Most templates read a text under "text", a few under "content".
+    # Most templates read the key "text", a few "content".
     content = [
         {"type": "text", "text": part, "content": part} if isinstance(part, str) else {"type": "image"}
         for part in turn.parts
@@ -100,41 +100,40 @@ def _string_message(turn: Turn) -> dict[str, Any]:
     return {"role": turn.role, "content": text}
 
 
-def _written(tokenizer: Any, template: str, turns: Sequence[Turn], messages: Sequence[dict[str, Any]]) -> str:
-    refused = f"the chat template refuses {_roles(turns)}"
+def _apply(tokenizer: Any, template: str, turns: Sequence[Turn], messages: Sequence[dict[str, Any]]) -> str:
+    problem = f"the chat template refuses {_roles(turns)}"
+    # A template is code that comes with the checkpoint: it must neither run forever nor use up the memory.
     with (
-        wrap_errors(refused, f"mend it; {TEMPLATE_SECONDS.hint}", catch=OutOfTimeError, raise_as=ModelError),
-        wrap_errors(refused, f"mend it; {TEMPLATE_MB.hint}", catch=OutOfMemoryError, raise_as=ModelError),
-        wrap_errors(refused, "ask in other turns, or mend it", catch=_REFUSALS, raise_as=ModelError),
-        computing_at_most(TEMPLATE_SECONDS.value),
-        taking_at_most(TEMPLATE_MB.value),
+        wrap_errors(problem, f"fix it; {TEMPLATE_SECONDS.hint}", catch=OutOfTimeError, raise_as=ModelError),
+        wrap_errors(problem, f"fix it; {TEMPLATE_MB.hint}", catch=OutOfMemoryError, raise_as=ModelError),
+        wrap_errors(problem, "use other turns, or fix it", catch=_REFUSALS, raise_as=ModelError),
+        limit_time(TEMPLATE_SECONDS.value),
+        limit_memory(TEMPLATE_MB.value),
     ):
         text: str = tokenizer.apply_chat_template(
             list(messages), chat_template=template, tokenize=False, add_generation_prompt=True
         )
-    if len(text) > TEMPLATE_CHARACTERS.value:  # which would take the tokenizer minutes, and gigabytes
-        raise ModelError(f"{refused} (it makes {len(text):,} characters); mend it; {TEMPLATE_CHARACTERS.hint}")
+    if len(text) > TEMPLATE_CHARACTERS.value:  # the tokenizer would take minutes and gigabytes
+        raise ModelError(f"{problem} (it writes {len(text):,} characters); fix it; {TEMPLATE_CHARACTERS.hint}")
     _check_texts(text, turns)
     return text
 
 
 def _check_texts(text: str, turns: Sequence[Turn]) -> None:
-    """See that a rendered text has every text of every turn.
+    """Check that a rendered text contains every text of every turn.
 
     Raises:
-        ModelError: one is left out.
+        ModelError: a text is missing.
     """
-    said = [(turn.role, part.strip()) for turn in turns for part in turn.parts if isinstance(part, str)]
-    # Counting reads the whole text for every part, and is only needed where they are not there in order.
-    counts = {} if _in_order(text, (part for _, part in said)) else Counter(part for _, part in said)
+    parts = [(turn.role, part.strip()) for turn in turns for part in turn.parts if isinstance(part, str)]
+    # Counting scans the whole text for every part, so it is done only if the parts do not appear in order.
+    counts = {} if _in_order(text, (part for _, part in parts)) else Counter(part for _, part in parts)
     for part, count in counts.items():
         if text.count(part) < count:
-            roles = " or ".join(sorted({role for role, other in said if other == part}))
-            raise ModelError(
-                f"the chat template leaves out the text {part[:40]!r} of a turn ({roles}); it cannot be used"
-            )
-    if _PRINTED in text and not any(_PRINTED in part for _, part in said):
-        raise ModelError(f"the chat template writes lists instead of texts for {_roles(turns)}; ask in other turns")
+            roles = " or ".join(sorted({role for role, other in parts if other == part}))
+            raise ModelError(f"the chat template drops the text {part[:40]!r} of a turn ({roles}); it cannot be used")
+    if _PRINTED in text and not any(_PRINTED in part for _, part in parts):
+        raise ModelError(f"the chat template writes lists instead of texts for {_roles(turns)}; use other turns")
 
 
 def _roles(turns: Sequence[Turn]) -> str:
@@ -142,7 +141,7 @@ def _roles(turns: Sequence[Turn]) -> str:
 
 
 def _in_order(text: str, parts: Iterable[str]) -> bool:
-    """Whether the parts stand in a rendered text one after the other."""
+    """Return whether the parts appear in a rendered text in this order."""
     at = 0
     for part in parts:
         at = text.find(part, at)

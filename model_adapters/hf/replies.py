@@ -1,4 +1,4 @@
-"""How a reply begins and what becomes of it, for one checkpoint and whichever way its tokens are computed."""
+"""Start and end of a reply, however its tokens are computed."""
 
 from collections.abc import Iterable, Sequence
 from typing import Any
@@ -9,56 +9,56 @@ from model_adapters.hf.loaded import Loaded
 from model_adapters.protocols import Decoding, Reply
 from model_adapters.stopping import cut_at_stop
 
-__all__ = ["begin_reply", "end_reply", "said", "stop_ids"]
+__all__ = ["begin_reply", "end_reply", "reply_text", "stop_ids"]
 
 
 def begin_reply(loaded: Loaded, decoding: Decoding, context: Iterable[int]) -> ReplyState:
-    """A reply of no tokens yet.
+    """Return an empty reply.
 
     Args:
         loaded: the checkpoint.
-        decoding: how it is decoded.
+        decoding: decoding of the reply.
         context: all ids before the reply.
 
     Raises:
-        ModelError: the reply may have too few tokens for one of the choices.
+        ModelError: one of the choices has more tokens than the reply may have.
     """
     ends = stop_ids(loaded.tokenizer, decoding)
 
-    def stopped(ids: list[int]) -> bool:
-        if not decoding.stop:  # nothing has to be decoded then
+    def has_stopped(ids: list[int]) -> bool:
+        if not decoding.stop:  # saves decoding the text after every token
             return False
         return ids[-1] in ends or cut_at_stop(_text(loaded.tokenizer, ids), decoding.stop) is not None
 
     choices = read_choices(loaded.tokenizer, decoding)
-    return ReplyState(loaded.generation, decoding, context=context, choices=choices, finished=stopped)
+    return ReplyState(loaded.generation, decoding, context=context, choices=choices, finished=has_stopped)
 
 
-def end_reply(loaded: Loaded, writing: ReplyState, n_context: int, n_cached: int) -> Reply:
-    """What was written.
+def end_reply(loaded: Loaded, state: ReplyState, n_context: int, n_cached: int) -> Reply:
+    """Return a finished reply.
 
     Args:
         loaded: the checkpoint.
-        writing: is done.
-        n_context: tokens before the reply.
-        n_cached: how many of them were not encoded again.
+        state: the finished reply.
+        n_context: tokens of the context.
+        n_cached: tokens of the context that were not encoded again.
     """
     return Reply(
-        writing.choice or said(loaded.tokenizer, writing.ids, writing.decoding),
-        n_reply_tokens=len(writing.ids),
+        state.choice or reply_text(loaded.tokenizer, state.ids, state.decoding),
+        n_reply_tokens=len(state.ids),
         n_context_tokens=n_context,
         n_cached_tokens=n_cached,
-        token_ids=tuple(writing.ids),
+        token_ids=tuple(state.ids),
     )
 
 
-def said(tokenizer: Any, ids: Sequence[int], decoding: Decoding) -> str:
-    """The text of a free reply, before its first stop string.
+def reply_text(tokenizer: Any, ids: Sequence[int], decoding: Decoding) -> str:
+    """Return the text of a free reply before its first stop string.
 
     Args:
-        tokenizer: the checkpoint's.
-        ids: of the reply, without the end token.
-        decoding: has the stop strings.
+        tokenizer: tokenizer of the checkpoint.
+        ids: ids of the reply, without the end token.
+        decoding: decoding with the stop strings.
     """
     text = _text(tokenizer, ids)
     before_stop = cut_at_stop(text, decoding.stop)
@@ -66,7 +66,7 @@ def said(tokenizer: Any, ids: Sequence[int], decoding: Decoding) -> str:
 
 
 def stop_ids(tokenizer: Any, decoding: Decoding) -> set[int]:
-    """Stop strings that are tokens of their own; where they are special ones, a reply's text never shows them."""
+    """Return the ids of stop strings that are single tokens; special tokens never appear in the text of a reply."""
     if not decoding.stop:
         return set()
     added: dict[str, int] = tokenizer.get_added_vocab()

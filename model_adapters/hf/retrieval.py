@@ -1,8 +1,8 @@
-"""How near frames and texts are to each other, by a CLIP model: what retrieval contexts choose frames with.
+"""Similarity of frames and texts by a CLIP model, for retrieval contexts.
 
 A set has hundreds of thousands of frames, and every question on a trajectory ranks the same ones. So each frame is
-embedded once, in batches of a few frames' pixels, and the vectors lie in a file of the user's cache: memory stays flat
-however large the set is, and the next run finds them there.
+embedded once, in small batches, and the vectors are kept in a file of the user's cache: memory does not grow with the
+set, and the next run reuses them.
 """
 
 import json
@@ -19,21 +19,18 @@ from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.formats.digests import digest
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.user_cache import user_cache
-from model_adapters.hf.checkpoint import loading, origin, resolve_device, versions
+from model_adapters.hf.checkpoint import origin, resolve_device, versions, wrap_loading_errors
 from model_adapters.hf.hub import fetch
 from model_adapters.hf.vectors import VectorFile
 from model_adapters.options.checkpoints import Placement
 
 __all__ = ["Retriever", "open_retriever"]
 
-_BATCH = 32  # frames whose pixels are held at once
+_BATCH = 32  # frames whose pixels are in memory at once
 
 
 class Retriever:
-    """A CLIP model in float32, on a GPU where there is one.
-
-    Its vectors have length 1, so that their dot product is the cosine.
-    """
+    """A CLIP model in float32, on a GPU if there is one; its vectors have length 1, so dot products are cosines."""
 
     def __init__(self, name: str, revision: str | None = None) -> None:
         """Load a checkpoint.
@@ -43,13 +40,13 @@ class Retriever:
             revision: branch, tag or commit on the hub; the default branch where None.
 
         Raises:
-            UsageError: there is none, it cannot be had, or it is not CLIP's.
+            UsageError: the checkpoint cannot be found or loaded, or is not one of CLIP.
             DataError: the user's cache cannot be written.
         """
         try:
             # Old CLIP checkpoints on the hub have no safetensors.
-            folder, commit = fetch(name, revision, option="--retriever ", also=["pytorch_model.bin"])
-            with loading(name):
+            folder, commit = fetch(name, revision, option="--retriever ", extra_patterns=["pytorch_model.bin"])
+            with wrap_loading_errors(name):
                 model = _load_model(folder)
                 self._tokenizer = transformers.AutoTokenizer.from_pretrained(folder)
                 self._image_processor = transformers.AutoImageProcessor.from_pretrained(folder, backend="pil")
@@ -61,7 +58,7 @@ class Retriever:
         self._vectors = VectorFile(file, model.config.projection_dim)
 
     def identity(self) -> dict[str, Any]:
-        """All that can change a ranking, as JSON values."""
+        """Return everything that can change a ranking, as JSON values."""
         return self._origin | {
             "device": self._model.device.type,
             "image_processor": json.loads(self._image_processor.to_json_string()),
@@ -69,7 +66,7 @@ class Retriever:
         }
 
     def frames(self, frames: Sequence[FrameRef]) -> np.ndarray:
-        """Vectors of frames, (frames, dimensions).
+        """Return the vectors of frames, (frames, dimensions).
 
         Raises:
             DataError: a frame cannot be decoded.
@@ -83,7 +80,7 @@ class Retriever:
         return self._vectors.get([frame.digest for frame in frames])
 
     def text(self, text: str) -> np.ndarray:
-        """The vector of a text, (dimensions,); what is beyond CLIP's limit (77 tokens) is cut off."""
+        """Return the vector of a text, (dimensions,); the text is truncated to CLIP's limit (77 tokens)."""
         key = digest(f"text: {text}")
         if key not in self._vectors:
             limit = self._model.config.text_config.max_position_embeddings
@@ -100,15 +97,15 @@ class Retriever:
 def _load_model(folder: Path) -> Any:
     model_type = transformers.AutoConfig.from_pretrained(folder).model_type
     if model_type != "clip":
-        raise ModelError(f"--retriever {folder} is a {model_type} checkpoint; retrieval takes one of CLIP")
+        raise ModelError(f"--retriever {folder} is a {model_type} checkpoint; retrieval needs one of CLIP")
     clip: Any = transformers.CLIPModel
     model, report = clip.from_pretrained(folder, dtype=torch.float32, output_loading_info=True)
-    if report["missing_keys"]:  # transformers would leave them random and only warn
-        raise ModelError(f"--retriever {folder} lacks {len(report['missing_keys'])} weights; give a whole checkpoint")
+    if report["missing_keys"]:  # transformers would draw them at random and only warn
+        raise ModelError(f"--retriever {folder} lacks {len(report['missing_keys'])} weights; give a complete one")
     return model
 
 
 @lru_cache(maxsize=2)
 def open_retriever(name: str, revision: str | None = None) -> Retriever:
-    """The retriever of a checkpoint, loaded once per process; see `Retriever`."""
+    """Return the retriever of a checkpoint, which is loaded once per process; see `Retriever`."""
     return Retriever(name, revision)

@@ -1,8 +1,8 @@
-"""Longer contexts by another scaling of rotary positions (RoPE), written as transformers 5 wants it.
+"""Longer contexts by scaled rotary positions (RoPE), in the form of transformers 5.
 
 transformers recomputes the frequencies of `dynamic` and `longrope` inside the forward pass, from the largest position
-it has seen: what a chunked prefill or a cached prefix holds would then belong to other frequencies than what follows.
-Here they are set once per request, from the prompt's full length, as one pass over the whole prompt sets them.
+so far. In a chunked prefill or with a cached prefix, earlier and later tokens would then have different frequencies.
+Here they are set once per request from the prompt's full length, as a single pass over the whole prompt would.
 """
 
 import re
@@ -15,45 +15,45 @@ from transformers.modeling_rope_utils import ROPE_INIT_FUNCTIONS
 from infthor_eval.errors import ModelError
 from model_adapters.options.checkpoints import parse_rope
 
-__all__ = ["LengthRope", "apply_rope", "length_rope"]
+__all__ = ["LengthRope", "apply_rope", "take_length_rope"]
 
-_FIXED = "fixed"  # a rope_type that transformers' forward pass leaves alone
+_FIXED = "fixed"  # a rope_type whose frequencies transformers does not recompute
 
 
 def apply_rope(config: Any, rope: str | None) -> int | None:
-    """Write an extension into a model's config.
+    """Write a context extension into a model's config.
 
-    The original length is the config's `max_position_embeddings`, as in the published evaluation. `longrope` takes
-    the checkpoint's own factors where it has some; else all frequencies are divided by the factor once a prompt is
-    longer than the original length.
+    The original length is the config's `max_position_embeddings`, as in the published evaluation. `longrope` uses the
+    checkpoint's own factors if it has them; else all frequencies are divided by the factor for prompts that are longer
+    than the original length.
 
     Args:
-        config: the model's config; its text config is changed.
+        config: config of the model; its text config is changed.
         rope: `TYPE:FACTOR`, or None for the checkpoint's own.
 
     Returns:
-        The context limit in tokens; None where the config names none.
+        The context limit in tokens, or None if the config has none.
 
     Raises:
-        ModelError: the model has no RoPE that could be scaled, or several.
+        ModelError: the model has no RoPE to scale, or several.
     """
     text = config.get_text_config()
     limit: int | None = getattr(text, "max_position_embeddings", None)
     if rope is None:
         return limit
     rope_type, factor = parse_rope(rope)
-    present = getattr(text, "rope_parameters", None)
-    if limit is None or not isinstance(present, dict) or "rope_theta" not in present:
+    parameters = getattr(text, "rope_parameters", None)
+    if limit is None or not isinstance(parameters, dict) or "rope_theta" not in parameters:
         raise ModelError(f"rope={rope}: a {config.model_type} model has no single RoPE with a length to extend")
-    kept = {name: present[name] for name in ("mrope_section", "partial_rotary_factor") if name in present}
-    new: dict[str, Any] = {"rope_type": rope_type, "rope_theta": present["rope_theta"], "factor": factor, **kept}
+    kept = {name: parameters[name] for name in ("mrope_section", "partial_rotary_factor") if name in parameters}
+    new: dict[str, Any] = {"rope_type": rope_type, "rope_theta": parameters["rope_theta"], "factor": factor, **kept}
     if rope_type in ("yarn", "longrope"):
         new["original_max_position_embeddings"] = limit
     if rope_type == "longrope":
         head = getattr(text, "head_dim", None) or text.hidden_size // text.num_attention_heads
         n_frequencies = int(head * kept.get("partial_rotary_factor", 1.0)) // 2
-        new["short_factor"] = present.get("short_factor", [1.0] * n_frequencies)
-        new["long_factor"] = present.get("long_factor", [factor] * n_frequencies)
+        new["short_factor"] = parameters.get("short_factor", [1.0] * n_frequencies)
+        new["long_factor"] = parameters.get("long_factor", [factor] * n_frequencies)
     text.rope_parameters = new
     return int(limit * factor)
 
@@ -63,10 +63,10 @@ class LengthRope:
     """Rotary embeddings whose frequencies depend on the length of the prompt.
 
     Attributes:
-        modules: the model's rotary embeddings.
+        modules: rotary embeddings of the model.
         compute: transformers' function for the frequencies.
-        original: length up to which the original frequencies hold, in positions.
-        by_length: whether every length beyond it has frequencies of its own (dynamic), or all have the same (longrope).
+        original: length up to which the original frequencies apply, in positions.
+        by_length: true if each greater length has its own frequencies (dynamic), false if all share some (longrope).
     """
 
     modules: tuple[Any, ...]
@@ -75,7 +75,7 @@ class LengthRope:
     by_length: bool
 
     def key(self, n_positions: int) -> int:
-        """Equal for lengths of equal frequencies."""
+        """Return a key that is equal for lengths with equal frequencies."""
         longer = max(n_positions - self.original, 0)
         return longer if self.by_length else int(longer > 0)
 
@@ -86,8 +86,8 @@ class LengthRope:
             module.inv_freq, module.attention_scaling = self.compute(module.config, device, seq_len=n_positions)
 
 
-def length_rope(model: Any) -> LengthRope | None:
-    """Take over the rotary embeddings of a model if their frequencies depend on the length, else None."""
+def take_length_rope(model: Any) -> LengthRope | None:
+    """Take control of a model's rotary embeddings if their frequencies depend on the length; else return None."""
     modules = tuple(
         module
         for module in model.modules()

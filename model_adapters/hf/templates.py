@@ -1,4 +1,4 @@
-"""The template that writes a conversation as text: the checkpoint's own, or a plain one without any roles."""
+"""Templates of conversations: the checkpoint's chat template, or a plain one without roles."""
 
 import json
 from pathlib import Path
@@ -9,7 +9,7 @@ from model_adapters.hf.family import Family
 
 __all__ = ["chat_template", "plain_template"]
 
-# As checkpoints see it that were trained on bare sequences of texts and frames: what is said, and nothing else.
+# The form of prompts in training on bare sequences of texts and frames.
 _PLAIN = """\
 {%- for message in messages -%}
 {%- for part in message.content -%}
@@ -20,14 +20,14 @@ _PLAIN = """\
 
 
 def chat_template(folder: Path, tokenizer: Any) -> str:
-    """The processor's template if the checkpoint has one of its own, else the tokenizer's.
+    """Return the processor's chat template if the checkpoint has one, else the tokenizer's.
 
     Args:
-        folder: the checkpoint's.
-        tokenizer: its tokenizer.
+        folder: folder of the checkpoint.
+        tokenizer: tokenizer of the checkpoint.
 
     Raises:
-        ModelError: it has none.
+        ModelError: the checkpoint has no chat template.
     """
     jinja, legacy = folder / "chat_template.jinja", folder / "chat_template.json"
     if jinja.is_file():
@@ -37,16 +37,16 @@ def chat_template(folder: Path, tokenizer: Any) -> str:
     else:
         template = tokenizer.chat_template
     if not isinstance(template, str):
-        raise ModelError(f"{folder} has no chat template; add a chat_template.jinja to it, or ask with prompt=plain")
+        raise ModelError(f"{folder} has no chat template; add a chat_template.jinja to it, or set prompt=plain")
     return template
 
 
 def plain_template(tokenizer: Any, family: Family) -> str:
-    """A template that writes turns one after the other, texts and frames in their places.
+    """Return a template that concatenates the texts and frames of all turns.
 
     Args:
-        tokenizer: the checkpoint's.
-        family: knows what stands for a frame.
+        tokenizer: tokenizer of the checkpoint.
+        family: family of the model, which knows the tokens of a frame in a text.
     """
-    image = "".join(tokenizer.convert_ids_to_tokens(list(family.written_ids())))
+    image = "".join(tokenizer.convert_ids_to_tokens(list(family.template_ids())))
     return _PLAIN.replace("IMAGE", json.dumps(image, ensure_ascii=False))

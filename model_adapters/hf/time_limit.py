@@ -1,4 +1,4 @@
-"""A limit on what a piece of code that comes with a checkpoint may compute."""
+"""A limit on the computing time of code that comes with a checkpoint (chat templates)."""
 
 import signal
 import threading
@@ -6,21 +6,21 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-__all__ = ["OutOfTimeError", "computing_at_most"]
+__all__ = ["OutOfTimeError", "limit_time"]
 
 
 class OutOfTimeError(Exception):
-    """It computed for longer than it may."""
+    """Code computed for longer than allowed."""
 
 
 @contextmanager
-def computing_at_most(seconds: int) -> Iterator[None]:
-    """Stop what computes for longer, in the main thread; in others there is no way to.
+def limit_time(seconds: int) -> Iterator[None]:
+    """Stop code that computes for longer; only in the main thread, because signals reach no other.
 
-    It is the process's own computing that counts, so a busy machine stops nothing.
+    The processor time of the process counts, so the limit does not depend on the load of the machine.
 
     Raises:
-        OutOfTimeError: it did.
+        OutOfTimeError: the time is used up.
     """
 
     def stop(_number: int, _frame: FrameType | None) -> None:

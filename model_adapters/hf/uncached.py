@@ -1,7 +1,7 @@
-"""Any image-text-to-text model, by its own processor and `generate`, encoding everything for every reply.
+"""Any image-text-to-text model, run by its own processor and `generate` without a cache between replies.
 
-The slow way that is right for every architecture: what the shared machinery cannot run (attention in both directions
-over images, vision features that enter at several layers), this does.
+It is slow and correct for every architecture, including those that cannot share prefixes: attention in both directions
+over images, or vision features that enter at several layers.
 """
 
 from collections.abc import Sequence
@@ -13,23 +13,24 @@ from transformers import LogitsProcessor, LogitsProcessorList, StoppingCriteria,
 
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
-from model_adapters.backend import BackendConversation
+from model_adapters.hf.checkpoint_model import CheckpointModel
 from model_adapters.hf.decoding import ReplyState, extend_replies
 from model_adapters.hf.description import capabilities, identity
-from model_adapters.hf.limits import check_limit, naming_memory_errors, naming_model_errors
+from model_adapters.hf.limits import check_limit, wrap_memory_errors, wrap_model_errors
 from model_adapters.hf.loaded import Loaded
-from model_adapters.hf.rendering import begins, render
+from model_adapters.hf.rendering import render, starts_with_bos
 from model_adapters.hf.replies import begin_reply, end_reply
+from model_adapters.hf.threads import torch_threads
 from model_adapters.options.checkpoints import HfOptions
 from model_adapters.protocols import Capabilities, Decoding, Reply, Turn
 
-__all__ = ["UncachedModel", "expanded", "image_token", "processed"]
+__all__ = ["UncachedModel", "expand_image_token", "image_token", "process_turns"]
 
 
-def processed(processor: Any, template: str, turns: Sequence[Turn]) -> Any:
-    """What transformers' processor makes of a conversation, as tensors.
+def process_turns(processor: Any, template: str, turns: Sequence[Turn]) -> Any:
+    """Return the tensors that transformers' processor makes of a conversation.
 
-    Frames are given as a flat list: that is what published results come from.
+    Frames are passed as a flat list, as in the published results.
 
     Raises:
         DataError: a frame cannot be read.
@@ -40,13 +41,13 @@ def processed(processor: Any, template: str, turns: Sequence[Turn]) -> Any:
     return processor(
         text=[text],
         images=images or None,
-        add_special_tokens=not begins(processor.tokenizer, text),
+        add_special_tokens=not starts_with_bos(processor.tokenizer, text),
         return_tensors="pt",
     )
 
 
 def image_token(processor: Any) -> str:
-    """The token that a chat template writes for an image and the processor expands.
+    """Return the image token of chat templates, which the processor expands.
 
     Raises:
         ModelError: the processor names none.
@@ -57,15 +58,15 @@ def image_token(processor: Any) -> str:
     return token
 
 
-def expanded(processor: Any, image: Image.Image) -> list[int]:
-    """The ids that the processor expands the token of one image to."""
+def expand_image_token(processor: Any, image: Image.Image) -> list[int]:
+    """Return the ids that the processor expands the token of one image to."""
     inputs = processor(text=[image_token(processor)], images=[image], add_special_tokens=False, return_tensors="pt")
     ids: list[int] = inputs["input_ids"][0].tolist()
     return ids
 
 
-class _Dictate(LogitsProcessor):
-    """Has `generate` take the tokens that a reply chooses."""
+class _ForceReplyTokens(LogitsProcessor):
+    """Makes `generate` emit the tokens that a `ReplyState` chooses, so that decoding is the same as with a cache."""
 
     def __init__(self, reply: ReplyState) -> None:
         self._reply = reply
@@ -77,8 +78,8 @@ class _Dictate(LogitsProcessor):
         return scores
 
 
-class _Done(StoppingCriteria):
-    """Ends `generate` with the reply."""
+class _StopWithReply(StoppingCriteria):
+    """Ends `generate` when the reply is done."""
 
     def __init__(self, reply: ReplyState) -> None:
         self._reply = reply
@@ -87,19 +88,18 @@ class _Done(StoppingCriteria):
         return torch.tensor([self._reply.done], device=input_ids.device)
 
 
-class UncachedModel:
-    """A loaded checkpoint behind the `Model` protocol, without any sharing.
+class UncachedModel(CheckpointModel):
+    """A loaded checkpoint behind the `Model` protocol, without a shared prefix.
 
     Args:
-        name: the registry's name.
+        name: name in the registry.
         loaded: the checkpoint.
-        processor: its processor.
-        options: how to run it.
+        processor: processor of the checkpoint.
+        options: inference options.
     """
 
     def __init__(self, name: str, loaded: Loaded, processor: Any, options: HfOptions) -> None:
-        self.name = name
-        self._loaded = loaded
+        super().__init__(name, loaded, options.threads)
         self._processor = processor
         self._options = options
 
@@ -109,49 +109,47 @@ class UncachedModel:
         return capabilities(self._loaded, self._options, batch_size=1)
 
     def identity(self) -> dict[str, Any]:
-        """Checkpoint, precision, kernels, versions and generation settings, as JSON values."""
+        """Return checkpoint, precision, kernels, versions and generation settings, as JSON values."""
         return identity(self.name, self._loaded, self._options)
 
     def tokens_per_frame(self, frame: FrameRef) -> int:
-        """How many tokens one frame becomes, as the checkpoint's processor has it."""
-        with naming_model_errors(self.name):
-            return len(expanded(self._processor, frame.load()))
-
-    def conversation(self) -> BackendConversation:
-        """A new, empty conversation."""
-        return BackendConversation(self)
+        """Return the tokens of one frame, as the checkpoint's processor expands it."""
+        with wrap_model_errors(self.name):
+            return len(expand_image_token(self._processor, frame.load()))
 
     def close(self) -> None:
         """Free the weights."""
-        del self._loaded, self._processor
+        del self._loaded, self._processor, self._prompter
         if torch.cuda.is_available():
             torch.cuda.empty_cache()
 
     def count(self, turns: Sequence[Turn]) -> int:
-        """Tokens that a reply to these turns would be made from."""
-        with naming_model_errors(self.name):
-            return int(processed(self._processor, self._loaded.template, turns)["input_ids"].shape[1])
+        """Return the context size of a reply to these turns, in tokens."""
+        return int(self._inputs(turns)["input_ids"].shape[1])
 
     def answer_each(self, conversations: Sequence[Sequence[Turn]], decoding: Decoding) -> list[Reply]:
         """Answer several conversations, one after the other; see `Conversation.replies`."""
-        return [self.answer(turns, decoding) for turns in conversations]
+        with torch_threads(self._threads):
+            return [self._answer(turns, decoding) for turns in conversations]
+
+    def _inputs(self, turns: Sequence[Turn]) -> Any:
+        with wrap_model_errors(self.name):
+            return process_turns(self._processor, self._loaded.template, turns)
 
     @torch.inference_mode()
-    def answer(self, turns: Sequence[Turn], decoding: Decoding) -> Reply:
-        """Answer a conversation; see `Conversation.reply`."""
-        with naming_model_errors(self.name):
-            inputs = processed(self._processor, self._loaded.template, turns)
+    def _answer(self, turns: Sequence[Turn], decoding: Decoding) -> Reply:
+        inputs = self._inputs(turns)
         n_context = int(inputs["input_ids"].shape[1])
         check_limit(self.name, n_context, decoding.max_new_tokens, self.capabilities.max_tokens)
         reply = begin_reply(self._loaded, decoding, inputs["input_ids"][0].tolist())
         weight = self._loaded.model.get_input_embeddings().weight
-        with naming_model_errors(self.name), naming_memory_errors(self.name, n_context):
+        with wrap_model_errors(self.name), wrap_memory_errors(self.name, n_context):
             self._loaded.model.generate(
                 **inputs.to(weight.device, self._loaded.model.dtype),
                 do_sample=False,
                 repetition_penalty=1.0,
                 max_new_tokens=decoding.max_new_tokens,
-                logits_processor=LogitsProcessorList([_Dictate(reply)]),
-                stopping_criteria=StoppingCriteriaList([_Done(reply)]),
+                logits_processor=LogitsProcessorList([_ForceReplyTokens(reply)]),
+                stopping_criteria=StoppingCriteriaList([_StopWithReply(reply)]),
             )
         return end_reply(self._loaded, reply, n_context, n_cached=0)

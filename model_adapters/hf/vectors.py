@@ -1,4 +1,4 @@
-"""Vectors by key in a file, which several processes may read and add to at the same time."""
+"""Vectors by key in a file that several processes may read and extend at the same time."""
 
 import fcntl
 import os
@@ -11,21 +11,21 @@ from infthor_eval.errors import DataError
 
 __all__ = ["VectorFile", "nearest"]
 
-_DIGITS = 6  # of a similarity; what is beyond is rounding, which must not decide between equal vectors
+_DIGITS = 6  # digits of a similarity; rounding errors beyond must not decide between equal vectors
 
 
 class VectorFile:
-    """An append-only file of float32 vectors. In memory are the keys alone, so millions of vectors cost little."""
+    """An append-only file of float32 vectors; only the keys are in memory, so millions of vectors cost little."""
 
     def __init__(self, path: Path, width: int) -> None:
-        """Open the file, or begin it.
+        """Open the file, or create it.
 
         Args:
-            path: the file; its folder is made.
+            path: the file; its folder is created.
             width: dimensions of a vector.
 
         Raises:
-            DataError: it cannot be written.
+            DataError: the file cannot be written.
         """
         self._row_type = np.dtype([("key", "S32"), ("vector", "<f4", (width,))])
         self._rows: dict[str, int] = {}
@@ -35,61 +35,61 @@ class VectorFile:
             self._file = path.open("a+b")
         except OSError as error:
             raise DataError(f"{path}: cannot be written ({error.strerror}); set XDG_CACHE_HOME") from error
-        self._look()
+        self._read_new_keys()
 
     def __contains__(self, key: str) -> bool:
         return key in self._rows
 
     def add(self, keys: Sequence[str], vectors: np.ndarray) -> None:
-        """Keep vectors.
+        """Append vectors.
 
         Args:
-            keys: 32 ASCII characters each; of a key that another process has added meanwhile its vector stays.
-            vectors: (keys, width).
+            keys: keys of 32 ASCII characters each; if another process has added a key meanwhile, its vector is kept.
+            vectors: vectors, (keys, width).
 
         Raises:
-            DataError: there is no room.
+            DataError: the disk is full.
         """
         rows = np.zeros(len(keys), self._row_type)
         rows["key"], rows["vector"] = keys, vectors
         fcntl.flock(self._file, fcntl.LOCK_EX)
         try:
             size = os.fstat(self._file.fileno()).st_size
-            self._file.truncate(size - size % self._row_type.itemsize)  # what a killed process left unfinished
+            self._file.truncate(size - size % self._row_type.itemsize)  # drops a killed process's unfinished row
             self._file.write(rows.tobytes())
             self._file.flush()
         except OSError as error:
-            raise DataError(f"{self._file.name}: cannot be written ({error.strerror}); make room") from error
+            raise DataError(f"{self._file.name}: cannot be written ({error.strerror}); free some space") from error
         finally:
             fcntl.flock(self._file, fcntl.LOCK_UN)
-        self._look()
+        self._read_new_keys()
 
     def get(self, keys: Sequence[str]) -> np.ndarray:
-        """The vectors of known keys, (keys, width)."""
-        return np.asarray(self._mapped()["vector"][[self._rows[key] for key in keys]])
+        """Return the vectors of known keys, (keys, width)."""
+        return np.asarray(self._map_rows()["vector"][[self._rows[key] for key in keys]])
 
-    def _look(self) -> None:
-        """Learn the keys of rows that are new, whoever added them."""
-        rows = self._mapped()
+    def _read_new_keys(self) -> None:
+        """Read the keys of rows that this or another process has added."""
+        rows = self._map_rows()
         for row, key in enumerate(rows["key"][self._n_rows :].tolist(), self._n_rows):
             self._rows.setdefault(key.decode(), row)
         self._n_rows = len(rows)
 
-    def _mapped(self) -> np.ndarray:
+    def _map_rows(self) -> np.ndarray:
         n_rows = os.fstat(self._file.fileno()).st_size // self._row_type.itemsize
-        if not n_rows:  # nothing cannot be mapped
+        if not n_rows:  # an empty file cannot be mapped
             return np.zeros(0, self._row_type)
         return np.memmap(self._file, self._row_type, mode="r", shape=(n_rows,))
 
 
-def nearest(vectors: np.ndarray, wanted: np.ndarray, top_k: int) -> tuple[int, ...]:
-    """Rows with the largest cosine, ascending.
+def nearest(vectors: np.ndarray, query: np.ndarray, top_k: int) -> tuple[int, ...]:
+    """Return the rows with the largest cosine, in ascending order of their numbers.
 
     Args:
-        vectors: (rows, dimensions), of length 1.
-        wanted: (dimensions,), of length 1.
-        top_k: how many.
+        vectors: unit vectors, (rows, dimensions).
+        query: a unit vector, (dimensions,).
+        top_k: number of rows.
     """
-    similarity = np.round(vectors.astype(np.float64) @ wanted.astype(np.float64), _DIGITS)
+    similarity = np.round(vectors.astype(np.float64) @ query.astype(np.float64), _DIGITS)
     order = np.argsort(-similarity, kind="stable")
     return tuple(sorted(order[:top_k].tolist()))

@@ -1,4 +1,4 @@
-"""The adapter `openai`: any model behind a server of OpenAI's chat completions."""
+"""The adapter `openai`: any model behind a server with OpenAI's chat completions."""
 
 from typing import TYPE_CHECKING, ClassVar
 from urllib.parse import urlsplit
@@ -22,13 +22,13 @@ class OpenAI:
 
     @classmethod
     def build(cls, name: str, options: OpenAIOptions, seed: int) -> "ServedModel":  # noqa: ARG003
-        """Make the client; the server is asked when it is to reply.
+        """Build the client; the first request is sent by the first reply.
 
         Raises:
-            ModelError: the client library is not installed, or there is no key where one is needed.
+            ModelError: the client library is not installed, or a required key is missing.
         """
-        mend = "pip install 'infthor-eval[openai]'"
-        with wrap_errors(f"{name} needs the package openai, 3 or newer", mend, catch=ImportError, raise_as=ModelError):
+        hint = "pip install 'infthor-eval[openai]'"
+        with wrap_errors(f"{name} needs the package openai, 3 or newer", hint, catch=ImportError, raise_as=ModelError):
             from model_adapters.openai.model import ServedModel
         key = read_key(options.api_key_env, needed=urlsplit(options.url).hostname == _NEEDS_KEY)
         return ServedModel(name, options, key)

@@ -1,4 +1,4 @@
-"""What a server answers: read strictly, for it may be anything."""
+"""Strict parsing of a server's reply, which may be anything."""
 
 from typing import Annotated
 
@@ -8,11 +8,11 @@ from infthor_eval.errors import ModelError, in_one_line
 
 __all__ = ["Completion", "TokenUsage", "read_completion"]
 
-# By finish_reason; another one is a stranger's text, and not told.
+# By finish_reason. Unknown ones are not quoted, because a server may put any text there.
 _WHY = {
-    "length": ": all its tokens were used up before one; have the task allow more (max_gen_toks)",
-    "content_filter": ": a filter of the server's held it back; ask something else",
-    "tool_calls": ": it calls a tool, though it was given none; ask a server without tools",
+    "length": ": the token limit was reached before any text; raise max_gen_toks of the task",
+    "content_filter": ": the server's content filter blocked it; change the question",
+    "tool_calls": ": it calls a tool, though none was offered; use a server without tools",
 }
 _Count = Annotated[int, msgspec.Meta(ge=0, le=2**48)]
 
@@ -22,12 +22,12 @@ class _Details(msgspec.Struct, frozen=True):
 
 
 class TokenUsage(msgspec.Struct, frozen=True):
-    """What a reply took.
+    """Tokens of one request and its reply.
 
     Attributes:
-        prompt_tokens: of the request, frames included.
-        completion_tokens: of the reply, with what it was thought out in, if that is counted.
-        prompt_tokens_details: of which so many were in the server's cache.
+        prompt_tokens: tokens of the request, frames included.
+        completion_tokens: tokens of the reply, including its reasoning if the server counts that.
+        prompt_tokens_details: tokens of the request that were in the server's cache.
     """
 
     prompt_tokens: _Count
@@ -36,7 +36,7 @@ class TokenUsage(msgspec.Struct, frozen=True):
 
     @property
     def cached(self) -> int | None:
-        """Tokens found in the server's cache; None where it does not tell."""
+        """Tokens of the request in the server's cache, or None if it does not report them."""
         details = self.prompt_tokens_details
         return (
             None if details is None or details.cached_tokens is None else min(details.cached_tokens, self.prompt_tokens)
@@ -59,49 +59,49 @@ class _Choice(msgspec.Struct, frozen=True):
 
 
 class Completion(msgspec.Struct, frozen=True):
-    """A server's answer.
+    """A server's reply.
 
     Attributes:
-        choices: replies, of which the first is taken.
-        usage: what it took; None where the server does not tell.
+        choices: alternative replies; the first one is used.
+        usage: token counts, or None if the server does not report them.
     """
 
     choices: list[_Choice]
     usage: TokenUsage | None = None
 
     def text(self, where: str) -> str:
-        """What was said; a refusal in words is a reply.
+        """Return the text of the reply; a refusal in words counts as a reply.
 
         Args:
-            where: it was said, for the message.
+            where: address of the server, for the message.
 
         Raises:
-            ModelError: nothing was.
+            ModelError: the reply has no text.
         """
         if not self.choices:
-            raise ModelError(f"{where} answers without a choice; is it a chat model's address?")
+            raise ModelError(f"{where} answers without choices; is it a chat model's address?")
         choice = self.choices[0]
-        said = choice.message.content
-        if said is None:
-            said = choice.message.refusal
-        if said is not None and (said or choice.finish_reason != "content_filter"):
-            return said
+        text = choice.message.content
+        if text is None:
+            text = choice.message.refusal
+        if text is not None and (text or choice.finish_reason != "content_filter"):
+            return text
         raise ModelError(f"{where} gives no text{_WHY.get(choice.finish_reason or '', '; see its log')}")
 
 
 def read_completion(where: str, content: bytes) -> Completion:
-    """The answer in the bytes of a reply.
+    """Parse a server's reply.
 
     Args:
-        where: they came from, for the message.
-        content: as received.
+        where: address of the server, for the message.
+        content: body of the reply.
 
     Raises:
-        ModelError: they are no answer of a chat model.
+        ModelError: the body is not a chat completion.
     """
     try:
         return msgspec.json.decode(content, type=Completion)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
         raise ModelError(
-            f"{where} answers what is no chat completion ({in_one_line(error)}); is it a chat model's address?"
+            f"{where} does not answer with a chat completion ({in_one_line(error)}); is it a chat model's address?"
         ) from error

@@ -1,4 +1,4 @@
-"""Asking a server until it answers: what passes is waited for, what does not is told in one line."""
+"""Requests to a server, with retries of transient failures and one-line errors for others."""
 
 import email.utils
 import random
@@ -18,49 +18,49 @@ from model_adapters.openai.wire import UnreadableError, Wire
 
 __all__ = ["Endpoint"]
 
-_FIRST_WAIT_S = 0.5  # before the second attempt; doubled before each further one
+_FIRST_WAIT_S = 0.5  # pause before the second attempt; it doubles before each further one
 _LONGEST_WAIT_S = 60.0
-_LONGEST_ASKED_S = 600.0  # that a server may ask to wait
-_QUOTED = 200  # characters of what a server says
-_PASSING = (408, 409, 425, 429)  # and all of the server's own, from 500 on
-_SPENT = b"insufficient_quota"  # with 429 where waiting does not help
-_MENDS = {
-    300: "redirects are not followed: give the address that it leads to as base_url",
-    401: "set the environment variable that api_key_env names to a key that it takes",
-    402: "see your account with it",
-    403: "set the environment variable that api_key_env names to a key that may ask this model",
+_LONGEST_RETRY_AFTER_S = 600.0  # longest pause that a server may request
+_QUOTED = 200  # characters of a server's text in a message
+_TRANSIENT = (408, 409, 425, 429)  # besides all server errors, from 500 on
+_QUOTA_EXCEEDED = b"insufficient_quota"  # comes with status 429, but waiting does not help
+_HINTS = {
+    300: "redirects are not followed: give the new address as base_url",
+    401: "set the environment variable that api_key_env names to a valid key",
+    402: "check your account",
+    403: "set the environment variable that api_key_env names to a key with access to this model",
     404: "check base_url (it ends before /chat/completions) and model",
-    413: "show fewer frames, or use image_format=jpeg",
+    413: "use fewer frames, or set image_format=jpeg",
     429: "lower max_in_flight, or set requests_per_minute and tokens_per_minute",
-    500: "see its log",
+    500: "see the server's log",
 }
-_OTHER_MEND = "check model and the options that are sent (send_seed, send_temperature, send_stop, max_tokens_field)"
+_OTHER_HINT = "check model and the options of requests (send_seed, send_temperature, send_stop, max_tokens_field)"
 
 
-class _PassingError(Exception):
-    """What may be over when the request is sent again.
+class _TransientError(Exception):
+    """A failure that a retry may cure.
 
     Attributes:
-        mend: what to do where it is not.
-        wait_s: how long the server asks to wait; None where it does not say.
-        busy: whether the server is well, and only has too much to do.
+        hint: how to fix it if retries do not help.
+        wait_s: pause that the server requests, in seconds, or None.
+        busy: true if the server works and only has too many requests.
     """
 
-    def __init__(self, said: str, mend: str, wait_s: float | None = None, *, busy: bool = False) -> None:
-        super().__init__(said)
-        self.mend = mend
+    def __init__(self, message: str, hint: str, wait_s: float | None = None, *, busy: bool = False) -> None:
+        super().__init__(message)
+        self.hint = hint
         self.wait_s = wait_s
         self.busy = busy
 
 
 class Endpoint:
-    """One server, asked from any number of threads.
+    """One server, for any number of threads.
 
-    Where a request failed for good, though it was sent again and again, the next ones are sent once only until one of
-    them is answered: a server that is down is not waited for by every unit of a run.
+    After a request has failed in all its attempts, later requests get one attempt each until one succeeds: otherwise
+    every sample of a run would wait through all retries of a server that is down.
 
     Args:
-        options: how it is asked.
+        options: options of the requests.
         secret: the key.
     """
 
@@ -69,73 +69,72 @@ class Endpoint:
         self._options = options
         self._secret = secret
         self._wire = Wire(options, secret)
-        self._requests = RateLimiter(options.requests_per_minute)
-        self._given_up = Event()
+        self._limiter = RateLimiter(options.requests_per_minute)
+        self._is_down = Event()
 
     def ask(self, request: Mapping[str, Any]) -> tuple[bytes, tuple[str, ...]]:
-        """What the server answers, and what went wrong on the way, a line each.
+        """Return the body of the server's reply, and the faults that retries recovered from, a line each.
 
         Args:
-            request: the fields of a chat completion.
+            request: fields of a chat completion request.
 
         Raises:
-            ModelError: it does not answer, or with an error.
+            ModelError: the server does not answer, or answers with an error.
         """
         faults: list[str] = []
-        most = 1 if self._given_up.is_set() else 1 + self._options.retries
+        n_attempts = 1 if self._is_down.is_set() else 1 + self._options.retries
         while True:
-            self._requests.wait()
+            self._limiter.wait()
             try:
-                content = self._asked_once(request)
-            except _PassingError as fault:
+                content = self._send_once(request)
+            except _TransientError as fault:
                 faults.append(f"{self.where} {fault}")
-                if len(faults) == most:
+                if len(faults) == n_attempts:
                     if not fault.busy:
-                        self._given_up.set()
-                    raise ModelError(f"{self.where} {fault}, in {most} attempts; {fault.mend}") from fault
-                time.sleep(_wait_s(len(faults), fault))
+                        self._is_down.set()
+                    raise ModelError(f"{self.where} {fault}, in {n_attempts} attempts; {fault.hint}") from fault
+                time.sleep(_pause_s(len(faults), fault))
             else:
-                self._given_up.clear()
+                self._is_down.clear()
                 return content, tuple(faults)
 
     def close(self) -> None:
         """Close all connections."""
         self._wire.close()
 
-    def _asked_once(self, request: Mapping[str, Any]) -> bytes:
+    def _send_once(self, request: Mapping[str, Any]) -> bytes:
         try:
             return self._wire.post(request)
         except TimeoutError as error:
             timeout_s = self._options.timeout_s
-            raise _PassingError(f"does not answer within {timeout_s:g} s", "raise timeout_s if it is slow") from error
+            raise _TransientError(f"does not answer within {timeout_s:g} s", "raise timeout_s if it is slow") from error
         except UnreadableError as error:
             raise ModelError(f"{self.where} {error}; is it a chat model's address?") from error
         except openai.APIConnectionError as error:
-            said = self._secret.hidden_in(in_one_line(error.__cause__ or error))
-            raise _PassingError(f"cannot be reached ({said})", "is the server up?") from error
+            reason = self._secret.redact(in_one_line(error.__cause__ or error))
+            raise _TransientError(f"cannot be reached ({reason})", "is the server up?") from error
         except openai.APIStatusError as error:
-            raise self._judged(error) from error
+            raise self._classify(error) from error
         except openai.OpenAIError as error:
-            said = self._secret.hidden_in(in_one_line(error))
-            raise ModelError(f"{self.where} cannot be asked ({said}); check base_url and model") from error
+            reason = self._secret.redact(in_one_line(error))
+            raise ModelError(f"{self.where} cannot be asked ({reason}); check base_url and model") from error
 
-    def _judged(self, error: openai.APIStatusError) -> _PassingError | ModelError:
+    def _classify(self, error: openai.APIStatusError) -> _TransientError | ModelError:
         status, body = error.status_code, error.response.content
-        said = f"answers {status}{_phrase(status)}: {self._quoted(body)}"
-        mend = _MENDS.get(status) or _MENDS.get(status // 100 * 100) or _OTHER_MEND
-        passing = status in _PASSING or status >= 500
-        if not passing or (status == 429 and _SPENT in body):
-            return ModelError(f"{self.where} {said}; {mend}")
-        wait_s = _asked_wait_s(error.response.headers)
-        if wait_s is not None and wait_s > _LONGEST_ASKED_S:
+        problem = f"answers {status}{_phrase(status)}: {self._quote(body)}"
+        hint = _HINTS.get(status) or _HINTS.get(status // 100 * 100) or _OTHER_HINT
+        is_transient = status in _TRANSIENT or status >= 500
+        if not is_transient or (status == 429 and _QUOTA_EXCEEDED in body):
+            return ModelError(f"{self.where} {problem}; {hint}")
+        wait_s = _retry_after_s(error.response.headers)
+        if wait_s is not None and wait_s > _LONGEST_RETRY_AFTER_S:
             return ModelError(
-                f"{self.where} {said}, and asks to wait {wait_s:.0f} s; run the same command again then, "
-                "which goes on where it was"
+                f"{self.where} {problem}, and asks to wait {wait_s:.0f} s; run the same command again then: it resumes"
             )
-        return _PassingError(said, mend, wait_s, busy=status == 429)
+        return _TransientError(problem, hint, wait_s, busy=status == 429)
 
-    def _quoted(self, body: bytes) -> str:
-        text = self._secret.hidden_in(body.decode("utf-8", "replace"))
+    def _quote(self, body: bytes) -> str:
+        text = self._secret.redact(body.decode("utf-8", "replace"))
         short = " ".join(text.split())[:_QUOTED]
         return repr(short) if short else "nothing"
 
@@ -144,22 +143,25 @@ def _phrase(status: int) -> str:
     return f" {HTTPStatus(status).phrase}" if status in set(HTTPStatus) else ""
 
 
-def _wait_s(n_faults: int, fault: _PassingError) -> float:
-    """Before the next attempt: as the server asks, or longer each time, and not all threads at once."""
-    waited = min(_FIRST_WAIT_S * 2 ** (n_faults - 1), _LONGEST_WAIT_S) * (1 + random.random() / 4)
-    return waited if fault.wait_s is None else fault.wait_s + random.random() * _FIRST_WAIT_S
+def _pause_s(n_faults: int, fault: _TransientError) -> float:
+    """Return the pause before the next attempt: the server's, or one that doubles.
+
+    A random part keeps threads that failed together from retrying together.
+    """
+    pause = min(_FIRST_WAIT_S * 2 ** (n_faults - 1), _LONGEST_WAIT_S) * (1 + random.random() / 4)
+    return pause if fault.wait_s is None else fault.wait_s + random.random() * _FIRST_WAIT_S
 
 
-def _asked_wait_s(headers: Mapping[str, str]) -> float | None:
-    """How long a server asks to wait, in seconds from now; None where it does not say, or nothing that can be read."""
+def _retry_after_s(headers: Mapping[str, str]) -> float | None:
+    """Return the pause that a server requests, in seconds from now, or None if there is none or it is not readable."""
     try:
         if "retry-after-ms" in headers:
             return max(0.0, float(headers["retry-after-ms"]) / 1000)
-        asked = headers.get("retry-after", "")
-        return max(0.0, float(asked)) if asked.replace(".", "", 1).isdecimal() else _until(asked)
+        value = headers.get("retry-after", "")
+        return max(0.0, float(value)) if value.replace(".", "", 1).isdecimal() else _seconds_until(value)
     except (ValueError, OverflowError):
         return None
 
 
-def _until(date: str) -> float:
+def _seconds_until(date: str) -> float:
     return max(0.0, email.utils.parsedate_to_datetime(date).timestamp() - time.time())

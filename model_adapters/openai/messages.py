@@ -1,4 +1,4 @@
-"""A conversation as a server takes it: messages of texts and images."""
+"""Conversations as messages of OpenAI's chat completions."""
 
 import base64
 from collections import OrderedDict
@@ -11,78 +11,78 @@ from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
 from model_adapters.protocols import Part, Turn
 
-__all__ = ["EncodedFrames", "messages_of"]
+__all__ = ["EncodedFrames", "to_messages"]
 
-_KEPT = 256 * 2**20  # bytes of encoded frames: a few thousand of the published size
+_CACHE_BYTES = 256 * 2**20  # of encoded frames: a few thousand of the published size
 _SETTINGS: dict[str, dict[str, Any]] = {"png": {"compress_level": 6}, "jpeg": {"quality": 95, "subsampling": 0}}
 
 
 class EncodedFrames:
-    """Frames as `data:` addresses, each encoded once by its content as long as there is room; for several threads.
+    """A cache of frames as `data:` URLs by the digest of their content, for several threads.
 
     Args:
         image_format: "png" or "jpeg".
-        room: bytes of what is kept; what was used longest ago makes place.
+        max_bytes: limit of the cache; the least recently used frames are dropped first.
     """
 
-    def __init__(self, image_format: str, room: int = _KEPT) -> None:
+    def __init__(self, image_format: str, max_bytes: int = _CACHE_BYTES) -> None:
         self._format = image_format
-        self._room = room
-        self._kept: OrderedDict[str, str] = OrderedDict()
+        self._max_bytes = max_bytes
+        self._cache: OrderedDict[str, str] = OrderedDict()
         self._size = 0
         self._lock = Lock()
 
-    def address(self, frame: FrameRef) -> str:
-        """The frame in an address, the same one whenever it is asked.
+    def url(self, frame: FrameRef) -> str:
+        """Return the frame as a URL, which is always the same for the same frame.
 
         Raises:
             DataError: the frame cannot be read.
         """
-        with self._lock:  # while it is encoded too: threads that show the same frames wait for one of them to do it
-            found = self._kept.get(frame.digest)
-            if found is None:
-                found = self._encoded(frame)
-                self._kept[frame.digest] = found
-                self._size += len(found)
-            self._kept.move_to_end(frame.digest)
-            while self._size > self._room and len(self._kept) > 1:
-                _, dropped = self._kept.popitem(last=False)
+        with self._lock:  # held while encoding: threads with the same frames wait instead of encoding them again
+            url = self._cache.get(frame.digest)
+            if url is None:
+                url = self._encode(frame)
+                self._cache[frame.digest] = url
+                self._size += len(url)
+            self._cache.move_to_end(frame.digest)
+            while self._size > self._max_bytes and len(self._cache) > 1:
+                _, dropped = self._cache.popitem(last=False)
                 self._size -= len(dropped)
-            return found
+            return url
 
-    def _encoded(self, frame: FrameRef) -> str:
-        """From its pixels, not its file: what else a file holds (a palette, transparency) is read in many ways."""
+    def _encode(self, frame: FrameRef) -> str:
+        """Encode the pixels, not the file: servers differ in how they read palettes and transparency."""
         content = BytesIO()
         frame.load().save(content, self._format, **_SETTINGS[self._format])
         return f"data:image/{self._format};base64,{base64.b64encode(content.getvalue()).decode('ascii')}"
 
 
-def messages_of(name: str, turns: Sequence[Turn], frames: EncodedFrames, detail: str | None) -> list[dict[str, Any]]:
-    """The messages of a conversation, texts and frames in their order.
+def to_messages(name: str, turns: Sequence[Turn], frames: EncodedFrames, detail: str | None) -> list[dict[str, Any]]:
+    """Return the messages of a conversation, with texts and frames in order.
 
     Args:
-        name: of the model, for the message.
-        turns: the conversation.
-        frames: encodes them.
-        detail: sent with every frame where it is given.
+        name: name of the model, for the message.
+        turns: turns of the conversation.
+        frames: cache of encoded frames.
+        detail: value of `detail` for every frame, or None to send none.
 
     Raises:
         DataError: a frame cannot be read.
-        ModelError: a frame in a turn that is not the user's, which no server takes.
+        ModelError: a turn other than the user's has a frame, which no server supports.
     """
     return [{"role": turn.role, "content": _content(name, turn, frames, detail)} for turn in turns]
 
 
 def _content(name: str, turn: Turn, frames: EncodedFrames, detail: str | None) -> str | list[dict[str, Any]]:
-    if all(isinstance(part, str) for part in turn.parts):  # some servers take nothing else of the system
+    if all(isinstance(part, str) for part in turn.parts):  # some servers accept only a string in system turns
         return "".join(map(str, turn.parts))
     if turn.role != "user":
-        raise ModelError(f"{name} is shown frames by the user alone, not by the {turn.role}; put them in a user turn")
+        raise ModelError(f"{name} accepts frames in user turns only, not in a turn of the {turn.role}; move them")
     return [_part(part, frames, detail) for part in turn.parts]
 
 
 def _part(part: Part, frames: EncodedFrames, detail: str | None) -> dict[str, Any]:
     if isinstance(part, str):
         return {"type": "text", "text": part}
-    image = {"url": frames.address(part)} | ({} if detail is None else {"detail": detail})
+    image = {"url": frames.url(part)} | ({} if detail is None else {"detail": detail})
     return {"type": "image_url", "image_url": image}

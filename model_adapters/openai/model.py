@@ -1,4 +1,4 @@
-"""A model behind a server, as the harness talks to it."""
+"""A model behind a server as a `Model`."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -9,7 +9,7 @@ from infthor_eval.formats.frames import FrameRef
 from model_adapters.backend import BackendConversation
 from model_adapters.openai.completions import Completion, TokenUsage, read_completion
 from model_adapters.openai.endpoint import Endpoint
-from model_adapters.openai.messages import EncodedFrames, messages_of
+from model_adapters.openai.messages import EncodedFrames, to_messages
 from model_adapters.openai.options import OpenAIOptions
 from model_adapters.openai.rate import RateLimiter
 from model_adapters.openai.secret import Secret
@@ -19,16 +19,16 @@ from model_adapters.stopping import cut_at_stop
 
 __all__ = ["ServedModel"]
 
-_MOST_STOPS = 4  # that servers take
-_SEEDS = 2**31  # servers take few bits more
+_MOST_STOPS = 4  # stop strings that servers accept
+_SEEDS = 2**31  # servers accept seeds of few more bits
 
 
 class ServedModel:
-    """A model behind a server. Every request holds the whole conversation; what it shares is the server's affair.
+    """A model behind a server. Every request has the whole conversation; the server may cache common prefixes.
 
     Args:
-        name: the registry's name.
-        options: how it is asked.
+        name: name in the registry.
+        options: options of the requests.
         secret: the key.
     """
 
@@ -40,12 +40,12 @@ class ServedModel:
         self._frames = EncodedFrames(options.image_format)
         self._spend = Spend(name, Caps(options.max_tokens_total, options.max_cost))
         self._prices = _prices(options)
-        self._tokens = RateLimiter(options.tokens_per_minute)
-        self._usual_tokens = 0  # of a request and its reply: the last one's
+        self._token_limiter = RateLimiter(options.tokens_per_minute)
+        self._expected_tokens = 0  # of a request with its reply, estimated by the previous one
 
     @property
     def capabilities(self) -> Capabilities:
-        """Nothing is promised of a server that is not known."""
+        """No guarantees beyond sampling: the server is unknown."""
         options = self._options
         return Capabilities(
             counts_tokens=False,
@@ -57,26 +57,26 @@ class ServedModel:
         )
 
     def identity(self) -> dict[str, Any]:
-        """Address, model and how it is asked, as JSON values; what stands behind the address is not known."""
+        """Return address, model and form of requests, as JSON values; the weights behind the address are unknown."""
         return {"adapter": self.name} | self._options.document()
 
     def tokens_per_frame(self, frame: FrameRef) -> None:
-        """None: the server counts, and only what it was sent."""
+        """Return None: only the server counts, and only sent requests."""
 
     def conversation(self) -> Conversation:
         """A new, empty conversation."""
         return BackendConversation(self)
 
     def count(self, turns: Sequence[Turn]) -> None:
-        """None, as `tokens_per_frame`."""
+        """Return None, as `tokens_per_frame`."""
 
     def answer(self, turns: Sequence[Turn], decoding: Decoding) -> Reply:
-        """See `Conversation.reply`."""
+        """Answer a conversation; see `Conversation.reply`."""
         request = self._request(turns, decoding)
         with self._spend.request() as charge:
-            completion, faults = self._completion(request, charge)
-        text = self._secret.hidden_in(completion.text(self._endpoint.where))
-        reply, usage = Reply(self._held(text, decoding), faults=faults), completion.usage
+            completion, faults = self._send(request, charge)
+        text = self._secret.redact(completion.text(self._endpoint.where))
+        reply, usage = Reply(self._cut(text, decoding), faults=faults), completion.usage
         if usage is None:
             return reply
         return replace(
@@ -88,7 +88,7 @@ class ServedModel:
         )
 
     def answer_each(self, conversations: Sequence[Sequence[Turn]], decoding: Decoding) -> list[Reply]:
-        """See `Conversation.replies`: one after the other, for what is answered before one fails is paid for."""
+        """Answer one after the other, because answers before a failure are paid for; see `Conversation.replies`."""
         return [self.answer(turns, decoding) for turns in conversations]
 
     def close(self) -> None:
@@ -99,7 +99,7 @@ class ServedModel:
         options = self._options
         request: dict[str, Any] = {
             "model": options.model,
-            "messages": messages_of(self.name, turns, self._frames, options.detail),
+            "messages": to_messages(self.name, turns, self._frames, options.detail),
             options.max_tokens_field: decoding.max_new_tokens,
         }
         if options.send_temperature:
@@ -108,24 +108,25 @@ class ServedModel:
                 request["top_p"] = decoding.top_p
         if options.send_seed and not decoding.greedy:
             request["seed"] = decoding.seed % _SEEDS
-        if decoding.choices:  # a stop string does not cut them
+        if decoding.choices:  # stop strings do not cut choices
             request["extra_body"] = {"structured_outputs": {"choice": list(decoding.choices)}}
         elif options.send_stop and decoding.stop:
             request["stop"] = list(decoding.stop[:_MOST_STOPS])
         return request
 
-    def _completion(self, request: dict[str, Any], charge: Charge) -> tuple[Completion, tuple[str, ...]]:
-        expected = taken = self._usual_tokens
-        self._tokens.wait(expected)
+    def _send(self, request: dict[str, Any], charge: Charge) -> tuple[Completion, tuple[str, ...]]:
+        # The tokens of a request are known only afterwards: an estimate is taken first and corrected then.
+        expected = used = self._expected_tokens
+        self._token_limiter.wait(expected)
         try:
             content, faults = self._endpoint.ask(request)
             charge.sent = True
             completion = read_completion(self._endpoint.where, content)
             if completion.usage is not None:
-                self._usual_tokens = taken = charge.tokens = completion.usage.total
+                self._expected_tokens = used = charge.tokens = completion.usage.total
                 charge.cost = self._cost(completion.usage) or 0.0
         finally:
-            self._tokens.take(taken - expected)
+            self._token_limiter.take(used - expected)
         return completion, faults
 
     def _cost(self, usage: TokenUsage) -> float | None:
@@ -133,21 +134,21 @@ class ServedModel:
             return None
         return self._prices.cost(usage.prompt_tokens, usage.cached or 0, usage.completion_tokens)
 
-    def _held(self, text: str, decoding: Decoding) -> str:
+    def _cut(self, text: str, decoding: Decoding) -> str:
         if not decoding.choices:
             before_stop = cut_at_stop(text, decoding.stop)
             return text if before_stop is None else before_stop
         if text not in decoding.choices:
             raise ModelError(
                 f"{self._endpoint.where} answers {text[:40]!r}, which is none of the choices; "
-                "it does not know structured_outputs: leave out guided"
+                "it does not support structured_outputs: leave out guided"
             )
         return text
 
 
 def _prices(options: OpenAIOptions) -> Prices | None:
-    read, written = options.price_per_m_input, options.price_per_m_output
-    if read is None or written is None:
+    prompt, reply = options.price_per_m_input, options.price_per_m_output
+    if prompt is None or reply is None:
         return None
     cached = options.price_per_m_cached
-    return Prices(read, read if cached is None else cached, written)
+    return Prices(prompt, prompt if cached is None else cached, reply)

@@ -1,4 +1,4 @@
-"""Options of models behind a server: whom to ask and how, how fast, and what it may cost."""
+"""Options of models behind a server: address, form of requests, rate limits and spend caps."""
 
 import re
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ _ONE_OF = {
 _RANGES = {"max_in_flight": (1, 256), "retries": (0, 20), "timeout_s": (0.01, 86_400)}
 _ABOVE_ZERO = ("requests_per_minute", "tokens_per_minute", "max_tokens_total", "max_cost")
 _PRICES = ("price_per_m_input", "price_per_m_cached", "price_per_m_output")
-_ACTING = (  # on a reply; how fast and how dear a server may be asked is not
+_IN_IDENTITY = (  # options that can change a reply; rates and prices cannot
     "model",
     "image_format",
     "detail",
@@ -32,30 +32,30 @@ _ACTING = (  # on a reply; how fast and how dear a server may be asked is not
 
 @dataclass(frozen=True, kw_only=True)
 class OpenAIOptions:
-    """How a server is asked.
+    """Options of requests to a server.
 
     Attributes:
-        model: as the server calls it.
-        base_url: of the server, up to where `/chat/completions` follows.
+        model: the server's name of the model.
+        base_url: address of the server without `/chat/completions`.
         api_key_env: name of the environment variable with the key; the key itself is never an option.
-        insecure: whether another machine may be asked without encryption.
-        image_format: how frames are sent: png loses nothing, jpeg (quality 95) is smaller.
-        detail: sent with every frame where it is given; what it means is the server's business.
-        max_tokens_field: what the server calls the limit of a reply.
-        send_seed: whether the seed of a draw is sent.
-        send_temperature: whether temperature and top_p are sent; some models take none and decode in their own way.
-        send_stop: whether stop strings are sent, at most 4; replies are cut here in any case.
-        guided: how replies are held to choices: `vllm` sends its `structured_outputs`; None holds none.
+        insecure: allow requests to another machine without encryption.
+        image_format: encoding of frames: png is lossless, jpeg (quality 95) is smaller.
+        detail: value of `detail` for every frame; not sent where None.
+        max_tokens_field: name of the field that limits the reply.
+        send_seed: send the seed of sampled replies.
+        send_temperature: send temperature and top_p; some models refuse them and decode in their own way.
+        send_stop: send stop strings, at most 4; replies are cut here in any case.
+        guided: method that restricts replies to choices: `vllm` sends its `structured_outputs`; None for no support.
         max_in_flight: requests at the same time.
-        timeout_s: for a whole reply, from the connection to its last byte.
-        retries: how often a request is sent again after a passing failure.
-        requests_per_minute: that are sent at most, evenly; None sets no limit.
-        tokens_per_minute: of requests and replies, likewise.
-        price_per_m_input: US dollars of a million tokens that are read.
-        price_per_m_cached: of those among them that the server had in its cache; as the others where None.
-        price_per_m_output: of those that are written.
-        max_tokens_total: no request is begun once a run has taken so many tokens.
-        max_cost: nor once it has cost so many US dollars.
+        timeout_s: limit for a whole reply, from the connection to its last byte, in seconds.
+        retries: repetitions of a request after transient failures.
+        requests_per_minute: rate limit, kept evenly; None for none.
+        tokens_per_minute: rate limit of the tokens of requests and replies, kept evenly; None for none.
+        price_per_m_input: US dollars per million tokens of requests.
+        price_per_m_cached: US dollars per million cached tokens of requests; as the others where None.
+        price_per_m_output: US dollars per million tokens of replies.
+        max_tokens_total: cap on the tokens of a run; no request is sent once it is reached.
+        max_cost: cap on the cost of a run in US dollars; no request is sent once it is reached.
     """
 
     model: str = ""
@@ -81,34 +81,34 @@ class OpenAIOptions:
     max_cost: float | None = None
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be, without a word of what may be a secret.
+        """Check all values; messages never repeat what may be a secret.
 
         Raises:
-            ValueError: names the option.
+            ValueError: a value is not valid; the message names the option.
         """
         if not self.model:
-            raise ValueError("it needs model=..., as the server calls it")
+            raise ValueError("it needs model=..., the server's name of the model")
         if not _NAME.fullmatch(self.api_key_env):
-            raise ValueError("api_key_env is no name of an environment variable; put the key there, never on a command")
+            raise ValueError("api_key_env is not the name of an environment variable; put the key into one")
         self._check_address()
         self._check_values()
         self._check_money()
 
     @property
     def url(self) -> str:
-        """The address without a stroke at its end."""
+        """The address without a slash at its end."""
         return self.base_url.rstrip("/")
 
     def document(self) -> dict[str, Any]:
-        """All that can change a reply, as JSON values."""
-        return {"base_url": self.url} | {name: getattr(self, name) for name in _ACTING}
+        """Return everything that can change a reply, as JSON values."""
+        return {"base_url": self.url} | {name: getattr(self, name) for name in _IN_IDENTITY}
 
     def _check_address(self) -> None:
         address = server_address("base_url", self.base_url)
         if address.scheme == "http" and not (is_local(address) or self.insecure):
             raise ValueError(
-                f"base_url leads to {address.hostname} without encryption, for all on the way to read; "
-                "use https, or say insecure=true"
+                f"base_url leads to {address.hostname} without encryption, readable by everyone in between; "
+                "use https, or set insecure=true"
             )
 
     def _check_values(self) -> None:
@@ -129,6 +129,6 @@ class OpenAIOptions:
             if getattr(self, name) is not None and not getattr(self, name) >= 0:
                 raise ValueError(f"{name}={getattr(self, name)} is below 0")
         needed = (self.price_per_m_input, self.price_per_m_output)
-        asked = [name for name in ("max_cost", *_PRICES) if getattr(self, name) is not None]
-        if asked and None in needed:
-            raise ValueError(f"{asked[0]} needs price_per_m_input and price_per_m_output; give both")
+        given = [name for name in ("max_cost", *_PRICES) if getattr(self, name) is not None]
+        if given and None in needed:
+            raise ValueError(f"{given[0]} needs price_per_m_input and price_per_m_output; give both")

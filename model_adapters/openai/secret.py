@@ -1,4 +1,4 @@
-"""The key: out of the environment, into a request's head, and nowhere else."""
+"""The API key: read from the environment, sent in a request's header, shown nowhere."""
 
 import os
 
@@ -6,14 +6,14 @@ from infthor_eval.errors import ModelError
 
 __all__ = ["Secret", "read_key"]
 
-_LEAST = 8  # characters: what is shorter ("EMPTY") keeps no secret, and is found in ordinary words
+_LEAST = 8  # characters; a shorter value ("EMPTY") is not secret and may be part of ordinary words
 
 
 class Secret:
-    """A key that is not shown by accident.
+    """A key that cannot be shown by accident.
 
     Attributes:
-        value: the key; None where there is none.
+        value: the key, or None.
     """
 
     def __init__(self, value: str | None) -> None:
@@ -22,22 +22,24 @@ class Secret:
     def __repr__(self) -> str:
         return "Secret(...)"
 
-    def hidden_in(self, text: str) -> str:
-        """A text with the key taken out: a server may say what it was told."""
+    def redact(self, text: str) -> str:
+        """Return a text without the key; servers may repeat it in messages."""
         if self.value is None or len(self.value) < _LEAST:
             return text
         return text.replace(self.value, "[key]")
 
 
 def read_key(variable: str, *, needed: bool) -> Secret:
-    """The key in an environment variable, whose name is not told either: it may be the key, put there by mistake.
+    """Return the key in an environment variable.
+
+    Messages do not repeat the name of the variable: it may be the key, given by mistake.
 
     Args:
-        variable: its name.
-        needed: whether the server takes nobody without a key.
+        variable: name of the variable.
+        needed: true if the server requires a key.
 
     Raises:
-        ModelError: there is none where one is needed, or it is none that can be sent.
+        ModelError: a required key is missing, or the value cannot be a key.
     """
     value = os.environ.get(variable, "").strip()
     if not value:
@@ -45,5 +47,5 @@ def read_key(variable: str, *, needed: bool) -> Secret:
             raise ModelError("the environment variable that api_key_env names holds no key; set it (OPENAI_API_KEY)")
         return Secret(None)
     if not (value.isascii() and value.isprintable()) or " " in value:
-        raise ModelError("the environment variable that api_key_env names holds no key (blanks, or no ASCII); mend it")
+        raise ModelError("the environment variable that api_key_env names holds no key (blanks, or not ASCII); fix it")
     return Secret(value)

@@ -1,4 +1,4 @@
-"""What requests take: tokens, money, and the caps on both."""
+"""Tokens and cost of requests, and caps on both."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -14,31 +14,30 @@ _MILLION = 1_000_000
 
 @dataclass(frozen=True)
 class Prices:
-    """US dollars of a million tokens.
+    """US dollars per million tokens.
 
     Attributes:
-        read: of a request.
-        cached: of a request, found in the server's cache.
-        written: of a reply.
+        prompt: tokens of requests.
+        cached: tokens of requests that were in the server's cache.
+        reply: tokens of replies.
     """
 
-    read: float
+    prompt: float
     cached: float
-    written: float
+    reply: float
 
-    def cost(self, n_read: int, n_cached: int, n_written: int) -> float:
-        """US dollars of one reply; the cached tokens are among those that are read."""
-        dearly = n_read - n_cached
-        return (dearly * self.read + n_cached * self.cached + n_written * self.written) / _MILLION
+    def cost(self, n_prompt: int, n_cached: int, n_reply: int) -> float:
+        """Return the US dollars of one reply; the cached tokens are among those of the prompt."""
+        return ((n_prompt - n_cached) * self.prompt + n_cached * self.cached + n_reply * self.reply) / _MILLION
 
 
 @dataclass(frozen=True)
 class Caps:
-    """What may be taken at most; None sets no limit.
+    """Caps on a run; None for no cap.
 
     Attributes:
-        tokens: of requests and replies.
-        cost: in US dollars.
+        tokens: most tokens of requests and replies.
+        cost: highest cost in US dollars.
     """
 
     tokens: int | None = None
@@ -47,12 +46,12 @@ class Caps:
 
 @dataclass
 class Charge:
-    """What one request took, filled in as soon as it is known.
+    """Tokens and cost of one request, filled in when they are known.
 
     Attributes:
-        tokens: of request and reply; None where the server does not tell.
-        cost: in US dollars.
-        sent: whether a reply came, which may have been charged for.
+        tokens: tokens of request and reply, or None if the server does not report them.
+        cost: cost in US dollars.
+        sent: true if a reply arrived, which may have been charged for.
     """
 
     tokens: int | None = None
@@ -61,15 +60,15 @@ class Charge:
 
 
 class Spend:
-    """What was taken so far, for several threads.
+    """Tokens and cost so far, for several threads.
 
-    A request is refused once a cap is reached, before it is sent. What requests in flight will take is estimated by
-    the dearest so far, and a request that could only be paid without them waits for their end: so a cap is passed by
-    one request at most, not by one per thread, as long as none is dearer than all before. A reply that does not tell
-    what it took counts as the dearest so far; where none has told yet, no cap can be kept.
+    Once a cap is reached, requests are refused before they are sent. Requests in flight count with the largest tokens
+    and cost so far, and a new request waits for them if they may use up the rest. So a cap is exceeded by at most one
+    request, not by one per thread, as long as no request costs more than all before. A reply without usage counts as
+    the largest so far; before the first usage is reported, caps cannot be enforced.
 
     Args:
-        name: of the model, for messages.
+        name: name of the model, for messages.
         caps: the caps.
     """
 
@@ -79,14 +78,14 @@ class Spend:
         self._changed = Condition()
         self._tokens = self._in_flight = self._most_tokens = 0
         self._cost = self._most_cost = 0.0
-        self._untold = False
+        self._has_unknown_usage = False
 
     @contextmanager
     def request(self) -> Iterator[Charge]:
-        """One request, from before it is sent; what is filled into the charge counts in any case.
+        """Account for one request; what is filled into the charge counts even if the request fails later.
 
         Raises:
-            ModelError: a cap is reached, or cannot be kept; nothing may be sent.
+            ModelError: a cap is reached or cannot be enforced; the request must not be sent.
         """
         charge = Charge()
         self._admit()
@@ -97,9 +96,9 @@ class Spend:
 
     def _admit(self) -> None:
         with self._changed:
-            while self._in_flight and self._short_with_those_in_flight():
+            while self._in_flight and self._may_reach_cap_in_flight():
                 self._changed.wait()
-            reason = self._reason()
+            reason = self._refusal()
             if reason is not None:
                 raise ModelError(reason)
             self._in_flight += 1
@@ -113,33 +112,33 @@ class Spend:
                 self._tokens += charge.tokens
                 self._cost += charge.cost
             elif charge.sent:
-                self._untold = self._untold or not self._most_tokens
+                self._has_unknown_usage = self._has_unknown_usage or not self._most_tokens
                 self._tokens += self._most_tokens
                 self._cost += self._most_cost
             self._changed.notify_all()
 
-    def _short_with_those_in_flight(self) -> bool:
-        """Whether those in flight may take what is left; of the first nothing is known, so it goes alone."""
+    def _may_reach_cap_in_flight(self) -> bool:
+        """Return whether requests in flight may use up the rest; the first one is unpredictable, so it runs alone."""
         if self._caps == Caps():
             return False
         tokens = self._tokens + self._in_flight * self._most_tokens
         cost = self._cost + self._in_flight * self._most_cost
         return not self._most_tokens or _reached(tokens, self._caps.tokens) or _reached(cost, self._caps.cost)
 
-    def _reason(self) -> str | None:
-        """Why nothing more may be sent; None where it may."""
-        if self._untold and self._caps != Caps():
+    def _refusal(self) -> str | None:
+        """Return why no more requests may be sent, or None if they may."""
+        if self._has_unknown_usage and self._caps != Caps():
             return (
-                f"not asked: {self._name} does not tell what its replies take, so no cap can be kept; "
+                f"not asked: {self._name} does not report the usage of its replies, so caps cannot be enforced; "
                 "leave out max_tokens_total and max_cost"
             )
-        mend = "raise it and run the same command again, which goes on where it was"
+        hint = "raise it and run the same command again, which resumes"
         if _reached(self._tokens, self._caps.tokens):
-            return f"not asked: {self._tokens} tokens reach max_tokens_total={self._caps.tokens}; {mend}"
+            return f"not asked: {self._tokens} tokens reach max_tokens_total={self._caps.tokens}; {hint}"
         if _reached(self._cost, self._caps.cost):
-            return f"not asked: {self._cost:.4f} US dollars reach max_cost={self._caps.cost:g}; {mend}"
+            return f"not asked: {self._cost:.4f} US dollars reach max_cost={self._caps.cost:g}; {hint}"
         return None
 
 
-def _reached(taken: float, cap: float | None) -> bool:
-    return cap is not None and taken >= cap
+def _reached(used: float, cap: float | None) -> bool:
+    return cap is not None and used >= cap

@@ -1,4 +1,4 @@
-"""One request on the official client: no redirects, a limit in bytes, and an end in time whatever the server does."""
+"""Requests by the official client, without redirects, limited in bytes and in time whatever the server does."""
 
 import asyncio
 import logging
@@ -17,30 +17,30 @@ from model_adapters.openai.secret import Secret
 
 __all__ = ["UnreadableError", "Wire"]
 
-_LARGEST = 4 * 2**20  # bytes of a reply
-_CONNECT_S = 30.0  # at most, for a connection
-_TALKATIVE = ("httpcore2", "httpx2")  # they log heads of replies, in which a server may say the key again
+_LARGEST = 4 * 2**20  # bytes of the largest accepted reply
+_CONNECT_S = 30.0  # limit for a connection
+_LOGGERS = ("httpcore2", "httpx2")  # they log headers of replies, in which a server may repeat the key
 
 
 class UnreadableError(Exception):
-    """A reply that is not read to its end; the text says why."""
+    """A reply that is not read to its end; the message says why."""
 
 
 class Wire:
     """Sends requests to one server, from any number of threads.
 
-    They are sent from one thread of its own: there a request can be given up at any moment, while a name is looked up,
-    while the head of a reply drips in, or its body.
+    All requests run in the event loop of one background thread. There a request can be cancelled at any moment, also
+    during a name lookup or while headers or body arrive slowly; timeouts of sockets cover only single reads.
 
     Args:
-        options: whom to ask, and for how long.
+        options: address and time limit.
         secret: the key.
     """
 
     def __init__(self, options: OpenAIOptions, secret: Secret) -> None:
         self._timeout_s = options.timeout_s
         self._closed = False
-        for name in _TALKATIVE:
+        for name in _LOGGERS:
             logging.getLogger(name).setLevel(logging.WARNING)
         self._loop = asyncio.new_event_loop()
         self._thread = Thread(target=self._loop.run_forever, name="openai", daemon=True)
@@ -51,29 +51,29 @@ class Wire:
             self._headers["Authorization"] = openai.Omit()
 
     def post(self, request: Mapping[str, Any]) -> bytes:
-        """What the server answers, as bytes.
+        """Return the body of the server's reply.
 
         Args:
-            request: the fields of a chat completion.
+            request: fields of a chat completion request.
 
         Raises:
             openai.OpenAIError: no connection, or an error status.
-            TimeoutError: no whole reply in time.
-            UnreadableError: the reply is not read.
+            TimeoutError: no complete reply in time.
+            UnreadableError: the reply is too long or encoded, or the client is closed.
         """
         if self._closed:
-            raise UnreadableError("is not asked any more: the model is closed")
-        sent = asyncio.run_coroutine_threadsafe(self._post(request), self._loop)
+            raise UnreadableError("gets no more requests: the model is closed")
+        future = asyncio.run_coroutine_threadsafe(self._post(request), self._loop)
         try:
-            return sent.result()
+            return future.result()
         except CancelledError as error:
-            raise UnreadableError("is not waited for any more: the model is closed") from error
+            raise UnreadableError("is no longer waited for: the model is closed") from error
         except openai.APIConnectionError as error:
             if isinstance(error.__cause__, UnreadableError):
                 raise error.__cause__ from error
             raise
         finally:
-            sent.cancel()  # where the one who waits was interrupted
+            future.cancel()  # has an effect if the waiting thread was interrupted
 
     async def _post(self, request: Mapping[str, Any]) -> bytes:
         async with asyncio.timeout(self._timeout_s):
@@ -81,14 +81,14 @@ class Wire:
             return bytes(reply.content)
 
     def close(self) -> None:
-        """Give up what is in flight and close all connections."""
+        """Cancel all requests and close all connections."""
         self._closed = True
-        asyncio.run_coroutine_threadsafe(self._end(), self._loop).result()
+        asyncio.run_coroutine_threadsafe(self._cancel_all(), self._loop).result()
         self._loop.call_soon_threadsafe(self._loop.stop)
         self._thread.join()
         self._loop.close()
 
-    async def _end(self) -> None:
+    async def _cancel_all(self) -> None:
         in_flight = asyncio.all_tasks() - {asyncio.current_task()}
         for task in in_flight:
             task.cancel()
@@ -97,32 +97,32 @@ class Wire:
 
 
 def _client(options: OpenAIOptions, secret: Secret) -> openai.AsyncOpenAI:
-    # A server on this machine is asked without the proxy of the environment, which may be another machine.
+    # A local server is asked without the proxy of the environment, which may be on another machine.
     http = openai.DefaultAsyncHttpxClient(
         timeout=httpx2.Timeout(None, connect=min(_CONNECT_S, options.timeout_s)),
         limits=httpx2.Limits(max_connections=None, max_keepalive_connections=options.max_in_flight),
         follow_redirects=False,
         trust_env=not is_local(urlsplit(options.url)),
-        event_hooks={"response": [_limit]},
+        event_hooks={"response": [_limit_body]},
     )
     return openai.AsyncOpenAI(
         base_url=options.url,
         api_key=secret.value or "none",
-        max_retries=0,  # who asks sends again, and tells of it
+        max_retries=0,  # `Endpoint` retries, and records it
         timeout=httpx2.Timeout(None, connect=min(_CONNECT_S, options.timeout_s)),
         http_client=http,
     )
 
 
-async def _limit(response: httpx2.Response) -> None:
-    """Have a body end in an error where it is too long; packed ones, which can hide any length, are not unpacked."""
+async def _limit_body(response: httpx2.Response) -> None:
+    """Make reading fail beyond the largest body; compressed ones, which may expand to any length, are refused."""
     if response.headers.get("Content-Encoding", "identity").strip().lower() not in ("", "identity"):
-        raise UnreadableError("answers in an encoding that it was not asked for")
+        raise UnreadableError("answers in an encoding that was not requested")
     assert isinstance(response.stream, httpx2.AsyncByteStream)  # of an asynchronous client
-    response.stream = _Limited(response.stream)
+    response.stream = _LimitedStream(response.stream)
 
 
-class _Limited(httpx2.AsyncByteStream):
+class _LimitedStream(httpx2.AsyncByteStream):
     def __init__(self, stream: httpx2.AsyncByteStream) -> None:
         self._stream = stream
 

@@ -1,6 +1,6 @@
-"""What every adapter can be told, as dataclasses with defaults; nothing here imports torch or transformers.
+"""Options of all adapters, as dataclasses with defaults.
 
-So that models can be listed, and a slip on the command line told, before anything slow is imported.
+Nothing here imports torch or transformers, so that listing models and reporting a typing error take no time.
 """
 
 from model_adapters.options.parsing import NoOptions, describe, parse

@@ -1,4 +1,4 @@
-"""Options that every transformers model takes."""
+"""Options of every transformers model."""
 
 import importlib.util
 from dataclasses import dataclass
@@ -8,21 +8,22 @@ __all__ = ["CheckpointOptions", "CheckpointReading", "HfOptions", "Placement", "
 
 
 _ATTENTION = ("eager", "sdpa", "flex_attention", "flash_attention_2", "flash_attention_3")
-# What is imported for attention that torch does not have, and what it is called when it is installed.
+# Implementation to the module that has it, and the package to install for it.
 _PACKAGES = {
     "flash_attention_2": ("flash_attn", "flash-attn"),
     "flash_attention_3": ("flash_attn_interface", "flash-attn-3"),
 }
-_LARGEST = 2**53  # of the numbers that options take; what is larger is a slip
+_LARGEST = 2**53  # largest value of an option; anything above is a typing error
+_MOST_THREADS = 1024
 _PROMPTS = ("chat", "plain")
 _ROPES = ("dynamic", "linear", "longrope", "yarn")
 
 
 def parse_rope(text: str) -> tuple[str, float]:
-    """Type and factor of a context extension `TYPE:FACTOR`.
+    """Return type and factor of a context extension `TYPE:FACTOR`.
 
     Raises:
-        ValueError: it has another form, or a factor that extends nothing.
+        ValueError: the text has another form, or the factor extends nothing.
     """
     rope_type, _, number = text.partition(":")
     try:
@@ -36,20 +37,24 @@ def parse_rope(text: str) -> tuple[str, float]:
 
 @dataclass(frozen=True, kw_only=True)
 class Placement:
-    """Where and how the weights of anything are run.
+    """Device, type and kernels of a network.
 
     Attributes:
-        dtype: torch's name of the weights' type, or auto: as in the checkpoint.
-        device: cpu, cuda, cuda:1, ..., or auto: a GPU where there is one.
+        dtype: torch's name of the weights' type, or auto for that of the checkpoint.
+        device: cpu, cuda, cuda:1, ..., or auto for a GPU if there is one.
         attn_implementation: sdpa, eager, flash_attention_2, ...
+        threads: torch threads of this model's computations on the CPU; torch's default where None.
     """
 
     dtype: str = "auto"
     device: str = "auto"
     attn_implementation: str = "sdpa"
+    threads: int | None = None
 
     def __post_init__(self) -> None:
-        """Refuse attention that transformers would fetch from the hub and run, or does not know."""
+        """Refuse attention that transformers does not know, or would download from the hub and run."""
+        if self.threads is not None and not 1 <= self.threads <= _MOST_THREADS:
+            raise ValueError(f"threads={self.threads} is not from 1 to {_MOST_THREADS}")
         name = self.attn_implementation
         if "/" in name and not getattr(self, "trust_remote_code", False):
             raise ValueError(f"attn_implementation={name} is code on the hub, which runs with trust_remote_code=true")
@@ -62,11 +67,11 @@ class Placement:
 
 @dataclass(frozen=True, kw_only=True)
 class Reading:
-    """What a model is made to read, whichever engine runs it.
+    """Form and length of a model's prompts, on any engine.
 
     Attributes:
-        prompt: chat writes conversations by the checkpoint's own chat template; plain writes the turns one after the
-            other, texts and frames in their places, without roles.
+        prompt: chat renders conversations by the checkpoint's chat template; plain concatenates the texts and frames
+            of all turns, without roles.
         rope: context extension TYPE:FACTOR (yarn:4, linear:2, dynamic:4, longrope:8) instead of the checkpoint's RoPE.
     """
 
@@ -74,7 +79,7 @@ class Reading:
     rope: str | None = None
 
     def image_settings(self) -> dict[str, Any]:
-        """Settings of the image processor that differ from the checkpoint's; families with options for it override."""
+        """Return the image processor settings that differ from the checkpoint's; some families override this."""
         return {}
 
     def __post_init__(self) -> None:
@@ -86,7 +91,7 @@ class Reading:
 
 @dataclass(frozen=True, kw_only=True)
 class CheckpointReading(Reading):
-    """Where a checkpoint comes from, whichever engine runs it.
+    """Source of a checkpoint, on any engine.
 
     Attributes:
         pretrained: hub id or folder.
@@ -101,15 +106,15 @@ class CheckpointReading(Reading):
 
 @dataclass(frozen=True, kw_only=True)
 class HfOptions(Reading, Placement):
-    """How a model is run by transformers.
+    """Inference by transformers.
 
     Attributes:
-        share_prefix: encode what two replies have in common once; false encodes everything for every reply.
+        share_prefix: encode the common prefix of two prompts once; false encodes every prompt as a whole.
         chunk_tokens: most tokens encoded in one forward pass.
         batch_size: most continuations of one prefix that are answered together; each has its own copy of the prefix's
-            keys and values, and continuations of different length have attention copy these for each token.
+            keys and values, which attention copies again for each token if the continuations differ in length.
         kv_offload: keep keys and values in CPU memory; slower, for contexts that do not fit on the GPU.
-        feature_cache_mb: memory for vision features of frames seen before, in MiB.
+        feature_cache_mb: memory for vision features of earlier frames, in MiB.
         max_tokens: context limit instead of the checkpoint's; 0 for none.
     """
 
@@ -134,7 +139,7 @@ class HfOptions(Reading, Placement):
 
 @dataclass(frozen=True, kw_only=True)
 class CheckpointOptions(HfOptions, CheckpointReading):
-    """How a checkpoint is run by transformers.
+    """A checkpoint, and inference with it by transformers.
 
     Attributes:
         device_map: transformers' device map (auto, balanced, ...) instead of one device.

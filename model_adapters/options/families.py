@@ -1,4 +1,4 @@
-"""Options of the model families of transformers, each with its usual checkpoint."""
+"""Options of the model families of transformers, each with its default checkpoint."""
 
 from dataclasses import dataclass
 
@@ -21,8 +21,8 @@ class PixelLimits:
     """Limits of a frame's area.
 
     Attributes:
-        min_pixels: smaller frames are enlarged to this area; the checkpoint's setting where None.
-        max_pixels: larger frames are reduced to this area; the checkpoint's setting where None.
+        min_pixels: area that smaller frames are enlarged to; the checkpoint's setting where None.
+        max_pixels: area that larger frames are reduced to; the checkpoint's setting where None.
     """
 
     min_pixels: int | None = None
@@ -36,10 +36,10 @@ class PixelLimits:
                 raise ValueError(f"{name}={value} is not between 1 and {most}")
         if self.min_pixels is not None and self.max_pixels is not None and self.min_pixels > self.max_pixels:
             raise ValueError(f"min_pixels={self.min_pixels} is above max_pixels={self.max_pixels}")
-        super().__post_init__()  # type: ignore[misc]  # it is mixed into options, which have one
+        super().__post_init__()  # type: ignore[misc]  # the options that it is mixed into have one
 
     def image_settings(self) -> dict[str, int]:
-        """Settings of the image processor that differ from the checkpoint's."""
+        """Return the image processor settings that differ from the checkpoint's."""
         limits = {"min_pixels": self.min_pixels, "max_pixels": self.max_pixels}
         return {name: value for name, value in limits.items() if value is not None}
 
@@ -58,6 +58,7 @@ class Qwen25VLNanoOptions(PixelLimits, CheckpointOptions):
     pretrained: str = ""
     dtype: str = "float32"
     device: str = "cpu"
+    threads: int | None = 1  # see `TinyOptions`
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,6 +84,6 @@ class PixtralOptions(CheckpointOptions):
 
 @dataclass(frozen=True, kw_only=True)
 class HfVlmOptions(CheckpointOptions):
-    """Options of `hf-vlm`, which has no usual checkpoint."""
+    """Options of `hf-vlm`, which has no default checkpoint."""
 
     pretrained: str = ""

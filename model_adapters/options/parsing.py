@@ -1,4 +1,4 @@
-"""Options of an adapter: a dataclass with defaults, filled from the `k=v` strings of the command line."""
+"""Parsing of an adapter's options from the `k=v` strings of the command line."""
 
 import dataclasses
 import difflib
@@ -11,34 +11,31 @@ from infthor_eval.errors import UsageError
 
 __all__ = ["NoOptions", "describe", "parse"]
 
-_LARGEST = 2**63  # of the numbers that a run's identity can hold
+_LARGEST = 2**63  # limit of the numbers in a run config
 _BOOLEANS = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
 
 
 @dataclasses.dataclass(frozen=True)
 class NoOptions:
-    """Options of an adapter that has none."""
+    """Options of an adapter without options."""
 
 
 def describe(options: type) -> str:
-    """The options with their defaults, as `a=1, b=x`; "no options" where there are none."""
+    """Return the options with their defaults, as `a=1, b=x`, or "no options"."""
     shown = [f"{field.name}={_show(_default(field))}" for field in dataclasses.fields(options)]
     return ", ".join(shown) or "no options"
 
 
 def parse(model: str, options: type, given: Mapping[str, str]) -> Any:
-    """Fill the dataclass from strings, by its annotations.
+    """Return an instance of the options with the given values, converted by the annotations.
 
     Args:
-        model: the model's name, for the message.
-        options: a dataclass whose fields are str, int, float, bool, or one of these or None, with defaults.
+        model: name of the model, for the message.
+        options: a dataclass with defaults, whose fields are str, int, float, bool, or one of these or None.
         given: option names to values as typed.
 
-    Returns:
-        An instance of `options`.
-
     Raises:
-        UsageError: an unknown option (the nearest is named) or a value that does not fit its type.
+        UsageError: an option is unknown (the message has the nearest one), or a value does not fit its type.
     """
     hints = typing.get_type_hints(options)
     for name in given:
@@ -53,18 +50,18 @@ def parse(model: str, options: type, given: Mapping[str, str]) -> Any:
 
 
 def _value(name: str, hint: Any, text: str) -> Any:
-    taken = typing.get_args(hint) if isinstance(hint, types.UnionType) else (hint,)
-    if types.NoneType in taken and text.lower() in ("none", ""):
+    accepted = typing.get_args(hint) if isinstance(hint, types.UnionType) else (hint,)
+    if types.NoneType in accepted and text.lower() in ("none", ""):
         return None
-    convert = next(each for each in taken if each is not types.NoneType)
+    convert = next(each for each in accepted if each is not types.NoneType)
     try:
         value = _BOOLEANS[text.lower()] if convert is bool else convert(text)
         if convert in (int, float) and not abs(value) < _LARGEST:
-            raise ValueError("too large, or no number")
+            raise ValueError("too large, or not a number")
         return value
     except (KeyError, ValueError) as error:
-        wanted = "true or false" if convert is bool else convert.__name__
-        raise ValueError(f"option {name}={text} is not {wanted}") from error
+        expected = "true or false" if convert is bool else convert.__name__
+        raise ValueError(f"option {name}={text} is not {expected}") from error
 
 
 def _default(field: "dataclasses.Field[Any]") -> Any:

@@ -1,4 +1,4 @@
-"""Options of policies: those whose weights are loaded here, and those behind a server."""
+"""Options of policies in this process and behind a server."""
 
 from dataclasses import dataclass
 
@@ -19,15 +19,15 @@ __all__ = [
 
 DEFAULT_INTRINSICS = "default"
 _ENSEMBLES = ("none", "exp")
-_ATTENTION = ("eager", "sdpa")  # of SpatialVLA
+_ATTENTION = ("eager", "sdpa")  # implementations that SpatialVLA supports
 _ENCODINGS = ("json_numpy", "list")
 
 
 def parse_field_of_view(text: str) -> float | None:
-    """The vertical field of view, in degrees, of `thor:DEGREES`; None for `default`.
+    """Return the vertical field of view in `thor:DEGREES`, in degrees, or None for `default`.
 
     Raises:
-        ValueError: it has another form, or no camera has such a field.
+        ValueError: the text has another form, or the angle is out of range.
     """
     if text == DEFAULT_INTRINSICS:
         return None
@@ -45,14 +45,13 @@ def parse_field_of_view(text: str) -> float | None:
 
 @dataclass(frozen=True, kw_only=True)
 class ActionOptions:
-    """How a policy acts, whichever engine runs it; it always takes the likeliest tokens.
+    """Decoding and use of a policy's actions, on any engine; decoding is always greedy.
 
     Attributes:
-        unnorm_key: the dataset whose robot's metres and radians the actions are scaled to; the checkpoint's own where
-            it knows only one.
-        constrained: choose among tokens that mean an action; false chooses among all and clips, as the originals do.
-        ensemble: none gives out chunks as they are; exp averages overlapping chunks and gives out one step a call.
-        execute: how many steps of a chunk are given out; all where None.
+        unnorm_key: dataset whose statistics scale actions to metres and radians; None if the checkpoint has only one.
+        constrained: decode among action tokens only; false decodes among all tokens and clips, as the originals do.
+        ensemble: none returns chunks as they are; exp averages overlapping chunks and returns one step a call.
+        execute: steps of a chunk that are returned; all where None.
     """
 
     unnorm_key: str | None = None
@@ -61,18 +60,18 @@ class ActionOptions:
     execute: int | None = None
 
     def __post_init__(self) -> None:
-        """Refuse what does not go together."""
+        """Refuse contradicting values."""
         if self.ensemble not in _ENSEMBLES:
             raise ValueError(f"ensemble={self.ensemble} is not {' or '.join(_ENSEMBLES)}")
         if self.execute is not None and self.execute < 1:
-            raise ValueError(f"execute={self.execute} gives out no step; it is 1 or more")
+            raise ValueError(f"execute={self.execute} returns no step; use 1 or more")
         if self.ensemble == "exp" and self.execute not in (None, 1):
-            raise ValueError(f"execute={self.execute} does not go with ensemble=exp, which gives out one step a call")
+            raise ValueError(f"execute={self.execute} contradicts ensemble=exp, which returns one step a call")
 
 
 @dataclass(frozen=True, kw_only=True)
 class PolicyOptions(ActionOptions, Placement):
-    """How a policy is run here."""
+    """Options of a policy whose network runs in this process."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -81,7 +80,7 @@ class PolicyOptions(ActionOptions, Placement):
 
 @dataclass(frozen=True, kw_only=True)
 class CheckpointPolicyOptions(PolicyOptions):
-    """Where a policy's checkpoint comes from.
+    """Source of a policy's checkpoint.
 
     Attributes:
         pretrained: hub id or folder.
@@ -101,13 +100,13 @@ class OpenVLAOptions(CheckpointPolicyOptions):
 
 @dataclass(frozen=True, kw_only=True)
 class SpatialVLAOptions(PolicyOptions):
-    """What SpatialVLA takes beside the options of all policies.
+    """Options of SpatialVLA.
 
     Attributes:
-        attn_implementation: eager caps attention scores as Gemma 2 was trained; sdpa is faster and does not.
+        attn_implementation: eager caps attention scores, as Gemma 2 was trained; sdpa is faster and does not.
         ensemble: exp as in the published evaluations in SimplerEnv.
-        intrinsics: default is the camera of the checkpoint's dataset; thor:DEGREES a simulator's with this vertical
-            field of view.
+        intrinsics: default for the camera of the checkpoint's dataset, or thor:DEGREES for a simulator's camera with
+            this vertical field of view.
     """
 
     attn_implementation: str = "eager"
@@ -119,7 +118,7 @@ class SpatialVLAOptions(PolicyOptions):
         parse_field_of_view(self.intrinsics)
         if self.attn_implementation not in _ATTENTION:
             raise ValueError(
-                f"attn_implementation={self.attn_implementation} cannot read the prefix in both directions; "
+                f"attn_implementation={self.attn_implementation} cannot attend to the prefix in both directions; "
                 f"use {' or '.join(_ATTENTION)}"
             )
 
@@ -133,15 +132,15 @@ class SpatialVLACheckpointOptions(SpatialVLAOptions, CheckpointPolicyOptions):
 
 @dataclass(frozen=True, kw_only=True)
 class VlaHttpOptions:
-    """How a server is asked.
+    """Options of a policy behind a server.
 
     Attributes:
-        url: of the server; `/act` is put behind it.
-        unnorm_key: sent with every request where it is given.
-        image: json_numpy sends a frame in base 64, as OpenVLA's server expects; list as nested lists of numbers.
-        execute: how many steps of a chunk are given out; all where None.
-        timeout_s: for a reply.
-        retries: how often a request is sent again where the connection failed.
+        url: address of the server, without `/act`.
+        unnorm_key: dataset key sent with every request; not sent where None.
+        image: json_numpy sends frames in base 64, as OpenVLA's server expects; list sends nested lists of numbers.
+        execute: steps of a chunk that are returned; all where None.
+        timeout_s: limit for a whole reply, in seconds.
+        retries: repetitions of a request after a failed connection.
     """
 
     url: str = "http://localhost:8000"
@@ -156,6 +155,6 @@ class VlaHttpOptions:
         if self.image not in _ENCODINGS:
             raise ValueError(f"image={self.image} is not {' or '.join(_ENCODINGS)}")
         if self.execute is not None and self.execute < 1:
-            raise ValueError(f"execute={self.execute} gives out no step; it is 1 or more")
+            raise ValueError(f"execute={self.execute} returns no step; use 1 or more")
         if not 0 < self.timeout_s <= 86_400 or not 0 <= self.retries <= 10:
             raise ValueError("timeout_s must be above 0 and at most a day, retries 0 to 10")

@@ -1,4 +1,4 @@
-"""Options of tiny models; their weights come from the run's seed."""
+"""Options of tiny models, whose weights are drawn by the run's seed."""
 
 from dataclasses import dataclass
 
@@ -14,12 +14,15 @@ class TinyOptions(HfOptions):
     """Options of tiny models.
 
     Attributes:
-        dtype: float32 unless told otherwise, so that replies do not hang on rounding.
-        device: cpu unless told otherwise.
+        dtype: float32 by default, so that replies do not depend on rounding.
+        device: cpu by default.
+        threads: 1 by default: tiny tensors gain nothing from more, and on a busy machine waiting for the slowest thread
+            makes each operation many times slower.
     """
 
     dtype: str = "float32"
     device: str = "cpu"
+    threads: int | None = 1
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,6 +36,7 @@ class OpenVLATinyOptions(PolicyOptions):
 
     dtype: str = "float32"
     device: str = "cpu"
+    threads: int | None = 1
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,3 +45,4 @@ class SpatialVLATinyOptions(SpatialVLAOptions):
 
     dtype: str = "float32"
     device: str = "cpu"
+    threads: int | None = 1

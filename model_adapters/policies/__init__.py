@@ -1,7 +1,7 @@
-"""Vision-language-action policies: published checkpoints as native ports, and a client for any other behind a server.
+"""Vision-language-action policies: native ports of published checkpoints, and a client for any policy behind a server.
 
-No remote code, no timm, no torchvision: what a checkpoint's file holds is mapped, key by key, to modules written here
-or in transformers.
+Remote code, timm and torchvision are not needed: the keys of a checkpoint are mapped to modules of this package or of
+transformers.
 """
 
 import model_adapters.lean_transformers  # noqa: F401 - before any module imports transformers

@@ -1,4 +1,4 @@
-"""Finding a policy's checkpoint and reading what stands beside its weights."""
+"""Checkpoints of policies, and the files beside their weights."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,18 +10,18 @@ from tokenizers import Tokenizer
 
 from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.formats.reading import read_json, require_file, require_plain_files
-from model_adapters.hf.checkpoint import loading, origin, resolve_device, resolve_dtype, versions
+from model_adapters.hf.checkpoint import origin, resolve_device, resolve_dtype, versions, wrap_loading_errors
 from model_adapters.hf.hub import fetch
 from model_adapters.options.checkpoints import Placement
 
-__all__ = ["PolicyCheckpoint", "find"]
+__all__ = ["PolicyCheckpoint", "find_policy_checkpoint"]
 
-MEND = "restore the checkpoint"
+_HINT = "restore the checkpoint"
 
 T = TypeVar("T")
 
 
-class _Kind(msgspec.Struct):
+class _ModelType(msgspec.Struct):
     model_type: str = "nameless"
     torch_dtype: str | None = None
     dtype: str | None = None
@@ -29,73 +29,73 @@ class _Kind(msgspec.Struct):
 
 @dataclass(frozen=True)
 class PolicyCheckpoint:
-    """A policy's checkpoint in a folder.
+    """A policy's checkpoint on disk.
 
     Attributes:
-        folder: where it lies.
-        pretrained: what was asked for, for messages.
-        origin: what identifies its weights, as JSON values.
+        folder: folder of the checkpoint.
+        pretrained: name of the checkpoint as the user gave it, for messages.
+        origin: what identifies the weights, as JSON values.
     """
 
     folder: Path
     pretrained: str
     origin: dict[str, Any]
 
-    def require_kind(self, model_type: str) -> None:
-        """Refuse a checkpoint of another family.
+    def require_model_type(self, model_type: str) -> None:
+        """Check that the checkpoint is of this family.
 
         Raises:
-            ModelError: names the family.
-            DataError: its config cannot be read.
+            ModelError: the checkpoint is of another family; the message names it.
+            DataError: the config cannot be read.
         """
-        found = self._kind().model_type
-        if found != model_type:
+        own_type = self._config().model_type
+        if own_type != model_type:
             raise ModelError(
-                f"{self.pretrained} is a {found} checkpoint, not {model_type}; see `infthor-eval ls models`"
+                f"{self.pretrained} is a {own_type} checkpoint, not {model_type}; see `infthor-eval ls models`"
             )
 
     def read(self, name: str, form: type[T]) -> T:
-        """One of its JSON files, in the form of a type.
+        """Read one of the JSON files as an instance of a type.
 
         Raises:
-            DataError: it is missing, no JSON, or of another form.
+            DataError: the file is missing, is not JSON, or has another form.
         """
-        return read_json(self.folder / name, MEND, form)
+        return read_json(self.folder / name, _HINT, form)
 
-    def has(self, name: str) -> bool:
-        """Whether it has a file."""
+    def has_file(self, name: str) -> bool:
+        """Return whether the checkpoint has this file."""
         return (self.folder / name).is_file()
 
     def tokenizer(self) -> Tokenizer:
-        """Its tokenizer, from `tokenizer.json` itself: transformers would ask to run the checkpoint's code.
+        """Load the tokenizer from `tokenizer.json` directly; transformers would need the checkpoint's remote code.
 
         Raises:
-            DataError: there is no such file.
-            ModelError: it is damaged.
+            DataError: the file is missing.
+            ModelError: the file is damaged.
         """
         path = self.folder / "tokenizer.json"
-        require_file(path, MEND)
-        with loading(self.pretrained):
+        require_file(path, _HINT)
+        with wrap_loading_errors(self.pretrained):
             return Tokenizer.from_file(str(path))
 
-    def placed(self, options: Placement) -> tuple[torch.device, torch.dtype]:
-        """Device and type of the weights; the type that the config names where none is asked for.
+    def resolve_placement(self, options: Placement) -> tuple[torch.device, torch.dtype]:
+        """Return device and type of the weights; the type defaults to that of the config.
 
         Raises:
-            UsageError: there is no such device or type.
-            ModelError: there is no GPU here.
+            UsageError: the device or the type is unknown.
+            ModelError: this machine has no GPU.
         """
-        kind = self._kind()
+        config = self._config()
         dtype = resolve_dtype(options)
         if isinstance(dtype, str):
-            named = getattr(torch, kind.dtype or kind.torch_dtype or "", None)
-            if not (isinstance(named, torch.dtype) and named.is_floating_point):
-                raise UsageError(f"{self.pretrained} names no type of weights; give dtype=")
-            dtype = named
+            config_dtype = getattr(torch, config.dtype or config.torch_dtype or "", None)
+            if not (isinstance(config_dtype, torch.dtype) and config_dtype.is_floating_point):
+                raise UsageError(f"the config of {self.pretrained} has no type of weights; give dtype=")
+            dtype = config_dtype
         return resolve_device(options), dtype
 
     def identity(self, device: torch.device, dtype: torch.dtype, options: Placement) -> dict[str, Any]:
-        """What its numbers hang on, as JSON values."""
+        """Return everything that results depend on, as JSON values."""
         return self.origin | {
             "dtype": str(dtype).removeprefix("torch."),
             "device": device.type,
@@ -103,20 +103,20 @@ class PolicyCheckpoint:
             "versions": versions(),
         }
 
-    def _kind(self) -> _Kind:
-        return self.read("config.json", _Kind)
+    def _config(self) -> _ModelType:
+        return self.read("config.json", _ModelType)
 
 
-def find(pretrained: str, revision: str | None) -> PolicyCheckpoint:
-    """Find a checkpoint by its name.
+def find_policy_checkpoint(pretrained: str, revision: str | None) -> PolicyCheckpoint:
+    """Find or download a checkpoint.
 
     Args:
-        pretrained: a hub id or a folder.
+        pretrained: hub id or folder.
         revision: branch, tag or commit on the hub.
 
     Raises:
-        ModelError: there is none, or it cannot be had.
+        ModelError: the checkpoint does not exist, or cannot be downloaded.
     """
     folder, commit = fetch(pretrained, revision)
-    require_plain_files(folder, MEND)
+    require_plain_files(folder, _HINT)
     return PolicyCheckpoint(folder, pretrained, origin(folder, commit, pretrained))

@@ -1,4 +1,4 @@
-"""Tokens of actions, one after the other, each the likeliest."""
+"""Greedy decoding of action tokens."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -7,39 +7,39 @@ import torch
 
 from infthor_eval.errors import ModelError
 
-__all__ = ["embedded", "greedy"]
+__all__ = ["decode_greedily", "embed_ids"]
 
 
-def embedded(model: Any, ids: Sequence[int]) -> torch.Tensor:
-    """Embeddings of ids, (1, ids, hidden), as a transformers model feeds them to its first layer."""
-    embedding = model.get_input_embeddings()
-    found: torch.Tensor = embedding(torch.tensor([ids], device=embedding.weight.device))
-    return found
+def embed_ids(model: Any, ids: Sequence[int]) -> torch.Tensor:
+    """Return the embeddings of ids, (1, ids, hidden), as input of a transformers model's first layer."""
+    layer = model.get_input_embeddings()
+    embeds: torch.Tensor = layer(torch.tensor([ids], device=layer.weight.device))
+    return embeds
 
 
-def greedy(
-    first: torch.Tensor, step: Callable[[int], torch.Tensor], legal: Sequence[range], *, constrained: bool
+def decode_greedily(
+    first: torch.Tensor, step: Callable[[int], torch.Tensor], action_ids: Sequence[range], *, constrained: bool
 ) -> list[int]:
-    """Write tokens of actions.
+    """Decode action tokens, each the most likely one.
 
     Args:
         first: logits of the first token, (vocabulary,).
         step: feeds a token and returns the logits of the next, (vocabulary,).
-        legal: the ids that mean something at each place.
-        constrained: choose among these; else among all, and clip to them, as the original implementations do. Every
-            place is written either way: an end-of-text token ends nothing.
+        action_ids: ids that encode an action at each place of the sequence.
+        constrained: choose among these ids only. If false, choose among all ids and clip, as the original
+            implementations do. All places are decoded in either case: an end-of-text token does not end the sequence.
 
     Raises:
-        ModelError: the logits are not numbers.
+        ModelError: the logits are not finite.
     """
     ids: list[int] = []
     logits = first
-    for place, allowed in enumerate(legal):
-        held = logits[allowed.start : allowed.stop] if constrained else logits
-        if not torch.isfinite(held.max()):  # the largest is NaN where one is
+    for place, allowed in enumerate(action_ids):
+        scores = logits[allowed.start : allowed.stop] if constrained else logits
+        if not torch.isfinite(scores.max()):  # the maximum is NaN if any score is
             raise ModelError(f"action token {place + 1} has no finite score (NaN); try dtype=float32")
-        token = int(held.argmax()) + (allowed.start if constrained else 0)
-        ids.append(min(max(token, allowed.start), allowed.stop - 1))
-        if place + 1 < len(legal):
+        token = int(scores.argmax()) + (allowed.start if constrained else 0)
+        ids.append(min(max(token, allowed.start), allowed.stop - 1))  # the model is fed the token without clipping
+        if place + 1 < len(action_ids):
             logits = step(token)
     return ids

@@ -1,4 +1,4 @@
-"""Averages over what overlapping chunks say of the same moment."""
+"""Temporal ensembling: averages of the predictions that overlapping chunks make for the same step."""
 
 from collections import deque
 
@@ -12,24 +12,24 @@ _RATE = 0.8
 
 
 class ExponentialEnsemble:
-    """Gives one step a call: the average of what this chunk and the ones before say of it, the newest counting most.
+    """Averages the predictions of this and earlier chunks for the current step, with the largest weight on the newest.
 
-    Of the predictions for the present step, oldest first, number i has the weight exp(0.8 i). That is what the
-    published evaluations of SpatialVLA do (SimplerEnv's ActionEnsembler with a temperature of -0.8).
+    The weight of prediction i, counted from the oldest, is exp(0.8 i), as in the published evaluations of SpatialVLA
+    (SimplerEnv's ActionEnsembler with a temperature of -0.8).
     """
 
     def __init__(self) -> None:
         self._chunks: deque[Actions] = deque()
 
     def reset(self) -> None:
-        """Forget all chunks."""
+        """Drop all chunks."""
         self._chunks.clear()
 
     def step(self, chunk: Actions) -> Actions:
-        """The present step, (1, 7).
+        """Return the current step, (1, 7).
 
         Args:
-            chunk: (steps, 7), beginning with the present step; each call is one step later.
+            chunk: new predictions, (steps, 7), beginning with the current step; each call is one step later.
         """
         self._chunks.append(chunk)
         while len(self._chunks) > len(chunk):

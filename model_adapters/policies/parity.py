@@ -1,4 +1,4 @@
-"""Whether a policy acts as another implementation of it does, behind a server."""
+"""Comparison of a policy with another implementation of it behind a server."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -48,12 +48,12 @@ class _ParityRow:
 
 @dataclass(frozen=True)
 class ParityReport:
-    """How far two implementations are apart.
+    """Differences between two implementations.
 
     Attributes:
-        name: of the policy.
-        rows: the largest differences of each instruction.
-        tolerance: what is taken for equal.
+        name: name of the policy.
+        rows: largest differences of each instruction.
+        tolerance: largest difference that counts as equal.
     """
 
     name: str
@@ -62,43 +62,43 @@ class ParityReport:
 
     @property
     def equal(self) -> bool:
-        """Whether every action agrees."""
+        """True if all actions agree."""
         return all(row.largest <= self.tolerance for row in self.rows)
 
     def table(self) -> Table:
-        """The largest differences, an instruction a row."""
+        """Return a table of the largest differences, one row per instruction."""
         columns = ("instruction", "frames", "steps", "metres", "radians", "gripper")
         rows = tuple(Row(_cells(row)) for row in self.rows)
-        verdict = "equal" if self.equal else "they differ"
-        note = f"Largest differences of actions; up to {self.tolerance:g} they are taken for equal: {verdict}."
+        verdict = "equal" if self.equal else "different"
+        note = f"Largest differences of actions; up to {self.tolerance:g} counts as equal: {verdict}."
         title = f"{self.name} and its reference"
         return Table(title, tuple(Column(name, name != "instruction") for name in columns), rows, (note,))
 
 
 def load_policy(name: str, options: Mapping[str, str]) -> Policy:
-    """The policy to compare; its chunks are compared as they are, not averaged, unless the options say otherwise.
+    """Load the policy to compare; chunks are not averaged unless the options say so.
 
     Raises:
-        UsageError: there is no such model, it is no policy, or the options do not fit.
-        ModelError: it cannot be loaded.
+        UsageError: the name is unknown or not that of a policy, or the options do not fit.
+        ModelError: the policy cannot be loaded.
     """
-    plain = {"ensemble": "none"} if has_option(name, "ensemble") else {}
-    policy = load(name, {**plain, **options}, seed=0)
+    defaults = {"ensemble": "none"} if has_option(name, "ensemble") else {}
+    policy = load(name, {**defaults, **options}, seed=0)
     if not isinstance(policy, Policy):
         policy.close()
-        raise UsageError(f"{name} is no policy; compare openvla or spatialvla")
+        raise UsageError(f"{name} is not a policy; compare openvla or spatialvla")
     return policy
 
 
 def reference_policy(url: str, unnorm_key: str | None) -> HttpPolicy:
-    """The other implementation.
+    """Return the other implementation as a policy.
 
     Args:
-        url: of a server of the `/act` convention.
-        unnorm_key: the dataset that it is to scale actions to.
+        url: address of a server with the `/act` convention.
+        unnorm_key: dataset whose statistics scale its actions.
 
     Raises:
-        UsageError: that is no address.
+        UsageError: the address is not valid.
     """
     try:
         return HttpPolicy("reference", VlaHttpOptions(url=url, unnorm_key=unnorm_key))
@@ -109,7 +109,7 @@ def reference_policy(url: str, unnorm_key: str | None) -> HttpPolicy:
 def compare_policies(
     ours: Policy, theirs: Policy, frames: Sequence[FrameRef], instructions: Sequence[str], tolerance: float
 ) -> ParityReport:
-    """Have both act on the same frames and instructions, each frame as the first of an episode.
+    """Compare the actions of both on the same frames and instructions, each frame as the first of an episode.
 
     Raises:
         ModelError: one of them cannot act.
@@ -120,22 +120,22 @@ def compare_policies(
 
 
 def frames_in_folder(folder: Path) -> list[FrameRef]:
-    """The pictures of a folder, by name.
+    """Return the pictures of a folder, sorted by name.
 
     Raises:
-        DataError: it has none, or cannot be read.
+        DataError: the folder has no pictures, or cannot be read.
     """
-    found = sorted(path for path in folder.iterdir() if path.suffix.lower() in _PICTURES) if folder.is_dir() else []
-    if not found:
-        raise DataError(f"{folder}: holds no pictures ({', '.join(_PICTURES)}); give a folder of frames")
-    return [FrameRef(path) for path in found]
+    paths = sorted(path for path in folder.iterdir() if path.suffix.lower() in _PICTURES) if folder.is_dir() else []
+    if not paths:
+        raise DataError(f"{folder}: has no pictures ({', '.join(_PICTURES)}); give a folder of frames")
+    return [FrameRef(path) for path in paths]
 
 
 @contextmanager
 def synthetic_frames() -> Iterator[list[FrameRef]]:
-    """A black frame, a white one and some of noise, for as long as they are needed; the same every time."""
-    draws = np.random.default_rng(0)
-    noise = [draws.integers(0, 256, (240, 320, 3), dtype=np.uint8) for _ in range(_NOISE)]
+    """Yield a black frame, a white one and some of noise, always the same, whose files exist within the context."""
+    rng = np.random.default_rng(0)
+    noise = [rng.integers(0, 256, (240, 320, 3), dtype=np.uint8) for _ in range(_NOISE)]
     with ScratchFolder() as folder:
         plain = [Image.new("RGB", (300, 300), colour) for colour in ("black", "white")]
         for number, picture in enumerate([*plain, *map(Image.fromarray, noise)]):
@@ -144,23 +144,23 @@ def synthetic_frames() -> Iterator[list[FrameRef]]:
 
 
 def _row(ours: Policy, theirs: Policy, frames: Sequence[FrameRef], instruction: str) -> _ParityRow:
-    differences, steps = [], (0, 0)
+    differences, n_steps = [], (0, 0)
     for frame in frames:
         ours.reset()
         theirs.reset()
         pair = ours.act(frame, instruction), theirs.act(frame, instruction)
-        steps = len(pair[0]), len(pair[1])
+        n_steps = len(pair[0]), len(pair[1])
         differences.append(_difference(*pair))
     largest = np.max(differences, axis=0).tolist()
-    return _ParityRow(instruction, len(frames), steps, *largest)
+    return _ParityRow(instruction, len(frames), n_steps, *largest)
 
 
 def _difference(ours: Sequence[ArmDelta], theirs: Sequence[ArmDelta]) -> list[float]:
-    """Largest differences of translation, rotation and gripper; without end where one gave more steps."""
+    """Return the largest differences of translation, rotation and gripper; infinite if the numbers of steps differ."""
     if len(ours) != len(theirs):
         return [float("inf")] * 3
-    apart = np.abs(_numbers(ours) - _numbers(theirs)).max(axis=0)
-    return [apart[:3].max(), apart[3:6].max(), apart[6]]
+    gaps = np.abs(_numbers(ours) - _numbers(theirs)).max(axis=0)
+    return [gaps[:3].max(), gaps[3:6].max(), gaps[6]]
 
 
 def _numbers(steps: Sequence[ArmDelta]) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""A loaded network as a `Policy`: scales, averages and checks what it writes."""
+"""A loaded network as a `Policy`: scaling, averaging and checking of its actions."""
 
 from typing import Any, Protocol
 
@@ -8,6 +8,7 @@ from PIL import Image
 
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
+from model_adapters.hf.threads import torch_threads
 from model_adapters.options.policies import ActionOptions
 from model_adapters.policies.ensemble import ExponentialEnsemble
 from model_adapters.policies.statistics import ACTION_SIZE, Actions, ActionStatistics
@@ -18,38 +19,38 @@ __all__ = ["Network", "VlaPolicy", "arm_deltas"]
 
 
 class Network(Protocol):
-    """What looks at a frame and writes actions."""
+    """A network that predicts actions from a frame."""
 
     def predict(self, image: Image.Image, instruction: str, *, constrained: bool) -> Actions:
-        """A chunk of actions, (steps, 7), as the model writes them: between -1 and 1.
+        """Return a chunk of normalised actions, (steps, 7), each number between -1 and 1.
 
         Args:
             image: the frame, RGB.
-            instruction: what is to be done, as the suite says it; the prompt around it is the network's.
-            constrained: choose among tokens that mean an action.
+            instruction: the suite's instruction; the network adds its prompt.
+            constrained: decode among action tokens only.
 
         Raises:
-            ModelError: it has no finite scores.
+            ModelError: the scores are not finite.
         """
         ...
 
 
 def arm_deltas(name: str, actions: Actions) -> tuple[ArmDelta, ...]:
-    """Actions as steps of an arm; the gripper is held to 0 (closed) to 1 (open).
+    """Return actions as steps of an arm, with the gripper clipped to 0 (closed) to 1 (open).
 
     Args:
-        name: of the policy, for the message.
-        actions: (steps, 7): x, y, z, roll, pitch, yaw, gripper.
+        name: name of the policy, for the message.
+        actions: actions, (steps, 7): x, y, z, roll, pitch, yaw, gripper.
 
     Raises:
-        ModelError: there are none, they have another length, or one is not finite.
+        ModelError: there are no actions, they have another shape, or one is not finite.
     """
     if actions.ndim != 2 or actions.shape[1] != ACTION_SIZE or not len(actions):
         raise ModelError(
             f"{name} gave actions of shape {list(actions.shape)}, not one or more of {ACTION_SIZE} numbers"
         )
     if not np.isfinite(actions).all():
-        raise ModelError(f"{name} gave an action that is no number: {actions.tolist()}")
+        raise ModelError(f"{name} gave an action that is not finite: {actions.tolist()}")
     return tuple(
         ArmDelta((x, y, z), (roll, pitch, yaw), min(max(gripper, 0.0), 1.0))
         for x, y, z, roll, pitch, yaw, gripper in actions.tolist()
@@ -57,14 +58,15 @@ def arm_deltas(name: str, actions: Actions) -> tuple[ArmDelta, ...]:
 
 
 class VlaPolicy:
-    """A vision-language-action model whose weights are here.
+    """A vision-language-action model with its network in this process, or in vLLM.
 
     Args:
-        name: the registry's name.
-        network: writes the actions.
-        statistics: scale them.
-        options: how it is run.
-        identity: of checkpoint, dataset and machine, as JSON values.
+        name: name in the registry.
+        network: network that predicts normalised actions.
+        statistics: statistics that scale the actions.
+        options: decoding and use of the actions.
+        identity: identity of checkpoint, dataset and machine, as JSON values.
+        threads: torch threads of the network's computations; torch's default where None.
     """
 
     def __init__(
@@ -74,12 +76,14 @@ class VlaPolicy:
         statistics: ActionStatistics,
         options: ActionOptions,
         identity: dict[str, Any],
+        threads: int | None = None,
     ) -> None:
         self.name = name
         self._network = network
         self._statistics = statistics
         self._options = options
         self._identity = identity
+        self._threads = threads
         self._ensemble = ExponentialEnsemble()
 
     @property
@@ -88,7 +92,7 @@ class VlaPolicy:
         return Capabilities(counts_tokens=False, token_ids=False)
 
     def identity(self) -> dict[str, Any]:
-        """Checkpoint, dataset of the scale, precision, versions and how chunks are used, as JSON values."""
+        """Return checkpoint, dataset of the statistics, precision, versions and use of chunks, as JSON values."""
         options = self._options
         return self._identity | {
             "adapter": self.name,
@@ -98,18 +102,18 @@ class VlaPolicy:
         }
 
     def reset(self) -> None:
-        """Forget the chunks of the last episode."""
+        """Drop the chunks of the last episode."""
         self._ensemble.reset()
 
     def act(self, frame: FrameRef, instruction: str) -> tuple[ArmDelta, ...]:
-        """The next steps; see `Policy.act`."""
-        with wrap_request_errors(self.name):
+        """Return the next steps; see `Policy.act`."""
+        with wrap_request_errors(self.name), torch_threads(self._threads):
             image = frame.load()
             chunk = self._network.predict(image, instruction, constrained=self._options.constrained)
             actions = self._statistics.unnormalise(chunk)
-            arm_deltas(self.name, actions)  # before a bad chunk is averaged into the steps to come
-            chosen = self._ensemble.step(actions) if self._options.ensemble == "exp" else actions
-            return arm_deltas(self.name, chosen[: self._options.execute])
+            arm_deltas(self.name, actions)  # refuses a bad chunk before it is averaged into later steps
+            steps = self._ensemble.step(actions) if self._options.ensemble == "exp" else actions
+            return arm_deltas(self.name, steps[: self._options.execute])
 
     def close(self) -> None:
         """Free the weights."""

@@ -1,8 +1,8 @@
-"""From the files of a checkpoint to a module's parameters, every key accounted for.
+"""Strict loading of a checkpoint's files into a module.
 
-A checkpoint's file and the module that reads it were written by different people at different times. So what the file
-has to hold is derived from the module, and anything missing, unknown or of another shape ends the loading: a part that
-stays random is seen in no number and spoils all of them.
+A checkpoint and the module that reads it were written by different people at different times. So the expected keys are
+derived from the module, and a key that is missing, unknown or of another shape is an error: a part that silently stayed
+random would spoil all results.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -18,18 +18,18 @@ from torch import nn
 
 from infthor_eval.errors import ModelError
 
-__all__ = ["Layout", "Shape", "empty", "load_weights"]
+__all__ = ["Layout", "Shape", "empty_parameters", "load_weights"]
 
 Shape = tuple[int, ...]
 
-_NAMED = 3  # keys that an error names
+_MOST_KEYS = 3  # keys that an error lists
 
 
 @contextmanager
-def empty() -> Iterator[None]:
-    """Modules made within have parameters without memory, but real buffers.
+def empty_parameters() -> Iterator[None]:
+    """Create modules whose parameters take no memory, but whose buffers are real.
 
-    Buffers are computed where a module is made and stand in no file; on the meta device they would be lost.
+    Buffers are computed when a module is created and are not in a checkpoint; on the meta device they would be lost.
     """
     with init_empty_weights(include_buffers=False):
         yield
@@ -37,12 +37,12 @@ def empty() -> Iterator[None]:
 
 @dataclass(frozen=True)
 class Layout:
-    """What the files of a checkpoint hold.
+    """Keys in the files of a checkpoint.
 
     Attributes:
-        parameters: keys of what the module reads, with the names of its parameters.
-        shapes: of these keys.
-        unused: keys that belong to the architecture and that no action depends on, with their shapes.
+        parameters: keys that the module reads, each with the name of its parameter.
+        shapes: shapes of these keys.
+        unused: shapes of further keys of the architecture, which no action depends on.
     """
 
     parameters: Mapping[str, str]
@@ -51,94 +51,96 @@ class Layout:
 
     @classmethod
     def of(cls, module: nn.Module, key_of: Callable[[str], str | None], unused: Mapping[str, Shape]) -> "Layout":
-        """The layout of a module's checkpoint.
+        """Return the layout of a module's checkpoint.
 
         Args:
-            module: its parameters need no memory.
-            key_of: the key of a parameter, by its name; None where the parameter is another's and has no key.
-            unused: see above.
+            module: the module; its parameters need no memory.
+            key_of: returns the key of a parameter by its name, or None if the parameter is tied to another.
+            unused: see `Layout.unused`.
         """
-        found = {key: (name, value) for name, value in module.state_dict().items() if (key := key_of(name)) is not None}
+        entries = {
+            key: (name, value) for name, value in module.state_dict().items() if (key := key_of(name)) is not None
+        }
         return cls(
-            {key: name for key, (name, _) in found.items()},
-            {key: tuple(value.shape) for key, (_, value) in found.items()},
+            {key: name for key, (name, _) in entries.items()},
+            {key: tuple(value.shape) for key, (_, value) in entries.items()},
             unused,
         )
 
     def expected(self) -> dict[str, Shape]:
-        """All keys, used and unused, with their shapes."""
+        """Return the shapes of all keys, used and unused."""
         return {**self.shapes, **self.unused}
 
-    def check(self, found: Mapping[str, Shape], pretrained: str) -> None:
-        """Refuse files that hold anything else than this.
+    def check(self, actual: Mapping[str, Shape], pretrained: str) -> None:
+        """Check that files have exactly these keys.
 
         Args:
-            found: their keys with shapes.
-            pretrained: the checkpoint, for the message.
+            actual: shapes of the files' keys.
+            pretrained: name of the checkpoint, for the message.
 
         Raises:
-            ModelError: names the first keys that are missing, unknown or of another shape, and how many there are.
+            ModelError: keys are missing, unknown or of another shape; the message has the first ones and their number.
         """
         expected = self.expected()
         faults = {
-            "lacks": sorted(expected.keys() - found.keys()),
-            "holds unknown": sorted(found.keys() - expected.keys()),
+            "lacks": sorted(expected.keys() - actual.keys()),
+            "has unknown": sorted(actual.keys() - expected.keys()),
             "has another shape in": [
-                f"{key} {list(found[key])} instead of {list(shape)}"
+                f"{key} {list(actual[key])} instead of {list(shape)}"
                 for key, shape in sorted(expected.items())
-                if key in found and found[key] != shape
+                if key in actual and actual[key] != shape
             ],
         }
-        said = [f"{fault} {_first(keys)}" for fault, keys in faults.items() if keys]
-        if said:
+        complaints = [f"{fault} {_first_keys(keys)}" for fault, keys in faults.items() if keys]
+        if complaints:
             raise ModelError(
-                f"the weights of {pretrained} are not this architecture's: the checkpoint {'; '.join(said)}"
+                f"the weights of {pretrained} are not this architecture's: the checkpoint {'; '.join(complaints)}"
             )
 
 
 def load_weights(
     module: nn.Module, folder: Path, layout: Layout, *, pretrained: str, device: torch.device, dtype: torch.dtype
 ) -> None:
-    """Read a checkpoint's safetensors files into a module, a tensor at a time.
+    """Read a checkpoint's safetensors files into a module, one tensor at a time.
 
     Args:
-        module: made within `empty()`; it ends up on the device, its parameters in the dtype, its buffers as they are.
-        folder: with the files.
-        layout: what they must hold.
-        pretrained: the checkpoint, for messages.
-        device: where the parameters go.
-        dtype: their type.
+        module: a module created within `empty_parameters()`. It ends up on the device; buffers keep their types.
+        folder: folder of the files.
+        layout: expected keys.
+        pretrained: name of the checkpoint, for messages.
+        device: device of the parameters.
+        dtype: type of the parameters.
 
     Raises:
-        ModelError: there are no files, or they hold anything else than the layout says.
+        ModelError: there are no files, or their keys differ from the layout.
     """
     paths = sorted(folder.glob("*.safetensors"))
     if not paths:
         raise ModelError(f"{pretrained} has no *.safetensors file; give a checkpoint with weights in that format")
-    with ExitStack() as opened:
-        files = [opened.enter_context(safe_open(path, framework="pt")) for path in paths]
-        place = _places(files, pretrained)
-        layout.check({key: tuple(file.get_slice(key).get_shape()) for key, file in place.items()}, pretrained)
+    with ExitStack() as stack:
+        files = [stack.enter_context(safe_open(path, framework="pt")) for path in paths]
+        file_of = _files_by_key(files, pretrained)
+        layout.check({key: tuple(file.get_slice(key).get_shape()) for key, file in file_of.items()}, pretrained)
         for key, name in layout.parameters.items():
-            tensor = place[key].get_tensor(key)
+            tensor = file_of[key].get_tensor(key)
             if not tensor.is_floating_point():
                 raise ModelError(f"{key} of {pretrained} is {tensor.dtype}; quantised weights are not supported")
             _assign(module, name, tensor.to(device, dtype))
-    # Not the whole module: a parameter without a key of its own has no memory yet.
+    # Not module.to(device): a tied parameter without a key has no memory yet, which `to` refuses.
     for part in module.modules():
         for name, buffer in part.named_buffers(recurse=False):
             setattr(part, name, buffer.to(device))
 
 
-def _places(files: Sequence[Any], pretrained: str) -> dict[str, Any]:
-    """The file of each key."""
-    place: dict[str, Any] = {}
+def _files_by_key(files: Sequence[Any], pretrained: str) -> dict[str, Any]:
+    """Return the file of each key."""
+    file_of: dict[str, Any] = {}
     for file in files:
-        for key in file.keys():  # noqa: SIM118  # it is no mapping
-            if key in place:
-                raise ModelError(f"two files of {pretrained} hold {key}; keep the files of one checkpoint in a folder")
-            place[key] = file
-    return place
+        for key in file.keys():  # noqa: SIM118  # it is not a mapping
+            if key in file_of:
+                raise ModelError(f"two files of {pretrained} have {key}; keep one checkpoint in a folder")
+            file_of[key] = file
+    return file_of
 
 
 def _assign(module: nn.Module, name: str, tensor: torch.Tensor) -> None:
@@ -146,6 +148,6 @@ def _assign(module: nn.Module, name: str, tensor: torch.Tensor) -> None:
     setattr(module.get_submodule(owner), attribute, nn.Parameter(tensor, requires_grad=False))
 
 
-def _first(keys: Sequence[str]) -> str:
-    more = f", ... ({len(keys)} in all)" if len(keys) > _NAMED else ""
-    return ", ".join(keys[:_NAMED]) + more
+def _first_keys(keys: Sequence[str]) -> str:
+    more = f", ... ({len(keys)} in all)" if len(keys) > _MOST_KEYS else ""
+    return ", ".join(keys[:_MOST_KEYS]) + more

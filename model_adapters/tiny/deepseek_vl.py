@@ -1,6 +1,6 @@
 """A DeepSeek-VL hybrid of two layers with random weights; frames take as many tokens as in the real one.
 
-Its high-resolution tower sees 256 pixels instead of 1024: what it sees is interpolated to the same 24 x 24 in the end.
+Its high-resolution tower reads 256 pixels instead of 1024, and its features are interpolated to the same 24 x 24.
 """
 
 from collections.abc import Mapping
@@ -12,7 +12,7 @@ from transformers.models.deepseek_vl_hybrid.image_processing_pil_deepseek_vl_hyb
 )
 
 from model_adapters.hf.families.deepseek_vl import DeepseekVLFamily
-from model_adapters.tiny.twin import SPREAD, TinyAdapter, Twin
+from model_adapters.tiny.twin import SPREAD, TinyAdapter, Twin, siglip_config, text_config
 
 __all__ = ["DeepseekVLTiny"]
 
@@ -41,30 +41,16 @@ def _config(ids: Mapping[str, int], vocab_size: int) -> Any:
     return DeepseekVLHybridConfig(
         image_token_id=ids["<image_placeholder>"],
         tie_word_embeddings=False,
-        text_config={
-            "model_type": "llama",
-            "vocab_size": vocab_size,
-            "hidden_size": 64,
-            "intermediate_size": 128,
-            "num_hidden_layers": 2,
-            "num_attention_heads": 4,
-            "num_key_value_heads": 4,
-            "max_position_embeddings": 16_384,
-            "initializer_range": SPREAD,
-            "bos_token_id": ids[_BEGIN],
-            "eos_token_id": ids[_END],
-            "pad_token_id": ids[_END],
-        },
-        vision_config={
-            "model_type": "siglip_vision_model",
-            "image_size": 384,
-            "patch_size": 16,
-            "hidden_size": 16,
-            "intermediate_size": 32,
-            "num_hidden_layers": 1,
-            "num_attention_heads": 1,
-            "vision_use_head": False,
-        },
+        text_config=text_config(
+            vocab_size,
+            ids[_END],
+            ids[_END],
+            model_type="llama",
+            num_key_value_heads=4,
+            max_position_embeddings=16_384,
+            bos_token_id=ids[_BEGIN],
+        ),
+        vision_config=siglip_config(patch_size=16),
         high_res_vision_config={
             "model_type": "sam_vision_model",
             "image_size": 256,

@@ -9,11 +9,11 @@ from transformers.models.llava_onevision.image_processing_pil_llava_onevision im
 )
 
 from model_adapters.hf.families.llava_onevision import LlavaOnevisionFamily
-from model_adapters.tiny.twin import SPREAD, TinyAdapter, Twin
+from model_adapters.tiny.twin import TinyAdapter, Twin, siglip_config, text_config
 
 __all__ = ["LlavaOnevisionTiny"]
 
-# As the family's: images first, then the texts, each on a line of its own.
+# Like the family's template: images first, then each text on its own line.
 _TEMPLATE = """\
 {%- for message in messages -%}
 {{- '<|im_start|>' + message.role + ' ' -}}
@@ -36,30 +36,14 @@ def _config(ids: Mapping[str, int], vocab_size: int) -> Any:
     return LlavaOnevisionConfig(
         image_token_index=ids["<image>"],
         video_token_index=ids["<video>"],
-        text_config={
-            "model_type": "qwen2",
-            "vocab_size": vocab_size,
-            "hidden_size": 64,
-            "intermediate_size": 128,
-            "num_hidden_layers": 2,
-            "num_attention_heads": 4,
-            "num_key_value_heads": 2,
-            "max_position_embeddings": 32_768,
-            "initializer_range": SPREAD,
-            "bos_token_id": None,
-            "eos_token_id": ids["<|im_end|>"],
-            "pad_token_id": ids["<|endoftext|>"],
-        },
-        vision_config={
-            "model_type": "siglip_vision_model",
-            "image_size": 384,
-            "patch_size": 14,
-            "hidden_size": 16,
-            "intermediate_size": 32,
-            "num_hidden_layers": 1,
-            "num_attention_heads": 1,
-            "vision_use_head": False,
-        },
+        text_config=text_config(
+            vocab_size,
+            ids["<|im_end|>"],
+            ids["<|endoftext|>"],
+            model_type="qwen2",
+            max_position_embeddings=32_768,
+        ),
+        vision_config=siglip_config(patch_size=14),
     )
 
 

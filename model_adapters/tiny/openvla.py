@@ -1,7 +1,7 @@
 """An OpenVLA of two layers with random weights and the vocabulary of the real one."""
 
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import Any
 
 import msgspec
 from tokenizers import Tokenizer
@@ -9,11 +9,10 @@ from tokenizers import Tokenizer
 from model_adapters.options.tiny import OpenVLATinyOptions
 from model_adapters.policies.openvla.adapter import MODEL_TYPE, load_openvla
 from model_adapters.policies.openvla.config import OpenVLAConfig
-from model_adapters.policies.openvla.network import OpenVLAWeights, layout_of
+from model_adapters.policies.openvla.network import OpenVLAWeights, weights_layout
 from model_adapters.policies.openvla.vision import TOWERS, TowerShape
-from model_adapters.policies.policy import VlaPolicy
-from model_adapters.policies.weights import Layout, empty
-from model_adapters.tiny.policy_twin import BRIDGE, PolicyTwin
+from model_adapters.policies.weights import Layout, empty_parameters
+from model_adapters.tiny.policy_twin import BRIDGE, PolicyTwin, TinyPolicyAdapter
 from model_adapters.tiny.tokenizer import train_tokenizer
 
 __all__ = ["OpenVLATiny"]
@@ -38,7 +37,7 @@ def _config() -> dict[str, Any]:
         "vision_towers": [msgspec.to_builtins(tower) for tower in _TOWERS],
         "text_config": {
             "model_type": "llama",
-            "vocab_size": 32_064,  # so that action ids and Llama's token of a space are the published ones
+            "vocab_size": 32_064,  # gives action ids and Llama's token of a space their published numbers
             "hidden_size": 64,
             "intermediate_size": 128,
             "num_hidden_layers": 2,
@@ -60,18 +59,13 @@ def _tokenizer() -> Tokenizer:
 
 def _layout() -> Layout:
     config = msgspec.convert(_config(), OpenVLAConfig)
-    with empty():
+    with empty_parameters():
         weights = OpenVLAWeights(_TOWERS, _IMAGE_SIZE, config.language("sdpa"))
-    return layout_of(weights, _TOWERS)
+    return weights_layout(weights, _TOWERS)
 
 
-class OpenVLATiny:
+class OpenVLATiny(TinyPolicyAdapter):
     """The adapter `openvla-tiny`."""
 
-    Options: ClassVar[type] = OpenVLATinyOptions
-    twin: ClassVar[PolicyTwin] = PolicyTwin(files=_files, tokenizer=_tokenizer, layout=_layout, load=load_openvla)
-
-    @classmethod
-    def build(cls, name: str, options: OpenVLATinyOptions, seed: int) -> VlaPolicy:
-        """Make a policy with random weights of this seed."""
-        return cls.twin.build(name, options, seed)
+    Options = OpenVLATinyOptions
+    twin = PolicyTwin(files=_files, tokenizer=_tokenizer, layout=_layout, load=load_openvla)

@@ -7,7 +7,7 @@ from transformers import LlavaConfig
 from transformers.models.pixtral.image_processing_pil_pixtral import PixtralImageProcessorPil
 
 from model_adapters.hf.families.pixtral import PixtralFamily
-from model_adapters.tiny.twin import SPREAD, TinyAdapter, Twin
+from model_adapters.tiny.twin import SPREAD, TinyAdapter, Twin, text_config
 
 __all__ = ["PixtralTiny"]
 
@@ -33,22 +33,16 @@ def _config(ids: Mapping[str, int], vocab_size: int) -> Any:
         image_seq_length=1,
         vision_feature_layer=-1,
         vision_feature_select_strategy="full",
-        text_config={
-            "model_type": "mistral",
-            "vocab_size": vocab_size,
-            "hidden_size": 64,
-            "intermediate_size": 128,
-            "num_hidden_layers": 2,
-            "num_attention_heads": 4,
-            "num_key_value_heads": 2,
-            "head_dim": 16,
-            "max_position_embeddings": 131_072,
-            "sliding_window": None,
-            "initializer_range": SPREAD,
-            "bos_token_id": ids["<s>"],
-            "eos_token_id": ids["</s>"],
-            "pad_token_id": ids["<pad>"],
-        },
+        text_config=text_config(
+            vocab_size,
+            ids["</s>"],
+            ids["<pad>"],
+            model_type="mistral",
+            head_dim=16,
+            max_position_embeddings=131_072,
+            sliding_window=None,
+            bos_token_id=ids["<s>"],
+        ),
         vision_config={
             "model_type": "pixtral",
             "image_size": 1024,

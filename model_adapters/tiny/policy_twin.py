@@ -1,11 +1,11 @@
-"""How a tiny twin of a policy is made: a whole checkpoint in the published layout, read by the family's own loader."""
+"""Tiny twins of policies: a checkpoint in the published layout with random weights, read by the family's loader."""
 
 import json
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import torch
 from safetensors.torch import save_file
@@ -17,9 +17,9 @@ from model_adapters.policies.checkpoint import PolicyCheckpoint
 from model_adapters.policies.policy import VlaPolicy
 from model_adapters.policies.weights import Layout, Shape
 
-__all__ = ["BRIDGE", "PolicyTwin"]
+__all__ = ["BRIDGE", "PolicyTwin", "TinyPolicyAdapter"]
 
-# What openvla/openvla-7b and SpatialVLA's checkpoints say of the actions of Bridge, to four digits.
+# Statistics of the actions of Bridge in openvla/openvla-7b and SpatialVLA's checkpoints, to four digits.
 BRIDGE = {
     "action": {
         "q01": [-0.0287, -0.0417, -0.0261, -0.0809, -0.0929, -0.2072, 0.0],
@@ -28,18 +28,18 @@ BRIDGE = {
     }
 }
 
-_GAIN = 1.5  # above 1, so that what goes in makes a difference in what comes out
+_GAIN = 1.5  # above 1, so that outputs depend on inputs
 
 
 @dataclass(frozen=True, kw_only=True)
 class PolicyTwin:
-    """What makes a tiny policy one of its family.
+    """Description of a tiny policy of a family.
 
     Attributes:
-        files: JSON files beside the weights, by name.
-        tokenizer: makes the tokenizer.
-        layout: makes the layout of its weights.
-        load: the family's loader.
+        files: builds the JSON files beside the weights, by name.
+        tokenizer: builds the tokenizer.
+        layout: builds the layout of the weights.
+        load: loader of the family.
     """
 
     files: Callable[[], Mapping[str, Mapping[str, Any]]]
@@ -51,30 +51,47 @@ class PolicyTwin:
         """Write a checkpoint that the family's adapter loads.
 
         Args:
-            folder: made if it does not exist.
-            seed: of the weights.
+            folder: folder of the checkpoint; it is created.
+            seed: seed of the weights.
         """
         folder.mkdir(parents=True, exist_ok=True)
         for name, content in self.files().items():
             (folder / name).write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
         self.tokenizer().save(str(folder / "tokenizer.json"))
-        save_file(_random(self.layout().expected(), seed), folder / "model.safetensors")
+        save_file(_draw_weights(self.layout().expected(), seed), folder / "model.safetensors")
 
     def build(self, name: str, options: PolicyOptions, seed: int) -> VlaPolicy:
-        """The policy with random weights of this seed, by way of a checkpoint that is gone afterwards."""
+        """Return the policy with random weights of this seed, loaded from a temporary checkpoint."""
         with ScratchFolder() as folder:
             self.save(folder, seed)
             return self.load(name, PolicyCheckpoint(folder, name, {"checkpoint": name, "seed": seed}), options)
 
 
-def _random(shapes: Mapping[str, Shape], seed: int) -> dict[str, torch.Tensor]:
-    """Weights in float32, drawn key by key in the order of their names."""
-    draws = torch.Generator().manual_seed(seed)
-    return {key: _drawn(key, shapes[key], draws) for key in sorted(shapes)}
+class TinyPolicyAdapter:
+    """Base of the adapters of tiny policies.
+
+    Attributes:
+        Options: options of the adapter.
+        twin: description of the policy.
+    """
+
+    Options: ClassVar[type]
+    twin: ClassVar[PolicyTwin]
+
+    @classmethod
+    def build(cls, name: str, options: PolicyOptions, seed: int) -> VlaPolicy:
+        """Build a policy with random weights of this seed."""
+        return cls.twin.build(name, options, seed)
 
 
-def _drawn(key: str, shape: Shape, draws: torch.Generator) -> torch.Tensor:
-    noise = torch.randn(shape, generator=draws)
+def _draw_weights(shapes: Mapping[str, Shape], seed: int) -> dict[str, torch.Tensor]:
+    """Return random weights in float32, drawn in the order of their names."""
+    generator = torch.Generator().manual_seed(seed)
+    return {key: _draw_weight(key, shapes[key], generator) for key in sorted(shapes)}
+
+
+def _draw_weight(key: str, shape: Shape, generator: torch.Generator) -> torch.Tensor:
+    noise = torch.randn(shape, generator=generator)
     if len(shape) > 1:
         return noise * _GAIN / math.sqrt(math.prod(shape[1:]))
-    return noise * 0.1 if key.endswith("bias") else 1 + noise * 0.1  # the latter of norms and layer scales
+    return noise * 0.1 if key.endswith("bias") else 1 + noise * 0.1  # norms and layer scales

@@ -9,7 +9,7 @@ from transformers.models.qwen2_vl.image_processing_pil_qwen2_vl import Qwen2VLIm
 
 from model_adapters.hf.families.qwen2_5_vl import Qwen25VLFamily
 from model_adapters.options.tiny import Qwen25VLTinyOptions
-from model_adapters.tiny.twin import SPREAD, TinyAdapter, Twin
+from model_adapters.tiny.twin import SPREAD, TinyAdapter, Twin, text_config
 
 __all__ = ["SPECIAL", "Qwen25VLTiny", "save_tiny_checkpoint"]
 
@@ -24,7 +24,7 @@ SPECIAL = (
     "<|video_pad|>",
 )
 
-# Writes what Qwen2.5-VL's template writes for turns of text, images and videos.
+# The same output as Qwen2.5-VL's template for turns of text, images and videos.
 _TEMPLATE = """\
 {%- for message in messages -%}
 {%- if loop.first and message.role != 'system' -%}
@@ -58,20 +58,13 @@ def _config(ids: Mapping[str, int], vocab_size: int) -> Any:
         video_token_id=ids["<|video_pad|>"],
         vision_start_token_id=ids["<|vision_start|>"],
         vision_end_token_id=ids["<|vision_end|>"],
-        text_config={
-            "vocab_size": vocab_size,
-            "hidden_size": 64,
-            "intermediate_size": 128,
-            "num_hidden_layers": 2,
-            "num_attention_heads": 4,
-            "num_key_value_heads": 2,
-            "max_position_embeddings": 128_000,
-            "initializer_range": SPREAD,
-            "bos_token_id": None,
-            "eos_token_id": ids["<|im_end|>"],
-            "pad_token_id": ids["<|endoftext|>"],
-            "rope_parameters": {"rope_type": "default", "rope_theta": 1e6, "mrope_section": [2, 3, 3]},
-        },
+        text_config=text_config(
+            vocab_size,
+            ids["<|im_end|>"],
+            ids["<|endoftext|>"],
+            max_position_embeddings=128_000,
+            rope_parameters={"rope_type": "default", "rope_theta": 1e6, "mrope_section": [2, 3, 3]},
+        ),
         vision_config={
             "depth": 2,
             "hidden_size": 32,
@@ -111,7 +104,7 @@ def save_tiny_checkpoint(folder: Path, seed: int) -> None:
     """Write the tiny Qwen2.5-VL as a checkpoint that `qwen2.5-vl` and transformers' auto classes load.
 
     Args:
-        folder: made if it does not exist.
-        seed: of the weights.
+        folder: folder of the checkpoint; it is created.
+        seed: seed of the weights.
     """
     Qwen25VLTiny.twin.save(folder, seed)

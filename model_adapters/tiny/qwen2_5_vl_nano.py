@@ -1,6 +1,6 @@
-"""The small trained Qwen2.5-VL that comes with the package; its card lies beside its weights.
+"""The small trained Qwen2.5-VL that comes with the package; its model card is beside its weights.
 
-`infthor-eval train --recipe tiny` makes it.
+`infthor-eval train --recipe tiny` trains it.
 """
 
 from dataclasses import replace
@@ -26,10 +26,10 @@ class Qwen25VLNano(CheckpointAdapter):
 
     @classmethod
     def build(cls, name: str, options: CheckpointOptions, seed: int) -> TransformersModel:
-        """Load the checkpoint of the package, or another one of its form.
+        """Load the checkpoint of the package, or another one of the same form.
 
         Raises:
-            ModelError: it cannot be loaded.
+            ModelError: the checkpoint cannot be loaded.
         """
         pretrained = options.pretrained or str(packaged_folder(FOLDER))
         return super().build(name, replace(options, pretrained=pretrained), seed)

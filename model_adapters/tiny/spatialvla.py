@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -10,12 +10,11 @@ from scipy.stats import norm
 from tokenizers import Tokenizer
 
 from model_adapters.options.tiny import SpatialVLATinyOptions
-from model_adapters.policies.policy import VlaPolicy
 from model_adapters.policies.spatialvla.adapter import MODEL_TYPE, load_spatialvla
 from model_adapters.policies.spatialvla.config import SpatialVLAConfig
 from model_adapters.policies.spatialvla.network import SpatialVLAWeights
-from model_adapters.policies.weights import Layout, empty
-from model_adapters.tiny.policy_twin import BRIDGE, PolicyTwin
+from model_adapters.policies.weights import Layout, empty_parameters
+from model_adapters.tiny.policy_twin import BRIDGE, PolicyTwin, TinyPolicyAdapter
 from model_adapters.tiny.tokenizer import train_tokenizer
 
 __all__ = ["SpatialVLATiny"]
@@ -23,8 +22,8 @@ __all__ = ["SpatialVLATiny"]
 _N_MERGED = 600
 _SPECIAL = ("<pad>", "<eos>", "<bos>", "<unk>", "<image>")
 _N_ACTIONS = 8194
-_BEGIN = _N_MERGED + len(_SPECIAL)  # of the action tokens; the image token comes before them, as in the real one
-_AXES = {  # bins, lowest and highest border, mean and deviation of the Gaussian whose quantiles the borders are
+_BEGIN = _N_MERGED + len(_SPECIAL)  # id of the first action token; the image token precedes it
+_AXES = {  # number of bins, lowest and highest border, mean and deviation of the Gaussian with the borders as quantiles
     "theta_bins": (16, 0.0, math.pi, 1.9, 0.7),
     "phi_bins": (32, -math.pi, math.pi, 0.1, 1.6),
     "r_bins": (8, 0.0, math.sqrt(3), 0.6, 0.5),
@@ -81,7 +80,7 @@ def _zoe() -> dict[str, Any]:
         "num_relative_features": 8,
         "bin_embedding_dim": 16,
         "num_attractors": [4, 2, 2, 1],
-        "num_patch_transformer_layers": 4,  # transformers runs four, whatever is said here
+        "num_patch_transformer_layers": 4,  # transformers ignores this and runs four
         "patch_transformer_hidden_size": 128,
         "patch_transformer_intermediate_size": 32,
         "patch_transformer_num_attention_heads": 4,
@@ -158,17 +157,12 @@ def _tokenizer() -> Tokenizer:
 
 
 def _layout() -> Layout:
-    with empty():
+    with empty_parameters():
         return SpatialVLAWeights(msgspec.convert(_config(), SpatialVLAConfig), "eager").layout()
 
 
-class SpatialVLATiny:
+class SpatialVLATiny(TinyPolicyAdapter):
     """The adapter `spatialvla-tiny`."""
 
-    Options: ClassVar[type] = SpatialVLATinyOptions
-    twin: ClassVar[PolicyTwin] = PolicyTwin(files=_files, tokenizer=_tokenizer, layout=_layout, load=load_spatialvla)
-
-    @classmethod
-    def build(cls, name: str, options: SpatialVLATinyOptions, seed: int) -> VlaPolicy:
-        """Make a policy with random weights of this seed."""
-        return cls.twin.build(name, options, seed)
+    Options = SpatialVLATinyOptions
+    twin = PolicyTwin(files=_files, tokenizer=_tokenizer, layout=_layout, load=load_spatialvla)

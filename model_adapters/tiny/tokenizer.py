@@ -9,7 +9,7 @@ from model_adapters.tiny.corpus import CORPUS
 
 __all__ = ["train_tokenizer"]
 
-# Letters, single digits, punctuation and white space apart: how current byte-level tokenizers cut text.
+# Splits letters, single digits, punctuation and white space, as current byte-level tokenizers do.
 _SPLIT = r"""[^\r\n\p{L}\p{N}]?\p{L}+|\p{N}| ?[^\s\p{L}\p{N}]+[\r\n]*|\s*[\r\n]+|\s+(?!\S)|\s+"""
 
 
@@ -26,14 +26,13 @@ def train_tokenizer(
     """Train a tokenizer.
 
     Args:
-        special: special tokens, which take the ids behind the trained ones in this order; the tokens below are among
-            them.
-        end: the token that ends a turn.
-        pad: the padding token.
-        begin: the token put before every text, if any.
-        named: tokens that processors look up by attribute, as `image_token`.
-        corpus: what it is trained on; the package's own.
-        n_merged: tokens that are trained, the 256 bytes among them.
+        special: special tokens, including those below; their ids follow those of the trained tokens in this order.
+        end: token that ends a turn.
+        pad: padding token.
+        begin: token that begins every text, or None.
+        named: attribute names of tokens that processors look up, such as `image_token`.
+        corpus: texts to train on; by default the package's.
+        n_merged: number of trained tokens, including the 256 bytes.
     """
     tokenizer = Tokenizer(models.BPE())
     tokenizer.normalizer = normalizers.NFC()

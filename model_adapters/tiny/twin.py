@@ -1,4 +1,4 @@
-"""How a tiny twin of a model family is made: the real classes, random weights, a tokenizer trained on the spot."""
+"""Tiny twins of model families: the real classes, random weights, a tokenizer trained on the spot."""
 
 import json
 from collections.abc import Callable, Mapping, Sequence
@@ -12,35 +12,36 @@ from transformers import AutoModelForImageTextToText, GenerationConfig, PreTrain
 from model_adapters.hf.checkpoint import assemble, resolve_device, resolve_dtype
 from model_adapters.hf.family import MakeFamily
 from model_adapters.hf.model import TransformersModel
+from model_adapters.hf.quiet import hide_transformers_output
 from model_adapters.hf.rope import apply_rope
 from model_adapters.hf.templates import plain_template
 from model_adapters.options.tiny import TinyOptions
 from model_adapters.tiny.tokenizer import train_tokenizer
 
-__all__ = ["SPREAD", "TinyAdapter", "Twin"]
+__all__ = ["SPREAD", "TinyAdapter", "Twin", "draw_model", "siglip_config", "text_config", "token_ids"]
 
-# Standard deviation of the weights. Ten times the usual one, so that replies of a model without training differ from
-# frame to frame and from question to question.
+# Standard deviation of the weights. Ten times the usual one, so that replies of an untrained model differ from frame to
+# frame and from question to question.
 SPREAD = 0.2
 
 
 @dataclass(frozen=True, kw_only=True)
 class Twin:
-    """What makes a tiny model one of its family.
+    """Description of a tiny model of a family.
 
     Attributes:
-        special: special tokens; their ids follow the trained ones.
-        end: the token that ends a turn.
-        pad: the padding token.
-        begin: the token that begins every text, if there is one.
-        image: the image token.
-        template: chat template that writes what the family's writes.
-        config: makes the model's config from the ids of the special tokens and the vocabulary size.
+        special: special tokens; their ids follow those of the trained tokens.
+        end: token that ends a turn.
+        pad: padding token.
+        begin: token that begins every text, or None.
+        image: image token.
+        template: chat template with the same output as the family's.
+        config: builds the model's config from the ids of the special tokens and the vocabulary size.
         image_processor: class of the image processor.
-        image_settings: its settings where they differ from the class's.
-        family: the family.
-        files: further files of a saved checkpoint, name to JSON content: what the full processor, which cannot be built
-            without torchvision, would write.
+        image_settings: settings of the image processor that differ from the defaults of its class.
+        family: builds the family of the model.
+        files: further files of a saved checkpoint, name to JSON content; the full processor, which cannot be built
+            without torchvision, would write them.
     """
 
     special: tuple[str, ...]
@@ -56,53 +57,106 @@ class Twin:
     files: Mapping[str, Mapping[str, Any]]
 
     def tokenizer(self) -> PreTrainedTokenizerBase:
-        """The tokenizer, trained anew."""
+        """Train the tokenizer."""
         return train_tokenizer(
             self.special, end=self.end, pad=self.pad, begin=self.begin, named={"image_token": self.image}
         )
 
     def model_config(self, tokenizer: PreTrainedTokenizerBase) -> Any:
-        """The config for a tokenizer."""
-        return self.config(_ids(self.special, tokenizer), len(tokenizer))
+        """Return the model's config for a tokenizer."""
+        return self.config(token_ids(self.special, tokenizer), len(tokenizer))
 
     def model(self, tokenizer: PreTrainedTokenizerBase, config: Any, seed: int, attn_implementation: str) -> Any:
-        """The model with random weights of this seed, in float32 on the CPU."""
-        ids = _ids(self.special, tokenizer)
-        with torch.random.fork_rng(devices=[]):
-            torch.manual_seed(seed)
-            model = cast(Any, AutoModelForImageTextToText).from_config(
-                config, attn_implementation=attn_implementation, dtype=torch.float32
-            )
-        ends = list(dict.fromkeys([ids[self.end], ids[self.pad]]))
-        model.generation_config = GenerationConfig(eos_token_id=ends, pad_token_id=ids[self.pad])
-        return model
+        """Return the model with random weights of this seed, in float32 on the CPU."""
+        ids = token_ids((self.end, self.pad), tokenizer)
+        return draw_model(config, seed, ids[self.end], ids[self.pad], attn_implementation)
 
     def save(self, folder: Path, seed: int) -> None:
         """Write a checkpoint that the family's adapter and transformers' auto classes load.
 
         Args:
-            folder: made if it does not exist.
-            seed: of the weights.
+            folder: folder of the checkpoint; it is created.
+            seed: seed of the weights.
         """
         folder.mkdir(parents=True, exist_ok=True)
         tokenizer = self.tokenizer()
         tokenizer.chat_template = self.template
-        tokenizer.save_pretrained(folder)
-        self.model(tokenizer, self.model_config(tokenizer), seed, "sdpa").save_pretrained(folder)
-        self.image_processor(**self.image_settings).save_pretrained(folder)
+        with hide_transformers_output():
+            tokenizer.save_pretrained(folder)
+            self.model(tokenizer, self.model_config(tokenizer), seed, "sdpa").save_pretrained(folder)
+            self.image_processor(**self.image_settings).save_pretrained(folder)
         for name, content in self.files.items():
             (folder / name).write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
 
 
-def _ids(tokens: Sequence[str], tokenizer: PreTrainedTokenizerBase) -> dict[str, int]:
+def token_ids(tokens: Sequence[str], tokenizer: PreTrainedTokenizerBase) -> dict[str, int]:
+    """Return the ids of tokens by their texts."""
     return {token: cast(int, tokenizer.convert_tokens_to_ids(token)) for token in tokens}
+
+
+def draw_model(config: Any, seed: int, end_id: int, pad_id: int, attn_implementation: str = "sdpa") -> Any:
+    """Return a transformers model with random weights, in float32 on the CPU.
+
+    Args:
+        config: config of the model.
+        seed: seed of the weights; torch's global generator is left as it was.
+        end_id: token that ends a turn.
+        pad_id: padding token, which also ends a turn.
+        attn_implementation: transformers' name of the attention kernel.
+    """
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(seed)
+        model = cast(Any, AutoModelForImageTextToText).from_config(
+            config, attn_implementation=attn_implementation, dtype=torch.float32
+        )
+    model.generation_config = GenerationConfig(eos_token_id=list(dict.fromkeys([end_id, pad_id])), pad_token_id=pad_id)
+    return model
+
+
+def text_config(vocab_size: int, end_id: int, pad_id: int, **settings: Any) -> dict[str, Any]:
+    """Return the config of a tiny language model of two layers.
+
+    Args:
+        vocab_size: size of the vocabulary.
+        end_id: token that ends a turn.
+        pad_id: padding token.
+        settings: further settings, or others than the usual ones.
+    """
+    return {
+        "vocab_size": vocab_size,
+        "hidden_size": 64,
+        "intermediate_size": 128,
+        "num_hidden_layers": 2,
+        "num_attention_heads": 4,
+        "num_key_value_heads": 2,
+        "initializer_range": SPREAD,
+        "bos_token_id": None,
+        "eos_token_id": end_id,
+        "pad_token_id": pad_id,
+        **settings,
+    }
+
+
+def siglip_config(patch_size: int) -> dict[str, Any]:
+    """Return the config of a tiny SigLIP tower of one layer for images of 384 x 384 pixels."""
+    return {
+        "model_type": "siglip_vision_model",
+        "image_size": 384,
+        "patch_size": patch_size,
+        "hidden_size": 16,
+        "intermediate_size": 32,
+        "num_hidden_layers": 1,
+        "num_attention_heads": 1,
+        "vision_use_head": False,
+    }
 
 
 class TinyAdapter:
     """Base of the adapters of tiny models.
 
     Attributes:
-        twin: what the model is made from.
+        Options: options of the adapter.
+        twin: description of the model.
     """
 
     Options: ClassVar[type] = TinyOptions
@@ -110,7 +164,7 @@ class TinyAdapter:
 
     @classmethod
     def build(cls, name: str, options: TinyOptions, seed: int) -> TransformersModel:
-        """Make a model with random weights of this seed."""
+        """Build a model with random weights of this seed."""
         twin = cls.twin
         tokenizer = twin.tokenizer()
         dtype = resolve_dtype(options)

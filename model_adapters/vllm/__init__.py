@@ -1,1 +1,1 @@
-"""Models that vLLM runs in this process; `engine` is the one module that imports it."""
+"""Models that vLLM runs in this process; only `engine` imports vLLM."""

@@ -1,4 +1,4 @@
-"""From our options and a checkpoint's config to the arguments of `vllm.LLM`. Nothing here imports vLLM."""
+"""Arguments of `vllm.LLM` from our options and a checkpoint's config. Nothing here imports vLLM."""
 
 from pathlib import Path
 from typing import Any
@@ -9,19 +9,19 @@ from model_adapters.vllm.options import EngineOptions, VllmOptions
 
 __all__ = ["engine_arguments", "frame_limit", "model_arguments", "rope_overrides", "token_limit"]
 
-# Whose extended length vLLM reads off max_position_embeddings; the length of the others it multiplies by the factor.
+# vLLM reads the extended length of these from max_position_embeddings; for others it multiplies by the factor itself.
 _LENGTH_IN_CONFIG = ("yarn", "longrope")
-_NO_VIDEO = 0  # else vLLM reserves memory for the longest video that the model could be shown
+_NO_VIDEO = 0  # otherwise vLLM reserves memory for the longest possible video
 
 
 def engine_arguments(folder: Path, options: EngineOptions) -> dict[str, Any]:
-    """What every model is started with.
+    """Return the arguments of every model.
 
     Args:
-        folder: the checkpoint's: vLLM reads the files that were found here, so that both engines run the same ones.
-        options: as typed; what is None is left to vLLM.
+        folder: folder of the checkpoint, found or downloaded here, so that both engines run the same files.
+        options: options of the model; None leaves the choice to vLLM.
     """
-    chosen = {
+    optional = {
         "max_model_len": options.max_model_len,
         "distributed_executor_backend": options.distributed_executor_backend,
         "quantization": options.quantization,
@@ -37,24 +37,24 @@ def engine_arguments(folder: Path, options: EngineOptions) -> dict[str, Any]:
         "gpu_memory_utilization": options.gpu_memory_utilization,
         "enforce_eager": options.enforce_eager,
         "enable_prefix_caching": options.prefix_caching,
-        **{name: value for name, value in chosen.items() if value is not None},
+        **{name: value for name, value in optional.items() if value is not None},
     }
 
 
 def model_arguments(
     folder: Path, config: Any, options: VllmOptions, *, max_tokens: int, max_frames: int
 ) -> dict[str, Any]:
-    """What a model that can be talked to is started with.
+    """Return the arguments of a model that answers in conversations.
 
     Args:
-        folder: the checkpoint's.
-        config: its config, with the extension of the context written into it.
-        options: as typed.
+        folder: folder of the checkpoint.
+        config: config of the checkpoint, including a context extension.
+        options: options of the model.
         max_tokens: most tokens of context and reply together.
         max_frames: most frames of a request.
 
     Raises:
-        ModelError: vLLM has no such extension for this model.
+        ModelError: vLLM does not support the context extension for this model.
     """
     frames = {"count": max_frames, "width": options.frame_size, "height": options.frame_size}
     arguments = engine_arguments(folder, options) | {
@@ -70,46 +70,48 @@ def model_arguments(
 
 
 def token_limit(pretrained: str, limit: int | None, options: VllmOptions) -> int:
-    """Most tokens of context and reply together.
+    """Return the most tokens of context and reply together.
 
     Args:
-        pretrained: the checkpoint, for the message.
-        limit: its own, extended; None where its config names none.
-        options: as typed.
+        pretrained: name of the checkpoint, for the message.
+        limit: limit of the checkpoint, extended, or None if its config has none.
+        options: options of the model.
 
     Raises:
-        ModelError: there is none.
+        ModelError: neither the options nor the config has a limit.
     """
-    chosen = options.max_model_len or limit
-    if chosen is None:
-        raise ModelError(f"the config of {pretrained} names no longest context; give max_model_len=")
-    return chosen
+    n_tokens = options.max_model_len or limit
+    if n_tokens is None:
+        raise ModelError(f"the config of {pretrained} has no context limit; give max_model_len=")
+    return n_tokens
 
 
 def frame_limit(max_tokens: int, tokens_per_frame: int, options: VllmOptions) -> int:
-    """Most frames of a request: what was asked for, else as many as fit."""
+    """Return the most frames of a request: that of the options, else as many as fit."""
     return options.max_frames or max(1, max_tokens // tokens_per_frame)
 
 
 def rope_overrides(config: Any, rope: str) -> dict[str, Any]:
-    """The extension of a context as vLLM takes it: in the language model's own config, whole.
+    """Return a context extension as overrides of the language model's config, in vLLM's form.
+
+    vLLM replaces `rope_parameters` as a whole, so all of them are given.
 
     Args:
-        config: the model's, into which `apply_rope` has written the extension.
+        config: config of the model, with the extension written by `apply_rope`.
         rope: `TYPE:FACTOR`.
 
     Raises:
-        ModelError: vLLM would drop the model's positions of three axes, and say nothing.
+        ModelError: vLLM would silently drop the model's three-axis positions.
     """
     rope_type, factor = parse_rope(rope)
     text = config.get_text_config()
     if "mrope_section" in text.rope_parameters and rope_type != "yarn":
         raise ModelError(
-            f"rope={rope}: of {config.model_type}, whose positions have three axes, vLLM extends the context by "
-            f"yarn alone; use yarn:{factor:g}"
+            f"rope={rope}: for {config.model_type}, which has three-axis positions, vLLM supports only yarn; "
+            f"use yarn:{factor:g}"
         )
-    changed: dict[str, Any] = {"rope_parameters": dict(text.rope_parameters)}
+    overrides: dict[str, Any] = {"rope_parameters": dict(text.rope_parameters)}
     if rope_type in _LENGTH_IN_CONFIG:
-        changed["max_position_embeddings"] = int(text.max_position_embeddings * factor)
+        overrides["max_position_embeddings"] = int(text.max_position_embeddings * factor)
     nested = next((name for name in config.sub_configs if getattr(config, name, None) is text), None)
-    return changed if nested is None else {nested: changed}
+    return overrides if nested is None else {nested: overrides}

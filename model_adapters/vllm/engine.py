@@ -1,4 +1,4 @@
-"""The one module that imports vLLM: starts it, asks it, and says in one line what went wrong."""
+"""vLLM itself, with its errors as one line each; no other module imports it."""
 
 import gc
 import importlib
@@ -18,12 +18,12 @@ __all__ = ["Engine", "EngineOutput", "EngineRequest", "SamplingSettings", "impor
 
 @dataclass(frozen=True)
 class EngineRequest:
-    """What is to be continued.
+    """A prompt to continue.
 
     Attributes:
-        ids: of the prompt, one placeholder per frame, which vLLM expands.
-        images: the frames, in order.
-        names: what tells the frames apart, so that vLLM need not hash their pixels; none has it hash them.
+        ids: token ids of the prompt, with one placeholder per frame, which vLLM expands.
+        images: frames in order.
+        names: unique names of the frames, which save vLLM from hashing pixels; if empty, it hashes them.
     """
 
     ids: Sequence[int]
@@ -31,7 +31,7 @@ class EngineRequest:
     names: Sequence[str] = ()
 
     def prompt(self) -> dict[str, Any]:
-        """As vLLM takes it."""
+        """Return the prompt in vLLM's form."""
         prompt: dict[str, Any] = {"prompt_token_ids": list(self.ids)}
         if self.images:
             prompt["multi_modal_data"] = {"image": list(self.images)}
@@ -42,11 +42,11 @@ class EngineRequest:
 
 @dataclass(frozen=True, kw_only=True)
 class SamplingSettings:
-    """How a request is continued.
+    """Decoding of requests.
 
     Attributes:
         settings: arguments of `vllm.SamplingParams`.
-        choices: where there are any, the reply is one of these texts.
+        choices: allowed replies; if there are any, the reply is one of them.
     """
 
     settings: Mapping[str, Any]
@@ -55,13 +55,13 @@ class SamplingSettings:
 
 @dataclass(frozen=True)
 class EngineOutput:
-    """What vLLM wrote.
+    """vLLM's output for one request.
 
     Attributes:
-        ids: the reply's, with the token that ended it.
-        text: the reply as vLLM spells it.
+        ids: token ids of the reply, including the end token.
+        text: text of the reply as vLLM decodes it.
         n_context: tokens of the prompt, frames expanded.
-        n_cached: how many of them were not encoded again; None where vLLM does not tell.
+        n_cached: tokens of the prompt that were not encoded again, or None if vLLM does not report them.
     """
 
     ids: tuple[int, ...]
@@ -71,20 +71,20 @@ class EngineOutput:
 
 
 def import_vllm(name: str) -> Any:
-    """The package, or a line that says how to get it.
+    """Return the package vllm.
 
     Args:
-        name: of the model, for the message.
+        name: name of the model, for the message.
 
     Raises:
-        ModelError: it is not installed, or does not import.
+        ModelError: the package is not installed, or cannot be imported.
     """
-    os.environ.setdefault("VLLM_LOGGING_STREAM", "ext://sys.stderr")  # tables go to standard output
-    if multiprocessing.current_process().daemon:  # a worker of --workers, which may start no process of its own
+    os.environ.setdefault("VLLM_LOGGING_STREAM", "ext://sys.stderr")  # standard output is for tables
+    if multiprocessing.current_process().daemon:  # a worker of --workers, which must not start processes
         os.environ.setdefault("VLLM_ENABLE_V1_MULTIPROCESSING", "0")
-    mend = "pip install 'infthor-eval[vllm]', on a machine that vLLM runs on"
+    hint = "pip install 'infthor-eval[vllm]', on a machine that vLLM runs on"
     with wrap_errors(
-        f"{name} needs the package vllm", mend, catch=(ImportError, OSError, RuntimeError), raise_as=ModelError
+        f"{name} needs the package vllm", hint, catch=(ImportError, OSError, RuntimeError), raise_as=ModelError
     ):
         return importlib.import_module("vllm")
 
@@ -93,15 +93,15 @@ class Engine:
     """A model in vLLM.
 
     Args:
-        name: the registry's name, for messages.
-        arguments: of `vllm.LLM`.
+        name: name in the registry, for messages.
+        arguments: arguments of `vllm.LLM`.
 
     Attributes:
-        version: vLLM's.
-        batch_invariant: whether vLLM was told to compute a request the same way whatever is run beside it.
+        version: version of vLLM.
+        batch_invariant: true if replies do not depend on what runs in the same batch (vLLM's batch-invariant mode).
 
     Raises:
-        ModelError: vLLM is not there, or does not start.
+        ModelError: vLLM is not installed, or does not start.
     """
 
     def __init__(self, name: str, arguments: Mapping[str, Any]) -> None:
@@ -109,26 +109,26 @@ class Engine:
         self._vllm = import_vllm(name)
         self.version = str(self._vllm.__version__)
         self.batch_invariant = os.environ.get("VLLM_BATCH_INVARIANT", "0") not in ("", "0")
-        less = "read above what it printed; for less memory, a smaller max_model_len or max_frames"
-        with self._naming("does not start", less):
+        hint = "see its output above; if memory is short, set a smaller max_model_len or max_frames"
+        with self._wrap_errors("does not start", hint):
             self._llm = self._vllm.LLM(**arguments)
 
     def generate(self, requests: Sequence[EngineRequest], sampling: SamplingSettings) -> list[EngineOutput]:
-        """Continue all requests, each for itself.
+        """Continue all requests independently.
 
         Raises:
-            ModelError: vLLM refuses one, memory ran out, or it died; nothing is answered then.
+            ModelError: vLLM refuses one, memory ran out, or it died; no output is returned then.
         """
         if not requests:
             return []
-        with self._naming("fails on the request", "ask with fewer frames, or start the command again, which goes on"):
+        with self._wrap_errors("fails on the request", "use fewer frames, or run the command again, which resumes"):
             outputs = self._llm.generate(
                 [request.prompt() for request in requests], sampling_params=self._params(sampling), use_tqdm=False
             )
-            return [_written(output) for output in outputs]
+            return [_engine_output(output) for output in outputs]
 
     def close(self) -> None:
-        """Give the memory back: vLLM ends its processes with the last reference to it."""
+        """Free the memory: vLLM ends its processes when the last reference to it is gone."""
         del self._llm
         gc.collect()
 
@@ -139,11 +139,11 @@ class Engine:
             settings["structured_outputs"] = params.StructuredOutputsParams(choice=list(sampling.choices))
         return self._vllm.SamplingParams(**settings)
 
-    def _naming(self, what: str, mend: str) -> AbstractContextManager[None]:
-        # vLLM's errors have no common base, and some come from torch or from the processes that it started.
-        return wrap_errors(f"{self._name}: vLLM {self.version} {what}", mend, catch=Exception, raise_as=ModelError)
+    def _wrap_errors(self, problem: str, hint: str) -> AbstractContextManager[None]:
+        # vLLM's errors have no common base class, and some come from torch or from its worker processes.
+        return wrap_errors(f"{self._name}: vLLM {self.version} {problem}", hint, catch=Exception, raise_as=ModelError)
 
 
-def _written(output: Any) -> EngineOutput:
+def _engine_output(output: Any) -> EngineOutput:
     reply = output.outputs[0]
     return EngineOutput(tuple(reply.token_ids), reply.text, len(output.prompt_token_ids), output.num_cached_tokens)

@@ -1,4 +1,4 @@
-"""A model in vLLM as the harness talks to it."""
+"""A model in vLLM behind the `Model` protocol."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -6,35 +6,34 @@ from typing import Any
 from PIL import Image
 
 from infthor_eval.errors import ModelError
-from infthor_eval.formats.frames import FrameRef
-from model_adapters.backend import BackendConversation
+from model_adapters.hf.checkpoint_model import CheckpointModel
 from model_adapters.hf.choices import read_choices
-from model_adapters.hf.limits import check_limit, naming_model_errors
+from model_adapters.hf.limits import check_limit, wrap_model_errors
 from model_adapters.hf.loaded import Loaded
-from model_adapters.hf.prompt import Frame, Piece, Prompter, n_common, n_tokens
-from model_adapters.hf.replies import said, stop_ids
+from model_adapters.hf.prompt import Frame, Piece, n_common, n_tokens
+from model_adapters.hf.replies import reply_text, stop_ids
 from model_adapters.protocols import Capabilities, Decoding, Reply, Turn
 from model_adapters.vllm.engine import Engine, EngineOutput, EngineRequest, SamplingSettings
 from model_adapters.vllm.options import VllmOptions
 
 __all__ = ["VllmModel"]
 
-_BATCH = 64  # continuations at once; vLLM itself decides how many of them it runs together
-_SEEDS = 2**63  # of torch's generators
-_OF_AN_OUTLINE = ("device", "dtype", "attn_implementation", "quantization")  # which runs nothing
+_BATCH = 64  # continuations per call; vLLM decides how many of them it runs together
+_SEEDS = 2**63  # number of seeds of torch's generators
+_META_KEYS = ("device", "dtype", "attn_implementation", "quantization")  # of the meta model, which does not run
 
 
-class VllmModel:
+class VllmModel(CheckpointModel):
     """A checkpoint in vLLM behind the `Model` protocol.
 
-    What is read is written here, as for transformers: prompts go to vLLM as token ids, one placeholder per frame.
-    What requests share, its prefix cache finds.
+    Prompts are written here, as for transformers, and go to vLLM as token ids with one placeholder per frame. vLLM's
+    prefix cache finds what requests share.
 
     Args:
-        name: the registry's name.
+        name: name in the registry.
         loaded: the checkpoint without weights.
-        engine: has the weights.
-        options: how it is run.
+        engine: vLLM with the weights.
+        options: options of the model.
         max_tokens: most tokens of context and reply together.
         max_frames: most frames of a request.
     """
@@ -42,21 +41,19 @@ class VllmModel:
     def __init__(
         self, name: str, loaded: Loaded, engine: Engine, options: VllmOptions, *, max_tokens: int, max_frames: int
     ) -> None:
-        self.name = name
-        self._loaded = loaded
+        super().__init__(name, loaded)
         self._engine = engine
         self._options = options
         self._max_tokens = max_tokens
         self._max_frames = max_frames
-        self._prompter = Prompter(loaded.tokenizer, loaded.template, loaded.family)
-        # vLLM ends a reply at the tokenizer's own end token too.
+        # vLLM also ends a reply at the tokenizer's end token.
         self._ends = loaded.generation.end_ids | ({loaded.tokenizer.eos_token_id} - {None})
-        self._images: dict[str, Image.Image] = {}  # of the last requests, by the digest of the frame's file
-        self._read: Sequence[Piece] = ()  # by the last request
+        self._images: dict[str, Image.Image] = {}  # frames of the last requests, by the digest of the file
+        self._last_prompt: Sequence[Piece] = ()
 
     @property
     def capabilities(self) -> Capabilities:
-        """Sampling and choices, many continuations together; equal requests may differ by what is run beside them."""
+        """Sampling and choices, many continuations together; replies may depend on what runs in the same batch."""
         text = self._loaded.model.config.get_text_config()
         return Capabilities(
             deterministic=False,
@@ -68,10 +65,10 @@ class VllmModel:
         )
 
     def identity(self) -> dict[str, Any]:
-        """Checkpoint, precision, how vLLM runs it, versions and generation settings, as JSON values."""
+        """Return checkpoint, precision, engine settings, versions and generation settings, as JSON values."""
         options, loaded = self._options, self._loaded
-        described = {name: value for name, value in loaded.identity.items() if name not in _OF_AN_OUTLINE}
-        return described | {
+        checkpoint = {name: value for name, value in loaded.identity.items() if name not in _META_KEYS}
+        return checkpoint | {
             "adapter": self.name,
             "engine": "vllm",
             "versions": {**loaded.identity["versions"], "vllm": self._engine.version},
@@ -91,60 +88,45 @@ class VllmModel:
             },
         }
 
-    def tokens_per_frame(self, frame: FrameRef) -> int:
-        """How many tokens one frame becomes, as the checkpoint's processor has it."""
-        with naming_model_errors(self.name):
-            return len(self._prompter.frame(frame).ids)
-
-    def conversation(self) -> BackendConversation:
-        """A new, empty conversation."""
-        return BackendConversation(self)
-
     def close(self) -> None:
-        """End vLLM."""
+        """Stop vLLM."""
         self._engine.close()
         self._images.clear()
-
-    def count(self, turns: Sequence[Turn]) -> int:
-        """Tokens that a reply to these turns would be made from."""
-        with naming_model_errors(self.name):
-            return n_tokens(self._prompter.pieces(turns))
-
-    def answer(self, turns: Sequence[Turn], decoding: Decoding) -> Reply:
-        """Answer a conversation; see `Conversation.reply`."""
-        return self.answer_each([turns], decoding)[0]
 
     def answer_each(self, conversations: Sequence[Sequence[Turn]], decoding: Decoding) -> list[Reply]:
         """Answer several conversations; see `Conversation.replies`.
 
-        Where they begin alike and vLLM has not read that yet, the first goes alone, so that the others, sent together,
-        find what it left in the cache.
+        If they share a prefix that is not in vLLM's cache, the first is sent alone and fills it: sent together, all of
+        them would compute the prefix.
         """
-        with naming_model_errors(self.name):
-            prompts = [self._prompter.pieces(turns) for turns in conversations]
+        with wrap_model_errors(self.name):
+            prompts = [self.pieces(turns) for turns in conversations]
         for prompt in prompts:
-            self._check(prompt, decoding)
+            self._check_size(prompt, decoding)
         sampling = self._sampling(decoding)
         requests = self._requests(prompts)
-        alone = 1 if self._shares_what_is_not_read(prompts) else 0
-        written = self._engine.generate(requests[:alone], sampling) + self._engine.generate(requests[alone:], sampling)
-        self._read = prompts[-1] if prompts else self._read
-        return [self._reply(prompt, found, decoding) for prompt, found in zip(prompts, written, strict=True)]
+        n_first = 1 if self._share_uncached_prefix(prompts) else 0
+        outputs = [
+            *self._engine.generate(requests[:n_first], sampling),
+            *self._engine.generate(requests[n_first:], sampling),
+        ]
+        self._last_prompt = prompts[-1] if prompts else self._last_prompt
+        return [self._reply(prompt, output, decoding) for prompt, output in zip(prompts, outputs, strict=True)]
 
-    def _shares_what_is_not_read(self, prompts: Sequence[Sequence[Piece]]) -> bool:
+    def _share_uncached_prefix(self, prompts: Sequence[Sequence[Piece]]) -> bool:
         if len(prompts) < 2 or not self._options.prefix_caching:
             return False
         common = n_common(prompts)
-        return list(self._read[:common]) != list(prompts[0][:common])
+        return list(self._last_prompt[:common]) != list(prompts[0][:common])
 
-    def _check(self, prompt: Sequence[Piece], decoding: Decoding) -> None:
+    def _check_size(self, prompt: Sequence[Piece], decoding: Decoding) -> None:
         check_limit(self.name, n_tokens(prompt), decoding.max_new_tokens, self._max_tokens, "max_model_len")
         n_frames = sum(isinstance(piece, Frame) for piece in prompt)
         if n_frames > self._max_frames:
             raise ModelError(f"{n_frames} frames are more than max_frames={self._max_frames} of {self.name}; raise it")
 
     def _sampling(self, decoding: Decoding) -> SamplingSettings:
-        read_choices(self._loaded.tokenizer, decoding)  # refuses those that are longer than the reply may be
+        read_choices(self._loaded.tokenizer, decoding)  # refuses choices that are longer than the reply may be
         settings: dict[str, Any] = {
             "max_tokens": decoding.max_new_tokens,
             "temperature": decoding.temperature,
@@ -154,7 +136,7 @@ class VllmModel:
         if not decoding.greedy:
             settings |= {"top_p": decoding.top_p, "seed": decoding.seed % _SEEDS}
         if decoding.stop and not decoding.choices:
-            # A special token is in no text that stop strings are looked for in, so it stops by its id.
+            # vLLM searches the text for stop strings, in which special tokens do not appear: these stop by their id.
             ends = self._ends | stop_ids(self._loaded.tokenizer, decoding)
             settings |= {"stop": list(decoding.stop), "stop_token_ids": sorted(ends)}
         return SamplingSettings(settings=settings, choices=decoding.choices)
@@ -170,23 +152,24 @@ class VllmModel:
         ids = [placeholder if isinstance(piece, Frame) else piece for piece in prompt]
         return EngineRequest(ids, [self._images[digest] for digest in digests], digests)
 
-    def _reply(self, prompt: Sequence[Piece], written: EngineOutput, decoding: Decoding) -> Reply:
+    def _reply(self, prompt: Sequence[Piece], output: EngineOutput, decoding: Decoding) -> Reply:
         expected = n_tokens(prompt)
-        if written.n_context != expected:
+        if output.n_context != expected:
             raise ModelError(
-                f"{self.name}: vLLM {self._engine.version} reads {written.n_context} tokens where the checkpoint's "
-                f"processor makes {expected}: it sees other frames; run it with --engine transformers"
+                f"{self.name}: vLLM {self._engine.version} reads {output.n_context} tokens where the checkpoint's "
+                f"processor makes {expected}: it processes frames differently; run it with --engine transformers"
             )
-        ids = written.ids[:-1] if written.ids and written.ids[-1] in self._ends else written.ids
+        ids = output.ids[:-1] if output.ids and output.ids[-1] in self._ends else output.ids
+        free_text = reply_text(self._loaded.tokenizer, ids, decoding)
         return Reply(
-            self._held(written.text, decoding) if decoding.choices else said(self._loaded.tokenizer, ids, decoding),
+            self._require_choice(output.text, decoding) if decoding.choices else free_text,
             n_reply_tokens=len(ids),
-            n_context_tokens=written.n_context,
-            n_cached_tokens=written.n_cached,
+            n_context_tokens=output.n_context,
+            n_cached_tokens=output.n_cached,
             token_ids=ids,
         )
 
-    def _held(self, text: str, decoding: Decoding) -> str:
+    def _require_choice(self, text: str, decoding: Decoding) -> str:
         if text not in decoding.choices:
             raise ModelError(
                 f"{self.name}: vLLM {self._engine.version} answers {text[:40]!r}, which is none of the "

@@ -1,4 +1,4 @@
-"""OpenVLA in vLLM: its prompt, its action tokens and its statistics are those of the native port."""
+"""OpenVLA in vLLM, with prompt, action tokens and statistics of the native port."""
 
 from typing import Any, ClassVar
 
@@ -7,7 +7,7 @@ from PIL import Image
 
 from infthor_eval.errors import ModelError
 from model_adapters.hf.checkpoint import versions
-from model_adapters.policies.checkpoint import find
+from model_adapters.policies.checkpoint import find_policy_checkpoint
 from model_adapters.policies.openvla.adapter import OpenVLADescription, describe_openvla
 from model_adapters.policies.openvla.network import prompt_ids
 from model_adapters.policies.policy import VlaPolicy
@@ -27,16 +27,16 @@ class OpenVLAOnVllm:
 
     @classmethod
     def build(cls, name: str, options: OpenVLAOnVllmOptions, seed: int) -> "VllmPolicy":  # noqa: ARG003
-        """Start vLLM with a checkpoint; nothing in it is random.
+        """Start vLLM with a checkpoint; the seed is not used.
 
         Raises:
-            ModelError: vLLM is not there, or the checkpoint cannot be run.
-            UsageError: an unknown unnorm_key.
-            DataError: a file beside its weights is missing or damaged.
+            ModelError: vLLM is not installed, or the checkpoint cannot be run.
+            UsageError: the unnorm_key is unknown.
+            DataError: a file beside the weights is missing or damaged.
         """
-        import_vllm(name)  # told before gigabytes are fetched
-        checkpoint = find(options.pretrained, options.revision)
-        described = describe_openvla(checkpoint, options.unnorm_key)
+        import_vllm(name)  # fails before gigabytes are downloaded
+        checkpoint = find_policy_checkpoint(options.pretrained, options.revision)
+        description = describe_openvla(checkpoint, options.unnorm_key)
         engine = Engine(name, engine_arguments(checkpoint.folder, options) | {"limit_mm_per_prompt": {"image": 1}})
         identity = checkpoint.origin | {
             "engine": "vllm",
@@ -46,65 +46,65 @@ class OpenVLAOnVllm:
             "parallel": [options.tensor_parallel_size, options.pipeline_parallel_size, options.data_parallel_size],
             "enforce_eager": options.enforce_eager,
             "batch_invariant": engine.batch_invariant,
-            "unnorm_key": described.key,
+            "unnorm_key": description.key,
         }
-        return VllmPolicy(name, _Network(name, engine, described), described, options, identity)
+        return VllmPolicy(name, _VllmNetwork(name, engine, description), description, options, identity)
 
 
-class _Network:
-    """The actions that vLLM writes.
+class _VllmNetwork:
+    """A network that lets vLLM decode the action tokens.
 
     Args:
-        name: of the policy, for messages.
-        engine: has the weights.
-        described: prompt, action tokens and statistics of the checkpoint.
+        name: name of the policy, for messages.
+        engine: vLLM with the weights.
+        description: the checkpoint without weights.
     """
 
-    def __init__(self, name: str, engine: Engine, described: OpenVLADescription) -> None:
+    def __init__(self, name: str, engine: Engine, description: OpenVLADescription) -> None:
         self.engine = engine
         self._name = name
-        self._described = described
+        self._description = description
 
     def predict(self, image: Image.Image, instruction: str, *, constrained: bool) -> Actions:
-        """A chunk of one action; see `Network.predict` of the policies."""
-        legal = self._described.bins.legal
+        """Return a chunk of one action; see `Network.predict` of the policies."""
+        action_ids = self._description.bins.action_ids
         settings: dict[str, Any] = {"max_tokens": ACTION_SIZE, "temperature": 0.0, "ignore_eos": True}
         if constrained:
-            settings["allowed_token_ids"] = list(legal)
-        request = EngineRequest(prompt_ids(self._described.tokenizer, instruction), [image])
-        (written,) = self.engine.generate([request], SamplingSettings(settings=settings))
-        if len(written.ids) != ACTION_SIZE:
-            raise ModelError(f"{self._name}: vLLM wrote {len(written.ids)} action tokens, not {ACTION_SIZE}; report it")
-        return self._described.bins.decode(np.clip(written.ids, legal.start, legal.stop - 1).tolist())
+            settings["allowed_token_ids"] = list(action_ids)
+        request = EngineRequest(prompt_ids(self._description.tokenizer, instruction), [image])
+        (output,) = self.engine.generate([request], SamplingSettings(settings=settings))
+        if len(output.ids) != ACTION_SIZE:
+            raise ModelError(f"{self._name}: vLLM wrote {len(output.ids)} action tokens, not {ACTION_SIZE}; report it")
+        return self._description.bins.decode(np.clip(output.ids, action_ids.start, action_ids.stop - 1).tolist())
 
 
 class VllmPolicy(VlaPolicy):
     """A policy whose weights are in vLLM.
 
     Args:
-        name: the registry's name.
-        network: asks vLLM.
-        described: the checkpoint without weights.
-        options: how it is run.
-        identity: of checkpoint, dataset and engine, as JSON values.
+        name: name in the registry.
+        network: network that uses vLLM.
+        description: the checkpoint without weights.
+        options: options of the policy.
+        identity: identity of checkpoint, dataset and engine, as JSON values.
     """
 
     def __init__(
         self,
         name: str,
-        network: _Network,
-        described: OpenVLADescription,
+        network: _VllmNetwork,
+        description: OpenVLADescription,
         options: VllmPolicyOptions,
         identity: dict[str, Any],
     ) -> None:
-        super().__init__(name, network, described.statistics, options, identity)
+        super().__init__(name, network, description.statistics, options, identity)
         self._engine = network.engine
 
     @property
     def capabilities(self) -> Capabilities:
-        """One request at a time; vLLM does not promise equal actions on equal frames."""
+        """One request at a time; vLLM does not guarantee equal actions on equal frames."""
         return Capabilities(counts_tokens=False, token_ids=False, deterministic=False)
 
     def close(self) -> None:
-        """End vLLM."""
+        """Stop vLLM."""
         self._engine.close()

@@ -1,4 +1,4 @@
-"""Options of models that vLLM runs; docs/vllm.md says what becomes of each."""
+"""Options of models that vLLM runs; docs/vllm.md lists the corresponding arguments of vLLM."""
 
 from dataclasses import dataclass
 
@@ -39,22 +39,22 @@ _LAUNCHED = "external_launcher"
 
 @dataclass(frozen=True, kw_only=True)
 class EngineOptions:
-    """How vLLM is started, whatever it runs.
+    """Options of vLLM for models and policies.
 
     Attributes:
-        dtype: of the weights: bfloat16, float16, float32, or auto: as in the checkpoint, but for float32, of which vLLM
-            makes float16.
+        dtype: type of the weights: bfloat16, float16, float32, or auto for that of the checkpoint (vLLM converts
+            float32 to float16).
         max_model_len: most tokens of context and reply together; the checkpoint's limit where None.
-        tensor_parallel_size: GPUs that share each layer.
-        pipeline_parallel_size: GPUs, or groups of them, that share the layers out.
+        tensor_parallel_size: GPUs that split each layer.
+        pipeline_parallel_size: GPUs, or groups of GPUs, that split the layers among them.
         data_parallel_size: copies of the model; above 1 only with distributed_executor_backend=external_launcher.
         distributed_executor_backend: mp, ray, uni or external_launcher; vLLM's own choice where None.
-        gpu_memory_utilization: share of a GPU's memory that vLLM takes, above 0 and at most 1.
-        enforce_eager: run without CUDA graphs: slower, less memory.
+        gpu_memory_utilization: fraction of a GPU's memory that vLLM uses, above 0 and at most 1.
+        enforce_eager: run without CUDA graphs, which is slower and needs less memory.
         quantization: vLLM's name of a method (fp8, awq, bitsandbytes, ...); the checkpoint's own where None.
-        prefix_caching: keep the keys and values of what was read, for requests that begin alike.
+        prefix_caching: cache keys and values for requests with a common prefix.
         mm_processor_cache_gb: memory for processed frames, in GiB; vLLM's default where None.
-        seed: of the engine; each request has its own besides.
+        seed: seed of the engine; each request has its own in addition.
     """
 
     dtype: str = "auto"
@@ -71,10 +71,10 @@ class EngineOptions:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        """Refuse what vLLM would refuse after minutes of loading.
+        """Refuse values that vLLM would refuse only after minutes of loading.
 
         Raises:
-            ValueError: names the option.
+            ValueError: a value is not valid; the message names the option.
         """
         if self.dtype not in _DTYPES:
             raise ValueError(f"dtype={self.dtype} is not {', '.join(_DTYPES)}")
@@ -86,17 +86,17 @@ class EngineOptions:
                 raise ValueError(f"{name}={value} is not from {least:,} to {most:,}")
         if self.data_parallel_size > 1 and self.distributed_executor_backend != _LAUNCHED:
             raise ValueError(
-                f"data_parallel_size={self.data_parallel_size} is refused by vLLM in one process, but with "
-                f"distributed_executor_backend={_LAUNCHED}; use --workers {self.data_parallel_size}, a model each"
+                f"data_parallel_size={self.data_parallel_size} needs distributed_executor_backend={_LAUNCHED} in vLLM; "
+                f"use --workers {self.data_parallel_size} instead, with a model in each"
             )
 
 
 @dataclass(frozen=True, kw_only=True)
 class VllmOptions(EngineOptions, CheckpointReading):
-    """How a model is run that can be talked to.
+    """Options of a model that answers in conversations.
 
     Attributes:
-        frame_size: width and height in pixels of the largest frame, by which vLLM reserves memory.
+        frame_size: width and height in pixels of the largest frame, for which vLLM reserves memory.
         max_frames: most frames of a request; as many as fit into max_model_len where None.
     """
 
@@ -110,7 +110,7 @@ class VllmOptions(EngineOptions, CheckpointReading):
 
 @dataclass(frozen=True, kw_only=True)
 class VllmPolicyOptions(EngineOptions, ActionOptions):
-    """How a policy is run.
+    """Options of a policy.
 
     Attributes:
         pretrained: hub id or folder.

@@ -114,7 +114,7 @@ TYPED = [
     ([*TINY, "min_pixels=0"], "min_pixels=0 is not between"),
     ([*TINY, "max_pixels=-5"], "max_pixels=-5 is not between"),
     ([*TINY, f"min_pixels={10**12}"], "is not between 1 and"),
-    ([*TINY, "min_pixels=40000000"], "pixels at least and"),
+    ([*TINY, "min_pixels=40000000"], "min_pixels is 40000000 and max_pixels"),
     (["validate", "SET", "--models", "oracle", "--out", "SET"], "is the set itself"),
     (["validate", "SET", "--models", "oracle", "--out", "OUT", "--decisions", "file"], "no column question_id"),
     (["validate", "SET", "--models", "a:x=1,oracle,a:x=1", "--out", "OUT"], "--models a: 'x' is given twice"),

@@ -13,10 +13,10 @@ __all__ = ["DeepseekVL", "DeepseekVLFamily"]
 
 
 class DeepseekVLFamily(PlainFamily):
-    """Frames of DeepSeek-VL hybrid."""
+    """The family of DeepSeek-VL hybrid."""
 
     def features(self, images: Sequence[Image.Image]) -> list[torch.Tensor]:
-        """Aligned features of both vision towers, (tokens, hidden), for each image."""
+        """Return the aligned features of both vision towers for each image, (tokens, hidden)."""
         inputs = self._inputs(images)
         output = self._model.model.get_image_features(
             inputs["pixel_values"], inputs["high_res_pixel_values"], return_dict=True

@@ -1,10 +1,10 @@
-"""Any model of `AutoModelForImageTextToText` with a chat template, so that next month's model needs no code.
+"""Any model of `AutoModelForImageTextToText` with a chat template, so that new models need no code.
 
-Models of the known families run as these. Of others, the processor tells what a frame's placeholder expands to, and the
-model's `get_image_features` what goes into the slots; before the first reply, token ids and logits are compared with
-what the processor and the plain model make of a sample, so that an architecture that works in another way is refused
-instead of being run wrongly. With share_prefix=false it is run by its own processor and `generate`; the sample then
-shows only that the two fit each other.
+A model of a known family runs as that family. For others, the processor says what a frame's placeholder expands to, and
+the model's `get_image_features` computes what goes into the slots. When such a model is loaded, token ids and logits of
+a sample are compared with those of the processor and the plain model: an architecture that works differently is refused
+instead of giving wrong results. With share_prefix=false it is run by its own processor and `generate`, and the sample
+shows only that processor and model fit each other.
 """
 
 import functools
@@ -22,8 +22,8 @@ from transformers.models.auto.modeling_auto import MODEL_FOR_IMAGE_TEXT_TO_TEXT_
 
 from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.formats.frames import FrameRef
-from model_adapters.hf.adapter import fitting, load_model
-from model_adapters.hf.checkpoint import LocatedCheckpoint, load_checkpoint, loading, locate
+from model_adapters.hf.adapter import load_model, wrap_mismatch_errors
+from model_adapters.hf.checkpoint import LocatedCheckpoint, load_checkpoint, locate, wrap_loading_errors
 from model_adapters.hf.families.deepseek_vl import DeepseekVLFamily
 from model_adapters.hf.families.llava_onevision import LlavaOnevisionFamily
 from model_adapters.hf.families.pixtral import PixtralFamily
@@ -33,28 +33,28 @@ from model_adapters.hf.family import MakeFamily, Size
 from model_adapters.hf.loaded import Loaded
 from model_adapters.hf.model import TransformersModel
 from model_adapters.hf.prompt import token_ids
-from model_adapters.hf.uncached import UncachedModel, expanded, image_token, processed
+from model_adapters.hf.uncached import UncachedModel, expand_image_token, image_token, process_turns
 from model_adapters.options.checkpoints import CheckpointReading
 from model_adapters.options.families import HfVlmOptions
 from model_adapters.protocols import Model, Part, Turn
 
-__all__ = ["HfVlm", "ProcessorFamily", "known_family", "load_processor"]
+__all__ = ["HfVlm", "ProcessorFamily", "family_of", "load_processor"]
 
-_TOLERANCE = {torch.float32: 1e-3, torch.float64: 1e-3}  # of the largest logit; half precision is compared more loosely
+_TOLERANCE = {torch.float32: 1e-3, torch.float64: 1e-3}  # relative to the largest logit; more in half precision
 _HALF_TOLERANCE = 0.1
-_BLANK = (300, 300)  # width and height of an image that shows what the processor expands one to
+_BLANK = (300, 300)  # width and height of a sample image
 
 R = TypeVar("R", bound=CheckpointReading)
 
 
 class ProcessorFamily(PlainFamily):
-    """Frames of a model whose processor knows what they expand to.
+    """A family whose processor expands frames.
 
     Args:
         model: a transformers model with `get_image_features`.
-        image_processor: its image processor.
-        tokenizer: its tokenizer.
-        processor: its processor.
+        image_processor: image processor of the model.
+        tokenizer: tokenizer of the model.
+        processor: processor of the model.
 
     Raises:
         ModelError: the processor names no image token.
@@ -66,31 +66,31 @@ class ProcessorFamily(PlainFamily):
         self.placeholder_id = tokenizer.convert_tokens_to_ids(image_token(processor))
 
     def frame_ids(self, size: Size) -> tuple[int, ...]:
-        """What the processor expands the placeholder of one image to."""
-        return tuple(expanded(self._processor, Image.new("RGB", size, "gray")))
+        """Return the ids that the processor expands the placeholder of one image to."""
+        return tuple(expand_image_token(self._processor, Image.new("RGB", size, "gray")))
 
-    def written_ids(self) -> tuple[int, ...]:
-        """The placeholder, between markers where the config names some that the processor does not write itself."""
+    def template_ids(self) -> tuple[int, ...]:
+        """Return the placeholder, between the config's markers unless the processor adds them itself."""
         markers = _markers(self._model.config)
         if markers is None or markers[0] in self.frame_ids(_BLANK):
             return (self.placeholder_id,)
         return (markers[0], self.placeholder_id, markers[1])
 
     def features(self, images: Sequence[Image.Image]) -> list[torch.Tensor]:
-        """The model's own features, (slots, hidden), for each image."""
+        """Return the model's features of each image, (slots, hidden)."""
         compute = getattr(self._model, "get_image_features", None) or self._model.model.get_image_features
-        takes = inspect.signature(compute).parameters
-        found = []
+        parameters = inspect.signature(compute).parameters
+        features = []
         for image in images:
-            inputs = {name: value for name, value in self._inputs([image]).items() if name in takes}
+            inputs = {name: value for name, value in self._inputs([image]).items() if name in parameters}
             pooled = compute(**inputs, return_dict=True).pooler_output
             parts = pooled if isinstance(pooled, list | tuple) else [pooled]
-            found.append(torch.cat([part.reshape(-1, part.shape[-1]) for part in parts]))
-        return found
+            features.append(torch.cat([part.reshape(-1, part.shape[-1]) for part in parts]))
+        return features
 
 
 def _markers(config: Any) -> tuple[int, int] | None:
-    """The tokens that begin and end an image, as the families call them that have some in their configs."""
+    """Return the tokens that begin and end an image, by the names that configs use for them, or None."""
     for kind in ("vision", "image"):
         start, end = (getattr(config, f"{kind}_{side}_token_id", None) for side in ("start", "end"))
         if start is not None and end is not None:
@@ -105,16 +105,17 @@ class HfVlm:
 
     @classmethod
     def build(cls, name: str, options: HfVlmOptions, seed: int) -> Model:  # noqa: ARG003
-        """Load a checkpoint; nothing in it is random.
+        """Load a checkpoint; the seed is not used.
 
         Raises:
-            UsageError: no checkpoint was named.
-            ModelError: it cannot be loaded, sees no images, is not of one piece, or cannot share prefixes.
+            UsageError: no checkpoint is given.
+            ModelError: the checkpoint cannot be loaded, has no vision, its parts do not belong together, or it cannot
+                share prefixes.
         """
         located = cls.locate(name, options)
-        known = known_family(located.config)
-        if known is not None:
-            return load_model(name, located, known)
+        family = family_of(located.config)
+        if family is not None:
+            return load_model(name, located, family)
         processor = load_processor(located)
         model: TransformersModel | UncachedModel
         loaded = load_checkpoint(located, functools.partial(ProcessorFamily, processor=processor))
@@ -122,16 +123,16 @@ class HfVlm:
             model = TransformersModel(name, loaded, options)
         else:
             model = UncachedModel(name, loaded, processor, options)
-        _try(model, loaded, processor, options.pretrained)
+        _compare_with_plain_model(model, loaded, processor, options.pretrained)
         return model
 
     @classmethod
     def locate(cls, name: str, options: R) -> LocatedCheckpoint[R]:
-        """Find a checkpoint that sees images, for whichever engine.
+        """Find a checkpoint of a vision-language model, for any engine.
 
         Raises:
-            UsageError: no checkpoint was named.
-            ModelError: there is none, or it sees no images.
+            UsageError: no checkpoint is given.
+            ModelError: the checkpoint does not exist, or has no vision.
         """
         if not options.pretrained:
             raise UsageError(f"{name} needs pretrained=..., a hub id or a folder")
@@ -139,12 +140,12 @@ class HfVlm:
         model_type = located.config.model_type
         remote = options.trust_remote_code and "AutoModelForImageTextToText" in getattr(located.config, "auto_map", {})
         if model_type not in MODEL_FOR_IMAGE_TEXT_TO_TEXT_MAPPING_NAMES and not remote:
-            raise ModelError(f"{options.pretrained} is a {model_type} checkpoint, which sees no images")
+            raise ModelError(f"{options.pretrained} is a {model_type} checkpoint, which has no vision")
         return located
 
 
-def known_family(config: Any) -> MakeFamily | None:
-    """The family made for this architecture, if there is one."""
+def family_of(config: Any) -> MakeFamily | None:
+    """Return the family of this architecture, or None if there is no code for it."""
     families: dict[str, MakeFamily] = {
         "qwen2_5_vl": Qwen25VLFamily,
         "qwen2_vl": Qwen25VLFamily,
@@ -157,13 +158,13 @@ def known_family(config: Any) -> MakeFamily | None:
 
 
 def load_processor(located: LocatedCheckpoint[Any]) -> Any:
-    """The checkpoint's processor of images and text, for families without code of their own.
+    """Return the checkpoint's processor of images and text, for architectures without their own family.
 
     Raises:
-        ModelError: it has none, or it cannot be loaded.
+        ModelError: the checkpoint has none, or it cannot be loaded.
     """
     remote = {"trust_remote_code": located.options.trust_remote_code}
-    with loading(located.options.pretrained):
+    with wrap_loading_errors(located.options.pretrained):
         processor = transformers.AutoProcessor.from_pretrained(located.folder, **remote)
         processor.image_processor = transformers.AutoImageProcessor.from_pretrained(
             located.folder, backend="pil", **remote
@@ -174,27 +175,29 @@ def load_processor(located: LocatedCheckpoint[Any]) -> Any:
 
 
 @torch.inference_mode()
-def _try(model: TransformersModel | UncachedModel, loaded: Loaded, processor: Any, pretrained: str) -> None:
-    """Run a sample by the processor and the plain model, and see that shared machinery makes the same of it.
+def _compare_with_plain_model(
+    model: TransformersModel | UncachedModel, loaded: Loaded, processor: Any, pretrained: str
+) -> None:
+    """Check that the shared prefix gives the token ids and logits of the processor and the plain model on a sample.
 
     Raises:
-        ModelError: model and processor do not fit, or the shared machinery gives other token ids or logits.
+        ModelError: model and processor do not fit, or token ids or logits differ.
     """
-    mend = f"{loaded.model.config.model_type} cannot be run with shared prefixes; use share_prefix=false"
+    hint = f"{loaded.model.config.model_type} cannot be run with shared prefixes; use share_prefix=false"
     shared = None
-    with tempfile.TemporaryDirectory() as folder, fitting(pretrained):
+    with tempfile.TemporaryDirectory() as folder, wrap_mismatch_errors(pretrained):
         turns = [Turn("user", _sample(Path(folder)))]
-        inputs = processed(processor, loaded.template, turns)
+        inputs = process_turns(processor, loaded.template, turns)
         if isinstance(model, TransformersModel):
             pieces = model.pieces(turns)
             if list(token_ids(pieces)) != inputs["input_ids"][0].tolist():
-                raise ModelError(f"token ids differ from the processor's: {mend}")
+                raise ModelError(f"token ids differ from the processor's: {hint}")
             shared = model.encode(pieces)
         weight = loaded.model.get_input_embeddings().weight
         plain = loaded.model(**inputs.to(weight.device, loaded.model.dtype)).logits[0, -1]
     tolerance = _TOLERANCE.get(loaded.model.dtype, _HALF_TOLERANCE) * plain.abs().max()
     if shared is not None and (shared - plain).abs().max() > tolerance:
-        raise ModelError(f"logits differ from the plain model's: {mend}")
+        raise ModelError(f"logits differ from the plain model's: {hint}")
 
 
 def _sample(folder: Path) -> tuple[Part, ...]:

@@ -1,4 +1,4 @@
-"""LLaVA-OneVision: a frame of 300x300 takes 1485 tokens, an overview and the frame itself with a break per row."""
+"""LLaVA-OneVision: a frame of 300x300 takes 1485 tokens, an overview and the frame with a break after each row."""
 
 from collections.abc import Sequence
 
@@ -13,14 +13,14 @@ __all__ = ["LlavaOnevision", "LlavaOnevisionFamily"]
 
 
 class LlavaOnevisionFamily(PlainFamily):
-    """Frames of LLaVA-OneVision, each cut into patches as if it were the only one.
+    """The family of LLaVA-OneVision; each frame is processed as a single image.
 
-    The processor takes a nested list of images as one multi-image sample and halves their tokens (730); published
-    results come from the flat list, and so do these.
+    The processor treats a nested list of images as one multi-image sample and halves their tokens (730). Frames are
+    passed as a flat list, as in the published results.
     """
 
     def features(self, images: Sequence[Image.Image]) -> list[torch.Tensor]:
-        """Packed features of overview, patches and row breaks, (tokens, hidden), for each image."""
+        """Return the packed features of overview, patches and row breaks for each image, (tokens, hidden)."""
         inputs = self._inputs(images)
         output = self._model.get_image_features(inputs["pixel_values"], inputs["image_sizes"], return_dict=True)
         return list(output.pooler_output)

@@ -1,4 +1,4 @@
-"""Pixtral 12B: a frame of 300x300 takes 19 rows of 19 tokens, a break after each row but the last, and an end: 380."""
+"""Pixtral 12B: a frame of 300x300 takes 380 tokens, 19 rows of 19 and a token that ends each row."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -16,15 +16,15 @@ __all__ = ["Pixtral", "PixtralFamily"]
 
 
 class PixtralFamily(PlainFamily):
-    """Frames of a LLaVA model with Pixtral's vision tower.
+    """The family of LLaVA models with Pixtral's vision tower.
 
     Args:
         model: a `LlavaForConditionalGeneration`.
         image_processor: a `PixtralImageProcessor`.
-        tokenizer: has the tokens that end rows and frames.
+        tokenizer: tokenizer with the tokens that end rows and frames.
 
     Raises:
-        ModelError: the checkpoint is another LLaVA, or its tokenizer lacks the tokens.
+        ModelError: the checkpoint is another LLaVA, or its tokenizer lacks these tokens.
     """
 
     def __init__(self, model: Any, image_processor: Any, tokenizer: Any) -> None:
@@ -37,26 +37,26 @@ class PixtralFamily(PlainFamily):
         self._break_id, self._end_id = vocabulary["[IMG_BREAK]"], vocabulary["[IMG_END]"]
 
     def frame_ids(self, size: Size) -> tuple[int, ...]:
-        """Rows of slots, each with a break behind it, the last one with the end."""
+        """Return rows of slots, each followed by a break, the last one by the end."""
         height, width = self._inputs([Image.new("RGB", size)])["image_sizes"][0].tolist()
         side = self._model.model.vision_tower.patch_size
         row = (self.slot_id,) * (width // side) + (self._break_id,)
         return (*(row * (height // side))[:-1], self._end_id)
 
     def features(self, images: Sequence[Image.Image]) -> list[torch.Tensor]:
-        """Projected patches, (tokens, hidden), for each image.
+        """Return the projected patches of each image, (tokens, hidden).
 
-        The vision tower joins a batch to one sequence with a mask over all pairs of patches, so that two frames cost
-        four times one: they go in one by one.
+        Frames are processed one by one: the vision tower joins a batch to one sequence with a mask over all pairs of
+        patches, so the cost would be quadratic in the number of frames.
         """
-        found = []
+        features = []
         for image in images:
             inputs = self._inputs([image])
             output = self._model.get_image_features(
                 inputs["pixel_values"], image_sizes=inputs["image_sizes"], return_dict=True
             )
-            found.extend(output.pooler_output)
-        return found
+            features.extend(output.pooler_output)
+        return features
 
 
 class Pixtral(CheckpointAdapter):

@@ -1,4 +1,4 @@
-"""What families with ordinary, one-axis positions have in common."""
+"""Base of families with one-axis positions."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -12,15 +12,15 @@ __all__ = ["PlainFamily"]
 
 
 class PlainFamily:
-    """Base of families that number tokens one by one and put a frame's features into equal slots.
+    """Base of families whose positions are consecutive and whose frames consist of equal slots.
 
-    Subclasses compute features; how many slots a frame takes is what they make of a blank image of its size, so the
-    count is always the model's own.
+    Subclasses compute features. The slots of a frame are counted on a blank image of its size, so the count is always
+    that of the model.
 
     Args:
         model: a transformers model with `config.image_token_id`.
-        image_processor: the checkpoint's image processor.
-        tokenizer: the checkpoint's tokenizer.
+        image_processor: image processor of the model.
+        tokenizer: tokenizer of the model.
     """
 
     def __init__(self, model: Any, image_processor: Any, tokenizer: Any) -> None:
@@ -31,26 +31,26 @@ class PlainFamily:
 
     @torch.inference_mode()
     def frame_ids(self, size: Size) -> tuple[int, ...]:
-        """As many slots as a frame of this size has features."""
+        """Return one slot for each feature of a frame of this size."""
         return (self.slot_id,) * len(self.features([Image.new("RGB", size)])[0])
 
-    def written_ids(self) -> tuple[int, ...]:
-        """The placeholder alone."""
+    def template_ids(self) -> tuple[int, ...]:
+        """Return the placeholder alone."""
         return (self.placeholder_id,)
 
     def features(self, images: Sequence[Image.Image]) -> list[torch.Tensor]:
-        """Embeddings for the slots of each image, (slots, hidden)."""
+        """Return the embeddings for the slots of each image, (slots, hidden)."""
         raise NotImplementedError
 
     def positions(self, ids: torch.Tensor, sizes: Sequence[Size], start: int) -> torch.Tensor:
-        """Consecutive positions, (1, tokens)."""
+        """Return consecutive positions, (1, tokens)."""
         return torch.arange(start, start + len(ids), device=ids.device)[None]
 
     def _inputs(self, images: Sequence[Image.Image]) -> Mapping[str, torch.Tensor]:
-        """The image processor's output on the model's device, pixels in the model's type."""
+        """Return the image processor's output on the model's device, pixels in the model's type."""
         inputs = self._image_processor(images=list(images), return_tensors="pt")
         weight = self._model.get_input_embeddings().weight
-        # Of an outline's pixels the shapes are enough; what is counted by has to have values.
+        # Without weights (meta device) only shapes of pixels are used, but counts need values.
         counts = torch.device("cpu") if weight.is_meta else weight.device
         return {
             name: value.to(weight.device, self._model.dtype) if value.is_floating_point() else value.to(counts)

@@ -16,12 +16,12 @@ __all__ = ["Qwen25VL", "Qwen25VLFamily"]
 
 
 class Qwen25VLFamily(PlainFamily):
-    """Frames of Qwen2.5-VL.
+    """The family of Qwen2.5-VL.
 
     Args:
         model: a `Qwen2_5_VLForConditionalGeneration`.
         image_processor: a `Qwen2VLImageProcessor`.
-        tokenizer: the checkpoint's tokenizer.
+        tokenizer: tokenizer of the model.
     """
 
     def __init__(self, model: Any, image_processor: Any, tokenizer: Any) -> None:
@@ -29,25 +29,25 @@ class Qwen25VLFamily(PlainFamily):
         self._grids: dict[Size, tuple[int, int, int]] = {}
 
     def frame_ids(self, size: Size) -> tuple[int, ...]:
-        """One token for each square of merged patches."""
+        """Return one token for each square of merged patches."""
         return (self.slot_id,) * (math.prod(self._grid(size)) // self._image_processor.merge_size**2)
 
-    def written_ids(self) -> tuple[int, ...]:
-        """The placeholder between the markers of vision, which the processor leaves to whoever writes the text."""
+    def template_ids(self) -> tuple[int, ...]:
+        """Return the placeholder between the vision markers, which the processor leaves to the template."""
         config = self._model.config
         return (config.vision_start_token_id, self.placeholder_id, config.vision_end_token_id)
 
     def features(self, images: Sequence[Image.Image]) -> list[torch.Tensor]:
-        """The vision tower's merged patches, (tokens, hidden), for each image."""
+        """Return the vision tower's merged patches of each image, (tokens, hidden)."""
         inputs = self._inputs(images)
         output = self._model.get_image_features(inputs["pixel_values"], inputs["image_grid_thw"], return_dict=True)
         return list(output.pooler_output)
 
     def positions(self, ids: torch.Tensor, sizes: Sequence[Size], start: int) -> torch.Tensor:
-        """Temporal, height and width positions, (3, 1, tokens).
+        """Return temporal, height and width positions, (3, 1, tokens).
 
-        The model's own rule counts from the first token on, and every position in it moves along with the first one:
-        so a stretch of the sequence that begins with a whole frame or a text token is numbered alone and shifted.
+        The model's own rule counts from the first token, and all positions shift with it. So a span that cuts no frame
+        is numbered by itself and shifted, which makes chunked prefill equal to one pass.
         """
         if not sizes:
             return torch.arange(start, start + len(ids), device=ids.device).expand(3, 1, -1)
@@ -59,7 +59,7 @@ class Qwen25VLFamily(PlainFamily):
         return positions + start
 
     def _grid(self, size: Size) -> tuple[int, int, int]:
-        """Patches along time, height and width, as the image processor makes them of an image of this size."""
+        """Return the patches of an image of this size along time, height and width, by the image processor."""
         if size not in self._grids:
             inputs = self._image_processor(images=[Image.new("RGB", size)], return_tensors="pt")
             time, height, width = inputs["image_grid_thw"][0].tolist()

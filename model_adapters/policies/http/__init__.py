@@ -1,1 +1,1 @@
-"""Policies behind a server: a client of the `/act` convention that OpenVLA's deployment script began."""
+"""Policies behind a server: a client of the `/act` convention of OpenVLA's deployment script."""

@@ -1,4 +1,4 @@
-"""The adapter `vla-http`: any policy that a server answers for."""
+"""The adapter `vla-http`: any policy behind a server."""
 
 from typing import Any, ClassVar
 
@@ -9,7 +9,7 @@ from infthor_eval.formats.frames import FrameRef
 from model_adapters.addresses import act_url
 from model_adapters.options.policies import VlaHttpOptions
 from model_adapters.policies.http.client import JsonClient
-from model_adapters.policies.http.json_numpy import decoded_numbers, encoded
+from model_adapters.policies.http.json_numpy import decode_numbers, encode_array
 from model_adapters.policies.policy import arm_deltas
 from model_adapters.protocols import ArmDelta, Capabilities
 
@@ -20,8 +20,8 @@ class HttpPolicy:
     """A policy behind a server.
 
     Args:
-        name: the registry's name.
-        options: how it is asked.
+        name: name in the registry.
+        options: options of the requests.
     """
 
     def __init__(self, name: str, options: VlaHttpOptions) -> None:
@@ -32,11 +32,11 @@ class HttpPolicy:
 
     @property
     def capabilities(self) -> Capabilities:
-        """Nothing is promised of a server that is not known."""
+        """No guarantees: the server is unknown."""
         return Capabilities(counts_tokens=False, token_ids=False, deterministic=False)
 
     def identity(self) -> dict[str, Any]:
-        """Address and how it is asked, as JSON values; what stands behind the address is not known."""
+        """Return address and form of requests, as JSON values; the policy behind the address is unknown."""
         options = self._options
         return {
             "adapter": self.name,
@@ -47,27 +47,27 @@ class HttpPolicy:
         }
 
     def reset(self) -> None:
-        """Nothing: the convention knows no episodes."""
+        """Do nothing: the convention has no episodes."""
 
     def act(self, frame: FrameRef, instruction: str) -> tuple[ArmDelta, ...]:
-        """The next steps; see `Policy.act`."""
+        """Return the next steps; see `Policy.act`."""
         pixels = np.asarray(frame.load())
-        asked: dict[str, Any] = {
-            "image": pixels.tolist() if self._options.image == "list" else encoded(pixels),
+        request: dict[str, Any] = {
+            "image": pixels.tolist() if self._options.image == "list" else encode_array(pixels),
             "instruction": instruction,
         }
         if self._options.unnorm_key is not None:
-            asked["unnorm_key"] = self._options.unnorm_key
-        reply = self._client.post(asked)
+            request["unnorm_key"] = self._options.unnorm_key
+        reply = self._client.post(request)
         try:
-            numbers = decoded_numbers(reply)
+            numbers = decode_numbers(reply)
         except (ValueError, OverflowError) as error:
-            raise ModelError(f"{self._url} answers no action of numbers: {error}; see its log") from error
+            raise ModelError(f"{self._url} answers without an action of numbers: {error}; see its log") from error
         actions = numbers[None] if numbers.ndim == 1 else numbers
         return arm_deltas(f"{self.name} ({self._url})", actions)[: self._options.execute]
 
     def close(self) -> None:
-        """Nothing is kept open."""
+        """Do nothing: no connection is kept open."""
 
 
 class VlaHttp:
@@ -77,5 +77,5 @@ class VlaHttp:
 
     @classmethod
     def build(cls, name: str, options: VlaHttpOptions, seed: int) -> HttpPolicy:  # noqa: ARG003
-        """Make the client; the server is asked when it is to act."""
+        """Build the client; the first request is sent by `act`."""
         return HttpPolicy(name, options)

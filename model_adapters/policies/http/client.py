@@ -1,4 +1,4 @@
-"""One request to a server, and what can go wrong with it."""
+"""A client that posts JSON, with retries and one-line errors."""
 
 import http.client
 import json
@@ -11,10 +11,10 @@ from infthor_eval.errors import ModelError, in_one_line
 
 __all__ = ["JsonClient"]
 
-_LARGEST = 16 * 2**20  # bytes of a reply
+_LARGEST = 16 * 2**20  # bytes of the largest accepted reply
 _PIECE = 2**16
-_FIRST_WAIT_S = 0.5  # before the second attempt; doubled before each further one
-_QUOTED = 200  # characters of what a server says
+_FIRST_WAIT_S = 0.5  # pause before the second attempt; it doubles before each further one
+_QUOTED = 200  # characters of a server's text in a message
 
 
 class _NoRedirect(urllib.request.HTTPRedirectHandler):
@@ -28,9 +28,9 @@ class JsonClient:
     """Posts JSON to one address.
 
     Args:
-        url: of http or https.
-        timeout_s: for a whole reply.
-        retries: how often a request is sent again where the connection failed.
+        url: address, http or https.
+        timeout_s: limit for a whole reply, in seconds.
+        retries: repetitions of a request after a failed connection.
     """
 
     def __init__(self, url: str, *, timeout_s: float, retries: int) -> None:
@@ -40,63 +40,66 @@ class JsonClient:
         self._opener = urllib.request.build_opener(_NoRedirect)
 
     def post(self, content: object) -> Any:
-        """What the server answers, as JSON values.
+        """Return the server's reply to a POST request, as JSON values.
 
         Raises:
-            ModelError: no connection, no reply in time, an error status, or a reply that is no JSON.
+            ModelError: no connection, no reply in time, an error status, or a reply that is not JSON.
         """
         body = json.dumps(content).encode()
-        reply = self._sent(body)
+        reply = self._send(body)
         try:
             return json.loads(reply)
         except (ValueError, RecursionError) as error:
-            raise ModelError(f"{self._url} answers what is no JSON: {_quoted(reply)}; is it a policy's?") from error
+            raise ModelError(
+                f"{self._url} answers with something that is not JSON: {_quote(reply)}; is it a policy's address?"
+            ) from error
 
-    def _sent(self, body: bytes) -> bytes:
+    def _send(self, body: bytes) -> bytes:
+        # Only a failed connection is retried: an error status would come again, and a late reply may still be computed.
         reason: Exception | None = None
         for attempt in range(self._retries + 1):
             if attempt:
                 time.sleep(_FIRST_WAIT_S * 2 ** (attempt - 1))
             try:
-                return self._sent_once(body)
+                return self._send_once(body)
             except (urllib.error.URLError, ConnectionError, http.client.HTTPException) as error:
                 reason = error
-        said = in_one_line(getattr(reason, "reason", None) or reason or ConnectionError())
-        raise ModelError(f"{self._url} cannot be reached in {self._retries + 1} attempts ({said}); is the server up?")
+        cause = in_one_line(getattr(reason, "reason", None) or reason or ConnectionError())
+        raise ModelError(f"{self._url} cannot be reached in {self._retries + 1} attempts ({cause}); is the server up?")
 
-    def _sent_once(self, body: bytes) -> bytes:
+    def _send_once(self, body: bytes) -> bytes:
         request = urllib.request.Request(self._url, body, {"Content-Type": "application/json"})
         try:
             with self._opener.open(request, timeout=self._timeout_s) as reply:
                 return self._read(reply)
         except urllib.error.HTTPError as error:
             with error:
-                said = _quoted(error.read(_QUOTED))
-            raise ModelError(f"{self._url} answers {error.code} {error.reason}: {said}") from error
+                text = _quote(error.read(_QUOTED))
+            raise ModelError(f"{self._url} answers {error.code} {error.reason}: {text}") from error
         except urllib.error.URLError as error:
             if isinstance(error.reason, TimeoutError):
-                raise self._late() from error
+                raise self._timeout_error() from error
             raise
         except TimeoutError as error:
-            raise self._late() from error
+            raise self._timeout_error() from error
 
     def _read(self, reply: http.client.HTTPResponse) -> bytes:
-        """The whole reply; the time-out of a socket is one of each piece alone."""
+        """Read the whole reply within the limit; a socket's own timeout restarts with every piece."""
         content, end = b"", time.monotonic() + self._timeout_s
         while piece := reply.read1(_PIECE):
             content += piece
             if time.monotonic() > end:
-                raise self._late()
+                raise self._timeout_error()
             if len(content) > _LARGEST:
                 raise ModelError(f"{self._url} answers more than {_LARGEST} bytes; is it a policy's?")
-        if reply.length:  # of what was announced, so much is missing
+        if reply.length:  # bytes of the announced length that are missing
             raise http.client.IncompleteRead(content, reply.length)
         return content
 
-    def _late(self) -> ModelError:
+    def _timeout_error(self) -> ModelError:
         return ModelError(f"{self._url} does not answer within {self._timeout_s:g} s; raise timeout_s if it is slow")
 
 
-def _quoted(content: bytes) -> str:
+def _quote(content: bytes) -> str:
     text = " ".join(content[:_QUOTED].decode("utf-8", "replace").split())
     return repr(text) if text else "nothing"

@@ -1,4 +1,4 @@
-"""Arrays in JSON as the package json_numpy writes them, which servers of the `/act` convention expect."""
+"""Arrays in JSON in the form of the package json_numpy, which servers of the `/act` convention expect."""
 
 import base64
 import binascii
@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["decoded_numbers", "encoded"]
+__all__ = ["decode_numbers", "encode_array"]
 
 _MARK = "__numpy__"
-_KINDS = "fiu"  # numbers; anything else could be an object that runs code when it is made
+_KINDS = "fiu"  # numbers only: object arrays could run code when they are created
 
 
-def encoded(array: npt.NDArray[Any]) -> dict[str, Any]:
-    """An array as JSON values: its bytes in base 64, its type and its shape."""
+def encode_array(array: npt.NDArray[Any]) -> dict[str, Any]:
+    """Return an array as JSON values: its bytes in base 64, its type and its shape."""
     content = np.ascontiguousarray(array)
     return {
         _MARK: base64.b64encode(content.tobytes()).decode("ascii"),
@@ -24,34 +24,34 @@ def encoded(array: npt.NDArray[Any]) -> dict[str, Any]:
     }
 
 
-def decoded_numbers(value: Any) -> npt.NDArray[np.float64]:
-    """Numbers that a server sent: lists, arrays of json_numpy, lists of either, or a text that holds such JSON.
+def decode_numbers(value: Any) -> npt.NDArray[np.float64]:
+    """Return the numbers in a reply: lists, arrays of json_numpy, lists of either, or a text with such JSON.
 
     Args:
-        value: as JSON was decoded.
+        value: the decoded JSON.
 
     Raises:
-        ValueError: it is anything else, or ragged.
+        ValueError: the value is anything else, or ragged.
     """
-    if isinstance(value, str):  # a server that was asked in encoded form answers so
+    if isinstance(value, str):  # the reply of some servers to encoded requests
         try:
             value = json.loads(value)
         except ValueError as error:
             raise ValueError(f"the text {value[:80]!r}") from error
-    return np.array(_plain(value), dtype=np.float64)
+    return np.array(_to_lists(value), dtype=np.float64)
 
 
-def _plain(value: Any) -> Any:
+def _to_lists(value: Any) -> Any:
     if isinstance(value, list):
-        return [_plain(item) for item in value]
+        return [_to_lists(item) for item in value]
     if isinstance(value, dict) and _MARK in value:
-        return _decoded(value).tolist()
+        return _decode_array(value).tolist()
     if isinstance(value, int | float) and not isinstance(value, bool):
         return value
     raise ValueError(f"{type(value).__name__} {str(value)[:80]!r} among numbers")
 
 
-def _decoded(value: dict[str, Any]) -> npt.NDArray[Any]:
+def _decode_array(value: dict[str, Any]) -> npt.NDArray[Any]:
     try:
         dtype = np.dtype(str(value["dtype"]))
         if dtype.kind not in _KINDS:

@@ -1,1 +1,1 @@
-"""OpenVLA: DINOv2 and SigLIP in front of Llama-2, actions as the last 256 ids of its vocabulary."""
+"""OpenVLA: DINOv2 and SigLIP in front of Llama-2; the last 256 ids of the vocabulary encode actions."""

@@ -12,28 +12,28 @@ __all__ = ["ActionBins"]
 
 @dataclass(frozen=True)
 class ActionBins:
-    """How ids mean numbers.
+    """Conversion of action ids to numbers.
 
     Attributes:
-        vocabulary: ids of the language model without the padding at their end; 32000 in OpenVLA-7B.
-        n_bins: how many of the last ids are actions; 256.
+        vocabulary: number of ids of the language model without padding; 32000 in OpenVLA-7B.
+        n_bins: number of action ids, the last of the vocabulary; 256.
     """
 
     vocabulary: int
     n_bins: int
 
     @property
-    def legal(self) -> range:
-        """The ids that mean a number; 31744 to 31999 in OpenVLA-7B."""
+    def action_ids(self) -> range:
+        """Ids that encode a number; 31744 to 31999 in OpenVLA-7B."""
         return range(self.vocabulary - self.n_bins, self.vocabulary)
 
     def decode(self, ids: Sequence[int]) -> Actions:
-        """One action, (1, numbers), each between -1 and 1.
+        """Return one action, (1, numbers), each between -1 and 1.
 
-        256 borders make 255 centres: the two lowest ids mean the same number, as in the original.
+        256 borders have 255 centres, so the two lowest ids encode the same number, as in the original.
 
         Args:
-            ids: among `legal`.
+            ids: ids among `action_ids`.
         """
         borders = np.linspace(-1, 1, self.n_bins)
         centres = (borders[:-1] + borders[1:]) / 2

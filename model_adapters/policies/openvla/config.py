@@ -1,4 +1,4 @@
-"""What an OpenVLA checkpoint's config says, as far as it is needed."""
+"""The config of an OpenVLA checkpoint, as far as it is used."""
 
 from typing import Any
 
@@ -15,17 +15,17 @@ class OpenVLAConfig(msgspec.Struct, frozen=True, kw_only=True):
     """`config.json`.
 
     Attributes:
-        text_config: of the language model, where it differs from Llama-2-7B's.
-        timm_model_ids: the two towers by timm's names: DINOv2, then SigLIP.
-        timm_override_act_layers: other activations than timm's own; there are none in what is run here.
-        image_sizes: of the two towers, in pixels.
-        image_resize_strategy: how frames become square.
-        use_fused_vision_backbone: whether there are two towers.
+        text_config: settings of the language model that differ from Llama-2-7B's.
+        timm_model_ids: timm's names of the two towers: DINOv2, then SigLIP.
+        timm_override_act_layers: activations that differ from timm's; only None is supported.
+        image_sizes: image sizes of the two towers, in pixels.
+        image_resize_strategy: method that makes frames square.
+        use_fused_vision_backbone: true if there are two towers.
         norm_stats: statistics of actions by dataset.
-        n_action_bins: ids that mean actions.
-        pad_to_multiple_of: how many ids were added at the end of the vocabulary.
-        vision_towers: sizes of the towers where they are not those of their names, as in our tiny twin; no published
-            checkpoint has this.
+        n_action_bins: number of action ids.
+        pad_to_multiple_of: number of ids added at the end of the vocabulary.
+        vision_towers: sizes of the towers if their names do not determine them, as in our tiny twin; published
+            checkpoints do not have this.
     """
 
     text_config: dict[str, Any]
@@ -40,36 +40,36 @@ class OpenVLAConfig(msgspec.Struct, frozen=True, kw_only=True):
     vision_towers: list[TowerShape] | None = None
 
     def language(self, attn_implementation: str) -> LlamaConfig:
-        """The language model's config."""
+        """Return the config of the language model."""
         config = LlamaConfig(**self.text_config)
         config._attn_implementation = attn_implementation
         return config
 
     def image_size(self, pretrained: str) -> int:
-        """Width and height of both towers' images, in pixels.
+        """Return width and height of both towers' images, in pixels.
 
         Raises:
-            ModelError: the checkpoint wants frames prepared in a way that is not known here.
+            ModelError: the checkpoint needs another preprocessing of frames.
         """
-        known = self.use_fused_vision_backbone and self.image_resize_strategy == "resize-naive"
-        if not known or set(self.timm_override_act_layers) != {None} or len(set(self.image_sizes)) != 1:
+        is_known = self.use_fused_vision_backbone and self.image_resize_strategy == "resize-naive"
+        if not is_known or set(self.timm_override_act_layers) != {None} or len(set(self.image_sizes)) != 1:
             raise ModelError(
                 f"{pretrained} has image_sizes={self.image_sizes}, image_resize_strategy={self.image_resize_strategy}, "
                 f"use_fused_vision_backbone={self.use_fused_vision_backbone}, timm_override_act_layers="
-                f"{self.timm_override_act_layers}; only the preparation of openvla/openvla-7b is known here"
+                f"{self.timm_override_act_layers}; only the preprocessing of openvla/openvla-7b is supported"
             )
         return self.image_sizes[0]
 
     def towers(self, pretrained: str) -> tuple[TowerShape, TowerShape]:
-        """Sizes of both towers, DINOv2's first.
+        """Return the sizes of both towers, DINOv2's first.
 
         Raises:
-            ModelError: there are others.
+            ModelError: the checkpoint has other towers.
         """
         unknown = [name for name in self.timm_model_ids if name not in TOWERS]
         shapes = self.vision_towers or [TOWERS[name] for name in self.timm_model_ids if name in TOWERS]
         if unknown or [shape.kind for shape in shapes] != ["dinov2", "siglip"]:
             raise ModelError(
-                f"{pretrained} sees by {self.timm_model_ids}, not by {list(TOWERS)}; it cannot be run here"
+                f"{pretrained} has the vision towers {self.timm_model_ids}; only {list(TOWERS)} are supported"
             )
         return shapes[0], shapes[1]

@@ -1,4 +1,4 @@
-"""OpenVLA's network: patches of two towers behind the begin token of a Llama-2."""
+"""OpenVLA's network: patches of two towers after the begin token of a Llama-2."""
 
 from dataclasses import dataclass
 
@@ -9,31 +9,31 @@ from torch import nn
 from torch.nn.functional import gelu
 from transformers import DynamicCache, LlamaConfig, LlamaForCausalLM
 
-from model_adapters.policies.decoding import embedded, greedy
+from model_adapters.policies.decoding import decode_greedily, embed_ids
 from model_adapters.policies.openvla.actions import ActionBins
 from model_adapters.policies.openvla.vision import Tower, TowerShape, unused_keys
-from model_adapters.policies.preprocessing import normalised, resized
+from model_adapters.policies.preprocessing import normalise, resize
 from model_adapters.policies.statistics import ACTION_SIZE, Actions
 from model_adapters.policies.weights import Layout
 
-__all__ = ["OpenVLANetwork", "OpenVLAWeights", "layout_of", "prompt", "prompt_ids"]
+__all__ = ["OpenVLANetwork", "OpenVLAWeights", "prompt", "prompt_ids", "weights_layout"]
 
 _DINOV2 = ((0.484375, 0.455078125, 0.40625), (0.228515625, 0.2236328125, 0.224609375))
 _SIGLIP = ((0.5, 0.5, 0.5), (0.5, 0.5, 0.5))
-_SPACE = 29871  # Llama's token of a lone space, which stood before every action in training
+_SPACE = 29871  # Llama's token of a single space, which precedes every action in the training data
 
 
 def prompt(instruction: str) -> str:
-    """What OpenVLA is asked; instructions were in lower case in training."""
+    """Return OpenVLA's prompt; instructions were in lower case in training."""
     return f"In: What action should the robot take to {instruction.lower()}?\nOut:"
 
 
 def prompt_ids(tokenizer: Tokenizer, instruction: str) -> list[int]:
-    """The ids of the prompt, with the space that actions follow.
+    """Return the ids of the prompt, ending with the space that precedes actions.
 
     Args:
-        tokenizer: of the language model; it writes the begin token by itself.
-        instruction: what is to be done.
+        tokenizer: tokenizer of the language model, which adds the begin token.
+        instruction: instruction of the task.
     """
     ids: list[int] = tokenizer.encode(prompt(instruction)).ids
     return ids if ids[-1] == _SPACE else [*ids, _SPACE]
@@ -46,11 +46,11 @@ class _Vision(nn.Module):
         self.fused_featurizer = Tower(towers[1], image_size)
 
     def forward(self, pixels: torch.Tensor) -> torch.Tensor:
-        """Features, (batch, patches, width of both), of pixels between 0 and 1, (batch, 3, size, size), in float32."""
+        """Return features, (batch, patches, widths), of pixels from 0 to 1, (batch, 3, size, size), in float32."""
         dtype = self.featurizer.pos_embed.dtype
         features = (
-            self.featurizer(normalised(pixels, *_DINOV2).to(dtype)),
-            self.fused_featurizer(normalised(pixels, *_SIGLIP).to(dtype)),
+            self.featurizer(normalise(pixels, *_DINOV2).to(dtype)),
+            self.fused_featurizer(normalise(pixels, *_SIGLIP).to(dtype)),
         )
         return torch.cat(features, dim=2)
 
@@ -67,11 +67,11 @@ class _OpenVLAProjector(nn.Module):
 
 
 class OpenVLAWeights(nn.Module):
-    """All that has weights, under the names of the published checkpoint.
+    """All modules with weights, under the names of the published checkpoint.
 
     Args:
         towers: sizes of DINOv2 and SigLIP.
-        image_size: of both, in pixels.
+        image_size: image size of both towers, in pixels.
         language: config of the language model.
     """
 
@@ -82,11 +82,11 @@ class OpenVLAWeights(nn.Module):
         self.language_model = LlamaForCausalLM(language)
 
 
-def layout_of(weights: OpenVLAWeights, towers: tuple[TowerShape, TowerShape]) -> Layout:
-    """The layout of the checkpoint of these weights: every parameter is a key of its own name.
+def weights_layout(weights: OpenVLAWeights, towers: tuple[TowerShape, TowerShape]) -> Layout:
+    """Return the layout of the checkpoint: the key of every parameter is its name.
 
     Args:
-        weights: made within `empty()`.
+        weights: modules created within `empty_parameters()`.
         towers: sizes of DINOv2 and SigLIP.
     """
     parts = zip(("featurizer", "fused_featurizer"), towers, strict=True)
@@ -101,10 +101,10 @@ class OpenVLANetwork:
     """A loaded OpenVLA.
 
     Attributes:
-        weights: on their device.
-        tokenizer: of the language model; it writes the begin token by itself.
-        bins: what action ids mean.
-        image_size: of both towers, in pixels.
+        weights: all modules, on their device.
+        tokenizer: tokenizer of the language model, which adds the begin token.
+        bins: conversion of action ids.
+        image_size: image size of both towers, in pixels.
     """
 
     weights: OpenVLAWeights
@@ -114,20 +114,20 @@ class OpenVLANetwork:
 
     @torch.inference_mode()
     def predict(self, image: Image.Image, instruction: str, *, constrained: bool) -> Actions:
-        """A chunk of one action; see `Network.predict`."""
+        """Return a chunk of one action; see `Network.predict`."""
         model = self.weights.language_model
         cache = DynamicCache(config=model.config)
 
-        def logits(fed: torch.Tensor) -> torch.Tensor:
-            output = model(inputs_embeds=fed, past_key_values=cache, use_cache=True, logits_to_keep=1)
+        def logits(embeds: torch.Tensor) -> torch.Tensor:
+            output = model(inputs_embeds=embeds, past_key_values=cache, use_cache=True, logits_to_keep=1)
             return output.logits[0, -1].float()
 
         def step(token: int) -> torch.Tensor:
-            return logits(embedded(model, [token]))
+            return logits(embed_ids(model, [token]))
 
-        pixels = resized(image, self.image_size).to(model.device)[None]
+        pixels = resize(image, self.image_size).to(model.device)[None]
         patches = self.weights.projector(self.weights.vision_backbone(pixels))
-        text = embedded(model, prompt_ids(self.tokenizer, instruction))
+        text = embed_ids(model, prompt_ids(self.tokenizer, instruction))
         first = logits(torch.cat([text[:, :1], patches, text[:, 1:]], dim=1))
-        ids = greedy(first, step, [self.bins.legal] * ACTION_SIZE, constrained=constrained)
+        ids = decode_greedily(first, step, [self.bins.action_ids] * ACTION_SIZE, constrained=constrained)
         return self.bins.decode(ids)

@@ -1,4 +1,4 @@
-"""Vision transformers under the names of timm, in which OpenVLA's checkpoints keep them."""
+"""Vision transformers with timm's names of parameters, as in OpenVLA's checkpoints."""
 
 from typing import Literal
 
@@ -7,7 +7,7 @@ import torch
 from torch import nn
 from torch.nn.functional import gelu, scaled_dot_product_attention
 
-from model_adapters.policies.weights import Shape, empty
+from model_adapters.policies.weights import Shape, empty_parameters
 
 __all__ = ["TOWERS", "Tower", "TowerShape", "unused_keys"]
 
@@ -19,11 +19,11 @@ class TowerShape(msgspec.Struct, frozen=True):
     """Sizes of a tower.
 
     Attributes:
-        kind: dinov2 has a class token, four registers and layer scales; siglip has none of these, and a pooling head.
-        width: of a patch's features.
-        depth: blocks in the checkpoint; the last is not run.
-        heads: of attention.
-        mlp_width: of the hidden layer of a block's MLP.
+        kind: dinov2 has a class token, four registers and layer scales; siglip has a pooling head instead.
+        width: width of a patch's features.
+        depth: blocks in the checkpoint; the last one is not run.
+        heads: attention heads.
+        mlp_width: width of the hidden layer of a block's MLP.
         patch: side of a patch in pixels.
     """
 
@@ -35,7 +35,7 @@ class TowerShape(msgspec.Struct, frozen=True):
     patch: int = 14
 
 
-# By timm's names, which stand in a checkpoint's config.
+# By timm's names, which a checkpoint's config has.
 TOWERS = {
     "vit_large_patch14_reg4_dinov2.lvd142m": TowerShape("dinov2", 1024, 24, 16, 4096),
     "vit_so400m_patch14_siglip_224": TowerShape("siglip", 1152, 27, 16, 4304),
@@ -63,13 +63,15 @@ class _Mlp(nn.Module):
         self.fc2 = nn.Linear(shape.mlp_width, shape.width)
 
     def forward(self, tokens: torch.Tensor) -> torch.Tensor:
-        return self.fc2(gelu(self.fc1(tokens)))  # timm's is exact, also where SigLIP was trained with tanh's
+        return self.fc2(
+            gelu(self.fc1(tokens))
+        )  # timm uses the exact GELU, also for SigLIP, which was trained with the tanh approximation
 
 
 class _LayerScale(nn.Module):
     def __init__(self, width: int) -> None:
         super().__init__()
-        self.scale_factor = nn.Parameter(torch.empty(width))  # timm says gamma, OpenVLA's checkpoints say this
+        self.scale_factor = nn.Parameter(torch.empty(width))  # OpenVLA's name of timm's `gamma`
 
     def forward(self, tokens: torch.Tensor) -> torch.Tensor:
         return tokens * self.scale_factor
@@ -101,10 +103,10 @@ class _PatchEmbedding(nn.Module):
 
 
 class Tower(nn.Module):
-    """A tower up to its second-to-last block: OpenVLA reads that block's features, without a final norm.
+    """A tower up to its second-to-last block, whose features OpenVLA uses without a final norm.
 
     Args:
-        shape: its sizes.
+        shape: sizes of the tower.
         image_size: width and height of its images in pixels.
     """
 
@@ -120,7 +122,7 @@ class Tower(nn.Module):
         self._has_prefix = shape.kind == "dinov2"
 
     def forward(self, pixels: torch.Tensor) -> torch.Tensor:
-        """Features of the patches, (batch, patches, width), of normalised pixels, (batch, 3, size, size)."""
+        """Return features of the patches, (batch, patches, width), of normalised pixels, (batch, 3, size, size)."""
         tokens = self.patch_embed(pixels) + self.pos_embed
         n_patches = tokens.shape[1]
         if self._has_prefix:
@@ -132,9 +134,9 @@ class Tower(nn.Module):
 
 
 def unused_keys(shape: TowerShape) -> dict[str, Shape]:
-    """Keys of a checkpoint's tower that no feature depends on: its last block, its final norm, its pooling head."""
+    """Return a tower's keys that no feature depends on: its last block, its final norm, its pooling head."""
     width = shape.width
-    with empty():
+    with empty_parameters():
         last = _Block(shape).state_dict()
     keys: dict[str, Shape] = {f"blocks.{shape.depth - 1}.{name}": tuple(value.shape) for name, value in last.items()}
     keys |= _affine("norm", width)

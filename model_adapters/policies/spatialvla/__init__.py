@@ -1,1 +1,1 @@
-"""SpatialVLA: PaliGemma 2 whose patches know where in space they lie, actions as tokens of spherical bins."""
+"""SpatialVLA: PaliGemma 2 with 3D positions of its patches; actions are tokens of spherical bins."""

@@ -44,7 +44,7 @@ class _ActionConfig(msgspec.Struct, frozen=True):
 
 
 class CameraIntrinsics(msgspec.Struct, frozen=True):
-    """Intrinsics of a camera at a size in pixels."""
+    """Intrinsics of a camera for images of a given size in pixels."""
 
     width: int
     height: int
@@ -55,11 +55,11 @@ class ProcessorConfig(msgspec.Struct, frozen=True):
     """`processor_config.json`.
 
     Attributes:
-        action_chunk_size: steps that are written at once.
-        action_config: how many bins there are.
-        bin_policy: their borders, in order; one more than bins.
+        action_chunk_size: steps of a chunk.
+        action_config: numbers of bins.
+        bin_policy: borders of the bins, in ascending order; one more than bins.
         intrinsic_config: cameras by dataset, and "default".
-        statistics: of actions, by dataset.
+        statistics: statistics of actions by dataset.
     """
 
     action_chunk_size: int
@@ -71,10 +71,10 @@ class ProcessorConfig(msgspec.Struct, frozen=True):
 
 @dataclass(frozen=True)
 class SpatialBins:
-    """How ids mean actions.
+    """Conversion of action ids to actions.
 
     Attributes:
-        begin: the id of the first action token.
+        begin: id of the first action token.
         theta, phi, r: borders of the bins of a translation's polar angle, azimuth (radians) and length.
         roll, pitch, yaw: borders of the bins of a rotation.
     """
@@ -89,42 +89,45 @@ class SpatialBins:
 
     @classmethod
     def of(cls, config: ProcessorConfig, begin: int, n_tokens: int, pretrained: str) -> "SpatialBins":
-        """The bins of a checkpoint.
+        """Return the bins of a checkpoint.
 
         Args:
-            config: its processor's.
-            begin: the id of its first action token.
-            n_tokens: how many action tokens it has.
-            pretrained: the checkpoint, for messages.
+            config: config of its processor.
+            begin: id of its first action token.
+            n_tokens: number of its action tokens.
+            pretrained: name of the checkpoint, for messages.
 
         Raises:
-            ModelError: bins and tokens do not fit each other, or translations are not spherical.
+            ModelError: the numbers of bins and tokens contradict each other, or translations are not spherical.
         """
         policy, counts = config.bin_policy, config.action_config.num_bins
         axes = {**msgspec.to_builtins(policy.translation), **msgspec.to_builtins(policy.rotation)}
-        wanted = {**counts.translation, **counts.rotation}
-        wrong = [name for name, borders in axes.items() if len(borders) - 1 != wanted.get(name)]
+        expected = {**counts.translation, **counts.rotation}
+        wrong = [name for name, borders in axes.items() if len(borders) - 1 != expected.get(name)]
         if wrong or not config.action_config.use_spherical or counts.gripper != _GRIPPER_IDS:
             raise ModelError(f"{pretrained}: bins and num_bins do not fit ({', '.join(wrong) or 'no spherical bins'})")
         bins = cls(begin, *(tuple(axes[name]) for name in axes))
-        if bins.legal[-1].stop != begin + n_tokens:
-            raise ModelError(f"{pretrained} has {n_tokens} action tokens and {bins.legal[-1].stop - begin} bins")
+        if bins.action_ids[-1].stop != begin + n_tokens:
+            raise ModelError(f"{pretrained} has {n_tokens} action tokens and {bins.action_ids[-1].stop - begin} bins")
         return bins
 
     @property
-    def legal(self) -> tuple[range, range, range]:
-        """The ids of a step's three tokens: translations, then rotations, then gripper closed and open."""
+    def action_ids(self) -> tuple[range, range, range]:
+        """Ids of a step's three tokens: translations, then rotations, then gripper closed and open."""
         rotations = self.begin + _n(self.theta) * _n(self.phi) * _n(self.r)
         grippers = rotations + _n(self.roll) * _n(self.pitch) * _n(self.yaw)
         return range(self.begin, rotations), range(rotations, grippers), range(grippers, grippers + _GRIPPER_IDS)
 
     def decode(self, ids: Sequence[int]) -> Actions:
-        """Actions, (steps, 7), each number between -1 and 1, the gripper 0 or 1.
+        """Return actions, (steps, 7), each number between -1 and 1, the gripper 0 or 1.
+
+        A translation token is a bin of polar angle, azimuth and length; its centre is converted to x, y, z. The corner
+        bins of large lengths reach beyond the unit cube, so translations are clipped.
 
         Args:
-            ids: three a step, each among `legal` of its place.
+            ids: three ids per step, each among `action_ids` of its place.
         """
-        steps = np.array(ids).reshape(-1, TOKENS_PER_STEP) - [place.start for place in self.legal]
+        steps = np.array(ids).reshape(-1, TOKENS_PER_STEP) - [place.start for place in self.action_ids]
         theta, phi, r = _centres(steps[:, 0], self.theta, self.phi, self.r)
         xyz = [r * np.sin(theta) * np.cos(phi), r * np.sin(theta) * np.sin(phi), r * np.cos(theta)]
         rotation = _centres(steps[:, 1], self.roll, self.pitch, self.yaw)
@@ -138,6 +141,6 @@ def _n(borders: Sequence[float]) -> int:
 
 
 def _centres(index: np.ndarray, *axes: Sequence[float]) -> list[np.ndarray]:
-    """Middles of the bins that numbers, (steps,), counted over three axes, the last fastest, mean on each axis."""
+    """Return the centres on three axes of bins, (steps,), that are numbered with the last axis fastest."""
     places = np.unravel_index(index, [_n(axis) for axis in axes])
     return [(np.array(axis)[at] + np.array(axis)[at + 1]) / 2 for at, axis in zip(places, axes, strict=True)]

@@ -1,69 +1,48 @@
 """The adapter `spatialvla`."""
 
-from typing import ClassVar
-
 from tokenizers import Tokenizer
 
 from infthor_eval.errors import ModelError
-from model_adapters.hf.checkpoint import loading
+from model_adapters.hf.checkpoint import wrap_loading_errors
 from model_adapters.options.policies import SpatialVLACheckpointOptions, SpatialVLAOptions, parse_field_of_view
-from model_adapters.policies.checkpoint import PolicyCheckpoint, find
+from model_adapters.policies.adapter import PolicyAdapter
+from model_adapters.policies.checkpoint import PolicyCheckpoint
 from model_adapters.policies.policy import VlaPolicy
 from model_adapters.policies.spatialvla.actions import ProcessorConfig, SpatialBins
 from model_adapters.policies.spatialvla.camera import published_intrinsics
 from model_adapters.policies.spatialvla.config import SpatialVLAConfig
 from model_adapters.policies.spatialvla.network import SpatialVLANetwork, SpatialVLAWeights, View
-from model_adapters.policies.statistics import statistics_of
-from model_adapters.policies.weights import empty, load_weights
+from model_adapters.policies.statistics import select_statistics
+from model_adapters.policies.weights import empty_parameters, load_weights
 
 __all__ = ["MODEL_TYPE", "SpatialVLA", "load_spatialvla"]
 
 MODEL_TYPE = "spatialvla"
 
 
-class SpatialVLA:
-    """The adapter `spatialvla`: IPEC-COMMUNITY/spatialvla-4b-224-pt and its relatives."""
-
-    Options: ClassVar[type] = SpatialVLACheckpointOptions
-
-    @classmethod
-    def build(cls, name: str, options: SpatialVLACheckpointOptions, seed: int) -> VlaPolicy:  # noqa: ARG003
-        """Load a checkpoint; nothing in it is random.
-
-        Raises:
-            ModelError: it cannot be loaded, or is another family's.
-            UsageError: an unknown unnorm_key, device or dtype.
-            DataError: a file beside its weights is missing or damaged.
-        """
-        return load_spatialvla(name, find(options.pretrained, options.revision), options)
-
-
 def load_spatialvla(name: str, checkpoint: PolicyCheckpoint, options: SpatialVLAOptions) -> VlaPolicy:
-    """Load a SpatialVLA from a folder.
+    """Load a SpatialVLA; see `PolicyAdapter.build`.
 
     Args:
-        name: the registry's name.
-        checkpoint: where it lies.
-        options: how it is run.
-
-    Raises:
-        ModelError: see `SpatialVLA.build`.
+        name: name in the registry.
+        checkpoint: the checkpoint.
+        options: options of the policy.
     """
-    checkpoint.require_kind(MODEL_TYPE)
+    checkpoint.require_model_type(MODEL_TYPE)
     config = checkpoint.read("config.json", SpatialVLAConfig)
     processor = checkpoint.read("processor_config.json", ProcessorConfig)
     pretrained = checkpoint.pretrained
-    key, statistics = statistics_of(processor.statistics, options.unnorm_key, pretrained)
+    key, statistics = select_statistics(processor.statistics, options.unnorm_key, pretrained)
     bins = SpatialBins.of(processor, config.action_token_begin_idx, config.spatial_token_num, pretrained)
     tokenizer = _tokenizer(checkpoint, config)
-    device, dtype = checkpoint.placed(options)
-    with loading(pretrained):
+    device, dtype = checkpoint.resolve_placement(options)
+    with wrap_loading_errors(pretrained):
         config.check(pretrained)
         view = _view(config, processor, key, options, pretrained)
-        with empty():
+        with empty_parameters():
             weights = SpatialVLAWeights(config, options.attn_implementation)
         load_weights(weights, checkpoint.folder, weights.layout(), pretrained=pretrained, device=device, dtype=dtype)
-        weights.finish()
+        weights.place_action_embeddings()
     network = SpatialVLANetwork(
         weights.eval(), tokenizer, bins, processor.action_chunk_size, config.image_token_index, view
     )
@@ -71,16 +50,16 @@ def load_spatialvla(name: str, checkpoint: PolicyCheckpoint, options: SpatialVLA
         "unnorm_key": key,
         "intrinsics": options.intrinsics,
     }
-    return VlaPolicy(name, network, statistics, options, identity)
+    return VlaPolicy(name, network, statistics, options, identity, options.threads)
 
 
 def _tokenizer(checkpoint: PolicyCheckpoint, config: SpatialVLAConfig) -> Tokenizer:
     tokenizer = checkpoint.tokenizer()
-    found = tokenizer.token_to_id("<ACTION00000>")
-    if found != config.action_token_begin_idx:
+    first_id = tokenizer.token_to_id("<ACTION00000>")
+    if first_id != config.action_token_begin_idx:
         raise ModelError(
-            f"{checkpoint.pretrained}: actions begin at {config.action_token_begin_idx} in the config and at {found} "
-            "in the tokenizer; restore the checkpoint"
+            f"{checkpoint.pretrained}: actions begin at {config.action_token_begin_idx} in the config and at "
+            f"{first_id} in the tokenizer; restore the checkpoint"
         )
     return tokenizer
 
@@ -98,3 +77,10 @@ def _view(
         intrinsics=published_intrinsics(cameras, key, size, pretrained) if degrees is None else None,
         field_of_view=degrees,
     )
+
+
+class SpatialVLA(PolicyAdapter):
+    """The adapter `spatialvla`: IPEC-COMMUNITY/spatialvla-4b-224-pt and similar checkpoints."""
+
+    Options = SpatialVLACheckpointOptions
+    load = staticmethod(load_spatialvla)

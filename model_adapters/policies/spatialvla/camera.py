@@ -1,4 +1,4 @@
-"""The camera that SpatialVLA is to believe its frames come from."""
+"""Camera intrinsics that SpatialVLA assumes for its frames."""
 
 import math
 from collections.abc import Mapping
@@ -15,16 +15,16 @@ __all__ = ["published_intrinsics", "thor_intrinsics"]
 def published_intrinsics(
     cameras: Mapping[str, CameraIntrinsics], unnorm_key: str, image_size: int, pretrained: str
 ) -> torch.Tensor:
-    """Intrinsics, (3, 3), in pixels of the squashed image: the dataset's camera, or the checkpoint's default.
+    """Return the intrinsics, (3, 3), in pixels of the squashed image, of the dataset's camera or the default one.
 
     Args:
-        cameras: the checkpoint's, by dataset.
-        unnorm_key: the dataset.
+        cameras: cameras of the checkpoint by dataset.
+        unnorm_key: key of the dataset.
         image_size: width and height that frames are squashed to.
-        pretrained: the checkpoint, for the message.
+        pretrained: name of the checkpoint, for the message.
 
     Raises:
-        ModelError: it has neither, or a camera that is none.
+        ModelError: the checkpoint has neither camera, or its entry is not valid.
     """
     camera = cameras.get(unnorm_key) or cameras.get(DEFAULT_INTRINSICS)
     rows = [] if camera is None else camera.intrinsic
@@ -37,12 +37,12 @@ def published_intrinsics(
 
 
 def thor_intrinsics(degrees: float, size: tuple[int, int], image_size: int) -> torch.Tensor:
-    """Intrinsics, (3, 3), in pixels of the squashed image, of a simulator's camera.
+    """Return the intrinsics, (3, 3), in pixels of the squashed image, of a simulator's camera.
 
     Args:
-        degrees: its vertical field of view.
+        degrees: vertical field of view of the camera.
         size: width and height of its frames in pixels.
-        image_size: width and height that they are squashed to.
+        image_size: width and height that frames are squashed to.
     """
     width, height = size
     focal = (height / 2) / math.tan(math.radians(degrees) / 2)

@@ -1,4 +1,4 @@
-"""What a SpatialVLA checkpoint's config says, as far as it is needed."""
+"""The config of a SpatialVLA checkpoint, as far as it is used."""
 
 from typing import Any
 
@@ -14,17 +14,17 @@ class SpatialVLAConfig(msgspec.Struct, frozen=True, kw_only=True):
     """`config.json`.
 
     Attributes:
-        text_config: of Gemma 2.
-        vision_config: of SigLIP.
-        vision_zoe_config: of ZoeDepth.
-        image_token_index: the id that the image's patches replace.
-        action_token_begin_idx: the id of the first action token.
-        spatial_token_num: how many action tokens there are.
+        text_config: config of Gemma 2.
+        vision_config: config of SigLIP.
+        vision_zoe_config: config of ZoeDepth.
+        image_token_index: id of the image tokens, which patches replace.
+        action_token_begin_idx: id of the first action token.
+        spatial_token_num: number of action tokens.
         ego3d_patch_reso: points along each side of a patch.
         n_freqs: frequencies of each coordinate of a point.
-        projection_dim: of the patches as Gemma sees them.
-        use_spatial_token: whether action tokens have embeddings of their own.
-        use_vision_zoe: whether patches know where they lie.
+        projection_dim: width of the patches as input of Gemma.
+        use_spatial_token: true if action tokens have separate embeddings.
+        use_vision_zoe: true if patches have 3D positions.
     """
 
     text_config: dict[str, Any]
@@ -40,39 +40,39 @@ class SpatialVLAConfig(msgspec.Struct, frozen=True, kw_only=True):
     use_vision_zoe: bool = True
 
     def check(self, pretrained: str) -> None:
-        """Refuse a variant that is not run here.
+        """Check that this variant is supported.
 
         Raises:
-            ModelError: it has no depth or no action tokens of its own, or these are not the last of the vocabulary.
+            ModelError: it has no depth or no separate action tokens, or these are not the last of the vocabulary.
         """
         at_end = self.action_token_begin_idx + self.spatial_token_num == self.text().vocab_size
         if not (self.use_spatial_token and self.use_vision_zoe and at_end):
             raise ModelError(
                 f"{pretrained}: only SpatialVLA with use_spatial_token, use_vision_zoe and its action tokens at the "
-                "end of the vocabulary can be run here"
+                "end of the vocabulary is supported"
             )
 
     def sides(self, pretrained: str) -> tuple[int, int, int]:
-        """Sides, in pixels, of the image, of its patches, and of the image that depth is estimated on.
+        """Return the sides, in pixels, of the image, of its patches, and of the image for depth estimation.
 
         Raises:
-            ModelError: one of them is no square.
+            ModelError: one of them is not a square.
         """
         vision, backbone = self.vision(), self.zoe().backbone_config
-        found = vision.image_size, vision.patch_size, getattr(backbone, "image_size", None)
-        image, patch, zoe = found
+        sides = vision.image_size, vision.patch_size, getattr(backbone, "image_size", None)
+        image, patch, zoe = sides
         if not (isinstance(image, int) and isinstance(patch, int) and isinstance(zoe, int)):
-            raise ModelError(f"{pretrained}: images, patches and depth images of sides {found} cannot be run here")
+            raise ModelError(f"{pretrained}: images, patches and depth images of sides {sides} are not supported")
         return image, patch, zoe
 
     def text(self) -> Gemma2Config:
-        """Gemma 2's config."""
+        """Return the config of Gemma 2."""
         return Gemma2Config(**self.text_config)
 
     def vision(self) -> SiglipVisionConfig:
-        """SigLIP's config."""
+        """Return the config of SigLIP."""
         return SiglipVisionConfig(**self.vision_config)
 
     def zoe(self) -> ZoeDepthConfig:
-        """ZoeDepth's config."""
+        """Return the config of ZoeDepth."""
         return ZoeDepthConfig(**self.vision_zoe_config)

@@ -1,25 +1,25 @@
-"""Where in space the patches of a frame lie, as SpatialVLA encodes it: depth, back-projection, frequencies, an MLP."""
+"""SpatialVLA's 3D positions of patches: depth estimation, back-projection, frequency encoding, an MLP."""
 
 import torch
 from torch import nn
 from torch.nn.functional import interpolate, pad
 
-from model_adapters.policies.preprocessing import normalised
+from model_adapters.policies.preprocessing import normalise
 
-__all__ = ["Ego3DEmbedding", "depth_of", "points_of"]
+__all__ = ["Ego3DEmbedding", "back_project", "estimate_depth"]
 
 _HALF = (0.5, 0.5, 0.5)
-_CENTRE = (0.0, 0.0, 2.0)  # metres; points are taken relative to this place in front of the camera
-_REACH = 2.0  # metres that become 1
+_CENTRE = (0.0, 0.0, 2.0)  # metres; the point in front of the camera that coordinates are relative to
+_REACH = 2.0  # metres; coordinates are divided by it
 
 
 class Ego3DEmbedding(nn.Module):
-    """From points to the features that are added to a patch's.
+    """Features of a patch's points, which are added to the patch's own.
 
     Args:
-        n_points: of each patch.
+        n_points: points of each patch.
         n_freqs: frequencies of each coordinate.
-        width: of the patch's features.
+        width: width of the features.
     """
 
     def __init__(self, n_points: int, n_freqs: int, width: int) -> None:
@@ -30,7 +30,7 @@ class Ego3DEmbedding(nn.Module):
         )
 
     def forward(self, points: torch.Tensor) -> torch.Tensor:
-        """Features, (batch, patches, width), of points in metres, (batch, patches, 3 * points), in float32."""
+        """Return features, (batch, patches, width), of points in metres, (batch, patches, 3 * points), in float32."""
         dtype = next(self.parameters()).dtype
         centre = points.new_tensor(_CENTRE).repeat(points.shape[-1] // 3)
         near = ((points - centre) / _REACH).to(dtype).unsqueeze(-1)
@@ -39,37 +39,37 @@ class Ego3DEmbedding(nn.Module):
         return self.position_embedding_head(encoded.flatten(2))
 
 
-def depth_of(zoe: nn.Module, pixels: torch.Tensor, zoe_size: int) -> torch.Tensor:
-    """Depth in metres, (batch, 1, size, size).
+def estimate_depth(zoe: nn.Module, pixels: torch.Tensor, zoe_size: int) -> torch.Tensor:
+    """Return the depth in metres, (batch, 1, size, size).
 
     Args:
         zoe: transformers' ZoeDepth.
-        pixels: between 0 and 1, (batch, 3, size, size).
-        zoe_size: width and height of the images that it was trained on; 384.
+        pixels: pixels from 0 to 1, (batch, 3, size, size).
+        zoe_size: width and height of the images that ZoeDepth was trained on; 384.
     """
     size = pixels.shape[-1]
     border = int((size / 2) ** 0.5 * 3)  # 31 for 224, as in ZoeDepth's own preprocessing
     framed = pad(pixels, (border,) * 4, mode="reflect")
-    # Normalised after resizing, and by 0.5 throughout: that is what SpatialVLA was trained with.
-    seen = normalised(interpolate(framed, (zoe_size, zoe_size), mode="bicubic", align_corners=True), _HALF, _HALF)
-    depth = zoe(pixel_values=seen).predicted_depth.unsqueeze(1)
+    # Normalised after resizing and with 0.5 for all channels, unlike ZoeDepth: SpatialVLA was trained so.
+    inputs = normalise(interpolate(framed, (zoe_size, zoe_size), mode="bicubic", align_corners=True), _HALF, _HALF)
+    depth = zoe(pixel_values=inputs).predicted_depth.unsqueeze(1)
     whole = interpolate(depth, framed.shape[-2:], mode="bicubic", align_corners=True)
     return whole[..., border:-border, border:-border]
 
 
-def points_of(depth: torch.Tensor, intrinsics: torch.Tensor, patch: int, resolution: int) -> torch.Tensor:
-    """Points in front of the camera, (batch, patches, 3 * resolution ** 2), in metres and float32.
+def back_project(depth: torch.Tensor, intrinsics: torch.Tensor, patch: int, resolution: int) -> torch.Tensor:
+    """Return points in front of the camera, (batch, patches, 3 * resolution ** 2), in metres and float32.
 
     Args:
-        depth: (batch, 1, size, size), in the type of the weights.
-        intrinsics: (3, 3), in pixels of that size.
+        depth: depth in metres, (batch, 1, size, size), in the type of the weights.
+        intrinsics: camera intrinsics, (3, 3), in pixels of that size.
         patch: side of a patch in pixels.
         resolution: points along each side of a patch.
     """
     size, cell = depth.shape[-1], patch // resolution
     n_patches, n_cells = size // patch, size // patch * resolution
     middle = torch.arange(0, size, cell, device=depth.device).float() + patch / resolution / 2
-    # The original makes these in the type of its weights: in bfloat16, 220.5 is 220.
+    # The original computes these in the type of its weights, which rounds: in bfloat16, 220.5 becomes 220.
     middle = middle.to(depth.dtype).float()
     v, u = torch.meshgrid(middle, middle, indexing="ij")
     rays = torch.linalg.inv(intrinsics.float()) @ torch.stack([u, v, torch.ones_like(u)]).reshape(3, -1)

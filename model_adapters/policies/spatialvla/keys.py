@@ -1,7 +1,7 @@
-"""Names of parameters in transformers 5, and as transformers 4.47 wrote them into SpatialVLA's checkpoints.
+"""Names of parameters in transformers 5 and in SpatialVLA's checkpoints, which transformers 4.47 wrote.
 
-transformers has these renamings too, but it applies them to whole models that it knows. Within SpatialVLA's files its
-parts would keep their old names; a loader that is not strict then leaves ZoeDepth random without a word.
+transformers has these renamings too, but applies them only to whole models that it knows. The parts of SpatialVLA would
+keep their old names, and a loader that is not strict would leave ZoeDepth random without a warning.
 """
 
 import re
@@ -25,7 +25,7 @@ _BEIT_RENAMES = (
 
 
 def checkpoint_key(name: str) -> str:
-    """The key in a checkpoint of a parameter in the module."""
+    """Return the key in a checkpoint of a parameter of the module."""
     if name.startswith(_SIGLIP) and not name.startswith(f"{_SIGLIP}vision_model."):
         return f"{_SIGLIP}vision_model.{name.removeprefix(_SIGLIP)}"
     if name.startswith(f"{_BEIT}beit."):

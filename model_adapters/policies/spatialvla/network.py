@@ -1,4 +1,4 @@
-"""SpatialVLA's network: patches that know where they lie, in front of a Gemma 2 that writes action tokens."""
+"""SpatialVLA's network: patches with 3D positions, followed by a Gemma 2 that predicts action tokens."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -10,12 +10,12 @@ from torch import nn
 from transformers import DynamicCache, Gemma2ForCausalLM, SiglipVisionModel, ZoeDepthForDepthEstimation
 
 from infthor_eval.errors import ModelError
-from model_adapters.policies.decoding import embedded, greedy
-from model_adapters.policies.preprocessing import normalised, resized
+from model_adapters.policies.decoding import decode_greedily, embed_ids
+from model_adapters.policies.preprocessing import normalise, resize
 from model_adapters.policies.spatialvla.actions import SpatialBins
 from model_adapters.policies.spatialvla.camera import thor_intrinsics
 from model_adapters.policies.spatialvla.config import SpatialVLAConfig
-from model_adapters.policies.spatialvla.ego3d import Ego3DEmbedding, depth_of, points_of
+from model_adapters.policies.spatialvla.ego3d import Ego3DEmbedding, back_project, estimate_depth
 from model_adapters.policies.spatialvla.keys import checkpoint_key
 from model_adapters.policies.statistics import Actions
 from model_adapters.policies.weights import Layout
@@ -28,7 +28,7 @@ _LM_HEAD = "language_model.lm_head.weight"
 
 
 def prompt(instruction: str) -> str:
-    """What SpatialVLA is asked."""
+    """Return SpatialVLA's prompt."""
     return f"What action should the robot take to {instruction}?"
 
 
@@ -39,11 +39,11 @@ class _SpatialVLAProjector(nn.Module):
 
 
 class SpatialVLAWeights(nn.Module):
-    """All that has weights; `layout` knows their names in a checkpoint.
+    """All modules with weights.
 
     Args:
-        config: the checkpoint's.
-        attn_implementation: of all transformers in it.
+        config: config of the checkpoint.
+        attn_implementation: attention kernel of all transformers in it.
     """
 
     def __init__(self, config: SpatialVLAConfig, attn_implementation: str) -> None:
@@ -60,35 +60,37 @@ class SpatialVLAWeights(nn.Module):
         self.spatial_embed_tokens = nn.Embedding(config.spatial_token_num, text.hidden_size)
 
     @property
-    def tied(self) -> bool:
-        """Whether tokens are embedded and written by the same weights."""
+    def has_tied_head(self) -> bool:
+        """True if the embeddings and the output head share their weights."""
         return bool(self.language_model.config.tie_word_embeddings)
 
     def layout(self) -> Layout:
-        """The layout of the checkpoint of these weights; all of it is used."""
-        return Layout.of(self, lambda name: None if self.tied and name == _LM_HEAD else checkpoint_key(name), {})
+        """Return the layout of the checkpoint; all of its keys are used."""
+        return Layout.of(
+            self, lambda name: None if self.has_tied_head and name == _LM_HEAD else checkpoint_key(name), {}
+        )
 
     @torch.inference_mode()
-    def finish(self) -> None:
-        """Put loaded embeddings in their places: action tokens have theirs apart from the vocabulary's."""
+    def place_action_embeddings(self) -> None:
+        """Copy the embeddings of action tokens, which have their own key, into those of the vocabulary."""
         model, spatial = self.language_model, self.spatial_embed_tokens.weight
         model.model.embed_tokens.weight[-len(spatial) :] = spatial
-        if self.tied:
+        if self.has_tied_head:
             model.lm_head.weight = model.model.embed_tokens.weight
         del self.spatial_embed_tokens
 
 
 @dataclass(frozen=True)
 class View:
-    """How frames are looked at.
+    """Image sizes and camera.
 
     Attributes:
-        image_size: width and height that they are squashed to, in pixels.
+        image_size: width and height that frames are squashed to, in pixels.
         patch: side of a patch in pixels.
         resolution: points along each side of a patch.
-        zoe_size: width and height of the images that depth is estimated on.
-        intrinsics: (3, 3), of all frames; None where they follow from the field of view.
-        field_of_view: vertical, in degrees.
+        zoe_size: width and height of the images for depth estimation.
+        intrinsics: camera intrinsics of all frames, (3, 3), or None to derive them from the field of view.
+        field_of_view: vertical field of view in degrees, or None.
     """
 
     image_size: int
@@ -99,7 +101,7 @@ class View:
     field_of_view: float | None
 
     def camera(self, size: tuple[int, int]) -> torch.Tensor:
-        """Intrinsics, (3, 3), in pixels of the squashed image, for a frame of this width and height."""
+        """Return the intrinsics, (3, 3), in pixels of the squashed image, for a frame of this width and height."""
         if self.intrinsics is not None:
             return self.intrinsics
         assert self.field_of_view is not None
@@ -107,7 +109,7 @@ class View:
 
     @property
     def n_patches(self) -> int:
-        """Of a frame."""
+        """Patches of a frame."""
         return (self.image_size // self.patch) ** 2
 
 
@@ -116,12 +118,12 @@ class SpatialVLANetwork:
     """A loaded SpatialVLA.
 
     Attributes:
-        weights: on their device.
-        tokenizer: of the language model.
-        bins: what action ids mean.
-        chunk: steps that are written at once.
-        image_id: the id that patches replace.
-        view: how frames are looked at.
+        weights: all modules, on their device.
+        tokenizer: tokenizer of the language model.
+        bins: conversion of action ids.
+        chunk: steps of a chunk.
+        image_id: id of the image tokens, which patches replace.
+        view: image sizes and camera.
     """
 
     weights: SpatialVLAWeights
@@ -132,10 +134,10 @@ class SpatialVLANetwork:
     view: View
 
     def prompt_ids(self, instruction: str) -> list[int]:
-        """The ids of the prompt behind as many image tokens as there are patches.
+        """Return one image token for each patch, followed by the ids of the prompt.
 
         Raises:
-            ModelError: the tokenizer writes others.
+            ModelError: the tokenizer has another image token.
         """
         text = f"{_IMAGE * self.view.n_patches}{_BEGIN}{prompt(instruction)}\n"
         ids: list[int] = self.tokenizer.encode(text, add_special_tokens=False).ids
@@ -144,33 +146,35 @@ class SpatialVLANetwork:
         return ids
 
     def features(self, image: Image.Image) -> torch.Tensor:
-        """Patches as Gemma sees them, (1, patches, hidden)."""
+        """Return the patches as input of Gemma, (1, patches, hidden)."""
         weights, view = self.weights, self.view
         weight = weights.multi_modal_projector.linear.weight
-        # Pixels and intrinsics are rounded to the weights' type before anything else, as the original does.
-        pixels = resized(image, view.image_size).to(weight.device, weight.dtype)[None]
+        # Like the original, pixels and intrinsics are rounded to the weights' type first.
+        pixels = resize(image, view.image_size).to(weight.device, weight.dtype)[None]
         camera = view.camera(image.size).to(weight.device, weight.dtype)
-        seen = weights.vision_tower(pixel_values=normalised(pixels, _HALF, _HALF)).last_hidden_state
-        points = points_of(
-            depth_of(weights.vision_zoe_model, pixels, view.zoe_size), camera, view.patch, view.resolution
+        patches = weights.vision_tower(pixel_values=normalise(pixels, _HALF, _HALF)).last_hidden_state
+        points = back_project(
+            estimate_depth(weights.vision_zoe_model, pixels, view.zoe_size), camera, view.patch, view.resolution
         )
-        # Not divided by the root of the width as in the original: Gemma scales within its embedding now.
-        return weights.multi_modal_projector.linear(seen + weights.position_embedding_3d(points))
+        # The original divides by the root of the width, because its Gemma scaled all inputs; now it scales tokens only.
+        return weights.multi_modal_projector.linear(patches + weights.position_embedding_3d(points))
 
     @torch.inference_mode()
     def predict(self, image: Image.Image, instruction: str, *, constrained: bool) -> Actions:
-        """A chunk of actions; see `Network.predict`."""
+        """Return a chunk of actions; see `Network.predict`."""
         model = self.weights.language_model
         cache = DynamicCache(config=model.config)
 
-        def logits(fed: torch.Tensor) -> torch.Tensor:
-            past, new = cache.get_seq_length(), fed.shape[1]
-            # Everything sees everything: the prefix is read in both directions, and what follows comes one by one.
-            mask = fed.new_zeros(1, 1, new, past + new)
+        def logits(embeds: torch.Tensor) -> torch.Tensor:
+            past, new = cache.get_seq_length(), embeds.shape[1]
+            # No position is masked: the prefix attends in both directions (PaliGemma), and actions follow one by one.
+            mask = embeds.new_zeros(1, 1, new, past + new)
             output = model(
-                inputs_embeds=fed,
+                inputs_embeds=embeds,
                 attention_mask={"full_attention": mask, "sliding_attention": mask},
-                position_ids=torch.arange(past + 1, past + new + 1, device=mask.device)[None],  # counted from 1
+                position_ids=torch.arange(past + 1, past + new + 1, device=mask.device)[
+                    None
+                ],  # PaliGemma counts from 1
                 past_key_values=cache,
                 use_cache=True,
                 logits_to_keep=1,
@@ -178,10 +182,10 @@ class SpatialVLANetwork:
             return output.logits[0, -1].float()
 
         def step(token: int) -> torch.Tensor:
-            return logits(embedded(model, [token]))
+            return logits(embed_ids(model, [token]))
 
         ids = self.prompt_ids(instruction)
         places = torch.tensor(ids, device=model.device) == self.image_id
-        prefix = embedded(model, ids).masked_scatter(places[None, :, None], self.features(image))
-        written = greedy(logits(prefix), step, self.bins.legal * self.chunk, constrained=constrained)
-        return self.bins.decode(written)
+        prefix = embed_ids(model, ids).masked_scatter(places[None, :, None], self.features(image))
+        action = decode_greedily(logits(prefix), step, self.bins.action_ids * self.chunk, constrained=constrained)
+        return self.bins.decode(action)

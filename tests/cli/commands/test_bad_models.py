@@ -50,7 +50,7 @@ def _without_slot(folder):
 
 
 BROKEN = {
-    "text only": ("hf-vlm", "text", lambda folder: None, {}, "is a llama checkpoint, which sees no images"),
+    "text only": ("hf-vlm", "text", lambda folder: None, {}, "is a llama checkpoint, which has no vision"),
     "text only, by a family": ("qwen2.5-vl", "text", lambda folder: None, {}, "is a llama checkpoint, not qwen2_5_vl"),
     "merged patches": (
         "qwen2.5-vl",

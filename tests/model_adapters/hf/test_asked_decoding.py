@@ -10,7 +10,7 @@ from transformers import set_seed
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
 from model_adapters import Decoding, Part, load
-from model_adapters.hf.uncached import UncachedModel, processed
+from model_adapters.hf.uncached import UncachedModel, process_turns
 
 from ..asking import up_to
 
@@ -75,7 +75,7 @@ def test_choices_are_those_that_generate_makes_under_the_same_constraint(
     loaded, talk = model._loaded, model.conversation()
     talk.append(*frames[:2], "\nWhere is it?")
     spelled = [loaded.tokenizer(text, add_special_tokens=False)["input_ids"] for text in choices]
-    inputs = processed(model._processor, loaded.template, talk.turns)
+    inputs = process_turns(model._processor, loaded.template, talk.turns)
     n_context = inputs["input_ids"].shape[1]
 
     def allowed(_: int, ids: Any) -> list[int]:
@@ -107,7 +107,7 @@ def test_a_choice_that_cannot_be_said_in_so_few_tokens_is_refused(ways: dict[str
     for model in ways.values():
         talk = model.conversation()
         talk.append(frames[0])
-        with pytest.raises(ModelError, match=r"the choice 'on the table top' takes \d+ tokens and a reply may have 3"):
+        with pytest.raises(ModelError, match=r"the choice 'on the table top' has \d+ tokens and a reply may have 3"):
             talk.reply(up_to(3, choices=("on", "on the table top")))
 
 

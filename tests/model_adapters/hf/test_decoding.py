@@ -8,7 +8,7 @@ from transformers import GenerationConfig, TemperatureLogitsWarper, TopPLogitsWa
 from infthor_eval.errors import ModelError
 from model_adapters import Decoding
 from model_adapters.hf.choices import Choices
-from model_adapters.hf.decoding import Generation, ReplyState, read_generation, write
+from model_adapters.hf.decoding import Generation, ReplyState, decode_replies, read_generation
 from model_adapters.stopping import cut_at_stop
 
 from ..asking import up_to
@@ -39,7 +39,7 @@ def _writing(
 
 
 def _written(reply: ReplyState, logits: torch.Tensor, step: Feed = _counting) -> list[int]:
-    write(logits[None], lambda tokens: torch.stack([step(token) for token in tokens]), [reply])
+    decode_replies(logits[None], lambda tokens: torch.stack([step(token) for token in tokens]), [reply])
     return reply.ids
 
 
@@ -78,7 +78,7 @@ def test_replies_are_written_in_step_each_to_its_own_end() -> None:
         fed.append(tokens)
         return torch.stack([_counting(token) for token in tokens])
 
-    write(torch.stack([_points_at(6), _points_at(1), _points_at(1)]), step, replies)
+    decode_replies(torch.stack([_points_at(6), _points_at(1), _points_at(1)]), step, replies)
     assert [reply.ids for reply in replies] == [[6, 7, 8], [1, 2], [1, 2]]
     assert fed == [[6, 1, 1], [7, 0, 2], [8, 0, 0]]
 

@@ -16,7 +16,7 @@ from infthor_eval.formats.frames import FrameRef
 from model_adapters import check_adapter, load
 from model_adapters.hf.model import TransformersModel
 from model_adapters.hf.prompt import token_ids
-from model_adapters.hf.uncached import UncachedModel, processed
+from model_adapters.hf.uncached import UncachedModel, process_turns
 from model_adapters.tiny.pixtral import PixtralTiny
 from model_adapters.tiny.qwen2_5_vl import Qwen25VLTiny, save_tiny_checkpoint
 
@@ -60,7 +60,7 @@ def test_what_is_refused_runs_without_sharing(checkpoints: dict[str, Path], fram
     parts = (frames[0], "\nWhat is it?")
     talk = model.conversation()
     talk.append(*parts)
-    inputs = processed(model._processor, model._loaded.template, talk.turns)
+    inputs = process_turns(model._processor, model._loaded.template, talk.turns)
     output = model._loaded.model.generate(**inputs, do_sample=False, max_new_tokens=6)
     expected = [token for token in output[0, talk.n_tokens :].tolist() if token not in model._loaded.generation.end_ids]
     reply = talk.reply(up_to(6))
@@ -128,7 +128,7 @@ def test_no_checkpoint_is_a_usage_error() -> None:
 
 def test_a_model_without_images_is_refused(tmp_path: Path) -> None:
     LlamaConfig(vocab_size=10).save_pretrained(tmp_path)
-    with pytest.raises(ModelError, match="is a llama checkpoint, which sees no images"):
+    with pytest.raises(ModelError, match="is a llama checkpoint, which has no vision"):
         _load(tmp_path)
 
 
@@ -143,7 +143,7 @@ def test_a_processor_that_disagrees_with_the_model_is_refused(checkpoints: dict[
 
 @pytest.mark.parametrize(
     ("piece", "complaint"),
-    [("'<image>'", "0 image placeholders for 3 frames"), ("part.text", "leaves out the text 'The first view:'")],
+    [("'<image>'", "0 image placeholders for 3 frames"), ("part.text", "drops the text 'The first view:'")],
 )
 def test_a_template_without_images_or_texts_is_refused(
     checkpoints: dict[str, Path], tmp_path: Path, piece: str, complaint: str

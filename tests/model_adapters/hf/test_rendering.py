@@ -66,7 +66,7 @@ def test_a_turn_is_written_the_same_whatever_comes_after_it(tokenizer: Any, fram
     ("template", "turns", "complaint"),
     [
         (NO_SYSTEM, (SYSTEM, *SAID), r"refuses the turns system, user, assistant, user \(no system turns\)"),
-        (ONLY_USERS, SAID, r"leaves out the text 'A mug.' of a turn \(assistant\)"),
+        (ONLY_USERS, SAID, r"drops the text 'A mug.' of a turn \(assistant\)"),
         (ONLY_USERS, (*SAID, Turn("assistant", ("Sure?",)), MORE), r"leaves out"),
         ("{{ messages[0].content[0].text.nothing.at_all }}", SAID, "refuses the turns user, assistant, user"),
         ("{{ 'a' + messages[0].content }}", SAID, "refuses the turns user, assistant, user"),
@@ -84,7 +84,7 @@ def test_turns_that_a_template_does_not_take_are_one_line(
 
 def test_a_text_that_is_said_twice_and_written_once_is_left_out(tokenizer: Any) -> None:
     turns = (*user("Sure?"), Turn("assistant", ("Sure?",)), *user("Why?"))
-    with pytest.raises(ModelError, match=r"leaves out the text 'Sure\?'"):
+    with pytest.raises(ModelError, match=r"drops the text 'Sure\?'"):
         _render(tokenizer, ONLY_USERS, turns)
 
 

@@ -105,7 +105,7 @@ def test_a_checkpoint_without_a_template_is_asked_plainly_or_not_at_all(
 ) -> None:
     folder = _without_template(checkpoints[name], tmp_path / "bare")
     for share_prefix in ("true", "false"):
-        with pytest.raises(ModelError, match=r"has no chat template; add .*, or ask with prompt=plain"):
+        with pytest.raises(ModelError, match=r"has no chat template; add .*, or set prompt=plain"):
             _load(name, folder, prompt="chat", share_prefix=share_prefix)
         check_adapter(_load(name, folder, share_prefix=share_prefix))
 

@@ -67,12 +67,12 @@ def _with_usage(**changes: Any) -> dict[str, Any]:
 
 
 SHAPES: dict[str, tuple[Answer, str]] = {
-    "nothing": (_sends(200, b""), "is no chat completion (Input data was truncated)"),
-    "no content": (_sends(204, b""), "is no chat completion"),
-    "no JSON": (_sends(200, b"<html>hello</html>", {"Content-Type": "text/html"}), "is no chat completion (JSON is"),
-    "no text": (_sends(200, b"\xff\xfe\x00" * 9), "is no chat completion"),
-    "deep": (_sends(200, b"[" * 200_000), "is no chat completion"),
-    "half": (_sends(200, json.dumps(completion()).encode()[:-20]), "is no chat completion"),
+    "nothing": (_sends(200, b""), "does not answer with a chat completion (Input data was truncated)"),
+    "no content": (_sends(204, b""), "does not answer with a chat completion"),
+    "no JSON": (_sends(200, b"<html>hello</html>", {"Content-Type": "text/html"}), "with a chat completion (JSON is"),
+    "no text": (_sends(200, b"\xff\xfe\x00" * 9), "does not answer with a chat completion"),
+    "deep": (_sends(200, b"[" * 200_000), "does not answer with a chat completion"),
+    "half": (_sends(200, json.dumps(completion()).encode()[:-20]), "does not answer with a chat completion"),
     "a list": (_answers([completion()]), "(Expected `object`, got `array`)"),
     "a stream": (_sends(200, b"data: {}\n\ndata: [DONE]\n\n", {"Content-Type": "text/event-stream"}), "is no chat"),
     "another object": (_answers({"detail": "hello"}), "(Object missing required field `choices`)"),
@@ -81,18 +81,18 @@ SHAPES: dict[str, tuple[Answer, str]] = {
     "choices that are none": (_answers(completion() | {"choices": [None]}), "(Expected `object`, got `null` - at"),
     "a choice without a message": (_answers(completion() | {"choices": [{"text": "yes"}]}), "field `message` - at"),
     "content of another type": (_answers(completion(message={"content": 7})), "(Expected `str | null`, got `int` - at"),
-    "half a pair": (_sends(200, json.dumps(completion("\ud800")).encode()), "is no chat completion"),
+    "half a pair": (_sends(200, json.dumps(completion("\ud800")).encode()), "does not answer with a chat completion"),
     "no words": (_answers(completion(None)), "gives no text; see its log"),
     "no words, strange reason": (_answers(completion(None, finish_reason="x\ny")), "gives no text; see its log"),
     "no words, too long": (
         _answers(completion(None, finish_reason="length")),
-        "all its tokens were used up before one",
+        "the token limit was reached before any text",
     ),
-    "filtered": (_answers(completion("", finish_reason="content_filter")), "a filter of the server's held it back"),
-    "tools": (_answers(completion(None, finish_reason="tool_calls")), "it calls a tool, though it was given none"),
+    "filtered": (_answers(completion("", finish_reason="content_filter")), "the server's content filter blocked it"),
+    "tools": (_answers(completion(None, finish_reason="tool_calls")), "it calls a tool, though none was offered"),
     "tokens below 0": (_answers(_with_usage(prompt_tokens=-1)), "(Expected `int` >= 0 - at `$.usage.prompt_tokens`)"),
     "tokens in words": (_answers(_with_usage(completion_tokens="2")), "(Expected `int`, got `str` - at"),
-    "tokens without end": (_answers(_with_usage(prompt_tokens=10**40)), "is no chat completion"),
+    "tokens without end": (_answers(_with_usage(prompt_tokens=10**40)), "does not answer with a chat completion"),
     "a redirect": (
         _sends(307, b"", {"Location": "http://127.0.0.1:1/v1"}),
         "answers 307 Temporary Redirect: nothing; r",
@@ -103,7 +103,7 @@ SHAPES: dict[str, tuple[Answer, str]] = {
     "a key that is not taken": (_sends(401, b"who?"), "answers 401 Unauthorized: 'who?'; set the environment variable"),
     "another status": (_sends(499, b""), "answers 499: nothing; check"),
     "no money": (_sends(429, b'{"error": {"code": "insufficient_quota"}}'), "answers 429 Too Many Requests"),
-    "packed": (_sends(200, b"\x1f\x8b", {"Content-Encoding": "gzip"}), "answers in an encoding that it was not asked"),
+    "packed": (_sends(200, b"\x1f\x8b", {"Content-Encoding": "gzip"}), "answers in an encoding that was not requested"),
     "strange letters": (_sends(418, b"\xff\xfe", {"Content-Type": "text/plain; charset=none-such"}), "answers 418"),
 }
 

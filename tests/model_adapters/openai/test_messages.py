@@ -11,7 +11,7 @@ from PIL import Image
 from infthor_eval.errors import DataError, ModelError
 from infthor_eval.formats.frames import FrameRef
 from model_adapters import Turn
-from model_adapters.openai.messages import EncodedFrames, messages_of
+from model_adapters.openai.messages import EncodedFrames, to_messages
 
 
 def _pixels(address: str) -> np.ndarray:
@@ -27,9 +27,9 @@ def test_texts_and_frames_keep_their_order(frames: list[FrameRef]) -> None:
         Turn("user", ("Where?",)),
     )
     first, second = (
-        {"type": "image_url", "image_url": {"url": encoded.address(frame), "detail": "low"}} for frame in frames[:2]
+        {"type": "image_url", "image_url": {"url": encoded.url(frame), "detail": "low"}} for frame in frames[:2]
     )
-    assert messages_of("m", turns, encoded, "low") == [
+    assert to_messages("m", turns, encoded, "low") == [
         {"role": "system", "content": "Be brief."},
         {
             "role": "user",
@@ -42,19 +42,19 @@ def test_texts_and_frames_keep_their_order(frames: list[FrameRef]) -> None:
 
 @pytest.mark.parametrize("role", ["system", "assistant"])
 def test_frames_are_the_users_alone(role, frames: list[FrameRef]) -> None:
-    with pytest.raises(ModelError, match=f"m is shown frames by the user alone, not by the {role}"):
-        messages_of("m", (Turn(role, (frames[0],)),), EncodedFrames("png"), None)
+    with pytest.raises(ModelError, match=f"m accepts frames in user turns only, not in a turn of the {role}"):
+        to_messages("m", (Turn(role, (frames[0],)),), EncodedFrames("png"), None)
 
 
 def test_png_loses_nothing_and_jpeg_little_and_both_are_the_same_bytes_each_time(frames: list[FrameRef]) -> None:
     seen = np.asarray(frames[0].load())
-    png, jpeg = EncodedFrames("png").address(frames[0]), EncodedFrames("jpeg").address(frames[0])
+    png, jpeg = EncodedFrames("png").url(frames[0]), EncodedFrames("jpeg").url(frames[0])
     assert png.startswith("data:image/png;base64,")
     assert jpeg.startswith("data:image/jpeg;base64,")
     assert (_pixels(png) == seen).all()
     assert 0 < np.abs(_pixels(jpeg).astype(int) - seen).mean() < 4
-    assert EncodedFrames("png").address(frames[0]) == png
-    assert EncodedFrames("jpeg").address(frames[0]) == jpeg
+    assert EncodedFrames("png").url(frames[0]) == png
+    assert EncodedFrames("jpeg").url(frames[0]) == jpeg
 
 
 def test_a_frame_is_encoded_once_by_its_content(tmp_path: Path, frames: list[FrameRef], monkeypatch) -> None:
@@ -63,20 +63,20 @@ def test_a_frame_is_encoded_once_by_its_content(tmp_path: Path, frames: list[Fra
     loaded, load = [], FrameRef.load
     monkeypatch.setattr(FrameRef, "load", lambda frame: loaded.append(frame) or load(frame))
     encoded = EncodedFrames("png")
-    assert len({encoded.address(frame) for frame in (frames[0], twin, FrameRef(frames[0].path))}) == 1
+    assert len({encoded.url(frame) for frame in (frames[0], twin, FrameRef(frames[0].path))}) == 1
     assert len(loaded) == 1
 
 
 def test_no_more_is_kept_than_there_is_room_for(frames: list[FrameRef], monkeypatch) -> None:
-    sizes = [len(EncodedFrames("png").address(frame)) for frame in frames[:3]]
-    encoded = EncodedFrames("png", room=sum(sizes) - 1)
+    sizes = [len(EncodedFrames("png").url(frame)) for frame in frames[:3]]
+    encoded = EncodedFrames("png", max_bytes=sum(sizes) - 1)
     loaded, load = [], FrameRef.load
     monkeypatch.setattr(FrameRef, "load", lambda frame: loaded.append(frame) or load(frame))
     for frame in (frames[0], frames[1], frames[0], frames[2], frames[0], frames[1]):
-        encoded.address(frame)
+        encoded.url(frame)
     assert loaded == [frames[0], frames[1], frames[2], frames[1]]  # what was used longest ago made place
 
 
 def test_a_frame_that_cannot_be_read_is_a_fault_of_the_data(tmp_path: Path) -> None:
     with pytest.raises(DataError):
-        EncodedFrames("png").address(FrameRef(tmp_path / "none.png"))
+        EncodedFrames("png").url(FrameRef(tmp_path / "none.png"))

@@ -169,9 +169,9 @@ def test_what_is_in_flight_ends_when_the_model_is_closed() -> None:
             with opened(answer) as model:
                 waiting = pool.submit(_ask, model, "What?")
                 assert asked.wait(10)
-            with pytest.raises(ModelError, match="is not waited for any more: the model is closed"):
+            with pytest.raises(ModelError, match="is no longer waited for: the model is closed"):
                 waiting.result(10)
-            with pytest.raises(ModelError, match="is not asked any more: the model is closed"):
+            with pytest.raises(ModelError, match="gets no more requests: the model is closed"):
                 _ask(model, "What?")
             done.set()
     finally:

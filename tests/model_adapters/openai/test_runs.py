@@ -90,7 +90,7 @@ def test_money_is_capped_likewise(ask: Any) -> None:
         (("--max-cost", 0), {}, "--max-cost"),
         (("--max-tokens-total", 0), {}, "--max-tokens-total"),
         ((), {"base_url": "http://10.1.2.3/v1"}, "base_url leads to 10.1.2.3 without encryption"),
-        ((), {"api_key_env": KEY}, "api_key_env is no name of an environment variable"),
+        ((), {"api_key_env": KEY}, "api_key_env is not the name of an environment variable"),
     ],
 )
 def test_misuse_is_one_line_before_anything_is_read(

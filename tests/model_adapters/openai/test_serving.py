@@ -161,6 +161,6 @@ def test_what_the_server_refuses_is_one_line(served: Served, tmp_path: Path) -> 
     model: Any = load("openai", served.options | {"model": str(tmp_path / "none"), "retries": "0"}, 0)
     talk = model.conversation()
     talk.append("What is it?")
-    with pytest.raises(ModelError, match=r"/v1 answers 500 Internal Server Error: .*; see its log"):
+    with pytest.raises(ModelError, match=r"/v1 answers 500 Internal Server Error: .*; see the server's log"):
         talk.reply(up_to(4))
     model.close()

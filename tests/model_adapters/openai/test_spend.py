@@ -20,7 +20,7 @@ def _took(spend: Spend, tokens: int | None, cost: float = 0.0) -> None:
 
 
 def test_cached_tokens_cost_what_they_cost() -> None:
-    prices = Prices(read=2.0, cached=0.5, written=8.0)
+    prices = Prices(prompt=2.0, cached=0.5, reply=8.0)
     assert prices.cost(1_000_000, 0, 0) == 2.0
     assert prices.cost(1_000_000, 400_000, 100_000) == pytest.approx(0.6 * 2 + 0.4 * 0.5 + 0.1 * 8)
 
@@ -59,7 +59,7 @@ def test_a_server_that_does_not_tell_is_asked_once_under_a_cap_and_for_ever_with
     for spend in (capped, free):
         _took(spend, None)
     _took(free, None)
-    with pytest.raises(ModelError, match="m does not tell what its replies take, so no cap can be kept"):
+    with pytest.raises(ModelError, match="m does not report the usage of its replies, so caps cannot be enforced"):
         _took(capped, None)
 
 

@@ -144,7 +144,7 @@ def test_a_depth_model_under_its_new_names_is_no_checkpoint_of_ours(altered: Alt
             name.replace("backbone.encoder.layer.", "backbone.beit.layers."): value for name, value in found.items()
         }
 
-    with pytest.raises(ModelError, match=r"lacks vision_zoe_model\.backbone\.encoder.*; holds unknown vision_zoe"):
+    with pytest.raises(ModelError, match=r"lacks vision_zoe_model\.backbone\.encoder.*; has unknown vision_zoe"):
         _load("spatialvla", altered("spatialvla", weights_edit(renamed)))
 
 
@@ -166,8 +166,8 @@ def test_a_checkpoint_of_another_family_is_named(family: str, other: str, policy
         (lambda folder: (folder / "config.json").unlink(), "config.json"),
         (json_edit("config.json", lambda config: config.update(model_type="llava")), "a llava checkpoint"),
         (json_edit("config.json", lambda config: config.update(text_config=3)), "not in its documented form"),
-        (json_edit("config.json", lambda config: config.update(torch_dtype="int8")), "names no type of weights"),
-        (json_edit("config.json", lambda config: config.pop("torch_dtype")), "names no type of weights; give dtype="),
+        (json_edit("config.json", lambda config: config.update(torch_dtype="int8")), "has no type of weights"),
+        (json_edit("config.json", lambda config: config.pop("torch_dtype")), "has no type of weights; give dtype="),
     ],
 )
 def test_a_damaged_checkpoint_is_one_line(family: str, edit: Edit, said: str, altered: Altered) -> None:
@@ -190,9 +190,9 @@ def test_the_dataset_is_chosen_by_its_key(
 ) -> None:
     still = {"q01": [0.0] * 7, "q99": [0.0] * 7, "mask": [True] * 6 + [False]}
     folder = altered(family, json_edit(name, lambda content: content[place].update(still={"action": still})))
-    with pytest.raises(UsageError, match=f"choose one by unnorm_key= of {key}, still"):
+    with pytest.raises(UsageError, match=f"choose one with unnorm_key= of {key}, still"):
         _load(family, folder)
-    with pytest.raises(UsageError, match=f"unnorm_key=bridge is no dataset of .*; there are {key}, still"):
+    with pytest.raises(UsageError, match=f"unnorm_key=bridge is not a dataset of .*; there are {key}, still"):
         _load(family, folder, unnorm_key="bridge")
     policy = _load(family, folder, unnorm_key="still")
     assert policy.identity()["unnorm_key"] == "still"
@@ -209,7 +209,7 @@ def test_statistics_of_a_fine_tuned_openvla_are_in_a_file_of_their_own(altered: 
 @pytest.mark.parametrize(
     ("family", "file", "change", "said"),
     [
-        ("openvla", "config.json", {"timm_model_ids": ["vit_tiny", "vit_small"]}, "sees by"),
+        ("openvla", "config.json", {"timm_model_ids": ["vit_tiny", "vit_small"]}, "has the vision towers"),
         ("openvla", "config.json", {"image_resize_strategy": "letterbox"}, "only the preparation of openvla"),
         ("openvla", "config.json", {"image_sizes": [56, 70]}, "only the preparation of openvla"),
         ("openvla", "config.json", {"timm_override_act_layers": ["quick_gelu", None]}, "only the preparation"),
@@ -252,5 +252,5 @@ def test_misuse_is_refused_before_anything_is_looked_for(name: str) -> None:
 
 
 def test_attention_that_cannot_read_in_both_directions_is_refused() -> None:
-    with pytest.raises(UsageError, match="cannot read the prefix in both directions; use eager or sdpa"):
+    with pytest.raises(UsageError, match="cannot attend to the prefix in both directions; use eager or sdpa"):
         load("spatialvla-tiny", {"attn_implementation": "flex_attention"}, 0)

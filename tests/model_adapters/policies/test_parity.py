@@ -63,7 +63,7 @@ def test_differences_are_told_by_kind(plain_frames: tuple[FrameRef, FrameRef]) -
     found = compare_policies(ours, theirs, plain_frames, ["pick up the mug"], 0.4)
     assert not found.equal
     assert found.table().rows[0].cells == ("pick up the mug", "2", "1", "0.25", "0.5", "1")
-    assert "they differ" in found.table().notes[0]
+    assert ": different." in found.table().notes[0]
     assert compare_policies(ours, theirs, plain_frames, ["x"], 1.0).equal
 
 
@@ -85,12 +85,12 @@ def test_pictures_of_a_folder_are_taken_by_name(tmp_path: Path) -> None:
 
 def test_a_folder_without_pictures_is_refused(tmp_path: Path) -> None:
     for folder in (tmp_path, tmp_path / "none"):
-        with pytest.raises(DataError, match="holds no pictures"):
+        with pytest.raises(DataError, match="has no pictures"):
             frames_in_folder(folder)
 
 
 def test_misuse_is_refused() -> None:
     with pytest.raises(UsageError, match=r"--reference-url: url is no address"):
         reference_policy("host", None)
-    with pytest.raises(UsageError, match=r"qwen2\.5-vl-tiny is no policy; compare openvla or spatialvla"):
+    with pytest.raises(UsageError, match=r"qwen2\.5-vl-tiny is not a policy; compare openvla or spatialvla"):
         load_policy("qwen2.5-vl-tiny", {})

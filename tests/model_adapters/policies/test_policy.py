@@ -74,7 +74,7 @@ def test_the_gripper_is_held_between_closed_and_open() -> None:
 @pytest.mark.parametrize(
     ("chunk", "said"),
     [
-        ([[*STEP[:3], float("nan"), *STEP[4:]]], "scripted gave an action that is no number"),
+        ([[*STEP[:3], float("nan"), *STEP[4:]]], "scripted gave an action that is not finite"),
         ([[float("inf"), *STEP[1:]]], "no number"),
         (RuntimeError("CUDA out of memory. Tried to allocate"), "scripted fails on the request .*out of memory"),
         (MemoryError("none left"), "scripted fails on the request"),
@@ -117,7 +117,7 @@ def test_the_identity_tells_how_chunks_are_used() -> None:
     [
         ({"ensemble": "mean"}, "ensemble=mean is not none or exp"),
         ({"execute": 0}, "execute=0"),
-        ({"ensemble": "exp", "execute": 4}, "does not go with ensemble=exp"),
+        ({"ensemble": "exp", "execute": 4}, "contradicts ensemble=exp"),
         ({"attn_implementation": "someone/kernel"}, "is code on the hub"),
     ],
 )

@@ -15,7 +15,7 @@ from PIL import Image
 from infthor_eval.formats.frames import FrameRef
 from model_adapters import load
 from model_adapters.policies.policy import VlaPolicy
-from model_adapters.policies.preprocessing import resized
+from model_adapters.policies.preprocessing import resize
 
 # A patch's features, of every 16th number: OpenVLA's as its towers give them, SpatialVLA's as Gemma sees them.
 FEATURES = {"openvla": [3.8063, 4.3223, 2.4657, -9.9152, 1.4795], "spatialvla": [0.3502, 0.1778, 0.865, 0.7166]}
@@ -41,7 +41,7 @@ def frame(tmp_path_factory: pytest.TempPathFactory) -> FrameRef:
 @torch.inference_mode()
 def _features(family: str, network: Any, image: Image.Image) -> torch.Tensor:
     if family == "openvla":
-        found: torch.Tensor = network.weights.vision_backbone(resized(image, network.image_size)[None])
+        found: torch.Tensor = network.weights.vision_backbone(resize(image, network.image_size)[None])
         return found
     return network.features(image)  # type: ignore[no-any-return]
 

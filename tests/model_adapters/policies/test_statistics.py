@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from infthor_eval.errors import ModelError, UsageError
-from model_adapters.policies.statistics import ActionStatistics, statistics_of
+from model_adapters.policies.statistics import ActionStatistics, select_statistics
 
 ARM = {"q01": [-1.0, 0, 0, 0, 0, 0, 0], "q99": [3.0, 1, 1, 1, 1, 1, 1], "mask": [True] * 6 + [False]}
 KNOWN = {"a": {"action": ARM}, "b": {"action": ARM | {"q99": [5.0, 1, 1, 1, 1, 1, 1]}}}
@@ -27,20 +27,20 @@ def test_without_a_mask_all_is_scaled() -> None:
 
 
 def test_the_only_dataset_is_the_default() -> None:
-    assert statistics_of({"a": KNOWN["a"]}, None, "mine")[0] == "a"
-    key, statistics = statistics_of(KNOWN, "b", "mine")
+    assert select_statistics({"a": KNOWN["a"]}, None, "mine")[0] == "a"
+    key, statistics = select_statistics(KNOWN, "b", "mine")
     assert (key, statistics.q99[0]) == ("b", 5.0)
 
 
 def test_of_several_one_must_be_chosen() -> None:
-    with pytest.raises(UsageError, match=r"mine was trained on several datasets; choose one by unnorm_key= of a, b"):
-        statistics_of(KNOWN, None, "mine")
+    with pytest.raises(UsageError, match=r"mine was trained on several datasets; choose one with unnorm_key= of a, b"):
+        select_statistics(KNOWN, None, "mine")
 
 
 @pytest.mark.parametrize("known", [KNOWN, {"a": KNOWN["a"]}])
 def test_an_unknown_dataset_lists_the_known(known: dict[str, object]) -> None:
-    with pytest.raises(UsageError, match=r"unnorm_key=c is no dataset of mine; there are " + ", ".join(known)):
-        statistics_of(known, "c", "mine")
+    with pytest.raises(UsageError, match=r"unnorm_key=c is not a dataset of mine; there are " + ", ".join(known)):
+        select_statistics(known, "c", "mine")
 
 
 @pytest.mark.parametrize(
@@ -54,9 +54,9 @@ def test_an_unknown_dataset_lists_the_known(known: dict[str, object]) -> None:
 )
 def test_statistics_of_another_robot_or_none_are_refused(action: object, said: str) -> None:
     with pytest.raises(ModelError, match=said):
-        statistics_of({"a": {"action": action}}, "a", "mine")
+        select_statistics({"a": {"action": action}}, "a", "mine")
 
 
 def test_a_dataset_without_actions_is_refused() -> None:
     with pytest.raises(ModelError, match="damaged"):
-        statistics_of({"a": {}}, "a", "mine")
+        select_statistics({"a": {}}, "a", "mine")

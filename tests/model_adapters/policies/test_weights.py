@@ -8,7 +8,7 @@ from safetensors.torch import save_file
 from torch import nn
 
 from infthor_eval.errors import ModelError
-from model_adapters.policies.weights import Layout, empty, load_weights
+from model_adapters.policies.weights import Layout, empty_parameters, load_weights
 
 
 class Small(nn.Module):
@@ -30,7 +30,7 @@ WHOLE = {
 
 
 def _loaded(folder: Path, dtype: torch.dtype = torch.float32) -> Small:
-    with empty():
+    with empty_parameters():
         module = Small()
     layout = Layout.of(module, lambda name: name.replace("first", "old"), UNUSED)
     load_weights(module, folder, layout, pretrained="mine", device=torch.device("cpu"), dtype=dtype)
@@ -55,7 +55,7 @@ def test_buffers_are_computed_not_lost(tmp_path: Path) -> None:
 
 
 def test_parameters_take_no_memory_before_they_are_loaded() -> None:
-    with empty():
+    with empty_parameters():
         module = Small()
     assert {parameter.device.type for parameter in module.parameters()} == {"meta"}
 
@@ -65,10 +65,10 @@ def test_parameters_take_no_memory_before_they_are_loaded() -> None:
     [
         ("norm.bias", {}, r"of mine .*: the checkpoint lacks norm\.bias$"),
         ("head.weight", {}, r"lacks head\.weight"),
-        (None, {"extra": torch.ones(1)}, "holds unknown extra"),
+        (None, {"extra": torch.ones(1)}, "has unknown extra"),
         (None, {"old.bias": torch.ones(3)}, r"another shape in old\.bias \[3\] instead of \[2\]"),
         (None, {"head.weight": torch.ones(5, 3)}, r"another shape in head\.weight \[5, 3\] instead of \[5, 2\]"),
-        ("old.bias", {"extra": torch.ones(1)}, "lacks old.bias; holds unknown extra"),
+        ("old.bias", {"extra": torch.ones(1)}, "lacks old.bias; has unknown extra"),
         (
             None,
             {f"extra{number}": torch.ones(1) for number in range(5)},

@@ -22,9 +22,9 @@ from transformers import StoppingCriteriaList
 from model_adapters.hf.checkpoint import load_checkpoint, locate
 from model_adapters.hf.families.hf_vlm import ProcessorFamily, known_family, load_processor
 from model_adapters.options.checkpoints import CheckpointOptions
-from model_adapters.policies.decoding import embedded
+from model_adapters.policies.decoding import embed_ids
 from model_adapters.policies.openvla.adapter import OpenVLA
-from model_adapters.policies.preprocessing import resized
+from model_adapters.policies.preprocessing import resize
 
 SIGNATURES: dict[str, Any] = json.loads((Path(__file__).parent / "signatures.json").read_text())
 _BLOCK = 16
@@ -185,7 +185,7 @@ class _OpenVLA:
         text, written = [token for token in ids if token != 32_000], []
         assert text[-1] == 29_871
         for _ in range(params.max_tokens):
-            embeds = embedded(model, text + written)
+            embeds = embed_ids(model, text + written)
             logits = model(inputs_embeds=torch.cat([embeds[:, :1], patches, embeds[:, 1:]], dim=1)).logits[0, -1]
             held = torch.full_like(logits, -torch.inf)
             allowed = torch.tensor(params.allowed_token_ids or range(len(logits)))
@@ -196,7 +196,7 @@ class _OpenVLA:
     @torch.inference_mode()
     def _patches(self, image: Image.Image) -> torch.Tensor:
         weights = self._network.weights
-        found: torch.Tensor = weights.projector(weights.vision_backbone(resized(image, self._network.image_size)[None]))
+        found: torch.Tensor = weights.projector(weights.vision_backbone(resize(image, self._network.image_size)[None]))
         return found
 
 

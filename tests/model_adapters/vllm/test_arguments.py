@@ -138,7 +138,7 @@ def test_the_limit_is_what_was_asked_for_or_the_checkpoints(typed: int | None, o
 
 
 def test_a_checkpoint_without_a_limit_needs_one() -> None:
-    with pytest.raises(ModelError, match="the config of x names no longest context; give max_model_len="):
+    with pytest.raises(ModelError, match="the config of x has no context limit; give max_model_len="):
         token_limit("x", None, VllmOptions(pretrained="x"))
 
 

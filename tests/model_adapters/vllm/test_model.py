@@ -165,7 +165,7 @@ def test_a_reply_is_held_to_choices_and_no_stop_string_cuts_it(
 
 
 def test_a_choice_that_does_not_fit_is_refused_before_vllm_is_asked(start: Start, vllm: Double) -> None:
-    with pytest.raises(ModelError, match=r"takes .* tokens and a reply may have 2"):
+    with pytest.raises(ModelError, match=r"has .* tokens and a reply may have 2"):
         start().answer(user("x"), up_to(2, choices=("on the kitchen table",)))
     assert vllm.calls == []
 
@@ -266,7 +266,7 @@ def test_frames_reserved_are_as_many_as_fit(start: Start, vllm: Double) -> None:
 def test_a_vllm_that_counts_otherwise_is_not_believed(start: Start, vllm: Double) -> None:
     model = start()
     vllm.expands = True
-    with pytest.raises(ModelError, match=r"vLLM 0\.33\.0 reads \d+ tokens where .* makes \d+: it sees other frames"):
+    with pytest.raises(ModelError, match=r"vLLM 0\.33\.0 reads \d+ tokens where .* makes \d+: it processes frames"):
         model.answer(user("x"), up_to(2))
 
 

@@ -73,7 +73,7 @@ def test_the_order_of_the_requests_makes_the_hits(
     ask: Any, vllm: Double, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert ask("one first", "--engine", "vllm")[0] == 0
-    monkeypatch.setattr("model_adapters.vllm.model.VllmModel._shares_what_is_not_read", lambda *_: False)
+    monkeypatch.setattr("model_adapters.vllm.model.VllmModel._share_uncached_prefix", lambda *_: False)
     assert ask("all at once", "--engine", "vllm", "--fresh")[0] == 0
     kept, lost = (_found(tmp_path / "out" / name)[2]["hit_rate"] for name in ("one first", "all at once"))
     assert kept > 0.4

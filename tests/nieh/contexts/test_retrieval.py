@@ -158,7 +158,7 @@ def test_a_checkpoint_of_another_kind_is_refused(noise, tmp_path):
     from model_adapters.tiny.qwen2_5_vl import save_tiny_checkpoint
 
     save_tiny_checkpoint(tmp_path / "qwen", seed=0)
-    with pytest.raises(UsageError, match="is a qwen2_5_vl checkpoint; retrieval takes one of CLIP"):
+    with pytest.raises(UsageError, match="is a qwen2_5_vl checkpoint; retrieval needs one of CLIP"):
         shown("clip_retrieval", noise(4), retriever=str(tmp_path / "qwen"))
 
 

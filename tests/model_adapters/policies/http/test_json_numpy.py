@@ -8,16 +8,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from model_adapters.policies.http.json_numpy import decoded_numbers, encoded
+from model_adapters.policies.http.json_numpy import decode_numbers, encode_array
 
 
 def test_an_array_is_its_bytes_its_type_and_its_shape() -> None:
-    assert encoded(np.array([[1, 2, 255]], dtype=np.uint8)) == {"__numpy__": "AQL/", "dtype": "|u1", "shape": [1, 3]}
+    assert encode_array(np.array([[1, 2, 255]], dtype=np.uint8)) == {
+        "__numpy__": "AQL/",
+        "dtype": "|u1",
+        "shape": [1, 3],
+    }
 
 
 def test_an_array_that_is_a_view_is_written_in_its_own_order() -> None:
     turned = np.array([[1, 2], [3, 4]], dtype=np.uint8).T
-    assert base64.b64decode(encoded(turned)["__numpy__"]) == bytes([1, 3, 2, 4])
+    assert base64.b64decode(encode_array(turned)["__numpy__"]) == bytes([1, 3, 2, 4])
 
 
 NUMBERS = [0.5, -1.0, 2.0]
@@ -33,11 +37,11 @@ ARRAY = {"__numpy__": base64.b64encode(struct.pack("<3d", *NUMBERS)).decode(), "
         (ARRAY, NUMBERS),
         ([ARRAY, NUMBERS], [NUMBERS, NUMBERS]),
         (json.dumps(ARRAY), NUMBERS),  # as OpenVLA's server answers a request in encoded form
-        (encoded(np.array([[1.5]], dtype=">f4")), [[1.5]]),
+        (encode_array(np.array([[1.5]], dtype=">f4")), [[1.5]]),
     ],
 )
 def test_numbers_come_in_several_forms(value: Any, expected: Any) -> None:
-    assert decoded_numbers(value).tolist() == expected
+    assert decode_numbers(value).tolist() == expected
 
 
 @pytest.mark.parametrize(
@@ -58,4 +62,4 @@ def test_numbers_come_in_several_forms(value: Any, expected: Any) -> None:
 )
 def test_anything_else_is_refused(value: Any, said: str) -> None:
     with pytest.raises(ValueError, match=said):
-        decoded_numbers(value)
+        decode_numbers(value)

@@ -9,7 +9,7 @@ BINS = ActionBins(vocabulary=32_000, n_bins=256)
 
 
 def test_the_legal_ids_are_the_last_256_before_the_padding() -> None:
-    assert (BINS.legal.start, BINS.legal.stop) == (31_744, 32_000)
+    assert (BINS.action_ids.start, BINS.action_ids.stop) == (31_744, 32_000)
 
 
 @pytest.mark.parametrize(

@@ -10,9 +10,9 @@ from collections import Counter
 import pytest
 from transformers import LlamaConfig
 
-from model_adapters.policies.openvla.network import OpenVLAWeights, layout_of
+from model_adapters.policies.openvla.network import OpenVLAWeights, weights_layout
 from model_adapters.policies.openvla.vision import TOWERS
-from model_adapters.policies.weights import Layout, Shape, empty
+from model_adapters.policies.weights import Layout, Shape, empty_parameters
 
 DINO, SIGLIP, LLAMA = "vision_backbone.featurizer", "vision_backbone.fused_featurizer", "language_model.model"
 
@@ -50,9 +50,9 @@ SHAPES: dict[str, Shape] = {
 @pytest.fixture(scope="module")
 def layout() -> Layout:
     towers = tuple(TOWERS.values())
-    with empty():
+    with empty_parameters():
         weights = OpenVLAWeights(towers, 224, LlamaConfig(vocab_size=32_064, pad_token_id=32_000))  # type: ignore[arg-type]
-    return layout_of(weights, towers)  # type: ignore[arg-type]
+    return weights_layout(weights, towers)  # type: ignore[arg-type]
 
 
 def test_names_and_shapes(layout: Layout) -> None:

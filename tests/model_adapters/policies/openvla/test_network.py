@@ -8,11 +8,11 @@ import torch
 from PIL import Image
 
 from infthor_eval.formats.frames import FrameRef
-from model_adapters.policies.decoding import embedded
+from model_adapters.policies.decoding import embed_ids
 from model_adapters.policies.openvla.network import OpenVLANetwork, prompt, prompt_ids
 from model_adapters.policies.openvla.vision import Tower, TowerShape
 from model_adapters.policies.policy import VlaPolicy
-from model_adapters.policies.preprocessing import normalised, resized
+from model_adapters.policies.preprocessing import normalise, resize
 
 
 @pytest.fixture
@@ -36,10 +36,10 @@ def test_the_space_before_actions_ends_the_prompt_once(network: OpenVLANetwork) 
 
 def test_frames_are_squashed_by_pil_and_normalised_by_channel() -> None:
     image = Image.new("RGB", (300, 200), (255, 0, 51))
-    pixels = resized(image, 224)
+    pixels = resize(image, 224)
     assert pixels.shape == (3, 224, 224)
     assert pixels[:, 100, 100].tolist() == pytest.approx([1.0, 0.0, 0.2])
-    seen = normalised(pixels, (0.5, 0.25, 0.0), (0.5, 0.25, 0.1))
+    seen = normalise(pixels, (0.5, 0.25, 0.0), (0.5, 0.25, 0.1))
     assert seen[:, 0, 0].tolist() == pytest.approx([1.0, -1.0, 2.0])
 
 
@@ -66,12 +66,12 @@ def test_actions_with_a_cache_are_those_of_reading_all_anew(
     """The patches go in behind the begin token; every token is chosen from the whole sequence so far."""
     weights, model = network.weights, network.weights.language_model
     image = plain_frames[1].load()
-    patches = weights.projector(weights.vision_backbone(resized(image, 56)[None]))
+    patches = weights.projector(weights.vision_backbone(resize(image, 56)[None]))
     assert patches.shape == (1, 16, 64)
     ids = prompt_ids(network.tokenizer, "pick up the mug")
     written: list[int] = []
     for _ in range(7):
-        text = embedded(model, [*ids, *written])
+        text = embed_ids(model, [*ids, *written])
         scores = model(inputs_embeds=torch.cat([text[:, :1], patches, text[:, 1:]], dim=1)).logits[0, -1]
         written.append(31_744 + int(scores[31_744:32_000].argmax()))
     assert len(set(written)) > 1

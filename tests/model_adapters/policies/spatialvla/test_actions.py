@@ -23,7 +23,7 @@ def bins() -> SpatialBins:
 
 
 def test_each_place_of_a_step_has_its_own_tokens(bins: SpatialBins) -> None:
-    assert [(place.start, place.stop) for place in bins.legal] == [
+    assert [(place.start, place.stop) for place in bins.action_ids] == [
         (257_153, 261_249),
         (261_249, 265_345),
         (265_345, 265_347),

@@ -8,14 +8,14 @@ import pytest
 import torch
 from torch import nn
 
-from model_adapters.policies.spatialvla.ego3d import Ego3DEmbedding, depth_of, points_of
+from model_adapters.policies.spatialvla.ego3d import Ego3DEmbedding, back_project, estimate_depth
 
 INTRINSICS = torch.tensor([[10.0, 0, 14], [0, 20.0, 14], [0, 0, 1]])
 
 
 def test_points_of_a_wall_lie_on_the_rays_through_the_middles_of_cells() -> None:
     depth = torch.full((1, 1, 28, 28), 2.0)
-    points = points_of(depth, INTRINSICS, patch=14, resolution=2)
+    points = back_project(depth, INTRINSICS, patch=14, resolution=2)
     assert points.shape == (1, 4, 12)
     # Middles of cells of 7 pixels: 3.5, 10.5, 17.5, 24.5; x = 2 (u - 14) / 10, y = 2 (v - 14) / 20, z = 2.
     x, y = [2 * (u - 14) / 10 for u in (3.5, 10.5, 17.5, 24.5)], [2 * (v - 14) / 20 for v in (3.5, 10.5, 17.5, 24.5)]
@@ -27,8 +27,8 @@ def test_points_of_a_wall_lie_on_the_rays_through_the_middles_of_cells() -> None
 
 def test_pixels_are_as_coarse_as_the_weights() -> None:
     unit = torch.eye(3)
-    coarse = points_of(torch.ones(1, 1, 224, 224, dtype=torch.bfloat16), unit, patch=14, resolution=2)
-    fine = points_of(torch.ones(1, 1, 224, 224), unit, patch=14, resolution=2)
+    coarse = back_project(torch.ones(1, 1, 224, 224, dtype=torch.bfloat16), unit, patch=14, resolution=2)
+    fine = back_project(torch.ones(1, 1, 224, 224), unit, patch=14, resolution=2)
     assert coarse.dtype == fine.dtype == torch.float32
     assert fine[0, -1, -3:].tolist() == [220.5, 220.5, 1.0]
     assert coarse[0, -1, -3:].tolist() == [220.0, 220.0, 1.0]
@@ -38,7 +38,7 @@ def test_pixels_are_as_coarse_as_the_weights() -> None:
 def test_depth_is_averaged_over_a_cell() -> None:
     depth = torch.zeros(1, 1, 28, 28)
     depth[..., :7, :7] = torch.arange(49.0).reshape(7, 7)
-    assert points_of(depth, INTRINSICS, patch=14, resolution=2)[0, 0, 2] == pytest.approx(24.0)
+    assert back_project(depth, INTRINSICS, patch=14, resolution=2)[0, 0, 2] == pytest.approx(24.0)
 
 
 class Seen(nn.Module):
@@ -54,7 +54,7 @@ def test_depth_is_estimated_on_a_mirrored_border_that_is_cut_off_again() -> None
     zoe = Seen()
     pixels = torch.zeros(1, 3, 224, 224)
     pixels[:, 0] = 1.0
-    depth = depth_of(zoe, pixels, 384)
+    depth = estimate_depth(zoe, pixels, 384)
     assert zoe.shown.shape == (1, 3, 384, 384)
     assert zoe.shown[0, :, 200, 200].tolist() == pytest.approx([1.0, -1.0, -1.0], abs=1e-5)
     assert depth.shape == (1, 1, 224, 224)

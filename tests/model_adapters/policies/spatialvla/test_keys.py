@@ -9,7 +9,7 @@ import pytest
 from model_adapters.policies.spatialvla.config import SpatialVLAConfig
 from model_adapters.policies.spatialvla.keys import checkpoint_key
 from model_adapters.policies.spatialvla.network import SpatialVLAWeights
-from model_adapters.policies.weights import Layout, Shape, empty
+from model_adapters.policies.weights import Layout, Shape, empty_parameters
 
 from .published import CONFIG
 
@@ -52,7 +52,7 @@ SHAPES: dict[str, Shape] = {
 
 def _layout(**text: object) -> Layout:
     config = msgspec.convert(CONFIG | {"text_config": CONFIG["text_config"] | text}, SpatialVLAConfig)
-    with empty():
+    with empty_parameters():
         return SpatialVLAWeights(config, "eager").layout()
 
 

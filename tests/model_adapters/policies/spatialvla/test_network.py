@@ -9,7 +9,7 @@ from safetensors.torch import load_file
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
 from model_adapters import check_adapter, load
-from model_adapters.policies.decoding import embedded
+from model_adapters.policies.decoding import embed_ids
 from model_adapters.policies.policy import VlaPolicy
 from model_adapters.policies.spatialvla.network import SpatialVLANetwork, prompt
 
@@ -43,7 +43,7 @@ def test_action_tokens_have_the_embeddings_kept_apart_and_all_are_scaled(
     kept = load_file(policy_checkpoints["spatialvla"] / "model.safetensors")
     model = network.weights.language_model
     begin = network.bins.begin
-    found = embedded(model, [5, begin, begin + N_ACTIONS - 1])[0]
+    found = embed_ids(model, [5, begin, begin + N_ACTIONS - 1])[0]
     of_text = kept["language_model.model.embed_tokens.weight"][5]
     spatial = kept["spatial_embed_tokens.weight"]
     expected = torch.stack([of_text, spatial[0], spatial[-1]]) * HIDDEN**0.5
@@ -61,7 +61,7 @@ def test_actions_with_a_cache_are_those_of_reading_all_anew(
     ids = network.prompt_ids("pick up the mug")
     written: list[int] = []
     for place in range(12):
-        fed = embedded(model, [*ids, *written])
+        fed = embed_ids(model, [*ids, *written])
         fed[:, :N_PATCHES] = network.features(image)
         length = fed.shape[1]
         mask = torch.full((length, length), torch.finfo(torch.float32).min).triu(1)
@@ -71,8 +71,8 @@ def test_actions_with_a_cache_are_those_of_reading_all_anew(
             attention_mask={"full_attention": mask[None, None], "sliding_attention": mask[None, None]},
             position_ids=torch.arange(1, length + 1)[None],
         )
-        legal = network.bins.legal[place % 3]
-        written.append(legal.start + int(output.logits[0, -1, legal.start : legal.stop].argmax()))
+        action_ids = network.bins.action_ids[place % 3]
+        written.append(action_ids.start + int(output.logits[0, -1, action_ids.start : action_ids.stop].argmax()))
     assert (network.predict(image, "pick up the mug", constrained=True) == network.bins.decode(written)).all()
 
 
