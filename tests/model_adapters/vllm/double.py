@@ -20,7 +20,7 @@ from PIL import Image
 from transformers import StoppingCriteriaList
 
 from model_adapters.hf.checkpoint import load_checkpoint, locate
-from model_adapters.hf.families.hf_vlm import ProcessorFamily, known_family, load_processor
+from model_adapters.hf.families.hf_vlm import ProcessorFamily, family_of, load_processor
 from model_adapters.options.checkpoints import CheckpointOptions
 from model_adapters.policies.decoding import embed_ids
 from model_adapters.policies.openvla.adapter import OpenVLA
@@ -79,7 +79,7 @@ class _Vlm:
         for part, changed in arguments.get("hf_overrides", {}).items():
             for name, value in changed.items():
                 setattr(getattr(located.config, part), name, value)
-        family = known_family(located.config)
+        family = family_of(located.config)
         if family is None:
             family = functools.partial(ProcessorFamily, processor=load_processor(located))
         self._loaded = load_checkpoint(located, family)
