@@ -1,1 +1,1 @@
-"""Fine-tuning: sequences with labels from trajectories and questions, and models that are trained on them."""
+"""Fine-tuning of models on sequences from trajectories and questions."""

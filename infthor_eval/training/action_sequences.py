@@ -1,7 +1,7 @@
-"""What a model learns acting from: a trajectory's true history, cut into windows of whole plans.
+"""Training sequences for acting: a trajectory's true history, cut into windows of whole plans.
 
-Every window has the form in which an agent is given a shortened history (`--history last:N`): the goal in force and the
-frame that it begins with, then plans.
+Every window has the form of an agent's truncated history (`--history last:N`): the current goal, the frame at the
+beginning of the window, then plans.
 """
 
 from collections.abc import Iterator, Sequence
@@ -10,8 +10,8 @@ from infthor_eval.errors import DataError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.step_log import Step
 from infthor_eval.formats.trajectory import Trajectory
+from infthor_eval.plans.segments import PlanSegment, segment_parts, restart_at
 from infthor_eval.plans.plan import plans_of, tasks_of
-from infthor_eval.plans.segments import PlanSegment, restart_at, segment_parts
 from infthor_eval.training.encoding import Encoder, SkippedItem, TrainingSequence
 from model_adapters.hf.prompt import n_tokens
 
@@ -19,15 +19,15 @@ __all__ = ["recorded_segments", "single_plans", "windows"]
 
 
 def recorded_segments(trajectory: Trajectory, steps: Sequence[Step], frames: Sequence[FrameRef]) -> list[PlanSegment]:
-    """A trajectory's true history from its replay, a segment per plan.
+    """Return a trajectory's true history from its replay, one entry per plan.
 
     Args:
-        trajectory: has goals and plans.
-        steps: the replayed log in time order; of several frames of one action the last counts.
-        frames: of each step.
+        trajectory: trajectory with goals and plans.
+        steps: steps of the replayed log in time order; of several frames of one action the last is used.
+        frames: frame of each step.
 
     Raises:
-        DataError: the trajectory has a task without a goal or an unknown kind of plan, or an action has no frame.
+        DataError: a task has no goal, a plan is of an unknown kind, or an action has no frame.
     """
     plans, tasks = plans_of(trajectory), tasks_of(trajectory)
     before: FrameRef | None = None
@@ -54,26 +54,26 @@ def recorded_segments(trajectory: Trajectory, steps: Sequence[Step], frames: Seq
 def windows(
     encoder: Encoder, name: str, segments: Sequence[PlanSegment], limit: int
 ) -> Iterator[TrainingSequence | SkippedItem]:
-    """A history as sequences, each with as many whole plans as fit; together they have every plan once.
+    """Cut a history into sequences, each with as many whole plans as fit; every plan is in one of them.
 
     Args:
-        encoder: makes the sequences.
-        name: of the trajectory.
-        segments: its history.
-        limit: tokens of a sequence, frames expanded.
+        encoder: builds the sequences.
+        name: name of the trajectory.
+        segments: history of the trajectory.
+        limit: most tokens of a sequence, frames expanded.
 
     Yields:
-        The sequences, and plans that are longer than the limit by themselves.
+        The sequences, and plans that exceed the limit alone.
 
     Raises:
-        DataError: a frame cannot be read, or a text of the history holds a mark.
+        DataError: a frame cannot be read, or a text of the history contains a mark.
         ModelError: the template refuses the history.
     """
     first = 0
     while first < len(segments):
-        end = _end(encoder, segments, first, limit)
+        end = _window_end(encoder, segments, first, limit)
         if end == first:
-            yield SkippedItem(f"{name}, plan {first + 1}", f"longer than {limit} tokens by itself")
+            yield SkippedItem(f"{name}, plan {first + 1}", f"longer than {limit} tokens")
             first += 1
             continue
         numbers = f"plan {end}" if end == first + 1 else f"plans {first + 1} to {end}"
@@ -82,15 +82,15 @@ def windows(
 
 
 def single_plans(encoder: Encoder, name: str, segments: Sequence[PlanSegment]) -> Iterator[TrainingSequence]:
-    """A history as sequences of one plan each, behind the goal that it serves and the frame that it begins with.
+    """Cut a history into sequences of one plan each, with its goal and the frame that it begins with.
 
     Args:
-        encoder: makes the sequences.
-        name: of the trajectory.
-        segments: its history.
+        encoder: builds the sequences.
+        name: name of the trajectory.
+        segments: history of the trajectory.
 
     Raises:
-        DataError: a frame cannot be read, or a text of the history holds a mark.
+        DataError: a frame cannot be read, or a text of the history contains a mark.
         ModelError: the template refuses the history.
     """
     for number, segment in enumerate(segments):
@@ -98,8 +98,11 @@ def single_plans(encoder: Encoder, name: str, segments: Sequence[PlanSegment]) -
             yield encoder.actions(f"{name}, plan {number + 1}", restart_at(segments, number, number + 1))
 
 
-def _end(encoder: Encoder, segments: Sequence[PlanSegment], first: int, limit: int) -> int:
-    """The index after the last segment that fits; found by doubling and bisection, as each count takes a rendering."""
+def _window_end(encoder: Encoder, segments: Sequence[PlanSegment], first: int, limit: int) -> int:
+    """Return the end of the largest window that fits.
+
+    It is found by doubling and bisection, because counting tokens needs a rendering of the whole window.
+    """
 
     def fits(end: int) -> bool:
         return n_tokens(encoder.pieces(segment_parts(restart_at(segments, first, end)))) <= limit

@@ -1,4 +1,4 @@
-"""Sequences as tensors that a model is trained on."""
+"""Batches of sequences as tensors."""
 
 from collections.abc import Sequence
 from typing import TypedDict
@@ -13,20 +13,20 @@ from model_adapters.hf.prompt import Frame, token_ids
 
 __all__ = ["IGNORED", "Batch", "collate", "n_labels"]
 
-IGNORED = -100  # the label of a token that no loss is taken on, as PyTorch's cross entropy has it
+IGNORED = -100  # label of tokens without loss, in PyTorch's cross entropy
 
 
 class Batch(TypedDict):
-    """What `SequenceModel` is called with, by the names of its arguments. All tensors are on the CPU.
+    """Arguments of `SequenceModel`. All tensors are on the CPU.
 
     Attributes:
-        input_ids: (batch, tokens), frames expanded, padded at the end.
-        position_ids: (batch, tokens), or (3, batch, tokens) where positions have three axes.
-        attention_mask: (batch, tokens), 0 where there is padding; None where there is none, so that attention can take
-            kernels that know the causal mask without reading one.
-        labels: (batch, tokens), the token itself where loss is taken on it, else -100.
-        slots: (batch, tokens), bool, where the features of frames go.
-        frames: of the whole batch, in the order of their slots.
+        input_ids: token ids, (batch, tokens), frames expanded, padded at the end.
+        position_ids: position ids, (batch, tokens), or (3, batch, tokens) for positions with three axes.
+        attention_mask: 0 for padding and 1 for tokens, (batch, tokens). None without padding, because attention kernels
+            with a built-in causal mask are faster than those that read one.
+        labels: the token where loss is computed on it, else -100, (batch, tokens).
+        slots: true for slots of frames' features, (batch, tokens).
+        frames: frames of the whole batch, in the order of their slots.
     """
 
     input_ids: torch.Tensor
@@ -38,15 +38,15 @@ class Batch(TypedDict):
 
 
 def collate(sequences: Sequence[TrainingSequence], family: Family, pad_id: int) -> Batch:
-    """Lay sequences out side by side.
+    """Combine sequences to a batch.
 
     Args:
-        sequences: at least one.
-        family: of the model that is trained.
-        pad_id: what shorter sequences are filled up with.
+        sequences: sequences, at least one.
+        family: family of the model.
+        pad_id: padding token.
 
     Raises:
-        DataError: a sequence has no token that loss could be taken on; the first token is none, as nothing predicts it.
+        DataError: a sequence has no token with loss; the first token never has any, because nothing predicts it.
     """
     ids = [torch.tensor(list(token_ids(sequence.pieces))) for sequence in sequences]
     labels = [_labels(sequence, own) for sequence, own in zip(sequences, ids, strict=True)]
@@ -62,23 +62,23 @@ def collate(sequences: Sequence[TrainingSequence], family: Family, pad_id: int) 
 
 
 def n_labels(batch: Batch) -> int:
-    """How many tokens of a batch loss is taken on."""
+    """Return the number of tokens of a batch with loss."""
     return int((batch["labels"] != IGNORED).sum())
 
 
 def _labels(sequence: TrainingSequence, ids: torch.Tensor) -> torch.Tensor:
-    trained: list[bool] = []
-    for piece, learned in zip(sequence.pieces, sequence.trained, strict=True):
-        trained.extend([learned] if isinstance(piece, int) else [False] * len(piece.ids))
-    chosen = torch.tensor(trained)
-    chosen[0] = False
-    if not chosen.any():
-        raise DataError(f"{sequence.name}: there is no token to take loss on; leave the sequence out")
-    return ids.where(chosen, IGNORED)
+    flags: list[bool] = []
+    for piece, has_loss in zip(sequence.pieces, sequence.has_loss, strict=True):
+        flags.extend([has_loss] if isinstance(piece, int) else [False] * len(piece.ids))
+    mask = torch.tensor(flags)
+    mask[0] = False
+    if not mask.any():
+        raise DataError(f"{sequence.name}: no token has loss; leave the sequence out")
+    return ids.where(mask, IGNORED)
 
 
 def _positions(sequences: Sequence[TrainingSequence], ids: Sequence[torch.Tensor], family: Family) -> torch.Tensor:
-    """Of whole sequences, each counted from 0; padding stands at position 0, where it stretches no scaled RoPE."""
+    """Return the positions of whole sequences, each from 0; padding has position 0, which never lengthens RoPE."""
     rows = [
         family.positions(own, [frame.size for frame in sequence.frames], 0)
         for sequence, own in zip(sequences, ids, strict=True)

@@ -1,4 +1,4 @@
-"""States of a training run that it can go on from, as if it had never ended."""
+"""States from which a training run resumes exactly."""
 
 import json
 import shutil
@@ -16,37 +16,37 @@ from infthor_eval.formats.files import prepare_folder, write_atomically
 __all__ = ["Checkpoints"]
 
 _WEIGHTS, _OPTIMIZER, _STATE = "model.safetensors", "optimizer.pt", "state.json"
-_MEND = "restore it, or remove the folder to begin anew"
+_HINT = "restore it, or remove the folder to restart"
 
 
 @dataclass(frozen=True)
 class Checkpoints:
-    """The folder `step-NUMBER` of a run's last state, with weights, the optimizer's moments and what run it is.
+    """The last state of a run, in a folder `step-NUMBER`: weights, the optimizer's moments, and the run's settings.
 
-    Nothing else is kept: order, learning rate and random numbers follow from the settings and the step.
+    Nothing else is stored: order of sequences, learning rate and random numbers follow from settings and step.
 
     Attributes:
-        folder: of the run.
-        about: what has to be equal for going on, as JSON values.
+        folder: folder of the run.
+        about: settings that have to be equal for resuming, as JSON values.
     """
 
     folder: Path
     about: Mapping[str, Any]
 
     def save(self, step: int, model: torch.nn.Module, optimizer: torch.optim.Optimizer) -> None:
-        """Write a state, and remove the one before.
+        """Write a state, then remove the previous one.
 
         Args:
-            step: how many steps are done.
-            model: with its weights after them.
-            optimizer: likewise.
+            step: number of finished steps.
+            model: the model after these steps.
+            optimizer: the optimizer after these steps.
 
         Raises:
-            DataError: it cannot be written.
+            DataError: the state cannot be written.
         """
         place = prepare_folder(self.folder) / f"step-{step:06d}"
         with (
-            wrap_errors(f"{place}: cannot be written", "make room; the last checkpoint is still there"),
+            wrap_errors(f"{place}: cannot be written", "free some space; the last checkpoint is still there"),
             write_atomically(place) as folder,
         ):
             folder.mkdir()
@@ -59,28 +59,28 @@ class Checkpoints:
                 shutil.rmtree(older)
 
     def restore(self, model: torch.nn.Module, optimizer: torch.optim.Optimizer) -> int:
-        """Take over the last state, if there is one.
+        """Load the last state, if there is one.
 
         Args:
-            model: takes its weights.
-            optimizer: takes its moments.
+            model: model that gets its weights.
+            optimizer: optimizer that gets its moments.
 
         Returns:
-            How many steps are done.
+            Number of finished steps.
 
         Raises:
-            DataError: it is damaged.
-            UsageError: it is of another run.
+            DataError: the state is damaged.
+            UsageError: the state is of another run.
         """
         places = self._places()
         if not places:
             return 0
         last = places[-1]
-        with wrap_errors(f"{last}: cannot be read", _MEND, catch=Exception):
+        with wrap_errors(f"{last}: cannot be read", _HINT, catch=Exception):
             state = json.loads((last / _STATE).read_text(encoding="utf-8"))
             step, about = int(state["step"]), dict(state["about"])
         self._require_same(last, about)
-        with wrap_errors(f"{last}: cannot be read", _MEND, catch=Exception):
+        with wrap_errors(f"{last}: cannot be read", _HINT, catch=Exception):
             load_model(model, last / _WEIGHTS)
             device = next(model.parameters()).device
             optimizer.load_state_dict(torch.load(last / _OPTIMIZER, map_location=device, weights_only=True))
@@ -93,8 +93,8 @@ class Checkpoints:
         for name in sorted({*self.about, *about}):
             if self.about.get(name) != about.get(name):
                 raise UsageError(
-                    f"{last}: is of a run with {name}={about.get(name)}, not {self.about.get(name)}; go on with its "
-                    "settings, or give another folder"
+                    f"{last}: is of a run with {name}={about.get(name)}, not {self.about.get(name)}; use its settings, "
+                    "or give another folder"
                 )
 
 

@@ -1,10 +1,10 @@
-"""Sequences that are too long for one process, cut over the ranks of a process group.
+"""Context parallelism: sequences that are too long for one process, split over the ranks of a process group.
 
-Positions are those of the whole sequence, features are put into their slots, and only then it is cut: so any family
-can be cut that can be trained at all, Qwen2.5-VL with its three-axis positions too. The sequence is cut into two chunks
-for each of N ranks, of which rank r holds chunks r and 2N - 1 - r: a chunk attends to all that is before it, so every
-rank has the same work. In each layer keys and values of the whole sequence are gathered; queries, and all else that is
-kept for the gradient, stay cut.
+Positions are computed for the whole sequence and features are put into their slots before it is split. So every family
+that can be trained can be split, including Qwen2.5-VL with its three-axis positions. Each sequence is split into 2N
+chunks for N ranks, and rank r has chunks r and 2N - 1 - r: attention of a chunk costs more the later it is, so this
+gives every rank the same work. In each layer keys and values of the whole sequence are gathered; queries, and all other
+activations that are kept for the gradient, stay split.
 """
 
 from collections.abc import Iterator, Sequence
@@ -24,36 +24,36 @@ from infthor_eval.training.batches import IGNORED, Batch
 from infthor_eval.training.network import SequenceModel, next_labels
 from model_adapters.hf.prompt import Frame
 
-__all__ = ["ContextParallel", "Cut", "attend", "context_parallel"]
+__all__ = ["ContextParallel", "SequenceSplit", "causal_attention", "context_parallel"]
 
-_ROWS = 256  # of a causal mask that exists at a time, where the kernel has to be given one
+_MASK_ROWS = 256  # rows of an explicit causal mask that exist at a time
 _HALF = (torch.float16, torch.bfloat16)
 
 
-class Cut:
-    """How a sequence is laid over ranks.
+class SequenceSplit:
+    """Assignment of a sequence's chunks to a rank.
 
     Args:
-        rank: whose share is meant.
-        n_ranks: how many there are.
+        rank: the rank.
+        n_ranks: number of ranks.
 
     Attributes:
-        chunks: the numbers of the rank's two chunks of `2 * n_ranks`.
+        chunks: numbers of the rank's two chunks of `2 * n_ranks`.
     """
 
     def __init__(self, rank: int, n_ranks: int) -> None:
         self._n_chunks = 2 * n_ranks
         self.chunks = (rank, self._n_chunks - 1 - rank)
 
-    def share(self, whole: Tensor, padding: int | bool = 0) -> Tensor:
-        """The rank's part of a tensor with the tokens on its last axis.
+    def local_part(self, whole: Tensor, padding: int | bool = 0) -> Tensor:
+        """Return the rank's part of a tensor with tokens on its last axis.
 
         Args:
-            whole: (..., tokens).
-            padding: what it is filled up with at the end, to chunks of equal length.
+            whole: values of all tokens, (..., tokens).
+            padding: value that is appended to make chunks of equal length.
 
         Returns:
-            (..., 2 * ceil(tokens / chunks)), its chunks one behind the other.
+            The rank's two chunks, concatenated, (..., 2 * ceil(tokens / chunks)).
         """
         missing = -whole.shape[-1] % self._n_chunks
         chunks = pad(whole, (0, missing), value=padding).chunk(self._n_chunks, dim=-1)
@@ -61,10 +61,10 @@ class Cut:
 
 
 class ContextParallel:
-    """A model of which every rank computes its share of each sequence; made by `context_parallel`.
+    """A model of which every rank computes its part of each sequence; see `context_parallel`.
 
     Args:
-        model: the same on every rank of the group.
+        model: the model, the same on every rank of the group.
         group: the ranks.
     """
 
@@ -72,47 +72,48 @@ class ContextParallel:
         self._model = model
         self._group = group
         self._rank, self._n_ranks = dist.get_rank(group), dist.get_world_size(group)
-        self._cut = Cut(self._rank, self._n_ranks)
+        self._split = SequenceSplit(self._rank, self._n_ranks)
 
     def loss(self, batch: Batch, n_items: Tensor | int) -> Tensor:
-        """This rank's summand of the loss; a gradient is whole when those of all ranks are added (`sum_gradients`).
+        """Return this rank's part of the loss; the gradients of all ranks have to be added (`sum_gradients`).
 
-        Every rank of the group has to call it, and its gradient's `backward`, for the same batches in the same order.
+        Every rank of the group has to call this, and `backward` of the result, for the same batches in the same order:
+        both communicate.
 
         Args:
             batch: one sequence.
-            n_items: what the sum of the tokens' losses is divided by.
+            n_items: divisor of the sum of the tokens' losses.
 
         Returns:
-            A float32 scalar, 0 on a rank whose chunks have no label.
+            A float32 scalar, 0 on a rank whose chunks have no labels.
 
         Raises:
             DataError: a frame cannot be read.
-            ModelError: processor and model disagree on how many tokens a frame takes, or the model attends in sliding
-                windows.
+            ModelError: processor and model disagree on the number of a frame's tokens, or the model uses sliding-window
+                attention.
         """
         if len(batch["input_ids"]) != 1:
             raise ValueError("ranks share one sequence at a time")
         embeds = self._embed(batch)
-        positions = self._cut.share(batch["position_ids"])
-        # The label of a chunk's last token is the first token of another chunk, so they move on before the cut.
-        targets = self._cut.share(next_labels(batch["labels"]), IGNORED)
+        positions = self._split.local_part(batch["position_ids"])
+        # The label of a chunk's last token is the first token of another chunk, so labels are shifted before the split.
+        targets = self._split.local_part(next_labels(batch["labels"]), IGNORED)
         total = self._model.loss_sum(self._model.decode(embeds, positions, None), targets)
         return total / torch.as_tensor(n_items, device=total.device)
 
     def _embed(self, batch: Batch) -> Tensor:
         slots = batch["slots"]
-        own_slots = self._cut.share(slots, False)
-        ids = self._cut.share(batch["input_ids"])
+        own_slots = self._split.local_part(slots, False)
+        ids = self._split.local_part(batch["input_ids"])
         if not batch["frames"]:
             return self._model.embed(ids, own_slots, [])
-        rows = self._cut.share(slots.cumsum(-1) - 1)[own_slots]
+        rows = self._split.local_part(slots.cumsum(-1) - 1)[own_slots]
         features = torch.cat(self._features(batch["frames"]))
-        # A rank without any slot takes no row, and still hands on a gradient for the others' sake.
+        # A rank without slots uses no row, but its backward pass has to take part in the gathering of gradients.
         return self._model.embed(ids, own_slots, [features[rows.to(features.device)]])
 
     def _features(self, frames: Sequence[Frame]) -> list[Tensor]:
-        """Of each frame, (slots, hidden); every rank runs the vision tower on some of them."""
+        """Return the features of each frame, (slots, hidden); every rank runs the vision tower on some frames."""
         distinct = list(dict.fromkeys(frames))
         shares = [distinct[rank :: self._n_ranks] for rank in range(self._n_ranks)]
         sizes = [[self._model.n_slots(frame) for frame in share] for share in shares]
@@ -124,12 +125,12 @@ class ContextParallel:
         return [by_frame[frame] for frame in frames]
 
     def _own_features(self, frames: Sequence[Frame], n_rows: int) -> Tensor:
-        """Features of some frames one behind the other, filled up to a number of rows."""
+        """Return the concatenated features of some frames, padded to a number of rows."""
         weight = self._model.model.get_input_embeddings().weight
         features = [piece.to(weight) for piece in self._model.features(frames)]
         own = torch.cat([weight.new_empty(0, weight.shape[1]), *features])
         own = pad(own, (0, 0, 0, n_rows - len(own)))
-        # Where some ranks have a gradient to gather all have to take part, those without any frame too.
+        # If any rank has gradients to gather, all have to take part, including those without frames.
         return own.requires_grad_() if self._model.trains_vision and not own.requires_grad else own
 
     def attention(
@@ -144,52 +145,52 @@ class ContextParallel:
         sliding_window: int | None = None,
         **_: Any,
     ) -> tuple[Tensor, None]:
-        """Attention as transformers' decoder layers call it: causal, of this rank's queries to the whole sequence.
+        """Compute causal attention of this rank's queries to the whole sequence; transformers' decoder layers call this.
 
         Args:
-            module: the layer's attention.
-            query: (batch, heads, own tokens, size of a head).
-            key: (batch, heads of keys, own tokens, size of a head).
-            value: like `key`.
+            module: attention module of the layer.
+            query: queries, (batch, heads, own tokens, head size).
+            key: keys, (batch, key heads, own tokens, head size).
+            value: values, like `key`.
             attention_mask: None.
-            dropout: probability.
-            scaling: of the products; by the size of a head where None.
+            dropout: dropout probability.
+            scaling: factor of the dot products; by the head size where None.
             sliding_window: None.
 
         Returns:
-            (batch, own tokens, heads, size of a head), and no weights.
+            The outputs, (batch, own tokens, heads, head size), and None instead of weights.
 
         Raises:
-            ModelError: the model attends in sliding windows.
+            ModelError: the model uses sliding-window attention.
         """
         if sliding_window is not None:
             raise ModelError(
-                f"the model attends in windows of {sliding_window} tokens; a sequence can be cut over ranks only where "
-                "attention is full"
+                f"the model attends in windows of {sliding_window} tokens; context parallelism needs full attention: "
+                "set parallel.context to 1"
             )
         keys, values = _GatherTokens.apply(torch.stack([key, value]), self._group)
         n_tokens = query.shape[-2] // 2
         outputs = [
-            attend(own, keys[..., : end * n_tokens, :], values[..., : end * n_tokens, :], dropout, scaling)
-            for own, end in zip(query.chunk(2, dim=-2), (number + 1 for number in self._cut.chunks), strict=True)
+            causal_attention(own, keys[..., : end * n_tokens, :], values[..., : end * n_tokens, :], dropout, scaling)
+            for own, end in zip(query.chunk(2, dim=-2), (number + 1 for number in self._split.chunks), strict=True)
         ]
         return torch.cat(outputs, dim=-2).transpose(1, 2), None
 
 
 @contextmanager
 def context_parallel(model: SequenceModel, group: dist.ProcessGroup) -> Iterator[ContextParallel]:
-    """Have the ranks of a group share sequences; the gradient has to be computed within the context, too.
+    """Split sequences over the ranks of a group; the backward pass has to run within the context, too.
 
     Args:
-        model: the same on every rank of the group.
+        model: the model, the same on every rank of the group.
         group: the ranks.
     """
     parallel = ContextParallel(model, group)
     name = f"context_parallel_{id(parallel)}"
     config = model.decoder.config
     before = config._attn_implementation
-    # As an attention that transformers makes no masks for: each would be of all tokens by all tokens. Put into the
-    # dictionary and not registered, because what is registered cannot be taken back.
+    # transformers creates no mask for an unknown attention name; a mask would have all tokens by all tokens. The
+    # function is put into the dictionary directly, because a registered one cannot be removed.
     ALL_ATTENTION_FUNCTIONS[name] = parallel.attention
     config._attn_implementation = name
     try:
@@ -199,40 +200,36 @@ def context_parallel(model: SequenceModel, group: dist.ProcessGroup) -> Iterator
         del ALL_ATTENTION_FUNCTIONS[name]
 
 
-def attend(query: Tensor, key: Tensor, value: Tensor, dropout: float, scaling: float | None) -> Tensor:
-    """Causal attention of the last tokens of a sequence to all of it.
+def causal_attention(query: Tensor, key: Tensor, value: Tensor, dropout: float, scaling: float | None) -> Tensor:
+    """Return causal attention of the last tokens of a sequence to the whole sequence, in the shape of the queries.
 
     Args:
-        query: (batch, heads, last tokens, size of a head).
-        key: (batch, heads of keys, tokens, size of a head).
-        value: like `key`.
-        dropout: probability.
-        scaling: of the products; by the size of a head where None.
-
-    Returns:
-        As `query`.
+        query: queries of the last tokens, (batch, heads, last tokens, head size).
+        key: keys of all tokens, (batch, key heads, tokens, head size).
+        value: values of all tokens, like `key`.
+        dropout: dropout probability.
+        scaling: factor of the dot products; by the head size where None.
     """
     if query.is_cuda and query.dtype in _HALF:
-        return _flash(query, key, value, dropout, scaling)
-    # Other kernels have to be given a mask. It is made for some rows at a time, and again for the gradient.
-    seen = key.shape[-2] - query.shape[-2]
+        return _flash_attention(query, key, value, dropout, scaling)
+    # Other kernels need an explicit mask. It is created for some rows at a time, and again for the gradient.
+    n_keys = key.shape[-2] - query.shape[-2]
     outputs = []
-    for rows in query.split(_ROWS, dim=-2):
-        seen += rows.shape[-2]
-        outputs.append(
-            checkpoint(_masked, rows, key[..., :seen, :], value[..., :seen, :], dropout, scaling, use_reentrant=False)
-        )
+    for rows in query.split(_MASK_ROWS, dim=-2):
+        n_keys += rows.shape[-2]
+        states = key[..., :n_keys, :], value[..., :n_keys, :]
+        outputs.append(checkpoint(_masked_attention, rows, *states, dropout, scaling, use_reentrant=False))
     return torch.cat(outputs, dim=-2)
 
 
-def _flash(query: Tensor, key: Tensor, value: Tensor, dropout: float, scaling: float | None) -> Tensor:
-    """By a kernel that aligns the causal mask with the last token by itself."""
+def _flash_attention(query: Tensor, key: Tensor, value: Tensor, dropout: float, scaling: float | None) -> Tensor:
+    """Use a kernel that aligns the causal mask with the last token."""
     mask = causal_lower_right(query.shape[-2], key.shape[-2])
     grouped = query.shape[1] != key.shape[1]
     return scaled_dot_product_attention(query, key, value, mask, dropout, scale=scaling, enable_gqa=grouped)
 
 
-def _masked(query: Tensor, key: Tensor, value: Tensor, dropout: float, scaling: float | None) -> Tensor:
+def _masked_attention(query: Tensor, key: Tensor, value: Tensor, dropout: float, scaling: float | None) -> Tensor:
     n_rows, n_columns = query.shape[-2], key.shape[-2]
     mask = torch.ones(n_rows, n_columns, dtype=torch.bool, device=query.device).tril(n_columns - n_rows)
     n_groups = query.shape[1] // key.shape[1]
@@ -241,7 +238,7 @@ def _masked(query: Tensor, key: Tensor, value: Tensor, dropout: float, scaling: 
 
 
 class _GatherTokens(torch.autograd.Function):
-    """All ranks' chunks, in the order of the sequence; (..., tokens, size) from (..., own tokens, size)."""
+    """Gathers all ranks' chunks in the order of the sequence: (..., own tokens, size) to (..., tokens, size)."""
 
     @staticmethod
     def forward(ctx: Any, own: Tensor, group: dist.ProcessGroup) -> Tensor:
@@ -258,7 +255,7 @@ class _GatherTokens(torch.autograd.Function):
 
 
 class _GatherStacked(torch.autograd.Function):
-    """All ranks' tensors, in the order of the ranks; (ranks, ...) from (...)."""
+    """Stacks all ranks' tensors: (...) to (ranks, ...)."""
 
     @staticmethod
     def forward(ctx: Any, own: Tensor, group: dist.ProcessGroup) -> Tensor:
@@ -271,14 +268,14 @@ class _GatherStacked(torch.autograd.Function):
 
 
 def _gather(own: Tensor, group: dist.ProcessGroup) -> Tensor:
-    """(ranks, ...) from (...)."""
+    """Stack all ranks' tensors: (...) to (ranks, ...)."""
     gathered = own.new_empty(dist.get_world_size(group), *own.shape)
     dist.all_gather(list(gathered.unbind()), own.contiguous(), group=group)
     return gathered
 
 
 def _sum_own(shares: Sequence[Tensor], group: dist.ProcessGroup) -> Tensor:
-    """The sum of what all ranks have for this one; (...) from one (...) for each rank."""
+    """Return the sum of all ranks' tensors for this rank: one (...) for each rank to (...)."""
     own = torch.empty_like(shares[0])
     dist.reduce_scatter(own, list(shares), group=group)
     return own

@@ -1,4 +1,4 @@
-"""What a training run will take, before it begins: work, and memory of a process. docs/training.md has the formulae."""
+"""Estimates of the work and memory of a training run; docs/training.md has the formulae."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -13,21 +13,21 @@ from infthor_eval.training.recipe import Recipe
 
 __all__ = ["TrainingCost", "estimate_cost"]
 
-_SAMPLE = (300, 300)  # a frame's width and height in the published data
-_MOMENTS = 2  # of AdamW
-_LORA_SHARE = 0.02  # of the decoder's weights, about: adapters of rank 16
+_SAMPLE = (300, 300)  # width and height of frames in the published data
+_MOMENTS = 2  # moments of AdamW per weight
+_LORA_SHARE = 0.02  # approximate size of adapters of rank 16, relative to the decoder's weights
 
 
 @dataclass(frozen=True)
 class TrainingCost:
-    """Of one run.
+    """Work of a run, and memory of one of its processes in bytes.
 
     Attributes:
-        flop: of all its steps.
-        weights: bytes, as are the others, of one process.
-        gradients: of what is trained.
-        optimizer: both moments.
-        activations: kept for the gradient of the longest sequence.
+        flop: floating point operations of all steps.
+        weights: memory of the weights.
+        gradients: memory of the gradients of trained weights.
+        optimizer: memory of both moments.
+        activations: memory of the activations that are kept for the gradient of the longest sequence.
     """
 
     flop: float
@@ -38,25 +38,25 @@ class TrainingCost:
 
     @property
     def memory(self) -> float:
-        """All of it, in bytes."""
+        """Total memory in bytes."""
         return self.weights + self.gradients + self.optimizer + self.activations
 
     def hours(self, tflops: float) -> float:
-        """How long it takes at so many TFLOP a second, of all processes together."""
+        """Return the hours that the run takes at this speed of all processes together, in TFLOP per second."""
         return self.flop / (tflops * 1e12) / 3600
 
 
 def estimate_cost(recipe: Recipe, network: SequenceModel, data: TrainingData, n_processes: int) -> TrainingCost:
-    """Reckon what a run takes.
+    """Estimate the work and memory of a run.
 
     Args:
-        recipe: of the run.
-        network: its model, frozen as the run freezes it.
-        data: its sequences.
-        n_processes: that share them.
+        recipe: recipe of the run.
+        network: model of the run, with its frozen parts.
+        data: training data of the run.
+        n_processes: number of processes.
     """
     parts = parameters_by_part(network)
-    held = sum(parameter.nbytes for parameter in network.parameters())
+    total = sum(parameter.nbytes for parameter in network.parameters())
     trained = sum(parameter.nbytes for parameter in network.parameters() if parameter.requires_grad)
     if recipe.lora is not None:
         trained = int(_LORA_SHARE * sum(parameter.nbytes for parameter in parts["decoder"]))
@@ -67,7 +67,7 @@ def estimate_cost(recipe: Recipe, network: SequenceModel, data: TrainingData, n_
         passes = min(passes, recipe.max_steps * recipe.sequences_per_step / len(data.sequences))
     return TrainingCost(
         flop=passes * _flop(recipe, network, data, parts),
-        weights=held / shards,
+        weights=total / shards,
         gradients=trained / shards,
         optimizer=_MOMENTS * trained / shards,
         activations=_activations(recipe, network, longest / recipe.parallel.context),
@@ -75,7 +75,7 @@ def estimate_cost(recipe: Recipe, network: SequenceModel, data: TrainingData, n_
 
 
 def _flop(recipe: Recipe, network: SequenceModel, data: TrainingData, parts: dict[str, Any]) -> float:
-    """Of all sequences once: forward, through the layers back, for their weights, and again where not all is kept."""
+    """Return the operations of one epoch: forward, backward through layers and to weights, and recomputation."""
     config = network.decoder.config
     n_weights = sum(parameter.numel() for parameter in parts["decoder"])
     width = config.num_attention_heads * getattr(config, "head_dim", config.hidden_size // config.num_attention_heads)
@@ -91,7 +91,7 @@ def _flop(recipe: Recipe, network: SequenceModel, data: TrainingData, parts: dic
 
 @torch.no_grad()
 def _flop_of_frame(network: SequenceModel) -> float:
-    """Counted while a blank frame is looked at."""
+    """Count the operations of the vision tower on a blank frame."""
     counter = FlopCounterMode(display=False)
     with counter:
         network.family.features([Image.new("RGB", _SAMPLE)])
@@ -99,12 +99,12 @@ def _flop_of_frame(network: SequenceModel) -> float:
 
 
 def _activations(recipe: Recipe, network: SequenceModel, n_tokens: float) -> float:
-    """Kept of one sequence: every layer's input, and all that one layer keeps; or that of all layers."""
+    """Return the activations of one sequence: each layer's input and one layer's activations, or all layers'."""
     config = network.decoder.config
     size = network.model.dtype.itemsize
     heads = config.num_key_value_heads / config.num_attention_heads
-    # Normed, queries, keys, values, attended, projected, normed; gate, up, their product; and the sums.
+    # Norm, queries, keys, values, attention, projection, norm; gate, up, product, activation; and the residual sums.
     within = (6 + 2 * heads) * config.hidden_size + 4 * config.intermediate_size
     layers = config.num_hidden_layers
-    kept = layers * config.hidden_size + within if recipe.gradient_checkpointing else layers * within
-    return kept * n_tokens * size
+    per_token = layers * config.hidden_size + within if recipe.gradient_checkpointing else layers * within
+    return per_token * n_tokens * size

@@ -1,4 +1,4 @@
-"""What a recipe is trained on: the sequences of replayed sets, and what none could be made of."""
+"""Training sequences of replayed sets."""
 
 import random
 from collections import Counter
@@ -22,77 +22,73 @@ __all__ = ["TrainingData", "action_sequences", "read_history", "read_training_da
 
 @dataclass(frozen=True)
 class TrainingData:
-    """All sequences of a recipe.
+    """All training data of a recipe.
 
     Attributes:
-        sequences: in the order of the sets.
-        left_out: what no sequence could be made of.
+        sequences: sequences in the order of the sets.
+        skipped: items of which no sequence could be built.
     """
 
     sequences: Sequence[TrainingSequence]
-    left_out: Sequence[SkippedItem]
+    skipped: Sequence[SkippedItem]
 
     @property
     def n_tokens(self) -> int:
-        """Of all sequences, frames expanded."""
+        """Tokens of all sequences, frames expanded."""
         return sum(sequence.n_tokens for sequence in self.sequences)
 
     @property
-    def n_trained(self) -> int:
-        """How many tokens loss is taken on."""
-        return sum(sequence.n_trained for sequence in self.sequences)
+    def n_loss_tokens(self) -> int:
+        """Tokens with loss."""
+        return sum(sequence.n_loss_tokens for sequence in self.sequences)
 
-    def reasons(self) -> Counter[str]:
-        """How much was left out, by reason."""
-        return Counter(item.reason for item in self.left_out)
+    def skip_reasons(self) -> Counter[str]:
+        """Return the number of skipped items by reason."""
+        return Counter(item.reason for item in self.skipped)
 
 
 def read_training_data(recipe: Recipe, encoder: Encoder, folders: Sequence[Path]) -> TrainingData:
-    """The sequences that a recipe makes of replayed sets.
-
-    A trajectory or question that cannot be used is left out and counted; the others are not hurt by it.
+    """Build the sequences of a recipe from replayed sets; trajectories and questions that cannot be used are skipped.
 
     Args:
-        recipe: says which sequences.
-        encoder: makes them.
-        folders: of the sets, in the form of NIEH sets; a question file is needed where there are to be questions.
+        recipe: recipe with the kinds of sequences.
+        encoder: builds the sequences.
+        folders: folders of the sets, in the form of NIEH sets; sequences of questions need a question file.
 
     Raises:
-        UsageError: a setting of the contexts does not fit.
-        DataError: a folder is no set, or nothing is left of all.
-        ModelError: the model's template refuses what there is.
+        UsageError: a setting of a context is not valid.
+        DataError: a folder is not a set, or no sequence is left.
+        ModelError: the model's template refuses the sequences.
     """
-    found = [item for folder in folders for item in _of_set(recipe, encoder, folder)]
-    sequences = [item for item in found if isinstance(item, TrainingSequence)]
-    left_out = [item for item in found if isinstance(item, SkippedItem)]
+    items = [item for folder in folders for item in _read_set(recipe, encoder, folder)]
+    sequences = [item for item in items if isinstance(item, TrainingSequence)]
+    skipped = [item for item in items if isinstance(item, SkippedItem)]
     if not sequences:
-        why = left_out[0].reason if left_out else "there are no trajectories and no questions"
+        why = skipped[0].reason if skipped else "there are no trajectories and no questions"
         raise DataError(f"{', '.join(map(str, folders))}: no sequence to train on ({why}); give another set")
-    return TrainingData(sequences, left_out)
+    return TrainingData(sequences, skipped)
 
 
-def _of_set(recipe: Recipe, encoder: Encoder, folder: Path) -> Iterator[TrainingSequence | SkippedItem]:
+def _read_set(recipe: Recipe, encoder: Encoder, folder: Path) -> Iterator[TrainingSequence | SkippedItem]:
     if recipe.actions is not None:
-        yield from _share(
+        yield from _sample_share(
             action_sequences(NiehSet(folder), encoder, recipe.max_tokens), recipe.actions.share, recipe.seed
         )
     if recipe.questions is not None:
-        told = {"seed": recipe.seed} | recipe.questions.settings | {"data": str(folder)}
+        settings = {"seed": recipe.seed} | recipe.questions.settings | {"data": str(folder)}
         for context in recipe.questions.contexts:
-            made = question_sequences(encoder, find_samples({**told, "context": context}), recipe.max_tokens)
-            yield from _share(made, recipe.questions.share, recipe.seed)
+            samples = find_samples({**settings, "context": context})
+            items = question_sequences(encoder, samples, recipe.max_tokens)
+            yield from _sample_share(items, recipe.questions.share, recipe.seed)
 
 
 def action_sequences(data: NiehSet, encoder: Encoder, limit: int) -> Iterator[TrainingSequence | SkippedItem]:
-    """The windows of every trajectory of a set.
+    """Yield the windows of every trajectory of a set, and the items of which no sequence could be built.
 
     Args:
-        data: the set; its trajectories are in it.
-        encoder: makes the sequences.
-        limit: tokens of a sequence, frames expanded.
-
-    Yields:
-        The sequences, and what none could be made of.
+        data: the set, which has to contain the trajectories.
+        encoder: builds the sequences.
+        limit: most tokens of a sequence, frames expanded.
     """
     for name in trajectory_names(data):
         try:
@@ -102,19 +98,19 @@ def action_sequences(data: NiehSet, encoder: Encoder, limit: int) -> Iterator[Tr
 
 
 def trajectory_names(data: NiehSet) -> list[str]:
-    """Names of the trajectories of a set, those without a question too, sorted."""
+    """Return the names of all trajectories of a set, including those without questions, sorted."""
     return sorted(path.name for path in (data.root / "metadata").iterdir() if path.is_dir())
 
 
 def read_history(data: NiehSet, name: str) -> tuple[Trajectory, list[PlanSegment]]:
-    """A trajectory of a set, and its true history.
+    """Return a trajectory of a set and its true history.
 
     Args:
         data: the set.
-        name: of the trajectory.
+        name: name of the trajectory.
 
     Raises:
-        DataError: it is not in the set, or its replay does not fit it.
+        DataError: the trajectory is not in the set, or does not match its replay.
     """
     path = data.outline_file(name)
     if path is None:
@@ -124,11 +120,11 @@ def read_history(data: NiehSet, name: str) -> tuple[Trajectory, list[PlanSegment
     return trajectory, recorded_segments(trajectory, steps, data.frames(name))
 
 
-def _share(
-    made: Iterable[TrainingSequence | SkippedItem], share: float, seed: int
+def _sample_share(
+    items: Iterable[TrainingSequence | SkippedItem], share: float, seed: int
 ) -> Iterator[TrainingSequence | SkippedItem]:
-    """A part of the sequences, drawn by the seed; what was left out is told all the same."""
-    draw = random.Random(seed)
-    for item in made:
-        if isinstance(item, SkippedItem) or share >= 1 or draw.random() < share:
+    """Yield a random share of the sequences, and all skipped items."""
+    rng = random.Random(seed)
+    for item in items:
+        if isinstance(item, SkippedItem) or share >= 1 or rng.random() < share:
             yield item

@@ -1,6 +1,6 @@
-"""Sequences as a model is trained on them: token ids and frames, each with whether loss is taken on it.
+"""Training sequences: token ids and frames, and which of them have loss.
 
-The ids are made by what makes a model's prompts, from the same texts: what is trained is what is asked for later.
+They are encoded by the prompter of evaluation from the same texts, so training and evaluation have the same prompts.
 """
 
 from collections.abc import Iterator, Sequence
@@ -19,41 +19,41 @@ __all__ = ["Encoder", "SkippedItem", "TrainingSequence"]
 
 @dataclass(frozen=True)
 class TrainingSequence:
-    """One sequence.
+    """One training sequence.
 
     Attributes:
-        name: where it comes from ("traj_a, plans 3 to 9"), for messages.
-        pieces: ids, and frames with theirs.
-        trained: for each piece, whether loss is taken on it; never on a frame.
+        name: source of the sequence ("traj_a, plans 3 to 9"), for messages.
+        pieces: token ids and frames.
+        has_loss: for each piece, true if loss is computed on it; always false for frames.
     """
 
     name: str
     pieces: tuple[Piece, ...]
-    trained: tuple[bool, ...]
+    has_loss: tuple[bool, ...]
 
     @property
     def n_tokens(self) -> int:
-        """Its length, frames expanded."""
+        """Tokens of the sequence, frames expanded."""
         return n_tokens(self.pieces)
 
     @property
-    def n_trained(self) -> int:
-        """How many tokens loss is taken on."""
-        return sum(self.trained)
+    def n_loss_tokens(self) -> int:
+        """Tokens with loss."""
+        return sum(self.has_loss)
 
     @property
     def frames(self) -> list[Frame]:
-        """Its frames, in order."""
+        """Frames in order."""
         return [piece for piece in self.pieces if isinstance(piece, Frame)]
 
 
 @dataclass(frozen=True)
 class SkippedItem:
-    """Something that no sequence could be made of.
+    """A part of the data of which no sequence could be built.
 
     Attributes:
-        name: what.
-        reason: why.
+        name: name of the trajectory, plan or question.
+        reason: reason, for people.
     """
 
     name: str
@@ -61,10 +61,10 @@ class SkippedItem:
 
 
 class Encoder:
-    """Makes sequences for one checkpoint.
+    """Builds sequences for one checkpoint.
 
     Args:
-        loaded: the checkpoint; its template writes what its prompts are written by.
+        loaded: the checkpoint; its template also renders prompts in evaluation.
     """
 
     def __init__(self, loaded: Loaded) -> None:
@@ -75,50 +75,50 @@ class Encoder:
         self._end: int = loaded.tokenizer.eos_token_id if loaded.tokenizer.eos_token_id in ends else min(ends)
 
     def pieces(self, parts: Sequence[Part]) -> list[Piece]:
-        """What a model is fed of a user's turn of these parts.
+        """Return the prompt of a user turn with these parts.
 
         Raises:
             DataError: a frame cannot be read.
-            ModelError: the template refuses them.
+            ModelError: the template refuses the parts.
         """
         return self._prompter.pieces([Turn("user", tuple(parts))])
 
     def actions(self, name: str, segments: Sequence[PlanSegment]) -> TrainingSequence:
-        """A history; loss is taken on its actions and the marks around them (appendix B).
+        """Encode a history, with loss on its actions and the marks around them (appendix B).
 
         Raises:
-            DataError: a frame cannot be read, or a text of the history holds a mark.
-            ModelError: the template refuses them.
+            DataError: a frame cannot be read, or a text of the history contains a mark.
+            ModelError: the template refuses the history.
         """
-        return self._acted(name, segment_parts(segments), sum(len(segment.steps) for segment in segments))
+        return self._encode_actions(name, segment_parts(segments), sum(len(segment.steps) for segment in segments))
 
-    def order(self, name: str, plan: str, actions: Sequence[str]) -> TrainingSequence:
-        """A plan and its actions without a frame; loss is taken as on a history.
+    def text_plan(self, name: str, plan: str, actions: Sequence[str]) -> TrainingSequence:
+        """Encode a plan and its actions without frames, with loss as in a history.
 
         Raises:
-            DataError: a text holds a mark.
-            ModelError: the template refuses them.
+            DataError: a text contains a mark.
+            ModelError: the template refuses the texts.
         """
-        return self._acted(name, [plan_part(plan), *map(action_part, actions)], len(actions))
+        return self._encode_actions(name, [plan_part(plan), *map(action_part, actions)], len(actions))
 
-    def _acted(self, name: str, parts: Sequence[Part], n_actions: int) -> TrainingSequence:
+    def _encode_actions(self, name: str, parts: Sequence[Part], n_actions: int) -> TrainingSequence:
         pieces = self.pieces(parts)
         if pieces.count(self._mark) != 2 * n_actions:
-            raise DataError(f"{name}: a goal, a plan or an action holds {ACT}; leave the trajectory out")
-        return TrainingSequence(name, tuple(pieces), tuple(self._between_marks(pieces)))
+            raise DataError(f"{name}: a goal, a plan or an action contains {ACT}; leave the trajectory out")
+        return TrainingSequence(name, tuple(pieces), tuple(self._is_between_marks(pieces)))
 
     def answer(self, name: str, parts: Sequence[Part], answer: str) -> TrainingSequence:
-        """A question and its answer; loss is taken on the answer and the token that ends the turn.
+        """Encode a question and its answer, with loss on the answer and the token that ends the turn.
 
         Raises:
             DataError: a frame cannot be read.
-            ModelError: the template refuses them.
+            ModelError: the template refuses the question.
         """
-        asked = self.pieces(parts)
+        prompt = self.pieces(parts)
         reply: list[int] = [*self._tokenizer(answer, add_special_tokens=False)["input_ids"], self._end]
-        return TrainingSequence(name, (*asked, *reply), (False,) * len(asked) + (True,) * len(reply))
+        return TrainingSequence(name, (*prompt, *reply), (False,) * len(prompt) + (True,) * len(reply))
 
-    def _between_marks(self, pieces: Sequence[Piece]) -> Iterator[bool]:
+    def _is_between_marks(self, pieces: Sequence[Piece]) -> Iterator[bool]:
         within = False
         for piece in pieces:
             if piece == self._mark:

@@ -1,4 +1,4 @@
-"""A trained model as a checkpoint that its family's adapter loads."""
+"""Writing of a trained model as a checkpoint that its family's adapter loads."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -9,14 +9,15 @@ from torch.distributed.tensor import DTensor
 
 from infthor_eval.errors import DataError, wrap_errors
 from model_adapters.hf.loaded import Loaded
+from model_adapters.hf.quiet import hide_transformers_output
 
-__all__ = ["export", "whole_weights"]
+__all__ = ["export", "gather_weights"]
 
 
-def whole_weights(model: torch.nn.Module) -> dict[str, torch.Tensor] | None:
-    """Weights that lie in shards on several processes, put together; None where they are whole.
+def gather_weights(model: torch.nn.Module) -> dict[str, torch.Tensor] | None:
+    """Gather weights that are sharded over processes, or return None if they are not.
 
-    All processes have to call it.
+    All processes have to call this.
     """
     weights = model.state_dict()
     if not any(isinstance(tensor, DTensor) for tensor in weights.values()):
@@ -29,22 +30,23 @@ def whole_weights(model: torch.nn.Module) -> dict[str, torch.Tensor] | None:
 def export(loaded: Loaded, folder: Path, weights: Mapping[str, torch.Tensor] | None = None) -> None:
     """Write weights (safetensors), configs, tokenizer with its template, and image processor.
 
-    The template is the one that the model was trained with: what it is asked by later is what it knows.
+    The template is that of training, so that evaluation renders the same prompts.
 
     Args:
         loaded: the model.
-        folder: made if it does not exist.
-        weights: of the model, where it has shards of them alone.
+        folder: folder of the checkpoint; it is created.
+        weights: gathered weights of a sharded model, or None.
 
     Raises:
-        DataError: it cannot be written.
+        DataError: the checkpoint cannot be written.
     """
     model: Any = loaded.model
     with wrap_errors(
-        f"{folder}: the checkpoint cannot be written", "make room, or choose another folder", raise_as=DataError
+        f"{folder}: the checkpoint cannot be written", "free some space, or choose another folder", raise_as=DataError
     ):
         folder.mkdir(parents=True, exist_ok=True)
         loaded.tokenizer.chat_template = loaded.template
-        loaded.tokenizer.save_pretrained(folder)
-        loaded.image_processor.save_pretrained(folder)
-        model.save_pretrained(folder, state_dict=None if weights is None else dict(weights))
+        with hide_transformers_output():
+            loaded.tokenizer.save_pretrained(folder)
+            loaded.image_processor.save_pretrained(folder)
+            model.save_pretrained(folder, state_dict=None if weights is None else dict(weights))

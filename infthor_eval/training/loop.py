@@ -1,7 +1,7 @@
-"""Training on one process or many, with sequences shared out over data groups and cut within them.
+"""Training on one process or many, with sequences distributed over data groups and split within them.
 
-The loss of a step is the mean over all tokens that loss is taken on, of all its sequences: how they are shared out
-changes nothing but rounding.
+The loss of a step is the mean over all tokens with loss of all its sequences, so the number of processes changes
+nothing but rounding.
 """
 
 import time
@@ -33,15 +33,15 @@ _Loss = Callable[[Batch, int], Tensor]
 
 @dataclass(frozen=True)
 class Progress:
-    """A step that is done.
+    """A finished step.
 
     Attributes:
-        step: its number, from 1 on.
-        n_steps: of the run.
-        loss: mean over the tokens that loss is taken on, in nats.
-        learning_rate: of the step.
-        gradient_norm: before clipping.
-        tokens_per_second: of all sequences of the step, frames expanded.
+        step: number of the step, from 1.
+        n_steps: steps of the run.
+        loss: mean over the tokens with loss, in nats.
+        learning_rate: learning rate of the step.
+        gradient_norm: norm of the gradient before clipping.
+        tokens_per_second: speed over all sequences of the step, frames expanded.
     """
 
     step: int
@@ -56,13 +56,13 @@ class Loop:
     """A training run.
 
     Args:
-        model: the same on every process.
-        pad_id: the tokenizer's padding.
-        sequences: all of them, on every process.
-        settings: of the run.
-        folder: of its checkpoints.
-        ranks: this process's place among all.
-        report: is told of every step, on the first process.
+        model: the model, the same on every process.
+        pad_id: padding token.
+        sequences: all sequences, on every process.
+        settings: settings of the run.
+        folder: folder of its states.
+        ranks: position of this process among all.
+        on_step: called after every step, on the first process.
 
     Raises:
         UsageError: there are no sequences, or nothing to train.
@@ -77,53 +77,53 @@ class Loop:
         folder: Path,
         *,
         ranks: Ranks | None = None,
-        report: Callable[[Progress], None] | None = None,
+        on_step: Callable[[Progress], None] | None = None,
     ) -> None:
         if not sequences:
-            raise UsageError("there is no sequence to train on; give data of which at least one can be made")
+            raise UsageError("there are no sequences to train on; give other data")
         self._model = model
         self._pad_id = pad_id
         self._sequences = sequences
         self._settings = settings
         self._ranks = ranks or Ranks()
-        self._report = report
+        self._on_step = on_step
         self._n_steps = settings.n_steps(len(sequences))
         self._trained = [parameter for parameter in model.parameters() if parameter.requires_grad]
         if not self._trained:
             raise UsageError("nothing is left to train; freeze fewer parts")
         self._optimizer = _optimizer(self._trained, settings)
-        self._checkpoints = Checkpoints(folder, self._about())
+        self._checkpoints = Checkpoints(folder, self._run_settings())
 
     def run(self) -> None:
-        """Train to the end, from the folder's checkpoint on if there is one.
+        """Train to the end, from the folder's last state if there is one.
 
-        All processes have to call it, and to see the same folder. On as many processes as before, the weights at the
-        end are bit for bit those of a run that was never interrupted.
+        All processes have to call this, with the same folder. With an unchanged number of processes, the final weights
+        are bit for bit those of a run that was never interrupted.
 
         Raises:
-            DataError: a frame cannot be read, a sequence has no token to take loss on, or a checkpoint is damaged or
-                cannot be written.
+            DataError: a frame cannot be read, a sequence has no token with loss, or a state is damaged or cannot be
+                written.
             ModelError: the gradient is not finite, or the model cannot be trained in this way.
-            UsageError: the checkpoint is of another run.
+            UsageError: the state is of another run.
         """
-        done = self._checkpoints.restore(self._model.model, self._optimizer)
-        self._share_weights()
+        n_done = self._checkpoints.restore(self._model.model, self._optimizer)
+        self._broadcast_weights()
         self._model.train()
         with self._losses() as loss:
-            for step in range(done, self._n_steps):
+            for step in range(n_done, self._n_steps):
                 progress = self._step(step, loss)
-                if self._ranks.rank == 0 and self._report is not None:
-                    self._report(progress)
-                if self._is_saved(step + 1):
+                if self._ranks.rank == 0 and self._on_step is not None:
+                    self._on_step(progress)
+                if self._is_save_step(step + 1):
                     self._save(step + 1)
         self._model.eval()
 
     def _step(self, step: int, loss: _Loss) -> Progress:
-        began = time.perf_counter()
-        # So dropout needs no state of its own in a checkpoint.
+        start = time.perf_counter()
+        # A seed per step, so that a state need not contain the generator.
         torch.manual_seed(seed_of(f"{self._settings.seed} step {step} rank {self._ranks.rank}") % 2**63)
         batches = self._batches(step)
-        n_items, n_tokens = self._counted(batches)
+        n_items, n_tokens = self._count_tokens(batches)
         total = torch.zeros((), device=self._model.device)
         for batch in batches:
             share = loss(batch, n_items)
@@ -142,17 +142,17 @@ class Loop:
             group["lr"] = learning_rate
         self._optimizer.step()
         self._optimizer.zero_grad()
-        seconds = time.perf_counter() - began
+        seconds = time.perf_counter() - start
         return Progress(step + 1, self._n_steps, total.item(), learning_rate, norm.item(), n_tokens / seconds)
 
     def _batches(self, step: int) -> list[Batch]:
-        """This process's sequences of a step, one a batch: so nothing is padded."""
-        chosen = self._settings.sequences_of(step, len(self._sequences))
-        own = chosen[self._ranks.data_rank :: self._ranks.n_data]
+        """Return this process's sequences of a step, one per batch, so that nothing is padded."""
+        numbers = self._settings.sequences_of(step, len(self._sequences))
+        own = numbers[self._ranks.data_rank :: self._ranks.n_data]
         return [collate([self._sequences[number]], self._model.family, self._pad_id) for number in own]
 
-    def _counted(self, batches: Sequence[Batch]) -> tuple[int, int]:
-        """Labels and tokens of a step's sequences, those of other processes too."""
+    def _count_tokens(self, batches: Sequence[Batch]) -> tuple[int, int]:
+        """Return the labels and tokens of a step's sequences on all processes."""
         counts = torch.zeros(2, dtype=torch.int64, device=self._model.device)
         if self._ranks.context_rank == 0:
             counts += counts.new_tensor([sum(map(n_labels, batches)), sum(b["input_ids"].numel() for b in batches)])
@@ -169,13 +169,13 @@ class Loop:
         with context_parallel(self._model, self._ranks.context_group) as parallel:
             yield parallel.loss
 
-    def _share_weights(self) -> None:
-        """The first process's weights for all: what is initialised at random would differ."""
+    def _broadcast_weights(self) -> None:
+        """Give all processes the first one's weights, because randomly initialised ones differ."""
         if self._ranks.n_ranks > 1:
             for parameter in self._model.parameters():
                 dist.broadcast(parameter.data, 0)
 
-    def _is_saved(self, n_done: int) -> bool:
+    def _is_save_step(self, n_done: int) -> bool:
         every = self._settings.save_every
         return n_done == self._n_steps or (every is not None and n_done % every == 0)
 
@@ -185,8 +185,8 @@ class Loop:
         if self._ranks.n_ranks > 1:
             dist.barrier()
 
-    def _about(self) -> dict[str, object]:
-        """What makes a run the same; how often it is saved, and on how many processes it runs, is no part of it."""
+    def _run_settings(self) -> dict[str, object]:
+        """Return the settings that identify a run; saving and the number of processes do not count."""
         settings = asdict(self._settings)
         del settings["save_every"]
         names = digest("\n".join(f"{sequence.name} {sequence.n_tokens}" for sequence in self._sequences))

@@ -1,4 +1,4 @@
-"""A vision-language model as a network from sequences to their loss, whatever its family."""
+"""A vision-language model of any family as a network from sequences to their loss."""
 
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any
@@ -17,31 +17,29 @@ from model_adapters.hf.prompt import Frame
 __all__ = ["PARTS", "SequenceModel", "decay_groups", "freeze", "next_labels", "parameters_by_part"]
 
 PARTS = ("vision", "embeddings", "decoder", "head")
-_FRAMES_AT_ONCE = (
-    32  # in the vision tower: a window of 1,000 frames would take more memory there than the decoder takes
-)
-_LOGITS_AT_ONCE = 1024  # rows; one has as many values as the vocabulary
+_FRAME_BATCH = 32  # frames in the vision tower at once; 1,000 frames would need more memory than the decoder
+_LOGIT_ROWS = 1024  # rows of logits at once; each has as many values as the vocabulary
 
 
 class SequenceModel(torch.nn.Module):
     """The loss of sequences of text and frames.
 
-    The transformers model in it runs by its parts: features of frames, embeddings, decoder, output head. So every
-    family is trained by the same code, logits are made only where a label is, and a sequence can be cut between
-    embedding and decoding.
+    The parts of the transformers model are called one by one: features of frames, embeddings, decoder, output head. So
+    all families are trained by the same code, logits are computed only where there are labels, and a sequence can be
+    split between embedding and decoding.
 
     Args:
         loaded: the checkpoint.
 
     Attributes:
-        model: its transformers model, to be saved by `save_pretrained`.
-        family: how its frames become features and positions.
+        model: the transformers model, which is saved by `save_pretrained`.
+        family: family of the model.
 
     Raises:
-        UsageError: the frequencies of its rotary positions depend on a sequence's length.
+        UsageError: the rotary frequencies of the model depend on the length of a sequence.
     """
 
-    # transformers' Trainer asks for it: the loss is a sum over tokens, divided by what `num_items_in_batch` says.
+    # Tells transformers' Trainer that the loss is a sum over tokens divided by `num_items_in_batch`.
     accepts_loss_kwargs = True
 
     def __init__(self, loaded: Loaded) -> None:
@@ -57,7 +55,7 @@ class SequenceModel(torch.nn.Module):
 
     @property
     def device(self) -> torch.device:
-        """Where embeddings are, and what goes into the decoder."""
+        """Device of the embeddings and of the decoder's inputs."""
         device: torch.device = self.model.get_input_embeddings().weight.device
         return device
 
@@ -71,23 +69,23 @@ class SequenceModel(torch.nn.Module):
         frames: Sequence[Frame],
         num_items_in_batch: Tensor | int | None = None,
     ) -> dict[str, Tensor]:
-        """The loss of a `Batch`, whose fields the arguments are.
+        """Return the loss of a `Batch`.
 
         Args:
-            input_ids: (batch, tokens).
-            position_ids: (batch, tokens) or (3, batch, tokens).
-            attention_mask: (batch, tokens) or None.
-            labels: (batch, tokens).
-            slots: (batch, tokens).
-            frames: in the order of their slots.
-            num_items_in_batch: what the sum of the tokens' losses is divided by; the labels of this batch where None.
+            input_ids: see `Batch`.
+            position_ids: see `Batch`.
+            attention_mask: see `Batch`.
+            labels: see `Batch`.
+            slots: see `Batch`.
+            frames: see `Batch`.
+            num_items_in_batch: divisor of the sum of the tokens' losses; the labels of this batch where None.
 
         Returns:
             "loss": cross entropy in nats, a float32 scalar.
 
         Raises:
             DataError: a frame cannot be read.
-            ModelError: processor and model disagree on how many tokens a frame takes.
+            ModelError: processor and model disagree on the number of a frame's tokens.
         """
         embeds = self.embed(input_ids, slots, self.features(frames))
         hidden = self.decode(embeds, position_ids, attention_mask)
@@ -97,43 +95,43 @@ class SequenceModel(torch.nn.Module):
         return {"loss": total / torch.as_tensor(n_items, device=total.device)}
 
     def features(self, frames: Sequence[Frame]) -> list[Tensor]:
-        """Features of each frame, (slots, hidden); a frame that stands several times is computed once.
+        """Return the features of each frame, (slots, hidden); repeated frames are computed once.
 
         Raises:
             DataError: a frame cannot be read.
-            ModelError: processor and model disagree on how many tokens a frame takes.
+            ModelError: processor and model disagree on the number of a frame's tokens.
         """
         distinct = list(dict.fromkeys(frames))
-        made: list[Tensor] = []
+        computed: list[Tensor] = []
         with torch.set_grad_enabled(torch.is_grad_enabled() and self.trains_vision):
-            for first in range(0, len(distinct), _FRAMES_AT_ONCE):
-                images = [frame.ref.load() for frame in distinct[first : first + _FRAMES_AT_ONCE]]
-                made.extend(self.family.features(images))
-        for frame, features in zip(distinct, made, strict=True):
+            for first in range(0, len(distinct), _FRAME_BATCH):
+                images = [frame.ref.load() for frame in distinct[first : first + _FRAME_BATCH]]
+                computed.extend(self.family.features(images))
+        for frame, features in zip(distinct, computed, strict=True):
             if len(features) != self.n_slots(frame):
                 raise ModelError(
                     f"the processor makes {self.n_slots(frame)} image tokens of a frame and the model {len(features)} "
                     "features; they do not belong to one checkpoint"
                 )
-        by_frame = dict(zip(distinct, made, strict=True))
+        by_frame = dict(zip(distinct, computed, strict=True))
         return [by_frame[frame] for frame in frames]
 
     def n_slots(self, frame: Frame) -> int:
-        """How many features a frame has."""
+        """Return the number of a frame's features."""
         return frame.ids.count(self.family.slot_id)
 
     @property
     def trains_vision(self) -> bool:
-        """Whether anything that features pass through is trained."""
+        """True if the vision tower or the projector is trained."""
         return any(parameter.requires_grad for parameter in parameters_by_part(self)["vision"])
 
     def embed(self, input_ids: Tensor, slots: Tensor, features: Sequence[Tensor]) -> Tensor:
-        """What the decoder is fed, (batch, tokens, hidden).
+        """Return the inputs of the decoder, (batch, tokens, hidden).
 
         Args:
-            input_ids: (batch, tokens).
-            slots: (batch, tokens).
-            features: rows for the slots, in their order; in as many pieces as one likes.
+            input_ids: token ids, (batch, tokens).
+            slots: true for slots of features, (batch, tokens).
+            features: features in the order of their slots, (slots, hidden) when concatenated.
         """
         embeds: Tensor = self.model.get_input_embeddings()(input_ids.to(self.device))
         if not features:
@@ -141,7 +139,7 @@ class SequenceModel(torch.nn.Module):
         return embeds.masked_scatter(slots[..., None].to(self.device), torch.cat(list(features)).to(embeds))
 
     def decode(self, embeds: Tensor, position_ids: Tensor, attention_mask: Tensor | None) -> Tensor:
-        """The decoder's last hidden states, (batch, tokens, hidden)."""
+        """Return the decoder's last hidden states, (batch, tokens, hidden)."""
         output = self.decoder(
             inputs_embeds=embeds,
             position_ids=position_ids.to(self.device),
@@ -152,41 +150,43 @@ class SequenceModel(torch.nn.Module):
         return hidden
 
     def loss_sum(self, hidden: Tensor, targets: Tensor) -> Tensor:
-        """Sum of the cross entropies of the tokens that have a target, in nats; a float32 scalar.
+        """Return the sum of the cross entropies of all tokens with a target, in nats; a float32 scalar.
 
-        Logits exist only where a target is, and only some of them at a time: they are made again for the gradient.
+        Logits are computed only for targets and in chunks, which are recomputed for the gradient: all logits of a long
+        sequence would need more memory than the model.
 
         Args:
-            hidden: (batch, tokens, hidden).
-            targets: (batch, tokens), what each token should predict, or -100.
+            hidden: hidden states, (batch, tokens, hidden).
+            targets: token that each token should predict, or -100, (batch, tokens).
         """
         targets = targets.to(hidden.device)
-        chosen = targets != IGNORED
+        has_target = targets != IGNORED
         total = hidden.new_zeros((), dtype=torch.float32)
-        # Without any target there is still one, empty, chunk: ranks of a cut sequence all need a gradient to pass on.
-        for states, wanted in zip(
-            hidden[chosen].split(_LOGITS_AT_ONCE), targets[chosen].split(_LOGITS_AT_ONCE), strict=True
+        # Without targets there is still one, empty, chunk: every rank of a split sequence needs a backward pass.
+        for states, chunk_targets in zip(
+            hidden[has_target].split(_LOGIT_ROWS), targets[has_target].split(_LOGIT_ROWS), strict=True
         ):
-            total = total + checkpoint(self._cross_entropy, states, wanted, use_reentrant=False)
+            total = total + checkpoint(self._cross_entropy, states, chunk_targets, use_reentrant=False)
         return total
 
-    def _cross_entropy(self, states: Tensor, wanted: Tensor) -> Tensor:
+    def _cross_entropy(self, states: Tensor, targets: Tensor) -> Tensor:
         logits = self.model.get_output_embeddings()(states)
-        return cross_entropy(logits.float(), wanted, reduction="sum")
+        return cross_entropy(logits.float(), targets, reduction="sum")
 
     def gradient_checkpointing_enable(
         self, gradient_checkpointing_kwargs: Mapping[str, Any] | None = None, **settings: Any
     ) -> None:
-        """Keep only the inputs of each layer and compute it again for the gradient; effective in training mode.
+        """Keep only the inputs of each layer and recompute the rest for the gradient, in training mode.
 
         Args:
-            gradient_checkpointing_kwargs: of `torch.utils.checkpoint.checkpoint`; `use_reentrant` is always False.
-            settings: further ones of the transformers model's method of this name.
+            gradient_checkpointing_kwargs: arguments of `torch.utils.checkpoint.checkpoint`; `use_reentrant` is always
+                False.
+            settings: further arguments of the transformers model's method of this name.
         """
         kwargs = {**(gradient_checkpointing_kwargs or {}), "use_reentrant": False}
         self.model.gradient_checkpointing_enable(gradient_checkpointing_kwargs=kwargs, **settings)
-        # transformers makes embeddings want gradients, which only reentrant checkpoints need: gradients of frozen
-        # embeddings, and of the vision tower's activations, would be computed for nobody.
+        # transformers lets embeddings require gradients, which only reentrant checkpoints need: gradients of frozen
+        # embeddings and of the vision tower would be computed for nothing.
         self.model.disable_input_require_grads()
 
     def gradient_checkpointing_disable(self) -> None:
@@ -195,15 +195,15 @@ class SequenceModel(torch.nn.Module):
 
 
 def next_labels(labels: Tensor) -> Tensor:
-    """What each token should predict: the label of the one behind it; (batch, tokens) like the labels."""
+    """Return the target of each token, which is the label of the next one, (batch, tokens)."""
     return pad(labels[:, 1:], (0, 1), value=IGNORED)
 
 
 def parameters_by_part(model: SequenceModel) -> dict[str, list[Parameter]]:
-    """A model's parameters by the names of PARTS.
+    """Return a model's parameters by the names of `PARTS`.
 
-    "vision" is everything outside the language model: the tower and what projects its features. A head that is tied to
-    the embeddings is in both parts.
+    "vision" is everything outside the language model: the tower and the projector. A head that is tied to the
+    embeddings is in both parts.
     """
     embeddings = list(model.model.get_input_embeddings().parameters())
     head = list(model.model.get_output_embeddings().parameters())
@@ -215,24 +215,24 @@ def parameters_by_part(model: SequenceModel) -> dict[str, list[Parameter]]:
 
 
 def decay_groups(parameters: Sequence[Parameter], weight_decay: float) -> list[dict[str, Any]]:
-    """Parameters as an optimizer takes them: matrices decay, biases and norms do not."""
+    """Return parameter groups of an optimizer: matrices decay, biases and norms do not."""
     groups = [
-        {"params": [one for one in parameters if one.ndim > 1], "weight_decay": weight_decay},
-        {"params": [one for one in parameters if one.ndim <= 1], "weight_decay": 0.0},
+        {"params": [parameter for parameter in parameters if parameter.ndim > 1], "weight_decay": weight_decay},
+        {"params": [parameter for parameter in parameters if parameter.ndim <= 1], "weight_decay": 0.0},
     ]
     return [group for group in groups if group["params"]]
 
 
 def freeze(model: SequenceModel, parts: Collection[str]) -> None:
-    """Leave parts of a model as they are in training; the others are not touched.
+    """Freeze parts of a model.
 
     Args:
         model: the model.
-        parts: names of PARTS.
+        parts: names of `PARTS`.
 
     Raises:
-        UsageError: there is no such part, one of two parts that share their weights would be frozen without the other,
-            or nothing would be left to train.
+        UsageError: a part is unknown, only one of two parts with shared weights would be frozen, or nothing would be
+            left to train.
     """
     for name in parts:
         if name not in PARTS:
@@ -251,5 +251,5 @@ def freeze(model: SequenceModel, parts: Collection[str]) -> None:
 def _require_fixed_rope(decoder: Any) -> None:
     rope_type = (getattr(decoder.config, "rope_parameters", None) or {}).get("rope_type")
     if rope_type in ("dynamic", "longrope"):
-        # Its frequencies would be those of whatever was run last, or on each rank those of its own share.
-        raise UsageError(f"a model with rope={rope_type} cannot be trained; take linear or yarn, or no extension")
+        # Its frequencies would be those of the previous sequence, or on each rank those of its own part.
+        raise UsageError(f"a model with rope={rope_type} cannot be trained; use linear or yarn, or no extension")

@@ -1,7 +1,7 @@
-"""Checkpoints of the published trainer: folders of torch's distributed checkpoints, on top of a checkpoint of the hub.
+"""Import of the published trainer's checkpoints: torch's distributed checkpoints of a model from the hub.
 
-Nothing exports them; this puts their weights into the model that they began with, which is then written as every
-other checkpoint is.
+The published trainer cannot export them. Their weights are put into the model that training started from, which is then
+written like any other checkpoint.
 """
 
 from collections.abc import Mapping
@@ -18,69 +18,69 @@ from model_adapters.hf.loaded import Loaded
 
 __all__ = ["ImportedWeights", "import_weights"]
 
-_MEND = "give a folder with .metadata and *.distcp files of the model that --model names"
+_HINT = "give a folder with .metadata and *.distcp files of the model that --model names"
 
 
 @dataclass(frozen=True)
 class ImportedWeights:
-    """What was taken over.
+    """Numbers of imported tensors.
 
     Attributes:
-        n_taken: weights that the folder has.
-        n_kept: weights of the model that it has not; they stay those of the checkpoint that it began with.
-        n_ignored: tensors of the folder that are no weights (an optimizer's).
+        n_imported: weights that the folder has.
+        n_kept: weights of the model that the folder does not have; they stay those of the initial checkpoint.
+        n_ignored: tensors of the folder that are not weights (an optimizer's).
     """
 
-    n_taken: int
+    n_imported: int
     n_kept: int
     n_ignored: int
 
 
 def import_weights(loaded: Loaded, folder: Path) -> ImportedWeights:
-    """Put the weights of a distributed checkpoint into a model.
+    """Load the weights of a distributed checkpoint into a model.
 
-    Weights may stand under any prefix ("model.", "app.model."), one for all of them.
+    The keys of all weights may have one common prefix ("model.", "app.model.").
 
     Args:
-        loaded: the model that the training began with, the marks of sequences among its tokens.
-        folder: of the checkpoint.
+        loaded: the model that training started from, with the marks of sequences as tokens.
+        folder: folder of the checkpoint.
 
     Raises:
-        DataError: it is none, or holds another model's weights.
+        DataError: the folder is not such a checkpoint, or has another model's weights.
     """
-    with wrap_errors(f"{folder}: not a distributed checkpoint", _MEND, catch=Exception):
+    with wrap_errors(f"{folder}: not a distributed checkpoint", _HINT, catch=Exception):
         reader = dcp.FileSystemReader(folder)
         stored: Mapping[str, Any] = reader.read_metadata().state_dict_metadata
         sizes = {name: item.size for name, item in stored.items() if isinstance(item, TensorStorageMetadata)}
     weights = loaded.model.state_dict()
-    prefix = _prefix(sizes, weights, folder)
-    taken = {name.removeprefix(prefix): size for name, size in sizes.items() if name.startswith(prefix)}
-    taken = {name: size for name, size in taken.items() if name in weights}
-    for name, size in taken.items():
+    prefix = _key_prefix(sizes, weights, folder)
+    imported = {name.removeprefix(prefix): size for name, size in sizes.items() if name.startswith(prefix)}
+    imported = {name: size for name, size in imported.items() if name in weights}
+    for name, size in imported.items():
         if size != weights[name].shape:
             raise DataError(
-                f"{folder}: {name} is {tuple(size)}, the model's {tuple(weights[name].shape)}; it began with another "
-                "checkpoint, or other tokens"
+                f"{folder}: {name} is {tuple(size)}, the model's {tuple(weights[name].shape)}; training started from "
+                "another checkpoint, or with other tokens"
             )
-    read = {f"{prefix}{name}": torch.empty_like(weights[name]) for name in taken}
+    tensors = {f"{prefix}{name}": torch.empty_like(weights[name]) for name in imported}
     with wrap_errors(f"{folder}: cannot be read", "restore its files", catch=Exception):
-        dcp.load(read, storage_reader=reader, no_dist=True)
-    loaded.model.load_state_dict({name.removeprefix(prefix): tensor for name, tensor in read.items()}, strict=False)
-    return ImportedWeights(len(taken), len(weights) - len(taken), len(sizes) - len(taken))
+        dcp.load(tensors, storage_reader=reader, no_dist=True)
+    loaded.model.load_state_dict({name.removeprefix(prefix): tensor for name, tensor in tensors.items()}, strict=False)
+    return ImportedWeights(len(imported), len(weights) - len(imported), len(sizes) - len(imported))
 
 
-def _prefix(sizes: Mapping[str, Any], weights: Mapping[str, Any], folder: Path) -> str:
-    """What stands before the names of weights in the folder: the one that explains most of them."""
-    found: dict[str, int] = {}
+def _key_prefix(sizes: Mapping[str, Any], weights: Mapping[str, Any], folder: Path) -> str:
+    """Return the prefix of the weights' keys in the folder: the one that most keys agree with."""
+    counts: dict[str, int] = {}
     for name in sizes:
         parts = name.split(".")
         for at in range(len(parts)):
             if ".".join(parts[at:]) in weights:
                 prefix = "".join(f"{part}." for part in parts[:at])
-                found[prefix] = found.get(prefix, 0) + 1
+                counts[prefix] = counts.get(prefix, 0) + 1
                 break
-    # An optimizer's moments bear the weights' names too, under a prefix of their own.
-    found = {prefix: n for prefix, n in found.items() if not prefix.startswith(("optim", "state"))}
-    if not found:
-        raise DataError(f"{folder}: no weight of this model is in it; {_MEND}")
-    return max(found, key=lambda prefix: (found[prefix], -len(prefix)))
+    # An optimizer's moments have the weights' names, too, with another prefix.
+    counts = {prefix: n for prefix, n in counts.items() if not prefix.startswith(("optim", "state"))}
+    if not counts:
+        raise DataError(f"{folder}: has no weight of this model; {_HINT}")
+    return max(counts, key=lambda prefix: (counts[prefix], -len(prefix)))

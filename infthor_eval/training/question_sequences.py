@@ -1,4 +1,4 @@
-"""What a model learns answering from: NIEH questions as they are asked, each with the answer of its key."""
+"""Training sequences for answering: NIEH questions as in evaluation, with their reference answers."""
 
 from collections.abc import Iterator
 
@@ -12,27 +12,27 @@ from infthor_eval.training.encoding import Encoder, SkippedItem, TrainingSequenc
 __all__ = ["question_sequences"]
 
 
-def question_sequences(encoder: Encoder, asked: TaskSamples, limit: int) -> Iterator[TrainingSequence | SkippedItem]:
-    """Sequences of a set's questions.
+def question_sequences(encoder: Encoder, task: TaskSamples, limit: int) -> Iterator[TrainingSequence | SkippedItem]:
+    """Build the sequences of a set's questions.
 
     Args:
-        encoder: makes the sequences.
-        asked: all that a task in one context asks.
-        limit: tokens of a sequence, frames expanded.
+        encoder: builds the sequences.
+        task: samples of a task in one context.
+        limit: most tokens of a sequence, frames expanded.
 
     Yields:
-        A sequence for each sample, and what cannot be asked or is too long.
+        A sequence for each sample, and samples that cannot be used or are too long.
 
     Raises:
-        UsageError: the context wants a model's notes.
+        UsageError: the context needs a model's notes.
         ModelError: the template refuses the turns.
     """
-    for skipped in asked.skipped:
+    for skipped in task.skipped:
         yield SkippedItem(_name(skipped.question.id, skipped.variant), skipped.reason)
-    for sample in asked.samples:
+    for sample in task.samples:
         name = _name(sample.question.id, sample.variant)
         try:
-            sequence = _sequence(encoder, asked, sample, name)
+            sequence = _sequence(encoder, task, sample, name)
         except DataError as error:
             yield SkippedItem(name, str(error))
             continue
@@ -40,12 +40,12 @@ def question_sequences(encoder: Encoder, asked: TaskSamples, limit: int) -> Iter
         yield SkippedItem(name, f"longer than {limit} tokens") if too_long else sequence
 
 
-def _sequence(encoder: Encoder, asked: TaskSamples, sample: Sample, name: str) -> TrainingSequence:
-    shown, text = asked.request(sample)
-    known = [part for part in shown if not isinstance(part, Notes)]
-    if len(known) < len(shown):
-        raise UsageError("a model that is being trained has no notes yet; train on another context")
-    return encoder.answer(name, [*known, text], doc_target(sample.question))
+def _sequence(encoder: Encoder, task: TaskSamples, sample: Sample, name: str) -> TrainingSequence:
+    context, text = task.request(sample)
+    parts = [part for part in context if not isinstance(part, Notes)]
+    if len(parts) < len(context):
+        raise UsageError("training has no notes of a model; use another context")
+    return encoder.answer(name, [*parts, text], doc_target(sample.question))
 
 
 def _name(question: str, variant: str) -> str:

@@ -1,4 +1,4 @@
-"""Which part of the work each process of a training run does."""
+"""Division of a training run among processes."""
 
 from dataclasses import dataclass
 
@@ -11,15 +11,15 @@ __all__ = ["Ranks", "assign_ranks"]
 
 @dataclass(frozen=True)
 class Ranks:
-    """A process's place in a grid of data groups times context.
+    """A process's position in a grid of data groups and context ranks.
 
     Attributes:
-        rank: of all processes.
-        data_rank: which of the sequences are its.
-        n_data: in how many ways sequences are shared out.
-        context_rank: which part of each of these sequences is its.
-        n_context: in how many parts a sequence is cut.
-        context_group: the processes that share its sequences; None where it has them alone.
+        rank: rank among all processes.
+        data_rank: number of its data group, which determines its sequences.
+        n_data: number of data groups.
+        context_rank: number of its part of each sequence.
+        n_context: number of parts of each sequence.
+        context_group: processes with the same sequences, or None if sequences are not split.
     """
 
     rank: int = 0
@@ -31,20 +31,20 @@ class Ranks:
 
     @property
     def n_ranks(self) -> int:
-        """All processes."""
+        """Number of processes."""
         return self.n_data * self.n_context
 
 
 def assign_ranks(n_context: int = 1) -> Ranks:
-    """This process's place; neighbouring ranks, which the fastest links join, share sequences.
+    """Return this process's position; neighbouring ranks, which have the fastest links, share sequences.
 
-    All processes of the default process group have to call it. Without one the process is alone.
+    All processes of the default process group have to call this. Without a group, the process is alone.
 
     Args:
-        n_context: in how many parts each sequence is cut.
+        n_context: number of parts of each sequence.
 
     Raises:
-        UsageError: the processes do not divide into groups of this size.
+        UsageError: the number of processes is not divisible by the number of parts.
     """
     world = dist.get_world_size() if dist.is_initialized() else 1
     if n_context < 1 or world % n_context:
@@ -55,7 +55,7 @@ def assign_ranks(n_context: int = 1) -> Ranks:
     data_rank, context_rank = divmod(rank, n_context)
     group = None
     if n_context > 1:
-        # Every process makes every group, or none of them comes about.
+        # Creating a group is collective: every process has to create every group.
         firsts = range(0, world, n_context)
         groups = [dist.new_group(list(range(first, first + n_context))) for first in firsts]
         group = groups[data_rank]

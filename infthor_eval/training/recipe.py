@@ -1,4 +1,4 @@
-"""Recipes: what a model is trained on and how, as YAML files. `infthor_eval/training/recipes/` has the paper's."""
+"""Recipes: data and settings of training, as YAML files; `infthor_eval/training/recipes/` has the paper's."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -17,10 +17,10 @@ _FOLDER = "training/recipes"
 
 
 class ActionData(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Sequences of trajectories, which agents learn from.
+    """Sequences of trajectories.
 
     Attributes:
-        share: of the sequences that are gone through in an epoch; 1 takes each once.
+        share: share of the sequences that is used.
     """
 
     share: float = 1.0
@@ -30,9 +30,9 @@ class QuestionData(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     """Sequences of questions.
 
     Attributes:
-        contexts: in which each question is asked.
-        settings: of the contexts, as `dataset_kwargs` of task files have them.
-        share: of the sequences that are gone through in an epoch; 1 takes each once.
+        contexts: contexts in which each question is asked.
+        settings: settings of the contexts, as in `dataset_kwargs` of task files.
+        share: share of the sequences that is used.
     """
 
     contexts: tuple[str, ...] = ("clues",)
@@ -44,10 +44,10 @@ class Optimizer(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     """AdamW with a linear schedule; defaults are those of the published trainer.
 
     Attributes:
-        lr: the highest learning rate.
-        betas: of AdamW.
-        weight_decay: of AdamW.
-        clip: the largest norm of all gradients together.
+        lr: highest learning rate.
+        betas: betas of AdamW.
+        weight_decay: weight decay of AdamW.
+        clip: largest norm of the gradient.
         warmup_ratio: share of the steps in which the learning rate rises.
     """
 
@@ -62,10 +62,10 @@ class Lora(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     """Low-rank adapters (peft) instead of the weights themselves.
 
     Attributes:
-        rank: of the adapters.
-        alpha: their scale.
-        dropout: in them.
-        targets: names of the linear layers that get one; of the decoder alone.
+        rank: rank of the adapters.
+        alpha: scale of the adapters.
+        dropout: dropout probability in the adapters.
+        targets: names of the decoder's linear layers that get an adapter.
     """
 
     rank: int = 16
@@ -75,11 +75,11 @@ class Lora(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
 
 
 class Parallel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """How processes share the work; those that are left go through different sequences.
+    """Parallelism; processes that do not share a sequence process different sequences.
 
     Attributes:
-        context: processes that share one sequence.
-        shard: whether weights, gradients and optimizer are sharded too (FSDP2), where no sequence is shared.
+        context: processes that share one sequence (context parallelism).
+        shard: shard weights, gradients and optimizer (FSDP2); not with context parallelism.
     """
 
     context: int = 1
@@ -90,25 +90,25 @@ class Recipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     """One way to train a model.
 
     Attributes:
-        title: what it is, in one line.
-        source: where its settings come from; empty where they are ours.
-        model: name of the adapter.
-        model_args: its options (`pretrained`, `dtype`, ...).
-        prompt: "plain" for bare sequences of texts and frames, "chat" for the checkpoint's own template; sequences of
+        title: description in one line.
+        source: source of the settings; empty for our own.
+        model: name of the model's adapter.
+        model_args: options of the adapter (`pretrained`, `dtype`, ...).
+        prompt: "plain" for bare sequences of texts and frames, "chat" for the checkpoint's template; sequences of
             actions are always plain.
-        max_tokens: of one sequence.
-        actions: sequences of trajectories; none where None.
-        questions: sequences of questions; none where None.
+        max_tokens: most tokens of a sequence.
+        actions: sequences of trajectories, or None.
+        questions: sequences of questions, or None.
         freeze: parts that are not trained: vision, embeddings, decoder, head.
-        optimizer: its settings.
-        lora: adapters instead of the weights; None trains the weights.
-        epochs: how often all sequences are gone through.
-        max_steps: steps at most; None for no limit.
-        sequences_per_step: of all processes together.
-        gradient_checkpointing: computes activations again instead of keeping them.
-        parallel: how processes share the work.
-        save_every: steps between checkpoints to resume from.
-        seed: of everything that is random.
+        optimizer: settings of the optimizer.
+        lora: settings of low-rank adapters, or None to train the weights.
+        epochs: number of epochs.
+        max_steps: most steps, or None for no limit.
+        sequences_per_step: sequences of a step, of all processes together.
+        gradient_checkpointing: recompute activations instead of keeping them.
+        parallel: division of the work among processes.
+        save_every: steps between states to resume from.
+        seed: seed of everything that is random.
     """
 
     title: str
@@ -131,10 +131,10 @@ class Recipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     seed: int = 0
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be.
+        """Check that the settings are valid and fit together.
 
         Raises:
-            ValueError: names the setting.
+            ValueError: a setting is not valid; the message names it.
         """
         if self.actions is None and self.questions is None:
             raise ValueError("neither actions nor questions: there is nothing to train on")
@@ -152,42 +152,46 @@ class Recipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         }
         wrong = next((name for name, value in positive.items() if not value > 0), None)
         if wrong is not None:
-            raise ValueError(f"{wrong} is {positive[wrong]}; it is above 0")
+            raise ValueError(f"{wrong} is {positive[wrong]}; use a number above 0")
         if self.parallel.context > 1 and self.parallel.shard:
-            raise ValueError("parallel.shard is for sequences that are not shared; leave one of the two out")
+            raise ValueError("parallel.shard and parallel.context cannot be combined; leave one of them out")
 
 
 def recipe_names() -> tuple[str, ...]:
-    """Names of the recipes that come with the package, sorted."""
+    """Return the names of the packaged recipes, sorted."""
     return tuple(sorted(path.stem for path in packaged_folder(_FOLDER).glob("*.yaml")))
 
 
 def read_recipe(name: str, changes: Mapping[str, Any] | None = None) -> Recipe | NanoRecipe:
-    """A recipe by its name, or from a file.
+    """Read a recipe by its name, or from a file.
 
     Args:
-        name: one of `recipe_names()`, or a path that ends with .yaml.
-        changes: settings that take the place of the file's, dotted (`optimizer.lr`) where they lie within another.
+        name: one of `recipe_names()`, or a path that ends in .yaml.
+        changes: settings that replace those of the file, with dots for nested ones (`optimizer.lr`). Another model does
+            not get the `model_args` of the file, which are options of the file's model.
 
     Raises:
-        UsageError: there is no such recipe, or a setting is unknown or cannot be.
-        DataError: the file is no YAML.
+        UsageError: the recipe does not exist, or a setting is unknown or not valid.
+        DataError: the file is not YAML.
     """
     path = Path(name) if name.endswith(".yaml") else packaged_folder(_FOLDER) / f"{name}.yaml"
     if not path.is_file() and not name.endswith(".yaml"):
         raise unknown_name("recipe", name, recipe_names())
-    document = read_yaml(path, "give a recipe as those in infthor_eval/training/recipes")
+    document = read_yaml(path, "see infthor_eval/training/recipes for examples")
     with wrap_errors(
-        f"{path}: not a recipe", "mend the setting", catch=(msgspec.ValidationError, TypeError), raise_as=UsageError
+        f"{path}: not a recipe", "fix the setting", catch=(msgspec.ValidationError, TypeError), raise_as=UsageError
     ):
-        for key, value in (changes or {}).items():
-            _put(document, key.split("."), value)
+        settings = changes or {}
+        if settings.get("model", document.get("model")) != document.get("model"):
+            document.pop("model_args", None)
+        for key, value in settings.items():
+            _set_nested(document, key.split("."), value)
         if "architecture" in document:
             return msgspec.convert(document, NanoRecipe, strict=False)
         return msgspec.convert(document, Recipe, strict=False)
 
 
-def _put(document: Any, keys: list[str], value: Any) -> None:
+def _set_nested(document: Any, keys: list[str], value: Any) -> None:
     *outer, last = keys
     for key in outer:
         document = document.setdefault(key, {})

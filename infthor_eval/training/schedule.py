@@ -1,4 +1,4 @@
-"""What a training run does in which step: which sequences, at which learning rate. Pure functions of its settings."""
+"""Sequences and learning rate of each training step, as pure functions of the settings."""
 
 import math
 from dataclasses import dataclass
@@ -13,19 +13,19 @@ __all__ = ["LoopSettings"]
 
 @dataclass(frozen=True, kw_only=True)
 class LoopSettings:
-    """Settings of a training run. The defaults are those of the published trainer where it has any.
+    """Settings of a training run, with the defaults of the published trainer.
 
     Attributes:
-        learning_rate: the highest; reached at the end of the warm-up, and falling to 0 along a line after it.
-        betas: of AdamW.
-        weight_decay: of AdamW; matrices decay, biases and norms do not.
-        clip: the largest norm of a step's gradient.
-        warmup_ratio: share of the steps in which the learning rate rises, along a line from 0.
-        epochs: how often each sequence is seen.
-        max_steps: where the run ends instead; it goes through the sequences as often as that takes.
-        sequences_per_step: of all processes together; the last step of an epoch takes what is left.
-        seed: of the order of the sequences, and of dropout.
-        save_every: steps from one checkpoint to the next; one at the end alone where None.
+        learning_rate: highest learning rate, reached linearly at the end of the warm-up; it then falls linearly to 0.
+        betas: betas of AdamW.
+        weight_decay: weight decay of AdamW, for matrices but not for biases and norms.
+        clip: largest norm of a step's gradient.
+        warmup_ratio: share of the steps in which the learning rate rises.
+        epochs: number of epochs.
+        max_steps: number of steps instead of epochs, or None.
+        sequences_per_step: sequences of a step, of all processes together; the last step of an epoch may have fewer.
+        seed: seed of the order of the sequences and of dropout.
+        save_every: steps between states; None for one at the end only.
 
     Raises:
         UsageError: a value is out of its range.
@@ -55,18 +55,18 @@ class LoopSettings:
             raise UsageError(f"weight_decay={self.weight_decay} is not 0 or more")
 
     def n_steps(self, n_sequences: int) -> int:
-        """Steps of a run on so many sequences."""
+        """Return the number of steps of a run."""
         return self.epochs * self._epoch_steps(n_sequences) if self.max_steps is None else self.max_steps
 
     def sequences_of(self, step: int, n_sequences: int) -> list[int]:
-        """Which of so many sequences a step trains on; steps count from 0. Each epoch has an order of its own."""
+        """Return the numbers of a step's sequences; steps count from 0. Each epoch has its own random order."""
         epoch, at = divmod(step, self._epoch_steps(n_sequences))
         generator = torch.Generator().manual_seed(seed_of(f"{self.seed} epoch {epoch}") % 2**63)
         order: list[int] = torch.randperm(n_sequences, generator=generator).tolist()
         return order[at * self.sequences_per_step : (at + 1) * self.sequences_per_step]
 
     def learning_rate_of(self, step: int, n_steps: int) -> float:
-        """Learning rate of one of so many steps, as transformers' linear schedule has it: the first one's is 0."""
+        """Return the learning rate of a step, as in transformers' linear schedule: that of the first step is 0."""
         n_warm = math.ceil(self.warmup_ratio * n_steps)
         if step < n_warm:
             return self.learning_rate * step / n_warm

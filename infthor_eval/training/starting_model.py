@@ -1,4 +1,4 @@
-"""The checkpoint that training begins with, made ready for sequences."""
+"""The model that training starts from, with the marks of sequences as tokens."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -15,30 +15,30 @@ __all__ = ["add_marks", "load_starting_model"]
 
 
 def load_starting_model(model: str, options: Mapping[str, str], prompt: str, seed: int) -> Loaded:
-    """Load a checkpoint and give it the marks of sequences as tokens.
+    """Load a model and add the marks of sequences to its tokens.
 
     Args:
-        model: name of its adapter.
-        options: the adapter's, as typed.
-        prompt: what its sequences are written by, "plain" or "chat".
-        seed: of weights that no checkpoint has.
+        model: name of the model.
+        options: options of the model as typed.
+        prompt: template of the sequences, "plain" or "chat".
+        seed: seed of the weights of a tiny model.
 
     Raises:
-        UsageError: an unknown name or option, or a model that cannot be trained here.
-        ModelError: it cannot be loaded.
+        UsageError: a name or an option is unknown, or the model cannot be trained here.
+        ModelError: the model cannot be loaded.
     """
-    found = load(model, {**options, "prompt": prompt}, seed) if has_option(model, "prompt") else None
-    if not isinstance(found, TransformersModel):
-        raise UsageError(f"{model} is nothing that can be trained here; take a model of a transformers family")
-    add_marks(found.loaded)
-    return found.loaded
+    loaded_model = load(model, {**options, "prompt": prompt}, seed) if has_option(model, "prompt") else None
+    if not isinstance(loaded_model, TransformersModel):
+        raise UsageError(f"{model} cannot be trained here; use a model of a transformers family")
+    add_marks(loaded_model.loaded)
+    return loaded_model.loaded
 
 
 def add_marks(loaded: Loaded) -> None:
-    """Make every mark of a sequence a token of its own, in a fixed order.
+    """Make every mark of a sequence a single token, in a fixed order.
 
-    New tokens begin as the mean of all others: published training leaves input embeddings as they are, and rows that
-    nobody ever trained may hold anything.
+    The embedding of a new token is the mean of all others: the published training freezes input embeddings, so an
+    arbitrary row would never be trained.
     """
     known = set(loaded.tokenizer.get_vocab())
     new = [mark for mark in MARKS if mark not in known]
@@ -50,7 +50,7 @@ def add_marks(loaded: Loaded) -> None:
     if len(loaded.tokenizer) > n_rows:
         model.resize_token_embeddings(len(loaded.tokenizer), mean_resizing=False)
     ids = loaded.tokenizer.convert_tokens_to_ids(new)
-    tables = {id(layer.weight): layer.weight for layer in _tables(model)}  # one, where the head is tied
+    tables = {id(layer.weight): layer.weight for layer in _tables(model)}  # a single one if the head is tied
     with torch.no_grad():
         for weight in tables.values():
             weight[ids] = weight[: min(ids)].float().mean(dim=0).to(weight)

@@ -1,6 +1,6 @@
-"""Training by transformers' own Trainer: one device, DDP, or weights sharded over processes (FSDP2).
+"""Training by transformers' Trainer: one device, DDP, or weights sharded over processes (FSDP2).
 
-It is told what it cannot know: how sequences become batches, what a model is saved as, and that loss is taken by token.
+The Trainer is given what it does not know: batches of sequences, the format of saved weights, and a loss per token.
 """
 
 import json
@@ -26,12 +26,12 @@ _WEIGHTS = "model.safetensors"
 
 
 class _SequenceTrainer(transformers.Trainer):
-    """Saves the weights of the network alone: tied ones stand in them once, as transformers' own models save them."""
+    """Saves the weights of the transformers model only, with tied weights stored once, as transformers does."""
 
     def _save(self, output_dir: str | None = None, state_dict: dict[str, Any] | None = None) -> None:
         folder = Path(output_dir or str(self.args.output_dir))
         folder.mkdir(parents=True, exist_ok=True)
-        if state_dict is not None:  # put together out of shards
+        if state_dict is not None:  # gathered from shards
             super()._save(output_dir, state_dict)
             return
         save_model(self.accelerator.unwrap_model(self.model).model, str(folder / _WEIGHTS))
@@ -44,22 +44,22 @@ class _SequenceTrainer(transformers.Trainer):
         load_model(network.model, Path(resume_from_checkpoint) / _WEIGHTS)
 
 
-class _Telling(transformers.TrainerCallback):
-    """Tells of every step what our own loop tells."""
+class _ReportSteps(transformers.TrainerCallback):
+    """Reports every step in the form of our own loop."""
 
-    def __init__(self, watcher: Callable[[Progress], None], n_tokens: float) -> None:
-        self._watcher = watcher
-        self._n_tokens = n_tokens  # of a step, on average
-        self._began = time.perf_counter()
+    def __init__(self, on_step: Callable[[Progress], None], tokens_per_step: float) -> None:
+        self._report = on_step
+        self._tokens_per_step = tokens_per_step
+        self._start = time.perf_counter()
 
     def on_log(self, args: Any, state: Any, control: Any, logs: Any = None, **kwargs: Any) -> None:
         if not (state.is_world_process_zero and logs and "loss" in logs):
             return
         now = time.perf_counter()
         loss, rate, norm = (float(logs[name]) for name in ("loss", "learning_rate", "grad_norm"))
-        speed = self._n_tokens / (now - self._began)
-        self._began = now
-        self._watcher(Progress(state.global_step, state.max_steps, loss, rate, norm, speed))
+        speed = self._tokens_per_step / (now - self._start)
+        self._start = now
+        self._report(Progress(state.global_step, state.max_steps, loss, rate, norm, speed))
 
 
 def train_with_trainer(
@@ -68,21 +68,21 @@ def train_with_trainer(
     collate: Callable[[list[Any]], dict[str, Any]],
     recipe: Recipe,
     out: Path,
-    watcher: Callable[[Progress], None],
+    on_step: Callable[[Progress], None],
 ) -> None:
-    """Train, going on from the last checkpoint in the folder if there is one.
+    """Train, resuming from the last checkpoint in the folder if there is one.
 
     Args:
-        network: what is trained.
-        sequences: all of them; each process goes through its own.
-        collate: makes a batch of sequences.
-        recipe: how.
-        out: folder of checkpoints.
-        watcher: is told of every step, in the first process.
+        network: the network.
+        sequences: all sequences, of which each process uses its own.
+        collate: combines sequences to a batch.
+        recipe: recipe of the run.
+        out: folder of the checkpoints.
+        on_step: called after every step, in the first process.
 
     Raises:
-        UsageError: the processes cannot share the recipe's sequences evenly.
-        DataError: the checkpoint that is gone on from cannot be read.
+        UsageError: the sequences of a step cannot be divided evenly among the processes.
+        DataError: the last checkpoint cannot be read.
     """
     n_tokens = sum(sequence.n_tokens for sequence in sequences)
     trainer = _SequenceTrainer(
@@ -90,21 +90,22 @@ def train_with_trainer(
         args=_arguments(recipe, out, network),
         train_dataset=list(sequences),
         data_collator=collate,
-        callbacks=[_Telling(watcher, recipe.sequences_per_step * n_tokens / len(sequences))],
+        callbacks=[_ReportSteps(on_step, recipe.sequences_per_step * n_tokens / len(sequences))],
     )
     trainer.remove_callback(transformers.trainer_callback.PrinterCallback)
-    last = _last_whole(out)
-    damaged = f"{last}: the checkpoint cannot be read"
+    last = _last_complete_checkpoint(out)
+    problem = f"{last}: the checkpoint cannot be read"
     with wrap_errors(
-        damaged, "remove it to go on from the one before", catch=(OSError, ValueError, KeyError), raise_as=DataError
+        problem, "remove it to resume from the one before", catch=(OSError, ValueError, KeyError), raise_as=DataError
     ):
         trainer.train(resume_from_checkpoint=last)
 
 
-def _last_whole(out: Path) -> str | None:
-    """The last checkpoint that was written to its end, of which the state is; a run may be killed while it writes one.
+def _last_complete_checkpoint(out: Path) -> str | None:
+    """Return the last checkpoint that was written completely; a run may be killed while writing one.
 
-    Trainer would take the last folder, whatever is in it, and go on without the optimizer where that is missing.
+    The Trainer itself would use the last folder, whatever it contains, and continue without the optimizer if that is
+    missing. The state file is the last to be written.
     """
     for place in sorted(out.glob("checkpoint-*"), key=lambda path: int(path.name.rpartition("-")[2]), reverse=True):
         try:
@@ -146,18 +147,18 @@ def _arguments(recipe: Recipe, out: Path, network: SequenceModel) -> transformer
         dataloader_pin_memory=False,
         **_sharding(recipe, network),
     )
-    per_pass = arguments.world_size
-    if recipe.sequences_per_step % per_pass:
-        least = math.ceil(recipe.sequences_per_step / per_pass) * per_pass
+    n_processes = arguments.world_size
+    if recipe.sequences_per_step % n_processes:
+        least = math.ceil(recipe.sequences_per_step / n_processes) * n_processes
         raise UsageError(
-            f"sequences_per_step is {recipe.sequences_per_step} for {per_pass} processes; set it to {least}, say"
+            f"sequences_per_step is {recipe.sequences_per_step} for {n_processes} processes; set it to a multiple ({least})"
         )
-    arguments.gradient_accumulation_steps = recipe.sequences_per_step // per_pass
+    arguments.gradient_accumulation_steps = recipe.sequences_per_step // n_processes
     return arguments
 
 
 def _sharding(recipe: Recipe, network: SequenceModel) -> dict[str, Any]:
-    """Weights, gradients and optimizer in shards, layer by layer; accelerate does it on GPUs alone."""
+    """Return the settings that shard weights, gradients and optimizer by layers, which accelerate does on GPUs only."""
     if not (recipe.parallel.shard and torch.distributed.is_initialized()):
         return {}
     layers = sorted(getattr(network.model, "_no_split_modules", None) or ())

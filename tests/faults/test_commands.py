@@ -120,11 +120,11 @@ TYPED = [
     (["validate", "SET", "--models", "a:x=1,oracle,a:x=1", "--out", "OUT"], "--models a: 'x' is given twice"),
     (
         ["train", "--recipe", "infthor_32k", "--data", "SET", "--out", "OUT", "--gpus", 4],
-        "--gpus and --tflops are what --dry-run reckons with; give it",
+        "--gpus and --tflops are for --dry-run; add it",
     ),
     (
         ["train", "--recipe", "questions", "--data", "SET", "--out", "OUT", "--workers", 2],
-        "share the making of data, which only the recipe tiny without --data does",
+        "share the generation of data, which only the recipe tiny without --data does",
     ),
     (["bundle", "file", "--out", "OUT"], "not in its documented form"),
     (

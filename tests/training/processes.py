@@ -17,7 +17,7 @@ from infthor_eval.errors import InfthorError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.training.batches import Batch, collate, n_labels
 from infthor_eval.training.context_parallel import context_parallel
-from infthor_eval.training.export import whole_weights
+from infthor_eval.training.export import gather_weights
 from infthor_eval.training.gradients import sum_gradients
 from infthor_eval.training.loop import Loop, LoopSettings, Progress
 from infthor_eval.training.network import SequenceModel, freeze
@@ -111,7 +111,7 @@ def train(checkpoint: Loaded, folder: Path, frames: list[FrameRef], ranks: Ranks
     ]
     settings = LoopSettings(learning_rate=1e-3, warmup_ratio=0.5, max_steps=2, sequences_per_step=3)
     told: list[Progress] = []
-    Loop(model, PAD, sequences, settings, folder, ranks=ranks, report=told.append).run()
+    Loop(model, PAD, sequences, settings, folder, ranks=ranks, on_step=told.append).run()
     return told
 
 
@@ -153,9 +153,9 @@ def _out_of_shards() -> bool:
     """Whether weights that were shared out over all processes come back whole."""
     model = loaded("qwen2.5-vl").model
     before = {name: tensor.clone() for name, tensor in model.state_dict().items()}
-    assert whole_weights(model) is None
+    assert gather_weights(model) is None
     fully_shard(model)
-    after = whole_weights(model)
+    after = gather_weights(model)
     return after is not None and all(after[name].equal(before[name]) for name in before)
 
 

@@ -41,7 +41,7 @@ def said(encoder, pieces):
 
 
 def trained_text(encoder, sequence):
-    runs = itertools.groupby(zip(sequence.pieces, sequence.trained, strict=True), key=lambda pair: pair[1])
+    runs = itertools.groupby(zip(sequence.pieces, sequence.has_loss, strict=True), key=lambda pair: pair[1])
     return [said(encoder, [piece for piece, _ in run]) for trained, run in runs if trained]
 
 
@@ -105,7 +105,7 @@ def test_a_plan_that_is_too_long_is_left_out_and_told(bundled_set, encoder):
     left = [item for item in made if isinstance(item, SkippedItem)]
     kept = [item for item in made if isinstance(item, TrainingSequence)]
     assert left
-    assert {item.reason for item in left} == {f"longer than {limit} tokens by itself"}
+    assert {item.reason for item in left} == {f"longer than {limit} tokens"}
     assert len(left) + sum(map(window_plans, kept)) == len(history)
 
 
@@ -141,8 +141,8 @@ def test_ids_and_labels_of_a_short_history(tmp_path, encoder, bundled_set):
         second,
         end,
     ]
-    assert window.trained == (False,) * len(expected) + (True,) * len(trained) + (False,) * 3
-    assert (window.n_trained, len(window.frames)) == (len(trained), 2)
+    assert window.has_loss == (False,) * len(expected) + (True,) * len(trained) + (False,) * 3
+    assert (window.n_loss_tokens, len(window.frames)) == (len(trained), 2)
 
 
 def test_a_text_that_holds_a_mark_is_refused(encoder, bundled_set):
@@ -181,5 +181,5 @@ def test_a_sequence_of_130k_tokens_is_built_and_its_labels_are_right(bundled_set
     text = text_of(segment_parts(history[: window_plans(window)]))
     assert trained_text(encoder, window) == [f"{ACT}{action}{ACT}" for action in _ACTION.findall(text)]
     assert not any(
-        trained for piece, trained in zip(window.pieces, window.trained, strict=True) if not isinstance(piece, int)
+        trained for piece, trained in zip(window.pieces, window.has_loss, strict=True) if not isinstance(piece, int)
     )

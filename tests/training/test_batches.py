@@ -44,9 +44,9 @@ def test_nothing_is_masked_where_nothing_is_padded(model: Loaded, two: list[Trai
 def test_labels_are_the_tokens_that_loss_is_taken_on(model: Loaded, two: list[TrainingSequence]) -> None:
     batch = collate(two, model.family, PAD)
     for one, labels in zip(two, batch["labels"], strict=True):
-        learned = [piece for piece, trained in zip(one.pieces, one.trained, strict=True) if trained]
+        learned = [piece for piece, trained in zip(one.pieces, one.has_loss, strict=True) if trained]
         assert labels[labels != IGNORED].tolist() == learned
-    assert n_labels(batch) == sum(one.n_trained for one in two)
+    assert n_labels(batch) == sum(one.n_loss_tokens for one in two)
     at = batch["labels"] != IGNORED
     assert torch.equal(batch["labels"][at], batch["input_ids"][at])
 
@@ -69,11 +69,11 @@ def test_a_batch_has_the_positions_of_its_sequences(model: Loaded, two: list[Tra
 
 
 def test_the_first_token_is_predicted_by_nothing(model: Loaded, two: list[TrainingSequence]) -> None:
-    everywhere = replace(two[1], trained=tuple(isinstance(piece, int) for piece in two[1].pieces))
-    assert n_labels(collate([everywhere], model.family, PAD)) == everywhere.n_trained - 1
+    everywhere = replace(two[1], has_loss=tuple(isinstance(piece, int) for piece in two[1].pieces))
+    assert n_labels(collate([everywhere], model.family, PAD)) == everywhere.n_loss_tokens - 1
 
 
 def test_a_sequence_without_labels_is_refused(model: Loaded, two: list[TrainingSequence]) -> None:
-    masked = replace(two[1], trained=(False,) * len(two[1].trained))
-    with pytest.raises(DataError, match="short: there is no token to take loss on"):
+    masked = replace(two[1], has_loss=(False,) * len(two[1].has_loss))
+    with pytest.raises(DataError, match="short: no token has loss"):
         collate([two[0], masked], model.family, PAD)

@@ -6,27 +6,28 @@ import pytest
 import torch
 from torch.nn.functional import scaled_dot_product_attention
 
-from infthor_eval.training.context_parallel import Cut, _flash, attend
+from infthor_eval.training.context_parallel import SequenceSplit, _flash_attention, causal_attention
 
 Kernel = Callable[..., torch.Tensor]
 
 
 def test_each_rank_has_a_chunk_from_the_head_and_one_from_the_tail() -> None:
     whole = torch.arange(10)[None]
-    shares = [Cut(rank, 2).share(whole, -1).tolist() for rank in range(2)]
+    shares = [SequenceSplit(rank, 2).local_part(whole, -1).tolist() for rank in range(2)]
     assert shares == [[[0, 1, 2, 9, -1, -1]], [[3, 4, 5, 6, 7, 8]]]
 
 
 @pytest.mark.parametrize("n_tokens", [1, 7, 8, 9, 64])
 def test_shares_are_all_of_the_sequence(n_tokens: int) -> None:
     whole = torch.arange(3 * n_tokens).reshape(3, 1, n_tokens)
-    shares = [Cut(rank, 4).share(whole, -1) for rank in range(4)]
+    shares = [SequenceSplit(rank, 4).local_part(whole, -1) for rank in range(4)]
     assert len({share.shape for share in shares}) == 1
     found = torch.cat(shares, dim=-1)
     assert sorted(found[found >= 0].tolist()) == whole.flatten().tolist()
 
 
-@pytest.mark.parametrize("kernel", [attend, _flash])  # here the second takes the mask too, by the same call
+# On the CPU the second kernel uses the mask, too, by the same call.
+@pytest.mark.parametrize("kernel", [causal_attention, _flash_attention])
 @pytest.mark.parametrize("n_own", [1, 300, 700])
 @pytest.mark.parametrize("n_key_heads", [1, 2, 4])
 def test_the_last_queries_see_what_they_see_in_the_whole(kernel: Kernel, n_own: int, n_key_heads: int) -> None:

@@ -144,7 +144,7 @@ def test_adapters_are_trained_and_merged(recipe, data, tmp_path):
         ({"optimiser.lr": "1"}, "unknown field `optimiser`"),
         ({"freeze": ["wheels"]}, "Invalid enum value 'wheels'"),
         ({"questions": None}, "nothing to train on"),
-        ({"model": "openvla-tiny"}, "openvla-tiny is nothing that can be trained here"),
+        ({"model": "openvla-tiny"}, "openvla-tiny cannot be trained here"),
         ({"max_tokens": "10"}, "no sequence to train on \\(longer than 10 tokens\\)"),
     ],
 )

@@ -48,7 +48,7 @@ Report = Callable[[Progress], None]
 def _run(
     model: SequenceModel, sequences: list[TrainingSequence], folder: Path, report: Report | None = None, **changed: Any
 ) -> None:
-    Loop(model, PAD, sequences, _settings(**changed), folder, report=report).run()
+    Loop(model, PAD, sequences, _settings(**changed), folder, on_step=report).run()
 
 
 def _dying_after(step: int) -> Report:
@@ -163,5 +163,5 @@ def test_a_gradient_that_is_not_finite_ends_the_run(
 
 
 def test_a_run_without_sequences_is_refused(model: SequenceModel, tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match="there is no sequence to train on"):
+    with pytest.raises(UsageError, match="there are no sequences to train on"):
         _run(model, [], tmp_path)

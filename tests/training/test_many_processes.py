@@ -11,7 +11,7 @@ from torch import Tensor
 
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.training.batches import IGNORED, n_labels
-from infthor_eval.training.context_parallel import Cut
+from infthor_eval.training.context_parallel import SequenceSplit
 from infthor_eval.training.ranks import Ranks
 
 from .processes import CASES, N_RANKS, RESULTS, Case, Found, batch_of, gradients_of, model_of, train, work
@@ -74,7 +74,8 @@ def test_the_cases_are_the_hard_ones(results: Any, frames: list[FrameRef]) -> No
     assert n_tokens % 4
     assert n_tokens % 8
     # With the vision tower alone trained, a rank without features has nothing of its own that wants a gradient.
-    assert [bool(Cut(rank, 4).share(batch["slots"], False).any()) for rank in range(4)] == [False, True, True, True]
+    parts = [SequenceSplit(rank, 4).local_part(batch["slots"], False) for rank in range(4)]
+    assert [bool(part.any()) for part in parts] == [False, True, True, True]
     borders = [-(-n_tokens // 8) * number for number in range(1, 8)]
     assert any(batch["slots"][0, border - 1] and batch["slots"][0, border] for border in borders)
     assert any(batch["labels"][0, border] != IGNORED for border in borders)

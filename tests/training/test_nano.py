@@ -1,4 +1,4 @@
-"""The small model's course, on two scenes and a few steps: what it is told, and that it learns."""
+"""Training of the small model on two scenes and a few steps: its data, and that the loss falls."""
 
 import random
 import shutil
@@ -28,9 +28,9 @@ SMALL = NanoRecipe(
     title="small",
     hidden=64,
     layers=2,
-    seeing_steps=20,
-    reading_steps=3,
-    telling_steps=6,
+    vision_steps=20,
+    text_steps=3,
+    joint_steps=6,
     frames_per_step=16,
     questions_per_step=8,
     windows_per_step=1,
@@ -53,20 +53,20 @@ def small_set(bundled_set, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def blank(small_set):
-    """The model before it learned anything, and its album."""
+    """The untrained model and its frames."""
     dataset = read_frame_dataset([small_set], image_processor())
     return build_untrained(SMALL, corpus_texts([small_set], dataset.types), [question_intro()]), dataset
 
 
-def test_an_album_shows_what_the_logs_say(small_set, blank):
+def test_labels_of_frames_are_those_of_the_logs(small_set, blank):
     _, dataset = blank
     data = NiehSet(small_set)
-    at = dataset.places()
+    index = dataset.index_by_digest()
     for folder in sorted((small_set / "metadata").iterdir()):
         for frame, step in list(zip(data.frames(folder.name), read_steps(folder), strict=True))[::20]:
-            place = at[frame.digest]
-            present = {name for name, there in zip(dataset.types, dataset.present[place], strict=True) if there}
-            shown = {name for name, there in zip(dataset.types, dataset.shown[place], strict=True) if there}
+            at = index[frame.digest]
+            present = {name for name, there in zip(dataset.types, dataset.present[at], strict=True) if there}
+            shown = {name for name, there in zip(dataset.types, dataset.shown[at], strict=True) if there}
             assert present == {_type(key) for key in step.seen}
             assert shown <= set(step.object_log.visible) | present
 
@@ -93,9 +93,9 @@ def test_frames_are_what_the_familys_own_features_are_made_of(blank):
     ],
 )
 def test_where_a_box_lies(box, cells):
-    found = {at for at, there in enumerate(_cell_coverage(torch.tensor([box]), (300, 300))[0]) if there}
-    assert found <= cells
-    assert found
+    cells_of_box = {at for at, there in enumerate(_cell_coverage(torch.tensor([box]), (300, 300))[0]) if there}
+    assert cells_of_box <= cells
+    assert cells_of_box
 
 
 def test_types_are_those_of_parts_and_slices():
@@ -106,34 +106,34 @@ def test_types_are_those_of_parts_and_slices():
 
 def test_words_are_tokens(blank):
     loaded, dataset = blank
-    asked = loaded.tokenizer.tokenize(f"{question_intro()} Have you seen a mug?")
-    assert len(asked) == 1 + 6
-    names = [way for name in dataset.types for way in spellings(name)]
+    tokens = loaded.tokenizer.tokenize(f"{question_intro()} Have you seen a mug?")
+    assert len(tokens) == 1 + 6
+    names = [spelling for name in dataset.types for spelling in spellings(name)]
     lengths = [len(loaded.tokenizer.tokenize(name)) for name in names]
     assert sum(lengths) / len(lengths) < 1.6
 
 
-def test_made_up_questions_are_true_and_their_names_tell_nothing(small_set, blank):
+def test_synthetic_questions_are_true_and_their_names_do_not_give_away_the_answer(small_set, blank):
     loaded, dataset = blank
     sampler = SequenceSampler(Encoder(loaded), [small_set], dataset, window_tokens=2048, seed=0)
-    places, counts = dataset.places(), {"yes": 0, "no": 0}
+    index, counts = dataset.index_by_digest(), {"yes": 0, "no": 0}
     from infthor_eval.household.wording import noun
 
     words = {noun(name): at for at, name in enumerate(dataset.types)}
-    for sequence in sampler.questions(200, made_up=1.0):
+    for sequence in sampler.questions(200, synthetic_share=1.0):
         (frame,) = sequence.frames
         text = loaded.tokenizer.decode([piece for piece in sequence.pieces if isinstance(piece, int)])
         answer = text.rpartition("?")[2].removesuffix("<|im_end|>")
         about = max((name for name in words if f" {name}" in text), key=len)
         counts[answer] += 1
-        here = places[frame.digest]
+        here = index[frame.digest]
         assert bool(dataset.shown[here, words[about]]) == (answer == "yes")
         assert answer == "yes" or not dataset.present[here, words[about]]
     assert min(counts.values()) > 70
 
 
-def test_orders_are_about_objects_that_stood_there_and_are_carried_out_by_name():
-    carried_out = [
+def test_synthetic_plans_replace_objects_in_plan_and_actions():
+    recorded = [
         ("pick up the mug", ["PickupObject Mug"]),
         ("pick up the butterknife", ["PickupObject ButterKnife"]),
         ("put the mug in the fridge", ["OpenObject Fridge", "PutObject Mug Fridge", "CloseObject Fridge"]),
@@ -141,8 +141,8 @@ def test_orders_are_about_objects_that_stood_there_and_are_carried_out_by_name()
         ("put the egg in the sinkbasin", ["PutObject Egg SinkBasin"]),
         ("go to the fridge", ["MoveAhead", "RotateLeft"]),
     ]
-    draw, orders = random.Random(0), SyntheticPlans(carried_out)
-    assert {(plan, *actions) for plan, actions in (orders.drawn(draw) for _ in range(200))} == {
+    rng, plans = random.Random(0), SyntheticPlans(recorded)
+    assert {(plan, *actions) for plan, actions in (plans.sample(rng) for _ in range(200))} == {
         ("pick up the mug", "PickupObject Mug"),
         ("pick up the butterknife", "PickupObject ButterKnife"),
         ("put the mug in the fridge", "OpenObject Fridge", "PutObject Mug Fridge", "CloseObject Fridge"),
@@ -151,41 +151,41 @@ def test_orders_are_about_objects_that_stood_there_and_are_carried_out_by_name()
         ("put the egg in the microwave", "OpenObject Microwave", "PutObject Egg Microwave", "CloseObject Microwave"),
         ("put the egg in the sinkbasin", "PutObject Egg SinkBasin"),
     }
-    assert not SyntheticPlans(carried_out[-1:])
+    assert not SyntheticPlans(recorded[-1:])
 
 
-def test_orders_have_no_frame_and_loss_is_taken_on_their_actions(small_set, blank):
+def test_synthetic_plans_have_no_frame_and_loss_on_their_actions(small_set, blank):
     loaded, dataset = blank
     sampler = SequenceSampler(Encoder(loaded), [small_set], dataset, window_tokens=600, seed=0)
-    for order in sampler.orders(20):
-        assert not order.frames
+    for plan in sampler.synthetic_plans(20):
+        assert not plan.frames
         ends = [
-            at for at, piece in enumerate(order.pieces) if piece == loaded.tokenizer.convert_tokens_to_ids("<|plan|>")
+            at for at, piece in enumerate(plan.pieces) if piece == loaded.tokenizer.convert_tokens_to_ids("<|plan|>")
         ]
-        assert order.trained == tuple(at > ends[1] for at in range(len(order.pieces)))
+        assert plan.has_loss == tuple(at > ends[1] for at in range(len(plan.pieces)))
 
 
 def test_histories_are_windows_or_single_plans(small_set, blank):
     loaded, dataset = blank
     sampler = SequenceSampler(Encoder(loaded), [small_set], dataset, window_tokens=600, seed=0)
-    assert len(sampler.histories(2, 5, alone=0.0)) == 2
-    plans = sampler.histories(2, 5, alone=1.0)
+    assert len(sampler.histories(2, 5, single_plan_share=0.0)) == 2
+    plans = sampler.histories(2, 5, single_plan_share=1.0)
     assert len(plans) == 5
     mark = loaded.tokenizer.convert_tokens_to_ids("<|plan|>")
     assert all(plan.pieces.count(mark) == 2 for plan in plans)
 
 
-def test_what_cannot_be_read_is_left_out_and_told(small_set, tmp_path):
+def test_what_cannot_be_read_is_skipped_and_reported(small_set, tmp_path):
     shutil.copytree(small_set, tmp_path / "set")
     (tmp_path / "set/metadata/kitchen-1-seed7/traj_data.json").unlink()
-    told = []
+    notes = []
     train_small_model(
-        msgspec.structs.replace(SMALL, seeing_steps=1, reading_steps=1, telling_steps=1),
+        msgspec.structs.replace(SMALL, vision_steps=1, text_steps=1, joint_steps=1),
         [tmp_path / "set"],
         lambda _: None,
-        told.append,
+        notes.append,
     )
-    assert any("trajectory is not in the set" in line for line in told)
+    assert any("trajectory is not in the set" in line for line in notes)
 
 
 def test_a_set_without_questions_is_refused(small_set, tmp_path):
@@ -196,13 +196,13 @@ def test_a_set_without_questions_is_refused(small_set, tmp_path):
         train_small_model(SMALL, [tmp_path / "set"], lambda _: None)
 
 
-def test_the_course_is_the_same_for_a_seed_and_lowers_the_loss(small_set, tmp_path):
+def test_training_is_the_same_for_a_seed_and_lowers_the_loss(small_set, tmp_path):
     losses = []
     for name in ("a", "b"):
-        told = []
-        export(train_small_model(SMALL, [small_set], told.append), tmp_path / name)
-        losses.append([lesson.loss for lesson in told])
-        assert [lesson.part for lesson in told] == ["see"] * 20 + ["read"] * 3 + ["tell"] * 6
+        steps = []
+        export(train_small_model(SMALL, [small_set], steps.append), tmp_path / name)
+        losses.append([step.loss for step in steps])
+        assert [step.stage for step in steps] == ["vision"] * 20 + ["text"] * 3 + ["joint"] * 6
     assert losses[0] == losses[1]
     assert sum(losses[0][15:20]) < 0.95 * sum(losses[0][:5])
     first, second = (load_file(tmp_path / name / "model.safetensors") for name in ("a", "b"))

@@ -30,7 +30,7 @@ def test_questions_are_asked_as_the_evaluation_asks_them(bundled_set, chat_tiny,
             context, text = samples.request(sample)
             asked = encoder._prompter.pieces([Turn("user", (*context, text))])
             assert list(sequence.pieces[: len(asked)]) == asked
-            assert sequence.trained == (False,) * len(asked) + (True,) * (len(sequence.pieces) - len(asked))
+            assert sequence.has_loss == (False,) * len(asked) + (True,) * (len(sequence.pieces) - len(asked))
             reply = sequence.pieces[len(asked) :]
             assert reply[-1] == loaded.tokenizer.convert_tokens_to_ids("<|im_end|>")
             assert loaded.tokenizer.decode(reply[:-1]) == ", ".join(map(str, sample.question.answers))

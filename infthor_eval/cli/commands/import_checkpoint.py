@@ -36,6 +36,6 @@ def command(folder: Path, model: str, model_args: str, out: Path) -> int:
     weights = import_weights(loaded, folder)
     export(loaded, out)
     print_line(
-        f"{weights.n_taken} weights imported, {weights.n_kept} kept, {weights.n_ignored} other tensors ignored: {out}"
+        f"{weights.n_imported} weights imported, {weights.n_kept} kept, {weights.n_ignored} other tensors ignored: {out}"
     )
     return 0

@@ -20,7 +20,7 @@ from infthor_eval.terminal import console, progress_bar
 if TYPE_CHECKING:
     from infthor_eval.training.fine_tuning import TrainingRun
     from infthor_eval.training.loop import Progress
-    from infthor_eval.training.nano.settings import NanoRecipe, Scenes
+    from infthor_eval.training.nano.settings import NanoRecipe, SceneSettings
     from infthor_eval.training.nano.stages import NanoProgress
     from infthor_eval.training.recipe import Recipe
     from infthor_eval.workers import WorkerSettings
@@ -30,7 +30,7 @@ __all__ = ["command"]
 _PATH = click.Path(path_type=Path)
 _GPUS, _TFLOPS = 8, 400.0
 _PER_TRAJECTORY = 500  # more than there are questions on a trajectory
-_PARTS = {"see": "training to see", "read": "training to read", "tell": "training to answer and to act"}
+_STAGES = {"vision": "recognising objects", "text": "reading plans", "joint": "answering and acting"}
 
 
 @click.command("train", cls=ExampleCommand, example="infthor-eval train --recipe questions --data SET --out runs/mine")
@@ -144,10 +144,10 @@ def _print_data(run: TrainingRun) -> None:
     longest = max(item.n_tokens for item in data.sequences)
     print_note(
         f"{run.recipe.title}: {len(data.sequences):,} sequences, {data.n_tokens:,} tokens (the longest {longest:,}), "
-        f"loss on {data.n_trained:,}"
+        f"loss on {data.n_loss_tokens:,}"
     )
-    for reason, n in data.reasons().most_common(5):
-        print_note(f"{n} left out: {reason}", "yellow")
+    for reason, n in data.skip_reasons().most_common(5):
+        print_note(f"{n} skipped: {reason}", "yellow")
 
 
 def _print_estimate(run: TrainingRun, n_gpus: int, tflops: float) -> None:
@@ -183,14 +183,14 @@ def _train_small_model(recipe: NanoRecipe, folders: Sequence[Path], out: Path, w
         bars = StepBars(progress)
 
         def observe(step: NanoProgress) -> None:
-            bars.advance(_PARTS[step.part], step.step, step.n_steps, f"loss {step.loss:.3f}")
+            bars.advance(_STAGES[step.stage], step.step, step.n_steps, f"loss {step.loss:.3f}")
 
         loaded = train_small_model(recipe, sets, observe, print_note)
     export(loaded, out / "checkpoint")
     console().print(f"{out / 'checkpoint'}")
 
 
-def _generate_data(scenes: Scenes, seed: int, out: Path, worker_settings: WorkerSettings) -> Path:
+def _generate_data(scenes: SceneSettings, seed: int, out: Path, worker_settings: WorkerSettings) -> Path:
     """Generate trajectories in procedural scenes, replay them, and write every question on them; return the set.
 
     What is in the folder already is not generated again.

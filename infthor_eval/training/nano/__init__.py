@@ -1,1 +1,1 @@
-"""A small model that has learned something: a Qwen2.5-VL of two million weights, trained from nothing in minutes."""
+"""A small Qwen2.5-VL of two million weights, trained from scratch in minutes."""

@@ -1,15 +1,14 @@
-"""The small model before it has learned anything: Qwen2.5-VL's classes, and a tokenizer that knows the household.
+"""The untrained small model: Qwen2.5-VL's classes with random weights, and a tokenizer for household words.
 
-A frame is 112 x 112 pixels and takes 16 tokens. Words are single tokens, and so is the sentence that every question of
-the published evaluation begins with: three quarters of a question's tokens would be the same in all of them.
+A frame is 112 x 112 pixels and takes 16 tokens. Words are single tokens. So is the introduction of every question of
+the published evaluation, which would otherwise be three quarters of a question's tokens.
 """
 
 from collections.abc import Iterable
-from typing import Any, cast
+from typing import Any
 
-import torch
 from tokenizers import AddedToken
-from transformers import AutoModelForImageTextToText, GenerationConfig, Qwen2_5_VLConfig
+from transformers import Qwen2_5_VLConfig
 from transformers.models.qwen2_vl.image_processing_pil_qwen2_vl import Qwen2VLImageProcessorPil
 
 from infthor_eval.household.sequence_text import MARKS
@@ -20,31 +19,32 @@ from model_adapters.hf.loaded import Loaded
 from model_adapters.hf.templates import plain_template
 from model_adapters.tiny.qwen2_5_vl import SPECIAL
 from model_adapters.tiny.tokenizer import train_tokenizer
+from model_adapters.tiny.twin import draw_model, token_ids
 
 __all__ = ["GRID", "PATCHES", "TOKENS", "build_untrained", "image_processor"]
 
-GRID = 4  # tokens of a frame, along each side
+GRID = 4  # tokens along each side of a frame
 TOKENS = GRID**2
-PATCHES = 4 * TOKENS  # two by two of them are merged to a token
+PATCHES = 4 * TOKENS  # a token merges two by two patches
 _SIDE = 14  # pixels of a patch
 _HEADS = 4
-# By the processor's own rounding 112 x 112 pixels; a limit of exactly as many would be rounded down to 84 x 84.
+# The processor rounds this to 112 x 112 pixels; with a limit of exactly 112 * 112 it would round down to 84 x 84.
 _PIXELS = 12_600
-_MERGES = 3000  # more than there are words, so that each of them is a token
+_N_MERGED = 3000  # more than the number of words, so that every word is a token
 
 
 def image_processor() -> Any:
-    """What makes patches of its frames."""
+    """Return the image processor."""
     return Qwen2VLImageProcessorPil(min_pixels=_PIXELS, max_pixels=_PIXELS)
 
 
 def build_untrained(recipe: NanoRecipe, corpus: Iterable[str], sentences: Iterable[str]) -> Loaded:
-    """The model with random weights of the recipe's seed, on the CPU in float32.
+    """Return the model with random weights of the recipe's seed, on the CPU in float32.
 
     Args:
-        recipe: its size.
-        corpus: texts with all the words that it is to know.
-        sentences: texts that are a token as a whole.
+        recipe: recipe with the size of the model.
+        corpus: texts with all words that become tokens.
+        sentences: texts that become a single token each.
     """
     tokenizer = train_tokenizer(
         (*SPECIAL, *MARKS),
@@ -52,10 +52,11 @@ def build_untrained(recipe: NanoRecipe, corpus: Iterable[str], sentences: Iterab
         pad="<|endoftext|>",
         named={"image_token": "<|image_pad|>"},
         corpus=corpus,
-        n_merged=_MERGES,
+        n_merged=_N_MERGED,
     )
     tokenizer.add_tokens([AddedToken(sentence, normalized=False) for sentence in sentences])
-    model = _model(recipe, tokenizer)
+    ids = token_ids(SPECIAL, tokenizer)
+    model = draw_model(_config(recipe, ids, len(tokenizer)), recipe.seed, ids["<|im_end|>"], ids["<|endoftext|>"])
     processor = image_processor()
     family = Qwen25VLFamily(model, processor, tokenizer)
     return assemble(
@@ -67,18 +68,6 @@ def build_untrained(recipe: NanoRecipe, corpus: Iterable[str], sentences: Iterab
         max_tokens=model.config.text_config.max_position_embeddings,
         origin={"checkpoint": "nano", "seed": recipe.seed},
     )
-
-
-def _model(recipe: NanoRecipe, tokenizer: Any) -> Any:
-    ids = {token: tokenizer.convert_tokens_to_ids(token) for token in SPECIAL}
-    with torch.random.fork_rng(devices=[]):
-        torch.manual_seed(recipe.seed)
-        model = cast(Any, AutoModelForImageTextToText).from_config(
-            _config(recipe, ids, len(tokenizer)), attn_implementation="sdpa", dtype=torch.float32
-        )
-    ends = [ids["<|im_end|>"], ids["<|endoftext|>"]]
-    model.generation_config = GenerationConfig(eos_token_id=ends, pad_token_id=ends[1])
-    return model
 
 
 def _config(recipe: NanoRecipe, ids: dict[str, int], vocab_size: int) -> Any:
@@ -121,7 +110,7 @@ def _config(recipe: NanoRecipe, ids: dict[str, int], vocab_size: int) -> Any:
 
 
 def _rope_sections(head_width: int) -> list[int]:
-    """How many of a head's frequencies tell time, height and width, in about the family's proportion."""
+    """Return how many of a head's frequencies encode time, height and width, in about the family's proportion."""
     frequencies = head_width // 2
     space = 3 * frequencies // 8
     return [frequencies - 2 * space, space, space]

@@ -1,4 +1,4 @@
-"""All frames that the small model is trained on, as what its vision tower takes, and what is to be seen in them."""
+"""Frames of the training data as inputs of the vision tower, with labels of the objects in them."""
 
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -18,22 +18,24 @@ from infthor_eval.training.nano.architecture import GRID, PATCHES, TOKENS
 
 __all__ = ["FrameDataset", "read_frame_dataset"]
 
-_READERS = 2  # threads
-_LEAST_PIXELS = 90  # of an object that counts as shown: a thousandth of a frame of 300 x 300, as in the questions
-_OF_CELL, _OF_OBJECT = 0.4, 0.5  # shares of a cell, or of an object, that lie within each other where it is seen there
+_READER_THREADS = 2
+_LEAST_PIXELS = 90  # smallest object that counts as shown: a thousandth of a 300 x 300 frame, as in the questions
+# An object is in a cell if its box covers this share of the cell, or has this share of its own area in the cell.
+_OF_CELL, _OF_OBJECT = 0.4, 0.5
 
 
 @dataclass(frozen=True)
 class FrameDataset:
-    """Frames and what they show.
+    """Frames with labels; labels are 0 or 1.
 
     Attributes:
-        frames: each once.
-        types: of objects, sorted.
-        pixels: (frames, patches, values) of one of the two equal moments that the tower wants, float16.
-        cells: (frames, tokens, types), whether a token's part of the frame shows a type.
-        shown: (frames, types), whether the frame shows it near enough to be visible in AI2-THOR's sense.
-        present: (frames, types), whether anything of it is in the frame.
+        frames: distinct frames.
+        types: object types, sorted.
+        pixels: patches of each frame, (frames, patches, values), in float16. The tower reads each frame twice, as two
+            time steps of a video; this has one of them.
+        cells: types in each token's part of the frame, (frames, tokens, types).
+        shown: types that the frame shows near enough to be visible in AI2-THOR's sense, (frames, types).
+        present: types of which any pixel is in the frame, (frames, types).
     """
 
     frames: tuple[FrameRef, ...]
@@ -43,55 +45,54 @@ class FrameDataset:
     shown: Tensor
     present: Tensor
 
-    def places(self) -> dict[str, int]:
-        """Digest of a frame's file to its place in the album."""
-        return {frame.digest: at for at, frame in enumerate(self.frames)}
+    def index_by_digest(self) -> dict[str, int]:
+        """Return the index of each frame by the digest of its file."""
+        return {frame.digest: index for index, frame in enumerate(self.frames)}
 
-    def tower_inputs(self, places: Sequence[int]) -> Tensor:
-        """What the vision tower is fed for some frames, (frames x patches, values)."""
-        chosen = self.pixels[list(places)].float().reshape(len(places) * PATCHES, 3, 1, -1)
-        return chosen.expand(-1, -1, 2, -1).reshape(len(places) * PATCHES, -1)
+    def tower_inputs(self, indices: Sequence[int]) -> Tensor:
+        """Return the vision tower's inputs for some frames, (frames x patches, values)."""
+        pixels = self.pixels[list(indices)].float().reshape(len(indices) * PATCHES, 3, 1, -1)
+        return pixels.expand(-1, -1, 2, -1).reshape(len(indices) * PATCHES, -1)
 
 
 def read_frame_dataset(folders: Iterable[Path], image_processor: Any) -> FrameDataset:
     """Read all frames of replayed sets.
 
     Args:
-        folders: of the sets.
-        image_processor: the model's.
+        folders: folders of the sets.
+        image_processor: image processor of the model.
 
     Raises:
-        DataError: a set cannot be read, or does not say what its frames show.
+        DataError: a set cannot be read, or its step log does not list the objects in frames.
     """
     frames: dict[str, tuple[FrameRef, Step]] = {}
     for folder in folders:
         data = NiehSet(folder)
         for name in trajectory_names(data):
-            place = data.folder(name)
-            steps = sorted(read_steps(place), key=lambda step: step.img_idx)
+            folder_of_steps = data.folder(name)
+            steps = sorted(read_steps(folder_of_steps), key=lambda step: step.img_idx)
             if any(step.seen is None for step in steps):
-                raise DataError(f"{place}: does not say what its frames show; replay the trajectory")
+                raise DataError(f"{folder_of_steps}: does not list the objects in its frames; replay the trajectory")
             for frame, step in zip(data.frames(name), steps, strict=True):
                 frames.setdefault(frame.digest, (frame, step))
-    found = list(frames.values())
-    types = sorted({_type(key) for _, step in found for key in step.seen or ()})
-    labels = [_labels(step.seen or {}, types, frame.size) for frame, step in found]
+    entries = list(frames.values())
+    types = sorted({_type(key) for _, step in entries for key in step.seen or ()})
+    labels = [_labels(step.seen or {}, types, frame.size) for frame, step in entries]
     cells, shown, present = (torch.stack(parts) for parts in zip(*labels, strict=True))
-    with ThreadPoolExecutor(_READERS) as readers:  # decoding and resizing let go of the interpreter
-        pixels = torch.stack(list(readers.map(lambda one: _patches(one[0], image_processor), found)))
-    return FrameDataset(tuple(frame for frame, _ in found), tuple(types), pixels, cells, shown, present)
+    with ThreadPoolExecutor(_READER_THREADS) as readers:  # decoding and resizing release the interpreter lock
+        pixels = torch.stack(list(readers.map(lambda entry: _patches(entry[0], image_processor), entries)))
+    return FrameDataset(tuple(frame for frame, _ in entries), tuple(types), pixels, cells, shown, present)
 
 
 def _patches(frame: FrameRef, image_processor: Any) -> Tensor:
-    made = image_processor(images=[frame.load()], return_tensors="pt")
-    pixels: Tensor = made["pixel_values"]
+    pixels: Tensor = image_processor(images=[frame.load()], return_tensors="pt")["pixel_values"]
     if len(pixels) != PATCHES:
-        raise DataError(f"{frame.path}: is not square; train on square frames")
+        raise DataError(f"{frame.path}: is not square; use square frames")
     return pixels.reshape(PATCHES, 3, 2, -1)[:, :, 0].reshape(PATCHES, -1).half()
 
 
 def _type(key: str) -> str:
-    """The type in an object's id: that of a part ("...|SinkBasin") or a slice ("...|AppleSliced_1") where it is one."""
+    """Return the type in an object's id; that of the part or slice for "...|SinkBasin" and "...|AppleSliced_1"."""
     first, *_, last = key.split("|")
     return last.partition("_")[0] if last[:1].isalpha() else first
 
@@ -101,24 +102,24 @@ def _labels(
 ) -> tuple[Tensor, Tensor, Tensor]:
     cells = torch.zeros(TOKENS, len(types))
     shown, present = torch.zeros(len(types)), torch.zeros(len(types))
-    covered = _cell_coverage(torch.tensor([item.box for item in seen.values()]).reshape(-1, 4), size)
-    for (key, item), within in zip(seen.items(), covered, strict=True):
-        at = types.index(_type(key))
-        present[at] = 1
+    coverage = _cell_coverage(torch.tensor([item.box for item in seen.values()]).reshape(-1, 4), size)
+    for (key, item), in_cells in zip(seen.items(), coverage, strict=True):
+        column = types.index(_type(key))
+        present[column] = 1
         if item.visible and item.pixels >= _LEAST_PIXELS:
-            shown[at] = 1
-        cells[:, at] = torch.maximum(cells[:, at], within)
+            shown[column] = 1
+        cells[:, column] = torch.maximum(cells[:, column], in_cells)
     return cells, shown, present
 
 
 def _cell_coverage(boxes: Tensor, size: tuple[int, int]) -> Tensor:
-    """In which cells of a frame boxes lie, (boxes, tokens), row by row."""
+    """Return the cells of a frame that boxes are in, (boxes, tokens), row by row, as 0 or 1."""
     left, top, right, bottom = boxes.T
     spans = []
     for low, high, extent in ((top, bottom + 1, size[1]), (left, right + 1, size[0])):
         edges = torch.arange(GRID + 1) * (extent / GRID)
         overlap = torch.minimum(edges[1:], high[:, None]) - torch.maximum(edges[:-1], low[:, None])
         spans.append(overlap.clamp(min=0) / (extent / GRID))
-    area = spans[0][:, :, None] * spans[1][:, None, :]  # in cells
-    whole = (right + 1 - left) * (bottom + 1 - top) / (size[0] * size[1]) * TOKENS
-    return ((area >= _OF_CELL) | (area >= _OF_OBJECT * whole[:, None, None])).float().flatten(1)
+    area = spans[0][:, :, None] * spans[1][:, None, :]  # in units of cells
+    box_area = (right + 1 - left) * (bottom + 1 - top) / (size[0] * size[1]) * TOKENS
+    return ((area >= _OF_CELL) | (area >= _OF_OBJECT * box_area[:, None, None])).float().flatten(1)

@@ -1,4 +1,4 @@
-"""What the small model is told: questions of sets, questions made up on any frame, and histories to act from."""
+"""Random sampling of the small model's training sequences."""
 
 import random
 from collections.abc import Iterable, Iterator, Sequence
@@ -24,140 +24,143 @@ from model_adapters import Part
 
 __all__ = ["SequenceSampler", "corpus_texts", "question_intro"]
 
-_LEAST_SEEN = 20  # frames that show a type that is asked about in questions that are made up
-_FORMS = ("Have you seen {0}?", "Is there any {1} in this room?")
-_TRIES = 200
+_LEAST_FRAMES = 20  # frames that have to show a type before synthetic questions ask for it
+_QUESTIONS = ("Have you seen {0}?", "Is there any {1} in this room?")
+_MAX_TRIES = 200
 
 
 def question_intro() -> str:
-    """What every question on clue frames begins with."""
+    """Return the text that precedes every question on clue frames."""
     return question_text(CONTEXTS["clues"].intro, Question("", "", (), ())).rstrip()
 
 
 def corpus_texts(folders: Sequence[Path], types: Sequence[str]) -> Iterator[str]:
-    """Everything that is said in sets, for a tokenizer that is to know its words."""
+    """Yield all texts of the sets, for training a tokenizer that has their words."""
     for object_type in types:
         yield from spellings(object_type)
         yield object_type
     for folder in folders:
         for path in sorted((folder / "metadata").glob("*/traj.txt")):
-            said = path.read_text(encoding="utf-8").replace("<image>", " ")
+            text = path.read_text(encoding="utf-8").replace("<image>", " ")
             for mark in MARKS:
-                said = said.replace(mark, "\n")
-            yield from said.splitlines()
+                text = text.replace(mark, "\n")
+            yield from text.splitlines()
         for question in NiehSet(folder).questions:
             yield f" {question.text}"
-            yield from (f"{way}{answer}" for answer in question.answers for way in ("", " "))
+            yield from (f"{space}{answer}" for answer in question.answers for space in ("", " "))
     yield from map(str, range(30))
     yield question_intro()
 
 
 class SequenceSampler:
-    """Sequences to learn from, drawn by a seed.
+    """Random training sequences: recorded and synthetic questions, histories, and synthetic plans.
 
     Args:
-        encoder: makes them.
-        folders: of replayed sets, with questions.
-        album: all their frames.
-        window_tokens: of a history at most.
-        seed: of the draws.
+        encoder: builds the sequences.
+        folders: folders of replayed sets with questions.
+        dataset: all frames of the sets.
+        window_tokens: most tokens of a history.
+        seed: seed of the samples.
 
     Attributes:
-        left_out: what no sequence could be made of.
+        skipped: items of which no sequence could be built.
 
     Raises:
-        DataError: there is nothing to learn answering or acting from.
+        DataError: there are no questions, no histories or no plans.
     """
 
     def __init__(
         self, encoder: Encoder, folders: Sequence[Path], dataset: FrameDataset, *, window_tokens: int, seed: int
     ) -> None:
         self._encoder = encoder
-        self._album = dataset
+        self._dataset = dataset
         self._limit = window_tokens
-        self._draw = random.Random(seed)
+        self._rng = random.Random(seed)
         self._questions: list[TrainingSequence] = []
         self._windows: list[TrainingSequence] = []
-        self._plans: list[TrainingSequence] = []
-        self.left_out: list[SkippedItem] = []
-        carried_out: list[tuple[str, list[str]]] = []
+        self._single_plans: list[TrainingSequence] = []
+        self.skipped: list[SkippedItem] = []
+        recorded: list[tuple[str, list[str]]] = []
         for folder in folders:
-            asked = find_samples({"data": str(folder), "context": "clues"})
-            self._questions += self._kept(question_sequences(encoder, asked, window_tokens))
-            for segments in self._histories(NiehSet(folder)):
-                carried_out += [(segment.plan, [action for action, _ in segment.steps]) for segment in segments]
-        self._orders = SyntheticPlans(carried_out)
-        for what, pool in (("question", self._questions), ("history", self._windows), ("plan", self._orders)):
+            samples = find_samples({"data": str(folder), "context": "clues"})
+            self._questions += self._without_skipped(question_sequences(encoder, samples, window_tokens))
+            for segments in self._read_histories(NiehSet(folder)):
+                recorded += [(segment.plan, [action for action, _ in segment.steps]) for segment in segments]
+        self._synthetic = SyntheticPlans(recorded)
+        for what, pool in (("question", self._questions), ("history", self._windows), ("plan", self._synthetic)):
             if not pool:
                 raise DataError(f"{', '.join(map(str, folders))}: no {what} to learn from; give another set")
         counts = dataset.shown.sum(0).tolist()
-        often = {name: count for name, count in zip(dataset.types, counts, strict=True) if count >= _LEAST_SEEN}
-        self._names, self._weights = list(often), list(often.values())
+        frequent = {name: count for name, count in zip(dataset.types, counts, strict=True) if count >= _LEAST_FRAMES}
+        self._names, self._weights = list(frequent), list(frequent.values())
 
-    def _histories(self, data: NiehSet) -> Iterator[list[PlanSegment]]:
-        """Read the histories of a set; one that cannot be read is left out."""
+    def _read_histories(self, data: NiehSet) -> Iterator[list[PlanSegment]]:
+        """Read the histories of a set, skipping those that cannot be read."""
         for name in trajectory_names(data):
             try:
                 _, segments = read_history(data, name)
-                cut = [*windows(self._encoder, name, segments, self._limit)]
-                alone = [*single_plans(self._encoder, name, segments)]
+                history_windows = [*windows(self._encoder, name, segments, self._limit)]
+                plans = [*single_plans(self._encoder, name, segments)]
             except DataError as error:
-                self.left_out.append(SkippedItem(name, str(error)))
+                self.skipped.append(SkippedItem(name, str(error)))
                 continue
-            self._windows += self._kept(cut)
-            self._plans += [plan for plan in alone if plan.n_tokens <= self._limit]
+            self._windows += self._without_skipped(history_windows)
+            self._single_plans += [plan for plan in plans if plan.n_tokens <= self._limit]
             yield segments
 
-    def _kept(self, made: Iterable[TrainingSequence | SkippedItem]) -> Iterator[TrainingSequence]:
-        for item in made:
+    def _without_skipped(self, items: Iterable[TrainingSequence | SkippedItem]) -> Iterator[TrainingSequence]:
+        for item in items:
             if isinstance(item, TrainingSequence):
                 yield item
             else:
-                self.left_out.append(item)
+                self.skipped.append(item)
 
-    def questions(self, n: int, made_up: float) -> list[TrainingSequence]:
-        """Some questions with their answers, a share of them made up."""
+    def questions(self, n: int, synthetic_share: float) -> list[TrainingSequence]:
+        """Return random questions with their answers, of which an expected share is synthetic."""
         return [
-            self._presence() if self._draw.random() < made_up else self._draw.choice(self._questions) for _ in range(n)
+            self._presence_question() if self._rng.random() < synthetic_share else self._rng.choice(self._questions)
+            for _ in range(n)
         ]
 
-    def histories(self, n_windows: int, n_plans: int, alone: float) -> list[TrainingSequence]:
-        """Some histories with their actions.
+    def histories(self, n_windows: int, n_plans: int, single_plan_share: float) -> list[TrainingSequence]:
+        """Return random histories with their actions: either windows or single plans.
 
         Args:
-            n_windows: this many windows,
-            n_plans: or this many single plans,
-            alone: with this probability.
+            n_windows: number of windows.
+            n_plans: number of single plans.
+            single_plan_share: probability of single plans.
         """
-        pool, n = (self._plans, n_plans) if self._draw.random() < alone else (self._windows, n_windows)
-        return [self._draw.choice(pool) for _ in range(n)]
+        is_single = self._rng.random() < single_plan_share
+        pool, n = (self._single_plans, n_plans) if is_single else (self._windows, n_windows)
+        return [self._rng.choice(pool) for _ in range(n)]
 
-    def orders(self, n: int) -> list[TrainingSequence]:
-        """Some plans that are made up, without a frame, with their actions."""
-        return [self._encoder.order("made up", *self._orders.drawn(self._draw)) for _ in range(n)]
+    def synthetic_plans(self, n: int) -> list[TrainingSequence]:
+        """Return random synthetic plans with their actions, without frames."""
+        return [self._encoder.text_plan("synthetic", *self._synthetic.sample(self._rng)) for _ in range(n)]
 
     def frames(self, n: int) -> list[int]:
-        """Places of some frames in the album."""
-        return self._draw.sample(range(len(self._album.frames)), min(n, len(self._album.frames)))
+        """Return the indices of random frames in the dataset."""
+        return self._rng.sample(range(len(self._dataset.frames)), min(n, len(self._dataset.frames)))
 
-    def way(self, n_spellings: int) -> int:
-        """One of the ways of writing names."""
-        return self._draw.randrange(n_spellings)
+    def spelling(self, n_spellings: int) -> int:
+        """Return the index of a random spelling of names."""
+        return self._rng.randrange(n_spellings)
 
-    def _presence(self) -> TrainingSequence:
-        """A question for an object's presence on one frame; the name tells nothing of the answer.
+    def _presence_question(self) -> TrainingSequence:
+        """Return a question for the presence of an object in one frame.
 
-        Names are drawn as often as frames show them, for yes as for no.
+        Names are sampled by the number of frames that show them, for "yes" as for "no", so that the name does not give
+        away the answer.
         """
-        is_there = self._draw.random() < 0.5
-        for _ in range(_TRIES):
-            (name,) = self._draw.choices(self._names, self._weights)
-            place = self._draw.randrange(len(self._album.frames))
-            kind = self._album.types.index(name)
-            if (self._album.shown if is_there else 1 - self._album.present)[place, kind]:
+        is_present = self._rng.random() < 0.5
+        for _ in range(_MAX_TRIES):
+            (name,) = self._rng.choices(self._names, self._weights)
+            index = self._rng.randrange(len(self._dataset.frames))
+            column = self._dataset.types.index(name)
+            if (self._dataset.shown if is_present else 1 - self._dataset.present)[index, column]:
                 break
         words = noun(name)
-        text = self._draw.choice(_FORMS).format(with_article(words), words)
-        asked = question_text(CONTEXTS["clues"].intro, Question("", text, (), ()))
-        parts: list[Part] = [self._album.frames[place], asked]
-        return self._encoder.answer("made up", parts, "yes" if self._album.shown[place, kind] else "no")
+        text = self._rng.choice(_QUESTIONS).format(with_article(words), words)
+        prompt = question_text(CONTEXTS["clues"].intro, Question("", text, (), ()))
+        parts: list[Part] = [self._dataset.frames[index], prompt]
+        return self._encoder.answer("synthetic", parts, "yes" if self._dataset.shown[index, column] else "no")

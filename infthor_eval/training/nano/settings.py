@@ -1,30 +1,30 @@
-"""What the small model is made by."""
+"""Recipe of the small model."""
 
 import msgspec
 
-__all__ = ["NanoRecipe", "Scenes"]
+__all__ = ["NanoRecipe", "SceneSettings"]
 
 _COUNTS = (
-    "seeing_steps",
-    "reading_steps",
-    "telling_steps",
+    "vision_steps",
+    "text_steps",
+    "joint_steps",
     "frames_per_step",
-    "orders_read",
+    "text_plans_per_step",
     "questions_per_step",
     "windows_per_step",
     "plans_per_step",
-    "orders_per_step",
+    "joint_text_plans_per_step",
 )
 
 
-class Scenes(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """The procedural scenes that it is trained in.
+class SceneSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Procedural scenes for training.
 
     Attributes:
-        kinds: of rooms.
-        first: number of the first scene of each kind; those that come with the package have lower ones.
+        kinds: kinds of rooms.
+        first: number of the first scene of each kind; the scenes of the bundled sets have lower numbers.
         count: scenes of each kind.
-        min_steps: of a trajectory, at least.
+        min_steps: fewest steps of a trajectory.
     """
 
     kinds: tuple[str, ...] = ("kitchen", "living-room", "bedroom", "bathroom")
@@ -34,75 +34,76 @@ class Scenes(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of all of them."""
+        """Names of all scenes."""
         return tuple(f"{kind}-{self.first + at}" for kind in self.kinds for at in range(self.count))
 
 
 class NanoRecipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """How the small model is trained: it learns to see, to read, then to answer and to act.
+    """Training of the small model in three stages: vision, then text, then both together.
 
     Attributes:
-        architecture: marks the recipe.
-        title: what it is, in one line.
-        scenes: where its data is made, if none is given.
-        hidden: width of tower and decoder.
-        layers: of each.
-        seeing_steps: in which it learns which objects are in which part of a frame, by their names' embeddings.
-        reading_steps: in which it learns to do what the words of a plan say, from plans that are made up, without a
-            frame; its tower stays as it is from here on.
-        telling_steps: in which it learns to answer questions and to act.
-        frames_per_step: while it learns to see.
-        orders_read: plans that are made up, in each step of reading.
-        questions_per_step: while it learns to answer.
-        made_up: share of these that ask for the presence of an object in any frame.
-        windows_per_step: histories that it learns to act from, in a step of these.
-        window_tokens: of each of them at most.
-        alone: share of the steps in which it learns from single plans of histories instead.
-        plans_per_step: how many these are.
-        orders_per_step: plans that are made up, while it learns to answer.
-        orders_weight: of these beside the histories.
-        lr: the highest learning rate.
-        weight_decay: of AdamW.
-        seeing_weight: of what is seen beside what is read or told.
-        threads: of torch; another number rounds otherwise.
-        seed: of everything that is random.
+        architecture: marks the recipe as one of the small model.
+        title: description in one line.
+        scenes: scenes to generate data in if no data are given.
+        hidden: width of vision tower and decoder.
+        layers: layers of each.
+        vision_steps: steps of the first stage, in which the tower learns which objects are in which part of a frame,
+            by the embeddings of their names.
+        text_steps: steps of the second stage, in which the decoder learns to act by the words of synthetic plans
+            without frames. The tower is frozen from here on.
+        joint_steps: steps of the third stage, in which the decoder learns to answer questions and to act.
+        frames_per_step: frames in each step of the first stage.
+        text_plans_per_step: synthetic plans in each step of the second stage.
+        questions_per_step: questions in each step of the third stage.
+        synthetic_questions: share of these that are synthetic questions for the presence of an object in any frame.
+        windows_per_step: windows of histories in a step of the third stage.
+        window_tokens: most tokens of a window.
+        single_plan_share: share of the steps of the third stage with single plans of histories instead of windows.
+        plans_per_step: single plans in such a step.
+        joint_text_plans_per_step: synthetic plans in each step of the third stage.
+        text_plans_weight: weight of the loss on these.
+        lr: highest learning rate.
+        weight_decay: weight decay of AdamW.
+        vision_weight: weight of the first stage's loss in the other stages.
+        threads: torch threads; another number rounds differently.
+        seed: seed of everything that is random.
     """
 
     architecture: str = "nano"
     title: str
-    scenes: Scenes = Scenes()
+    scenes: SceneSettings = SceneSettings()
     hidden: int = 128
     layers: int = 4
-    seeing_steps: int = 400
-    reading_steps: int = 200
-    telling_steps: int = 600
+    vision_steps: int = 400
+    text_steps: int = 200
+    joint_steps: int = 600
     frames_per_step: int = 64
-    orders_read: int = 96
+    text_plans_per_step: int = 96
     questions_per_step: int = 40
-    made_up: float = 0.4
+    synthetic_questions: float = 0.4
     windows_per_step: int = 1
     window_tokens: int = 2048
-    alone: float = 0.5
+    single_plan_share: float = 0.5
     plans_per_step: int = 12
-    orders_per_step: int = 24
-    orders_weight: float = 0.5
+    joint_text_plans_per_step: int = 24
+    text_plans_weight: float = 0.5
     lr: float = 1.5e-3
     weight_decay: float = 0.05
-    seeing_weight: float = 0.1
+    vision_weight: float = 0.1
     threads: int = 2
     seed: int = 0
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be.
+        """Check the ranges of all settings.
 
         Raises:
-            ValueError: names the setting.
+            ValueError: a value is out of its range; the message names the setting.
         """
         for name in _COUNTS:
             if getattr(self, name) < 1:
-                raise ValueError(f"{name} is {getattr(self, name)}; it is at least 1")
+                raise ValueError(f"{name} is {getattr(self, name)}; use 1 or more")
         if self.hidden % 32:
-            raise ValueError(f"hidden is {self.hidden}; it is a multiple of 32")
-        for name in ("made_up", "alone"):
+            raise ValueError(f"hidden is {self.hidden}; use a multiple of 32")
+        for name in ("synthetic_questions", "single_plan_share"):
             if not 0 <= getattr(self, name) <= 1:
-                raise ValueError(f"{name} is {getattr(self, name)}; it is between 0 and 1")
+                raise ValueError(f"{name} is {getattr(self, name)}; use a number between 0 and 1")

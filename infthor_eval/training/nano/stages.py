@@ -1,4 +1,4 @@
-"""From sets to a small model that has learned to see, to answer and to act."""
+"""Training of the small model in three stages, from replayed sets to a loaded model."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -22,25 +22,25 @@ from model_adapters.hf.loaded import Loaded
 __all__ = ["NanoProgress", "train_small_model"]
 
 _WARM_UP = 50  # steps
-_LOWEST = 0.05  # of the learning rate, in the end
+_LOWEST = 0.05  # final learning rate as a share of the highest
 _BETAS = (0.9, 0.98)
 _CLIP = 1.0
-_FRAMES_BESIDE = 16  # of which it is asked what is to be seen, while it reads
+_TEXT_STAGE_FRAMES = 16  # frames for the vision loss in each step of the text stage
 
 
 @dataclass(frozen=True)
 class NanoProgress:
-    """A step that is done.
+    """A finished step.
 
     Attributes:
-        part: "see", "read" or "tell".
-        step: its number in the part, from 1 on.
-        n_steps: of the part.
-        loss: of what is seen, per frame; of what is read, per token; of answers and of actions, each per token,
-            together. In nats.
+        stage: "vision", "text" or "joint".
+        step: number of the step in the stage, from 1.
+        n_steps: steps of the stage.
+        loss: loss in nats: per frame in the vision stage, per token in the text stage, and in the joint stage the sum
+            of the losses per token of answers, of actions, and of weighted synthetic plans.
     """
 
-    part: str
+    stage: str
     step: int
     n_steps: int
     loss: float
@@ -49,22 +49,22 @@ class NanoProgress:
 def train_small_model(
     recipe: NanoRecipe,
     folders: Sequence[Path],
-    watcher: Callable[[NanoProgress], None],
-    say: Callable[[str], None] = lambda _: None,
+    on_step: Callable[[NanoProgress], None],
+    print_note: Callable[[str], None] = lambda _: None,
 ) -> Loaded:
     """Train the small model on replayed sets.
 
     Args:
-        recipe: how.
-        folders: of the sets, with trajectories and questions.
-        watcher: is told of every step.
-        say: is told what no sequence could be made of.
+        recipe: recipe of the training.
+        folders: folders of the sets, with trajectories and questions.
+        on_step: called after every step.
+        print_note: called with a line for each reason for which items were skipped.
 
     Returns:
-        The model, to be exported; its weights are rounded to bfloat16.
+        The trained model with weights rounded to bfloat16.
 
     Raises:
-        DataError: a set cannot be read, or there is nothing in them to learn from.
+        DataError: a set cannot be read, or has no data for one of the stages.
     """
     torch.set_num_threads(recipe.threads)
     torch.manual_seed(recipe.seed)
@@ -72,80 +72,92 @@ def train_small_model(
     loaded = build_untrained(recipe, corpus_texts(folders, dataset.types), [question_intro()])
     network = NanoNetwork(loaded, dataset)
     sampler = SequenceSampler(Encoder(loaded), folders, dataset, window_tokens=recipe.window_tokens, seed=recipe.seed)
-    for _, reason, n in count_reasons(("", item.reason) for item in sampler.left_out):
-        say(f"{n} left out: {reason}")
-    trainer = _StageTrainer(recipe, network, sampler)
+    for _, reason, n in count_reasons(("", item.reason) for item in sampler.skipped):
+        print_note(f"{n} skipped: {reason}")
+    trainer = _StageTrainer(recipe, network, sampler, on_step)
     network.train()
-    trainer.run("see", recipe.seeing_steps, trainer.see, watcher)
+    trainer.run("vision", recipe.vision_steps, trainer.vision_step)
     network.cache_features()
-    trainer.run("read", recipe.reading_steps, trainer.read, watcher)
-    trainer.run("tell", recipe.telling_steps, trainer.tell, watcher)
+    trainer.run("text", recipe.text_steps, trainer.text_step)
+    trainer.run("joint", recipe.joint_steps, trainer.joint_step)
     network.eval()
-    loaded.model.to(torch.bfloat16)  # half the file, and no answer hangs on what is rounded off
+    loaded.model.to(torch.bfloat16)  # halves the file; no answer of the bundled model depends on the rounding
     return loaded
 
 
 class _StageTrainer:
-    """The steps of all parts."""
+    """Steps of all stages, with one optimizer."""
 
-    def __init__(self, recipe: NanoRecipe, network: NanoNetwork, sampler: SequenceSampler) -> None:
+    def __init__(
+        self,
+        recipe: NanoRecipe,
+        network: NanoNetwork,
+        sampler: SequenceSampler,
+        on_step: Callable[[NanoProgress], None],
+    ) -> None:
         self._recipe = recipe
         self._network = network
-        self._lessons = sampler
-        self._trained = list(network.parameters())
-        groups = decay_groups(self._trained, recipe.weight_decay)
+        self._sampler = sampler
+        self._on_step = on_step
+        self._parameters = list(network.parameters())
+        groups = decay_groups(self._parameters, recipe.weight_decay)
         self._optimizer = torch.optim.AdamW(groups, lr=recipe.lr, betas=_BETAS)
 
-    def run(
-        self,
-        part: str,
-        n_steps: int,
-        step: Callable[[], tuple[Tensor, Tensor]],
-        watcher: Callable[[NanoProgress], None],
-    ) -> None:
-        """Make the steps of one part, at a learning rate that rises, and falls along a cosine."""
+    def run(self, stage: str, n_steps: int, compute: Callable[[], tuple[Tensor, Tensor]]) -> None:
+        """Run the steps of one stage with a linear warm-up and a cosine decay of the learning rate.
+
+        Args:
+            stage: name of the stage.
+            n_steps: steps of the stage.
+            compute: computes the loss of a step, and the part of it to report.
+        """
         for number in range(n_steps):
-            rise = min(1.0, (number + 1) / _WARM_UP)
-            fall = _LOWEST + (1 - _LOWEST) * 0.5 * (1 + math.cos(math.pi * number / n_steps))
+            warm_up = min(1.0, (number + 1) / _WARM_UP)
+            decay = _LOWEST + (1 - _LOWEST) * 0.5 * (1 + math.cos(math.pi * number / n_steps))
             for group in self._optimizer.param_groups:
-                group["lr"] = self._recipe.lr * rise * fall
-            loss, told = step()
+                group["lr"] = self._recipe.lr * warm_up * decay
+            loss, reported = compute()
             self._optimizer.zero_grad()
             loss.backward()
-            torch.nn.utils.clip_grad_norm_(self._trained, _CLIP)
+            torch.nn.utils.clip_grad_norm_(self._parameters, _CLIP)
             self._optimizer.step()
-            watcher(NanoProgress(part, number + 1, n_steps, told.item()))
+            self._on_step(NanoProgress(stage, number + 1, n_steps, reported.item()))
 
-    def see(self) -> tuple[Tensor, Tensor]:
-        """What is in some frames."""
-        places = self._lessons.frames(self._recipe.frames_per_step)
-        loss = self._seen(self._network.frame_features(places), places)
+    def vision_step(self) -> tuple[Tensor, Tensor]:
+        """Return the vision loss of some frames."""
+        indices = self._sampler.frames(self._recipe.frames_per_step)
+        loss = self._vision_loss(self._network.frame_features(indices), indices)
         return loss, loss.detach()
 
-    def read(self) -> tuple[Tensor, Tensor]:
-        """Orders; and some frames, as the names' embeddings learn here and are not to leave what they look like."""
-        recipe, places = self._recipe, self._lessons.frames(_FRAMES_BESIDE)
-        loss = self._told(self._lessons.orders(recipe.orders_read))
-        return loss + recipe.seeing_weight * self._seen(self._network.frame_features(places), places), loss.detach()
+    def text_step(self) -> tuple[Tensor, Tensor]:
+        """Return the loss of synthetic plans, plus that of some frames.
 
-    def tell(self) -> tuple[Tensor, Tensor]:
-        """Answers and actions, which count alike, though histories have most of the tokens; and orders beside them.
+        The embeddings of names change in this stage; the vision loss keeps them close to the features of the objects.
+        """
+        recipe, indices = self._recipe, self._sampler.frames(_TEXT_STAGE_FRAMES)
+        loss = self._token_loss(self._sampler.synthetic_plans(recipe.text_plans_per_step))
+        vision_loss = self._vision_loss(self._network.frame_features(indices), indices)
+        return loss + recipe.vision_weight * vision_loss, loss.detach()
 
-        What is in the questions' frames is asked too, as in reading.
+    def joint_step(self) -> tuple[Tensor, Tensor]:
+        """Return the loss of questions, histories and synthetic plans, plus that of the questions' frames.
+
+        Answers and actions have the same weight, though most tokens are actions.
         """
         recipe = self._recipe
-        answered = self._told(self._lessons.questions(recipe.questions_per_step, recipe.made_up))
-        places, features = self._network.last_frames
-        acted = self._told(self._lessons.histories(recipe.windows_per_step, recipe.plans_per_step, recipe.alone))
-        ordered = self._told(self._lessons.orders(recipe.orders_per_step))
-        loss = answered + acted + recipe.orders_weight * ordered
-        return loss + recipe.seeing_weight * self._seen(features, places), loss.detach()
+        answers = self._token_loss(self._sampler.questions(recipe.questions_per_step, recipe.synthetic_questions))
+        indices, features = self._network.last_frames
+        histories = self._sampler.histories(recipe.windows_per_step, recipe.plans_per_step, recipe.single_plan_share)
+        actions = self._token_loss(histories)
+        text_plans = self._token_loss(self._sampler.synthetic_plans(recipe.joint_text_plans_per_step))
+        loss = answers + actions + recipe.text_plans_weight * text_plans
+        return loss + recipe.vision_weight * self._vision_loss(features, indices), loss.detach()
 
-    def _seen(self, features: Tensor, places: Sequence[int]) -> Tensor:
-        return self._network.vision_loss(features, places, self._lessons.way(self._network.n_spellings))
+    def _vision_loss(self, features: Tensor, indices: Sequence[int]) -> Tensor:
+        return self._network.vision_loss(features, indices, self._sampler.spelling(self._network.n_spellings))
 
-    def _told(self, sequences: Sequence[TrainingSequence]) -> Tensor:
-        """Loss of some sequences, by token."""
+    def _token_loss(self, sequences: Sequence[TrainingSequence]) -> Tensor:
+        """Return the mean loss per token of some sequences."""
         batch = collate(sequences, self._network.family, pad_id=0)
         loss: Tensor = self._network(**batch)["loss"]
         return loss
