@@ -145,7 +145,7 @@ class ContextParallel:
         sliding_window: int | None = None,
         **_: Any,
     ) -> tuple[Tensor, None]:
-        """Compute causal attention of this rank's queries to the whole sequence; transformers' decoder layers call this.
+        """Compute causal attention of this rank's queries to the whole sequence, as a transformers attention function.
 
         Args:
             module: attention module of the layer.

@@ -151,7 +151,8 @@ def _arguments(recipe: Recipe, out: Path, network: SequenceModel) -> transformer
     if recipe.sequences_per_step % n_processes:
         least = math.ceil(recipe.sequences_per_step / n_processes) * n_processes
         raise UsageError(
-            f"sequences_per_step is {recipe.sequences_per_step} for {n_processes} processes; set it to a multiple ({least})"
+            f"sequences_per_step={recipe.sequences_per_step} is not a multiple of the {n_processes} processes; "
+            f"set it to {least}"
         )
     arguments.gradient_accumulation_steps = recipe.sequences_per_step // n_processes
     return arguments
