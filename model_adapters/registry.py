@@ -71,7 +71,7 @@ def name_on_engine(name: str, engine: str) -> str:
         return name
     supported = [known.removesuffix(f"@{engine}") for known in names() if known.endswith(f"@{engine}")]
     if model not in supported:
-        raise UsageError(f"{model} does not run on {engine}; there do: {', '.join(supported)}")
+        raise UsageError(f"{model} does not run on {engine}; these do: {', '.join(supported)}")
     return f"{model}@{engine}"
 
 

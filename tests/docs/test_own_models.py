@@ -71,7 +71,7 @@ def test_the_table_of_checks_has_all_of_them():
 
 def test_the_table_of_capabilities_has_all_of_them_with_their_defaults():
     page = (ROOT / "docs/own-models.md").read_text()
-    assert rows("What it can do") == [item.name for item in dataclasses.fields(Capabilities)]
+    assert rows("What it supports") == [item.name for item in dataclasses.fields(Capabilities)]
     for item in dataclasses.fields(Capabilities):
         assert f"| `{item.name}` | `{item.default}` |" in page
 
@@ -101,7 +101,7 @@ def test_a_broken_clause_and_an_exception_are_reported_with_the_others(folder, r
     source.write_text(
         source.read_text()
         .replace("return Reply(text if", "return Reply('same' if")
-        .replace('asked = "".join(', 'asked = None + "".join(')
+        .replace('question = "".join(', 'question = None + "".join(')
     )
     code, out, err = run("check-adapter", NAME)
     assert (code, err) == (1, "")
@@ -137,7 +137,7 @@ def test_an_incomplete_adapter_is_refused_by_a_run_in_one_line(folder, run, edit
 
 def test_an_error_in_an_adapter_says_where_and_keeps_its_traceback(folder, run):
     source = folder / "my_adapter.py"
-    source.write_text(source.read_text().replace('asked = "".join(', 'asked = None + "".join('))
+    source.write_text(source.read_text().replace('question = "".join(', 'question = None + "".join('))
     code, _, err = run("--model", NAME, "--tasks", "nieh_mini_gt", "--limit", 2)
     assert code == 1
     assert "Brightness fails on the request (TypeError in my_adapter.py:" in err
