@@ -57,8 +57,8 @@ class NiehSet:
         simulator: simulator that rendered the frames ("embedded", "unity"), or None if the set does not say.
     """
 
-    def __init__(self, root: Path, trajectories: Path | None = None) -> None:
-        """Read the questions of the set in `root`.
+    def __init__(self, root: Path, trajectories: Path | None = None, *, needs_questions: bool = True) -> None:
+        """Read the questions of the set in `root`, which may have none if they are not needed.
 
         Raises:
             DataError: a folder or file is missing, the set has another format version, or a question file is
@@ -68,7 +68,7 @@ class NiehSet:
             raise DataError(f"{root}: no such folder; {_GIVE_A_SET}")
         self.root = root
         self._files = sorted(root.glob("qa_set*.csv"))
-        if not self._files:
+        if needs_questions and not self._files:
             raise DataError(f"{root}: has no qa_set*.csv, as an NIEH set has beside metadata/; {_GIVE_A_SET}")
         if not (root / "metadata").is_dir():
             raise DataError(f"{root}: has no metadata/; unpack the set's metadata.tar there")

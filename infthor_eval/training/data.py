@@ -72,7 +72,9 @@ def read_training_data(recipe: Recipe, encoder: Encoder, folders: Sequence[Path]
 def _read_set(recipe: Recipe, encoder: Encoder, folder: Path) -> Iterator[TrainingSequence | SkippedItem]:
     if recipe.actions is not None:
         yield from _sample_share(
-            action_sequences(NiehSet(folder), encoder, recipe.max_tokens), recipe.actions.share, recipe.seed
+            action_sequences(NiehSet(folder, needs_questions=False), encoder, recipe.max_tokens),
+            recipe.actions.share,
+            recipe.seed,
         )
     if recipe.questions is not None:
         settings = {"seed": recipe.seed} | recipe.questions.settings | {"data": str(folder)}

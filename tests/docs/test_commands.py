@@ -17,7 +17,7 @@ from model_adapters import has_option, is_known, name_on_engine, names
 from .blocks import ROOT, written_files
 from .commands import CANNOT_RUN, FLOOR_PLANS, SLOW, Command, command_blocks
 
-RUN_PAGES = ("README.md", "docs/tutorial.md", "docs/own-models.md", "docs/own-tasks.md")
+RUN_PAGES = ("README.md", "docs/tutorial.md", "docs/own-models.md", "docs/own-tasks.md", "docs/training.md")
 PAGES = sorted(
     str(path.relative_to(ROOT))
     for path in (*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("examples/**/*.md"))

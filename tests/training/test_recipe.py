@@ -1,9 +1,13 @@
-"""Recipes: those of the package are the paper's."""
+"""Recipes: those of the package are the paper's, and their models can be replaced."""
+
+import shutil
 
 import pytest
 
 from infthor_eval.errors import UsageError
+from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.published import published_tables
+from infthor_eval.formats.qa_csv import write_questions
 from infthor_eval.training.recipe import read_recipe, recipe_names
 
 
@@ -29,3 +33,30 @@ def test_settings_are_changed_by_their_dotted_names():
 def test_an_unknown_recipe_is_told_with_the_nearest():
     with pytest.raises(UsageError, match="infthor_32k"):
         read_recipe("infthor_32")
+
+
+@pytest.mark.parametrize("name", ["infthor_32k", "questions"])
+def test_model_options_of_a_recipe_apply_to_its_own_model_alone(name):
+    own = read_recipe(name).model
+    other = read_recipe(name, {"model": "qwen2.5-vl-tiny", "model_args.dtype": "float32"})
+    assert (other.model, other.model_args) == ("qwen2.5-vl-tiny", {"dtype": "float32"})
+    assert read_recipe(name, {"model": own}).model_args == read_recipe(name).model_args
+    same = read_recipe(name, {"model": own, "model_args.dtype": "float32"}).model_args
+    assert same == {**read_recipe(name).model_args, "dtype": "float32"}
+
+
+@pytest.mark.parametrize("name", ["infthor_32k", "questions"])
+def test_train_takes_another_model_than_the_recipes(name, bundled_set, tmp_path, run):
+    data = tmp_path / "set"
+    shutil.copytree(bundled_set / "metadata/bedroom-1-seed7", data / "metadata/bedroom-1-seed7")
+    questions = [item for item in NiehSet(bundled_set).questions if item.traj_id == "bedroom-1-seed7"]
+    if name == "questions":  # trajectories alone are enough for the others
+        write_questions(data / "qa_set_small.csv", questions[:3])
+    code, _, err = run(
+        *("train", "--recipe", name, "--data", data, "--out", tmp_path / "out", "--model", "qwen2.5-vl-tiny"),
+        *("--model-args", "dtype=float32", "--set", "max_steps=1", "--set", "sequences_per_step=1"),
+        *("--set", "max_tokens=4000"),
+    )
+    assert code == 0, err
+    assert (tmp_path / "out/checkpoint/model.safetensors").is_file()
+    assert "%|" not in err  # no progress bar of transformers

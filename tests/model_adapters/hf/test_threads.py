@@ -1,0 +1,94 @@
+"""Tiny and small models compute on one torch thread; other models and the process keep theirs."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+import torch
+
+from infthor_eval.errors import UsageError
+from infthor_eval.formats.frames import FrameRef
+from model_adapters import Part, load, options
+from model_adapters.hf.threads import torch_threads
+
+from ..asking import up_to
+
+
+@pytest.fixture(autouse=True)
+def two_threads() -> Iterator[None]:
+    """A process with two torch threads."""
+    before = torch.get_num_threads()
+    torch.set_num_threads(2)
+    yield
+    torch.set_num_threads(before)
+
+
+def _threads_of(network: torch.nn.Module, use: Any) -> set[int]:
+    counts = set()
+    hooks = [
+        part.register_forward_pre_hook(lambda *_: counts.add(torch.get_num_threads())) for part in network.modules()
+    ]
+    use()
+    for hook in hooks:
+        hook.remove()
+    return counts
+
+
+@pytest.mark.parametrize(
+    ("name", "given", "expected"),
+    [
+        ("qwen2.5-vl-tiny", {}, 1),
+        ("qwen2.5-vl-tiny", {"threads": "2"}, 2),
+        ("qwen2.5-vl-tiny", {"threads": "none"}, 2),
+        ("qwen2.5-vl-nano", {}, 1),
+        ("llava-onevision-tiny", {}, 1),
+    ],
+)
+def test_a_model_computes_on_its_threads(
+    name: str, given: dict[str, str], expected: int, frames: list[FrameRef]
+) -> None:
+    model: Any = load(name, given, seed=0)
+
+    def use() -> None:
+        parts: tuple[Part, ...] = (frames[0], "\nWhat is it?")
+        talk = model.conversation()
+        talk.append(*parts)
+        assert talk.n_tokens
+        talk.reply(up_to(2))
+        model.tokens_per_frame(frames[1])
+
+    assert _threads_of(model.loaded.model, use) == {expected}
+    assert torch.get_num_threads() == 2
+
+
+@pytest.mark.parametrize(
+    ("name", "given", "expected"), [("openvla-tiny", {}, 1), ("spatialvla-tiny", {"threads": "2"}, 2)]
+)
+def test_a_policy_acts_on_its_threads(name: str, given: dict[str, str], expected: int, frames: list[FrameRef]) -> None:
+    policy: Any = load(name, given, seed=0)
+    threads = _threads_of(policy._network.weights, lambda: policy.act(frames[0], "pick up the mug"))
+    assert threads == {expected}
+    assert torch.get_num_threads() == 2
+
+
+def test_replies_do_not_depend_on_the_number_of_threads(frames: list[FrameRef]) -> None:
+    replies = []
+    for threads in ("1", "2"):
+        model: Any = load("qwen2.5-vl-nano", {"threads": threads}, seed=0)
+        talk = model.conversation()
+        talk.append(*frames, "\nHave you seen a mug?")
+        replies.append(talk.reply(up_to(8)))
+    assert replies[0] == replies[1]
+
+
+def test_other_models_take_the_threads_of_the_process_unless_they_are_given_some() -> None:
+    assert "threads=none" in options("qwen2.5-vl")
+    assert "threads=1" in options("qwen2.5-vl-tiny")
+    with torch_threads(None):
+        assert torch.get_num_threads() == 2
+    with pytest.raises(ZeroDivisionError), torch_threads(1):
+        assert torch.get_num_threads() == 1
+        raise ZeroDivisionError
+    assert torch.get_num_threads() == 2
+    with pytest.raises(UsageError, match="threads=0 is not from 1 to 1024"):
+        load("qwen2.5-vl-tiny", {"threads": "0"}, seed=0)
