@@ -10,8 +10,8 @@ from infthor_eval.errors import DataError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.step_log import Step
 from infthor_eval.formats.trajectory import Trajectory
-from infthor_eval.plans.segments import PlanSegment, segment_parts, restart_at
 from infthor_eval.plans.plan import plans_of, tasks_of
+from infthor_eval.plans.segments import PlanSegment, restart_at, segment_parts
 from infthor_eval.training.encoding import Encoder, SkippedItem, TrainingSequence
 from model_adapters.hf.prompt import n_tokens
 

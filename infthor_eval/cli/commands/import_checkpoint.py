@@ -35,7 +35,6 @@ def command(folder: Path, model: str, model_args: str, out: Path) -> int:
     loaded = load_starting_model(model, parse_model_args(model_args), "plain", seed=0)
     weights = import_weights(loaded, folder)
     export(loaded, out)
-    print_line(
-        f"{weights.n_imported} weights imported, {weights.n_kept} kept, {weights.n_ignored} other tensors ignored: {out}"
-    )
+    counts = f"{weights.n_imported} weights imported, {weights.n_kept} kept, {weights.n_ignored} other tensors ignored"
+    print_line(f"{counts}: {out}")
     return 0

@@ -8,7 +8,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Sequence
 
 from infthor_eval.plans.habits import fill_action, open_action
-from infthor_eval.plans.script import replace_objects, read_plan
+from infthor_eval.plans.script import read_plan, replace_objects
 
 __all__ = ["SyntheticPlans"]
 
