@@ -30,7 +30,7 @@ from infthor_eval.training.context_parallel import context_parallel
 from infthor_eval.training.encoding import TrainingSequence
 from infthor_eval.training.network import SequenceModel, freeze
 from infthor_eval.training.ranks import assign_ranks
-from model_adapters.hf.loaded import Loaded
+from model_adapters.hf.loaded import LoadedCheckpoint
 from model_adapters.hf.prompt import Prompter
 from model_adapters.options.tiny import TinyOptions
 from model_adapters.tiny.qwen2_5_vl import Qwen25VLTiny
@@ -115,7 +115,7 @@ def step(model: SequenceModel, batch: Batch, group: Any) -> tuple[float, float]:
     return sum(kept.values()) / 1e6, loss.item()
 
 
-def batch_of(loaded: Loaded, folder: Path, n_tokens: int) -> Batch:
+def batch_of(loaded: LoadedCheckpoint, folder: Path, n_tokens: int) -> Batch:
     """A sequence of this length, frames between stretches of text."""
     prompter = Prompter(loaded.tokenizer, loaded.template, loaded.family)
     frames = [prompter.frame(FrameRef(folder / f"{number}.png")) for number in range(N_FRAMES)]

@@ -11,7 +11,7 @@ from infthor_eval.errors import DataError
 from infthor_eval.household.sequence_text import ACT, action_part, plan_part
 from infthor_eval.plans.segments import PlanSegment, segment_parts
 from model_adapters import Part, Turn
-from model_adapters.hf.loaded import Loaded
+from model_adapters.hf.loaded import LoadedCheckpoint
 from model_adapters.hf.prompt import Frame, Piece, Prompter, n_tokens
 
 __all__ = ["Encoder", "SkippedItem", "TrainingSequence"]
@@ -67,7 +67,7 @@ class Encoder:
         loaded: the checkpoint; its template also renders prompts in evaluation.
     """
 
-    def __init__(self, loaded: Loaded) -> None:
+    def __init__(self, loaded: LoadedCheckpoint) -> None:
         self._tokenizer: Any = loaded.tokenizer
         self._prompter = Prompter(loaded.tokenizer, loaded.template, loaded.family)
         self._mark: int = loaded.tokenizer.convert_tokens_to_ids(ACT)

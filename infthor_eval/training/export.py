@@ -8,7 +8,7 @@ import torch
 from torch.distributed.tensor import DTensor
 
 from infthor_eval.errors import DataError, wrap_errors
-from model_adapters.hf.loaded import Loaded
+from model_adapters.hf.loaded import LoadedCheckpoint
 from model_adapters.hf.quiet import hide_transformers_output
 
 __all__ = ["export", "gather_weights"]
@@ -27,7 +27,7 @@ def gather_weights(model: torch.nn.Module) -> dict[str, torch.Tensor] | None:
     }
 
 
-def export(loaded: Loaded, folder: Path, weights: Mapping[str, torch.Tensor] | None = None) -> None:
+def export(loaded: LoadedCheckpoint, folder: Path, weights: Mapping[str, torch.Tensor] | None = None) -> None:
     """Write weights (safetensors), configs, tokenizer with its template, and image processor.
 
     The template is that of training, so that evaluation renders the same prompts.

@@ -27,7 +27,7 @@ from infthor_eval.training.ranks import assign_ranks
 from infthor_eval.training.recipe import Recipe
 from infthor_eval.training.starting_model import load_starting_model
 from infthor_eval.training.trainer import train_with_trainer
-from model_adapters.hf.loaded import Loaded
+from model_adapters.hf.loaded import LoadedCheckpoint
 
 __all__ = ["StepCallback", "TrainingRun", "fine_tune", "prepare_run"]
 
@@ -46,7 +46,7 @@ class TrainingRun:
     """
 
     recipe: Recipe
-    loaded: Loaded
+    loaded: LoadedCheckpoint
     data: TrainingData
 
     def document(self) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from torch.utils.checkpoint import checkpoint
 
 from infthor_eval.errors import ModelError, UsageError, unknown_name
 from infthor_eval.training.batches import IGNORED
-from model_adapters.hf.loaded import Loaded
+from model_adapters.hf.loaded import LoadedCheckpoint
 from model_adapters.hf.prompt import Frame
 
 __all__ = ["PARTS", "SequenceModel", "decay_groups", "freeze", "next_labels", "parameters_by_part"]
@@ -42,7 +42,7 @@ class SequenceModel(torch.nn.Module):
     # Tells transformers' Trainer that the loss is a sum over tokens divided by `num_items_in_batch`.
     accepts_loss_kwargs = True
 
-    def __init__(self, loaded: Loaded) -> None:
+    def __init__(self, loaded: LoadedCheckpoint) -> None:
         super().__init__()
         self.model: Any = loaded.model
         self.family = loaded.family

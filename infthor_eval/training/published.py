@@ -14,7 +14,7 @@ import torch.distributed.checkpoint as dcp
 from torch.distributed.checkpoint.metadata import TensorStorageMetadata
 
 from infthor_eval.errors import DataError, wrap_errors
-from model_adapters.hf.loaded import Loaded
+from model_adapters.hf.loaded import LoadedCheckpoint
 
 __all__ = ["ImportedWeights", "import_weights"]
 
@@ -36,7 +36,7 @@ class ImportedWeights:
     n_ignored: int
 
 
-def import_weights(loaded: Loaded, folder: Path) -> ImportedWeights:
+def import_weights(loaded: LoadedCheckpoint, folder: Path) -> ImportedWeights:
     """Load the weights of a distributed checkpoint into a model.
 
     The keys of all weights may have one common prefix ("model.", "app.model.").

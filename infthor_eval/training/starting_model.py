@@ -1,20 +1,19 @@
 """The model that training starts from, with the marks of sequences as tokens."""
 
 from collections.abc import Mapping
-from typing import Any
 
 import torch
 
 from infthor_eval.errors import UsageError
 from infthor_eval.household.sequence_text import MARKS
 from model_adapters import has_option, load
-from model_adapters.hf.loaded import Loaded
+from model_adapters.hf.loaded import LoadedCheckpoint
 from model_adapters.hf.model import TransformersModel
 
 __all__ = ["add_marks", "load_starting_model"]
 
 
-def load_starting_model(model: str, options: Mapping[str, str], prompt: str, seed: int) -> Loaded:
+def load_starting_model(model: str, options: Mapping[str, str], prompt: str, seed: int) -> LoadedCheckpoint:
     """Load a model and add the marks of sequences to its tokens.
 
     Args:
@@ -34,7 +33,7 @@ def load_starting_model(model: str, options: Mapping[str, str], prompt: str, see
     return loaded_model.loaded
 
 
-def add_marks(loaded: Loaded) -> None:
+def add_marks(loaded: LoadedCheckpoint) -> None:
     """Make every mark of a sequence a single token, in a fixed order.
 
     The embedding of a new token is the mean of all others: the published training freezes input embeddings, so an
@@ -50,11 +49,8 @@ def add_marks(loaded: Loaded) -> None:
     if len(loaded.tokenizer) > n_rows:
         model.resize_token_embeddings(len(loaded.tokenizer), mean_resizing=False)
     ids = loaded.tokenizer.convert_tokens_to_ids(new)
-    tables = {id(layer.weight): layer.weight for layer in _tables(model)}  # a single one if the head is tied
+    layers = (model.get_input_embeddings(), model.get_output_embeddings())
+    tables = {id(layer.weight): layer.weight for layer in layers if layer is not None}  # one if the head is tied
     with torch.no_grad():
         for weight in tables.values():
             weight[ids] = weight[: min(ids)].float().mean(dim=0).to(weight)
-
-
-def _tables(model: Any) -> list[Any]:
-    return [layer for layer in (model.get_input_embeddings(), model.get_output_embeddings()) if layer is not None]

@@ -23,7 +23,7 @@ from infthor_eval.formats.reading import require_plain_files
 from model_adapters.hf.decoding import read_generation
 from model_adapters.hf.family import Family, MakeFamily
 from model_adapters.hf.hub import fetch
-from model_adapters.hf.loaded import Loaded
+from model_adapters.hf.loaded import LoadedCheckpoint
 from model_adapters.hf.quiet import hide_transformers_output
 from model_adapters.hf.rope import apply_rope
 from model_adapters.hf.templates import chat_template, plain_template
@@ -81,7 +81,7 @@ def locate(options: R) -> LocatedCheckpoint[R]:
     return LocatedCheckpoint(folder, commit, config, options)
 
 
-def load_checkpoint(located: LocatedCheckpoint[CheckpointOptions], family: MakeFamily) -> Loaded:
+def load_checkpoint(located: LocatedCheckpoint[CheckpointOptions], family: MakeFamily) -> LoadedCheckpoint:
     """Load everything that a conversation needs, including the weights.
 
     Args:
@@ -97,7 +97,7 @@ def load_checkpoint(located: LocatedCheckpoint[CheckpointOptions], family: MakeF
 
 def read_checkpoint(
     located: LocatedCheckpoint[R], make_family: MakeFamily, build_model: Callable[[LocatedCheckpoint[R]], Any]
-) -> Loaded:
+) -> LoadedCheckpoint:
     """Load everything that a conversation needs.
 
     Args:
@@ -154,7 +154,7 @@ def assemble(
     family: Family,
     max_tokens: int | None,
     origin: Mapping[str, Any],
-) -> Loaded:
+) -> LoadedCheckpoint:
     """Combine loaded parts and derive their identity.
 
     Args:
@@ -182,7 +182,7 @@ def assemble(
         "chat_template": digest(template),
         "versions": versions(),
     }
-    return Loaded(
+    return LoadedCheckpoint(
         model=model.eval(),
         tokenizer=tokenizer,
         image_processor=image_processor,

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from infthor_eval.formats.frames import FrameRef
 from model_adapters.backend import BackendConversation
 from model_adapters.hf.limits import wrap_model_errors
-from model_adapters.hf.loaded import Loaded
+from model_adapters.hf.loaded import LoadedCheckpoint
 from model_adapters.hf.prompt import Piece, Prompter, n_tokens
 from model_adapters.hf.threads import torch_threads
 from model_adapters.protocols import Capabilities, Decoding, Reply, Turn
@@ -23,7 +23,7 @@ class CheckpointModel(ABC):
         threads: torch threads of its computations; torch's default where None.
     """
 
-    def __init__(self, name: str, loaded: Loaded, threads: int | None = None) -> None:
+    def __init__(self, name: str, loaded: LoadedCheckpoint, threads: int | None = None) -> None:
         self.name = name
         self._loaded = loaded
         self._threads = threads
@@ -35,7 +35,7 @@ class CheckpointModel(ABC):
         """Capabilities of the model."""
 
     @property
-    def loaded(self) -> Loaded:
+    def loaded(self) -> LoadedCheckpoint:
         """The checkpoint, for training."""
         return self._loaded
 

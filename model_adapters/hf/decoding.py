@@ -135,7 +135,7 @@ class ReplyState:
         if self._penalised_ids is not None:
             new = self._penalised_ids.new_full((1, 1), token)
             self._penalised_ids = torch.cat((self._penalised_ids, new), dim=-1)
-        self.done = len(self.ids) == self.decoding.max_new_tokens or self._is_complete()
+        self.done = len(self.ids) == self.decoding.max_new_tokens or self._ends_here()
 
     def _penalise(self, logits: torch.Tensor) -> torch.Tensor:
         """Return logits with those of earlier tokens lowered by transformers' repetition penalty."""
@@ -162,7 +162,7 @@ class ReplyState:
             rows = warp(cast(Any, None), cast(Any, rows))
         return int(torch.multinomial(rows[0].softmax(dim=-1), 1, generator=self._generator))
 
-    def _is_complete(self) -> bool:
+    def _ends_here(self) -> bool:
         return self._finished(self.ids) if self._choices is None else not self._choices.after(self.ids)
 
 

@@ -2,14 +2,14 @@
 
 from typing import Any
 
-from model_adapters.hf.loaded import Loaded
+from model_adapters.hf.loaded import LoadedCheckpoint
 from model_adapters.options.checkpoints import HfOptions
 from model_adapters.protocols import Capabilities
 
 __all__ = ["capabilities", "identity"]
 
 
-def capabilities(loaded: Loaded, options: HfOptions, batch_size: int) -> Capabilities:
+def capabilities(loaded: LoadedCheckpoint, options: HfOptions, batch_size: int) -> Capabilities:
     """Return the capabilities of a checkpoint under these options.
 
     Args:
@@ -27,7 +27,7 @@ def capabilities(loaded: Loaded, options: HfOptions, batch_size: int) -> Capabil
     )
 
 
-def identity(name: str, loaded: Loaded, options: HfOptions) -> dict[str, Any]:
+def identity(name: str, loaded: LoadedCheckpoint, options: HfOptions) -> dict[str, Any]:
     """Return what distinguishes this model under these options from others, as JSON values."""
     generation = loaded.generation
     return loaded.identity | {
@@ -44,6 +44,6 @@ def identity(name: str, loaded: Loaded, options: HfOptions) -> dict[str, Any]:
     }
 
 
-def _context_limit(loaded: Loaded, options: HfOptions) -> int | None:
+def _context_limit(loaded: LoadedCheckpoint, options: HfOptions) -> int | None:
     """Return the context limit of the options, else of the checkpoint, or None."""
     return (loaded.max_tokens if options.max_tokens is None else options.max_tokens) or None

@@ -6,11 +6,11 @@ from typing import Any
 from model_adapters.hf.decoding import Generation
 from model_adapters.hf.family import Family
 
-__all__ = ["Loaded"]
+__all__ = ["LoadedCheckpoint"]
 
 
 @dataclass(frozen=True)
-class Loaded:
+class LoadedCheckpoint:
     """A model with everything that is needed to run it.
 
     Attributes:

@@ -13,7 +13,7 @@ from model_adapters.hf.description import capabilities, identity
 from model_adapters.hf.embedding import Embedder
 from model_adapters.hf.features import FeatureCache
 from model_adapters.hf.limits import check_limit, wrap_memory_errors, wrap_model_errors
-from model_adapters.hf.loaded import Loaded
+from model_adapters.hf.loaded import LoadedCheckpoint
 from model_adapters.hf.prefix import Prefix
 from model_adapters.hf.prompt import Piece, n_common, n_tokens, token_ids
 from model_adapters.hf.replies import begin_reply, end_reply
@@ -37,7 +37,7 @@ class TransformersModel(CheckpointModel):
         options: inference options.
     """
 
-    def __init__(self, name: str, loaded: Loaded, options: HfOptions) -> None:
+    def __init__(self, name: str, loaded: LoadedCheckpoint, options: HfOptions) -> None:
         super().__init__(name, loaded, options.threads)
         self._options = options
         cache_bytes = options.feature_cache_mb * 2**20 if options.share_prefix else 0
@@ -97,9 +97,10 @@ class TransformersModel(CheckpointModel):
         if not self._options.share_prefix:
             self._prefix.reset()
         replies = [begin_reply(self._loaded, decoding, token_ids(prompt)) for prompt in prompts]
+        decode = self._decode_one if len(prompts) == 1 else self._decode_rows
         try:
             with wrap_model_errors(self.name), wrap_memory_errors(self.name, sum(map(n_tokens, prompts))):
-                n_cached = self._decode(prompts, replies)
+                n_cached = decode(prompts, replies)
         except ModelError:
             # After running out of memory, the next request needs all of it.
             self._prefix.reset()
@@ -110,11 +111,9 @@ class TransformersModel(CheckpointModel):
             for reply, prompt, cached in zip(replies, prompts, n_cached, strict=True)
         ]
 
-    def _decode(self, prompts: Sequence[Sequence[Piece]], replies: Sequence[ReplyState]) -> list[int]:
-        """Decode the replies; return how many tokens of each prompt were in the cache."""
-        return self._decode_one(prompts[0], replies[0]) if len(prompts) == 1 else self._decode_rows(prompts, replies)
-
-    def _decode_one(self, prompt: Sequence[Piece], reply: ReplyState) -> list[int]:
+    def _decode_one(self, prompts: Sequence[Sequence[Piece]], replies: Sequence[ReplyState]) -> list[int]:
+        """Decode a single reply; return how many tokens of the prompt were in the cache."""
+        (prompt,), (reply,) = prompts, replies
         shared = self._prefix.rewind_to(prompt)
         cached = self._prefix.n_tokens
         logits = self._prefix.feed(prompt[shared:], reserve=reply.decoding.max_new_tokens)
@@ -122,6 +121,7 @@ class TransformersModel(CheckpointModel):
         return [cached]
 
     def _decode_rows(self, prompts: Sequence[Sequence[Piece]], replies: Sequence[ReplyState]) -> list[int]:
+        """Decode several replies together; return how many tokens of each prompt were in the cache."""
         common = n_common(prompts)
         shared = min(self._prefix.rewind_to(prompts[0]), common)
         # The cached sequence may share more with the first prompt than all prompts share: rows copy the common part.

@@ -5,14 +5,14 @@ from typing import Any
 
 from model_adapters.hf.choices import read_choices
 from model_adapters.hf.decoding import ReplyState
-from model_adapters.hf.loaded import Loaded
+from model_adapters.hf.loaded import LoadedCheckpoint
 from model_adapters.protocols import Decoding, Reply
 from model_adapters.stopping import cut_at_stop
 
 __all__ = ["begin_reply", "end_reply", "reply_text", "stop_ids"]
 
 
-def begin_reply(loaded: Loaded, decoding: Decoding, context: Iterable[int]) -> ReplyState:
+def begin_reply(loaded: LoadedCheckpoint, decoding: Decoding, context: Iterable[int]) -> ReplyState:
     """Return an empty reply.
 
     Args:
@@ -34,7 +34,7 @@ def begin_reply(loaded: Loaded, decoding: Decoding, context: Iterable[int]) -> R
     return ReplyState(loaded.generation, decoding, context=context, choices=choices, finished=has_stopped)
 
 
-def end_reply(loaded: Loaded, state: ReplyState, n_context: int, n_cached: int) -> Reply:
+def end_reply(loaded: LoadedCheckpoint, state: ReplyState, n_context: int, n_cached: int) -> Reply:
     """Return a finished reply.
 
     Args:

@@ -17,7 +17,7 @@ from model_adapters.hf.checkpoint_model import CheckpointModel
 from model_adapters.hf.decoding import ReplyState, extend_replies
 from model_adapters.hf.description import capabilities, identity
 from model_adapters.hf.limits import check_limit, wrap_memory_errors, wrap_model_errors
-from model_adapters.hf.loaded import Loaded
+from model_adapters.hf.loaded import LoadedCheckpoint
 from model_adapters.hf.rendering import render, starts_with_bos
 from model_adapters.hf.replies import begin_reply, end_reply
 from model_adapters.hf.threads import torch_threads
@@ -98,7 +98,7 @@ class UncachedModel(CheckpointModel):
         options: inference options.
     """
 
-    def __init__(self, name: str, loaded: Loaded, processor: Any, options: HfOptions) -> None:
+    def __init__(self, name: str, loaded: LoadedCheckpoint, processor: Any, options: HfOptions) -> None:
         super().__init__(name, loaded, options.threads)
         self._processor = processor
         self._options = options

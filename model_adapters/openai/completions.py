@@ -35,7 +35,7 @@ class TokenUsage(msgspec.Struct, frozen=True):
     prompt_tokens_details: _Details | None = None
 
     @property
-    def cached(self) -> int | None:
+    def n_cached(self) -> int | None:
         """Tokens of the request in the server's cache, or None if it does not report them."""
         details = self.prompt_tokens_details
         return (

@@ -121,7 +121,8 @@ class Endpoint:
 
     def _classify(self, error: openai.APIStatusError) -> _TransientError | ModelError:
         status, body = error.status_code, error.response.content
-        problem = f"answers {status}{_phrase(status)}: {self._quote(body)}"
+        phrase = f" {HTTPStatus(status).phrase}" if status in set(HTTPStatus) else ""
+        problem = f"answers {status}{phrase}: {self._quote(body)}"
         hint = _HINTS.get(status) or _HINTS.get(status // 100 * 100) or _OTHER_HINT
         is_transient = status in _TRANSIENT or status >= 500
         if not is_transient or (status == 429 and _QUOTA_EXCEEDED in body):
@@ -137,10 +138,6 @@ class Endpoint:
         text = self._secret.redact(body.decode("utf-8", "replace"))
         short = " ".join(text.split())[:_QUOTED]
         return repr(short) if short else "nothing"
-
-
-def _phrase(status: int) -> str:
-    return f" {HTTPStatus(status).phrase}" if status in set(HTTPStatus) else ""
 
 
 def _pause_s(n_faults: int, fault: _TransientError) -> float:

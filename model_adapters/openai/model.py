@@ -83,7 +83,7 @@ class ServedModel:
             reply,
             n_reply_tokens=usage.completion_tokens,
             n_context_tokens=usage.prompt_tokens,
-            n_cached_tokens=usage.cached,
+            n_cached_tokens=usage.n_cached,
             cost=self._cost(usage),
         )
 
@@ -132,7 +132,7 @@ class ServedModel:
     def _cost(self, usage: TokenUsage) -> float | None:
         if self._prices is None:
             return None
-        return self._prices.cost(usage.prompt_tokens, usage.cached or 0, usage.completion_tokens)
+        return self._prices.cost(usage.prompt_tokens, usage.n_cached or 0, usage.completion_tokens)
 
     def _cut(self, text: str, decoding: Decoding) -> str:
         if not decoding.choices:

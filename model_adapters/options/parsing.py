@@ -22,8 +22,12 @@ class NoOptions:
 
 def describe(options: type) -> str:
     """Return the options with their defaults, as `a=1, b=x`, or "no options"."""
-    shown = [f"{field.name}={_show(_default(field))}" for field in dataclasses.fields(options)]
-    return ", ".join(shown) or "no options"
+    texts = []
+    for field in dataclasses.fields(options):
+        default = field.default_factory() if callable(field.default_factory) else field.default
+        is_keyword = default is None or isinstance(default, bool)
+        texts.append(f"{field.name}={str(default).lower() if is_keyword else default}")
+    return ", ".join(texts) or "no options"
 
 
 def parse(model: str, options: type, given: Mapping[str, str]) -> Any:
@@ -62,11 +66,3 @@ def _value(name: str, hint: Any, text: str) -> Any:
     except (KeyError, ValueError) as error:
         expected = "true or false" if convert is bool else convert.__name__
         raise ValueError(f"option {name}={text} is not {expected}") from error
-
-
-def _default(field: "dataclasses.Field[Any]") -> Any:
-    return field.default_factory() if callable(field.default_factory) else field.default
-
-
-def _show(value: Any) -> str:
-    return str(value).lower() if value is None or isinstance(value, bool) else str(value)

@@ -67,7 +67,7 @@ class Layout:
             unused,
         )
 
-    def expected(self) -> dict[str, Shape]:
+    def all_shapes(self) -> dict[str, Shape]:
         """Return the shapes of all keys, used and unused."""
         return {**self.shapes, **self.unused}
 
@@ -81,7 +81,7 @@ class Layout:
         Raises:
             ModelError: keys are missing, unknown or of another shape; the message has the first ones and their number.
         """
-        expected = self.expected()
+        expected = self.all_shapes()
         faults = {
             "lacks": sorted(expected.keys() - actual.keys()),
             "has unknown": sorted(actual.keys() - expected.keys()),

@@ -58,7 +58,7 @@ class PolicyTwin:
         for name, content in self.files().items():
             (folder / name).write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
         self.tokenizer().save(str(folder / "tokenizer.json"))
-        save_file(_draw_weights(self.layout().expected(), seed), folder / "model.safetensors")
+        save_file(_draw_weights(self.layout().all_shapes(), seed), folder / "model.safetensors")
 
     def build(self, name: str, options: PolicyOptions, seed: int) -> VlaPolicy:
         """Return the policy with random weights of this seed, loaded from a temporary checkpoint."""

@@ -9,7 +9,7 @@ from infthor_eval.errors import ModelError
 from model_adapters.hf.checkpoint_model import CheckpointModel
 from model_adapters.hf.choices import read_choices
 from model_adapters.hf.limits import check_limit, wrap_model_errors
-from model_adapters.hf.loaded import Loaded
+from model_adapters.hf.loaded import LoadedCheckpoint
 from model_adapters.hf.prompt import Frame, Piece, n_common, n_tokens
 from model_adapters.hf.replies import reply_text, stop_ids
 from model_adapters.protocols import Capabilities, Decoding, Reply, Turn
@@ -39,7 +39,14 @@ class VllmModel(CheckpointModel):
     """
 
     def __init__(
-        self, name: str, loaded: Loaded, engine: Engine, options: VllmOptions, *, max_tokens: int, max_frames: int
+        self,
+        name: str,
+        loaded: LoadedCheckpoint,
+        engine: Engine,
+        options: VllmOptions,
+        *,
+        max_tokens: int,
+        max_frames: int,
     ) -> None:
         super().__init__(name, loaded)
         self._engine = engine

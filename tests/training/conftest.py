@@ -7,7 +7,7 @@ import pytest
 from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.training.encoding import Encoder
 from infthor_eval.training.starting_model import load_starting_model
-from model_adapters.hf.loaded import Loaded
+from model_adapters.hf.loaded import LoadedCheckpoint
 
 
 @pytest.fixture(scope="session")
@@ -16,10 +16,10 @@ def bundled_set() -> Path:
 
 
 @pytest.fixture(scope="session")
-def plain_tiny() -> Loaded:
+def plain_tiny() -> LoadedCheckpoint:
     return load_starting_model("qwen2.5-vl-tiny", {}, "plain", seed=0)
 
 
 @pytest.fixture(scope="session")
-def encoder(plain_tiny: Loaded) -> Encoder:
+def encoder(plain_tiny: LoadedCheckpoint) -> Encoder:
     return Encoder(plain_tiny)

@@ -22,7 +22,7 @@ from infthor_eval.training.gradients import sum_gradients
 from infthor_eval.training.loop import Loop, LoopSettings, Progress
 from infthor_eval.training.network import SequenceModel, freeze
 from infthor_eval.training.ranks import Ranks, assign_ranks
-from model_adapters.hf.loaded import Loaded
+from model_adapters.hf.loaded import LoadedCheckpoint
 
 from .twins import PAD, everywhere, loaded, sequence
 
@@ -73,7 +73,7 @@ CASES = (
 
 
 @cache
-def _loaded(family: str) -> Loaded:
+def _loaded(family: str) -> LoadedCheckpoint:
     return loaded(family)
 
 
@@ -101,7 +101,7 @@ def gradients_of(model: SequenceModel) -> dict[str, Tensor]:
     return {name: one.grad.clone() for name, one in model.named_parameters() if one.grad is not None}
 
 
-def train(checkpoint: Loaded, folder: Path, frames: list[FrameRef], ranks: Ranks) -> list[Progress]:
+def train(checkpoint: LoadedCheckpoint, folder: Path, frames: list[FrameRef], ranks: Ranks) -> list[Progress]:
     """Two steps of a loop, the first at learning rate 0: so the optimizer has the sum of gradients at equal weights."""
     model = SequenceModel(checkpoint).requires_grad_(True)
     model.zero_grad()

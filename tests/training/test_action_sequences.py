@@ -21,7 +21,7 @@ from model_adapters.hf.prompt import Frame
 _ACTION = re.compile(r"<\|act\|>(.*?)<\|act\|>")
 
 
-def chapters_of(root, name):
+def segments_of(root, name):
     data, folder = NiehSet(root), root / "metadata" / name
     (trajectory,) = iter_trajectories(folder / "traj_data.json")
     return recorded_segments(trajectory, read_steps(folder), data.frames(name))
@@ -47,7 +47,7 @@ def trained_text(encoder, sequence):
 
 def test_a_recorded_history_says_what_the_replay_wrote(bundled_set):
     for name in names_in(bundled_set):
-        parts = segment_parts(chapters_of(bundled_set, name))
+        parts = segment_parts(segments_of(bundled_set, name))
         assert text_of(parts) == (bundled_set / "metadata" / name / "traj.txt").read_text().strip()
         frames = [part for part in parts if isinstance(part, FrameRef)]
         shown = NiehSet(bundled_set).frames(name)
@@ -58,7 +58,7 @@ def test_a_recorded_history_says_what_the_replay_wrote(bundled_set):
 
 def test_windows_have_every_action_once_and_each_begins_as_a_trajectory_does(bundled_set, encoder):
     for name in names_in(bundled_set)[:3]:
-        history = chapters_of(bundled_set, name)
+        history = segments_of(bundled_set, name)
         goals = {segment.goal for segment in history}
         made = list(windows(encoder, name, history, 5000))
         assert len(made) > 1
@@ -73,7 +73,7 @@ def test_windows_have_every_action_once_and_each_begins_as_a_trajectory_does(bun
 
 def test_single_plans_have_every_action_once_and_each_begins_as_a_trajectory_does(bundled_set, encoder):
     for name in names_in(bundled_set):
-        segments = chapters_of(bundled_set, name)
+        segments = segments_of(bundled_set, name)
         alone = list(single_plans(encoder, name, segments))
         assert len(alone) == sum(bool(segment.steps) for segment in segments)
         found = [_ACTION.findall(said(encoder, [one for one in plan.pieces if isinstance(one, int)])) for plan in alone]
@@ -83,7 +83,7 @@ def test_single_plans_have_every_action_once_and_each_begins_as_a_trajectory_doe
 
 def test_windows_cannot_hold_another_plan(bundled_set, encoder):
     name = names_in(bundled_set)[0]
-    history = chapters_of(bundled_set, name)
+    history = segments_of(bundled_set, name)
     made = list(windows(encoder, name, history, 5000))
     ends = itertools.accumulate(window_plans(window) for window in made)
     for window, end in zip(made[:-1], ends, strict=False):
@@ -98,7 +98,7 @@ def window_plans(window):
 
 def test_a_plan_that_is_too_long_is_left_out_and_told(bundled_set, encoder):
     name = names_in(bundled_set)[0]
-    history = chapters_of(bundled_set, name)
+    history = segments_of(bundled_set, name)
     least = min(len(segment.steps) for segment in history)
     limit = 150 + least * 130
     made = list(windows(encoder, name, history, limit))
@@ -112,7 +112,7 @@ def test_a_plan_that_is_too_long_is_left_out_and_told(bundled_set, encoder):
 def test_an_agent_is_asked_with_what_it_was_trained_on(bundled_set, encoder):
     """By the model's own prompts: an agent's at each action is the window up to the mark that opens it."""
     name = names_in(bundled_set)[1]
-    history = chapters_of(bundled_set, name)[:3]
+    history = segments_of(bundled_set, name)[:3]
     window = encoder.actions(name, history)
     opens = [at for at, piece in enumerate(window.pieces) if piece == encoder._mark][::2]
     parts = segment_parts(history)

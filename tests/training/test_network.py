@@ -11,27 +11,27 @@ from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.training.batches import Batch, collate, n_labels
 from infthor_eval.training.encoding import TrainingSequence
 from infthor_eval.training.network import PARTS, SequenceModel, freeze, parameters_by_part
-from model_adapters.hf.loaded import Loaded
+from model_adapters.hf.loaded import LoadedCheckpoint
 
 from .twins import FAMILIES, PAD, everywhere, loaded, sequence, write_frames
 
 
 @pytest.fixture(params=FAMILIES)
-def checkpoint(request: pytest.FixtureRequest) -> Loaded:
+def checkpoint(request: pytest.FixtureRequest) -> LoadedCheckpoint:
     return loaded(request.param)
 
 
 @pytest.fixture
-def qwen() -> Loaded:
+def qwen() -> LoadedCheckpoint:
     return loaded("qwen2.5-vl")
 
 
-def _two(checkpoint: Loaded, folder: Path) -> list[TrainingSequence]:
+def _two(checkpoint: LoadedCheckpoint, folder: Path) -> list[TrainingSequence]:
     frames = write_frames(folder, 2)
     return [sequence(checkpoint, frames[:1], "a mug"), everywhere(sequence(checkpoint, frames[1:], "two forks"))]
 
 
-def _batch(checkpoint: Loaded, folder: Path) -> Batch:
+def _batch(checkpoint: LoadedCheckpoint, folder: Path) -> Batch:
     return collate(_two(checkpoint, folder), checkpoint.family, PAD)
 
 
@@ -41,7 +41,7 @@ def _gradients(model: SequenceModel, batch: Batch) -> dict[str, Tensor]:
     return {name: one.grad.clone() for name, one in model.named_parameters() if one.grad is not None}
 
 
-def _own_loss(checkpoint: Loaded, batch: Batch) -> Tensor:
+def _own_loss(checkpoint: LoadedCheckpoint, batch: Batch) -> Tensor:
     """transformers' own loss, from ids and pixels."""
     family: Any = checkpoint.family
     images = [frame.ref.load() for frame in batch["frames"]]
@@ -54,14 +54,14 @@ def _own_loss(checkpoint: Loaded, batch: Batch) -> Tensor:
     return loss
 
 
-def test_the_loss_is_transformers_own(checkpoint: Loaded, tmp_path: Path) -> None:
+def test_the_loss_is_transformers_own(checkpoint: LoadedCheckpoint, tmp_path: Path) -> None:
     batch = _batch(checkpoint, tmp_path)
     with torch.no_grad():
         found, expected = SequenceModel(checkpoint)(**batch)["loss"], _own_loss(checkpoint, batch)
     torch.testing.assert_close(found, expected, rtol=1e-5, atol=0)
 
 
-def test_gradients_are_transformers_own(qwen: Loaded, tmp_path: Path) -> None:
+def test_gradients_are_transformers_own(qwen: LoadedCheckpoint, tmp_path: Path) -> None:
     batch = _batch(qwen, tmp_path)
     model = SequenceModel(qwen)
     found = _gradients(model, batch)
@@ -72,7 +72,7 @@ def test_gradients_are_transformers_own(qwen: Loaded, tmp_path: Path) -> None:
         torch.testing.assert_close(found[name], one.grad, rtol=1e-4, atol=1e-5)
 
 
-def test_a_batch_has_the_loss_of_its_sequences_by_tokens(checkpoint: Loaded, tmp_path: Path) -> None:
+def test_a_batch_has_the_loss_of_its_sequences_by_tokens(checkpoint: LoadedCheckpoint, tmp_path: Path) -> None:
     model, two = SequenceModel(checkpoint), _two(checkpoint, tmp_path)
     batches = [collate([one], checkpoint.family, PAD) for one in two]
     n_items = sum(map(n_labels, batches))
@@ -82,7 +82,7 @@ def test_a_batch_has_the_loss_of_its_sequences_by_tokens(checkpoint: Loaded, tmp
     torch.testing.assert_close(parts[0] + parts[1], whole, rtol=1e-5, atol=0)
 
 
-def test_every_parameter_is_in_one_part(checkpoint: Loaded) -> None:
+def test_every_parameter_is_in_one_part(checkpoint: LoadedCheckpoint) -> None:
     model = SequenceModel(checkpoint)
     by_part = parameters_by_part(model)
     assert tuple(by_part) == PARTS
@@ -93,7 +93,7 @@ def test_every_parameter_is_in_one_part(checkpoint: Loaded) -> None:
 
 
 @pytest.mark.parametrize("parts", [("vision",), ("vision", "embeddings"), ("decoder",), ("embeddings", "head")])
-def test_what_is_frozen_has_no_gradient(checkpoint: Loaded, parts: tuple[str, ...], tmp_path: Path) -> None:
+def test_what_is_frozen_has_no_gradient(checkpoint: LoadedCheckpoint, parts: tuple[str, ...], tmp_path: Path) -> None:
     model = SequenceModel(checkpoint)
     batch = _batch(checkpoint, tmp_path)
     before = _gradients(model, batch)
@@ -107,7 +107,9 @@ def test_what_is_frozen_has_no_gradient(checkpoint: Loaded, parts: tuple[str, ..
 
 
 @pytest.mark.parametrize("frozen", [(), ("vision", "embeddings")])
-def test_activations_can_be_computed_again(checkpoint: Loaded, frozen: tuple[str, ...], tmp_path: Path) -> None:
+def test_activations_can_be_computed_again(
+    checkpoint: LoadedCheckpoint, frozen: tuple[str, ...], tmp_path: Path
+) -> None:
     model = SequenceModel(checkpoint).train()
     freeze(model, frozen)
     batch = _batch(checkpoint, tmp_path)
@@ -132,7 +134,7 @@ def _n_kept(model: SequenceModel, batch: Batch) -> int:
 
 
 def test_a_frame_that_stands_twice_is_computed_once(
-    qwen: Loaded, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    qwen: LoadedCheckpoint, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     first, second = write_frames(tmp_path, 2)
     batch = collate([sequence(qwen, [first, second, first])], qwen.family, PAD)
@@ -143,12 +145,14 @@ def test_a_frame_that_stands_twice_is_computed_once(
     assert asked == [2]
 
 
-def test_sequences_without_frames_are_trained_on_too(qwen: Loaded) -> None:
+def test_sequences_without_frames_are_trained_on_too(qwen: LoadedCheckpoint) -> None:
     batch = collate([sequence(qwen, [])], qwen.family, PAD)
     assert torch.isfinite(SequenceModel(qwen)(**batch)["loss"])
 
 
-def test_parts_of_two_checkpoints_are_told_apart(qwen: Loaded, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_parts_of_two_checkpoints_are_told_apart(
+    qwen: LoadedCheckpoint, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     batch = _batch(qwen, tmp_path)
     compute = qwen.family.features
     monkeypatch.setattr(qwen.family, "features", lambda images: [one[1:] for one in compute(images)])
@@ -156,7 +160,7 @@ def test_parts_of_two_checkpoints_are_told_apart(qwen: Loaded, tmp_path: Path, m
         SequenceModel(qwen)(**batch)
 
 
-def test_weights_that_two_parts_share_are_frozen_in_both_or_neither(qwen: Loaded) -> None:
+def test_weights_that_two_parts_share_are_frozen_in_both_or_neither(qwen: LoadedCheckpoint) -> None:
     qwen.model.get_output_embeddings().weight = qwen.model.get_input_embeddings().weight
     model = SequenceModel(qwen)
     with pytest.raises(UsageError, match="the same weights in this model; freeze both"):
@@ -165,7 +169,7 @@ def test_weights_that_two_parts_share_are_frozen_in_both_or_neither(qwen: Loaded
     assert not qwen.model.get_output_embeddings().weight.requires_grad
 
 
-def test_unknown_parts_and_freezing_all_are_refused(qwen: Loaded) -> None:
+def test_unknown_parts_and_freezing_all_are_refused(qwen: LoadedCheckpoint) -> None:
     model = SequenceModel(qwen)
     with pytest.raises(UsageError, match="unknown part of a model 'visio'; did you mean 'vision'"):
         freeze(model, ["visio"])

@@ -11,7 +11,7 @@ from PIL import Image
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.training.encoding import Encoder, TrainingSequence
 from model_adapters import load
-from model_adapters.hf.loaded import Loaded
+from model_adapters.hf.loaded import LoadedCheckpoint
 
 __all__ = ["FAMILIES", "PAD", "everywhere", "loaded", "sequence", "write_frames"]
 
@@ -19,10 +19,10 @@ FAMILIES = ("qwen2.5-vl", "llava-onevision", "deepseek-vl", "pixtral")
 PAD = 0
 
 
-def loaded(family: str) -> Loaded:
+def loaded(family: str) -> LoadedCheckpoint:
     """A tiny model of a family with the weights of seed 0."""
     model: Any = load(f"{family}-tiny", {}, seed=0)
-    found: Loaded = model._loaded
+    found: LoadedCheckpoint = model._loaded
     return found
 
 
@@ -38,7 +38,9 @@ def write_frames(folder: Path, count: int) -> list[FrameRef]:
     return refs
 
 
-def sequence(model: Loaded, frames: Sequence[FrameRef], answer: str = "a mug", name: str = "one") -> TrainingSequence:
+def sequence(
+    model: LoadedCheckpoint, frames: Sequence[FrameRef], answer: str = "a mug", name: str = "one"
+) -> TrainingSequence:
     """Frames with a text behind each, a question, and the answer, on which loss is taken."""
     parts = [part for number, frame in enumerate(frames) for part in (frame, f"\nRotateLeft {number}\n")]
     return Encoder(model).answer(name, ["What happens?\n", *parts, "What do you see now?"], answer)

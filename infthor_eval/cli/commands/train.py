@@ -44,7 +44,7 @@ _STAGES = {"vision": "recognising objects", "text": "reading plans", "joint": "a
     help="Replayed set (`replay`) to train on, with a question file if the recipe needs questions; may be repeated. "
     "The recipe tiny generates its own by default.",
 )
-@click.option("--model", metavar="NAME", help="Model to use instead of the recipe's.")
+@click.option("--model", metavar="NAME", help="Model to use instead of the recipe's, without its options.")
 @click.option(
     "--model-args", metavar="K=V,...", help="Options of the model (pretrained, dtype, ...), added to the recipe's."
 )

@@ -15,7 +15,7 @@ from infthor_eval.household.sequence_text import MARKS
 from infthor_eval.training.nano.settings import NanoRecipe
 from model_adapters.hf.checkpoint import assemble
 from model_adapters.hf.families.qwen2_5_vl import Qwen25VLFamily
-from model_adapters.hf.loaded import Loaded
+from model_adapters.hf.loaded import LoadedCheckpoint
 from model_adapters.hf.templates import plain_template
 from model_adapters.tiny.qwen2_5_vl import SPECIAL
 from model_adapters.tiny.tokenizer import train_tokenizer
@@ -38,7 +38,7 @@ def image_processor() -> Any:
     return Qwen2VLImageProcessorPil(min_pixels=_PIXELS, max_pixels=_PIXELS)
 
 
-def build_untrained(recipe: NanoRecipe, corpus: Iterable[str], sentences: Iterable[str]) -> Loaded:
+def build_untrained(recipe: NanoRecipe, corpus: Iterable[str], sentences: Iterable[str]) -> LoadedCheckpoint:
     """Return the model with random weights of the recipe's seed, on the CPU in float32.
 
     Args:

@@ -15,7 +15,7 @@ from infthor_eval.household.wording import compact_name, noun
 from infthor_eval.training.nano.architecture import TOKENS
 from infthor_eval.training.nano.frame_dataset import FrameDataset
 from infthor_eval.training.network import SequenceModel
-from model_adapters.hf.loaded import Loaded
+from model_adapters.hf.loaded import LoadedCheckpoint
 from model_adapters.hf.prompt import Frame
 
 __all__ = ["NanoNetwork", "spellings"]
@@ -44,7 +44,7 @@ class NanoNetwork(SequenceModel):
 
     last_frames: tuple[list[int], Tensor]
 
-    def __init__(self, loaded: Loaded, dataset: FrameDataset) -> None:
+    def __init__(self, loaded: LoadedCheckpoint, dataset: FrameDataset) -> None:
         super().__init__(loaded)
         self._dataset = dataset
         self._index_by_digest = dataset.index_by_digest()

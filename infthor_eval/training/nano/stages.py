@@ -17,7 +17,7 @@ from infthor_eval.training.nano.network import NanoNetwork
 from infthor_eval.training.nano.sampler import SequenceSampler, corpus_texts, question_intro
 from infthor_eval.training.nano.settings import NanoRecipe
 from infthor_eval.training.network import decay_groups
-from model_adapters.hf.loaded import Loaded
+from model_adapters.hf.loaded import LoadedCheckpoint
 
 __all__ = ["NanoProgress", "train_small_model"]
 
@@ -51,7 +51,7 @@ def train_small_model(
     folders: Sequence[Path],
     on_step: Callable[[NanoProgress], None],
     print_note: Callable[[str], None] = lambda _: None,
-) -> Loaded:
+) -> LoadedCheckpoint:
     """Train the small model on replayed sets.
 
     Args:

@@ -30,7 +30,7 @@ from model_adapters.hf.families.pixtral import PixtralFamily
 from model_adapters.hf.families.plain import PlainFamily
 from model_adapters.hf.families.qwen2_5_vl import Qwen25VLFamily
 from model_adapters.hf.family import MakeFamily, Size
-from model_adapters.hf.loaded import Loaded
+from model_adapters.hf.loaded import LoadedCheckpoint
 from model_adapters.hf.model import TransformersModel
 from model_adapters.hf.prompt import token_ids
 from model_adapters.hf.uncached import UncachedModel, expand_image_token, image_token, process_turns
@@ -176,7 +176,7 @@ def load_processor(located: LocatedCheckpoint[Any]) -> Any:
 
 @torch.inference_mode()
 def _compare_with_plain_model(
-    model: TransformersModel | UncachedModel, loaded: Loaded, processor: Any, pretrained: str
+    model: TransformersModel | UncachedModel, loaded: LoadedCheckpoint, processor: Any, pretrained: str
 ) -> None:
     """Check that the shared prefix gives the token ids and logits of the processor and the plain model on a sample.
 

@@ -56,7 +56,10 @@ def describe_openvla(checkpoint: PolicyCheckpoint, unnorm_key: str | None) -> Op
     """
     checkpoint.require_model_type(MODEL_TYPE)
     config = checkpoint.read("config.json", OpenVLAConfig)
-    key, statistics = select_statistics(_statistics(checkpoint, config), unnorm_key, checkpoint.pretrained)
+    # OpenVLA's fine-tuning writes the statistics of new data to a separate file.
+    is_fine_tuned = checkpoint.has_file(_FINE_TUNED)
+    known = checkpoint.read(_FINE_TUNED, dict[str, Any]) if is_fine_tuned else config.norm_stats
+    key, statistics = select_statistics(known, unnorm_key, checkpoint.pretrained)
     with wrap_loading_errors(checkpoint.pretrained):
         vocabulary = config.language("eager").vocab_size - config.pad_to_multiple_of
     bins = ActionBins(vocabulary, config.n_action_bins)
@@ -91,11 +94,6 @@ def _tokenizer(checkpoint: PolicyCheckpoint) -> Tokenizer:
     if tokenizer.encode("In").ids[0] != tokenizer.token_to_id("<s>"):
         raise ModelError(f"{checkpoint.pretrained}: the tokenizer does not begin a text with <s>; restore its file")
     return tokenizer
-
-
-def _statistics(checkpoint: PolicyCheckpoint, config: OpenVLAConfig) -> dict[str, Any]:
-    """Return the statistics by dataset; OpenVLA's fine-tuning writes those of new data to a separate file."""
-    return checkpoint.read(_FINE_TUNED, dict[str, Any]) if checkpoint.has_file(_FINE_TUNED) else config.norm_stats
 
 
 class OpenVLA(PolicyAdapter):

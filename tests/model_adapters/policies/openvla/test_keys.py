@@ -56,12 +56,12 @@ def layout() -> Layout:
 
 
 def test_names_and_shapes(layout: Layout) -> None:
-    expected = layout.expected()
+    expected = layout.all_shapes()
     assert {key: expected.get(key) for key in SHAPES} == SHAPES
 
 
 def test_how_many_there_are_of_each_part(layout: Layout) -> None:
-    expected = layout.expected()
+    expected = layout.all_shapes()
     parts = Counter(".".join(key.split(".")[:2]) for key in expected)
     # 14 a block and 7 beside them; 12 a block and 18 beside them; 9 a layer and embeddings, norm and head
     assert parts[DINO] == 24 * 14 + 7
@@ -96,7 +96,7 @@ def test_what_no_feature_depends_on_is_known_not_ignored(layout: Layout) -> None
 
 def test_it_is_a_model_of_seven_billion(layout: Layout) -> None:
     n_weights = 0
-    for shape in layout.expected().values():
+    for shape in layout.all_shapes().values():
         size = 1
         for side in shape:
             size *= side

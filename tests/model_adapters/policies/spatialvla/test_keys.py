@@ -62,24 +62,24 @@ def layout() -> Layout:
 
 
 def test_names_and_shapes(layout: Layout) -> None:
-    expected = layout.expected()
+    expected = layout.all_shapes()
     assert {key: expected.get(key) for key in SHAPES} == SHAPES
 
 
 def test_how_many_there_are_of_each_part(layout: Layout) -> None:
-    parts = Counter(key.split(".")[0] for key in layout.expected())
+    parts = Counter(key.split(".")[0] for key in layout.all_shapes())
     assert parts["language_model"] == 26 * 11 + 3
     assert parts["vision_tower"] == 27 * 16 + 5
     assert parts["position_embedding_3d"] == 6
     assert parts["multi_modal_projector"] == 2
     assert parts["spatial_embed_tokens"] == 1
-    n_beit = sum(key.startswith("vision_zoe_model.backbone.") for key in layout.expected())
+    n_beit = sum(key.startswith("vision_zoe_model.backbone.") for key in layout.all_shapes())
     assert n_beit == 24 * 18 + 3
-    assert len(layout.expected()) == 1382
+    assert len(layout.all_shapes()) == 1382
 
 
 def test_it_is_a_model_of_four_billion(layout: Layout) -> None:
-    assert sum(math.prod(shape) for shape in layout.expected().values()) == pytest.approx(4.03e9, rel=0.005)
+    assert sum(math.prod(shape) for shape in layout.all_shapes().values()) == pytest.approx(4.03e9, rel=0.005)
 
 
 def test_nothing_is_unused_and_no_key_means_two_parameters(layout: Layout) -> None:
@@ -89,12 +89,12 @@ def test_nothing_is_unused_and_no_key_means_two_parameters(layout: Layout) -> No
 
 def test_no_name_of_transformers_5_is_expected_of_a_file(layout: Layout) -> None:
     new = ("backbone.beit.", "q_proj.", "o_proj.", ".layers.")
-    beit = [key for key in layout.expected() if key.startswith("vision_zoe_model.backbone.")]
+    beit = [key for key in layout.all_shapes() if key.startswith("vision_zoe_model.backbone.")]
     assert not [key for key in beit if any(part in key for part in new)]
 
 
 def test_tied_embeddings_have_one_key() -> None:
-    keys = _layout(tie_word_embeddings=True).expected()
+    keys = _layout(tie_word_embeddings=True).all_shapes()
     assert "language_model.lm_head.weight" not in keys
     assert "language_model.model.embed_tokens.weight" in keys
 
