@@ -9,10 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from infthor_eval import suites
 from infthor_eval.errors import InfthorError, UsageError
 from infthor_eval.runs import Catalog
-from infthor_eval.suites import options_of, suite_identity, suite_named, suite_names
+from infthor_eval.suites import find_suite, options_class, suite_code, suite_names
 
 ROOT = Path(__file__).parents[1]
 SUITE = """
@@ -75,12 +74,12 @@ def test_a_suite_of_another_package_runs_with_its_task_and_its_options(package):
 
 def test_it_is_found_by_name_behind_the_built_in_ones(package):
     assert suite_names() == ("nieh", "manipulation", "plans", "sums")
-    assert suite_named("sums").name == "sums"
-    assert list(options_of("sums").__dataclass_fields__) == ["abacus"]
-    assert suite_identity("nieh") == {}
-    before = suite_identity("sums")
+    assert find_suite("sums").name == "sums"
+    assert list(options_class("sums").__dataclass_fields__) == ["abacus"]
+    assert suite_code("nieh") == {}
+    before = suite_code("sums")
     (package / "sums_suite.py").write_text(SUITE + "\n")
-    assert suite_identity("sums") != before
+    assert suite_code("sums") != before
     assert Catalog.installed().tasks["sums"].suite == "sums"
     assert "sums" not in Catalog.packaged().tasks
 
@@ -91,7 +90,7 @@ def point(package, monkeypatch):
 
     def point(target, group="infthor_eval.suites"):
         found = [EntryPoint("sums", target, group)]
-        for module in ("infthor_eval.suites", "infthor_eval.runs.catalog"):
+        for module in ("infthor_eval.plugins", "infthor_eval.runs.catalog"):
             monkeypatch.setattr(f"{module}.entry_points", lambda group: [one for one in found if one.group == group])
 
     return point
@@ -109,8 +108,19 @@ def point(package, monkeypatch):
 def test_what_is_no_suite_is_refused_in_one_line(point, target, said):
     point(target)
     with pytest.raises(InfthorError, match=said) as caught:
-        suite_named("sums")
+        find_suite("sums")
     assert "\n" not in str(caught.value)
+
+
+def test_a_fault_in_the_module_of_a_suite_is_told_with_its_place(point, package):
+    (package / "broken_suite.py").write_text("limits = {}\nhighest = limits['sums']\n")
+    point("broken_suite:Sums")
+    with pytest.raises(UsageError) as caught:
+        find_suite("sums")
+    place = "KeyError in broken_suite.py:2 (<module>): no 'sums'"
+    assert str(caught.value) == (
+        f"the suite sums cannot be imported from broken_suite:Sums ({place}); fix its package, or uninstall it"
+    )
 
 
 @pytest.mark.parametrize("target", ["no_such_package.tasks", "sums_tasks.nowhere", "sums_suite"])
@@ -132,5 +142,5 @@ def test_an_option_that_every_run_has_is_refused(package):
 
 
 def test_no_package_can_take_a_built_in_name(monkeypatch):
-    monkeypatch.setattr(suites, "entry_points", lambda group: [EntryPoint("nieh", "json:loads", group)])
-    assert type(suite_named("nieh")).__name__ == "NiehSuite"
+    monkeypatch.setattr("infthor_eval.plugins.entry_points", lambda group: [EntryPoint("nieh", "json:loads", group)])
+    assert type(find_suite("nieh")).__name__ == "NiehSuite"

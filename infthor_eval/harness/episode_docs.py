@@ -1,25 +1,49 @@
-"""What the docs of tasks have in common whose requests are episodes in a simulator."""
+"""Docs of tasks whose requests are episodes in a simulator."""
 
 import json
 from collections.abc import Mapping
 from dataclasses import fields
+from pathlib import Path
 from typing import Any
 
-__all__ = ["about_run"]
+from infthor_eval.harness.requests import Doc
+from infthor_eval.runs import TaskFile, TaskRequest
+
+__all__ = ["settings_doc", "task_request"]
 
 
-def about_run(config: Mapping[str, Any], settings: type, options: type) -> dict[str, str]:
-    """What each doc carries along of the run: settings and options as JSON, and where the data are.
+def settings_doc(suite: str, config: Mapping[str, Any], settings: type, options: type) -> Doc:
+    """Return what every doc of a task has: its suite, settings and options as JSON, and the place of the data.
 
     Args:
-        config: a task's settings, and of what lm-eval hands over as metadata: `data`, and the suite's options.
-        settings: dataclass of what `dataset_kwargs` can say.
+        suite: name of the suite.
+        config: settings of the task, and lm-eval's metadata: `data`, and options of the suite.
+        settings: dataclass of the settings that `dataset_kwargs` can have.
         options: dataclass of the suite's options.
     """
     names = [item.name for item in fields(settings)]
-    more = [item.name for item in fields(options) if item.name not in names]
+    other_names = [item.name for item in fields(options) if item.name not in names]
     return {
+        "suite": suite,
         "settings": json.dumps({name: config[name] for name in names if config.get(name) is not None}),
-        "options": json.dumps({name: config[name] for name in more if name in config}),
+        "options": json.dumps({name: config[name] for name in other_names if name in config}),
         "data": str(config.get("data") or ""),
     }
+
+
+def task_request(
+    doc: Doc, task: str, options: type, generation_kwargs: Mapping[str, Any], seed: int
+) -> TaskRequest[Any]:
+    """Return the request that a doc's task makes of its suite.
+
+    Args:
+        doc: any doc of the task.
+        task: name of the task.
+        options: dataclass of the suite's options.
+        generation_kwargs: decoding settings in lm-eval's words.
+        seed: seed of the run.
+    """
+    settings = {"dataset_kwargs": json.loads(doc["settings"]), "generation_kwargs": generation_kwargs}
+    file = TaskFile(task, doc["suite"], Path(task), settings)
+    data = Path(doc["data"]) if doc["data"] else None
+    return TaskRequest([file], options(**json.loads(doc["options"])), data, None, seed)

@@ -1,38 +1,37 @@
-"""The functions behind the task files in `tasks/manipulation/`, called by lm-eval: an episode is one request.
+"""Manipulation in lm-eval: the functions behind the files in `tasks/manipulation/`, and the adapter of their requests.
 
-lm-eval has no simulator and no policies, so our model class alone can answer, with a policy as its adapter.
+A request is an episode. lm-eval has no simulator and no policies, so only our model class can answer, with a policy as
+its adapter.
 """
 
 import json
-from collections.abc import Sequence
-from pathlib import Path
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from infthor_eval.errors import UsageError
-from infthor_eval.harness.episode_docs import about_run
+from infthor_eval.harness.episode_docs import settings_doc, task_request
 from infthor_eval.harness.registration import model_takes_references, register
+from infthor_eval.harness.requests import Doc
 from infthor_eval.manipulation.evaluation import ManipulationEvaluation
 from infthor_eval.manipulation.options import ManipulationOptions
 from infthor_eval.manipulation.records import ArmRecord
 from infthor_eval.manipulation.task import ArmTaskSettings
-from infthor_eval.runs import TaskFile, TaskRequest, UnitRecord
+from infthor_eval.runs import UnitKey, UnitRecord
 
-__all__ = ["arm_evaluation", "arm_response", "dataset", "doc_to_target", "doc_to_text", "process_results"]
+__all__ = ["ManipulationRequests", "dataset", "doc_to_target", "doc_to_text", "process_results"]
 
 register()  # see `nieh_task`
 
-Doc = dict[str, Any]
-
 
 def dataset(**config: Any) -> dict[str, Any]:
-    """The docs of a task, one per episode (`custom_dataset` of the task files).
+    """Build the docs of a task, one per episode (`custom_dataset` of the task files).
 
     Args:
-        config: the task's settings, and of what lm-eval hands over as metadata: `data`, and the suite's options.
+        config: settings of the task, and lm-eval's metadata: `data`, and options of the suite.
 
     Raises:
         UsageError: the model is not ours, or there are no trajectories.
-        DataError: none of them can be read.
+        DataError: no trajectory can be read.
     """
     from datasets import Dataset
 
@@ -41,49 +40,52 @@ def dataset(**config: Any) -> dict[str, Any]:
             "arms are driven in a simulator, which infthor-eval's policies alone do; use --model infthor"
             " --model_args adapter=openvla"
         )
-    about = about_run(config, ArmTaskSettings, ManipulationOptions)
-    units = arm_evaluation(about, "dataset", 0).units
+    doc = settings_doc("manipulation", config, ArmTaskSettings, ManipulationOptions)
+    units = ManipulationEvaluation(task_request(doc, "dataset", ManipulationOptions, {}, 0)).units
     return {
         "test": Dataset.from_list([
-            {**about, "arm_episode": unit.key.id, "instruction": unit.payload.instruction} for unit in units
+            {**doc, "arm_episode": unit.key.id, "instruction": unit.payload.instruction} for unit in units
         ])
     }  # fmt: skip
 
 
 def doc_to_text(doc: Doc) -> str:
-    """What a policy is told."""
+    """Return the instruction to the policy."""
     return str(doc["instruction"])
 
 
 def doc_to_target(doc: Doc) -> str:
-    """That it is done."""
+    """Return the expected result: the episode done."""
     return f"{doc['arm_episode']}: done"
 
 
 def process_results(_doc: Doc, results: Sequence[str]) -> dict[str, float]:
-    """Whether the episode was a success, and what it earned; see `arm_response`."""
-    found = json.loads(results[0] or "{}")
-    return {"success": float(found.get("done", False)), "reward": float(found.get("reward", 0.0))}
+    """Return success and reward of the episode; see `ManipulationRequests.response`."""
+    outcome = json.loads(results[0] or "{}")
+    return {"success": float(outcome.get("done", False)), "reward": float(outcome.get("reward", 0.0))}
 
 
-def arm_evaluation(doc: Doc, task: str, seed: int) -> ManipulationEvaluation:
-    """The suite set up for the task of a doc.
+class ManipulationRequests:
+    """Manipulation as requests of lm-eval; see `RequestAdapter`."""
 
-    Args:
-        doc: any of the task's.
-        task: its name.
-        seed: of the run.
-    """
-    file = TaskFile(task, "manipulation", Path(task), {"dataset_kwargs": json.loads(doc["settings"])})
-    data = Path(doc["data"]) if doc["data"] else None
-    return ManipulationEvaluation(
-        TaskRequest([file], ManipulationOptions(**json.loads(doc["options"])), data, None, seed)
-    )
+    def prepare(
+        self, task: str, docs: Sequence[Doc], generation_kwargs: Mapping[str, Any], seed: int
+    ) -> ManipulationEvaluation:
+        """See `RequestAdapter`."""
+        return ManipulationEvaluation(task_request(docs[0], task, ManipulationOptions, generation_kwargs, seed))
 
+    def doc_id(self, doc: Doc) -> str:
+        """Return the id of the episode."""
+        return str(doc["arm_episode"])
 
-def arm_response(record: UnitRecord[ArmRecord]) -> str:
-    """What came of an episode, as JSON; one that does not count is told as none."""
-    payload = record.payload
-    if record.excluded is not None:
-        return json.dumps({"excluded": record.excluded})
-    return json.dumps({"done": payload.done, "reward": payload.reward, "ended": payload.ended})
+    def doc_id_of_unit(self, key: UnitKey, cluster: str) -> str:
+        """Return the id of the episode."""
+        return key.id
+
+    def response(self, records: Sequence[UnitRecord[ArmRecord]]) -> str:
+        """Return the outcome of the episode as JSON; of an excluded one, the reason."""
+        (record,) = records
+        payload = record.payload
+        if record.excluded is not None:
+            return json.dumps({"excluded": record.excluded})
+        return json.dumps({"done": payload.done, "reward": payload.reward, "ended": payload.ended})

@@ -1,38 +1,31 @@
 """Our models under lm-eval's own command: `lm-eval run --model infthor --model_args adapter=qwen2.5-vl-tiny,...`."""
 
-from collections.abc import Sequence
-from itertools import groupby
+from collections.abc import Hashable, Sequence
+from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from lm_eval.api.instance import Instance
 from lm_eval.api.model import LM
 
 from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.formats.scratch import ScratchFolder
-from infthor_eval.harness.manipulation_task import arm_evaluation, arm_response
-from infthor_eval.harness.plans_task import episode_response, evaluation_around
 from infthor_eval.harness.registration import NAME, say_model_takes_references
-from infthor_eval.manipulation import records as arm_records
-from infthor_eval.manipulation.evaluation import ArmUnit, BoundManipulation
-from infthor_eval.nieh import records as nieh_records
-from infthor_eval.nieh.answering import ModelAnswerer, NiehUnit, answered
-from infthor_eval.nieh.baselines import BASELINES
-from infthor_eval.nieh.docs import sample_of, samples_around
-from infthor_eval.nieh.task import PreparedTask
-from infthor_eval.plans import records as plan_records
-from infthor_eval.plans.evaluation import BoundPlans, PlanUnit
-from infthor_eval.runs import Group, RunHeader
-from infthor_eval.runs.generation_kwargs import decoding_of
+from infthor_eval.harness.requests import RequestAdapter
+from infthor_eval.runs import RunHeader, Suite, Unit, UnitRecord
+from infthor_eval.runs.binding import require_capability
 from infthor_eval.runs.journal import Journal
-from infthor_eval.runs.records import UnitKey
 from infthor_eval.runs.run_config import run_config
 from infthor_eval.runs.session import JournalSession
-from model_adapters import Model, Policy, adapter_identity, has_option, label, load
+from infthor_eval.suites import baseline_suites, find_request_adapter, find_suite
+from model_adapters import adapter_identity, has_option, label, load
 
 __all__ = ["InfthorLM"]
 
-_RECORDS = {"nieh": nieh_records.RECORDS, "plans": plan_records.RECORDS, "manipulation": arm_records.RECORDS}
+P = TypeVar("P")
+U = TypeVar("U", bound=Unit[Any])
+
 _DEFAULT_DEVICE = "cuda:0"  # what lm-eval says where nobody said anything
 
 
@@ -72,8 +65,8 @@ class InfthorLM(LM):
             ModelError: the model cannot be loaded.
         """
         super().__init__()
-        if adapter in BASELINES:
-            raise UsageError(f"{adapter} reads the answer key; run it with infthor-eval --model {adapter}")
+        if adapter in baseline_suites():
+            raise UsageError(f"{adapter} is a baseline, not a model; run it with infthor-eval --model {adapter}")
         given = {key: str(value) for key, value in options.items()}
         theirs = {"device": None if device == _DEFAULT_DEVICE else device, "batch_size": _number(batch_size)}
         given |= {key: value for key, value in theirs.items() if value is not None and has_option(adapter, key)}
@@ -84,9 +77,6 @@ class InfthorLM(LM):
         self._scratch = ScratchFolder()
         self._folder = Path(journal) if journal else self._scratch.path
         self._sessions: dict[str, JournalSession[Any]] = {}
-        self._plans: dict[str, BoundPlans] = {}
-        self._groups: dict[str, dict[str, Group[PlanUnit]]] = {}
-        self._arms: dict[str, tuple[BoundManipulation, list[ArmUnit]]] = {}
 
     @property
     def tokenizer_name(self) -> str:
@@ -98,25 +88,20 @@ class InfthorLM(LM):
         return {"model_source": NAME, "model_name": self._model.name}
 
     def generate_until(self, requests: Sequence[Instance]) -> list[str]:
-        """One response per request; empty where the model could not answer (the journal has the reason).
-
-        A request of a task of plans or of manipulation is an episode, and is answered with what came of it.
+        """Return one response per request; empty where the model could not answer (the journal has the reason).
 
         Raises:
-            UsageError: a policy is asked anything but episodes of manipulation, or a model those.
+            UsageError: the model lacks what a suite needs.
+            ModelError: a request is of no task of a suite.
         """
-        if _are(requests, "arm_episode"):
-            return self._arm_episodes(requests)
-        if not isinstance(self._model, Model):
-            raise UsageError(f"{self._name} cannot be talked to; it is a policy, for tasks of manipulation")
-        if _are(requests, "plans"):
-            return [self._episode(request) for request in requests]
-        replies: dict[UnitKey, str] = {}
-        units = [_unit(request) for request in requests]
-        order = sorted(range(len(units)), key=lambda number: (units[number].key.task, units[number].cluster))
-        for _, numbers in groupby(order, key=lambda number: (units[number].key.task, units[number].cluster)):
-            replies |= self._replies(self._model, [(units[number], requests[number]) for number in numbers])
-        return [replies[unit.key] for unit in units]
+        numbers_of: dict[tuple[str, str], list[int]] = {}
+        for number, request in enumerate(requests):
+            numbers_of.setdefault(_suite_and_task(request), []).append(number)
+        responses: dict[int, str] = {}
+        for (suite, task), numbers in numbers_of.items():
+            of_task = self._respond(find_suite(suite), task, [requests[number] for number in numbers])
+            responses |= zip(numbers, of_task, strict=True)
+        return [responses[number] for number in range(len(requests))]
 
     def loglikelihood(self, requests: Sequence[Instance]) -> list[tuple[float, bool]]:
         """Not offered: no task of ours compares likelihoods."""
@@ -126,70 +111,36 @@ class InfthorLM(LM):
         """Not offered, see `loglikelihood`."""
         raise ModelError("infthor-eval models answer in words; use a task with output_type generate_until")
 
-    def _replies(self, model: Model, group: Sequence[tuple[NiehUnit, Instance]]) -> dict[UnitKey, str]:
-        """Replies to the requests of one task on one trajectory."""
-        unit, request = group[0]
-        decoding = decoding_of(request.args[1], self._seed, unit.key.task)
-        prepared = PreparedTask(samples_around(request.doc), decoding, request.args[1])
-        session = self._session("nieh")
-        records = answered([unit for unit, _ in group], prepared, ModelAnswerer(model, session), session)
-        return {record.key: session.append_new(record)[0].payload.reply or "" for record in records}
+    def _respond(self, suite: Suite[U, P], task: str, requests: Sequence[Instance]) -> list[str]:
+        """Return the responses to the requests of one task."""
+        require_capability(self._model, self._name, suite)
+        adapter: RequestAdapter[U, P] = find_request_adapter(suite.name)
+        session = self._session(suite)
+        docs = [request.doc for request in requests]
+        records: dict[Hashable, list[UnitRecord[P]]] = {adapter.doc_id(doc): [] for doc in docs}
+        evaluation = adapter.prepare(task, docs, requests[0].args[1], self._seed)
+        with closing(evaluation.bind(self._model)) as bound:
+            for group in bound.workload.groups:
+                units = [unit for unit in group.units if adapter.doc_id_of_unit(unit.key, unit.cluster) in records]
+                for record in bound.run(replace(group, units=units), session) if units else ():
+                    doc_id = adapter.doc_id_of_unit(record.key, record.cluster)
+                    records[doc_id].append(session.append_new(record)[0])
+        return [adapter.response(records[adapter.doc_id(doc)]) for doc in docs]
 
-    def _episode(self, request: Instance) -> str:
-        """What came of a trajectory."""
-        doc, task, session = request.doc, str(request.task_name), self._session("plans")
-        if task not in self._plans:
-            self._plans[task] = evaluation_around(doc, task, request.args[1], self._seed).bind(self._model)
-            self._groups[task] = {group.units[0].cluster: group for group in self._plans[task].workload.groups}
-        records = self._plans[task].run(self._groups[task][doc["traj_id"]], session)
-        return episode_response(session.append_new(record)[0] for record in records)
-
-    def _arm_episodes(self, requests: Sequence[Instance]) -> list[str]:
-        """What came of episodes of an arm; those of one trajectory are played together."""
-        if not isinstance(self._model, Policy):
-            raise UsageError(
-                f"{self._name} drives no arm; tasks of manipulation need a policy (openvla, spatialvla, ...)"
-            )
-        session, responses = self._session("manipulation"), {}
-        for task, same in _by_task(requests).items():
-            if task not in self._arms:
-                evaluation = arm_evaluation(same[0].doc, task, self._seed)
-                self._arms[task] = evaluation.bind(self._model), evaluation.units
-            asked = {request.doc["arm_episode"] for request in same}
-            bound, every = self._arms[task]
-            units = [unit for unit in every if unit.key.id in asked]
-            for _, group in groupby(units, key=lambda unit: unit.cluster):
-                for record in bound.run(Group(list(group)), session):
-                    responses[task, record.id] = arm_response(session.append_new(record)[0])
-        return [responses[str(request.task_name), request.doc["arm_episode"]] for request in requests]
-
-    def _session(self, suite: str) -> JournalSession[Any]:
-        """Where the records of a suite go: those of NIEH into the folder itself, others into one of theirs."""
-        if suite not in self._sessions:
-            config = run_config(suite, self._model, self._code, {"host": "lm-eval"}, None, self._seed)
-            header = RunHeader(suite=suite, name=self._name, config=config)
-            folder = self._folder if suite == "nieh" else self._folder / suite
-            journal = Journal(folder, header, _RECORDS[suite])
-            self._sessions[suite] = JournalSession(journal)
-        return self._sessions[suite]
+    def _session(self, suite: Suite[U, P]) -> JournalSession[P]:
+        """Return the session of a suite, whose journal is in a folder of the suite's name."""
+        if suite.name not in self._sessions:
+            config = run_config(suite.name, self._model, self._code, {"host": "lm-eval"}, None, self._seed)
+            header = RunHeader(suite=suite.name, name=self._name, config=config)
+            self._sessions[suite.name] = JournalSession(Journal(self._folder / suite.name, header, suite.records))
+        return self._sessions[suite.name]
 
 
-def _are(requests: Sequence[Instance], kind: str) -> bool:
-    """Whether requests are episodes of a kind, by what their docs hold."""
-    return any(isinstance(request.doc, dict) and kind in request.doc for request in requests)
-
-
-def _by_task(requests: Sequence[Instance]) -> dict[str, list[Instance]]:
-    found: dict[str, list[Instance]] = {}
-    for request in requests:
-        found.setdefault(str(request.task_name), []).append(request)
-    return found
-
-
-def _unit(request: Instance) -> NiehUnit:
-    if request.task_name is None or not isinstance(request.doc, dict) or "question_id" not in request.doc:
+def _suite_and_task(request: Instance) -> tuple[str, str]:
+    suite = request.doc.get("suite") if isinstance(request.doc, dict) else None
+    if request.task_name is None or not isinstance(suite, str):
         raise ModelError(f"{request.task_name}: infthor-eval's models answer its own tasks (tasks/nieh) under lm-eval")
-    return NiehUnit.of(request.task_name, sample_of(request.doc))
+    return suite, request.task_name
 
 
 def _number(batch_size: int | str | None) -> str | None:

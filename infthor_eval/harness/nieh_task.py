@@ -1,10 +1,11 @@
-"""The functions behind the NIEH task files in `tasks/nieh/`, called by lm-eval.
+"""NIEH in lm-eval: the functions behind the task files in `tasks/nieh/`, and the adapter of their requests.
 
-They are the ones that our own run goes through, in lm-eval's forms.
+A request is a question. The functions are those of our own runs, in lm-eval's forms.
 """
 
 import json
 from collections import Counter
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from PIL import Image
@@ -12,11 +13,17 @@ from PIL import Image
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.harness.registration import model_takes_references, register
-from infthor_eval.nieh.docs import Doc, doc_of, doc_parts, doc_prompt, doc_target, sample_of
+from infthor_eval.harness.requests import Doc
+from infthor_eval.nieh.docs import doc_of, doc_parts, doc_prompt, doc_target, sample_of, samples_of
+from infthor_eval.nieh.evaluation import PreparedEvaluation
+from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.nieh.samples import find_samples
 from infthor_eval.nieh.scoring import scores
+from infthor_eval.nieh.task import PreparedTask
+from infthor_eval.runs import UnitKey, UnitRecord
+from infthor_eval.runs.generation_kwargs import decoding_of
 
-__all__ = ["dataset", "doc_to_image", "doc_to_target", "doc_to_text", "process_results"]
+__all__ = ["NiehRequests", "dataset", "doc_to_image", "doc_to_target", "doc_to_text", "process_results"]
 
 # lm-eval 0.4.13 reads no entry points; where it imports a task's functions before it looks for the model (a task file
 # given by its path), this lets it find ours.
@@ -24,12 +31,12 @@ register()
 
 
 def dataset(**config: Any) -> dict[str, Any]:
-    """The docs of a task, one per sample (`custom_dataset` of the task files).
+    """Build the docs of a task, one per sample (`custom_dataset` of the task files).
 
-    Requests hold decoded images, as lm-eval's own models want them; our models decode by themselves.
+    Requests hold decoded images, as lm-eval's own models need them; ours decode the frames themselves.
 
     Args:
-        config: see `find_samples`; what else lm-eval passes to every task is not looked at.
+        config: see `find_samples`; whatever else lm-eval passes to every task is ignored.
 
     Raises:
         UsageError: nothing can be asked, the model would have to take notes, or as in `find_samples`.
@@ -51,20 +58,43 @@ def dataset(**config: Any) -> dict[str, Any]:
 
 
 def doc_to_text(doc: Doc) -> str:
-    """The request's text, with a placeholder where each frame, and the model's notes, go."""
+    """Return the text of the request, with a placeholder for each frame and for the model's notes."""
     return doc_prompt(doc)
 
 
 def doc_to_image(doc: Doc) -> list[Image.Image]:
-    """The decoded frames; none where the model takes references instead."""
+    """Return the decoded frames; none where the model takes references instead."""
     return [part.load() for part in doc_parts(doc) if isinstance(part, FrameRef)] if doc["pixels"] else []
 
 
 def doc_to_target(doc: Doc) -> str:
-    """The gold answers as one response would give them."""
+    """Return the gold answers as one response would give them."""
     return doc_target(sample_of(doc).question)
 
 
 def process_results(doc: Doc, results: list[str]) -> dict[str, float]:
-    """Both scores of a response."""
+    """Return both scores of a response."""
     return scores(results[0], json.loads(doc["answers"]))
+
+
+class NiehRequests:
+    """Questions as requests of lm-eval; see `RequestAdapter`."""
+
+    def prepare(
+        self, task: str, docs: Sequence[Doc], generation_kwargs: Mapping[str, Any], seed: int
+    ) -> PreparedEvaluation:
+        """See `RequestAdapter`."""
+        decoding = decoding_of(generation_kwargs, seed, task)
+        return PreparedEvaluation({task: PreparedTask(samples_of(docs), decoding, generation_kwargs)})
+
+    def doc_id(self, doc: Doc) -> tuple[str, str]:
+        """Return question and variant."""
+        return doc["question_id"], doc["variant"]
+
+    def doc_id_of_unit(self, key: UnitKey, cluster: str) -> tuple[str, str]:
+        """Return question and variant."""
+        return key.id, key.variant
+
+    def response(self, records: Sequence[UnitRecord[NiehAnswer]]) -> str:
+        """Return the reply; empty where the model could not answer."""
+        return records[0].payload.reply or ""

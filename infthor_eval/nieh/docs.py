@@ -5,6 +5,7 @@ trajectories of thousands of frames.
 """
 
 import json
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -15,7 +16,7 @@ from infthor_eval.nieh.notes import Notes, Notetaking
 from infthor_eval.nieh.samples import TaskSamples, open_set
 from infthor_eval.nieh.stand_ins import StandIns
 
-__all__ = ["Doc", "doc_of", "doc_parts", "doc_prompt", "doc_target", "prompt_of", "sample_of", "samples_around"]
+__all__ = ["Doc", "doc_of", "doc_parts", "doc_prompt", "doc_target", "prompt_of", "sample_of", "samples_of"]
 
 Doc = dict[str, Any]
 _PLACEHOLDERS = {FrameRef: "<image>", Notes: "<notes>"}  # the first is lm-eval's own mark for an image in a text
@@ -31,6 +32,7 @@ def doc_of(found: TaskSamples, sample: Sample, pixels: bool = False) -> Doc:
     """
     question = sample.question
     return {
+        "suite": "nieh",
         "question_id": question.id,
         "traj_id": question.traj_id,
         "question": question.text,
@@ -63,23 +65,24 @@ def sample_of(doc: Doc) -> Sample:
     return Sample(question, tuple(doc["frames"]), doc["variant"], notes=notes)
 
 
-def samples_around(doc: Doc) -> TaskSamples:
-    """The task's samples as far as one doc tells of them: that one."""
+def samples_of(docs: Sequence[Doc]) -> TaskSamples:
+    """Return the samples of some docs of one task."""
+    doc = docs[0]
     context = context_named(doc["context"])
     data = open_set(doc["set"], doc["trajectories"] or None)
     stand_ins = StandIns(**doc["stand_ins"])
-    return TaskSamples(data, doc["context"], context, [sample_of(doc)], [], {}, stand_ins)
+    return TaskSamples(data, doc["context"], context, [sample_of(doc) for doc in docs], [], {}, stand_ins)
 
 
 def doc_parts(doc: Doc) -> list[ContextPart]:
     """All that a model is shown and told for a doc, the text with the question last."""
-    context, text = samples_around(doc).request(sample_of(doc))
+    context, text = samples_of([doc]).request(sample_of(doc))
     return [*context, text]
 
 
 def doc_prompt(doc: Doc) -> str:
     """The request's text, with a placeholder where each frame, and the model's notes, go."""
-    return prompt_of(samples_around(doc), sample_of(doc))
+    return prompt_of(samples_of([doc]), sample_of(doc))
 
 
 def prompt_of(found: TaskSamples, sample: Sample) -> str:

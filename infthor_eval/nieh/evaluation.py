@@ -26,7 +26,7 @@ from infthor_eval.runs import (
 )
 from model_adapters import Subject
 
-__all__ = ["BoundNieh", "NiehEvaluation", "nieh_groups"]
+__all__ = ["BoundNieh", "NiehEvaluation", "PreparedEvaluation"]
 
 
 class NiehEvaluation:
@@ -56,7 +56,7 @@ class NiehEvaluation:
         open_answerer = model.fit({name: partial(task.key, prepared[name], tokens) for name, task in tasks.items()})
         costs = {name: model.cost(item) for name, item in prepared.items()}
         workload = Workload(
-            groups=[group for name, item in prepared.items() for group in nieh_groups(name, item)],
+            groups=_groups(prepared),
             skipped=[skipped for name, item in prepared.items() for skipped in _skipped(name, item.found)],
             config={
                 "tasks": {name: task.identity(prepared[name]) for name, task in tasks.items()},
@@ -99,6 +99,18 @@ class NiehEvaluation:
     def _depends_on(self, source: str) -> bool:
         """Return whether a context of the tasks reads a source beside the set."""
         return any(task.found is not None and source in task.found.sources for task in self._tasks)
+
+
+class PreparedEvaluation:
+    """Samples of known contexts set up for a run of a model; see `infthor_eval.runs.Evaluation`."""
+
+    def __init__(self, prepared: Mapping[str, PreparedTask]) -> None:
+        """Take up tasks by name."""
+        self._prepared = prepared
+
+    def bind(self, subject: Subject) -> "BoundNieh":
+        """See `infthor_eval.runs.Evaluation.bind`."""
+        return BoundNieh(Workload(_groups(self._prepared)), self._prepared, answering_model(subject).fit({}))
 
 
 class BoundNieh:
@@ -150,13 +162,16 @@ class BoundNieh:
         }
 
 
-def nieh_groups(task: str, prepared: PreparedTask) -> Iterator[Group[NiehUnit]]:
-    """Yield the samples of each trajectory as a group: they share what is encoded of it."""
-    ordered = sorted(prepared.found.samples, key=lambda sample: sample.question.traj_id)
-    for _, samples in groupby(ordered, key=lambda sample: sample.question.traj_id):
-        same = list(samples)
-        frames = len({frame for sample in same for frame in sample.frames})
-        yield Group([NiehUnit.of(task, sample) for sample in same], frames=frames)
+def _groups(prepared: Mapping[str, PreparedTask]) -> list[Group[NiehUnit]]:
+    """Return a group for each task and trajectory: its samples share what is encoded of the trajectory."""
+    groups = []
+    for task, item in prepared.items():
+        ordered = sorted(item.found.samples, key=lambda sample: sample.question.traj_id)
+        for _, samples in groupby(ordered, key=lambda sample: sample.question.traj_id):
+            same = list(samples)
+            frames = len({frame for sample in same for frame in sample.frames})
+            groups.append(Group([NiehUnit.of(task, sample) for sample in same], frames))
+    return groups
 
 
 def _skipped(task: str, found: TaskSamples) -> Iterator[Skipped]:

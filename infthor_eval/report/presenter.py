@@ -1,7 +1,7 @@
 """How the results of a suite are presented: on the report's page, as figures and as recordings.
 
 `Presenter` is what a suite offers; `infthor_eval.report.plain.PlainPresenter` implements all of it for suites that have
-none. `infthor_eval.suites.presenter_of` finds the presenter of a suite.
+none. `infthor_eval.suites.find_presenter` finds the presenter of a suite.
 """
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence

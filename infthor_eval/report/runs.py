@@ -76,7 +76,7 @@ class ReportRun:
 
 
 def read_report_runs(
-    folders: Sequence[Path], suite_named: Callable[[str], Suite], presenter_of: Callable[[str], "Presenter"]
+    folders: Sequence[Path], find_suite: Callable[[str], Suite], find_presenter: Callable[[str], "Presenter"]
 ) -> list[ReportRun]:
     """Read runs from their folders.
 
@@ -93,7 +93,7 @@ def read_report_runs(
         raise UsageError("one run is given twice; give each once")
     headers = [read_header(folder) for folder in folders]
     return [
-        _read(folder, header, name, suite_named(header.suite), presenter_of(header.suite))
+        _read(folder, header, name, find_suite(header.suite), find_presenter(header.suite))
         for folder, header, name in zip(folders, headers, _distinct_names(folders, headers), strict=True)
     ]
 

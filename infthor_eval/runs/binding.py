@@ -8,13 +8,18 @@ from infthor_eval.errors import UsageError
 from infthor_eval.runs.records import RunHeader, Unit
 from infthor_eval.runs.request import PreparedRun
 from infthor_eval.runs.run_config import header_of
-from infthor_eval.runs.suite import BoundEvaluation
+from infthor_eval.runs.suite import BoundEvaluation, Need, Suite
 from model_adapters import Model, Policy, Subject, load
 
-__all__ = ["BoundRun", "bind_run"]
+__all__ = ["BoundRun", "bind_run", "require_capability"]
 
 P = TypeVar("P")
 U = TypeVar("U", bound=Unit[Any])
+
+_NEEDED: dict[Need, tuple[type, str]] = {
+    "conversation": (Model, "a model that answers in words"),
+    "policy": (Policy, "a policy that drives an arm (openvla, spatialvla, ...)"),
+}
 
 
 @dataclass(frozen=True)
@@ -61,8 +66,25 @@ def _load_subject(run: PreparedRun[U, P]) -> Subject:
     if request.model in suite.baselines:
         return suite.baselines[request.model](request.tasks.seed)
     subject = load(request.model, request.model_options, request.tasks.seed)
-    needed: type = {"conversation": Model, "policy": Policy}[suite.needs]
-    if not isinstance(subject, needed):
+    try:
+        require_capability(subject, request.model, suite)
+    except UsageError:
         subject.close()
-        raise UsageError(f"{request.model} cannot be evaluated on {suite.name}, which needs a {suite.needs}")
+        raise
     return subject
+
+
+def require_capability(subject: Subject, name: str, suite: Suite[U, P]) -> None:
+    """Refuse a subject that a suite cannot evaluate.
+
+    Args:
+        subject: a model or a policy.
+        name: the name that it was asked for.
+        suite: the suite.
+
+    Raises:
+        UsageError: the subject lacks what the suite needs.
+    """
+    kind, description = _NEEDED[suite.needs]
+    if not isinstance(subject, kind):
+        raise UsageError(f"{name} cannot be evaluated on {suite.name}, which needs {description}")

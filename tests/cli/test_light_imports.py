@@ -67,8 +67,8 @@ def test_making_data_loads_nothing_of_runs(typed: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", suites.suite_names())
 def test_the_baselines_that_are_listed_are_the_suites_own(name: str) -> None:
-    listed = {baseline for baseline, having in suites.baseline_names().items() if name in having.split(", ")}
-    assert listed == set(suites.suite_named(name).baselines)
+    listed = {baseline for baseline, having in suites.baseline_suites().items() if name in having}
+    assert listed == set(suites.find_suite(name).baselines)
 
 
 def test_every_command_is_listed_by_name():

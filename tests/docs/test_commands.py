@@ -11,7 +11,7 @@ import pytest
 
 from infthor_eval.cli.main import _infthor_eval
 from infthor_eval.runs import Catalog
-from infthor_eval.suites import baseline_names
+from infthor_eval.suites import baseline_suites
 from model_adapters import has_option, is_known, name_on_engine, names
 
 from .blocks import ROOT, written_files
@@ -94,7 +94,7 @@ def _check_names(given):
     """Models, their options and tasks are known, but for those of the example package and of files beside a page."""
     engine = given["engine"]
     for model, own in given["models"]:
-        if model == "thumbnails" or model in baseline_names():
+        if model == "thumbnails" or model in baseline_suites():
             continue
         assert is_known(model), f"{model}: there are {names()}"
         if model in names():

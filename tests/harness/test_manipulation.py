@@ -59,10 +59,10 @@ def test_one_request_an_episode_and_what_our_own_run_finds(tmp_path, short, run,
         pytest.param(
             "qwen2.5-vl-tiny",
             "manipulathor_pickup",
-            "drives no arm; tasks of manipulation need a policy",
+            "cannot be evaluated on manipulation, which needs a policy that drives an arm",
             marks=pytest.mark.slow,
         ),
-        (TINY, "nieh_mini_gt", "cannot be talked to; it is a policy, for tasks of manipulation"),
+        (TINY, "nieh_mini_gt", "openvla-tiny cannot be evaluated on nieh, which needs a model that answers in words"),
     ],
 )
 def test_what_a_model_cannot_do_is_refused_in_one_line(tmp_path, short, adapter, task, said):

@@ -1,12 +1,17 @@
 """Our model class for lm-eval, without its command."""
 
+import json
+from importlib.metadata import EntryPoint
+
 import pytest
 from lm_eval.api.instance import Instance
 
 from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.harness import nieh_task, registration
 from infthor_eval.harness.model import InfthorLM
+from infthor_eval.runs import read_run
 from model_adapters.hf.model import TransformersModel
+from tests.runs.toy import Prepared, Sums, ToySuite
 
 KWARGS = {"until": [], "max_gen_toks": 6, "do_sample": False, "temperature": 0.0}
 
@@ -48,7 +53,7 @@ def test_what_lm_eval_says_by_default_is_not_taken_for_a_wish(requests):
 
 
 def test_what_it_cannot_do_is_said_in_one_line(requests):
-    with pytest.raises(UsageError, match="blind reads the answer key; run it with infthor-eval --model blind"):
+    with pytest.raises(UsageError, match="blind is a baseline, not a model; run it with infthor-eval --model blind"):
         InfthorLM("blind")
     model = InfthorLM("qwen2.5-vl-tiny")
     foreign = Instance("generate_until", {"question": "2+2?"}, ("2+2?", KWARGS), 0, metadata=("gsm8k", 0, 1))
@@ -57,3 +62,72 @@ def test_what_it_cannot_do_is_said_in_one_line(requests):
     for method in (model.loglikelihood, model.loglikelihood_rolling):
         with pytest.raises(ModelError, match="use a task with output_type generate_until"):
             method(requests)
+
+
+class SumRequests:
+    """How lm-eval's requests reach the toy suite: a doc is a sum."""
+
+    def prepare(self, task, docs, generation_kwargs, seed):
+        return Prepared(Sums)
+
+    def doc_id(self, doc):
+        return f"{doc['a']}+{doc['b']}"
+
+    def doc_id_of_unit(self, key, cluster):
+        return key.id
+
+    def response(self, records):
+        return json.dumps([record.payload.answer for record in records])
+
+
+class Incomplete:
+    doc_id = None
+
+
+def sum_requests(*sums):
+    docs = [{"suite": "toy", "a": a, "b": b} for a, b in sums]
+    return [
+        Instance("generate_until", doc, ("", KWARGS), number, metadata=("sums", number, 1))
+        for number, doc in enumerate(docs)
+    ]
+
+
+@pytest.fixture
+def install(monkeypatch):
+    """Makes the toy suite another package's, with an adapter for lm-eval of that name in this module, or none."""
+
+    def install(adapter):
+        points = [EntryPoint("toy", "tests.runs.toy:ToySuite", "infthor_eval.suites")]
+        if adapter is not None:
+            points.append(EntryPoint("toy", f"{__name__}:{adapter}", "infthor_eval.lm_eval"))
+        monkeypatch.setattr(
+            "infthor_eval.plugins.entry_points", lambda group: [point for point in points if point.group == group]
+        )
+
+    return install
+
+
+def test_a_suite_of_another_package_answers_its_docs_and_no_others(install, requests, tmp_path):
+    install("SumRequests")
+    model = InfthorLM("qwen2.5-vl-tiny", journal=str(tmp_path))
+    nieh = requests[:1]
+    sums = sum_requests((1, 4), (1, 3))
+    alone = model.generate_until(nieh)
+    assert model.generate_until([sums[0], *nieh, sums[1]]) == ["[5]", *alone, "[4]"]
+    assert [record.id for record in read_run(tmp_path / "toy", ToySuite.records)[1]] == ["1+3", "1+4"]
+    assert model.generate_until(sum_requests((1, 3))) == ["[4]"]  # each call closes what it opened
+
+
+@pytest.mark.parametrize(
+    ("adapter", "said"),
+    [
+        (None, "unknown lm-eval adapter of suite 'toy'; there are manipulation, nieh, plans"),
+        ("Incomplete", "adapter of suite toy of another package lacks prepare, doc_id_of_unit, response; see docs/"),
+    ],
+)
+def test_a_suite_that_lm_eval_cannot_reach_is_refused_in_one_line(install, adapter, said):
+    install(adapter)
+    with pytest.raises(UsageError) as caught:
+        InfthorLM("qwen2.5-vl-tiny").generate_until(sum_requests((1, 3)))
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)

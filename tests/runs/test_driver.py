@@ -241,7 +241,7 @@ def test_a_subject_that_cannot_do_what_the_suite_needs_is_refused(tmp_path, monk
     monkeypatch.setattr("infthor_eval.runs.request.is_known", lambda name: name == "arm")
     monkeypatch.setattr("infthor_eval.runs.request.check_options", lambda *_: None)
     monkeypatch.setattr("infthor_eval.runs.binding.load", lambda *_: Policy())
-    with pytest.raises(UsageError, match="arm cannot be evaluated on toy, which needs a conversation"):
+    with pytest.raises(UsageError, match="arm cannot be evaluated on toy, which needs a model that answers in words"):
         run(request(tmp_path, model="arm"))
 
 

@@ -22,14 +22,14 @@ def command(first: Path, second: Path) -> None:
     from infthor_eval.report.runs import label_report_runs
     from infthor_eval.report.terminal import print_table, table_console
     from infthor_eval.runs import read_header, read_run
-    from infthor_eval.suites import presenter_of, suite_named
+    from infthor_eval.suites import find_presenter, find_suite
 
     folders = (first, second)
     headers = [read_header(folder) for folder in folders]
     name, other = (header.suite for header in headers)
     if name != other:
         raise UsageError(f"{first} is a run of {name}, {second} of {other}; compare runs of one suite")
-    suite = suite_named(name)
+    suite = find_suite(name)
     records = [read_run(folder, suite.records)[1] for folder in folders]
-    comparisons = compare(suite, presenter_of(name), *records)
+    comparisons = compare(suite, find_presenter(name), *records)
     print_table(comparison_table(comparisons, *label_report_runs(folders, headers)), table_console())

@@ -15,7 +15,7 @@ from infthor_eval.report.terminal import print_table, table_console
 from infthor_eval.runs.catalog import Catalog
 from infthor_eval.runs.run_labels import label_runs
 from infthor_eval.runs.run_search import BrokenRun, StoredRun, find_runs
-from infthor_eval.suites import baseline_names, split_by_suite
+from infthor_eval.suites import baseline_suites, split_by_suite
 from infthor_eval.tables import Column, Row, Table
 from infthor_eval.terminal import console, print_line
 from model_adapters import names, options
@@ -40,8 +40,8 @@ def command(context: click.Context) -> None:
 def _models() -> None:
     """Models and baselines, with their options and defaults."""
     table = RichTable("model", "options and defaults (--model-args)", box=box.SIMPLE_HEAD)
-    for name, suites in baseline_names().items():
-        table.add_row(name, f"no options; a baseline of {suites}")
+    for name, suites in baseline_suites().items():
+        table.add_row(name, f"no options; a baseline of {', '.join(suites)}")
     for name in names():
         try:
             note = model_description(name)

@@ -83,13 +83,13 @@ def _write_page(folders: tuple[Path, ...], request: PageRequest, out: Path) -> N
     from infthor_eval.report.runs import read_report_runs
     from infthor_eval.report.web.build import build_page
     from infthor_eval.report.web.page import write_page
-    from infthor_eval.suites import presenter_of, suite_named
+    from infthor_eval.suites import find_presenter, find_suite
     from infthor_eval.terminal import error_console, print_line, progress_bar
 
     if out.suffix.lower() not in (".html", ".htm"):
         raise UsageError(f"--out {out}: the page is an .html file; name one")
     path = prepare_file(out)
-    runs = read_report_runs(folders, suite_named, presenter_of)
+    runs = read_report_runs(folders, find_suite, find_presenter)
     with progress_bar(error_console()) as progress:
         page = build_page(runs, request, _ReplayBar(progress))
     size = write_page(page, path)
@@ -118,14 +118,14 @@ def _draw(folders: tuple[Path, ...], name: str, request: FigureRequest, out: Pat
     from infthor_eval.formats.files import prepare_folder, require_writable
     from infthor_eval.report.runs import read_report_runs
     from infthor_eval.report.terminal import print_table, table_console
-    from infthor_eval.suites import presenter_of, suite_named, suite_names
+    from infthor_eval.suites import find_presenter, find_suite, suite_names
     from infthor_eval.terminal import print_line
 
-    owners: dict[str, Mapping[str, Figure]] = {suite: presenter_of(suite).figures for suite in suite_names()}
+    owners: dict[str, Mapping[str, Figure]] = {suite: find_presenter(suite).figures for suite in suite_names()}
     if not any(name in figures for figures in owners.values()):
         abouts = sorted(f"{key} ({figure.about})" for figures in owners.values() for key, figure in figures.items())
         raise UsageError(f"--figure {name}: is none that can be drawn; there are {', '.join(abouts)}")
-    runs = read_report_runs(folders, suite_named, presenter_of)
+    runs = read_report_runs(folders, find_suite, find_presenter)
     figure = _require_figure(runs, name, owners)
     if request.panels is not None and not figure.has_panels:
         raise UsageError(f"--panels: figure {name} has panels of its own; leave it out")

@@ -11,7 +11,7 @@ from infthor_eval.cli.results import RunResults, print_results
 from infthor_eval.runs import RunSummary, read_header
 from infthor_eval.runs.run_search import read_results
 from infthor_eval.runs.shards import read_shards
-from infthor_eval.suites import suite_named
+from infthor_eval.suites import find_suite
 
 __all__ = ["command", "read_run_results"]
 
@@ -36,7 +36,7 @@ def read_run_results(folder: Path) -> RunResults:
         UsageError: its suite is not known here.
     """
     header = read_header(folder)
-    suite = suite_named(header.suite)
+    suite = find_suite(header.suite)
     log, results = read_shards(folder, suite.records.decoder()), read_results(folder)
     summary = RunSummary(header, suite.summarise(header, log.records))
     return RunResults(folder, suite, summary, log.usage, results.n_missing if results else None)

@@ -64,13 +64,13 @@ def command(
     from infthor_eval.formats.files import prepare_file
     from infthor_eval.report.presenter import Selection
     from infthor_eval.report.runs import read_report_runs
-    from infthor_eval.suites import presenter_of, suite_named
+    from infthor_eval.suites import find_presenter, find_suite
 
     if out is not None:
         require_animation_name(out)
     if sheet is not None and sheet.suffix.lower() != ".png":
         raise UsageError(f"--sheet {sheet}: a sheet is a PNG; give a file whose name ends in .png")
-    (recorded,) = read_report_runs([run], suite_named, presenter_of)
+    (recorded,) = read_report_runs([run], find_suite, find_presenter)
     replay = _require_replay(recorded)
     _refuse_options(recorded, replay, {"--plans": plans, "--episode": episode, "--sheet": sheet})
     if sheet is not None and out is not None:
@@ -90,10 +90,10 @@ def _require_replay(run: ReportRun) -> Replay:
         UsageError: the suite has none.
     """
     from infthor_eval.errors import UsageError
-    from infthor_eval.suites import presenter_of, suite_names
+    from infthor_eval.suites import find_presenter, suite_names
 
     if run.presenter.replay is None:
-        others = sorted((name for name in suite_names() if presenter_of(name).replay is not None), reverse=True)
+        others = sorted((name for name in suite_names() if find_presenter(name).replay is not None), reverse=True)
         raise UsageError(
             f"{run.folder}: is a run of {run.suite.name}, and only runs of {' and '.join(others)} can be watched"
         )

@@ -27,7 +27,7 @@ from infthor_eval.cli.options.values import (
 from infthor_eval.cli.options.workers import parse_worker_settings, worker_options
 from infthor_eval.errors import UsageError
 from infthor_eval.runs import Catalog, RunRequest, Suite, TaskRequest
-from infthor_eval.suites import baseline_names, split_by_suite, suite_identity, suite_named
+from infthor_eval.suites import baseline_suites, find_suite, split_by_suite, suite_code
 from infthor_eval.workers import WorkerSettings
 from model_adapters import is_known, name_on_engine
 
@@ -198,16 +198,18 @@ class RunOptions:
                         recover=self.recover,
                         worker_settings=self.worker_settings,
                         include=self.include,
-                        suite_code=suite_identity(suite),
+                        suite_code=suite_code(suite),
                     )
-                    requests.append((request, suite_named(suite)))
+                    requests.append((request, find_suite(suite)))
         return requests
 
 
 def _refuse_baseline_of_others(model: str, suite: str, task: str) -> None:
-    suites = baseline_names().get(model)
-    if suites is not None and suite not in suites.split(", ") and not is_known(model):
-        raise UsageError(f"{model} is a baseline of {suites}, and {task} is a task of {suite}; see `ls models`")
+    suites = baseline_suites().get(model, (suite,))
+    if suite not in suites and not is_known(model):
+        raise UsageError(
+            f"{model} is a baseline of {', '.join(suites)}, and {task} is a task of {suite}; see `ls models`"
+        )
 
 
 def _options_of_all_models(given: Mapping[str, Any]) -> dict[str, str]:

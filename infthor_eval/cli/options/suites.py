@@ -11,7 +11,7 @@ import click
 
 from infthor_eval.cli.options.values import WholeNumber, split_names
 from infthor_eval.errors import UsageError
-from infthor_eval.suites import options_of, suite_names
+from infthor_eval.suites import options_class, suite_names
 
 __all__ = ["expand_suite_options", "refuse_duplicate_options", "suite_options", "suite_values"]
 
@@ -23,7 +23,7 @@ def suite_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """
     for name, by_suite in reversed(_options_by_name().items()):
         first, item = next(iter(by_suite.items()))
-        kind = _value_type(typing.get_type_hints(options_of(first))[name])
+        kind = _value_type(typing.get_type_hints(options_class(first))[name])
         choices = item.metadata.get("choices")
         command = click.option(
             f"--{name.replace('_', '-')}",
@@ -55,13 +55,13 @@ def expand_suite_options(suite: str, given: Mapping[str, Any], used: Collection[
         UsageError: an option belongs to no suite that is used.
     """
     _refuse_unused(given, used)
-    kinds = typing.get_type_hints(options_of(suite))
+    kinds = typing.get_type_hints(options_class(suite))
     values: dict[str, list[Any]] = {}
-    for item in fields(options_of(suite)):
+    for item in fields(options_class(suite)):
         if given.get(item.name) is not None:
             typed = split_names(given[item.name], f"--{item.name}") if item.metadata.get("each") else [given[item.name]]
             values[item.name] = [_value_type(kinds[item.name])(value) for value in typed]
-    return [options_of(suite)(**dict(zip(values, chosen, strict=True))) for chosen in product(*values.values())]
+    return [options_class(suite)(**dict(zip(values, chosen, strict=True))) for chosen in product(*values.values())]
 
 
 def refuse_duplicate_options(command: Callable[..., Any]) -> None:
@@ -85,7 +85,7 @@ def _options_by_name() -> dict[str, dict[str, Field[Any]]]:
     """The options of all suites by name, then by suite."""
     options: dict[str, dict[str, Field[Any]]] = {}
     for suite in suite_names():
-        for item in fields(options_of(suite)):
+        for item in fields(options_class(suite)):
             options.setdefault(item.name, {})[suite] = item
     return options
 

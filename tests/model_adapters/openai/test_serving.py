@@ -18,7 +18,7 @@ import pytest
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.runs import UnitRecord, read_header, read_run
-from infthor_eval.suites import suite_named
+from infthor_eval.suites import find_suite
 from model_adapters import check_adapter, load
 from tests.plans.cut import CANDLE, FORK, cut, write
 
@@ -92,7 +92,7 @@ def both(served: Served, tmp_path: Path, run: Any) -> Callable[..., list[list[Un
             code, _, err = run(*typed, *arguments)
             assert code == 0, err
             (results,) = (tmp_path / "out" / model).rglob("results.json")
-            found.append(read_run(results.parent, suite_named(read_header(results.parent).suite).records)[1])
+            found.append(read_run(results.parent, find_suite(read_header(results.parent).suite).records)[1])
         return found
 
     return both
