@@ -1,7 +1,8 @@
-"""Generating many trajectories into a directory, so that stopping and starting continues."""
+"""Generating many trajectories into a folder; an interrupted run is resumed by the same command."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import msgspec
@@ -12,6 +13,7 @@ from infthor_eval.formats.trajectory import encode_trajectory, iter_sources
 from infthor_eval.generation.factory import GeneratedTrajectory, TaskStatistics, generate
 from infthor_eval.generation.garbage import freeze_existing_objects
 from infthor_eval.generation.settings import TrajectorySettings
+from infthor_eval.generation.simulator_jobs import StartSimulatorWorker, collect_outcomes
 from infthor_eval.household.pddl import DOMAIN
 from infthor_eval.thor.launch import Launch
 from infthor_eval.thor.simulator import Simulator
@@ -28,15 +30,15 @@ class TaskCounts(msgspec.Struct):
 
 
 class GenerationSummary(msgspec.Struct):
-    """What came of it in numbers, as `--json` prints it.
+    """Numbers of a set of trajectories, as `--json` prints them.
 
     Attributes:
-        trajectories: how many there are.
-        resumed: how many of them are from earlier runs.
-        steps: low-level actions of all of them.
-        tasks: numbers of this run, by task type.
-        refusals: why tasks failed in this run, the most frequent first.
-        failures: what could not be made, one line each.
+        trajectories: number of trajectories.
+        resumed: number of trajectories of earlier runs.
+        steps: number of low-level actions in all trajectories.
+        tasks: numbers of tasks in this run, by task type.
+        refusals: numbers of failed tasks in this run by reason, the most frequent first.
+        failures: trajectories that could not be generated, one line each.
     """
 
     trajectories: int
@@ -49,13 +51,13 @@ class GenerationSummary(msgspec.Struct):
 
 @dataclass
 class GeneratedSet:
-    """What came of it.
+    """A set of generated trajectories.
 
     Attributes:
-        paths: the trajectories, those of earlier runs included.
-        resumed: how many of them are from earlier runs.
-        steps: low-level actions of all of them.
-        failures: what could not be made, one line each.
+        paths: files of the trajectories, including those of earlier runs.
+        resumed: number of trajectories of earlier runs.
+        steps: number of low-level actions in all trajectories.
+        failures: trajectories that could not be generated, one line each.
         statistics: tasks tried and accepted in this run.
     """
 
@@ -66,7 +68,7 @@ class GeneratedSet:
     statistics: TaskStatistics = field(default_factory=TaskStatistics)
 
     def summary(self) -> GenerationSummary:
-        """It in numbers."""
+        """Return the numbers of the set."""
         tried, accepted = self.statistics.tried, self.statistics.accepted
         return GenerationSummary(
             trajectories=len(self.paths),
@@ -80,19 +82,24 @@ class GeneratedSet:
 
 @dataclass(frozen=True)
 class _GenerationOutcome:
-    """What became of one job.
+    """The outcome of one job.
 
     Attributes:
-        path: of the trajectory; None where it could not be made.
-        steps: its low-level actions.
-        statistics: tasks tried and accepted; None where an earlier run made it.
-        failure: why it could not be made.
+        path: file of the trajectory; None if it could not be generated.
+        steps: number of low-level actions.
+        statistics: tasks tried and accepted; None for a trajectory of an earlier run.
+        failure: reason why it could not be generated.
     """
 
     path: Path | None = None
     steps: int = 0
     statistics: TaskStatistics | None = None
     failure: str | None = None
+
+    @property
+    def is_resumed(self) -> bool:
+        """True for a trajectory of an earlier run."""
+        return self.path is not None and self.statistics is None
 
 
 def generate_set(
@@ -101,19 +108,20 @@ def generate_set(
     out: Path,
     progress: Callable[[bool], None] = lambda _: None,
 ) -> GeneratedSet:
-    """Make the trajectories that `out` does not have yet, one file each, and beside it their tasks as PDDL.
+    """Generate the trajectories that `out` does not have yet: a file each, with a folder of its tasks as PDDL.
 
     Args:
-        jobs: what to make.
-        simulator: where it happens.
-        out: directory of the files; made where it does not exist.
-        progress: is called after each trajectory, with whether an earlier run had made it.
+        jobs: settings of the trajectories.
+        simulator: simulator to generate them in.
+        out: folder of the files; created if it does not exist.
+        progress: called after each trajectory, with True if it is of an earlier run.
 
     Raises:
-        DataError: a trajectory cannot be written; those before it stay.
+        DataError: a trajectory cannot be written; those before it remain.
     """
     out.mkdir(parents=True, exist_ok=True)
-    return _collected(enumerate(_outcome(job, simulator, out) for job in jobs), progress)
+    outcomes = (_generate_one(job, simulator, out) for job in jobs)
+    return _summarise(collect_outcomes(enumerate(outcomes), _failed, progress))
 
 
 def generate_with_workers(
@@ -124,62 +132,32 @@ def generate_with_workers(
     progress: Callable[[bool], None] = lambda _: None,
     say: Callable[[str], None] = lambda _: None,
 ) -> GeneratedSet:
-    """As `generate_set`, by workers with a simulator each: the same files.
+    """Generate as `generate_set` does, with the same files, by workers with a simulator each.
 
     Args:
-        jobs: what to make.
-        launch: how a simulator is started.
-        out: directory of the files, the same for all workers; made where it does not exist.
-        worker_settings: how many workers, and where.
-        progress: is called after each trajectory, with whether an earlier run had made it.
-        say: is told what becomes of workers.
+        jobs: settings of the trajectories.
+        launch: simulator that each worker starts.
+        out: folder of the files, shared by all workers; created if it does not exist.
+        worker_settings: number and place of the workers.
+        progress: called after each trajectory, with True if it is of an earlier run.
+        say: called with messages about the workers.
 
     Raises:
-        DataError: a trajectory cannot be written; those before it stay.
+        DataError: a trajectory cannot be written; those before it remain.
     """
     out.mkdir(parents=True, exist_ok=True)
-    return _collected(shared_out(_OpenMaker(launch, out), jobs, worker_settings, say), progress)
+    start = StartSimulatorWorker(launch, partial(_generate_one, out=out))
+    outcomes = shared_out(start, jobs, worker_settings, say)
+    return _summarise(collect_outcomes(outcomes, _failed, progress))
 
 
-@dataclass(frozen=True)
-class _OpenMaker:
-    """Makes a worker that generates."""
-
-    launch: Launch
-    out: Path
-
-    def __call__(self, number: int) -> "_Maker":
-        return _Maker(self.launch, self.out)
+def _failed(_number: int, error: InfthorError) -> _GenerationOutcome:
+    return _GenerationOutcome(failure=str(error))
 
 
-class _Maker:
-    """Generates in a simulator of its own; see `infthor_eval.workers.Worker`."""
-
-    greeting = None
-
-    def __init__(self, launch: Launch, out: Path) -> None:
-        self._simulator = Simulator(launch)
-        self._out = out
-
-    def do(self, job: TrajectorySettings) -> Iterator[_GenerationOutcome]:
-        yield _outcome(job, self._simulator, self._out)
-
-    def close(self) -> None:
-        self._simulator.close()
-
-
-def _collected(
-    outcomes: Iterable[tuple[int, _GenerationOutcome | InfthorError]], progress: Callable[[bool], None]
-) -> GeneratedSet:
-    """What came of it, in the order of the jobs."""
-    found: dict[int, _GenerationOutcome] = {}
-    for number, outcome in outcomes:
-        if isinstance(outcome, InfthorError):
-            outcome = _GenerationOutcome(failure=str(outcome))  # noqa: PLW2901
-        found[number] = outcome
-        progress(outcome.path is not None and outcome.statistics is None)
+def _summarise(outcomes: Sequence[_GenerationOutcome]) -> GeneratedSet:
     result = GeneratedSet()
-    for _, outcome in sorted(found.items()):
+    for outcome in outcomes:
         if outcome.path is None:
             result.failures.append(str(outcome.failure))
             continue
@@ -192,39 +170,34 @@ def _collected(
     return result
 
 
-def _outcome(job: TrajectorySettings, simulator: Simulator, out: Path) -> _GenerationOutcome:
+def _generate_one(job: TrajectorySettings, simulator: Simulator, out: Path) -> _GenerationOutcome:
     path = out / f"{job.traj_id}.json"
     try:
         if path.exists():
-            return _GenerationOutcome(path, _earlier(path, job))
-        made = _made(job, simulator)
+            return _GenerationOutcome(path, _check_earlier(path, job))
+        with freeze_existing_objects():
+            generated = generate(job, simulator)
     except InfthorError as error:
         return _GenerationOutcome(failure=str(error))
-    _write(made, path)  # not a failure of this one: where it has no room, the others would be made in vain
-    return _GenerationOutcome(path, len(made.trajectory.plan.low_actions), made.statistics)
+    # Outside of `try`: if this file has no room, generating the other trajectories would be wasted.
+    _write(generated, path)
+    return _GenerationOutcome(path, len(generated.trajectory.plan.low_actions), generated.statistics)
 
 
-def _made(job: TrajectorySettings, simulator: Simulator) -> GeneratedTrajectory:
-    with freeze_existing_objects():
-        return generate(job, simulator)
-
-
-def _write(made: GeneratedTrajectory, path: Path) -> None:
+def _write(generated: GeneratedTrajectory, path: Path) -> None:
     folder = path.with_suffix(".pddl")
-    with wrap_errors(
-        f"{path}: cannot be written", "make room and run the same command again, which goes on where it was"
-    ):
+    with wrap_errors(f"{path}: cannot be written", "make room and run the same command again, which resumes"):
         folder.mkdir(exist_ok=True)
         (folder / "domain.pddl").write_text(DOMAIN)
-        for number, problem in enumerate(made.problems):
+        for number, problem in enumerate(generated.problems):
             (folder / f"task-{number:03d}.pddl").write_text(problem)
-        with write_atomically(path) as partial:  # it comes last: where it is, everything is
-            partial.write_bytes(encode_trajectory(made.trajectory))
+        with write_atomically(path) as partial_file:  # last: if this file exists, the others do
+            partial_file.write_bytes(encode_trajectory(generated.trajectory))
 
 
-def _earlier(path: Path, job: TrajectorySettings) -> int:
+def _check_earlier(path: Path, job: TrajectorySettings) -> int:
+    """Check that a trajectory was generated with the same settings, and return its number of actions."""
     trajectory = next(iter_sources(path)).read()
-    made = trajectory.gen_info or {}
-    if made.get("settings") != job.document():
-        raise UsageError(f"{path}: made with other settings; remove it or choose another --out")
+    if (trajectory.gen_info or {}).get("settings") != job.document():
+        raise UsageError(f"{path}: generated with other settings; remove it or choose another --out")
     return len(trajectory.plan.low_actions)

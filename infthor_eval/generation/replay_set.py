@@ -1,8 +1,7 @@
-"""Replaying many trajectories into one set, so that stopping and starting continues.
+"""Replaying many trajectories into one set; an interrupted run is resumed by the same command.
 
-Each trajectory is made in a hidden folder beside its final place and moved there when it is complete; what is
-there is complete. A folder that is there already, made from the same trajectory, is counted and not made
-again.
+Each trajectory is written to a hidden folder, which is renamed when it is complete. An existing folder is therefore
+complete; if it was made from the same trajectory, it is counted and not replayed again.
 """
 
 import time
@@ -10,6 +9,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import msgspec
@@ -22,6 +22,7 @@ from infthor_eval.formats.set_info import claim_for_simulator
 from infthor_eval.formats.trajectory import Trajectory, TrajectorySource, folder_name, iter_sources, trajectory_files
 from infthor_eval.generation.garbage import freeze_existing_objects
 from infthor_eval.generation.replay import ReplayReport, replay
+from infthor_eval.generation.simulator_jobs import StartSimulatorWorker, collect_outcomes
 from infthor_eval.thor.launch import Launch
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.supplement import agent_path
@@ -43,7 +44,7 @@ class ReplayFailure:
 
 @dataclass
 class Selection:
-    """The trajectories to replay, and those that could not even be read."""
+    """The trajectories to replay, and those that could not be read."""
 
     items: list[tuple[TrajectorySource, Trajectory]] = field(default_factory=list)
     failures: list[ReplayFailure] = field(default_factory=list)
@@ -51,12 +52,12 @@ class Selection:
 
 @dataclass
 class ReplayedSet:
-    """What came of a set.
+    """A set of replayed trajectories.
 
     Attributes:
-        reports: one per replayed trajectory, those of earlier runs included.
-        resumed: how many of them are from earlier runs.
-        failures: the trajectories without one.
+        reports: reports of the replayed trajectories, including those of earlier runs.
+        resumed: number of trajectories that earlier runs replayed.
+        failures: trajectories that could not be replayed.
         seconds: wall time of this run.
     """
 
@@ -70,12 +71,12 @@ def select(paths: Iterable[Path], limit: int | None = None, per_floor_plan: int 
     """Read the trajectories to replay.
 
     Args:
-        paths: files and directories.
-        limit: take no more than this many.
-        per_floor_plan: take no more than this many of one floor plan.
+        paths: files and folders of trajectories.
+        limit: maximum number of trajectories.
+        per_floor_plan: maximum number of trajectories on one floor plan.
 
     Raises:
-        DataError: a path holds no trajectory file.
+        DataError: a path has no trajectory file.
     """
     selection = Selection()
     taken: Counter[str] = Counter()
@@ -84,8 +85,8 @@ def select(paths: Iterable[Path], limit: int | None = None, per_floor_plan: int 
             break
         try:
             trajectory = source.read()
-            with _malformed(source):
-                agent_path(trajectory)  # what the scene is supplemented with, before the first replay
+            with _wrap_malformed(source):
+                agent_path(trajectory)  # read for all scenes before the first replay, so an error must show here
         except DataError as error:
             selection.failures.append(ReplayFailure(source.place, str(error)))
             continue
@@ -101,16 +102,16 @@ Item = tuple[TrajectorySource, Trajectory]
 
 @dataclass(frozen=True)
 class _ReplayOutcome:
-    """What became of one trajectory.
+    """The outcome of one trajectory.
 
     Attributes:
-        report: of its replay; None where it could not be replayed at all.
-        new: whether it was made now.
-        failure: why there is no report.
+        report: report of its replay; None if it could not be replayed.
+        is_resumed: True if an earlier run replayed it.
+        failure: reason why there is no report.
     """
 
     report: ReplayReport | None = None
-    new: bool = False
+    is_resumed: bool = False
     failure: ReplayFailure | None = None
 
 
@@ -121,21 +122,18 @@ def replay_set(
     progress: Callable[[bool], None] = lambda _: None,
     frames: int = 1,
 ) -> ReplayedSet:
-    """Replays the selected trajectories into `out/metadata/<traj_id>`.
+    """Replay the selected trajectories into `out/metadata/<traj_id>`; a failure does not stop the others.
 
     Args:
-        selection: what to replay.
-        simulator: runs them.
-        out: the set; made where it does not exist.
-        progress: is called after each trajectory, with whether an earlier run had made it.
-        frames: per action that moves the agent or its camera.
-
-    Returns:
-        The result. The failure of one trajectory is in it and does not stop the others.
+        selection: the trajectories.
+        simulator: simulator to replay them in.
+        out: folder of the set; created if it does not exist.
+        progress: called after each trajectory, with True if an earlier run replayed it.
+        frames: number of frames of each action that moves the agent or its camera.
     """
-    metadata = _prepared(out, simulator.label)
-    outcomes = enumerate(_outcome(item, simulator, metadata, frames) for item in selection.items)
-    return _collected(outcomes, selection, progress)
+    metadata = _prepare_set(out, simulator.label)
+    outcomes = enumerate(_replay_one(item, simulator, metadata, frames) for item in selection.items)
+    return _collect(outcomes, selection, progress)
 
 
 def replay_with_workers(
@@ -147,86 +145,53 @@ def replay_with_workers(
     progress: Callable[[bool], None] = lambda _: None,
     say: Callable[[str], None] = lambda _: None,
 ) -> ReplayedSet:
-    """As `replay_set`, by workers with a simulator each: the same files.
+    """Replay as `replay_set` does, with the same files, by workers with a simulator each.
 
     Args:
-        selection: what to replay.
-        launch: how a simulator is started.
-        out: the set, the same for all workers; made where it does not exist.
-        worker_settings: how many workers, and where.
-        frames: per action that moves the agent or its camera.
-        progress: is called after each trajectory, with whether an earlier run had made it.
-        say: is told what becomes of workers.
+        selection: the trajectories.
+        launch: simulator that each worker starts.
+        out: folder of the set, shared by all workers; created if it does not exist.
+        worker_settings: number and place of the workers.
+        frames: number of frames of each action that moves the agent or its camera.
+        progress: called after each trajectory, with True if an earlier run replayed it.
+        say: called with messages about the workers.
     """
-    metadata = _prepared(out, launch.label)
-    outcomes = shared_out(_OpenReplayer(launch, metadata, frames), selection.items, worker_settings, say)
-    return _collected(outcomes, selection, progress)
+    metadata = _prepare_set(out, launch.label)
+    start = StartSimulatorWorker(launch, partial(_replay_one, metadata=metadata, frames=frames))
+    return _collect(shared_out(start, selection.items, worker_settings, say), selection, progress)
 
 
-@dataclass(frozen=True)
-class _OpenReplayer:
-    """Makes a worker that replays."""
-
-    launch: Launch
-    metadata: Path
-    frames: int
-
-    def __call__(self, number: int) -> "_Replayer":
-        return _Replayer(self)
-
-
-class _Replayer:
-    """Replays in a simulator of its own; see `infthor_eval.workers.Worker`."""
-
-    greeting = None
-
-    def __init__(self, settings: _OpenReplayer) -> None:
-        self._settings = settings
-        self._simulator = Simulator(settings.launch)
-
-    def do(self, job: Item) -> Iterator[_ReplayOutcome]:
-        yield _outcome(job, self._simulator, self._settings.metadata, self._settings.frames)
-
-    def close(self) -> None:
-        self._simulator.close()
-
-
-def _prepared(out: Path, label: str) -> Path:
-    """The folder that takes the trajectories of a set."""
+def _prepare_set(out: Path, label: str) -> Path:
+    """Create the folder of a set's trajectories."""
     metadata = out / "metadata"
     metadata.mkdir(parents=True, exist_ok=True)
     claim_for_simulator(out, label)
     return metadata
 
 
-def _collected(
+def _collect(
     outcomes: Iterable[tuple[int, _ReplayOutcome | InfthorError]],
     selection: Selection,
     progress: Callable[[bool], None],
 ) -> ReplayedSet:
-    """What came of it, in the order of the selection."""
+    """Return the set of the outcomes, in the order of the selection."""
     started = time.monotonic()
-    found: dict[int, _ReplayOutcome] = {}
-    for number, outcome in outcomes:
-        if isinstance(outcome, InfthorError):
-            outcome = _failed(selection.items[number], outcome)  # noqa: PLW2901
-        found[number] = outcome
-        progress(outcome.report is not None and not outcome.new)
+    collected = collect_outcomes(outcomes, lambda number, error: _failed(selection.items[number], error), progress)
     result = ReplayedSet(failures=list(selection.failures), seconds=time.monotonic() - started)
-    for _, outcome in sorted(found.items()):
+    for outcome in collected:
         if outcome.report is not None:
             result.reports.append(outcome.report)
-            result.resumed += not outcome.new
+            result.resumed += outcome.is_resumed
         elif outcome.failure is not None:
             result.failures.append(outcome.failure)
     return result
 
 
-def _outcome(item: Item, simulator: Simulator, metadata: Path, frames: int) -> _ReplayOutcome:
+def _replay_one(item: Item, simulator: Simulator, metadata: Path, frames: int) -> _ReplayOutcome:
     source, trajectory = item
     try:
-        with freeze_existing_objects(), _malformed(source):
-            return _ReplayOutcome(*_one(source, trajectory, simulator, metadata, frames))
+        with freeze_existing_objects(), _wrap_malformed(source):
+            return _replay_or_check(source, trajectory, simulator, metadata, frames)
     except InfthorError as error:
         return _failed(item, error)
 
@@ -237,57 +202,55 @@ def _failed(item: Item, error: InfthorError) -> _ReplayOutcome:
 
 
 def _all_sources(paths: Iterable[Path], failures: list[ReplayFailure]) -> Iterator[TrajectorySource]:
-    """What is in the files; one of several that cannot be read to its end is a failure, and the others go on."""
+    """Yield the trajectories of all files; among several files, one that cannot be read is added to `failures`."""
     for path in paths:
         files = trajectory_files(path)
         for file in files:
-            n_found = 0
+            n_read = 0
             try:
                 for source in iter_sources(file):
-                    n_found += 1
+                    n_read += 1
                     yield source
             except DataError as error:
-                if not n_found and files == [path]:
+                if not n_read and files == [path]:
                     raise
                 failures.append(ReplayFailure(str(file), str(error)))
 
 
-def _malformed(source: TrajectorySource) -> AbstractContextManager[None]:
-    """Names what a trajectory that is JSON of the right form can still be wrong in."""
+def _wrap_malformed(source: TrajectorySource) -> AbstractContextManager[None]:
+    """Convert the errors of a trajectory that has the documented form but inconsistent content."""
     wrong = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError)
     return wrap_errors(
         f"{source.place}: not a trajectory that can be replayed", "restore it or leave it out", catch=wrong
     )
 
 
-def _one(
+def _replay_or_check(
     source: TrajectorySource, trajectory: Trajectory, simulator: Simulator, metadata: Path, frames: int
-) -> tuple[ReplayReport, bool]:
-    """The report of one trajectory, and whether it was made now."""
+) -> _ReplayOutcome:
     content = source.raw.strip()
     final = metadata / folder_name(trajectory.traj_id)
     if final.exists():
-        return _earlier(final, digest(content), frames), False
+        return _ReplayOutcome(_check_earlier(final, digest(content), frames), is_resumed=True)
     started = time.monotonic()
     try:
-        with write_atomically(final) as partial:
-            partial.mkdir()
-            report = replay(trajectory, simulator, partial, digest(content), frames)
+        with write_atomically(final) as folder:
+            folder.mkdir()
+            report = replay(trajectory, simulator, folder, digest(content), frames)
             report.seconds = round(time.monotonic() - started, 3)
-            (partial / _TRAJECTORY).write_bytes(content + b"\n")
-            (partial / _REPORT).write_bytes(msgspec.json.encode(report) + b"\n")
+            (folder / _TRAJECTORY).write_bytes(content + b"\n")
+            (folder / _REPORT).write_bytes(msgspec.json.encode(report) + b"\n")
     except OSError as error:
         message = f"{final}: cannot be written ({error.strerror}); make room or choose another --out"
         raise SimulatorError(message) from error
-    return report, True
+    return _ReplayOutcome(report)
 
 
-def _earlier(folder: Path, wanted: str, frames: int) -> ReplayReport:
-    """The report of a trajectory that an earlier run replayed."""
-    path = folder / _REPORT
-    report = read_json(path, "remove the folder to replay it again", ReplayReport)
-    if report.digest != wanted:
-        raise DataError(f"{folder}: made from another trajectory of this name; remove it or choose another --out")
+def _check_earlier(folder: Path, digest: str, frames: int) -> ReplayReport:
+    """Return the report of an earlier run, if it is of the same trajectory and settings."""
+    report = read_json(folder / _REPORT, "remove the folder to replay it again", ReplayReport)
+    if report.digest != digest:
+        raise DataError(f"{folder}: replayed from another trajectory of this name; remove it or choose another --out")
     if report.frames != frames:
-        raise DataError(f"{folder}: made with {report.frames} frames per move; remove it or choose another --out")
+        raise DataError(f"{folder}: replayed with {report.frames} frames per move; remove it or choose another --out")
     return report

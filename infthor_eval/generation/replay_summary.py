@@ -1,4 +1,4 @@
-"""A replayed set in numbers."""
+"""Summary of a replayed set in numbers."""
 
 import statistics
 from collections import Counter, defaultdict
@@ -20,7 +20,7 @@ class ActionCounts(msgspec.Struct):
 
 
 class OverlapStatistics(msgspec.Struct):
-    """How well rendered boxes meet the recorded ones: their number, median and mean overlap (IoU)."""
+    """Number of boxes, and median and mean overlap (IoU) of the rendered with the recorded ones."""
 
     count: int
     median: float
@@ -37,20 +37,20 @@ class Divergence(msgspec.Struct):
 
 
 class ReplaySummary(msgspec.Struct):
-    """What came of a set, as `--json` prints it.
+    """Numbers of a replayed set, as `--json` prints them.
 
     Attributes:
-        trajectories: how many were replayed, in earlier runs too.
-        resumed: how many of them in earlier runs.
-        failed: how many could not be replayed at all.
-        complete: how many were replayed without a refused action.
+        trajectories: number of replayed trajectories, including those of earlier runs.
+        resumed: number of trajectories that earlier runs replayed.
+        failed: number of trajectories that could not be replayed.
+        complete: number of trajectories without a refused action.
         floor_plans: number of scenes.
-        actions: numbers by name, the most frequent first.
-        iou: box overlaps by object type.
-        iou_by_action: box overlaps by action.
+        actions: numbers of actions by name, the most frequent first.
+        iou: overlaps of boxes by object type.
+        iou_by_action: overlaps of boxes by action.
         seconds: wall time of this run.
-        diverged: where the others first were refused an action.
-        failures: why some could not be replayed.
+        diverged: first refused action of each trajectory that has one.
+        failures: trajectories that could not be replayed, with the reasons.
     """
 
     trajectories: int
@@ -67,7 +67,7 @@ class ReplaySummary(msgspec.Struct):
 
 
 def summarise(replayed: ReplayedSet) -> ReplaySummary:
-    """Count what came of a set."""
+    """Return the numbers of a replayed set."""
     reports = replayed.reports
     overlaps = [overlap for report in reports for overlap in report.overlaps]
     return ReplaySummary(
@@ -76,7 +76,7 @@ def summarise(replayed: ReplayedSet) -> ReplaySummary:
         failed=len(replayed.failures),
         complete=sum(report.complete for report in reports),
         floor_plans=len({report.floor_plan for report in reports}),
-        actions=_actions(reports),
+        actions=_count_actions(reports),
         iou=_statistics(overlaps, lambda overlap: overlap.type),
         iou_by_action=_statistics(overlaps, lambda overlap: overlap.action),
         seconds=round(replayed.seconds, 2),
@@ -85,7 +85,7 @@ def summarise(replayed: ReplayedSet) -> ReplaySummary:
     )
 
 
-def _actions(reports: Sequence[ReplayReport]) -> dict[str, ActionCounts]:
+def _count_actions(reports: Sequence[ReplayReport]) -> dict[str, ActionCounts]:
     accepted: Counter[str] = Counter()
     refused: Counter[str] = Counter()
     for report in reports:
@@ -96,12 +96,12 @@ def _actions(reports: Sequence[ReplayReport]) -> dict[str, ActionCounts]:
 
 
 def _statistics(overlaps: Sequence[Overlap], by: Callable[[Overlap], str]) -> dict[str, OverlapStatistics]:
-    found: defaultdict[str, list[float]] = defaultdict(list)
+    groups: defaultdict[str, list[float]] = defaultdict(list)
     for overlap in overlaps:
-        found[by(overlap)].append(overlap.iou)
+        groups[by(overlap)].append(overlap.iou)
     return {
         name: OverlapStatistics(len(values), round(statistics.median(values), 4), round(statistics.fmean(values), 4))
-        for name, values in sorted(found.items())
+        for name, values in sorted(groups.items())
     }
 
 

@@ -1,4 +1,4 @@
-"""What a trajectory is made from."""
+"""Settings of a generated trajectory."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -9,21 +9,21 @@ from infthor_eval.household.tasks import TaskType
 
 __all__ = ["MAX_FAIL", "MIN_STEPS", "MIN_SUBGOALS", "TrajectorySettings"]
 
-MIN_STEPS, MIN_SUBGOALS, MAX_FAIL = 300, 10, 20  # Algorithm 1's, as published
+MIN_STEPS, MIN_SUBGOALS, MAX_FAIL = 300, 10, 20  # values of the paper's Algorithm 1
 
 
 @dataclass(frozen=True)
 class TrajectorySettings:
-    """What to make.
+    """Settings of one trajectory.
 
     Attributes:
         scene: name of the scene.
-        seed: makes every choice.
-        min_steps: low-level actions at least.
-        min_subgoals: tasks at least, the final one apart. Algorithm 1 calls a task's part of a trajectory a sub-goal.
-        final_task: whether a final task follows (see `final_task`).
-        task_types: what to draw from, as far as it belongs in the scene.
-        max_fail: tasks that may fail to be carried out; the final one has as many tries again.
+        seed: seed of all random choices.
+        min_steps: minimum number of low-level actions.
+        min_subgoals: minimum number of tasks without the final one. Algorithm 1 calls a task's part a sub-goal.
+        final_task: True to end with a final task (see the module `final_task`).
+        task_types: task types to sample from, if the scene's room type has them.
+        max_fail: maximum number of failed tasks; the final task has the same number of tries again.
     """
 
     scene: str
@@ -40,6 +40,6 @@ class TrajectorySettings:
         return f"{self.scene}-seed{self.seed}"
 
     def document(self) -> dict[str, Any]:
-        """The settings as trajectories hold them, in JSON's own types."""
+        """Return the settings as JSON values, as they are stored in trajectories."""
         document: dict[str, Any] = msgspec.json.decode(msgspec.json.encode(self))
         return document

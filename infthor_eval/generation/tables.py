@@ -1,34 +1,58 @@
-"""What came of making and replaying trajectories, as tables."""
+"""Tables of generated and replayed trajectories."""
+
+from collections.abc import Sized
 
 from infthor_eval.generation.generate_set import GenerationSummary
-from infthor_eval.generation.replay_summary import ReplaySummary
+from infthor_eval.generation.replay_summary import OverlapStatistics, ReplaySummary
 from infthor_eval.tables import Column, Row, Table
 
-__all__ = ["actions_table", "overlaps_table", "tasks_table"]
+__all__ = ["overlaps_table", "refusals_table", "regular_numbers", "tasks_table"]
+
+_EXACT = 0.995  # an IoU that is shown as 1.00
 
 
 def tasks_table(summary: GenerationSummary) -> Table:
-    """The tasks tried and accepted: a row per type."""
+    """Return the numbers of tasks tried and accepted, one row per task type."""
     rows = [Row((name, str(counts.tried), str(counts.accepted))) for name, counts in summary.tasks.items()]
     return Table("", (Column("task", False), Column("tried"), Column("accepted")), tuple(rows))
 
 
-def actions_table(summary: ReplaySummary) -> Table:
-    """The actions carried out and refused: a row per name."""
+def refusals_table(summary: ReplaySummary) -> Table | None:
+    """Return the numbers of the actions that were refused at least once, one row per name, or None without any."""
     rows = []
     for name, counts in summary.actions.items():
         share = counts.accepted / (counts.accepted + counts.refused)
-        rows.append(Row((name, str(counts.accepted), str(counts.refused), f"{share:.1%}")))
-    return Table("", (Column("action", False), *map(Column, ("accepted", "refused", "share"))), tuple(rows))
+        if counts.refused:
+            rows.append(Row((name, str(counts.accepted), str(counts.refused), f"{share:.1%}")))
+    columns = (Column("action", False), *map(Column, ("accepted", "refused", "share")))
+    return Table("", columns, tuple(rows)) if rows else None
 
 
 def overlaps_table(summary: ReplaySummary) -> Table | None:
-    """How well boxes meet the recorded ones: a row per action, then per object type; None without any box."""
-    if not summary.iou:
-        return None
+    """Return the overlaps of boxes that differ from the recording, by action and object type; None without any."""
     rows = [
         Row((name, str(overlap.count), f"{overlap.median:.2f}", f"{overlap.mean:.2f}"))
         for name, overlap in {**summary.iou_by_action, **summary.iou}.items()
+        if not _is_exact(overlap)
     ]
     columns = (Column("action, object type", False), *map(Column, ("boxes", "median IoU", "mean IoU")))
-    return Table("", columns, tuple(rows))
+    return Table("", columns, tuple(rows)) if rows else None
+
+
+def regular_numbers(summary: ReplaySummary) -> str:
+    """Return one line on the actions and boxes that the tables leave out because they are as recorded."""
+    accepted = [counts.accepted for counts in summary.actions.values() if not counts.refused]
+    exact = [overlap.count for overlap in summary.iou_by_action.values() if _is_exact(overlap)]
+    parts = [f"{_all_or_other(accepted, summary.actions)}{sum(accepted)} actions accepted"] if accepted else []
+    parts += (
+        [f"{_all_or_other(exact, summary.iou_by_action)}{sum(exact)} boxes as recorded (IoU 1.00)"] if exact else []
+    )
+    return f"{', '.join(parts) or 'nothing as recorded'} (--json has the numbers by action and object type)"
+
+
+def _all_or_other(regular: Sized, everything: Sized) -> str:
+    return "all " if len(regular) == len(everything) else "other "
+
+
+def _is_exact(overlap: OverlapStatistics) -> bool:
+    return min(overlap.median, overlap.mean) >= _EXACT

@@ -1,4 +1,4 @@
-"""What a rollout did: every action goes through the simulator and is kept in the form that trajectories have."""
+"""The actions of a rollout, executed in the simulator and stored in the form of trajectories."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -11,11 +11,11 @@ __all__ = ["ExecutedAction", "RolloutError", "Trace"]
 
 
 class RolloutError(Exception):
-    """The plan cannot be carried out here; the message says at which action and why.
+    """A plan failed in the simulator; the message has the action and the reason.
 
     Attributes:
-        item: id of an object that cannot be acted on as things are, where it was that.
-        receptacle: id of the receptacle that the object finds no room in, where it was that.
+        item: id of the object that could not be acted on, if that is the reason.
+        receptacle: id of the receptacle without room for the object, if that is the reason.
     """
 
     def __init__(self, message: str, item: str | None = None, receptacle: str | None = None) -> None:
@@ -26,7 +26,7 @@ class RolloutError(Exception):
 
 @dataclass(frozen=True)
 class ExecutedAction:
-    """One action that was carried out: as it is stored, and the world after it."""
+    """One executed action in its stored form, with the state after it."""
 
     low: LowAction
     view: SimulatorView
@@ -36,16 +36,16 @@ class Trace:
     """The actions and sub-goals so far.
 
     Attributes:
-        simulator: carries the actions out.
+        simulator: simulator that executes the actions.
         actions: executed actions.
-        high: the sub-goals.
+        high: sub-goals.
     """
 
     def __init__(self, simulator: Simulator, first_high: int = 0) -> None:
-        """Begin with nothing done.
+        """Start without actions.
 
         Args:
-            simulator: carries the actions out.
+            simulator: simulator that executes the actions.
             first_high: number of the first sub-goal.
         """
         self.simulator = simulator
@@ -55,29 +55,29 @@ class Trace:
 
     @property
     def view(self) -> SimulatorView:
-        """The world after the last action."""
+        """State after the last action."""
         return self.simulator.view
 
     def begin(self, words: list[str], action: PlannerAction) -> None:
-        """Begin a sub-goal: the actions from here on belong to it.
+        """Begin a sub-goal, to which the following actions belong.
 
         Args:
-            words: the object types that it is about, in words.
-            action: what it is.
+            words: its object types in words.
+            action: the sub-goal in the planner's form.
         """
         number = self._first_high + len(self.high)
         self.high.append(HighAction(number, DiscreteAction(action.action, words), action))
 
     def act(self, api: ApiAction, arguments: dict[str, Any], suffix: str = "") -> None:
-        """Carry out one action of the present sub-goal.
+        """Execute one action of the current sub-goal.
 
         Args:
-            api: the action as it is stored.
-            arguments: of the call.
-            suffix: of its name in words ("MoveAhead_25").
+            api: the action in its stored form.
+            arguments: arguments of the call.
+            suffix: suffix of its name in words (25 for "MoveAhead_25").
 
         Raises:
-            RolloutError: the simulator refused it; nothing is kept of it.
+            RolloutError: the simulator refused the action, which is not stored.
         """
         before = self.view
         after = self.simulator.step(api.action, **arguments)
@@ -91,6 +91,6 @@ class Trace:
 
 
 def _box(view: SimulatorView, arguments: dict[str, Any]) -> dict[str, Any]:
-    """The box of the object acted on, as trajectories store it with the action."""
-    shown = (view.instances or {}).get(arguments.get("objectId", ""))
-    return {} if shown is None else {"bbox": list(shown.box)}
+    """Return the box of the object acted on, in the form of trajectories."""
+    instance = (view.instances or {}).get(arguments.get("objectId", ""))
+    return {} if instance is None else {"bbox": list(instance.box)}

@@ -1,4 +1,4 @@
-"""Walking to where objects can be acted on, planned on the grid as it comes."""
+"""Walking to poses from which objects can be acted on, replanned when the simulator refuses a step."""
 
 from infthor_eval.formats.trajectory import ApiAction, PlannerAction
 from infthor_eval.generation.trace import RolloutError, Trace
@@ -8,26 +8,26 @@ from infthor_eval.household.wording import compact_name
 
 __all__ = ["Walker"]
 
-_TURN = 90
-_MIN_PIXELS = 60  # of what is acted on, in a frame of 90,000
+_TURN = 90  # degrees
+_MIN_PIXELS = 60  # minimum size of the object acted on, in a frame of 90,000 pixels
 
 
 class Walker:
-    """Walks for a rollout, and adds its steps to the trace."""
+    """Walks for a rollout and adds the actions to its trace."""
 
     def __init__(self, trace: Trace) -> None:
         self._trace = trace
         self._grid: Grid | None = None
 
     def go(self, shown: list[str], inside: str | None = None) -> None:
-        """Walk to where objects can be acted on, as a sub-goal of its own where there is a step to go.
+        """Walk to where objects can be acted on; this is a sub-goal, unless the agent is there already.
 
         Args:
-            shown: ids of the objects; the first is what the agent faces.
-            inside: id of an object that is hidden in the first.
+            shown: ids of the objects; the agent faces the first.
+            inside: id of an object hidden in the first one.
 
         Raises:
-            RolloutError: there is no such place, or no way to it.
+            RolloutError: there is no such pose, or no path to it.
         """
         target = self._trace.view.objects[shown[0]]
         viewpoint = self._viewpoint(shown, inside)
@@ -40,7 +40,7 @@ class Walker:
         self._walk(viewpoint, shown)
 
     def step_aside(self, item: str) -> None:
-        """Walk to where an object is in sight, within the present sub-goal.
+        """Walk to where an object is visible, within the current sub-goal.
 
         Raises:
             RolloutError: as `go`.
@@ -48,19 +48,20 @@ class Walker:
         self._walk(self._viewpoint([item]), [item])
 
     def forget_grid(self) -> None:
-        """Forget where the agent can stand: things may be in the way now, or no longer."""
+        """Discard the cached grid, after an action that may have blocked or freed cells."""
         self._grid = None
 
     def _viewpoint(self, shown: list[str], inside: str | None = None) -> Viewpoint:
-        """Where to act on the objects from."""
-        found = find_viewpoint(self._trace.simulator, self._cells(), shown, inside, _MIN_PIXELS)
-        if found is None:
+        """Return a pose from which the objects can be acted on."""
+        viewpoint = find_viewpoint(self._trace.simulator, self._cells(), shown, inside, _MIN_PIXELS)
+        if viewpoint is None:
             target = self._trace.view.objects[inside or shown[0]]
             raise RolloutError(f"no place to reach {target.object_type} from", target.object_id)
-        return found
+        return viewpoint
 
     def _walk(self, viewpoint: Viewpoint, shown: list[str]) -> None:
-        """Go there. A refused step changes nothing and is not part of the trajectory: it is walked around."""
+        # A refused step changes nothing and is not part of the trajectory. Its cell is removed from the grid, so that
+        # the next path leads around it.
         target = self._trace.view.objects[shown[0]].object_type
         while (moves := self._moves(viewpoint)) is not None:
             if all(self._move(action) for action in moves):
@@ -71,7 +72,7 @@ class Walker:
             raise RolloutError(f"{target} is out of sight after walking to it")
 
     def _moves(self, viewpoint: Viewpoint) -> list[str] | None:
-        """The actions that lead to a viewpoint."""
+        """Return the actions to a viewpoint, or None if there is no path."""
         grid = self._cells()
         path = grid.path(grid_pose_of(self._trace.view.agent, grid), viewpoint.pose)
         return None if path is None else path + self._looks(viewpoint)
@@ -86,16 +87,16 @@ class Walker:
         return ["LookDown" if steps > 0 else "LookUp"] * abs(steps)
 
     def _move(self, action: str) -> bool:
-        """One step of a walk; False where something is in the way, which the grid then knows."""
+        """Execute one action of a walk; returns False if a step is blocked, and removes its cell from the grid."""
         if action != "MoveAhead":
             degrees = _TURN if action.startswith("Rotate") else HORIZON_STEP
             self._trace.act(ApiAction(action), {"degrees": float(degrees)}, str(degrees))
             return True
         grid = self._cells()
-        stand = grid_pose_of(self._trace.view.agent, grid)
+        pose = grid_pose_of(self._trace.view.agent, grid)
         try:
             self._trace.act(ApiAction(action, move_magnitude=GRID), {"moveMagnitude": GRID}, "25")
         except RolloutError:
-            self._grid = grid.without_cell(stand.ahead)
+            self._grid = grid.without_cell(pose.ahead)
             return False
         return True

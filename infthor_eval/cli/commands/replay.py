@@ -80,17 +80,17 @@ def command(
 
 
 def _print(summary: ReplaySummary, output: Console) -> None:
-    from infthor_eval.generation.tables import actions_table, overlaps_table
+    from infthor_eval.generation.tables import overlaps_table, refusals_table, regular_numbers
     from infthor_eval.report.terminal import print_table
 
     output.print(
         f"{summary.trajectories} trajectories on {summary.floor_plans} floor plans ({summary.resumed} replayed "
-        f"earlier, {summary.failed} failed), {summary.complete} whole, {summary.seconds} s",
+        f"earlier, {summary.failed} failed), {summary.complete} complete, {summary.seconds} s",
     )
-    print_table(actions_table(summary), output)
-    overlaps = overlaps_table(summary)
-    if overlaps is not None:
-        print_table(overlaps, output)
+    for table in (refusals_table(summary), overlaps_table(summary)):
+        if table is not None:
+            print_table(table, output)
+    output.print(regular_numbers(summary))
     for item in summary.diverged[:_MAX_SHOWN]:
         line = f"diverged: {item.traj_id}: step {item.step}: {item.action}: {item.error}"
         output.print(line)

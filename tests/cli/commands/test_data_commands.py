@@ -41,8 +41,8 @@ def test_the_three_commands_make_a_set(work, run):
 def test_what_they_print_for_people(work, tmp_path, run):
     code, out, _ = run("replay", work / "trajectories", "--out", work / "set")
     assert code == 0
-    assert "1 trajectories on 1 floor plans (1 replayed earlier, 0 failed), 1 whole" in out
-    assert "MoveAhead" in out
+    assert "1 trajectories on 1 floor plans (1 replayed earlier, 0 failed), 1 complete" in out
+    assert "actions accepted, " in out and "MoveAhead" not in out and len(out.splitlines()) == 2
     code, out, _ = run("generate", "--scene", "kitchen-5", "--min-steps", 1, "--min-subgoals", 1, "--out", tmp_path)
     assert code == 0
     assert "1 trajectories (0 generated earlier)" in out

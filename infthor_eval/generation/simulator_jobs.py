@@ -1,0 +1,75 @@
+"""Jobs that each need a simulator, done by workers with one simulator each."""
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any, Protocol, TypeVar
+
+from infthor_eval.errors import InfthorError
+from infthor_eval.thor.launch import Launch
+from infthor_eval.thor.simulator import Simulator
+
+__all__ = ["SimulatorWorker", "StartSimulatorWorker", "collect_outcomes"]
+
+
+class _JobOutcome(Protocol):
+    @property
+    def is_resumed(self) -> bool:
+        """True if the result is of an earlier run."""
+        ...
+
+
+T = TypeVar("T", bound=_JobOutcome)
+
+
+@dataclass(frozen=True)
+class StartSimulatorWorker:
+    """Starts a worker; see `infthor_eval.workers.OpenWorker`.
+
+    Attributes:
+        launch: the simulator to start.
+        run_job: does one job in the simulator; it is pickled, so it must be a module's function or a `partial` of one.
+    """
+
+    launch: Launch
+    run_job: Callable[[Any, Simulator], Any]
+
+    def __call__(self, number: int) -> "SimulatorWorker":
+        """Return the worker with this number."""
+        return SimulatorWorker(self)
+
+
+class SimulatorWorker:
+    """A worker with a simulator; see `infthor_eval.workers.Worker`."""
+
+    greeting = None
+
+    def __init__(self, settings: StartSimulatorWorker) -> None:
+        self._run_job = settings.run_job
+        self._simulator = Simulator(settings.launch)
+
+    def do(self, job: Any) -> Iterator[Any]:
+        """Yield the outcome of a job."""
+        yield self._run_job(job, self._simulator)
+
+    def close(self) -> None:
+        """Stop the simulator."""
+        self._simulator.close()
+
+
+def collect_outcomes(
+    outcomes: Iterable[tuple[int, T | InfthorError]],
+    failed: Callable[[int, InfthorError], T],
+    progress: Callable[[bool], None],
+) -> list[T]:
+    """Return the outcomes in the order of the jobs.
+
+    Args:
+        outcomes: number and outcome of each job as they finish; an error if its workers were lost.
+        failed: returns the outcome of a job that ended in an error.
+        progress: called after each job, with True if its result is of an earlier run.
+    """
+    by_number: dict[int, T] = {}
+    for number, outcome in outcomes:
+        by_number[number] = failed(number, outcome) if isinstance(outcome, InfthorError) else outcome
+        progress(by_number[number].is_resumed)
+    return [by_number[number] for number in sorted(by_number)]
