@@ -1,3 +1,3 @@
-"""Making data: trajectories, their replay to frames and logs, and questions on them."""
+"""Generating data: trajectories, their replay to frames and logs, and questions on them."""
 
 __all__: list[str] = []

@@ -1,7 +1,7 @@
-"""Question sets that come with the package, made from a manifest: scenes and seeds in, the same files out.
+"""Building the question sets of the package reproducibly from a manifest of scenes and seeds.
 
-The manifest says which trajectories to generate and how questions are drawn; the set's own copy of it also has the
-digest of every file, by which a test tells that the same set comes out again.
+The manifest has the trajectories to generate and how questions are sampled. The copy of it in the set also has the
+digest of every file, so that a test can check that the same files are built again.
 """
 
 from collections.abc import Callable
@@ -26,7 +26,7 @@ from infthor_eval.thor.simulator import Simulator
 __all__ = ["MANIFEST", "Manifest", "TrajectoryRecipe", "build_bundle", "differing_files", "read_manifest"]
 
 MANIFEST = "manifest.json"
-_NOT_SHIPPED = ("replay.json",)  # holds times
+_NOT_SHIPPED = ("replay.json",)  # has wall times, which differ from build to build
 
 
 class TrajectoryRecipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -39,16 +39,16 @@ class TrajectoryRecipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Manifest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What a bundled set is made from.
+    """Everything that determines a bundled set.
 
     Attributes:
-        name: of the set; the question file is `qa_set_<name>.csv`.
-        trajectories: what to generate.
-        per_trajectory: questions at most on one trajectory.
-        question_seed: makes every choice among the questions.
-        further: whether questions of our further forms are asked too.
-        colors: frames are stored with a palette of so many colours, which halves the set.
-        files: digest by path of every file of the set; empty in a manifest that nothing was made from yet.
+        name: name of the set; the question file is `qa_set_<name>.csv`.
+        trajectories: trajectories to generate.
+        per_trajectory: maximum number of questions on one trajectory.
+        question_seed: seed of the choice of questions.
+        further: True to include our further question forms.
+        colors: number of colours in the palette of stored frames, which halves the size of the set.
+        files: digests of all files of the set by path; empty in a manifest before the first build.
     """
 
     name: Annotated[str, Meta(pattern=r"^[\w.-]+$")]
@@ -64,7 +64,7 @@ def read_manifest(path: Path) -> Manifest:
     """Read a manifest.
 
     Raises:
-        DataError: it cannot be read or is none.
+        DataError: the file cannot be read or is not a manifest.
     """
     return read_json(path, "give a manifest", Manifest)
 
@@ -72,56 +72,56 @@ def read_manifest(path: Path) -> Manifest:
 def build_bundle(
     manifest: Manifest, simulator: Simulator, out: Path, progress: Callable[[bool], None] = lambda _: None
 ) -> tuple[Manifest, GeneratedQuestions]:
-    """Make the set: generate, replay, ask, and store the frames small.
+    """Build the set: generate and replay the trajectories, generate questions, and compress the frames.
 
     Args:
-        manifest: what to make; its digests are not looked at.
-        simulator: the embedded one.
-        out: folder of the set; must not exist or be empty.
-        progress: is called twice for each trajectory, with whether an earlier run had made it.
+        manifest: the manifest; its digests are not used.
+        simulator: the embedded simulator.
+        out: folder of the set, new or empty.
+        progress: called twice for each trajectory, with True if it is of an earlier run.
 
     Returns:
-        The manifest with the digests of what was made, and the questions.
+        The manifest with the digests of the new files, and the questions.
 
     Raises:
-        DataError: the folder is not empty, or a trajectory could not be made.
+        DataError: the folder is not empty, or a trajectory could not be generated or replayed.
     """
     if out.exists() and any(out.iterdir()):
-        raise DataError(f"{out}: is not empty; give a new folder")
+        raise DataError(f"{out}: not empty; give a new folder")
     jobs = [TrajectorySettings(**msgspec.structs.asdict(item)) for item in manifest.trajectories]
     with ScratchFolder() as folder:
-        _refuse(generate_set(jobs, simulator, folder, progress).failures)
+        _raise_first(generate_set(jobs, simulator, folder, progress).failures)
         replayed = replay_set(select([folder]), simulator, out, progress)
-    _refuse([f"{item.place}: {item.message}" for item in replayed.failures])
-    made = generate_questions(
+    _raise_first([f"{item.place}: {item.message}" for item in replayed.failures])
+    generated = generate_questions(
         out, seed=manifest.question_seed, per_trajectory=manifest.per_trajectory, further=manifest.further
     )
-    write_questions(out / f"qa_set_{manifest.name}.csv", made.questions)
+    write_questions(out / f"qa_set_{manifest.name}.csv", generated.questions)
     for frame in sorted(out.rglob("img/*.png")):
-        _store_small(frame, manifest.colors)
+        _reduce_colors(frame, manifest.colors)
     for name in _NOT_SHIPPED:
         for path in out.rglob(name):
             path.unlink()
     finished = msgspec.structs.replace(manifest, files=_digests(out))
     (out / MANIFEST).write_bytes(msgspec.json.format(msgspec.json.encode(finished), indent=1) + b"\n")
-    return finished, made
+    return finished, generated
 
 
-def differing_files(wanted: Manifest, made: Manifest) -> list[str]:
-    """Paths of the files whose digests differ, or that one of two manifests lacks."""
-    names = wanted.files.keys() | made.files.keys()
-    return sorted(name for name in names if wanted.files.get(name) != made.files.get(name))
+def differing_files(expected: Manifest, built: Manifest) -> list[str]:
+    """Return the paths of files whose digests differ, or that only one of two manifests has."""
+    names = expected.files.keys() | built.files.keys()
+    return sorted(name for name in names if expected.files.get(name) != built.files.get(name))
 
 
-def _refuse(failures: list[str]) -> None:
+def _raise_first(failures: list[str]) -> None:
     if failures:
-        raise DataError(f"the set cannot be made: {failures[0]}")
+        raise DataError(f"the set cannot be built: {failures[0]}")
 
 
-def _store_small(path: Path, colors: int) -> None:
+def _reduce_colors(path: Path, colors: int) -> None:
     with Image.open(path) as frame:
-        small = frame.convert("RGB").quantize(colors, dither=Image.Dither.NONE)
-    small.save(path, optimize=True)
+        reduced = frame.convert("RGB").quantize(colors, dither=Image.Dither.NONE)
+    reduced.save(path, optimize=True)
 
 
 def _digests(root: Path) -> dict[str, str]:

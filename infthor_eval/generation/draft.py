@@ -1,4 +1,4 @@
-"""A trajectory in the making: what is kept of it, and taken back where a task does not work out."""
+"""A trajectory while it is generated; the actions of a failed task can be removed again."""
 
 from importlib.metadata import version
 from typing import Any, NamedTuple
@@ -33,12 +33,12 @@ class Length(NamedTuple):
 
 
 def initial_scene(settings: TrajectorySettings, view: SimulatorView, start: InitAction) -> Scene:
-    """The initial state as trajectories hold it.
+    """Return the initial state in the form of trajectories.
 
     Args:
-        settings: of the trajectory.
-        view: the scene as it is.
-        start: where the agent is to begin.
+        settings: settings of the trajectory.
+        view: state of the scene.
+        start: first pose of the agent.
     """
     return Scene(
         floor_plan=settings.scene,
@@ -57,26 +57,27 @@ class Draft:
     """The actions, sub-goals and tasks so far, and the log of every frame."""
 
     def __init__(self, settings: TrajectorySettings, scene: Scene, view: SimulatorView) -> None:
-        """Begin with the first frame.
+        """Start with the log of the first frame.
 
         Args:
-            settings: what is being made.
+            settings: settings of the trajectory.
             scene: the initial state.
-            view: what the agent sees first.
+            view: state of the simulator at the first frame.
         """
         self._settings = settings
         self._scene = scene
         self._low: list[LowAction] = []
         self._high: list[HighAction] = []
-        self._log: list[bytes] = []  # encoded: what is kept of every step must not weigh on the garbage collector
+        # Encoded: thousands of Python objects per frame would slow down the garbage collector.
+        self._log: list[bytes] = []
         self._sub_tasks: list[SubTask] = []
         self._sub_trajs: list[SubTrajectory] = []
         self._final: SubTask | None = None
-        self._note(view)
+        self._log_frame(view)
 
     @property
     def length(self) -> Length:
-        """How long it is so far."""
+        """Length so far."""
         return Length(len(self._low), len(self._high))
 
     @property
@@ -85,43 +86,43 @@ class Draft:
         return len(self._sub_tasks)
 
     def add(self, trace: Trace) -> None:
-        """Add what a rollout did."""
+        """Add the actions and sub-goals of a rollout."""
         for action in trace.actions:
             action.low.low_idx = len(self._low)
             self._low.append(action.low)
-            self._note(action.view)
+            self._log_frame(action.view)
         self._high += trace.high
 
     def cut(self, length: Length) -> None:
-        """Take back what was added since it had a length."""
+        """Remove what was added after the trajectory had this length."""
         del self._low[length.low :], self._high[length.high :], self._log[length.low + 1 :]
 
     def add_task(self, task: SubTask, start: Length, end: Length) -> None:
-        """Note which part of it carried a task out.
+        """Add a completed task.
 
         Args:
             task: the task.
-            start: the length before it.
-            end: the length after it.
+            start: length before its first action.
+            end: length after its last action.
         """
         number = len(self._sub_tasks)
         self._sub_trajs.append(SubTrajectory(number, (start.high, end.high), (start.low, end.low), task.task_desc))
         self._sub_tasks.append(task)
 
     def make_last_task_final(self) -> None:
-        """Take the last task for the final one, which a test set names once more beside the others."""
+        """Make the last task the final one, which trajectories of test sets name once more beside the others."""
         self._final = self._sub_tasks[-1]
 
     def object_log(self) -> list[dict[str, Any]]:
-        """What each frame shows, by object type."""
+        """Return the log of each frame, by object type."""
         return [msgspec.json.decode(entry) for entry in self._log]
 
     def trajectory(self, tried: dict[str, int], accepted: dict[str, int]) -> Trajectory:
-        """The trajectory.
+        """Return the trajectory.
 
         Args:
-            tried: number of tasks tried, by type.
-            accepted: number of those that are part of it.
+            tried: numbers of tried tasks by type.
+            accepted: numbers of the tasks that are part of the trajectory, by type.
         """
         return Trajectory(
             scene=self._scene,
@@ -141,7 +142,7 @@ class Draft:
             },
         )
 
-    def _note(self, view: SimulatorView) -> None:
+    def _log_frame(self, view: SimulatorView) -> None:
         entry = {"step": len(self._log), **msgspec.to_builtins(object_log(view))}
         self._log.append(msgspec.json.encode(entry))
 
@@ -152,7 +153,7 @@ def _number(scene: str) -> int:
 
 
 def _image(low: LowAction) -> dict[str, Any]:
-    """The frame after an action, by the name that a replay gives it; frame 0 is before the first action."""
+    """Return the entry of the frame after an action, with its name in a replay; frame 0 is before the first action."""
     assert low.low_idx is not None
     return {"high_idx": low.high_idx, "low_idx": low.low_idx, "image_name": f"{low.low_idx + 1:09d}.png"}
 

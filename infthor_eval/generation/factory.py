@@ -1,4 +1,4 @@
-"""Algorithm 1: a long trajectory out of sampled, planned and simulated tasks."""
+"""The paper's Algorithm 1: a long trajectory of sampled, planned and simulated tasks."""
 
 import random
 from collections import Counter
@@ -28,12 +28,12 @@ from infthor_eval.thor.simulator import Simulator, SimulatorMark
 
 __all__ = ["GeneratedTrajectory", "TaskStatistics", "generate"]
 
-_LONGER = 4  # how often a trajectory is made longer because no final task works
+_MAX_EXTENSIONS = 4  # ordinary tasks that are added at most because no final task works
 
 
 @dataclass
 class TaskStatistics:
-    """Tasks tried and accepted by type, and why others failed."""
+    """Numbers of tasks tried and accepted by type, and of failures by reason."""
 
     tried: Counter[str] = field(default_factory=Counter)
     accepted: Counter[str] = field(default_factory=Counter)
@@ -56,15 +56,15 @@ class GeneratedTrajectory:
 
 
 def generate(settings: TrajectorySettings, simulator: Simulator) -> GeneratedTrajectory:
-    """Make one trajectory.
+    """Generate one trajectory.
 
     Args:
-        settings: what to make.
-        simulator: where it happens; its scene is replaced.
+        settings: settings of the trajectory.
+        simulator: simulator to generate it in; its scene is replaced.
 
     Raises:
-        UsageError: the scene offers no task that can be carried out.
-        SimulatorError: the simulator fails or has no such scene.
+        UsageError: no task in the scene can be completed.
+        SimulatorError: the simulator fails, or has no such scene.
     """
     factory = _Factory(settings, simulator)
     while not factory.long_enough():
@@ -75,26 +75,28 @@ def generate(settings: TrajectorySettings, simulator: Simulator) -> GeneratedTra
 
 
 class _Factory:
-    """Makes one trajectory."""
+    """Generates one trajectory."""
 
     def __init__(self, settings: TrajectorySettings, simulator: Simulator) -> None:
-        """Load the scene and put the agent somewhere."""
+        """Load the scene and place the agent at random."""
         self._settings = settings
         self._name = f"scene {settings.scene}, seed {settings.seed}"
         self._simulator = simulator
+        # One stream for all random choices, seeded by a text, which Python hashes alike in every process. Another order
+        # of draws would be another trajectory.
         self._rng = random.Random(f"{settings.scene}/{settings.seed}")
         self._pool = TaskPool(usual_tasks(settings.scene).intersection(settings.task_types), self._rng)
-        self._setbacks = KnownFailures()
+        self._known_failures = KnownFailures()
         self._statistics = TaskStatistics()
-        self._failures = 0
+        self._n_failed = 0
         self._problems: list[str] = []
-        self._draft = self._begun()
+        self._draft = self._start_draft()
 
-    def _begun(self) -> Draft:
+    def _start_draft(self) -> Draft:
         view = self._simulator.reset(self._settings.scene)
         grid = reachable_grid(self._simulator)
         if not grid.cells:
-            raise UsageError(f"scene {self._settings.scene}: the agent can stand nowhere; choose another scene")
+            raise UsageError(f"scene {self._settings.scene}: the agent cannot stand anywhere; choose another scene")
         x, z = grid.position(self._rng.choice(sorted(grid.cells)))
         start = InitAction(x, view.agent.position.y, z, float(self._rng.choice([0, 90, 180, 270])), 30.0)
         scene = initial_scene(self._settings, view, start)
@@ -102,73 +104,73 @@ class _Factory:
         return Draft(self._settings, scene, self._simulator.view)
 
     def long_enough(self) -> bool:
-        """Whether the asked length is reached."""
+        """Return True if the minimum length is reached."""
         draft, settings = self._draft, self._settings
         return draft.length.low >= settings.min_steps and draft.n_tasks >= settings.min_subgoals
 
     def result(self) -> GeneratedTrajectory:
-        """What was made so far."""
+        """Return the trajectory so far."""
         statistics = self._statistics
         trajectory = self._draft.trajectory(dict(statistics.tried), dict(statistics.accepted))
         return GeneratedTrajectory(trajectory, statistics, self._problems)
 
     def extend(self) -> None:
-        """Add one task: the first sampled one that can be planned and carried out.
+        """Add one task, the first sampled one that can be planned and completed.
 
-        What it leaves in the hand is put down, as a sub-goal of its own behind the task.
+        If it leaves an object in the hand, that is put down in a sub-goal after the task.
         """
-        if self._first_that_works(lambda _: True) is None:
+        if self._add_task(lambda _: True) is None:
             reasons = "; ".join(f"{reason} ({count})" for reason, count in self._statistics.reasons.most_common(3))
             hint = "choose another scene or seed" + (" or a higher --max-fail" if self._out_of_tries else "")
             raise UsageError(
                 f"{self._name}: no further task works after {self._draft.length.low} steps and "
-                f"{self._failures} failed tasks ({reasons or 'nothing there to do'}); {hint}"
+                f"{self._n_failed} failed tasks ({reasons or 'no possible task'}); {hint}"
             )
 
     def finish(self) -> None:
-        """Add the final task; where none works, another ordinary one comes before it."""
-        for _ in range(_LONGER):
-            ways = list(end_types(self._draft.object_log()))
-            self._rng.shuffle(ways)
-            for ends in ways:
-                self._failures = 0
-                if self._first_that_works(ends.allows_task, is_last=True) is not None:
+        """Add the final task; if none works, an ordinary task is added before the next try."""
+        for _ in range(_MAX_EXTENSIONS):
+            directions = list(end_types(self._draft.object_log()))
+            self._rng.shuffle(directions)
+            for types in directions:
+                self._n_failed = 0
+                if self._add_task(types.allows_task, is_last=True) is not None:
                     self._draft.make_last_task_final()
                     return
-            self._failures = 0
+            self._n_failed = 0
             self.extend()
         raise UsageError(f"{self._name}: no final task works; choose another scene or seed")
 
     @property
     def _out_of_tries(self) -> bool:
-        return self._failures >= self._settings.max_fail
+        return self._n_failed >= self._settings.max_fail
 
-    def _first_that_works(self, allowed: Callable[[Task], bool], is_last: bool = False) -> Task | None:
-        """Try sampled tasks until one becomes part of the trajectory; None where none does."""
+    def _add_task(self, allowed: Callable[[Task], bool], is_last: bool = False) -> Task | None:
+        """Try sampled tasks until one becomes part of the trajectory; returns None if none does."""
         task = self._try_sampled(allowed, is_last)
-        if task is None and self._setbacks and not self._out_of_tries:
-            self._setbacks.forget()  # before giving up: they may be outdated
+        if task is None and self._known_failures and not self._out_of_tries:
+            self._known_failures.forget()  # they may be outdated, so everything is tried again before giving up
             task = self._try_sampled(allowed, is_last)
         return task
 
     def _try_sampled(self, allowed: Callable[[Task], bool], is_last: bool) -> Task | None:
         view = self._simulator.view
         types = {item.object_type for item in view.objects.values()}
-        room = self._setbacks.room(view)
+        room = self._known_failures.room(view)
         possible = set(tasks_of(room, types))
         for task in self._pool.sample(room, types):
             if self._out_of_tries:
                 return None
             operators = plan(task, room) if task in possible and allowed(task) else None
             if not operators or all(step.name == "GotoLocation" for step in operators):
-                continue  # it holds already, or would by standing elsewhere
+                continue  # its goal holds already, or would after walking alone
             failure = self._try(task, room, operators, is_last)
             if failure is None:
                 return task
-            self._failures += 1
+            self._n_failed += 1
             if failure.item is not None:
-                self._setbacks.note(view, failure.item, failure.receptacle)
-            room = self._setbacks.room(view)
+                self._known_failures.note(view, failure.item, failure.receptacle)
+            room = self._known_failures.room(view)
             possible = set(tasks_of(room, types))
         return None
 
@@ -176,7 +178,7 @@ class _Factory:
         name = f"{task.task_type}{' sliced' if task.sliced else ''}"
         self._statistics.tried[name] += 1
         mark, start = self._simulator.mark(), self._draft.length
-        failure = self._carry_out(operators) or self._unmet(task)
+        failure = self._execute(operators) or self._check_goal(task)
         end = self._draft.length
         if failure is None and not is_last:
             failure = self._put_down()
@@ -186,21 +188,21 @@ class _Factory:
             return failure
         self._statistics.accepted[name] += 1
         self._pool.note_use(task)
-        self._setbacks.task_done()
+        self._known_failures.task_done()
         self._problems.append(problem(task, room, f"task-{len(self._problems):03d}"))
         self._draft.add_task(sub_task(task, self._settings.scene), start, end)
         return None
 
-    def _unmet(self, task: Task) -> RolloutError | None:
-        """What is wrong where a plan was carried out and its goal does not hold: things can slide."""
+    def _check_goal(self, task: Task) -> RolloutError | None:
+        # A completed plan is no proof: objects can slide.
         if goal_holds(task, self._simulator.view):
             return None
-        error = RolloutError(f"{task.task_type}: its plan was carried out and its goal does not hold")
+        error = RolloutError(f"{task.task_type}: its plan was completed, but its goal does not hold")
         self._statistics.reasons[str(error)] += 1
         return error
 
     def _put_down(self) -> RolloutError | None:
-        """Put a held object down, wherever there is room for it."""
+        """Put a held object into a random receptacle that has room for it."""
         room = room_of(self._simulator.view)
         held = room.start.held
         if held is None:
@@ -210,20 +212,20 @@ class _Factory:
         ]
         self._rng.shuffle(places)
         for place in places:
-            if self._carry_out([Operator("PutObject", held, place)]) is None:
+            if self._execute([Operator("PutObject", held, place)]) is None:
                 return None
-        error = RolloutError(f"no place takes {room.types[held]}", held)
+        error = RolloutError(f"no receptacle has room for {room.types[held]}", held)
         self._statistics.reasons[str(error)] += 1
         return error
 
     def _go_back(self, mark: SimulatorMark, length: Length) -> None:
-        """Take back what was added since a mark at which the trajectory had this length."""
+        """Remove what was added since a mark, at which the trajectory had this length."""
         if self._draft.length.low > length.low:
             self._simulator.rewind(mark)
             self._draft.cut(length)
 
-    def _carry_out(self, operators: Sequence[Operator]) -> RolloutError | None:
-        """Run operators; where that fails, the simulator is as it was before and nothing is added."""
+    def _execute(self, operators: Sequence[Operator]) -> RolloutError | None:
+        """Run operators and add their actions; if one fails, the simulator is rewound and nothing is added."""
         mark = self._simulator.mark()
         rollout = Rollout(self._simulator, self._draft.length.high)
         try:

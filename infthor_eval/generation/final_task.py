@@ -1,7 +1,7 @@
-"""The final task: what it is about must have been seen at the two ends of the trajectory before it.
+"""The final task, whose objects must have been seen at both ends of the trajectory before it.
 
 The object to pick up is among those `pickupable` in the first fifth of the steps and the receptacle (or lamp) among
-those `visible` in the last fifth, or the other way round, so that solving the task needs what was seen long ago.
+those `visible` in the last fifth, or vice versa. So the task requires to remember what was seen long ago.
 """
 
 import math
@@ -14,17 +14,17 @@ from infthor_eval.household.tasks import Task
 
 __all__ = ["SHARE", "EndTypes", "end_types", "violation"]
 
-SHARE = 0.2
+SHARE = 0.2  # of the frames, at either end
 
 
 @dataclass(frozen=True)
 class EndTypes:
-    """The object types seen at the two ends of a trajectory: one end holds the object, the other the receptacle.
+    """Object types seen at the two ends of a trajectory, with the object at one end and the receptacle at the other.
 
     Attributes:
-        pickupable: at the end that holds the object.
-        visible: at the end that holds the receptacle.
-        either: visible at any of the two.
+        pickupable: types that can be picked up, at the end with the object.
+        visible: types that are visible at the end with the receptacle.
+        either: types that are visible at either end.
     """
 
     pickupable: frozenset[str]
@@ -32,17 +32,17 @@ class EndTypes:
     either: frozenset[str]
 
     def allows(self, pickup: str, other: str | None, movable: str | None = None) -> bool:
-        """Whether a task on these types meets the rule; a carried receptacle may be from either end."""
+        """Return True if a task on these types satisfies the rule; a movable receptacle may be from either end."""
         carried = movable is None or movable in self.either
         return carried and pickup in self.pickupable and other in self.visible
 
     def allows_task(self, task: Task) -> bool:
-        """Whether a task meets the rule."""
+        """Return True if a task satisfies the rule."""
         return self.allows(task.pickup, task.receptacle or task.light, task.movable)
 
 
 def end_types(object_log: Sequence[dict[str, Any]]) -> tuple[EndTypes, EndTypes]:
-    """The ends of the trajectory that a log tells of: with the object early, and the other way round.
+    """Return the types of both directions: with the object early, and with the object late.
 
     Args:
         object_log: one entry per frame, with the types that are visible and pickupable there.
@@ -57,7 +57,7 @@ def end_types(object_log: Sequence[dict[str, Any]]) -> tuple[EndTypes, EndTypes]
 
 
 def violation(trajectory: Trajectory) -> str | None:
-    """How a trajectory's final task breaks the rule, derived anew from its object log; None where it does not."""
+    """Return how a trajectory's final task violates the rule, by its object log, or None if it does not."""
     task = trajectory.long_horizon_task
     if task is None:
         return "there is no final task"

@@ -1,4 +1,4 @@
-"""Long loops of simulator steps and Python's garbage collector."""
+"""Tuning Python's garbage collector for long loops of simulator steps."""
 
 import gc
 from collections.abc import Iterator
@@ -9,10 +9,10 @@ __all__ = ["freeze_existing_objects"]
 
 @contextmanager
 def freeze_existing_objects() -> Iterator[None]:
-    """Has the garbage collector pass over all that exists now, which is mainly what libraries hold.
+    """Exempt all existing objects, which are mainly those of libraries, from garbage collection.
 
-    A reply of the simulator decodes to thousands of objects. They make the collector look through everything again
-    and again: 40 % of the processor time of a long loop of steps (`benchmarks/generation_growth.py`).
+    Each reply of the simulator decodes to thousands of objects, which trigger collections over all objects again and
+    again: 40 % of the processor time of a long loop of steps (`benchmarks/generation_growth.py`).
     """
     gc.collect()
     gc.freeze()

@@ -1,4 +1,4 @@
-"""Which trajectories a set is made of."""
+"""The trajectories to generate for a set."""
 
 from collections.abc import Sequence
 
@@ -20,19 +20,19 @@ def trajectory_jobs(
     final_task: bool,
     max_fail: int = MAX_FAIL,
 ) -> list[TrajectorySettings]:
-    """The settings of every trajectory of a set, scene by scene.
+    """Return the settings of all trajectories of a set, scene by scene.
 
     Args:
         scenes: names of the scenes.
-        seed: of the first trajectory of each scene; the others have the seeds after it.
-        count: trajectories for each scene.
-        min_steps: low-level actions at least.
-        min_subgoals: tasks at least.
-        final_task: whether a final task follows.
-        max_fail: tasks that may fail in one trajectory.
+        seed: seed of the first trajectory of each scene; the others have the next seeds.
+        count: number of trajectories for each scene.
+        min_steps: minimum number of low-level actions.
+        min_subgoals: minimum number of tasks.
+        final_task: True to end each trajectory with a final task.
+        max_fail: maximum number of failed tasks in one trajectory.
 
     Raises:
-        UsageError: there would be more of them than the limit.
+        UsageError: the number of trajectories exceeds the limit.
     """
     if count * len(scenes) > TRAJECTORIES.value:
         raise UsageError(f"{count} trajectories for each of {len(scenes)} scenes are too many; {TRAJECTORIES.hint}")
@@ -45,13 +45,13 @@ def trajectory_jobs(
 
 
 def without_bathrooms(scenes: Sequence[str]) -> tuple[list[str], list[str]]:
-    """The scenes that a test set may have, and the others in alphabetical order.
+    """Return the scenes without the bathrooms, and the bathrooms in alphabetical order.
 
     Raises:
-        UsageError: all of them are bathrooms.
+        UsageError: all scenes are bathrooms.
     """
     chosen = [scene for scene in scenes if scene_type(scene) != BATHROOM]
     skipped = sorted(set(scenes) - set(chosen))
     if not chosen:
-        raise UsageError(f"{', '.join(skipped)}: bathrooms are left out of test sets; name other scenes")
+        raise UsageError(f"{', '.join(skipped)}: bathrooms are left out of test sets; give other scenes")
     return chosen, skipped

@@ -1,4 +1,4 @@
-"""What turned out not to work in a room, so that it is not tried again while things are as they were."""
+"""Failures of earlier tasks in a room, which are not tried again as long as the objects involved are unchanged."""
 
 from collections.abc import Iterator
 
@@ -9,16 +9,18 @@ from infthor_eval.thor.view import SimulatorView, ThorObject
 __all__ = ["KnownFailures"]
 
 _Size = tuple[float, ...]
-_BELIEVED = 8  # tasks that a setback is believed for: other things move too and may clear the way
-_NEAR = 0.02  # metres within which an object has not moved
+_LIFETIME = 8  # tasks after which a failure is forgotten: other objects have moved and may have cleared the way
+_NEAR = 0.02  # tolerance of positions and sizes, metres
 
 
 class KnownFailures:
-    """Objects out of reach, and receptacles without room for an object."""
+    """Objects that cannot be acted on, and receptacles without room for an object."""
 
     def __init__(self) -> None:
-        self._tasks = 0
+        self._n_tasks = 0
+        # Number of the task at which an object failed, and its position then.
         self._blocked: dict[str, tuple[int, tuple[float, float, float]]] = {}
+        # Number of the task at which an object did not fit into a receptacle, and its contents then.
         self._refused: dict[tuple[str, str], tuple[int, frozenset[str]]] = {}
         self._sizes: dict[str, _Size | None] = {}
 
@@ -26,38 +28,38 @@ class KnownFailures:
         return bool(self._blocked or self._refused)
 
     def note(self, view: SimulatorView, item: str, receptacle: str | None) -> None:
-        """Remember that an object cannot be acted on, or finds no room in a receptacle, as things are.
+        """Record that an object cannot be acted on, or does not fit into a receptacle.
 
         Args:
-            view: as things are.
-            item: the object.
-            receptacle: where it was to go; None where the object itself is out of reach.
+            view: state before the failed task.
+            item: id of the object.
+            receptacle: id of the receptacle without room; None if the object itself cannot be acted on.
         """
         if receptacle is not None:
-            self._refused[item, receptacle] = self._tasks, _contents(view, receptacle)
+            self._refused[item, receptacle] = self._n_tasks, _contents(view, receptacle)
             if item in view.objects:
                 self._sizes[item] = _size(view.objects[item])
         elif item in view.objects:
-            self._blocked[item] = self._tasks, _position(view, item)
+            self._blocked[item] = self._n_tasks, _position(view, item)
 
     def task_done(self) -> None:
-        """One more task changed the room."""
-        self._tasks += 1
+        """Count a completed task, which changed the room."""
+        self._n_tasks += 1
 
     def forget(self) -> None:
-        """Believes that everything may work again."""
+        """Forget all failures."""
         self._blocked.clear()
         self._refused.clear()
 
     def room(self, view: SimulatorView) -> SymbolicRoom:
-        """The room without what is not believed to work."""
-        oldest = self._tasks - _BELIEVED
+        """Return the room, without the objects and pairs that are known to fail."""
+        oldest = self._n_tasks - _LIFETIME
         self._blocked = {
             item: (since, position)
             for item, (since, position) in self._blocked.items()
             if since > oldest and item in view.objects and _is_near(position, _position(view, item))
         }
-        # A receptacle that has lost something may have room now.
+        # A receptacle from which something was taken may have room now.
         self._refused = {
             pair: (since, contents)
             for pair, (since, contents) in self._refused.items()
@@ -66,26 +68,30 @@ class KnownFailures:
         return room_of(view, self._blocked.keys(), set(self._without_room(view)))
 
     def _without_room(self, view: SimulatorView) -> Iterator[tuple[str, str]]:
-        """Where things find no room: as was found, and where they are larger than what did not, or than the place."""
+        """Yield (object, receptacle) pairs that do not fit: known ones, and those that follow from sizes.
+
+        An object does not fit where an object of at most its size did not, nor into a receptacle of a smaller base.
+        """
         yield from self._refused
         sizes = {key: size for key, item in view.objects.items() if (size := _size(item)) is not None}
-        things = [key for key in sizes if view.objects[key].pickupable]
+        items = [key for key in sizes if view.objects[key].pickupable]
         for item, receptacle in self._refused:
-            least = self._sizes.get(item)
-            yield from ((key, receptacle) for key in things if least is not None and _covers(sizes[key], least))
-        for place in (key for key in sizes if view.objects[key].receptacle):
-            ground = sizes[place][:2]
-            yield from ((key, place) for key in things if not _covers(ground, sizes[key][:2]))
+            refused_size = self._sizes.get(item)
+            if refused_size is not None:
+                yield from ((key, receptacle) for key in items if _covers(sizes[key], refused_size))
+        for receptacle in (key for key in sizes if view.objects[key].receptacle):
+            base = sizes[receptacle][:2]
+            yield from ((key, receptacle) for key in items if not _covers(base, sizes[key][:2]))
 
 
 def _size(item: ThorObject) -> _Size | None:
-    """Width, depth (the larger first) and height, metres."""
+    """Return the horizontal sizes, the larger first, and the height, metres."""
     box = item.axis_aligned_bounding_box
     return None if box is None else (*sorted((box.size.x, box.size.z), reverse=True), box.size.y)
 
 
 def _covers(one: _Size, other: _Size) -> bool:
-    """Whether one thing is as large as the other, in each direction."""
+    """Return True if one size is at least the other in each direction."""
     return all(a >= b - _NEAR for a, b in zip(one, other, strict=True))
 
 

@@ -1,4 +1,4 @@
-"""The views between two poses of the agent, for replays with several frames per action."""
+"""Intermediate frames between two poses of the agent, for replays with several frames per action."""
 
 from collections.abc import Iterator
 
@@ -10,27 +10,27 @@ __all__ = ["intermediate_views"]
 
 
 def intermediate_views(simulator: Simulator, start: AgentPose, end: AgentPose, frames: int) -> Iterator[SimulatorView]:
-    """Look from evenly spaced poses between two; the agent is back at the second one afterwards.
+    """Yield the states at evenly spaced poses between two; the agent returns to the second pose.
 
     Args:
-        simulator: where the agent stands at `end`.
-        start: before the action.
-        end: after the action.
-        frames: of the whole action, the one at `end` included.
+        simulator: simulator with the agent at `end`.
+        start: pose before the action.
+        end: pose after the action.
+        frames: number of frames of the action, including that at `end`.
 
     Yields:
-        `frames` - 1 views, none where the agent did not move.
+        `frames` - 1 states, or none if the agent did not move.
     """
     if start == end:
         return
     for number in range(1, frames):
-        yield simulator.query(**teleport_call(_mix(start, end, number / frames)))
+        yield simulator.query(**teleport_call(_interpolate(start, end, number / frames)))
     if frames > 1:
         simulator.query(**teleport_call(end))
 
 
-def _mix(start: AgentPose, end: AgentPose, share: float) -> AgentPose:
-    turn = (end.rotation - start.rotation + 180.0) % 360.0 - 180.0
+def _interpolate(start: AgentPose, end: AgentPose, share: float) -> AgentPose:
+    turn = (end.rotation - start.rotation + 180.0) % 360.0 - 180.0  # the shorter way round
     one, other = start.position, end.position
     return AgentPose(
         Vector(

@@ -1,8 +1,7 @@
 """Replaying one recorded trajectory to frames and a step log.
 
-A refused action is recorded with its message and the replay goes on, as ALFRED's own does: the log tells what
-really happened, so questions made from it hold all the same. Such a trajectory counts as diverged from its
-first refused action on.
+A refused action is logged with its message and the replay continues, as ALFRED's does. The log has what really
+happened, so questions on it are still correct. The trajectory counts as diverged from its first refused action on.
 """
 
 from pathlib import Path
@@ -26,7 +25,7 @@ __all__ = ["Overlap", "Refusal", "ReplayReport", "box_iou", "replay"]
 
 
 class Refusal(msgspec.Struct):
-    """An action that the simulator did not carry out."""
+    """An action that the simulator refused."""
 
     step: int
     action: str
@@ -34,7 +33,7 @@ class Refusal(msgspec.Struct):
 
 
 class Overlap(msgspec.Struct):
-    """How well the rendered box of an object meets the recorded one, at the frame in which it is acted on."""
+    """Overlap (IoU) of the rendered and the recorded box of an object, at the frame before the action on it."""
 
     step: int
     action: str
@@ -43,17 +42,17 @@ class Overlap(msgspec.Struct):
 
 
 class ReplayReport(msgspec.Struct):
-    """What came of one replay (`replay.json`).
+    """Report of one replay (`replay.json`).
 
     Attributes:
-        traj_id: the trajectory.
-        digest: hash of its JSON, by which a later run knows that this is it.
-        floor_plan: its scene.
-        frames: per action that moves the agent or its camera.
-        accepted: number of actions carried out, by name.
-        refusals: the others; the first is where the trajectory diverges.
-        restore: what of the initial scene could not be restored, in words.
-        overlaps: where the recording has boxes.
+        traj_id: id of the trajectory.
+        digest: hash of its JSON, by which a later run recognises it.
+        floor_plan: scene of the trajectory.
+        frames: number of frames of each action that moves the agent or its camera.
+        accepted: numbers of accepted actions by name.
+        refusals: refused actions; at the first one the trajectory diverges.
+        restore: parts of the initial scene that could not be restored, in words.
+        overlaps: overlaps of the boxes in the recording.
         seconds: wall time.
     """
 
@@ -69,25 +68,25 @@ class ReplayReport(msgspec.Struct):
 
     @property
     def complete(self) -> bool:
-        """Whether every action was carried out."""
+        """True if no action was refused."""
         return not self.refusals
 
 
 def replay(trajectory: Trajectory, simulator: Simulator, folder: Path, digest: str, frames: int = 1) -> ReplayReport:
     """Run a trajectory and write its frames and logs into a folder.
 
-    These are `img/`, `metadata.json`, `traj.txt`, `expert_log.json`, and `state_summary.json`: the room in words
-    after each task and at the end, by index of the low-level action.
+    These are `img/`, `metadata.json`, `traj.txt`, `expert_log.json`, and `state_summary.json`: the room in words after
+    each task and at the end, by index of the low-level action.
 
     Args:
-        trajectory: ALFRED's, ∞-THOR's or ours.
-        simulator: runs it; its scene is replaced.
-        folder: exists and is empty.
-        digest: of the trajectory's JSON, passed through.
-        frames: per action that moves the agent or its camera; the others have one.
+        trajectory: a trajectory of ALFRED, of ∞-THOR, or ours.
+        simulator: simulator to run it in; its scene is replaced.
+        folder: an existing, empty folder.
+        digest: hash of the trajectory's JSON, for the report.
+        frames: number of frames of each action that moves the agent or its camera; other actions have one.
 
     Raises:
-        SimulatorError: the simulator fails or has no such scene.
+        SimulatorError: the simulator fails, or has no such scene.
     """
     run = _Run(simulator, ReplayReport(trajectory.traj_id, digest, trajectory.scene.floor_plan, frames))
     restored = restore(simulator, trajectory.scene)
@@ -108,7 +107,7 @@ def replay(trajectory: Trajectory, simulator: Simulator, folder: Path, digest: s
 
 
 def box_iou(one: tuple[int, int, int, int], other: tuple[int, int, int, int]) -> float:
-    """Intersection over union of two boxes [xmin, ymin, xmax, ymax], both ends inclusive."""
+    """Return the intersection over union of two boxes [xmin, ymin, xmax, ymax], both ends inclusive."""
     width = min(one[2], other[2]) - max(one[0], other[0]) + 1
     height = min(one[3], other[3]) - max(one[1], other[1]) + 1
     shared = max(width, 0) * max(height, 0)
@@ -120,14 +119,14 @@ def _area(box: tuple[int, int, int, int]) -> int:
 
 
 class _Run:
-    """The state of one replay."""
+    """One replay while it runs."""
 
     def __init__(self, simulator: Simulator, report: ReplayReport) -> None:
         self._simulator = simulator
         self.report = report
 
     def begin(self, images: Path) -> None:
-        """Record the first frame; the scene is restored by now."""
+        """Record the first frame of the restored scene."""
         self.recorder = Recorder(images)
         self.recorder.record(self._simulator.view)
         self._grounding = Grounding(self._simulator.view)
@@ -152,11 +151,11 @@ class _Run:
             target=next(iter(before.inventory), None) if putting else target,
             receptacle=target if putting else None,
         )
-        # An action that could not even be called has no reply of its own.
+        # Set here, as an action that could not be called at all has no reply of the simulator.
         step.success, step.error = error is None, error
 
     def _call(self, index: int, low: LowAction, before: SimulatorView) -> tuple[str | None, str | None]:
-        """Run it; the id of the object it is about, and why it was refused."""
+        """Execute an action; returns the id of the object acted on, and the reason if it was refused."""
         try:
             call = translate(low, self._grounding, before)
         except MissingObjectError as missing:
@@ -167,12 +166,11 @@ class _Run:
         return target, None if after.success else after.error or "refused without a message"
 
     def _compare_box(self, index: int, low: LowAction, target: str | None, before: SimulatorView) -> None:
-        """Compare the recorded box of the object acted on with what the frame before the action shows of
-        it."""
+        """Compare the recorded box of the object acted on with the box in the frame before the action."""
         recorded = low.discrete_action.box if low.discrete_action is not None else None
         if recorded is None or target is None or before.instances is None:
             return
-        shown = before.instances.get(target)
-        iou = 0.0 if shown is None else box_iou(recorded, shown.box)
+        instance = before.instances.get(target)
+        iou = 0.0 if instance is None else box_iou(recorded, instance.box)
         object_type = before.objects[target].object_type
         self.report.overlaps.append(Overlap(index, low.api_action.action, object_type, round(iou, 4)))

@@ -1,7 +1,6 @@
-"""Carrying a symbolic plan out in the simulator, sub-goal by sub-goal.
+"""Executing a symbolic plan in the simulator, sub-goal by sub-goal.
 
-Doors are opened and closed around what needs it. Every action goes through the simulator, and the first one that it
-refuses ends the rollout.
+Receptacles are opened and closed where this is needed. The first action that the simulator refuses ends the rollout.
 """
 
 from collections.abc import Callable
@@ -19,29 +18,33 @@ __all__ = ["Rollout"]
 
 
 class Rollout:
-    """Operators turned into actions. `trace` has what was done so far."""
+    """Executes operators.
+
+    Attributes:
+        trace: actions and sub-goals so far.
+    """
 
     def __init__(self, simulator: Simulator, first_high: int = 0) -> None:
-        """Begin with nothing done.
+        """Start without actions.
 
         Args:
-            simulator: carries the actions out.
+            simulator: simulator that executes the actions.
             first_high: number of the first sub-goal.
         """
         self.trace = Trace(simulator, first_high)
         self._walker = Walker(self.trace)
-        self._slices: dict[str, str] = {}
+        self._slices: dict[str, str] = {}  # real ids of planned slices
 
     def run(self, operators: list[Operator]) -> None:
-        """Carry out a plan.
+        """Execute a plan.
 
         Raises:
-            RolloutError: an action was refused, or there is no place to act from.
+            RolloutError: an action was refused, or there is no pose to act from.
         """
         for number, operator in enumerate(operators, 1):
             if operator.name == "GotoLocation" and number == len(operators):
-                self._walker.go([operator.item])  # to a lamp that is lit already
-            elif operator.name != "GotoLocation":  # walked to when it is known what for
+                self._walker.go([operator.item])  # the plan ends at a lamp that is lit already
+            elif operator.name != "GotoLocation":  # each sub-goal walks by itself: only then is its object known
                 _SUBGOALS[operator.name](self, operator)
 
     # -- sub-goals
@@ -97,7 +100,7 @@ class Rollout:
         self._inside(fridge, lambda: self._interact("PutObject", item, fridge))
         self._inside(fridge, lambda: self._interact("PickupObject", item))
 
-    # -- their parts
+    # -- parts of sub-goals
 
     def _begin(self, name: str, item: str, receptacle: str | None = None) -> None:
         ids = [key for key in (item, receptacle) if key is not None]
@@ -105,7 +108,7 @@ class Rollout:
         self.trace.begin(words, PlannerAction(name, object_id=item, receptacle_id=receptacle))
 
     def _inside(self, holder: str | None, act: Callable[[], None]) -> None:
-        """Open what holds the object, act, and close it again; just act where nothing is closed."""
+        """Open a receptacle, act, and close it; without a receptacle, only act."""
         if holder is not None:
             self._interact("OpenObject", holder)
         act()
@@ -113,25 +116,24 @@ class Rollout:
             self._interact("CloseObject", holder)
 
     def _interact(self, action: str, item: str, receptacle: str | None = None) -> None:
-        """An action on an object, stored in the form that trajectories have (the held object and its
-        receptacle)."""
+        """Execute an action on an object; the stored form of PutObject has the held object and the receptacle."""
         acted_on = item if receptacle is None else receptacle
         if acted_on not in self._view.objects:
             raise RolloutError(f"{action}: {acted_on.split('|')[0]} is gone")
         if not self._view.objects[acted_on].visible:
-            # A thing just put down or uncovered may lie where it cannot be seen from here.
+            # An object that was just put down or uncovered may not be visible from here.
             self._walker.step_aside(acted_on)
         self.trace.act(ApiAction(action, object_id=item, receptacle_id=receptacle), {"objectId": acted_on})
-        self._walker.forget_grid()  # a door or a thing on the floor may be in the way now, or no longer
+        self._walker.forget_grid()  # a door or an object on the floor may block cells now, or no longer
 
-    # -- what is where
+    # -- objects
 
     @property
     def _view(self) -> SimulatorView:
         return self.trace.view
 
     def _resolve(self, item: str) -> str:
-        """The object that a planned item is; a planned slice becomes a real one when it is first needed."""
+        """Return the object id of a planned item; a planned slice gets a real one when it is first needed."""
         if "#" not in item:
             return item
         if item not in self._slices:
@@ -140,16 +142,16 @@ class Rollout:
             taken = set(self._slices.values())
             free = [
                 key
-                for key, found in self._view.objects.items()
-                if found.object_type == object_type and key.startswith(whole) and key not in taken
+                for key, candidate in self._view.objects.items()
+                if candidate.object_type == object_type and key.startswith(whole) and key not in taken
             ]
             if not free:
-                raise RolloutError(f"no {object_type} came of slicing")
+                raise RolloutError(f"slicing left no {object_type}")
             self._slices[item] = min(free, key=lambda key: (not self._view.objects[key].visible, key))
         return self._slices[item]
 
     def _closed_around(self, item: str) -> str | None:
-        """The closed receptacle that hides an object, if one does."""
+        """Return the closed receptacle that an object is in, or None."""
         objects = self._view.objects
         current = objects[item]
         while (parent := direct_parent(current, objects)) is not None:
@@ -164,11 +166,11 @@ class Rollout:
 
     def _nearest(self, object_type: str, to: str) -> str:
         objects = self._view.objects
-        found = [item for item in objects.values() if item.object_type == object_type]
-        if not found:
+        candidates = [item for item in objects.values() if item.object_type == object_type]
+        if not candidates:
             raise RolloutError(f"no {object_type} in the room")
         at = objects[to].position
-        return min(found, key=lambda item: (item.position.x - at.x) ** 2 + (item.position.z - at.z) ** 2).object_id
+        return min(candidates, key=lambda item: (item.position.x - at.x) ** 2 + (item.position.z - at.z) ** 2).object_id
 
 
 _SUBGOALS: dict[str, Callable[[Rollout, Operator], None]] = {

@@ -1,8 +1,8 @@
-"""Which task comes next: sampled so that types, objects and receptacles stay diverse, from what the room can do.
+"""Sampling the next task among those that are possible, so that types, objects and receptacles are diverse.
 
-A task is drawn variable by variable - its type, then the object, what carries it, and where it goes, each given those
-before it. A value that was used n times is weighed by 1 / (1 + n), once for its uses with the values drawn before it
-(conditionally) and once for all its uses (as a prior), with some noise on it, as published.
+A task is sampled variable by variable: its type, the object, the movable receptacle and the receptacle or lamp, each
+conditioned on those before it. The weight of a value is 1 / (1 + n) for its n uses after the same values (conditional),
+times 1 / (1 + n) for all its uses (prior), with noise, as in the paper.
 """
 
 import random
@@ -15,69 +15,71 @@ from infthor_eval.household.tasks import Task, TaskType
 
 __all__ = ["TaskPool"]
 
-_DOUBTED = 3  # failures that count: rooms change, and tasks that never failed must not crowd out the others
-_NOISE = 0.1  # by how much of itself a weight may be off
+_MAX_FAILURES = 3  # further failures do not lower a weight: rooms change, and other tasks must not crowd this one out
+_NOISE = 0.1  # relative noise of a weight
 _N_VARIABLES = 4
 
 
 class TaskPool:
-    """Samples tasks; what was used or failed becomes less likely."""
+    """Samples tasks; used and failed ones become less likely."""
 
     def __init__(self, task_types: Iterable[TaskType], rng: random.Random) -> None:
-        """Begin with nothing used.
+        """Start without uses.
 
         Args:
-            task_types: what to draw from.
-            rng: makes the choices.
+            task_types: task types to sample from.
+            rng: source of all random choices.
         """
         self._task_types = frozenset(task_types)
         self._rng = rng
-        self._alone: Counter[tuple[int, str]] = Counter()
-        self._together: Counter[tuple[str, ...]] = Counter()
-        self._failed: Counter[Task] = Counter()
+        self._uses: Counter[tuple[int, str]] = Counter()  # of a value of the variable with this index
+        self._joint_uses: Counter[tuple[str, ...]] = Counter()  # of the first values together
+        self._failures: Counter[Task] = Counter()
 
     def sample(self, room: SymbolicRoom, extra_types: Iterable[str] = ()) -> Iterator[Task]:
-        """Tasks for a room as it is now, in random order, the fresher ones earlier.
+        """Yield the possible tasks in weighted random order.
 
         Args:
-            room: as it is now.
-            extra_types: types of what the room has beside items and places (faucets).
+            room: the room in its current state.
+            extra_types: types of the objects that are neither items nor places (faucets).
         """
-        found = [task for task in tasks_of(room, extra_types) if task.task_type in self._task_types]
-        # Efraimidis and Spirakis: sorting by exponential waits is weighted sampling without replacement.
-        waits = {task: self._rng.expovariate(chance) for task, chance in self._chances(found)}
-        yield from sorted(found, key=lambda task: waits[task])
+        tasks = [task for task in tasks_of(room, extra_types) if task.task_type in self._task_types]
+        # Sorting by exponential waiting times is weighted sampling without replacement (Efraimidis and Spirakis 2006).
+        waits = {task: self._rng.expovariate(probability) for task, probability in self._probabilities(tasks)}
+        yield from sorted(tasks, key=lambda task: waits[task])
 
     def note_use(self, task: Task) -> None:
-        """Note that a task became part of the trajectory."""
+        """Count a task that became part of the trajectory."""
         values = _values(task)
-        self._alone.update(enumerate(values))
-        self._together.update(values[:length] for length in range(1, len(values) + 1))
+        self._uses.update(enumerate(values))
+        self._joint_uses.update(values[:length] for length in range(1, len(values) + 1))
 
     def note_failure(self, task: Task) -> None:
-        """Note that a task was tried and did not work."""
-        self._failed[task] += 1
+        """Count a task that was tried and failed."""
+        self._failures[task] += 1
 
-    def _chances(self, tasks: Sequence[Task], drawn: int = 0, chance: float = 1.0) -> Iterator[tuple[Task, float]]:
-        """Every task with how likely it is to be drawn; the first `drawn` variables of these are alike."""
-        if drawn == _N_VARIABLES:
-            yield from ((task, chance * 0.5 ** min(self._failed[task], _DOUBTED)) for task in tasks)
+    def _probabilities(
+        self, tasks: Sequence[Task], n_fixed: int = 0, probability: float = 1.0
+    ) -> Iterator[tuple[Task, float]]:
+        """Yield the tasks with their probabilities; the first `n_fixed` variables of all of them are equal."""
+        if n_fixed == _N_VARIABLES:
+            yield from ((task, probability * 0.5 ** min(self._failures[task], _MAX_FAILURES)) for task in tasks)
             return
         groups: dict[tuple[str, ...], list[Task]] = {}
         for task in tasks:
-            groups.setdefault(_values(task)[: drawn + 1], []).append(task)
+            groups.setdefault(_values(task)[: n_fixed + 1], []).append(task)
         weights = {values: self._weight(values) for values in groups}
         total = sum(weights.values())
         for values, group in groups.items():
-            yield from self._chances(group, drawn + 1, chance * weights[values] / total)
+            yield from self._probabilities(group, n_fixed + 1, probability * weights[values] / total)
 
     def _weight(self, values: tuple[str, ...]) -> float:
-        """Of the last of these values, given those before it."""
-        prior = 1 / (1 + self._alone[len(values) - 1, values[-1]])
-        conditional = 1 / (1 + self._together[values]) if len(values) > 1 else 1.0
+        """Return the weight of the last value, given those before it."""
+        prior = 1 / (1 + self._uses[len(values) - 1, values[-1]])
+        conditional = 1 / (1 + self._joint_uses[values]) if len(values) > 1 else 1.0
         return prior * conditional * self._rng.uniform(1 - _NOISE, 1 + _NOISE)
 
 
 def _values(task: Task) -> tuple[str, ...]:
-    """The variables of a task in the order in which they are drawn."""
+    """Return the variables of a task in the order in which they are sampled."""
     return str(task.task_type), task.target, task.movable or "", task.receptacle or task.light or ""

@@ -45,7 +45,7 @@ def test_a_folder_that_is_not_empty_and_a_scene_that_is_not_there_are_refused(tm
     manifest = read_manifest(BUNDLED / MANIFEST)
     (tmp_path / "file").write_text("")
     with Simulator(embedded()) as simulator:
-        with pytest.raises(DataError, match="is not empty"):
+        with pytest.raises(DataError, match="not empty"):
             build_bundle(manifest, simulator, tmp_path)
         nowhere = msgspec.structs.replace(
             manifest, trajectories=(msgspec.structs.replace(manifest.trajectories[0], scene="attic-1"),)

@@ -1,3 +1,3 @@
-"""The rules that make NIEH questions from the step log of a replayed trajectory."""
+"""Rules that generate NIEH questions from the step log of a replayed trajectory."""
 
 __all__: list[str] = []
