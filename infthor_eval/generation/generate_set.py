@@ -121,7 +121,7 @@ def generate_set(
     """
     out.mkdir(parents=True, exist_ok=True)
     outcomes = (_generate_one(job, simulator, out) for job in jobs)
-    return _summarise(collect_outcomes(enumerate(outcomes), _failed, progress))
+    return _summarise(collect_outcomes(enumerate(outcomes), _failure_outcome, progress))
 
 
 def generate_with_workers(
@@ -148,10 +148,10 @@ def generate_with_workers(
     out.mkdir(parents=True, exist_ok=True)
     start = StartSimulatorWorker(launch, partial(_generate_one, out=out))
     outcomes = shared_out(start, jobs, worker_settings, say)
-    return _summarise(collect_outcomes(outcomes, _failed, progress))
+    return _summarise(collect_outcomes(outcomes, _failure_outcome, progress))
 
 
-def _failed(_number: int, error: InfthorError) -> _GenerationOutcome:
+def _failure_outcome(_number: int, error: InfthorError) -> _GenerationOutcome:
     return _GenerationOutcome(failure=str(error))
 
 

@@ -176,7 +176,9 @@ def _collect(
 ) -> ReplayedSet:
     """Return the set of the outcomes, in the order of the selection."""
     started = time.monotonic()
-    collected = collect_outcomes(outcomes, lambda number, error: _failed(selection.items[number], error), progress)
+    collected = collect_outcomes(
+        outcomes, lambda number, error: _failure_outcome(selection.items[number], error), progress
+    )
     result = ReplayedSet(failures=list(selection.failures), seconds=time.monotonic() - started)
     for outcome in collected:
         if outcome.report is not None:
@@ -193,10 +195,10 @@ def _replay_one(item: Item, simulator: Simulator, metadata: Path, frames: int) -
         with freeze_existing_objects(), _wrap_malformed(source):
             return _replay_or_check(source, trajectory, simulator, metadata, frames)
     except InfthorError as error:
-        return _failed(item, error)
+        return _failure_outcome(item, error)
 
 
-def _failed(item: Item, error: InfthorError) -> _ReplayOutcome:
+def _failure_outcome(item: Item, error: InfthorError) -> _ReplayOutcome:
     source, trajectory = item
     return _ReplayOutcome(failure=ReplayFailure(source.place, f"{trajectory.traj_id}: {error}"))
 

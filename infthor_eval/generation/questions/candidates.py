@@ -1,4 +1,4 @@
-"""What question rules make, before some of it is chosen."""
+"""Candidate questions, which the rules generate and from which a set is sampled."""
 
 import difflib
 from collections.abc import Iterable, Iterator, Sequence
@@ -19,9 +19,9 @@ __all__ = [
     "with_the",
 ]
 
-MANY = 6  # gold answers; longer lists are a test of writing, not of seeing
-_SIMILAR = 0.75  # the published scorer takes answers alike from 0.8 on
-_ALIKE = (
+MANY = 6  # maximum number of gold answers; longer lists would test writing, not seeing
+_SIMILAR = 0.75  # the published scorer accepts answers from a similarity of 0.8 on
+_ALIKE = (  # types that people call by each other's names
     {"Pen", "Pencil"},
     {"Desk", "SideTable", "CoffeeTable", "DiningTable", "CounterTop"},
     {"Dresser", "Drawer"},
@@ -32,16 +32,16 @@ _ALIKE = (
 
 @dataclass(frozen=True)
 class Candidate:
-    """A question that holds.
+    """A valid question.
 
     Attributes:
-        question_type: its type.
-        form: the question with "{}" where it names things; balance is kept within a form.
-        names: what stands there.
-        clues: the frames that show the answer, in order.
-        answers: the gold answers.
-        subjects: object types that it is about, for balance.
-        absence: whether the answer is that something is not there, which no frame proves.
+        question_type: type of the question.
+        form: the question with "{}" for the names in it; answers are balanced within a form.
+        names: names to insert into the form.
+        clues: frames that show the answer, in order.
+        answers: gold answers.
+        subjects: object types in question and answer, for balancing.
+        absence: True if the answer is that something is nowhere, for which no frame is evidence.
     """
 
     question_type: str
@@ -54,46 +54,44 @@ class Candidate:
 
     @property
     def text(self) -> str:
-        """The question."""
+        """Text of the question."""
         return self.form.format(*self.names)
 
     @property
     def is_closed(self) -> bool:
-        """Whether the answer is yes, no or a number: few answers, which must not be guessed from the form."""
+        """True if the answer is yes, no or a number; answers to a form must be balanced then, or could be guessed."""
         answer = str(self.answers[0])
         return len(self.answers) == 1 and (answer in {"yes", "no"} or answer.isdecimal())
 
     def question(self, traj_id: str) -> Question:
-        """The question as sets hold it."""
+        """Return the question in the form of sets."""
         return Question(traj_id, self.text, self.clues, self.answers, self.question_type, self.absence)
 
 
 def further_type(question_type: str) -> str:
-    """The question type of our own forms beside those of Table 3's type."""
+    """Return the question type of our forms that belongs to a type of Table 3."""
     return f"{question_type}_further"
 
 
 def with_the(object_type: str) -> str:
-    """ "the coffee table" for an object type."""
+    """Return an object type in words with "the" ("the coffee table")."""
     return f"the {noun(canonical_type(object_type))}"
 
 
 def in_or_on(object_type: str) -> str:
-    """ "on the coffee table", "in the fridge" for a receptacle type."""
+    """Return a receptacle type in words with its preposition ("on the coffee table", "in the fridge")."""
     return f"{preposition(object_type)} {with_the(object_type)}"
 
 
 def answer_of(object_type: str) -> str:
-    """An object type as a gold answer, in the published data's form ("coffeetable")."""
+    """Return an object type as a gold answer, in the published form ("coffeetable")."""
     return compact_name(canonical_type(object_type))
 
 
 def are_distinguishable(object_types: Sequence[str]) -> bool:
-    """Whether a list of these types can be a gold answer: no scorer may take one for another.
-
-    The published scorer deletes "and" inside words of lists too ("candle"), so such words cannot be in one.
-    """
+    """Return True if these types can be the gold answers of one question, so that no scorer confuses two of them."""
     words = [answer_of(object_type) for object_type in object_types]
+    # The published scorer deletes "and" from lists even inside of words ("candle").
     if len(words) > 1 and any("and" in word for word in words):
         return False
     for index, word in enumerate(words):
@@ -106,24 +104,24 @@ def are_distinguishable(object_types: Sequence[str]) -> bool:
 
 
 def listing_question(
-    question_type: str, form: str, occasions: Iterable[tuple[str | None, int | None]]
+    question_type: str, form: str, events: Iterable[tuple[str | None, int | None]]
 ) -> Iterator[Candidate]:
-    """A question on all types that something happened with, each with the first frame that shows it happen.
+    """Yield a question on all object types of some events, with the first frame that shows each type's event.
 
     Args:
-        question_type: the question's type.
-        form: the question; it names nothing.
-        occasions: of each, the object type (None where that is not clear) and the frame (None where none shows it).
+        question_type: type of the question.
+        form: the question, without names in it.
+        events: object type (None if it is ambiguous) and frame (None if no frame shows it) of each event.
 
     Yields:
-        The question, if every type is shown and the types can be a gold answer.
+        The question, unless a type is not shown or the types cannot be gold answers of one question.
     """
-    everything = list(occasions)
+    all_events = list(events)
     first: dict[str, int] = {}
-    for name, frame in everything:
+    for name, frame in all_events:
         if name is not None and frame is not None:
             first.setdefault(canonical_type(name), frame)
-    complete = all(name is not None and canonical_type(name) in first for name, _ in everything)
+    complete = all(name is not None and canonical_type(name) in first for name, _ in all_events)
     if first and complete and len(first) <= MANY and are_distinguishable(list(first)):
         answers = tuple(answer_of(name) for name in first)
         yield Candidate(question_type, form, (), tuple(first.values()), answers, tuple(first))

@@ -1,8 +1,8 @@
-"""A second opinion on questions: it reads the text and answers from the log, by another way than the rules.
+"""An independent check of questions, which answers their text from the log in another way than the rules.
 
-It sees a list of glimpses (`solvers`). Given the whole log, every glimpse holds the true state of all objects; given
-clue frames only, each holds what that frame's entry tells: the action that led to it and the objects large enough to be
-seen. A question is sound if both give its gold answer, and its clues are minimal if no smaller set of them does.
+The answer is computed from the facts of frames (see `solvers`). Facts of the whole log have the true states of all
+objects. Facts of clue frames have only what the frame's entry shows: the action before it, and the objects that are
+large enough to be seen. A question is sound if both give its gold answer, and no smaller set of clues does.
 """
 
 from collections.abc import Sequence
@@ -17,7 +17,13 @@ __all__ = ["Checker", "Verdict"]
 
 @dataclass(frozen=True)
 class Verdict:
-    """Whether the whole log, the clues alone, and no smaller set of clues give the gold answer."""
+    """The result of a check.
+
+    Attributes:
+        right: True if the whole log gives the gold answer.
+        sufficient: True if the clues give it.
+        minimal: True if no smaller set of clues does.
+    """
 
     right: bool
     sufficient: bool
@@ -25,42 +31,42 @@ class Verdict:
 
     @property
     def sound(self) -> bool:
-        """Whether all three hold."""
+        """True if all three hold."""
         return self.right and self.sufficient and self.minimal
 
 
 class Checker:
-    """Judges the questions on one trajectory."""
+    """Checks the questions on one trajectory."""
 
     def __init__(self, steps: Sequence[Step], share: float) -> None:
         """Read the log.
 
         Args:
             steps: the log.
-            share: of the frame's pixels that an object must fill to be seen.
+            share: share of the frame's pixels that an object must fill to count as seen.
         """
         self._whole = frame_facts(steps, share)
         self._single = {item.frame: item for item in frame_facts(steps, share, range(len(steps)))}
 
     def verdict(self, question: Question) -> Verdict:
-        """Judge one question.
+        """Check one question.
 
-        An absence is proven by no frame; its clues count as minimal. Of a count that is mixed with frames without an
-        occasion as many clues as it counts must be needed.
+        The clues of an absence question, for which no frame is evidence, count as minimal. For a mixed count, the
+        number of necessary clues must be the answer.
         """
         gold = sorted(str(item) for item in question.answers)
         clues = question.clues
 
-        def gives(seen: Sequence[FrameFacts]) -> bool:
-            found = answer(question.text, seen)
-            return found is not None and sorted(found) == gold
+        def gives_gold(facts: Sequence[FrameFacts]) -> bool:
+            answers = answer(question.text, facts)
+            return answers is not None and sorted(answers) == gold
 
         shown = [self._single[clue] for clue in clues]
-        smaller = [[item for item in shown if item.frame != skipped] for skipped in clues]
-        needed = sum(not gives(rest) for rest in smaller)
+        without_one = [[item for item in shown if item.frame != skipped] for skipped in clues]
+        n_necessary = sum(not gives_gold(rest) for rest in without_one)
         if (question.question_type or "").endswith("_mixed"):
-            minimal = [str(needed)] == gold and needed < len(clues)
+            minimal = [str(n_necessary)] == gold and n_necessary < len(clues)
         else:
             absence = question.text.startswith(("Is there any", "Have you seen")) and gold == ["no"]
-            minimal = absence or needed == len(clues)
-        return Verdict(gives(self._whole), gives(shown), minimal)
+            minimal = absence or n_necessary == len(clues)
+        return Verdict(gives_gold(self._whole), gives_gold(shown), minimal)

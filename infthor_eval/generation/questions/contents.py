@@ -1,7 +1,7 @@
-"""Slicing and container content: what was sliced, and what a receptacle held, at a told moment or all along.
+"""Slicing and container content: what was sliced, and what a receptacle held, at a given step or always.
 
-Table 3's forms do not say what counts as an object in or on something, so they are asked only where every reading gives
-the same answer (`readings`). Ours do say: what can be picked up, and is directly there.
+Table 3's forms do not define which objects count as being in or on something, so they are used only where every reading
+gives the same answer (see `readings`). Our forms define it: objects that can be picked up and are directly there.
 """
 
 from collections import Counter
@@ -26,11 +26,11 @@ __all__ = ["CONTENT", "FURTHER", "SLICING", "at_opening", "at_pickup", "at_slici
 CONTENT = "container_content"
 FURTHER = further_type(CONTENT)
 SLICING = "slicing"
-Asked = tuple[str, tuple[str, ...]]  # a form and its names
+FormAndNames = tuple[str, tuple[str, ...]]
 
 
 def slicings(history: TrajectoryHistory) -> Iterator[Candidate]:
-    """What the agent sliced."""
+    """Yield the question on what the agent sliced."""
     events = [event for event in history.events if event.action == "SliceObject"]
     types = [event.object_type for event in events]
     shown = all(history.shows_slices(event.frame, event.target) for event in events)
@@ -41,103 +41,113 @@ def slicings(history: TrajectoryHistory) -> Iterator[Candidate]:
 
 
 def at_slicing(history: TrajectoryHistory) -> Iterator[Candidate]:
-    """What lay where something was sliced, that itself among it."""
+    """Yield the questions on what was where something was sliced, including the sliced object."""
     events = [event for event in history.events if event.action == "SliceObject"]
     count = Counter(event.object_type for event in events)
     for event in events:
         place = history.parent(event.frame - 1, event.target)
+        # With two slicings of a type it would be ambiguous which one is meant.
         if count[event.object_type] > 1 or place is None or not is_plain(history, event.frame, place):
             continue
         inside = history.contents(event.frame, place)
         slices = sorted(key for key in inside if key.startswith(f"{event.target}|") and history.shows(event.frame, key))
         others = frozenset(key for key in inside if not key.startswith(f"{event.target}|"))
         if slices and others:
-            place_type = history.world(event.frame)[place].type
+            place_type = history.states(event.frame)[place].type
             asked = "What objects were {} when you slice {}?", (in_or_on(place_type), with_the(event.object_type))
-            frames = _unchanged(history, event.frame, place)
-            yield from _contents(history, SLICING, asked, frames, place, others | {slices[0]})
+            frames = _unchanged_frames(history, event.frame, place)
+            # One slice stands for the sliced object: all of them together would need more clues.
+            yield from _contents_question(history, SLICING, asked, frames, place, others | {slices[0]})
 
 
 def contents(history: TrajectoryHistory) -> Iterator[Candidate]:
-    """What is in or on the only receptacle of its type all along."""
+    """Yield the questions on receptacles whose contents never change and that are the only ones of their types."""
     last = len(history) - 1
-    places = {parent for key in history.world(last) if (parent := history.parent(last, key)) is not None}
+    places = {parent for key in history.states(last) if (parent := history.parent(last, key)) is not None}
     for place in sorted(places):
-        frames = _unchanged(history, 0, place)
-        if len(frames) == len(history) and history.only_one(last, place) and is_plain(history, last, place):
-            asked = "What objects were {}?", (in_or_on(history.world(last)[place].type),)
-            yield from _contents(history, CONTENT, asked, frames, place, history.contents(last, place))
+        frames = _unchanged_frames(history, 0, place)
+        if len(frames) == len(history) and history.is_only_one(last, place) and is_plain(history, last, place):
+            asked = "What objects were {}?", (in_or_on(history.states(last)[place].type),)
+            yield from _contents_question(history, CONTENT, asked, frames, place, history.contents(last, place))
 
 
 def at_opening(history: TrajectoryHistory) -> Iterator[Candidate]:
-    """What was in the only receptacle of its type when it was first opened."""
+    """Yield the questions on what was in the only receptacle of its type when it was first opened."""
     opened: set[str] = set()
     for event in history.events:
         first = event.action == "OpenObject" and event.target not in opened
         opened |= {event.target} if event.action == "OpenObject" else set()
-        if first and history.only_one(event.frame, event.target):
+        if first and history.is_only_one(event.frame, event.target):
             form = "Which things that can be picked up were directly {} when you first opened it?"
             asked = form, (in_or_on(event.object_type),)
-            yield from _loose_contents(history, asked, event, event.target)
+            yield from _loose_contents_question(history, asked, event, event.target)
 
 
 def at_pickup(history: TrajectoryHistory) -> Iterator[Candidate]:
-    """What was left where something was picked up."""
+    """Yield the questions on what was left where something was picked up."""
     events = [event for event in history.events if event.action == "PickupObject"]
     count = Counter(event.object_type for event in events)
     for event in events:
         place = history.parent(event.frame - 1, event.target)
-        if count[event.object_type] == 1 and place is not None and place in history.world(event.frame):
-            place_type = history.world(event.frame)[place].type
+        if count[event.object_type] == 1 and place is not None and place in history.states(event.frame):
+            place_type = history.states(event.frame)[place].type
             form = "Which other things that can be picked up were directly {} when you picked up {} from it?"
-            yield from _loose_contents(
+            yield from _loose_contents_question(
                 history, (form, (in_or_on(place_type), with_the(event.object_type))), event, place
             )
 
 
-def _loose_contents(history: TrajectoryHistory, asked: Asked, event: Event, place: str) -> Iterator[Candidate]:
-    """A question on what can be picked up of what a receptacle holds right after an event."""
-    wanted = can_be_picked_up(history, event.frame, history.contents(event.frame, place))
-    if wanted is not None:
-        yield from _contents(history, FURTHER, asked, _unchanged(history, event.frame, place), place, wanted)
+def _loose_contents_question(
+    history: TrajectoryHistory, asked: FormAndNames, event: Event, place: str
+) -> Iterator[Candidate]:
+    """Yield a question on the contents of a receptacle right after an event that can be picked up."""
+    items = can_be_picked_up(history, event.frame, history.contents(event.frame, place))
+    if items is not None:
+        frames = _unchanged_frames(history, event.frame, place)
+        yield from _contents_question(history, FURTHER, asked, frames, place, items)
 
 
-def _unchanged(history: TrajectoryHistory, first: int, place: str) -> range:
-    """The frames from one on during which a receptacle holds the same."""
+def _unchanged_frames(history: TrajectoryHistory, first: int, place: str) -> range:
+    """Return the frames from `first` on during which the contents of a receptacle do not change."""
     inside = history.contents(first, place)
     changed = (frame for frame in range(first, len(history)) if history.contents(frame, place) != inside)
     return range(first, next(changed, len(history)))
 
 
-def _contents(
-    history: TrajectoryHistory, question_type: str, asked: Asked, frames: range, place: str, wanted: frozenset[str]
+def _contents_question(
+    history: TrajectoryHistory,
+    question_type: str,
+    asked: FormAndNames,
+    frames: range,
+    place: str,
+    items: frozenset[str],
 ) -> Iterator[Candidate]:
-    """A question on objects in a receptacle, with the frames that show them there."""
+    """Yield a question on objects in a receptacle, with the frames that show them there."""
     shown = {
-        frame: frozenset(key for key in wanted if history.shows_inside(frame, key))
+        frame: frozenset(key for key in items if history.shows_inside(frame, key))
         for frame in frames
-        if history.shows(frame, place) and not _others(history, frame, place)
+        if history.shows(frame, place) and not _shows_similar_contents(history, frame, place)
     }
-    clues = minimal_cover(wanted, shown, lambda frame, keys: history.clearness(frame, *keys)) if wanted else None
-    types = sorted(_whole_types(history, frames[0], wanted))
+    clues = minimal_cover(items, shown, lambda frame, keys: history.clarity(frame, *keys)) if items else None
+    types = sorted(_whole_types(history, frames[0], items))
     if clues is not None and len(set(types)) == len(types) <= MANY and are_distinguishable(types):
-        place_type = history.world(frames[0])[place].type
+        place_type = history.states(frames[0])[place].type
         answers = tuple(answer_of(item) for item in types)
         yield Candidate(question_type, *asked, clues, answers, (place_type, *types))
 
 
 def _whole_types(history: TrajectoryHistory, frame: int, keys: frozenset[str]) -> list[str]:
-    """The types of objects; of a fresh slice that of what was cut."""
-    world = history.world(frame)
-    cut = {event.target for event in history.events if event.action == "SliceObject" and event.frame == frame}
-    fresh = {key for key in keys for whole in cut if key.startswith(f"{whole}|")}
-    return [world[key].type.removesuffix("Sliced") if key in fresh else world[key].type for key in keys]
+    """Return the types of objects; a slice that was cut at this frame has the type of the whole."""
+    states = history.states(frame)
+    sliced = {event.target for event in history.events if event.action == "SliceObject" and event.frame == frame}
+    fresh = {key for key in keys for whole in sliced if key.startswith(f"{whole}|")}
+    return [states[key].type.removesuffix("Sliced") if key in fresh else states[key].type for key in keys]
 
 
-def _others(history: TrajectoryHistory, frame: int, place: str) -> bool:
-    """Whether a frame shows contents of another receptacle that people would call the same."""
-    world = history.world(frame)
-    object_type = canonical_type(world[place].type)
-    parents = {history.parent(frame, key) for key in history.seen(frame) if key in world} - {None}
+def _shows_similar_contents(history: TrajectoryHistory, frame: int, place: str) -> bool:
+    """Return True if a frame shows contents of another receptacle with the same name."""
+    states = history.states(frame)
+    object_type = canonical_type(states[place].type)
+    parents = {history.parent(frame, key) for key in history.objects_in_frame(frame) if key in states} - {None}
     others = (parent for parent in parents if parent is not None and not is_same_object(parent, place))
-    return any(canonical_type(world[parent].type) == object_type for parent in others)
+    return any(canonical_type(states[parent].type) == object_type for parent in others)

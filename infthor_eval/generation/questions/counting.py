@@ -1,8 +1,8 @@
-"""Movement counting: how often something was moved; and further forms: opened, put somewhere, different things.
+"""Movement counting: how often something was moved; further forms count openings, puts and different objects.
 
-Of every count all occasions are shown, a frame each, so the number of clue frames gives the answer away to who sees
-nothing else. Some of the further questions therefore have frames among their clues that hold no occasion; these are of
-a type of their own.
+The clues of a count are one frame per counted event, so the number of clue frames alone gives the answer away. Some of
+the further questions therefore have additional frames without an event among their clues; these have a type of their
+own.
 """
 
 import random
@@ -19,13 +19,16 @@ __all__ = ["FURTHER", "MIXED", "QUESTION_TYPE", "counts", "further_counts"]
 QUESTION_TYPE = "movement_counting"
 FURTHER = further_type(QUESTION_TYPE)
 MIXED = "movement_counting_mixed"
-_SHARE_MIXED = 0.5
-_MOST_ADDED = 3
+_SHARE_MIXED = 0.5  # of the further questions
+_MAX_ADDED = 3  # frames without an event
 
 
 def counts(history: TrajectoryHistory) -> Iterator[Candidate]:
-    """How often what was picked up more than once, alone of its type, was moved: picked up and put down."""
-    for object_type, items in sorted(history.handled.items()):
+    """Yield the questions on how often an object was moved: picked up more than once, and put down each time.
+
+    It must be the only object of its type that was picked up, or the name would be ambiguous.
+    """
+    for object_type, items in sorted(history.picked_up_by_type.items()):
         item = min(items)
         moves = history.moves_of(item)
         shown = all(history.shows(move.after, move.item, move.target) for move in moves)
@@ -37,51 +40,51 @@ def counts(history: TrajectoryHistory) -> Iterator[Candidate]:
 
 
 def further_counts(history: TrajectoryHistory, rng: random.Random) -> Iterator[Candidate]:
-    """Every other count, some of them mixed with frames that hold no occasion.
+    """Yield all other counts, some of them with additional frames without an event.
 
     Args:
         history: the trajectory.
-        rng: chooses which, and the frames.
+        rng: source of the random choice of questions and frames.
     """
     idle = sorted(set(range(1, len(history))) - {event.frame for event in history.events})
     for candidate in (*_openings(history), *_puts(history), *_items(history)):
         if idle and rng.random() < _SHARE_MIXED:
-            added = rng.sample(idle, min(len(idle), rng.randint(1, _MOST_ADDED)))
+            added = rng.sample(idle, min(len(idle), rng.randint(1, _MAX_ADDED)))
             yield replace(candidate, question_type=MIXED, clues=tuple(sorted({*candidate.clues, *added})))
         else:
             yield candidate
 
 
 def _openings(history: TrajectoryHistory) -> Iterator[Candidate]:
-    """Of every type: "the fridge" where there is one, "a drawer" where there are several."""
+    # By type: "the fridge" if there is one, "a drawer" if there are several.
     by_type: dict[str, list[Event]] = defaultdict(list)
     for event in history.events:
         if event.action == "OpenObject":
             by_type[event.object_type].append(event)
     for object_type, events in sorted(by_type.items()):
         if all(history.shows(event.frame, event.target) for event in events):
-            single = all(history.only_one(event.frame, event.target) for event in events)
+            single = all(history.is_only_one(event.frame, event.target) for event in events)
             name = with_the(object_type) if single else with_article(noun(object_type))
             frames = [event.frame for event in events]
             yield _count(FURTHER, "How many times did you open {}?", (name,), frames, object_type)
 
 
 def _puts(history: TrajectoryHistory) -> Iterator[Candidate]:
-    """Of every receptacle that alone is of its type."""
+    # Only for receptacles that are the only ones of their types.
     by_target: dict[str, list[ObjectMove]] = defaultdict(list)
     for move in history.moves:
         by_target[move.target].append(move)
     for target, moves in sorted(by_target.items()):
         shown = all(history.shows_put(move) for move in moves)
-        if shown and all(history.only_one(move.after, target) for move in moves):
-            place_type = history.world(moves[0].after)[target].type
+        if shown and all(history.is_only_one(move.after, target) for move in moves):
+            place_type = history.states(moves[0].after)[target].type
             frames = [move.after for move in moves]
             form = "How many times did you put something {}?"
             yield _count(FURTHER, form, (in_or_on(place_type),), frames, place_type)
 
 
 def _items(history: TrajectoryHistory) -> Iterator[Candidate]:
-    """Of the different objects, each with the frame in which it is first held."""
+    # The clues are the frames in which each object is held for the first time.
     first: dict[str, int] = {}
     for event in history.events:
         if event.action == "PickupObject":

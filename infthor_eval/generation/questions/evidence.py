@@ -1,4 +1,4 @@
-"""Choosing the frames that together show something, none of them in vain."""
+"""Choosing clue frames that together show some objects, without superfluous ones."""
 
 from collections.abc import Callable, Mapping, Set
 from typing import Any
@@ -7,31 +7,32 @@ __all__ = ["minimal_cover"]
 
 
 def minimal_cover(
-    wanted: Set[str], shown: Mapping[int, Set[str]], clearness: Callable[[int, Set[str]], Any]
+    items: Set[str], shown: Mapping[int, Set[str]], clarity: Callable[[int, Set[str]], Any]
 ) -> tuple[int, ...] | None:
-    """A small set of frames that shows every wanted object, and from which none can be left out.
+    """Return a small set of frames that shows all objects and from which no frame can be removed.
 
     Args:
-        wanted: ids of the objects.
-        shown: frame to the wanted objects that it shows.
-        clearness: how well a frame shows some of them, in any form that can be compared: of frames that show as many,
-            the clearest is taken.
+        items: ids of the objects.
+        shown: the objects that each frame shows.
+        clarity: how well a frame shows some objects, as any comparable value; among frames that show equally many, the
+            clearest is chosen.
 
     Returns:
-        The frames in order; None where no set does.
+        The frames in order, or None if no set of frames shows all objects.
     """
-    missing = set(wanted)
+    # Greedy set cover: minimum covers are NP-hard, and the checker only demands that no clue can be removed.
+    missing = set(items)
     chosen: list[int] = []
     while missing:
         most = max((len(objects & missing) for objects in shown.values()), default=0)
         if not most:
             return None
-        best_ones = [frame for frame in sorted(shown) if len(shown[frame] & missing) == most]
-        best = max(best_ones, key=lambda frame: clearness(frame, shown[frame] & missing))
+        candidates = [frame for frame in sorted(shown) if len(shown[frame] & missing) == most]
+        best = max(candidates, key=lambda frame: clarity(frame, shown[frame] & missing))
         chosen.append(best)
         missing -= shown[best]
     for frame in list(chosen):
         rest = [other for other in chosen if other != frame]
-        if wanted <= set().union(*(shown[other] for other in rest)):
+        if items <= set().union(*(shown[other] for other in rest)):
             chosen = rest
     return tuple(sorted(chosen))

@@ -1,6 +1,6 @@
-"""Questions on a whole set: every rule is applied to every trajectory, and a balanced part of it is chosen.
+"""Generating questions on a whole set: all rules on all trajectories, then a balanced choice of the candidates.
 
-The rules are those of Table 3; our further forms are asked where they are wanted, under question types of their own.
+The rules are those of the paper's Table 3; our further forms are optional and have question types of their own.
 """
 
 import random
@@ -30,21 +30,20 @@ from infthor_eval.workers import WorkerSettings, shared_out
 
 __all__ = ["GeneratedQuestions", "candidates_of", "further_candidates_of", "generate_questions"]
 
-
-_ALONE = WorkerSettings()
-# What a log that is JSON of the right form can still be wrong in.
-_WRONG = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError)
+_ONE_PROCESS = WorkerSettings()
+# Errors of a log that has the documented form but inconsistent content.
+_INCONSISTENT = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError)
 
 
 @dataclass
 class GeneratedQuestions:
-    """What came of it.
+    """The questions on a set.
 
     Attributes:
-        questions: in the order of trajectories, then of their first clue.
-        trajectories: how many were read.
-        skipped: those that could not be, one line each.
-        unconfirmed: questions skipped because the checker did not agree with them.
+        questions: questions in the order of trajectories, then of their first clue.
+        trajectories: number of trajectories that could be read.
+        skipped: trajectories that could not be read, one line each.
+        unconfirmed: questions that were left out because the checker does not confirm them.
     """
 
     questions: list[Question] = field(default_factory=list)
@@ -53,16 +52,16 @@ class GeneratedQuestions:
     unconfirmed: list[Question] = field(default_factory=list)
 
     def by_type(self) -> dict[str, int]:
-        """Number of questions by type."""
+        """Return the number of questions by type."""
         return dict(sorted(Counter(item.question_type or "" for item in self.questions).items()))
 
     def by_clues(self) -> dict[str, int]:
-        """Number of questions by number of clues: 1, 2, >=3, and of absences, which have none."""
-        found = Counter(clue_column(item.n_clues) for item in self.questions)
-        return {name: found[name] for name in ("1", "2", ">=3", ABSENCE)}
+        """Return the number of questions by number of clues: 1, 2, >=3, and of absences, which have none."""
+        counts = Counter(clue_column(item.n_clues) for item in self.questions)
+        return {name: counts[name] for name in ("1", "2", ">=3", ABSENCE)}
 
     def summary_text(self) -> str:
-        """The counts by type and by number of clues, a line each, for people."""
+        """Return the counts by type and by number of clues for people, one line each."""
         types = ", ".join(f"{name} {count}" for name, count in self.by_type().items())
         clues = ", ".join(f"{name}: {count}" for name, count in self.by_clues().items())
         return f"by type: {types}\nby number of clues: {clues}"
@@ -75,54 +74,55 @@ def generate_questions(
     per_trajectory: int = 25,
     share: float = DEFAULT_SHARE,
     further: bool = False,
-    worker_settings: WorkerSettings = _ALONE,
+    worker_settings: WorkerSettings = _ONE_PROCESS,
     say: Callable[[str], None] = lambda _: None,
 ) -> GeneratedQuestions:
-    """Make questions on a replayed set.
+    """Generate questions on a replayed set.
 
     Args:
         folder: the set, with `metadata/<traj_id>/metadata.json`.
-        seed: makes every choice.
-        per_trajectory: how many questions at most on one trajectory.
-        share: of the frame's pixels that an object must fill to count as shown.
-        further: whether to ask our further forms too.
-        worker_settings: how many workers, and where; the questions are the same.
-        say: is told what becomes of workers.
+        seed: seed of all random choices.
+        per_trajectory: maximum number of questions on one trajectory.
+        share: share of the frame's pixels that an object must fill to count as shown.
+        further: True to add our further forms.
+        worker_settings: number and place of the workers; they do not change the questions.
+        say: called with messages about the workers.
 
     Returns:
-        The questions; trajectories whose log cannot be read are named in it.
+        The questions, and the trajectories whose log cannot be read.
 
     Raises:
-        DataError: the set has no trajectory, or is of another version.
+        DataError: the set has no trajectory, or another format version.
     """
-    simulator_of(folder)
-    made = GeneratedQuestions()
+    simulator_of(folder)  # raises for another format version
+    result = GeneratedQuestions()
     types: dict[Path, frozenset[str]] = {}
-    for path in _folders(folder):
+    for path in _trajectory_folders(folder):
         try:
-            types[path] = _history(path, share).all_object_types
+            types[path] = _read_history(path, share).all_object_types
         except DataError as error:
-            made.skipped.append(str(error))
-    made.trajectories = len(types)
+            result.skipped.append(str(error))
+    result.trajectories = len(types)
     vocabulary = frozenset[str]().union(*types.values())
-    asking = [_Asking(path, vocabulary, seed, share, further) for path in types]
-    found = _shared_out(asking, worker_settings, say, made)
+    rule_jobs = [_RuleJob(path, vocabulary, seed, share, further) for path in types]
+    candidates_by_path = _share_out(rule_jobs, worker_settings, say, result)
     chooser = _Chooser()
-    checking = []
-    for path in [path for path in types if path in found]:  # one after the other: what was chosen before counts
-        candidates, rng = found[path]
+    check_jobs = []
+    # Not shared out: the balance depends on what was chosen on all trajectories before.
+    for path in [path for path in types if path in candidates_by_path]:
+        candidates, rng = candidates_by_path[path]
         chosen = chooser.choose(candidates, per_trajectory, rng)
-        checking.append(_Checking(path, tuple(item.question(path.name) for item in chosen), share))
-    sound = _shared_out(checking, worker_settings, say, made)
-    for item in checking:
-        for question, verdict in zip(item.questions, sound.get(item.path, ()), strict=False):
-            (made.questions if verdict else made.unconfirmed).append(question)
-    return made
+        check_jobs.append(_CheckJob(path, tuple(item.question(path.name) for item in chosen), share))
+    soundness = _share_out(check_jobs, worker_settings, say, result)
+    for job in check_jobs:
+        for question, is_sound in zip(job.questions, soundness.get(job.path, ()), strict=False):
+            (result.questions if is_sound else result.unconfirmed).append(question)
+    return result
 
 
 @dataclass(frozen=True)
-class _Asking:
-    """Find all questions on a trajectory."""
+class _RuleJob:
+    """Applies all rules to a trajectory."""
 
     path: Path
     vocabulary: frozenset[str]
@@ -130,9 +130,10 @@ class _Asking:
     share: float
     further: bool
 
-    def do(self) -> tuple[list[Candidate], random.Random]:
-        """The candidates, and what makes the further choices on this trajectory."""
-        history = _history(self.path, self.share)
+    def run(self) -> tuple[list[Candidate], random.Random]:
+        """Return the candidates, and the random stream for the later choices on this trajectory."""
+        history = _read_history(self.path, self.share)
+        # A stream per trajectory, so that its questions do not depend on the order of the jobs.
         rng = random.Random(f"{self.seed}/{history.traj_id}")
         candidates = candidates_of(history, self.vocabulary, rng)
         if self.further:
@@ -141,74 +142,74 @@ class _Asking:
 
 
 @dataclass(frozen=True)
-class _Checking:
-    """Check the questions that were chosen on a trajectory."""
+class _CheckJob:
+    """Checks the chosen questions on a trajectory."""
 
     path: Path
     questions: tuple[Question, ...]
     share: float
 
-    def do(self) -> list[bool]:
-        """Whether the checker agrees with each."""
-        checker = Checker(_history(self.path, self.share).steps, self.share)
+    def run(self) -> list[bool]:
+        """Return True for each sound question."""
+        checker = Checker(_read_history(self.path, self.share).steps, self.share)
         return [checker.verdict(question).sound for question in self.questions]
 
 
-class _Asker:
-    """Does either; see `infthor_eval.workers.Worker`."""
+class _QuestionWorker:
+    """A worker for both kinds of jobs; see `infthor_eval.workers.Worker`."""
 
     greeting = None
 
     def __init__(self, number: int) -> None:
-        """Nothing is needed."""
+        pass
 
-    def do(self, job: _Asking | _Checking) -> Iterator[Any]:
-        yield job.do()
+    def do(self, job: _RuleJob | _CheckJob) -> Iterator[Any]:
+        yield job.run()
 
     def close(self) -> None:
-        """Nothing is held."""
+        pass
 
 
-def _shared_out(
-    jobs: Sequence[_Asking] | Sequence[_Checking],
+def _share_out(
+    jobs: Sequence[_RuleJob] | Sequence[_CheckJob],
     worker_settings: WorkerSettings,
     say: Callable[[str], None],
-    made: GeneratedQuestions,
+    result: GeneratedQuestions,
 ) -> dict[Path, Any]:
-    """What came of the jobs, by trajectory; where worker after worker was lost at one, it is skipped."""
-    found: dict[Path, Any] = {}
-    for number, result in shared_out(_Asker, jobs, worker_settings, say):
-        if isinstance(result, InfthorError):
-            made.skipped.append(f"{jobs[number].path}: {result}")
+    """Return the results of the jobs by trajectory; a trajectory at which several workers were lost is skipped."""
+    results: dict[Path, Any] = {}
+    for number, outcome in shared_out(_QuestionWorker, jobs, worker_settings, say):
+        if isinstance(outcome, InfthorError):
+            result.skipped.append(f"{jobs[number].path}: {outcome}")
         else:
-            found[jobs[number].path] = result
-    return found
+            results[jobs[number].path] = outcome
+    return results
 
 
-def _history(path: Path, share: float) -> TrajectoryHistory:
-    with wrap_errors(f"{path}: its log does not hang together", "replay the trajectory again", catch=_WRONG):
+def _read_history(path: Path, share: float) -> TrajectoryHistory:
+    with wrap_errors(f"{path}: its log is inconsistent", "replay the trajectory again", catch=_INCONSISTENT):
         return TrajectoryHistory(path.name, read_steps(path), share)
 
 
-def _folders(folder: Path) -> list[Path]:
+def _trajectory_folders(folder: Path) -> list[Path]:
     metadata = folder / "metadata"
-    found = sorted(path for path in metadata.glob("*/") if not path.name.startswith(".")) if metadata.is_dir() else []
-    if not found:
-        raise DataError(f"{metadata}: no trajectory there; replay some into this set first")
-    return found
+    folders = sorted(path for path in metadata.glob("*/") if not path.name.startswith(".")) if metadata.is_dir() else []
+    if not folders:
+        raise DataError(f"{metadata}: has no trajectory; replay some into this set first")
+    return folders
 
 
 def candidates_of(history: TrajectoryHistory, vocabulary: frozenset[str], rng: random.Random) -> list[Candidate]:
-    """All questions of Table 3's forms on one trajectory.
+    """Return all questions of Table 3's forms on one trajectory.
 
     Args:
         history: the trajectory.
-        vocabulary: object types of the whole set, for what is asked about in vain.
-        rng: samples the frames of absences.
+        vocabulary: object types of the whole set, for absence questions.
+        rng: source of the sampled frames of absence questions.
     """
     return [
-        *presence.present_types(history),
-        *presence.absent_types(history, vocabulary, rng),
+        *presence.yes_questions(history),
+        *presence.no_questions(history, vocabulary, rng),
         *open_state.open_states(history),
         *location.locations(history),
         *contents.slicings(history),
@@ -221,11 +222,11 @@ def candidates_of(history: TrajectoryHistory, vocabulary: frozenset[str], rng: r
 
 
 def further_candidates_of(history: TrajectoryHistory, rng: random.Random) -> list[Candidate]:
-    """All questions of our further forms on one trajectory.
+    """Return all questions of our further forms on one trajectory.
 
     Args:
         history: the trajectory.
-        rng: samples the frames that counts are mixed with.
+        rng: source of the frames that are added to counting questions.
     """
     return [
         *open_state.further_open_states(history),
@@ -238,7 +239,7 @@ def further_candidates_of(history: TrajectoryHistory, rng: random.Random) -> lis
 
 
 class _Chooser:
-    """Chooses so that types, forms, answers, numbers of clues and what is asked about are even over the whole set."""
+    """Chooses questions so that types, forms, answers, numbers of clues and subjects are balanced over the set."""
 
     def __init__(self) -> None:
         self._types: Counter[str] = Counter()
@@ -248,31 +249,31 @@ class _Chooser:
         self._subjects: Counter[tuple[str, str]] = Counter()
 
     def choose(self, candidates: Iterable[Candidate], number: int, rng: random.Random) -> list[Candidate]:
-        left = list(candidates)
-        rng.shuffle(left)
+        remaining = list(candidates)
+        rng.shuffle(remaining)  # ties are broken by this order
         chosen: list[Candidate] = []
-        # Where little happened, presence questions must not fill the place of all others.
-        room = Counter({_group(item): max(2, number // 5) for item in left})
+        # A limit per group: presence questions, which are always possible, must not fill up quiet trajectories.
+        limits = Counter({_group(item): max(2, number // 5) for item in remaining})
         while len(chosen) < number:
-            open_to = [item for item in left if room[_group(item)] and not self._gives_away(item)]
-            if not open_to:
+            eligible = [item for item in remaining if limits[_group(item)] and not self._is_unbalanced(item)]
+            if not eligible:
                 break
-            best = min(open_to, key=self._use)
-            left.remove(best)
-            room[_group(best)] -= 1
+            best = min(eligible, key=self._use)
+            remaining.remove(best)
+            limits[_group(best)] -= 1
             chosen.append(best)
-            self._note(best)
+            self._count(best)
         return sorted(chosen, key=lambda item: (item.clues, item.text))
 
-    def _gives_away(self, item: Candidate) -> bool:
-        """Whether an answer would become the one to guess from the question's form alone."""
+    def _is_unbalanced(self, item: Candidate) -> bool:
+        """Return True if the answer is already more frequent than all other answers to the form together."""
         if not item.is_closed:
             return False
         same = self._answers[item.form, str(item.answers[0])]
         others = sum(count for (form, _), count in self._answers.items() if form == item.form) - same
         return same > others
 
-    def _note(self, item: Candidate) -> None:
+    def _count(self, item: Candidate) -> None:
         group = _group(item)
         self._types[item.question_type] += 1
         self._groups[group] += 1
@@ -288,10 +289,9 @@ class _Chooser:
 
 
 def _group(item: Candidate) -> str:
-    """What is to be even within a question type: yes, no, and the rest."""
+    """Return the group that is balanced within a question type: yes, no, or other answers."""
     return f"{item.question_type} {item.answers[0]}" if item.answers[0] in {"yes", "no"} else item.question_type
 
 
 def _clue_class(item: Candidate) -> int:
-    """1, 2, or 3 for more."""
     return min(len(item.clues), 3)

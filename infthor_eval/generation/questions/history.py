@@ -1,4 +1,4 @@
-"""What happened in a trajectory and what its frames show, read from the step log."""
+"""The events of a trajectory and the contents of its frames, read from the step log."""
 
 from collections import Counter
 from collections.abc import Iterable, Iterator
@@ -14,21 +14,21 @@ __all__ = ["DEFAULT_SHARE", "FRAME_PIXELS", "Event", "ObjectMove", "TrajectoryHi
 
 _SIDE = 300
 FRAME_PIXELS = _SIDE * _SIDE
-_MARGIN = 15  # pixels between an object and the frame's edge from which on it is well inside
-DEFAULT_SHARE = 0.001  # of the frame: 90 pixels, about a fork on a table an arm's length away
+_MARGIN = 15  # distance from the frame's edge from which on an object is well inside, pixels
+DEFAULT_SHARE = 0.001  # of the frame: 90 pixels, about a fork on a table at arm's length
 
 
 @dataclass(frozen=True)
 class ObjectMove:
-    """An object was picked up and put somewhere.
+    """A pick-up of an object, and the next put of it.
 
     Attributes:
-        item: its id.
-        object_type: its type.
-        origin: id of what it was in or on; None where that is not clear.
-        before: the frame before it was picked up.
-        target: id of what it was put into or onto.
-        after: the frame after it was put.
+        item: id of the object.
+        object_type: type of the object.
+        origin: id of the receptacle it was in or on; None if that is ambiguous.
+        before: frame before the pick-up.
+        target: id of the receptacle it was put into or onto.
+        after: frame after the put.
     """
 
     item: str
@@ -41,13 +41,13 @@ class ObjectMove:
 
 @dataclass(frozen=True)
 class Event:
-    """An action on an object that was carried out.
+    """A successful action on an object.
 
     Attributes:
-        frame: the frame after it.
-        action: its name.
+        frame: frame after the action.
+        action: name of the action.
         target: id of the object acted on.
-        object_type: its type.
+        object_type: type of the object.
         receptacle: id of the receptacle, for PutObject.
     """
 
@@ -62,96 +62,95 @@ class TrajectoryHistory:
     """The log of one trajectory, for question rules.
 
     Attributes:
-        traj_id: the trajectory's folder.
+        traj_id: name of the trajectory's folder.
         steps: the log.
-        least: number of pixels from which on an object counts as shown.
+        min_pixels: minimum size of an object that counts as shown, pixels.
     """
 
     def __init__(self, traj_id: str, steps: list[Step], share: float = DEFAULT_SHARE) -> None:
         """Read a log.
 
         Args:
-            traj_id: the trajectory's folder.
+            traj_id: name of the trajectory's folder.
             steps: the log, with the fields that a replay adds.
-            share: of the frame's pixels that an object must fill to count as shown.
+            share: share of the frame's pixels that an object must fill to count as shown.
 
         Raises:
-            DataError: the log is empty or lacks what questions are made from.
+            DataError: the log is empty, or lacks the fields that questions are generated from.
         """
         if not steps or any(step.seen is None for step in steps):
             raise DataError(f"{traj_id}: the log does not say what the frames show; replay the trajectory again")
         self.traj_id = traj_id
         self.steps = steps
-        self.least = share * FRAME_PIXELS
-        self._worlds = list(_snapshots(steps))
+        self.min_pixels = share * FRAME_PIXELS
+        self._states = list(_snapshots(steps))
 
     def __len__(self) -> int:
         return len(self.steps)
 
-    def world(self, frame: int) -> dict[str, ObjectState]:
-        """The true state of every object at a frame, by id."""
-        return self._worlds[frame]
+    def states(self, frame: int) -> dict[str, ObjectState]:
+        """Return the true states of all objects at a frame, by id."""
+        return self._states[frame]
 
-    def seen(self, frame: int) -> dict[str, ObjectInFrame]:
-        """What a frame shows, by id."""
+    def objects_in_frame(self, frame: int) -> dict[str, ObjectInFrame]:
+        """Return the objects in a frame, by id."""
         return self.steps[frame].seen or {}
 
     def shows(self, frame: int, *ids: str) -> bool:
-        """Whether a frame shows all these objects large enough."""
-        seen = self.seen(frame)
-        return all(key in seen and seen[key].pixels >= self.least for key in ids)
+        """Return True if a frame shows all these objects large enough."""
+        seen = self.objects_in_frame(frame)
+        return all(key in seen and seen[key].pixels >= self.min_pixels for key in ids)
 
-    def clearness(self, frame: int, *ids: str) -> tuple[bool, int]:
-        """How well a frame shows some of the objects that it shows: well inside it at best, then large."""
-        seen = [self.seen(frame)[key] for key in ids]
+    def clarity(self, frame: int, *ids: str) -> tuple[bool, int]:
+        """Return how well a frame shows some objects, to compare: if all are well inside, then the smallest size."""
+        seen = [self.objects_in_frame(frame)[key] for key in ids]
         inside = all(_MARGIN <= edge < _SIDE - _MARGIN for item in seen for edge in item.box)
         return inside, min((item.pixels for item in seen), default=0)
 
     def clearest(self, frames: Iterable[int], *ids: str) -> int | None:
-        """Of the frames that show all these objects the one that does so best, the earliest of equals."""
+        """Return the frame that shows all these objects best, the earliest of equals, or None if none shows them."""
         shown = [frame for frame in frames if self.shows(frame, *ids)]
-        return max(shown, key=lambda frame: self.clearness(frame, *ids), default=None)
+        return max(shown, key=lambda frame: self.clarity(frame, *ids), default=None)
 
     def shows_put(self, move: ObjectMove) -> bool:
-        """Whether the frame after a move shows the object where it was put."""
+        """Return True if the frame after a move shows the object where it was put."""
         shown = self.shows(move.after, move.item, move.target)
         return shown and self.parent(move.after, move.item) == move.target
 
     def shows_slices(self, frame: int, whole: str) -> bool:
-        """Whether a frame shows a slice of an object."""
-        world = self.world(frame)
-        slices = (key for key in world if key.startswith(f"{whole}|") and world[key].type.endswith("Sliced"))
+        """Return True if a frame shows a slice of an object."""
+        states = self.states(frame)
+        slices = (key for key in states if key.startswith(f"{whole}|") and states[key].type.endswith("Sliced"))
         return any(self.shows(frame, key) for key in slices)
 
     def parent(self, frame: int, item: str) -> str | None:
-        """What an object is directly in or on at a frame; None where it is held, lies on the floor, or it is not
-        clear."""
-        world = self.world(frame)
-        return logged_parent(world[item], world) if item in world else None
+        """Return the id of what an object is directly in or on, or None if it is held, on the floor, or ambiguous."""
+        states = self.states(frame)
+        return logged_parent(states[item], states) if item in states else None
 
     @cached_property
     def all_object_types(self) -> frozenset[str]:
-        """The types that exist at any time."""
+        """Types of all objects that ever exist."""
         return frozenset(canonical_type(state.type) for step in self.steps for state in step.changes.values())
 
     @cached_property
     def has_rooms(self) -> bool:
-        """Whether the scene is of several rooms, each of which has a floor of its own."""
-        return sum(state.type == "Floor" for state in self.world(0).values()) > 1
+        """True if the scene has several rooms; each has a floor object."""
+        return sum(state.type == "Floor" for state in self.states(0).values()) > 1
 
     @cached_property
-    def types_told(self) -> frozenset[str]:
-        """The types that the simulator calls visible at any time, so that the log tells what they are."""
+    def reported_types(self) -> frozenset[str]:
+        """Types that the log ever reports as visible, so that it also tells whether they can be picked up."""
         return frozenset(name for step in self.steps for name in step.object_log.visible)
 
     @cached_property
-    def types_picked_up(self) -> frozenset[str]:
-        """Those of them that can be picked up."""
+    def pickupable_types(self) -> frozenset[str]:
+        """Types that the log reports as objects that can be picked up."""
         return frozenset(name for step in self.steps for name in step.object_log.pickupable)
 
     @cached_property
     def events(self) -> tuple[Event, ...]:
-        """The actions on objects that were carried out, in order."""
+        """Successful actions on objects, in order."""
         return tuple(
             Event(frame, step.action.partition(" ")[0], step.target, self._type_of(frame, step.target), step.receptacle)
             for frame, step in enumerate(self.steps)
@@ -160,8 +159,8 @@ class TrajectoryHistory:
 
     @cached_property
     def moves(self) -> tuple[ObjectMove, ...]:
-        """Every time that an object was picked up and put down, in order."""
-        found: list[ObjectMove] = []
+        """All pick-ups that were followed by a put, in order of the puts."""
+        moves: list[ObjectMove] = []
         picked: dict[str, int] = {}
         for event in self.events:
             if event.action == "PickupObject":
@@ -169,73 +168,73 @@ class TrajectoryHistory:
             elif event.action == "PutObject" and event.receptacle is not None and event.target in picked:
                 before = picked.pop(event.target)
                 origin = self.parent(before, event.target)
-                found.append(ObjectMove(event.target, event.object_type, origin, before, event.receptacle, event.frame))
-        return tuple(found)
+                moves.append(ObjectMove(event.target, event.object_type, origin, before, event.receptacle, event.frame))
+        return tuple(moves)
 
     def moves_of(self, item: str) -> tuple[ObjectMove, ...]:
-        """The moves of one object."""
+        """Return the moves of one object."""
         return tuple(move for move in self.moves if move.item == item)
 
     @cached_property
     def pickups(self) -> Counter[str]:
-        """How often each object was picked up, by id."""
+        """Number of pick-ups of each object, by id."""
         return Counter(event.target for event in self.events if event.action == "PickupObject")
 
     @cached_property
-    def handled(self) -> dict[str, set[str]]:
-        """The objects that were picked up, by type."""
-        found: dict[str, set[str]] = {}
+    def picked_up_by_type(self) -> dict[str, set[str]]:
+        """Ids of the objects that were picked up, by type."""
+        by_type: dict[str, set[str]] = {}
         for event in self.events:
             if event.action == "PickupObject":
-                found.setdefault(event.object_type, set()).add(event.target)
-        return found
+                by_type.setdefault(event.object_type, set()).add(event.target)
+        return by_type
 
-    def alone(self, frame: int, item: str) -> bool:
-        """Whether a frame shows no other object that people would call the same, however small."""
+    def is_alone_in_frame(self, frame: int, item: str) -> bool:
+        """Return True if a frame shows no other object with the same name, not even a small one."""
         object_type = canonical_type(self._type_of(frame, item))
-        world = self.world(frame)
-        others = (key for key in self.seen(frame) if key != item and key in world)
+        states = self.states(frame)
+        others = (key for key in self.objects_in_frame(frame) if key != item and key in states)
         return not any(
-            canonical_type(world[key].type) == object_type and not is_same_object(key, item) for key in others
+            canonical_type(states[key].type) == object_type and not is_same_object(key, item) for key in others
         )
 
-    def only_one(self, frame: int, item: str) -> bool:
-        """Whether the scene has no other object that people would call the same."""
-        world = self.world(frame)
-        object_type = canonical_type(world[item].type)
+    def is_only_one(self, frame: int, item: str) -> bool:
+        """Return True if the scene has no other object with the same name."""
+        states = self.states(frame)
+        object_type = canonical_type(states[item].type)
         return not any(
-            canonical_type(state.type) == object_type and not is_same_object(key, item) for key, state in world.items()
+            canonical_type(state.type) == object_type and not is_same_object(key, item) for key, state in states.items()
         )
 
     def contents(self, frame: int, receptacle: str) -> frozenset[str]:
-        """The objects directly in or on a receptacle."""
-        return frozenset(key for key in self.world(frame) if self.is_inside(frame, key, receptacle))
+        """Return the ids of the objects directly in or on a receptacle."""
+        return frozenset(key for key in self.states(frame) if self.is_inside(frame, key, receptacle))
 
     def is_inside(self, frame: int, item: str, receptacle: str) -> bool:
-        """Whether an object is directly in or on a receptacle; a sink and its basin are one to people."""
+        """Return True if an object is directly in or on a receptacle; a sink and its basin count as one."""
         parent = self.parent(frame, item)
         return parent is not None and is_same_object(parent, receptacle)
 
     def shows_inside(self, frame: int, item: str) -> bool:
-        """Whether a frame shows an object and what it is directly in or on."""
+        """Return True if a frame shows an object and what it is directly in or on."""
         parent = self.parent(frame, item)
         return parent is not None and self.shows(frame, item, parent)
 
     def _type_of(self, frame: int, item: str) -> str:
-        """The type of an object; one that the action used up was there the frame before."""
-        state = self.world(frame).get(item) or self.world(frame - 1)[item]
+        """Return the type of an object; one that the action consumed is looked up in the frame before."""
+        state = self.states(frame).get(item) or self.states(frame - 1)[item]
         return state.type
 
 
 def is_same_object(one: str, other: str) -> bool:
-    """Whether two ids mean one thing, or one of them a part of the other, as a basin is of its sink."""
+    """Return True if two ids are equal, or one is a part of the other, as a basin of its sink."""
     return one == other or one.startswith(f"{other}|") or other.startswith(f"{one}|")
 
 
 def _snapshots(steps: list[Step]) -> Iterator[dict[str, ObjectState]]:
-    """The worlds of a log; equal neighbours share one dict."""
+    """Yield the states at each step of a log; successive steps without a change share one dict, to save memory."""
     last: dict[str, ObjectState] = {}
-    for step, world in zip(steps, iter_object_states(steps), strict=True):
+    for step, states in zip(steps, iter_object_states(steps), strict=True):
         if step.changes or not last:
-            last = {key: state for key, state in world.items() if state.exists}
+            last = {key: state for key, state in states.items() if state.exists}
         yield last

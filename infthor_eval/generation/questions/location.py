@@ -1,6 +1,6 @@
-"""Object location tracing: where something was, where it was moved, where it is now.
+"""Object location tracing: where an object was, where it was moved, and where it is now.
 
-Which pick-up or put is meant must be clear: what was picked up twice has no "before you picked it up".
+It must be clear which pick-up or put is meant: "before you picked it up" is ambiguous for an object picked up twice.
 """
 
 from collections.abc import Iterator, Sequence
@@ -22,30 +22,30 @@ FURTHER = further_type(QUESTION_TYPE)
 
 
 def locations(history: TrajectoryHistory) -> Iterator[Candidate]:
-    """Questions on every object that alone of its type was handled."""
-    for object_type, moves in _traced(history):
+    """Yield questions on every object that is the only one of its type that was picked up."""
+    for object_type, moves in _moves_by_type(history):
         yield from _before_put(history, object_type, moves)
         yield from _moved_from(history, object_type, moves)
         yield from _now(history, object_type, moves)
 
 
 def further_locations(history: TrajectoryHistory) -> Iterator[Candidate]:
-    """Further questions on the same objects."""
-    for object_type, moves in _traced(history):
+    """Yield further questions on the same objects."""
+    for object_type, moves in _moves_by_type(history):
         yield from _origin(history, object_type, moves)
         yield from _destination(history, object_type, moves)
         yield from _journey(history, object_type, moves)
 
 
-def _traced(history: TrajectoryHistory) -> Iterator[tuple[str, tuple[ObjectMove, ...]]]:
-    for object_type, items in sorted(history.handled.items()):
+def _moves_by_type(history: TrajectoryHistory) -> Iterator[tuple[str, tuple[ObjectMove, ...]]]:
+    for object_type, items in sorted(history.picked_up_by_type.items()):
         moves = history.moves_of(next(iter(items))) if len(items) == 1 else ()
         if moves:
             yield object_type, moves
 
 
 def _before_put(history: TrajectoryHistory, object_type: str, moves: tuple[ObjectMove, ...]) -> Iterator[Candidate]:
-    """Of the first move, where nothing else led to such a container: it then was in one place before."""
+    # Only for the first move, and only if no other leads to such a container: then there is one place before it.
     move = moves[0]
     to = _end(history, move)
     once = [_end(history, other) for other in moves].count(to) == 1
@@ -55,7 +55,7 @@ def _before_put(history: TrajectoryHistory, object_type: str, moves: tuple[Objec
 
 
 def _moved_from(history: TrajectoryHistory, object_type: str, moves: tuple[ObjectMove, ...]) -> Iterator[Candidate]:
-    """Of the last move, where no other began at such a container: it then was in one place after."""
+    # Only for the last move, and only if no other starts at such a container: then there is one place after it.
     move = moves[-1]
     if not _left(history, move) or not history.shows_put(move) or not _is_down(history, move):
         return
@@ -68,9 +68,9 @@ def _moved_from(history: TrajectoryHistory, object_type: str, moves: tuple[Objec
 
 def _now(history: TrajectoryHistory, object_type: str, moves: tuple[ObjectMove, ...]) -> Iterator[Candidate]:
     move, last = moves[-1], len(history) - 1
-    alone = move.item in history.world(last) and history.only_one(last, move.item)
+    alone = move.item in history.states(last) and history.is_only_one(last, move.item)
     if alone and history.shows_put(move) and _is_down(history, move):
-        place = history.world(last)[move.target].type
+        place = history.states(last)[move.target].type
         yield _candidate(QUESTION_TYPE, "Where is {} now?", (move.after,), [place], object_type)
 
 
@@ -99,30 +99,30 @@ def _journey(history: TrajectoryHistory, object_type: str, moves: tuple[ObjectMo
 
 
 def _start(history: TrajectoryHistory, move: ObjectMove) -> str | None:
-    """The type of what an object was in or on before a move."""
-    return None if move.origin is None else history.world(move.before)[move.origin].type
+    """Return the type of what an object was in or on before a move."""
+    return None if move.origin is None else history.states(move.before)[move.origin].type
 
 
 def _end(history: TrajectoryHistory, move: ObjectMove) -> str:
-    """The type of what an object was put into or onto."""
-    return history.world(move.after)[move.target].type
+    """Return the type of what an object was put into or onto."""
+    return history.states(move.after)[move.target].type
 
 
 def _changes(history: TrajectoryHistory, move: ObjectMove) -> bool:
-    """Whether a move led to another type of receptacle: else the question would hold the answer."""
+    """Return True if a move led to another type of receptacle; otherwise the question would contain the answer."""
     start = _start(history, move)
     return start is not None and canonical_type(start) != canonical_type(_end(history, move))
 
 
 def _is_down(history: TrajectoryHistory, move: ObjectMove) -> bool:
-    """Whether an object is still where its last move put it."""
+    """Return True if an object is still where its last move put it."""
     return history.parent(len(history) - 1, move.item) == move.target
 
 
 def _left(history: TrajectoryHistory, move: ObjectMove) -> bool:
-    """Whether the frame before the pick-up shows the object, and no other of its type, where it was."""
+    """Return True if the frame before the pick-up shows the object where it was, and no other of its type."""
     shown = move.origin is not None and history.shows(move.before, move.item, move.origin)
-    return shown and history.alone(move.before, move.item)
+    return shown and history.is_alone_in_frame(move.before, move.item)
 
 
 def _candidate(
@@ -133,7 +133,7 @@ def _candidate(
     object_type: str,
     named: str | None = None,
 ) -> Candidate:
-    """A question on an object, and on a place where the form names one."""
+    """Return a question on an object, and on a place if the form names one."""
     types = [place for place in places if place is not None]
     names = [object_type] if named is None else [object_type, named]
     answers = tuple(map(answer_of, types))

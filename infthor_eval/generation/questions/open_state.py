@@ -1,4 +1,4 @@
-"""Open state: "Was the fridge open?" (at any time), and further forms: open when, open now, what was opened."""
+"""Open state: "Was the fridge open?" (at any time); further forms: open when, open now, what was opened."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -16,11 +16,11 @@ _ASKED_AT = {"PickupObject", "PutObject", "SliceObject", "ToggleObjectOn"}
 
 
 def open_states(history: TrajectoryHistory) -> Iterator[Candidate]:
-    """Whether a container that is the only one of its type was ever open: no where the log never has it open."""
+    """Yield questions on whether a container that is the only one of its type was ever open."""
     frames = range(len(history))
     for key in _singles(history):
-        open_at = [frame for frame in frames if key in history.world(frame) and history.world(frame)[key].is_open]
-        object_type = history.world(len(history) - 1)[key].type
+        open_at = [frame for frame in frames if key in history.states(frame) and history.states(frame)[key].is_open]
+        object_type = history.states(len(history) - 1)[key].type
         frame = history.clearest(open_at or frames, key)
         if object_type in _CONTAINERS and frame is not None:
             answer = "yes" if open_at else "no"
@@ -30,47 +30,47 @@ def open_states(history: TrajectoryHistory) -> Iterator[Candidate]:
 
 
 def further_open_states(history: TrajectoryHistory) -> Iterator[Candidate]:
-    """Questions on when what is the only one of its type was open, and on all that was opened."""
+    """Yield questions on when an object that is the only one of its type was open, and on all that was opened."""
     phrases = Counter(_phrase(history, event) for event in history.events)
     for key in _singles(history):
         yield from _now(history, key)
         for event in history.events:
-            told = _phrase(history, event)
-            about = key in {event.target, event.receptacle}
-            if event.action in _ASKED_AT and phrases[told] == 1 and not about:
-                yield from _then(history, key, event, told)
-    yield from _opened(history)
+            phrase = _phrase(history, event)
+            involved = key in {event.target, event.receptacle}  # then the action itself tells whether it was open
+            if event.action in _ASKED_AT and phrases[phrase] == 1 and not involved:
+                yield from _then(history, key, event, phrase)
+    yield from _all_opened(history)
 
 
 def _singles(history: TrajectoryHistory) -> list[str]:
-    """What can be opened and is the only one of its type."""
+    """Return the ids of the objects that can be opened and are the only ones of their types."""
     last = len(history) - 1
     return sorted(
         key
-        for key, state in history.world(last).items()
-        if state.is_open is not None and state.type not in _UNASKED and history.only_one(last, key)
+        for key, state in history.states(last).items()
+        if state.is_open is not None and state.type not in _UNASKED and history.is_only_one(last, key)
     )
 
 
 def _phrase(history: TrajectoryHistory, event: Event) -> str:
-    """What the agent did, as the end of a "when you ..." """
+    """Return an action as the end of a clause "when you ..."."""
     if event.action == "PutObject" and event.receptacle is not None:
-        place_type = history.world(event.frame)[event.receptacle].type
+        place_type = history.states(event.frame)[event.receptacle].type
         return f"put {with_the(event.object_type)} {in_or_on(place_type)}"
     verbs = {"PickupObject": "picked up", "SliceObject": "sliced", "ToggleObjectOn": "turned on"}
     return f"{verbs.get(event.action, event.action)} {with_the(event.object_type)}"
 
 
-def _then(history: TrajectoryHistory, key: str, event: Event, told: str) -> Iterator[Candidate]:
-    world = history.world(event.frame)
-    if key in world and history.shows(event.frame, key) and _shows_event(history, event):
-        answer = "yes" if world[key].is_open else "no"
-        names, subjects = (with_the(world[key].type), told), (world[key].type, event.object_type)
+def _then(history: TrajectoryHistory, key: str, event: Event, phrase: str) -> Iterator[Candidate]:
+    states = history.states(event.frame)
+    if key in states and history.shows(event.frame, key) and _shows_event(history, event):
+        answer = "yes" if states[key].is_open else "no"
+        names, subjects = (with_the(states[key].type), phrase), (states[key].type, event.object_type)
         yield Candidate(FURTHER, "Was {} open when you {}?", names, (event.frame,), (answer,), subjects)
 
 
 def _shows_event(history: TrajectoryHistory, event: Event) -> bool:
-    """Whether the frame after it shows what was done."""
+    """Return True if the frame after an event shows its result."""
     if event.action == "SliceObject":
         return history.shows_slices(event.frame, event.target)
     if event.receptacle is None:
@@ -81,7 +81,7 @@ def _shows_event(history: TrajectoryHistory, event: Event) -> bool:
 
 def _now(history: TrajectoryHistory, key: str) -> Iterator[Candidate]:
     last = len(history) - 1
-    state = history.world(last)[key]
+    state = history.states(last)[key]
     changed = next((frame for frame in range(last, -1, -1) if _is_open(history, frame, key) != state.is_open), -1)
     frame = history.clearest(range(changed + 1, last + 1), key)
     if frame is not None:
@@ -90,12 +90,11 @@ def _now(history: TrajectoryHistory, key: str) -> Iterator[Candidate]:
 
 
 def _is_open(history: TrajectoryHistory, frame: int, key: str) -> bool | None:
-    state = history.world(frame).get(key)
+    state = history.states(frame).get(key)
     return None if state is None else state.is_open
 
 
-def _opened(history: TrajectoryHistory) -> Iterator[Candidate]:
-    """Everything that was opened."""
+def _all_opened(history: TrajectoryHistory) -> Iterator[Candidate]:
     yield from listing_question(
         FURTHER,
         "What did you open?",

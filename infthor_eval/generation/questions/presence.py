@@ -1,12 +1,12 @@
 """Object presence: "Is there any mug in this room?", "Have you seen a mug?"
 
-A yes-question carries the frame of the first sighting. A no-question names a type that nowhere exists in the
-trajectory's scene and is not easily taken for one that does: one that other trajectories of the set have, so that its
-name does not give the answer away, and where there are few of these, another of AI2-THOR's. No frame proves an absence,
-so it carries a sampled frame instead of evidence: one, as a yes-question has one, because else the number of frames
-would give the answer away.
+The clue of a yes-question is the first frame that shows such an object. A no-question names a type that the scene does
+not have and that is not easily mistaken for one that it has. The type is one of other trajectories in the set, so that
+its name does not give the answer away, or another of AI2-THOR's if there are few of these. No frame is evidence for an
+absence, so its clue is a sampled frame. It has one, like a yes-question, or the number of frames would give the answer
+away.
 
-In a house of several rooms nobody could say which one "this room" is, and only the second form is asked.
+In a house of several rooms "this room" would be ambiguous, so only the second form is used.
 """
 
 import random
@@ -16,13 +16,13 @@ from infthor_eval.generation.questions.candidates import Candidate
 from infthor_eval.generation.questions.history import TrajectoryHistory
 from infthor_eval.household.wording import noun, with_article
 
-__all__ = ["QUESTION_TYPE", "absent_types", "present_types"]
+__all__ = ["QUESTION_TYPE", "no_questions", "yes_questions"]
 
 QUESTION_TYPE = "object_presence"
-_FEW = 8  # types of other trajectories below which AI2-THOR's join them
-_BUSY = 3  # objects that a sampled frame shows at least, where the trajectory has such frames
+_FEW = 8  # with fewer types of other trajectories, AI2-THOR's are added
+_BUSY = 3  # minimum number of objects in a sampled frame, if the trajectory has such frames
 
-# Not asked about: surroundings, parts, and what people would not call by that name.
+# Never in questions: structures, parts, and types that people would not call by these names.
 _UNASKED = frozenset(
     {"Floor", "Wall", "Ceiling", "Window", "Door", "Doorway", "DoorFrame", "StoveBurner", "StoveKnob", "LightSwitch"}
     | {"Faucet", "ShowerHead", "ShowerGlass", "ShowerDoor", "Undefined", "Shelf", "ShelvingUnit", "Stool", "Curtains"}
@@ -39,7 +39,7 @@ _COMMON = frozenset(
     | {"TissueBox", "Toaster", "Toilet", "ToiletPaper", "Tomato", "Towel", "TVStand", "VacuumCleaner", "Vase", "Watch"}
     | {"WateringCan", "WineBottle"}
 )
-_TAKEN_FOR_EACH_OTHER = (
+_SIMILAR_TYPES = (
     {"Cup", "Mug", "Bowl", "Vase"},
     {"Pen", "Pencil"},
     {"Knife", "ButterKnife", "Fork", "Spoon", "Spatula", "Ladle"},
@@ -62,53 +62,53 @@ _TAKEN_FOR_EACH_OTHER = (
 )
 
 
-def present_types(history: TrajectoryHistory) -> Iterator[Candidate]:
-    """Yes-questions, each with the first frame that shows such an object."""
+def yes_questions(history: TrajectoryHistory) -> Iterator[Candidate]:
+    """Yield the yes-questions, each with the first frame that shows such an object."""
     first: dict[str, int] = {}
     for frame in range(len(history)):
-        world = history.world(frame)
-        for key in history.seen(frame):
-            if key in world and history.shows(frame, key):
-                first.setdefault(world[key].type, frame)
+        states = history.states(frame)
+        for key in history.objects_in_frame(frame):
+            if key in states and history.shows(frame, key):
+                first.setdefault(states[key].type, frame)
     for object_type, frame in sorted(first.items()):
-        if _asked(object_type):
-            yield from _asking(history, object_type, frame, "yes")
+        if _is_nameable(object_type):
+            yield from _all_forms(history, object_type, frame, "yes")
 
 
-def absent_types(history: TrajectoryHistory, vocabulary: frozenset[str], rng: random.Random) -> Iterator[Candidate]:
-    """No-questions on types that the scene does not have.
+def no_questions(history: TrajectoryHistory, vocabulary: frozenset[str], rng: random.Random) -> Iterator[Candidate]:
+    """Yield no-questions on types that the scene does not have.
 
     Args:
         history: the trajectory.
-        vocabulary: types of the whole set.
-        rng: samples the frames.
+        vocabulary: object types of the whole set.
+        rng: source of the sampled frames.
     """
-    frames = [frame for frame in range(len(history)) if _shown(history, frame) >= _BUSY] or [0]
-    types = _missing(history, vocabulary)
+    frames = [frame for frame in range(len(history)) if _n_shown(history, frame) >= _BUSY] or [0]
+    types = _absent_types(history, vocabulary)
     if len(types) < _FEW:
-        types |= _missing(history, _COMMON)
+        types |= _absent_types(history, _COMMON)
     for object_type in sorted(types):
         frame = rng.choice(frames)
-        yield from _asking(history, object_type, frame, "no")
+        yield from _all_forms(history, object_type, frame, "no")
 
 
-def _asking(history: TrajectoryHistory, object_type: str, frame: int, answer: str) -> Iterator[Candidate]:
-    """The forms that suit the scene."""
+def _all_forms(history: TrajectoryHistory, object_type: str, frame: int, answer: str) -> Iterator[Candidate]:
+    """Yield the question in the forms that suit the scene."""
     words = noun(object_type)
-    of_a_room = () if history.has_rooms else (("Is there any {} in this room?", words),)
-    for form, name in (*of_a_room, ("Have you seen {}?", with_article(words))):
+    room_form = () if history.has_rooms else (("Is there any {} in this room?", words),)
+    for form, name in (*room_form, ("Have you seen {}?", with_article(words))):
         yield Candidate(QUESTION_TYPE, form, (name,), (frame,), (answer,), (object_type,), absence=answer == "no")
 
 
-def _missing(history: TrajectoryHistory, vocabulary: frozenset[str]) -> set[str]:
-    there = history.all_object_types
-    alike = set().union(*(group for group in _TAKEN_FOR_EACH_OTHER if group & there))
-    return {object_type for object_type in vocabulary - there - alike if _asked(object_type)}
+def _absent_types(history: TrajectoryHistory, vocabulary: frozenset[str]) -> set[str]:
+    existing = history.all_object_types
+    similar = set().union(*(group for group in _SIMILAR_TYPES if group & existing))
+    return {object_type for object_type in vocabulary - existing - similar if _is_nameable(object_type)}
 
 
-def _shown(history: TrajectoryHistory, frame: int) -> int:
-    return sum(seen.pixels >= history.least for seen in history.seen(frame).values())
+def _n_shown(history: TrajectoryHistory, frame: int) -> int:
+    return sum(seen.pixels >= history.min_pixels for seen in history.objects_in_frame(frame).values())
 
 
-def _asked(object_type: str) -> bool:
+def _is_nameable(object_type: str) -> bool:
     return object_type not in _UNASKED and not object_type.endswith(("Basin", "Sliced", "Cracked"))

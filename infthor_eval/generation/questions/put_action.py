@@ -1,6 +1,6 @@
-"""Put action: "What object did you put in the fridge?", and further forms on several puts.
+"""Put action: "What object did you put in the fridge?"; further forms ask about several puts.
 
-Table 3's form has two clues that follow each other: the object in the hand, and the object where it was put.
+Table 3's form has two successive frames as clues: the object in the hand, and the object where it was put.
 """
 
 from collections.abc import Iterator, Sequence
@@ -23,7 +23,7 @@ FURTHER = further_type(QUESTION_TYPE)
 
 
 def puts(history: TrajectoryHistory) -> Iterator[Candidate]:
-    """What was put into a container, where it was one put into one of its type."""
+    """Yield the questions on what was put into a container, if there was only one put into any of its type."""
     for place_type, moves in sorted(_by_type(history).items()):
         (move, *others) = moves
         before = move.after - 1
@@ -36,7 +36,7 @@ def puts(history: TrajectoryHistory) -> Iterator[Candidate]:
 
 
 def further_puts(history: TrajectoryHistory) -> Iterator[Candidate]:
-    """All that was put into one receptacle, where that were several things, and one question on all puts."""
+    """Yield questions on all objects put into one receptacle, if they are several, and on all puts."""
     for place_type, moves in sorted(_by_type(history).items()):
         if len(moves) > 1 and len({move.target for move in moves}) == 1:
             yield from _what(history, "What did you put {}?", (place_type,), moves)
@@ -45,17 +45,17 @@ def further_puts(history: TrajectoryHistory) -> Iterator[Candidate]:
 
 
 def _by_type(history: TrajectoryHistory) -> dict[str, list[ObjectMove]]:
-    """The moves by the type of receptacle that they end in."""
-    found: dict[str, list[ObjectMove]] = {}
+    """Return the moves by the type of their target receptacle."""
+    by_type: dict[str, list[ObjectMove]] = {}
     for move in history.moves:
-        found.setdefault(history.world(move.after)[move.target].type, []).append(move)
-    return found
+        by_type.setdefault(history.states(move.after)[move.target].type, []).append(move)
+    return by_type
 
 
 def _what(
     history: TrajectoryHistory, form: str, places: tuple[str, ...], moves: Sequence[ObjectMove]
 ) -> Iterator[Candidate]:
-    """Which objects were moved, each with the frame after its first put."""
+    """Yield a question on the moved objects, with the frame after the first put of each."""
     first_puts = list({move.item: move for move in reversed(moves)}.values())[::-1]
     items = [move.object_type for move in first_puts]
     shown = all(history.shows_put(move) for move in first_puts)
@@ -66,12 +66,12 @@ def _what(
 
 
 def _where(history: TrajectoryHistory) -> Iterator[Candidate]:
-    """The places that something was put into or onto."""
+    """Yield the question on the types of receptacles that something was put into or onto."""
     yield from listing_question(
         FURTHER,
         "Where did you put things?",
         (
-            (history.world(move.after)[move.target].type, move.after if history.shows_put(move) else None)
+            (history.states(move.after)[move.target].type, move.after if history.shows_put(move) else None)
             for move in history.moves
         ),
     )

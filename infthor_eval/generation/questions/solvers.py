@@ -1,6 +1,7 @@
-"""Answers to questions by their text, from glimpses of what happened: the second opinion's own way.
+"""Answering questions by their text, from the facts of frames, for the independent check.
 
-It does not know how a question came about and shares no code with the rules, so that it does not share their faults.
+The solvers do not know how a question was generated and share no code with the rules, so they do not share their
+errors.
 """
 
 import re
@@ -17,9 +18,15 @@ _FRAME_PIXELS = 300 * 300
 
 @dataclass(frozen=True)
 class FrameFacts:
-    """One moment: its frame, the action that led to it, what is known of the objects, and which types are loose.
+    """What is known at one frame.
 
-    That something of a type can be picked up is known of things, whatever the moment.
+    Attributes:
+        frame: number of the frame.
+        action: name of the successful action before it, or empty.
+        target: id of the object acted on.
+        objects: states of the known objects by id.
+        everything: True if `objects` has all objects, False if only those in the frame.
+        loose: types that can be picked up, which is general knowledge and not restricted to the frame.
     """
 
     frame: int
@@ -31,34 +38,33 @@ class FrameFacts:
 
 
 def frame_facts(steps: Sequence[Step], share: float, frames: Container[int] | None = None) -> list[FrameFacts]:
-    """What the log tells: all of it, or what the entries of some frames show.
+    """Return the facts of the whole log, or only what some frames show.
 
     Args:
         steps: the log.
-        share: of the frame's pixels that an object must fill to be seen.
+        share: share of the frame's pixels that an object must fill to be seen.
         frames: the clue frames; None for the whole log.
     """
-    found = []
+    facts = []
     loose = frozenset(name for step in steps for name in step.object_log.pickupable)
-    for step, world in zip(steps, iter_object_states(steps), strict=True):
-        there = {key: state for key, state in world.items() if state.exists}
+    for step, states in zip(steps, iter_object_states(steps), strict=True):
+        objects = {key: state for key, state in states.items() if state.exists}
         if frames is not None:
             if step.img_idx not in frames:
                 continue
             large = {key for key, seen in (step.seen or {}).items() if seen.pixels >= share * _FRAME_PIXELS}
-            there = {key: state for key, state in there.items() if key in large}
+            objects = {key: state for key, state in objects.items() if key in large}
         action = (step.action or "").split(" ")[0] if step.success else ""
-        found.append(FrameFacts(step.img_idx, action, step.target, there, frames is None, loose))
-    return found
+        facts.append(FrameFacts(step.img_idx, action, step.target, objects, frames is None, loose))
+    return facts
 
 
-def answer(text: str, seen: Sequence[FrameFacts]) -> list[str] | None:
-    """Answer a question from glimpses; None where they do not tell."""
+def answer(text: str, facts: Sequence[FrameFacts]) -> list[str] | None:
+    """Return the answers to a question, or None if the facts are not sufficient."""
     for pattern, solve in _SOLVERS:
         match = re.fullmatch(pattern, text)
-        if match is not None and seen:
-            found = solve(seen, *match.groups())
-            return found if found else None
+        if match is not None and facts:
+            return solve(facts, *match.groups()) or None
     return None
 
 
@@ -66,8 +72,8 @@ def _name(object_type: str) -> str:
     return object_type.lower().replace(" ", "").removesuffix("basin")
 
 
-def _said(words: str) -> str:
-    """The type that words name: "sliced apple" is AppleSliced."""
+def _type_name(words: str) -> str:
+    """Return the type for some words: "sliced apple" is AppleSliced."""
     words = words.lower()
     if words.startswith("sliced "):
         words = f"{words.removeprefix('sliced ')}sliced"
@@ -75,15 +81,12 @@ def _said(words: str) -> str:
 
 
 def _is(state: ObjectState, words: str) -> bool:
-    return _name(state.type) == _said(words)
+    return _name(state.type) == _type_name(words)
 
 
 def _holder(glimpse: FrameFacts, key: str) -> str | None:
-    """What an object is directly in or on: of its parents the one that is in most of the others.
-
-    Found in its own way, not by `household.containment`, on which the rules rely: a second opinion must not share their
-    faults.
-    """
+    """Return what an object is directly in or on: the one of its parents that is in most of the others."""
+    # Not by `household.containment`, which the rules use: an independent check must not share its errors.
     state = glimpse.objects[key]
     parents = [parent for parent in state.parents if parent in glimpse.objects]
     parents = [parent for parent in parents if glimpse.objects[parent].type != "Floor"]
@@ -98,7 +101,7 @@ def _holder(glimpse: FrameFacts, key: str) -> str | None:
 
 
 def _whole(key: str | None) -> str | None:
-    """Of a part's id ("Sink|x|y|z|SinkBasin") that of the whole."""
+    """Return the id of the whole for that of a part ("Sink|x|y|z|SinkBasin")."""
     return None if key is None else "|".join(key.split("|")[:4])
 
 
@@ -108,129 +111,133 @@ def _place(glimpse: FrameFacts, key: str) -> str | None:
 
 
 def _inside(glimpse: FrameFacts, words: str) -> set[str]:
-    """Ids of what is in or on a receptacle of a type."""
-    return {key for key in glimpse.objects if _place(glimpse, key) == _said(words)}
+    """Return the ids of what is in or on a receptacle of a type."""
+    return {key for key in glimpse.objects if _place(glimpse, key) == _type_name(words)}
 
 
 def _names(glimpse: FrameFacts, keys: set[str]) -> list[str]:
     return sorted(_name(glimpse.objects[key].type) for key in keys)
 
 
-def _events(seen: Sequence[FrameFacts], action: str, words: str | None = None) -> list[FrameFacts]:
-    """The moments right after an action on an object of a type, of which the moment itself tells."""
-    moments = [item for item in seen if item.action == action and _is_told(item)]
-    return [item for item in moments if words is None or _target_is(item, words)]
+def _events(facts: Sequence[FrameFacts], action: str, words: str | None = None) -> list[FrameFacts]:
+    """Return the facts right after an action on an object of a type, if they include the object."""
+    events = [item for item in facts if item.action == action and _is_target_known(item)]
+    return [item for item in events if words is None or _target_is(item, words)]
 
 
-def _is_told(item: FrameFacts) -> bool:
-    """Whether what was acted on is among the objects that are known, or what became of it where it was cut."""
+def _is_target_known(item: FrameFacts) -> bool:
+    """Return True if the object acted on, or a slice of it, is among the known objects."""
     target = item.target or ""
     return target in item.objects or any(key.startswith(f"{target}|") for key in item.objects)
 
 
 def _target_name(item: FrameFacts) -> str:
-    """The type of the object acted on, from its id: the last part for slices and basins."""
+    """Return the type of the object acted on, from its id: its last part for slices and basins."""
     parts = (item.target or "").split("|")
     return _name(re.sub(r"_\d+$", "", parts[-1]) if len(parts) > 4 else parts[0])
 
 
 def _target_is(item: FrameFacts, words: str) -> bool:
-    return _target_name(item) == _said(words)
+    return _target_name(item) == _type_name(words)
 
 
-def _handled(seen: Sequence[FrameFacts], words: str) -> str | None:
-    """The object of a type that is acted on, or else the only one there."""
-    acted = {item.target for item in seen if item.target in item.objects and _is(item.objects[item.target], words)}
-    there = {key for item in seen for key, state in item.objects.items() if _is(state, words)}
-    chosen = acted or there
-    return next(iter(chosen)) if len(chosen) == 1 else None
+def _handled_object(facts: Sequence[FrameFacts], words: str) -> str | None:
+    """Return the object of a type that is acted on, or else the only known one."""
+    acted = {item.target for item in facts if item.target in item.objects and _is(item.objects[item.target], words)}
+    known = {key for item in facts for key, state in item.objects.items() if _is(state, words)}
+    candidates = acted or known
+    return next(iter(candidates)) if len(candidates) == 1 else None
 
 
-def _track(seen: Sequence[FrameFacts], words: str) -> list[tuple[FrameFacts, str]]:
-    """Where the handled object of a type is at each moment at which that is known."""
-    key = _handled(seen, words)
+def _track(facts: Sequence[FrameFacts], words: str) -> list[tuple[FrameFacts, str]]:
+    """Return where the handled object of a type is, at each frame at which that is known."""
+    key = _handled_object(facts, words)
     if key is None:
         return []
-    known = [(item, _place(item, key)) for item in seen if key in item.objects]
+    known = [(item, _place(item, key)) for item in facts if key in item.objects]
     return [(item, place) for item, place in known if place is not None]
 
 
-def _presence(seen: Sequence[FrameFacts], words: str) -> list[str]:
+def _presence(facts: Sequence[FrameFacts], words: str) -> list[str]:
     words = re.sub(r"^an? ", "", words)
-    return ["yes" if any(_is(state, words) for item in seen for state in item.objects.values()) else "no"]
+    return ["yes" if any(_is(state, words) for item in facts for state in item.objects.values()) else "no"]
 
 
-def _before(seen: Sequence[FrameFacts], words: str, first: str | None) -> list[str]:
-    picked = [item.frame for item in _events(seen, "PickupObject", words)]
+def _before(facts: Sequence[FrameFacts], words: str, first: str | None) -> list[str]:
+    picked = [item.frame for item in _events(facts, "PickupObject", words)]
     if len(picked) > 1 and not first:
-        return []  # which one is meant?
-    places = [place for item, place in _track(seen, words) if not picked or item.frame < picked[0]]
+        return []  # ambiguous
+    places = [place for item, place in _track(facts, words) if not picked or item.frame < picked[0]]
     return places[-1:]
 
 
-def _before_put(seen: Sequence[FrameFacts], words: str, place: str) -> list[str]:
-    """Where it was before the one put into a place, if that was one place only."""
-    track = _track(seen, words)
-    puts = {item.frame for item in _events(seen, "PutObject", words)}
-    there = [item.frame for item, name in track if item.frame in puts and name == _said(place)]
+def _before_put(facts: Sequence[FrameFacts], words: str, place: str) -> list[str]:
+    """Return where it was before the only put into a place, if that was only one place."""
+    track = _track(facts, words)
+    puts = {item.frame for item in _events(facts, "PutObject", words)}
+    there = [item.frame for item, name in track if item.frame in puts and name == _type_name(place)]
     before = {name for item, name in track if there and item.frame < there[0]}
     return list(before) if len(there) == len(before) == 1 else []
 
 
-def _moved_from(seen: Sequence[FrameFacts], words: str, place: str) -> list[str]:
-    """Where it went from a place, if it left that once and then stayed."""
-    places = _journey(seen, words)
-    return places[-1:] if len(places) > 1 and places[-2] == _said(place) and places.count(_said(place)) == 1 else []
+def _moved_from(facts: Sequence[FrameFacts], words: str, place: str) -> list[str]:
+    """Return where it went from a place, if it left that place once and then stayed."""
+    places = _journey(facts, words)
+    return (
+        places[-1:]
+        if len(places) > 1 and places[-2] == _type_name(place) and places.count(_type_name(place)) == 1
+        else []
+    )
 
 
-def _moved_to(seen: Sequence[FrameFacts], words: str) -> list[str]:
-    puts = {item.frame for item in _events(seen, "PutObject", words)}
-    return [place for item, place in _track(seen, words) if item.frame in puts][-1:]
+def _moved_to(facts: Sequence[FrameFacts], words: str) -> list[str]:
+    puts = {item.frame for item in _events(facts, "PutObject", words)}
+    return [place for item, place in _track(facts, words) if item.frame in puts][-1:]
 
 
-def _now(seen: Sequence[FrameFacts], words: str) -> list[str]:
-    return [place for _, place in _track(seen, words)][-1:]
+def _now(facts: Sequence[FrameFacts], words: str) -> list[str]:
+    return [place for _, place in _track(facts, words)][-1:]
 
 
-def _journey(seen: Sequence[FrameFacts], words: str) -> list[str]:
-    places = [place for _, place in _track(seen, words)]
+def _journey(facts: Sequence[FrameFacts], words: str) -> list[str]:
+    places = [place for _, place in _track(facts, words)]
     return places[:1] + [place for previous, place in pairwise(places) if place != previous]
 
 
-def _put_into(seen: Sequence[FrameFacts], _preposition: str, words: str) -> list[str]:
-    found: dict[str, str] = {}
-    for item in _events(seen, "PutObject"):
-        if item.target in item.objects and _place(item, item.target) == _said(words):
-            found.setdefault(item.target, _target_name(item))
-    return list(found.values())
+def _put_into(facts: Sequence[FrameFacts], _preposition: str, words: str) -> list[str]:
+    names: dict[str, str] = {}
+    for item in _events(facts, "PutObject"):
+        if item.target in item.objects and _place(item, item.target) == _type_name(words):
+            names.setdefault(item.target, _target_name(item))
+    return list(names.values())
 
 
-def _put_object(seen: Sequence[FrameFacts], _preposition: str, words: str) -> list[str]:
-    """What is in the hand at one moment and in or on a receptacle at the next."""
-    found = []
-    for previous, item in pairwise(seen):
+def _put_object(facts: Sequence[FrameFacts], _preposition: str, words: str) -> list[str]:
+    """Return what is in the hand at one frame and in or on a receptacle at the next."""
+    names = []
+    for previous, item in pairwise(facts):
         target = item.target or ""
         held = target in previous.objects and previous.objects[target].held
-        if item.action == "PutObject" and held and target in item.objects and _place(item, target) == _said(words):
-            found.append(_target_name(item))
-    return found
+        if item.action == "PutObject" and held and target in item.objects and _place(item, target) == _type_name(words):
+            names.append(_target_name(item))
+    return names
 
 
-def _put_down(seen: Sequence[FrameFacts]) -> list[str]:
-    found: dict[str, str] = {}
-    for item in _events(seen, "PutObject"):
+def _put_down(facts: Sequence[FrameFacts]) -> list[str]:
+    names: dict[str, str] = {}
+    for item in _events(facts, "PutObject"):
         if _place(item, item.target or "") is not None:
-            found.setdefault(item.target or "", _target_name(item))
-    return list(found.values())
+            names.setdefault(item.target or "", _target_name(item))
+    return list(names.values())
 
 
-def _put_places(seen: Sequence[FrameFacts]) -> list[str]:
-    places = (_place(item, item.target or "") for item in _events(seen, "PutObject"))
+def _put_places(facts: Sequence[FrameFacts]) -> list[str]:
+    places = (_place(item, item.target or "") for item in _events(facts, "PutObject"))
     return list(dict.fromkeys(place for place in places if place is not None))
 
 
-def _opened(seen: Sequence[FrameFacts]) -> list[str]:
-    return list(dict.fromkeys(_target_name(item) for item in _events(seen, "OpenObject")))
+def _opened_types(facts: Sequence[FrameFacts]) -> list[str]:
+    return list(dict.fromkeys(_target_name(item) for item in _events(facts, "OpenObject")))
 
 
 def _open(item: FrameFacts, words: str) -> list[str]:
@@ -238,124 +245,120 @@ def _open(item: FrameFacts, words: str) -> list[str]:
     return ["yes" if states[0].is_open else "no"] if len(states) == 1 else []
 
 
-def _ever_open(seen: Sequence[FrameFacts], words: str) -> list[str]:
-    known = {answer for item in seen for answer in _open(item, words)}
+def _ever_open(facts: Sequence[FrameFacts], words: str) -> list[str]:
+    known = {answer for item in facts for answer in _open(item, words)}
     return [max(known)] if known else []  # "yes" is the later word
 
 
-def _open_now(seen: Sequence[FrameFacts], words: str) -> list[str]:
-    known = [found for item in seen if (found := _open(item, words))]
+def _open_now(facts: Sequence[FrameFacts], words: str) -> list[str]:
+    known = [answers for item in facts if (answers := _open(item, words))]
     return known[-1] if known else []
 
 
-def _open_then(seen: Sequence[FrameFacts], words: str, verb: str, item: str) -> list[str]:
+def _open_then(facts: Sequence[FrameFacts], words: str, verb: str, item: str) -> list[str]:
     actions = {"picked up": "PickupObject", "sliced": "SliceObject", "turned on": "ToggleObjectOn"}
-    moments = _events(seen, actions[verb], item)
-    return _open(moments[0], words) if len(moments) == 1 else []
+    events = _events(facts, actions[verb], item)
+    return _open(events[0], words) if len(events) == 1 else []
 
 
-def _open_at_put(seen: Sequence[FrameFacts], words: str, item: str, _preposition: str, place: str) -> list[str]:
-    moments = [
-        moment
-        for moment in _events(seen, "PutObject", item)
-        if moment.target in moment.objects and _place(moment, moment.target) == _said(place)
+def _open_at_put(facts: Sequence[FrameFacts], words: str, item: str, _preposition: str, place: str) -> list[str]:
+    events = [
+        event
+        for event in _events(facts, "PutObject", item)
+        if event.target in event.objects and _place(event, event.target) == _type_name(place)
     ]
-    return _open(moments[0], words) if len(moments) == 1 else []
+    return _open(events[0], words) if len(events) == 1 else []
 
 
-def _sliced(seen: Sequence[FrameFacts]) -> list[str]:
-    return [_target_name(item) for item in _events(seen, "SliceObject")]
+def _sliced_types(facts: Sequence[FrameFacts]) -> list[str]:
+    return [_target_name(item) for item in _events(facts, "SliceObject")]
 
 
-def _at_slicing(seen: Sequence[FrameFacts], _preposition: str, place: str, item: str) -> list[str]:
-    names = _left_at(seen, "SliceObject", place, item)
-    return sorted({_said(item) if name == f"{_said(item)}sliced" else name for name in names})
+def _at_slicing(facts: Sequence[FrameFacts], _preposition: str, place: str, item: str) -> list[str]:
+    names = _left_at(facts, "SliceObject", place, item)
+    return sorted({_type_name(item) if name == f"{_type_name(item)}sliced" else name for name in names})
 
 
-def _always_inside(seen: Sequence[FrameFacts], _preposition: str, place: str) -> list[str]:
-    return _listed(seen, place)
+def _at_opening(facts: Sequence[FrameFacts], _preposition: str, place: str) -> list[str]:
+    chosen = _events(facts, "OpenObject", place)[:1] if facts[0].everything else facts
+    return _all_contents([_only_loose(item) for item in chosen], "", place)
 
 
-def _at_opening(seen: Sequence[FrameFacts], _preposition: str, place: str) -> list[str]:
-    moments = _events(seen, "OpenObject", place)[:1] if seen[0].everything else seen
-    return _listed([_only_loose(item) for item in moments], place)
+def _left_at_pickup(facts: Sequence[FrameFacts], _preposition: str, place: str, item: str) -> list[str]:
+    return _left_at([_only_loose(glimpse) for glimpse in facts], "PickupObject", place, item)
 
 
-def _left_at_pickup(seen: Sequence[FrameFacts], _preposition: str, place: str, item: str) -> list[str]:
-    return _left_at([_only_loose(glimpse) for glimpse in seen], "PickupObject", place, item)
-
-
-def _left_at(seen: Sequence[FrameFacts], action: str, place: str, item: str) -> list[str]:
-    """What is in the receptacle in which an object was until an action on it."""
-    if not seen[0].everything:
-        return _listed(seen, place)
-    for previous, moment in pairwise(seen):
-        if moment.action == action and moment.target is not None and _target_is(moment, item):
-            holder = _whole(_holder(previous, moment.target))
-            return _names(moment, {key for key in moment.objects if _whole(_holder(moment, key)) == holder})
+def _left_at(facts: Sequence[FrameFacts], action: str, place: str, item: str) -> list[str]:
+    """Return what is in the receptacle in which an object was until an action on it."""
+    if not facts[0].everything:
+        return _all_contents(facts, "", place)
+    for previous, event in pairwise(facts):
+        if event.action == action and event.target is not None and _target_is(event, item):
+            holder = _whole(_holder(previous, event.target))
+            return _names(event, {key for key in event.objects if _whole(_holder(event, key)) == holder})
     return []
 
 
 def _only_loose(item: FrameFacts) -> FrameFacts:
-    """A moment without the fixtures that stand in or on others; what has no holder stays, as it may be one."""
-    kept = {key: state for key, state in item.objects.items() if state.type in item.loose or not state.parents}
-    return replace(item, objects=kept)
+    """Return the facts without the fixtures in or on others; objects without a parent remain, as possible holders."""
+    remaining = {key: state for key, state in item.objects.items() if state.type in item.loose or not state.parents}
+    return replace(item, objects=remaining)
 
 
-def _listed(seen: Sequence[FrameFacts], place: str) -> list[str]:
-    """What is in a receptacle in all glimpses together."""
-    found = {key: _name(item.objects[key].type) for item in seen for key in _inside(item, place)}
-    return sorted(found.values())
+def _all_contents(facts: Sequence[FrameFacts], _preposition: str, place: str) -> list[str]:
+    """Return what is in a receptacle in any of the frames."""
+    names = {key: _name(item.objects[key].type) for item in facts for key in _inside(item, place)}
+    return sorted(names.values())
 
 
-def _is_in(seen: Sequence[FrameFacts], item: str, _preposition: str, place: str) -> list[str]:
-    places = _now(seen, item)
-    return ["yes" if places[0] == _said(place) else "no"] if places else []
+def _is_in(facts: Sequence[FrameFacts], item: str, _preposition: str, place: str) -> list[str]:
+    places = _now(facts, item)
+    return ["yes" if places[0] == _type_name(place) else "no"] if places else []
 
 
-def _last_inside(seen: Sequence[FrameFacts], place: str) -> dict[str, str]:
-    """What is in a receptacle in the end, by id: of each object the last that is known."""
-    if seen[-1].everything:
-        return {key: _name(seen[-1].objects[key].type) for key in _inside(seen[-1], place)}
-    found: dict[str, str] = {}
-    for item in seen:
+def _last_inside(facts: Sequence[FrameFacts], place: str) -> dict[str, str]:
+    """Return what is in a receptacle in the end, by id: where each object is at the last frame that shows it."""
+    if facts[-1].everything:
+        return {key: _name(facts[-1].objects[key].type) for key in _inside(facts[-1], place)}
+    names: dict[str, str] = {}
+    for item in facts:
         inside = _inside(item, place)
         for key, state in item.objects.items():
             if key in inside:
-                found[key] = _name(state.type)
+                names[key] = _name(state.type)
             elif _place(item, key) is not None:
-                found.pop(key, None)
-    return found
+                names.pop(key, None)
+    return names
 
 
-def _what_now(seen: Sequence[FrameFacts], _preposition: str, place: str) -> list[str]:
-    return sorted(_last_inside(seen, place).values())
+def _what_now(facts: Sequence[FrameFacts], _preposition: str, place: str) -> list[str]:
+    return sorted(_last_inside(facts, place).values())
 
 
-def _how_many(seen: Sequence[FrameFacts], _preposition: str, place: str) -> list[str]:
-    found = _last_inside(seen, place)
-    return [str(len(found))] if found else []
+def _how_many(facts: Sequence[FrameFacts], _preposition: str, place: str) -> list[str]:
+    inside = _last_inside(facts, place)
+    return [str(len(inside))] if inside else []
 
 
-def _moves(seen: Sequence[FrameFacts], words: str) -> list[str]:
-    """How often it was put down; each time it was picked up before, at least where all is known."""
-    count = len(_events(seen, "PutObject", words))
-    paired = not seen[0].everything or count == len(_events(seen, "PickupObject", words)) > 1
+def _moves(facts: Sequence[FrameFacts], words: str) -> list[str]:
+    """Return how often it was put down; with full knowledge, it must have been picked up as often."""
+    count = len(_events(facts, "PutObject", words))
+    paired = not facts[0].everything or count == len(_events(facts, "PickupObject", words)) > 1
     return [str(count)] if count and paired else []
 
 
-def _openings(seen: Sequence[FrameFacts], words: str) -> list[str]:
-    count = len(_events(seen, "OpenObject", words))
+def _openings(facts: Sequence[FrameFacts], words: str) -> list[str]:
+    count = len(_events(facts, "OpenObject", words))
     return [str(count)] if count else []
 
 
-def _puts(seen: Sequence[FrameFacts], _preposition: str, words: str) -> list[str]:
-    puts = [item for item in _events(seen, "PutObject") if _place(item, item.target or "") == _said(words)]
+def _puts(facts: Sequence[FrameFacts], _preposition: str, words: str) -> list[str]:
+    puts = [item for item in _events(facts, "PutObject") if _place(item, item.target or "") == _type_name(words)]
     return [str(len(puts))] if puts else []
 
 
-def _picked(seen: Sequence[FrameFacts]) -> list[str]:
-    count = len({item.target for item in _events(seen, "PickupObject")})
+def _n_picked_up(facts: Sequence[FrameFacts]) -> list[str]:
+    count = len({item.target for item in _events(facts, "PickupObject")})
     return [str(count)] if count else []
 
 
@@ -366,13 +369,13 @@ _SOLVERS: tuple[tuple[str, Callable[..., list[str]]], ...] = (
     (r"Where was the (.+) before you put it to the (.+)\?", _before_put),
     (r"Where did you move the (.+) from the (.+)\?", _moved_from),
     (r"Where is the (.+) now\?", _now),
-    (r"What did you slice\?", _sliced),
+    (r"What did you slice\?", _sliced_types),
     (r"What objects were (in|on) the (.+) when you slice the (.+)\?", _at_slicing),
-    (r"What objects were (in|on) the ((?:(?! when you ).)+)\?", _always_inside),
+    (r"What objects were (in|on) the ((?:(?! when you ).)+)\?", _all_contents),
     (r"What object did you put (in|on) the (.+)\?", _put_object),
     (r"Is the (.+) (in|on) the (.+)\?", _is_in),
     (r"What objects are (in|on) the (.+)\?", _what_now),
-    (r"How many objects were (?:in|on) the (.+)\?", lambda seen, place: _how_many(seen, "", place)),
+    (r"How many objects were (in|on) the (.+)\?", _how_many),
     (r"How many times did you move the (.+)\?", _moves),
     # our further forms
     (r"Where was the (.+) before you (first )?picked it up\?", _before),
@@ -381,7 +384,7 @@ _SOLVERS: tuple[tuple[str, Callable[..., list[str]]], ...] = (
     (r"What did you put (in|on) the (.+)\?", _put_into),
     (r"What did you put down\?", _put_down),
     (r"Where did you put things\?", _put_places),
-    (r"What did you open\?", _opened),
+    (r"What did you open\?", _opened_types),
     (r"Is the (.+) open now\?", _open_now),
     (r"Was the (.+) open when you (picked up|sliced|turned on) the (.+)\?", _open_then),
     (r"Was the (.+) open when you put the (.+) (in|on) the (.+)\?", _open_at_put),
@@ -393,5 +396,5 @@ _SOLVERS: tuple[tuple[str, Callable[..., list[str]]], ...] = (
     ),
     (r"How many times did you open (?:the|an?) (.+)\?", _openings),
     (r"How many times did you put something (in|on) the (.+)\?", _puts),
-    (r"How many different objects did you pick up\?", _picked),
+    (r"How many different objects did you pick up\?", _n_picked_up),
 )

@@ -61,7 +61,7 @@ def test_a_truncated_trajectory_is_named_and_nothing_half_written(work, tmp_path
     ("arguments", "words"),
     [
         (("replay", "nowhere.jsonl", "--out", "set"), "nowhere.jsonl"),
-        (("questions", "nowhere", "--out", "qa.csv"), "no trajectory there"),
+        (("questions", "nowhere", "--out", "qa.csv"), "has no trajectory; replay"),
         (("generate", "--scene", "nowhere-1", "--out", "out"), "unknown scene 'nowhere-1'"),
         (("generate", "--scene", "kitchn-3", "--out", "out"), "unknown scene 'kitchn-3'; did you mean 'kitchen-3'?"),
         (("generate", "--scene", "FloorPlan1", "--out", "out"), "not generated: scene FloorPlan1"),

@@ -115,7 +115,7 @@ def test_moves_are_counted_of_what_was_moved_more_than_once():
 def test_the_first_sighting_is_shown():
     log = history({**PLACES, MUG: state(MUG, TABLE)}, ("LookUp", None, None, {}))
     del log.steps[0].seen[MUG]
-    clues = {candidate.text: candidate.clues for candidate in presence.present_types(log)}
+    clues = {candidate.text: candidate.clues for candidate in presence.yes_questions(log)}
     assert clues["Have you seen a mug?"] == clues["Is there any mug in this room?"] == (1,)
     assert clues["Have you seen a fridge?"] == (0,)
 
@@ -127,7 +127,7 @@ def test_no_room_is_meant_in_a_house_of_several():
         (rooms, {"Have you seen"}),
     ):
         log = history({**PLACES, **floors, MUG: state(MUG, TABLE)})
-        asked = [*presence.present_types(log), *presence.absent_types(log, frozenset({"Toaster"}), random.Random(0))]
+        asked = [*presence.yes_questions(log), *presence.no_questions(log, frozenset({"Toaster"}), random.Random(0))]
         assert {" ".join(candidate.text.split()[:3]) for candidate in asked} == forms
         assert {candidate.answers for candidate in asked} == {("yes",), ("no",)}
 

@@ -186,5 +186,5 @@ def test_no_answer_is_in_its_question(everything):
 def test_a_log_without_what_frames_show_is_skipped(replayed, tmp_path):
     with pytest.raises(DataError, match="does not say what the frames show"):
         TrajectoryHistory("t", [Step(0, "0.png")])
-    with pytest.raises(DataError, match="no trajectory there"):
+    with pytest.raises(DataError, match="has no trajectory; replay"):
         generate_questions(tmp_path)
