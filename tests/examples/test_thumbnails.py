@@ -1,27 +1,17 @@
 """The example package is found, checked and evaluated once pip has installed it."""
 
 import json
-import shutil
-import subprocess
-import sys
-from pathlib import Path
 
 import pytest
 
 from infthor_eval.errors import UsageError
 from model_adapters import adapter_identity, check_adapter, load, names
 
-EXAMPLE = Path(__file__).parents[2] / "examples" / "thumbnails"
-
 
 @pytest.fixture(scope="module")
-def target(tmp_path_factory):
-    """Where pip has installed it; nothing is downloaded."""
-    source = shutil.copytree(EXAMPLE, tmp_path_factory.mktemp("source") / "thumbnails")  # setuptools writes into it
-    target = tmp_path_factory.mktemp("installed")
-    quietly = ("--quiet", "--disable-pip-version-check", "--no-index", "--no-deps", "--no-build-isolation")
-    subprocess.run([sys.executable, "-m", "pip", "install", *quietly, "--target", target, source], check=True)
-    return target
+def target(install):
+    """Where pip has installed it."""
+    return install("thumbnails")
 
 
 @pytest.fixture(autouse=True)

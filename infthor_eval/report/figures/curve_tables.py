@@ -1,4 +1,4 @@
-"""Curves of reward in words: the table of their ends, and which runs stand in which panel."""
+"""Curves of reward in words: the table of their ends, the panels, and notes."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,20 +16,20 @@ __all__ = [
     "embedded_note",
     "one_panel",
     "read_panels",
-    "trajectories_told",
+    "trajectories_text",
 ]
 
-_MOST_PANELS = 12  # a picture of more cannot be read
+_MOST_PANELS = 12  # a figure with more cannot be read
 _COLUMNS = ("reward", "95 % interval", "of the bound, %")
 
 
 @dataclass(frozen=True)
 class Panel:
-    """A panel of a picture.
+    """A panel of a figure.
 
     Attributes:
-        title: above it; empty for none.
-        labels: of the runs in it; the bound is in all of them.
+        title: heading of the panel; empty for none.
+        labels: labels of its runs; the bound is in every panel.
     """
 
     title: str
@@ -37,23 +37,23 @@ class Panel:
 
 
 def one_panel(curves: RewardCurves) -> list[Panel]:
-    """All runs in one."""
+    """Return one panel with all runs."""
     return [Panel("", tuple(run.label for run in curves.runs))]
 
 
 def read_panels(path: Path, curves: RewardCurves) -> list[Panel]:
-    """The panels that a YAML file names: titles, each with a list of runs by their names in the table.
+    """Read panels from a YAML file: titles, each with a list of runs by their names in the table.
 
     Raises:
         DataError: it cannot be read, is of another form, or names a run that is not there.
     """
-    mend = "write titles, each with a list of runs (docs/figures.md)"
-    found = read_yaml(path, mend)
-    if not isinstance(found, dict) or not found:
-        raise DataError(f"{path}: not a mapping; {mend}")
-    if len(found) > _MOST_PANELS:
-        raise DataError(f"{path}: {len(found)} panels, and a picture takes {_MOST_PANELS}; write several files")
-    return [_panel(path, str(title), named, curves) for title, named in found.items()]
+    fix = "write titles, each with a list of runs (docs/figures.md)"
+    panels = read_yaml(path, fix)
+    if not isinstance(panels, dict) or not panels:
+        raise DataError(f"{path}: not a mapping; {fix}")
+    if len(panels) > _MOST_PANELS:
+        raise DataError(f"{path}: {len(panels)} panels, and a figure takes {_MOST_PANELS}; write several files")
+    return [_panel(path, str(title), named, curves) for title, named in panels.items()]
 
 
 def _panel(path: Path, title: str, named: object, curves: RewardCurves) -> Panel:
@@ -67,17 +67,17 @@ def _panel(path: Path, title: str, named: object, curves: RewardCurves) -> Panel
 
 
 def embedded_label(curves: RewardCurves) -> str | None:
-    """What must stand on a picture with numbers of the embedded simulator; None where none are."""
+    """Return the note on runs in the embedded simulator; None if there are none."""
     return embedded_note([run.label for run in curves.runs if run.is_embedded], len(curves.runs), "curves")
 
 
 def embedded_note(labels: Sequence[str], n_labels: int, what: str) -> str | None:
-    """What must stand beside numbers of the embedded simulator; None where none are.
+    """Return the note on numbers of the embedded simulator; None if there are none.
 
     Args:
-        labels: of what was made in it.
-        n_labels: of all that is drawn.
-        what: the paper's own, which these are not comparable with.
+        labels: labels of the runs in it.
+        n_labels: number of all labels.
+        what: the paper's numbers that these are not comparable with, in the plural.
     """
     if not labels:
         return None
@@ -86,7 +86,7 @@ def embedded_note(labels: Sequence[str], n_labels: int, what: str) -> str | None
 
 
 def curves_table(curves: RewardCurves) -> Table:
-    """Where the curves end: a row per run."""
+    """Return a table of the ends of the curves, with a row per run."""
     bound = next(run for run in curves.runs if run.is_bound).curves[curves.main].end.mean
     facets = curves.facets.values()
     earned = [facet.earned for facet in facets if facet.earned is not None]
@@ -94,12 +94,12 @@ def curves_table(curves: RewardCurves) -> Table:
     columns = (Column("run", False), *map(Column, (*_COLUMNS, *earned, *end_at, *curves.runs[0].counts)))
     label = embedded_label(curves)
     notes = ((label,) if label else ()) + curves.notes
-    title = f"{curves.task}: reward at the end, mean over {trajectories_told(curves.n_trajectories)}"
+    title = f"{curves.task}: reward at the end, mean over {trajectories_text(curves.n_trajectories)}"
     return Table(title, columns, tuple(_row(run, bound, curves) for run in curves.runs), notes)
 
 
-def trajectories_told(count: int) -> str:
-    """So many trajectories, in words."""
+def trajectories_text(count: int) -> str:
+    """Return the number of trajectories in words."""
     return "1 trajectory" if count == 1 else f"{count} trajectories"
 
 
@@ -107,7 +107,7 @@ def _row(run: RunCurves, bound: float, curves: RewardCurves) -> Row:
     end = run.curves[curves.main].end
     interval = interval_cell(end.low, end.high, ".2f")
     share = f"{100 * end.mean / bound:.1f}" if bound > 0 else "-"
-    found = [(facet, run.curves.get(name)) for name, facet in curves.facets.items()]
-    earned = ("-" if curve is None else f"{curve.end.mean:.2f}" for facet, curve in found if facet.earned)
-    places = ("-" if curve is None else f"{curve.places[-1]:.0f}" for facet, curve in found if facet.end_at)
+    curves_of_run = [(facet, run.curves.get(name)) for name, facet in curves.facets.items()]
+    earned = ("-" if curve is None else f"{curve.end.mean:.2f}" for facet, curve in curves_of_run if facet.earned)
+    places = ("-" if curve is None else f"{curve.places[-1]:.0f}" for facet, curve in curves_of_run if facet.end_at)
     return Row((run.label, f"{end.mean:.2f}", interval, share, *earned, *places, *map(str, run.counts.values())))

@@ -1,4 +1,4 @@
-"""Curves of reward as a picture, in PNG and SVG; the same curves give the same bytes of SVG."""
+"""Curves of reward as a figure; the same curves give the same bytes of SVG."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from infthor_eval.episodes.curves import Curve, Facet, RewardCurves, RunCurves
-from infthor_eval.report.figures.curve_tables import Panel, embedded_label, trajectories_told
+from infthor_eval.report.figures.curve_tables import Panel, embedded_label, trajectories_text
 from infthor_eval.report.figures.style import BOUND, LEGEND, Look, add_legend, add_words, looks_of, save_figure
 from infthor_eval.terminal import printable
 
@@ -21,16 +21,16 @@ _LINE = 0.2  # inches of a line of the legend
 
 
 def draw_curves(curves: RewardCurves, panels: Sequence[Panel], folder: Path, name: str) -> list[Path]:
-    """Draw a row per panel, with a column for each facet that some run tells of.
+    """Draw a row per panel, with a column for each facet that some run has.
 
     Args:
-        curves: what is drawn.
-        panels: which runs stand together; the bound is in all of them.
-        folder: takes the files.
-        name: of the files, without what stands behind the dot.
+        curves: curves to draw.
+        panels: runs of each panel; the bound is in all of them.
+        folder: folder of the files.
+        name: name of the files, without suffix.
 
     Returns:
-        The files.
+        Paths of the files.
 
     Raises:
         DataError: a file cannot be written.
@@ -39,23 +39,23 @@ def draw_curves(curves: RewardCurves, panels: Sequence[Panel], folder: Path, nam
 
 
 def curves_figure(curves: RewardCurves, panels: Sequence[Panel]) -> Figure:
-    """The figure that `draw_curves` writes."""
+    """Return the figure that `draw_curves` writes."""
     facets = {name: it for name, it in curves.facets.items() if any(name in run.curves for run in curves.runs)}
     width = len(facets) * (_PANEL[0] if len(facets) < 3 else _NARROW) + LEGEND
     height = max(_PANEL[1], _LINE * (len(curves.runs) + 1))
     figure = Figure(figsize=(width, len(panels) * height + _MARGIN), layout="constrained")
-    # One scale of reward for all panels, so that they can be held against each other.
+    # One scale of reward for all panels, so that they can be compared.
     grid = figure.subplots(len(panels), len(facets), sharex="col", sharey=True, squeeze=False)
     looks = _looks(curves.runs)
     for row, panel in zip(grid, panels, strict=True):
         runs = [run for run in curves.runs if run.is_bound or run.label in panel.labels]
-        for place, (name, facet) in zip(row, facets.items(), strict=True):
-            _draw_panel(place, name, facet, runs, looks)
+        for axes, (name, facet) in zip(row, facets.items(), strict=True):
+            _draw_panel(axes, name, facet, runs, looks)
         row[0].set_ylabel(_REWARD)
         row[0].set_title(printable(panel.title), loc="left", fontweight="bold")
-        # The bound first, as it lies on top.
-        named = [run.label for run in reversed(runs) if run.is_bound] + [run.label for run in runs if not run.is_bound]
-        add_legend(row[-1], [(label, looks[label]) for label in named])
+        # The bound comes first: its line is drawn last and lies on top.
+        labels = [run.label for run in reversed(runs) if run.is_bound] + [run.label for run in runs if not run.is_bound]
+        add_legend(row[-1], [(label, looks[label]) for label in labels])
     for top, bottom, facet in zip(grid[0], grid[-1], facets.values(), strict=True):
         bottom.set_xlabel(facet.over)
         if facet.title:
@@ -65,37 +65,35 @@ def curves_figure(curves: RewardCurves, panels: Sequence[Panel]) -> Figure:
 
 
 def _looks(runs: Sequence[RunCurves]) -> dict[str, Look]:
-    """One look per run in all panels."""
+    """Return a look per run, the same in all panels."""
     bounds = {run.label: BOUND for run in runs if run.is_bound}
     return bounds | looks_of(run.label for run in runs if not run.is_bound)
 
 
-def _draw_panel(place: Axes, name: str, facet: Facet, runs: Sequence[RunCurves], looks: Mapping[str, Look]) -> None:
+def _draw_panel(axes: Axes, name: str, facet: Facet, runs: Sequence[RunCurves], looks: Mapping[str, Look]) -> None:
     for order, run in enumerate(runs, 3):  # above the grid; the bound, the last, on top
         if name in run.curves:
-            _draw_curve(place, run.curves[name], looks[run.label], order)
+            _draw_curve(axes, run.curves[name], looks[run.label], order)
     if not any(name in run.curves for run in runs):
-        place.text(0.5, 0.5, facet.missing, transform=place.transAxes, ha="center", color="gray")
-    place.xaxis.set_major_locator(MaxNLocator(6, integer=True))
-    place.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.0f}"))
-    place.tick_params(labelbottom=True)
+        axes.text(0.5, 0.5, facet.missing, transform=axes.transAxes, ha="center", color="gray")
+    axes.xaxis.set_major_locator(MaxNLocator(6, integer=True))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.0f}"))
+    axes.tick_params(labelbottom=True)
 
 
-def _draw_curve(place: Axes, curve: Curve, look: Look, order: int) -> None:
+def _draw_curve(axes: Axes, curve: Curve, look: Look, order: int) -> None:
     means = [estimate.mean for estimate in curve.means]
-    place.plot(
+    axes.plot(
         curve.places, means, drawstyle="steps-post", color=look.colour, ls=look.style, lw=look.width, zorder=order
     )
-    # A dot ends it: where contexts were cut, the rewards of many plans stand above each other in the last place.
-    place.plot(curve.places[-1:], means[-1:], marker="o", ms=3.5, color=look.colour, zorder=order)
+    # A dot marks the end: where contexts were cut, many plans end at the last place and the line rises there.
+    axes.plot(curve.places[-1:], means[-1:], marker="o", ms=3.5, color=look.colour, zorder=order)
     low = [mean if estimate.low is None else estimate.low for mean, estimate in zip(means, curve.means, strict=True)]
     high = [mean if estimate.high is None else estimate.high for mean, estimate in zip(means, curve.means, strict=True)]
-    place.fill_between(curve.places, low, high, step="post", color=look.colour, alpha=0.13, linewidth=0, zorder=2)
+    axes.fill_between(curve.places, low, high, step="post", color=look.colour, alpha=0.13, linewidth=0, zorder=2)
 
 
 def _heading(curves: RewardCurves) -> list[str]:
-    told = trajectories_told(curves.n_trajectories)
-    title = f"Cumulative reward on {curves.task}: mean over {told}" + (
-        ", 95 % intervals shaded" if curves.n_trajectories > 1 else ""
-    )
+    intervals = ", 95 % intervals shaded" if curves.n_trajectories > 1 else ""
+    title = f"Cumulative reward on {curves.task}: mean over {trajectories_text(curves.n_trajectories)}{intervals}"
     return [title, *filter(None, [embedded_label(curves)])]

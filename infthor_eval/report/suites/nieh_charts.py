@@ -1,4 +1,4 @@
-"""Pictures of NIEH results: accuracy by clues and by type of question, by depth and size of context, gain by frames."""
+"""Charts of NIEH results: accuracy by clues, type of question and depth, and the gain over blank frames."""
 
 import math
 from collections.abc import Sequence
@@ -19,14 +19,14 @@ from infthor_eval.terminal import printable
 __all__ = ["nieh_charts"]
 
 _COLUMNS = (*CLUE_COLUMNS, ABSENCE)
-_SPREAD = 0.6  # of the room between two columns that the dots of several runs take
+_SPREAD = 0.6  # share of a column's width that the dots of several runs are spread over
 _PANEL, _ROW = (4.6, 2.6), 0.34  # inches
 _DEPTH = "depth="
 _GAIN = looks_of(("gain",))["gain"].colour
 
 
 class _Line(NamedTuple):
-    """A run, in a task."""
+    """Results of a run on a task."""
 
     label: str
     task: TaskSummary
@@ -34,12 +34,12 @@ class _Line(NamedTuple):
 
     @property
     def metric(self) -> str:
-        """That the task is known by."""
+        """The task's primary metric."""
         return main_metric(self.task)
 
 
 def nieh_charts(runs: Sequence[ReportRun]) -> list[Chart]:
-    """All pictures that there is something to draw for."""
+    """Draw all charts that the runs have numbers for."""
     looks = looks_of(run.label for run in runs)
     charts = []
     for task in dict.fromkeys(name for run in runs for name in run.summary.summary.tasks):
@@ -56,97 +56,99 @@ def nieh_charts(runs: Sequence[ReportRun]) -> list[Chart]:
 
 
 def _by_clues(task: str, lines: Sequence[_Line]) -> Chart:
-    def make() -> Figure:
+    def draw() -> Figure:
         figure = Figure(figsize=(_PANEL[0] + LEGEND, _PANEL[1]), layout="constrained")
-        place = figure.subplots()
+        axes = figure.subplots()
         for number, line in enumerate(lines):
-            _dots(place, [line.task.by_clues[name] for name in _COLUMNS], line, _off(number, len(lines)))
+            _dots(axes, [line.task.by_clues[name] for name in _COLUMNS], line, _offset(number, len(lines)))
         counts = [lines[0].task.by_clues[name].n for name in _COLUMNS]
         names = [f"{name}\n({n})" for name, n in zip(_COLUMNS, counts, strict=True)]
-        place.set_xticks(range(len(_COLUMNS)), names)
-        place.set_ylim(-3, 103)
-        place.set_ylabel(f"{lines[0].metric} (%)")
-        place.set_xlabel("clues (questions)")
-        place.grid(axis="x", visible=False)
-        add_legend(place, [(line.label, line.look) for line in lines])
+        axes.set_xticks(range(len(_COLUMNS)), names)
+        axes.set_ylim(-3, 103)
+        axes.set_ylabel(f"{lines[0].metric} (%)")
+        axes.set_xlabel("clues (questions)")
+        axes.grid(axis="x", visible=False)
+        add_legend(axes, [(line.label, line.look) for line in lines])
         return figure
 
-    return Chart(f"{task}: accuracy by number of clues", inline_svg(make), _told(lines))
+    return Chart(f"{task}: accuracy by number of clues", inline_svg(draw), _describe(lines))
 
 
 def _by_type(task: str, lines: Sequence[_Line]) -> Chart:
     types = sorted({name for line in lines for name in line.task.by_question_type}, reverse=True)
 
-    def make() -> Figure:
+    def draw() -> Figure:
         height = max(_PANEL[1], 0.8 + _ROW * len(types))
         figure = Figure(figsize=(_PANEL[0] + LEGEND, height), layout="constrained")
-        place = figure.subplots()
+        axes = figure.subplots()
         for number, line in enumerate(lines):
             cells = [line.task.by_question_type.get(name) for name in types]
-            _dots(place, cells, line, -_off(number, len(lines)), is_flat=True)
-        place.set_yticks(range(len(types)), [printable(name)[:40] for name in types])
-        place.set_xlim(-3, 103)
-        place.set_xlabel(f"{lines[0].metric} (%)")
-        place.grid(axis="y", visible=False)
-        add_legend(place, [(line.label, line.look) for line in lines])
+            _dots(axes, cells, line, -_offset(number, len(lines)), is_flat=True)
+        axes.set_yticks(range(len(types)), [printable(name)[:40] for name in types])
+        axes.set_xlim(-3, 103)
+        axes.set_xlabel(f"{lines[0].metric} (%)")
+        axes.grid(axis="y", visible=False)
+        add_legend(axes, [(line.label, line.look) for line in lines])
         return figure
 
-    return Chart(f"{task}: accuracy by type of question", inline_svg(make), _told(lines))
+    return Chart(f"{task}: accuracy by type of question", inline_svg(draw), _describe(lines))
 
 
-def _off(number: int, n_lines: int) -> float:
+def _offset(number: int, n_lines: int) -> float:
     return 0.0 if n_lines == 1 else _SPREAD * (number / (n_lines - 1) - 0.5)
 
 
-def _dots(place: Axes, cells: Sequence[Cell | None], line: _Line, off: float, *, is_flat: bool = False) -> None:
-    """A dot with its interval for each cell that was asked."""
+def _dots(axes: Axes, cells: Sequence[Cell | None], line: _Line, offset: float, *, is_flat: bool = False) -> None:
+    """Draw a dot with its interval for each cell that has questions."""
     for at, cell in enumerate(cells):
         if cell is not None and cell.n:
-            _dot(place, cell.scores[line.metric], at + off, line.look.colour, is_flat=is_flat)
+            _dot(axes, cell.scores[line.metric], at + offset, line.look.colour, is_flat=is_flat)
 
 
-def _dot(place: Axes, score: Score | MeanEstimate, where: float, colour: str, *, is_flat: bool) -> None:
+def _dot(axes: Axes, score: Score | MeanEstimate, where: float, colour: str, *, is_flat: bool) -> None:
     mean = 100 * score.mean
-    place.plot(*((mean, where) if is_flat else (where, mean)), marker="o", ms=4.5, color=colour, zorder=3)
+    axes.plot(*((mean, where) if is_flat else (where, mean)), marker="o", ms=4.5, color=colour, zorder=3)
     if score.low is not None and score.high is not None:
-        span = place.hlines if is_flat else place.vlines
+        span = axes.hlines if is_flat else axes.vlines
         span(where, 100 * score.low, 100 * score.high, color=colour, lw=1.3, zorder=2.8)
 
 
-def _told(lines: Sequence[_Line]) -> str:
-    """In words: the totals."""
+def _describe(lines: Sequence[_Line]) -> str:
+    """Return the totals in words."""
     totals = ((line.label, line.task.by_clues["total"].scores[line.metric]) for line in lines)
     return "; ".join(f"{label} {100 * score.mean:.1f} %" for label, score in totals)
 
 
 def _gains_chart(runs: Sequence[ReportRun]) -> Chart | None:
-    """What each run scores above the same model on blank frames, a line a task; None where there is no such pair."""
-    found = [
+    """Draw the gain of each run over blank frames, a row per task; None if no run on blank frames is among them."""
+    rows = [
         (f"{name_of(gain.run)}, {gain.task}", total)
         for gain in gains([run.summary for run in runs])
         if gain.metric == main_metric(gain.seeing) and (total := gain.total()) is not None
     ]
-    if not found:
+    if not rows:
         return None
 
-    def make() -> Figure:
-        figure = Figure(figsize=(_PANEL[0] + LEGEND, max(_PANEL[1], 0.8 + _ROW * len(found))), layout="constrained")
-        place = figure.subplots()
-        place.axvline(0, color="#444444", lw=0.8)
-        for row, (_, total) in enumerate(reversed(found)):
-            _dot(place, total, row, _GAIN, is_flat=True)
-        place.set_yticks(range(len(found)), [printable(name)[:60] for name, _ in reversed(found)])
-        place.set_ylim(-0.6, len(found) - 0.4)
-        place.set_xlabel("gain, in points, and its 95 % interval")
-        place.grid(axis="y", visible=False)
+    def draw() -> Figure:
+        figure = Figure(figsize=(_PANEL[0] + LEGEND, max(_PANEL[1], 0.8 + _ROW * len(rows))), layout="constrained")
+        axes = figure.subplots()
+        axes.axvline(0, color="#444444", lw=0.8)
+        for height, (_, total) in enumerate(reversed(rows)):
+            _dot(axes, total, height, _GAIN, is_flat=True)
+        axes.set_yticks(range(len(rows)), [printable(name)[:60] for name, _ in reversed(rows)])
+        axes.set_ylim(-0.6, len(rows) - 0.4)
+        low, high = axes.get_xlim()
+        axes.set_xlim(min(low, -5), max(high, 5))  # a gain of nothing would be drawn on a scale of hundredths
+        axes.set_xlabel("gain, in points, and its 95 % interval")
+        axes.grid(axis="y", visible=False)
         return figure
 
-    told = "; ".join(f"{name} {100 * total.mean:+.1f} points" for name, total in found)
-    return Chart("Gain over blank frames", inline_svg(make), told)
+    description = "; ".join(f"{name} {100 * total.mean:+.1f} points" for name, total in rows)
+    return Chart("Gain over blank frames", inline_svg(draw), description)
 
 
 def _heat_map(run: ReportRun) -> Chart | None:
-    """Accuracy of a run by depth of the needle and size of the context; None where no task of it has depths."""
+    """Draw accuracy by depth of the needle and size of the context; None if no task of the run has depths."""
     tasks = {
         int(run.dataset(name).get("ctx_size") or 0): task
         for name, task in run.summary.summary.tasks.items()
@@ -158,25 +160,25 @@ def _heat_map(run: ReportRun) -> Chart | None:
     depths = sorted({depth for task in tasks.values() for depth in task.by_variant if depth.startswith(_DEPTH)})
     means = [[_percent(tasks[size].by_variant.get(depth), metric) for size in sizes] for depth in depths]
 
-    def make() -> Figure:
+    def draw() -> Figure:
         figure = Figure(figsize=(2.2 + 0.9 * len(sizes), 1.4 + 0.5 * len(depths)), layout="constrained")
-        place = figure.subplots()
-        place.grid(visible=False)
-        # A single-hued scale whose lightness alone tells, for colour-blind readers and for print.
-        picture = place.imshow(means, cmap="Blues", vmin=0, vmax=100, aspect="auto")
+        axes = figure.subplots()
+        axes.grid(visible=False)
+        # One hue: colour-blind readers and prints tell its values apart by lightness alone.
+        picture = axes.imshow(means, cmap="Blues", vmin=0, vmax=100, aspect="auto")
         for row, values in enumerate(means):
             for column, value in enumerate(values):
                 ink = "white" if value > 55 else "#222222"
                 text = "-" if math.isnan(value) else f"{value:.0f}"
-                place.text(column, row, text, ha="center", va="center", color=ink)
-        place.set_xticks(range(len(sizes)), [f"{size}K" if size else "all" for size in sizes])
-        place.set_yticks(range(len(depths)), [depth.removeprefix(_DEPTH) for depth in depths])
-        place.set_xlabel("context (thousand tokens)")
-        place.set_ylabel("depth of the needle")
-        figure.colorbar(picture, ax=place, label=f"{metric} (%)")
+                axes.text(column, row, text, ha="center", va="center", color=ink)
+        axes.set_xticks(range(len(sizes)), [f"{size}K" if size else "all" for size in sizes])
+        axes.set_yticks(range(len(depths)), [depth.removeprefix(_DEPTH) for depth in depths])
+        axes.set_xlabel("context (thousand tokens)")
+        axes.set_ylabel("depth of the needle")
+        figure.colorbar(picture, ax=axes, label=f"{metric} (%)")
         return figure
 
-    return Chart(f"{run.label}: accuracy by depth and size of the context", inline_svg(make), "see the table by depth")
+    return Chart(f"{run.label}: accuracy by depth and size of the context", inline_svg(draw), "see the table by depth")
 
 
 def _percent(cell: Cell | None, metric: str) -> float:

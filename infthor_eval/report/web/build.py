@@ -72,7 +72,7 @@ def build_page(runs: Sequence[ReportRun], request: PageRequest, progress: Replay
         title=_title(runs),
         version=infthor_eval.__version__,
         runs=[_about(run) for run in runs],
-        suites={name: _labels(same[0]) for name, same in by_suite.items()},
+        suites={name: _labels(runs, same) for name, same in by_suite.items()},
         sections=[section for section in sections if not section.is_empty],
         samples=samples,
         metrics=_metrics(runs, samples),
@@ -112,9 +112,9 @@ def _comparisons(suites: Iterable[Sequence[ReportRun]]) -> Iterator[Section]:
         yield Section("comparison", "Comparison", (), tuple(tables), tuple(notes))
 
 
-def _labels(run: ReportRun) -> SuiteLabels:
-    presenter = run.presenter
-    return SuiteLabels(presenter.target_label, presenter.reply_label, presenter.compares_scorers)
+def _labels(runs: Sequence[ReportRun], same: Sequence[ReportRun]) -> SuiteLabels:
+    presenter, places = same[0].presenter, tuple(runs.index(run) for run in same)
+    return SuiteLabels(places, presenter.target_label, presenter.reply_label, presenter.compares_scorers)
 
 
 def _metrics(runs: Sequence[ReportRun], samples: Sequence[Sample]) -> list[str]:

@@ -42,14 +42,16 @@ class About:
 
 
 class SuiteLabels(msgspec.Struct, frozen=True):
-    """Words for the samples of a suite.
+    """How the samples of a suite are shown.
 
     Attributes:
+        runs: places of the suite's runs among those of the page.
         target: what a sample's target is called.
         reply: what the reply to a sample is called.
         compares_scorers: whether samples can be filtered by disagreement of the metrics.
     """
 
+    runs: tuple[int, ...]
     target: str
     reply: str
     compares_scorers: bool
@@ -63,7 +65,7 @@ class Page:
         title: title of the page.
         version: version of the package that built it.
         runs: settings of the runs.
-        suites: words for samples, by suite.
+        suites: how samples are shown, by suite.
         sections: tables and charts; the first section is above the runs.
         samples: samples for the browser.
         metrics: names of the metrics, those that decide the outcome first.

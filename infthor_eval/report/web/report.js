@@ -49,6 +49,7 @@
   if (runs.length < 2) byId("differ").parentElement.hidden = true;
 
   const resultsOf = sample => sample.results.filter(Boolean);
+  const ofSuite = sample => suites[sample.suite].runs.map(at => [sample.results[at], at]); // with places of the runs
   const disagrees = result => {
     const scores = metrics.map(name => result.scores?.[name]).filter(score => score !== undefined);
     return new Set(scores).size > 1;
@@ -68,7 +69,7 @@
       && of.length > 0
       && (!value("outcome") || of.some(result => result.outcome === value("outcome")))
       && (!byId("disagree").checked || (suites[sample.suite].compares_scorers && of.some(disagrees)))
-      && (!byId("differ").checked || new Set(sample.results.map(result => result?.outcome)).size > 1)
+      && (!byId("differ").checked || new Set(ofSuite(sample).map(([result]) => result?.outcome)).size > 1)
       && texts[at].includes(value("search").trim().toLowerCase());
   };
 
@@ -77,7 +78,7 @@
   const list = byId("list");
   const item = place => {
     const sample = samples[shown[place]];
-    const marks = make("span", {}, ...sample.results.map((result, at) => mark(result, runs[at])));
+    const marks = make("span", {}, ...ofSuite(sample).map(([result, at]) => mark(result, runs[at])));
     const facts = [sample.kind, sample.variant, sample.cluster].filter(Boolean).map(text => make("span", {}, text));
     const element = make("div", { class: "item", role: "option", "data-place": place, id: `item-${place}` },
       make("div", { class: "q" }, sample.title), make("div", { class: "of" }, marks, ...facts));
@@ -136,7 +137,7 @@
   const results = sample => {
     const names = metrics.filter(name => resultsOf(sample).some(result => result.scores?.[name] !== undefined));
     const head = ["run", "", suites[sample.suite].reply, ...names, "seconds", "tokens"];
-    const rows = sample.results.map((result, at) => {
+    const rows = ofSuite(sample).map(([result, at]) => {
       if (!result) return make("tr", {}, make("td", {}, runs[at]), make("td", {}, mark(null, runs[at])), make("td", { class: "note" }, "not evaluated"));
       const reason = [result.reason, ...(result.faults ?? [])].filter(Boolean).join("; ");
       const reply = make("td", {}, result.reply ?? "", reason ? make("span", { class: "note" }, ` (${reason})`) : "");

@@ -10,6 +10,7 @@ from infthor_eval.tables import Column, Row, Table, interval_cell
 __all__ = ["costs_table", "left_out_table", "primary_metrics_table"]
 
 _NAMES = (Column("run", False), Column("task", False))
+_MEASURABLE_S = 0.05  # less is the clock's noise: baselines take microseconds
 
 
 def primary_metrics_table(runs: Sequence[ReportRun]) -> Table:
@@ -46,7 +47,7 @@ def costs_table(runs: Sequence[ReportRun]) -> Table:
 
 def _cost_row(run: ReportRun) -> Row:
     seconds = sum(record.seconds for record in run.records)
-    rate = f"{len(run.records) / seconds:.2f}" if seconds else "-"
+    rate = f"{len(run.records) / seconds:,.2f}" if seconds >= _MEASURABLE_S else "-"
     usage = run.usage
     cached = "-" if usage.hit_rate is None else f"{100 * usage.hit_rate:.1f}"
     counts = f"{usage.requests:,}", f"{usage.context:,}", cached, f"{usage.reply:,}"

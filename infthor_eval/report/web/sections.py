@@ -1,4 +1,4 @@
-"""What a page is made of, before it is known how it looks."""
+"""Parts of a page as values: sections with charts and tables."""
 
 from dataclasses import dataclass
 
@@ -9,17 +9,17 @@ __all__ = ["Chart", "Section"]
 
 @dataclass(frozen=True)
 class Chart:
-    """A picture.
+    """A chart.
 
     Attributes:
-        title: above it.
-        svg: the picture, to stand in the page.
-        told: what it shows, in words, for those who do not see it.
+        title: heading of the chart.
+        svg: the chart as an SVG element.
+        description: contents in words, for screen readers.
     """
 
     title: str
     svg: str
-    told: str
+    description: str
 
 
 @dataclass(frozen=True)
@@ -27,11 +27,11 @@ class Section:
     """A part of the page.
 
     Attributes:
-        key: of links to it; letters and hyphens.
-        title: its heading.
-        charts: above the tables.
-        tables: with the numbers.
-        notes: what must be said, a paragraph each.
+        key: anchor of links to the section; letters and hyphens.
+        title: heading of the section.
+        charts: charts, above the tables.
+        tables: tables with the numbers.
+        notes: remarks, a paragraph each.
     """
 
     key: str
@@ -42,5 +42,5 @@ class Section:
 
     @property
     def is_empty(self) -> bool:
-        """Whether there is nothing in it."""
+        """Whether the section has no contents."""
         return not (self.charts or self.tables or self.notes)

@@ -1,4 +1,4 @@
-"""Small pictures for a page, each once, within a budget of bytes."""
+"""Thumbnails for a page, each once, up to a total size."""
 
 import base64
 import io
@@ -8,61 +8,61 @@ from PIL import Image
 
 __all__ = ["Thumbnails"]
 
-_QUALITY = 55  # of WebP; at 132 pixels a frame takes some three kilobytes
+_QUALITY = 55  # of WebP: about 3 kB for a frame of 132 pixels, so that thousands fit into a page
 
 
 class Thumbnails:
-    """Pictures by number; whoever comes first gets the room."""
+    """Thumbnails by number; pictures that come first get the room."""
 
     def __init__(self, budget: int, side: int = 132) -> None:
-        """Begin with none.
+        """Start without pictures.
 
         Args:
-            budget: bytes of all pictures together, as they stand in the page.
-            side: pixels of the longer side of a picture.
+            budget: maximum size of all pictures together, in bytes of base64.
+            side: length of a picture's longer side in pixels.
         """
         self._left = budget
         self._side = side
-        self._made: list[str] = []
+        self._encoded: list[str] = []
         self._numbers: dict[str, int | None] = {}
 
     @property
     def encoded(self) -> list[str]:
-        """All pictures, by their numbers, as WebP in base64."""
-        return self._made
+        """All pictures as WebP in base64, in the order of their numbers."""
+        return self._encoded
 
     @property
     def n_left_out(self) -> int:
-        """Pictures that there was no room for."""
+        """Number of pictures that there was no room for."""
         return sum(number is None for number in self._numbers.values())
 
     def add(self, key: str, load: Callable[[], Image.Image], side: int | None = None) -> int | None:
-        """The number of a picture.
+        """Add a picture, unless it was added before.
 
         Args:
-            key: what it is known by; the same key is the same picture.
-            load: gives it.
-            side: pixels of its longer side, if it is not like the others.
+            key: name of the picture; the same name is the same picture.
+            load: loads the picture.
+            side: length of its longer side, if it differs from that of the others.
 
         Returns:
-            None where there is no room for it.
+            Its number, or None if there is no room for it.
         """
         if key not in self._numbers:
             self._numbers[key] = self._add(load, side or self._side) if self._left > 0 else None
         return self._numbers[key]
 
     def _add(self, load: Callable[[], Image.Image], side: int) -> int | None:
-        encoded = _encoded(load(), side)
+        encoded = _encode(load(), side)
         self._left -= len(encoded)
         if self._left < 0:
             return None
-        self._made.append(encoded)
-        return len(self._made) - 1
+        self._encoded.append(encoded)
+        return len(self._encoded) - 1
 
 
-def _encoded(picture: Image.Image, side: int) -> str:
+def _encode(picture: Image.Image, side: int) -> str:
     small = picture.convert("RGB")
     small.thumbnail((side, side), Image.Resampling.LANCZOS)
-    written = io.BytesIO()
-    small.save(written, format="webp", quality=_QUALITY, method=4)
-    return base64.b64encode(written.getvalue()).decode("ascii")
+    encoded = io.BytesIO()
+    small.save(encoded, format="webp", quality=_QUALITY, method=4)
+    return base64.b64encode(encoded.getvalue()).decode("ascii")

@@ -54,7 +54,13 @@ def browser() -> Iterator[Any]:
 
 
 class Opened:
-    """A page in a browser, with what went wrong in it."""
+    """A page in a browser.
+
+    Attributes:
+        tab: the browser's tab.
+        errors: messages of what went wrong in it.
+        requests: addresses that it asked for.
+    """
 
     def __init__(self, browser: Any, path: Path, **options: Any) -> None:
         self.tab = browser.new_page(viewport={"width": 1400, "height": 1000}, **options)
@@ -67,12 +73,12 @@ class Opened:
 
 
 @pytest.fixture
-def opened(browser: Any, tmp_path: Path) -> Callable[..., Opened]:
+def open_page(browser: Any, tmp_path: Path) -> Callable[..., Opened]:
     """Writes a page and opens it from its file."""
 
-    def opened(page: Page, **options: Any) -> Opened:
+    def open_page(page: Page, **options: Any) -> Opened:
         path = tmp_path / "report.html"
         write_page(page, path)
         return Opened(browser, path, **options)
 
-    return opened
+    return open_page

@@ -19,17 +19,17 @@ def count(tab):
     return tab.locator("#count").inner_text()
 
 
-def test_it_opens_without_errors_and_fetches_nothing(page, opened):
-    found = opened(page)
-    assert count(found.tab) == f"{len(page.samples)} of {len(page.samples)}"
-    assert found.tab.locator("#sample h3").inner_text() == page.samples[0].title
-    assert found.tab.locator("figure.chart svg").count() == sum(len(section.charts) for section in page.sections)
-    assert found.errors == []
-    assert all(url.startswith(("file:", "data:")) for url in found.requests)
+def test_it_opens_without_errors_and_fetches_nothing(page, open_page):
+    opened = open_page(page)
+    assert count(opened.tab) == f"{len(page.samples)} of {len(page.samples)}"
+    assert opened.tab.locator("#sample h3").inner_text() == page.samples[0].title
+    assert opened.tab.locator("figure.chart svg").count() == sum(len(section.charts) for section in page.sections)
+    assert opened.errors == []
+    assert all(url.startswith(("file:", "data:")) for url in opened.requests)
 
 
-def test_filters_show_what_they_say(page, opened):
-    tab = opened(page).tab
+def test_filters_show_what_they_say(page, open_page):
+    tab = open_page(page).tab
     blind = next(at for at, run in enumerate(page.runs) if run.label == "blind")
     tab.select_option("#run", label="blind")
     tab.select_option("#outcome", "wrong")
@@ -52,8 +52,8 @@ def test_filters_show_what_they_say(page, opened):
     assert tab.locator("#sample h3").inner_text() == page.samples[3].title
 
 
-def test_pictures_of_a_sample_load(page, opened):
-    tab = opened(page).tab
+def test_pictures_of_a_sample_load(page, open_page):
+    tab = open_page(page).tab
     tab.locator("#sample").scroll_into_view_if_needed()
     tab.eval_on_selector_all("#sample img", "them => Promise.all(them.map(it => it.decode())).then(() => true)")
     widths = tab.eval_on_selector_all("#sample img", "them => them.map(it => it.naturalWidth)")
@@ -61,24 +61,24 @@ def test_pictures_of_a_sample_load(page, opened):
     assert all(width > 100 for width in widths)
 
 
-def test_keys_go_through_the_samples(page, opened):
-    found = opened(page)
+def test_keys_go_through_the_samples(page, open_page):
+    opened = open_page(page)
     for key, place in (("j", 1), ("j", 2), ("k", 1)):
-        found.tab.keyboard.press(key)
-        assert found.tab.locator('[aria-selected="true"]').get_attribute("data-place") == str(place)
-        assert found.tab.locator("#sample h3").inner_text() == page.samples[place].title
-    found.tab.keyboard.press("/")
-    found.tab.keyboard.type("jk")  # letters of a search, not keys
-    assert found.tab.input_value("#search") == "jk"
-    found.tab.keyboard.press("Escape")
-    found.tab.keyboard.press("t")
-    assert found.tab.evaluate("document.documentElement.dataset.theme") == "dark"
-    assert found.errors == []
+        opened.tab.keyboard.press(key)
+        assert opened.tab.locator('[aria-selected="true"]').get_attribute("data-place") == str(place)
+        assert opened.tab.locator("#sample h3").inner_text() == page.samples[place].title
+    opened.tab.keyboard.press("/")
+    opened.tab.keyboard.type("jk")  # letters of a search, not keys
+    assert opened.tab.input_value("#search") == "jk"
+    opened.tab.keyboard.press("Escape")
+    opened.tab.keyboard.press("t")
+    assert opened.tab.evaluate("document.documentElement.dataset.theme") == "dark"
+    assert opened.errors == []
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_text_can_be_read_in_both_schemes(page, opened, scheme):
-    tab = opened(page, color_scheme=scheme).tab
+def test_text_can_be_read_in_both_schemes(page, open_page, scheme):
+    tab = open_page(page, color_scheme=scheme).tab
     ink, paper = (
         tab.evaluate(f"getComputedStyle(document.body).{name}").removeprefix("rgb(").split(",")[0]
         for name in ("color", "backgroundColor")
@@ -88,7 +88,7 @@ def test_text_can_be_read_in_both_schemes(page, opened, scheme):
     assert in_chart == tab.evaluate("getComputedStyle(document.body).color")
 
 
-def test_hostile_text_stays_text(page, opened):
+def test_hostile_text_stays_text(page, open_page):
     sample = page.samples[0]
     results = tuple(
         msgspec.structs.replace(it, reply=HOSTILE, reason=HOSTILE, faults=(HOSTILE,)) for it in sample.results
@@ -97,28 +97,28 @@ def test_hostile_text_stays_text(page, opened):
         sample, title=HOSTILE, target=HOSTILE, kind=HOSTILE, cluster=HOSTILE, variant=HOSTILE, results=results
     )
     runs = [page.runs[0].__class__(HOSTILE, ((HOSTILE, HOSTILE),), HOSTILE, HOSTILE) for _ in page.runs]
-    found = opened(page.__class__(**(vars(page) | {"samples": [hostile], "runs": runs, "title": HOSTILE})))
-    assert found.tab.locator("#sample h3").inner_text().startswith("</script><img")
-    assert found.tab.evaluate("window.hacked") is None
-    assert found.tab.locator("#sample img[onerror], #list img, main img[src=x]").count() == 0
-    assert found.errors == []
+    opened = open_page(page.__class__(**(vars(page) | {"samples": [hostile], "runs": runs, "title": HOSTILE})))
+    assert opened.tab.locator("#sample h3").inner_text().startswith("</script><img")
+    assert opened.tab.evaluate("window.hacked") is None
+    assert opened.tab.locator("#sample img[onerror], #list img, main img[src=x]").count() == 0
+    assert opened.errors == []
 
 
-def test_an_episode_has_its_steps_and_its_map(make_page, scripted_run, opened):
+def test_an_episode_has_its_steps_and_its_map(make_page, scripted_run, open_page):
     page = make_page(scripted_run, data=DATA, episodes=2)
-    found = opened(page)
+    opened = open_page(page)
     place = next(at for at, sample in enumerate(page.samples) if sample.results[0].map is not None)
     for _ in range(place):
-        found.tab.keyboard.press("j")
+        opened.tab.keyboard.press("j")
     steps = page.samples[place].results[0].steps
-    assert found.tab.locator(".steps tbody tr").count() == len(steps) + 1
-    assert found.tab.locator("img.map").evaluate("it => it.naturalWidth") == 300
-    assert found.errors == []
+    assert opened.tab.locator(".steps tbody tr").count() == len(steps) + 1
+    assert opened.tab.locator("img.map").evaluate("it => it.naturalWidth") == 300
+    assert opened.errors == []
 
 
-def test_many_samples_are_put_into_the_list_as_it_is_scrolled(page, opened):
+def test_many_samples_are_put_into_the_list_as_it_is_scrolled(page, open_page):
     many = page.__class__(**(vars(page) | {"samples": list(page.samples) * 10}))
-    tab = opened(many).tab
+    tab = open_page(many).tab
     assert tab.locator(".item").count() < len(many.samples)
     for _ in range(3):
         tab.locator("#list").evaluate("it => it.scrollTo(0, it.scrollHeight)")

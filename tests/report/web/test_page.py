@@ -23,7 +23,7 @@ def page_of(text, n_samples=1):
     sample = Sample("nieh", text, text, text, text, (Result("right", text, {"strict": 1.0}, text),), text, text)
     table = Table(text, (Column(text),), (Row((text,)),), (text,))
     about = About(text, ((text, text),), text, text)
-    labels = {"nieh": SuiteLabels(text, text, True)}
+    labels = {"nieh": SuiteLabels((0,), text, text, True)}
     sections = [Section("key", text, (), (table,), (text,))]
     return Page(text, "0", [about], labels, sections, [sample] * n_samples, ["strict"], [])
 

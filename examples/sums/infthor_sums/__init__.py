@@ -1,0 +1,1 @@
+"""A suite for infthor-eval: models add two numbers."""

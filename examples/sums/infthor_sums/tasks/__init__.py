@@ -1,0 +1,1 @@
+"""Task files; there is no code here."""
