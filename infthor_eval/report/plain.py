@@ -11,7 +11,7 @@ from infthor_eval.report.presenter import Description, Figure, Replay, Timelines
 from infthor_eval.report.runs import ReportRun
 from infthor_eval.report.web.samples import StepRow
 from infthor_eval.report.web.sections import Chart, Section
-from infthor_eval.report.web.thumbnails import Thumbnails
+from infthor_eval.report.web.thumbnails import ThumbnailStore
 from infthor_eval.runs import UnitRecord
 
 __all__ = ["PlainPresenter"]
@@ -61,7 +61,7 @@ class PlainPresenter:
         """See `Presenter.steps`: none."""
         return ()
 
-    def timelines(self, runs: Sequence[ReportRun], data: Path | None, thumbnails: Thumbnails) -> Timelines:
+    def timelines(self, runs: Sequence[ReportRun], data: Path | None, thumbnails: ThumbnailStore) -> Timelines:
         """See `Presenter.timelines`: none."""
         return Timelines()
 

@@ -15,21 +15,21 @@ from PIL import Image
 from infthor_eval.report.runs import ReportRun
 from infthor_eval.report.web.samples import StepRow, Timeline
 from infthor_eval.report.web.sections import Chart, Section
-from infthor_eval.report.web.thumbnails import Thumbnails
+from infthor_eval.report.web.thumbnails import ThumbnailStore
 from infthor_eval.runs import UnitKey, UnitRecord
 from infthor_eval.tables import Table
 
 __all__ = [
     "Description",
+    "EpisodeSelection",
     "Figure",
     "FigureRequest",
     "FigureResult",
+    "OpenReplay",
     "Presenter",
     "Recording",
     "Replay",
     "ReplayFrame",
-    "ReplaySession",
-    "Selection",
     "Timelines",
 ]
 
@@ -108,7 +108,7 @@ class Figure:
 
 
 @dataclass(frozen=True)
-class Selection:
+class EpisodeSelection:
     """The episodes of a run to replay; None stands for all, or for the only one where one is needed.
 
     Attributes:
@@ -140,7 +140,7 @@ class ReplayFrame(Protocol):
         ...
 
 
-class ReplaySession(Protocol):
+class OpenReplay(Protocol):
     """A simulator in which recorded episodes of one trajectory are replayed."""
 
     @property
@@ -174,7 +174,7 @@ class Recording:
     tasks: Sequence[str]
     records: Sequence[Record]
     simulator: str
-    open: Callable[[Path | None, Path | None], AbstractContextManager[ReplaySession]]
+    open: Callable[[Path | None, Path | None], AbstractContextManager[OpenReplay]]
 
 
 class Replay(Protocol):
@@ -190,7 +190,7 @@ class Replay(Protocol):
     options: Collection[str]
     sheet_rows: int
 
-    def select(self, run: ReportRun, selection: Selection) -> Recording:
+    def select(self, run: ReportRun, selection: EpisodeSelection) -> Recording:
         """Find the selected episodes in a run.
 
         Raises:
@@ -268,7 +268,7 @@ class Presenter(Protocol):
         """Return the steps of a recorded episode; empty if it has none."""
         ...
 
-    def timelines(self, runs: Sequence[ReportRun], data: Path | None, thumbnails: Thumbnails) -> Timelines:
+    def timelines(self, runs: Sequence[ReportRun], data: Path | None, thumbnails: ThumbnailStore) -> Timelines:
         """Find the frames that the samples of some runs are about.
 
         Args:

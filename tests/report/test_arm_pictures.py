@@ -13,8 +13,8 @@ from infthor_eval.manipulation.replay_frames import ArmFrame, ArmObservation, Ep
 from infthor_eval.report.figures.curve_tables import curves_table, one_panel
 from infthor_eval.report.figures.curves import draw_curves
 from infthor_eval.report.figures.radius import draw_radii, radii_table
-from infthor_eval.report.recordings.arm_pictures import arm_pictures, draw_arm_moment, draw_arm_title
-from infthor_eval.report.recordings.canvas import END_HELD, SIZE, TITLE_HELD
+from infthor_eval.report.recordings.arm_pictures import arm_pictures, draw_arm_frame, draw_arm_title
+from infthor_eval.report.recordings.canvas import END_REPEATS, SIZE, TITLE_REPEATS
 from infthor_eval.report.recordings.episode_sheet import COLUMNS, draw_sheet, shown_steps
 from infthor_eval.report.recordings.reach_view import draw_reach
 
@@ -99,23 +99,23 @@ def test_success_by_radius_is_drawn_with_its_floor(tmp_path):
 
 def test_an_episode_has_its_title_its_start_and_its_end_held():
     found = list(arm_pictures([START, END], "a run"))
-    assert len(found) == TITLE_HELD + 1 + END_HELD
+    assert len(found) == TITLE_REPEATS + 1 + END_REPEATS
     assert {(picture.size, picture.mode) for picture in found} == {(SIZE, "RGB")}
     idle = replace(START, observation=None, ending="left out: no room")
-    assert len(list(arm_pictures([idle], "a run"))) == TITLE_HELD
+    assert len(list(arm_pictures([idle], "a run"))) == TITLE_REPEATS
     assert RED in colours(draw_arm_title(idle, ""))
     with pytest.raises(ValueError, match="nothing to be seen"):
-        draw_arm_moment(idle, "")
+        draw_arm_frame(idle, "")
 
 
 def test_the_ending_is_green_or_red_and_what_is_told_is_written():
     lost = replace(END, ending="step limit", done=False)
-    assert GREEN in colours(draw_arm_moment(END, ""))
-    assert RED in colours(draw_arm_moment(lost, ""))
-    assert not {GREEN, RED} & colours(draw_arm_moment(START, ""))
-    plain = draw_arm_moment(END, "").tobytes()
+    assert GREEN in colours(draw_arm_frame(END, ""))
+    assert RED in colours(draw_arm_frame(lost, ""))
+    assert not {GREEN, RED} & colours(draw_arm_frame(START, ""))
+    plain = draw_arm_frame(END, "").tobytes()
     for change in ({"refusals": ("Collided",)}, {"note": "differs"}, {"requests": ("other",)}, {"n_collisions": 3}):
-        assert draw_arm_moment(replace(END, **change), "").tobytes() != plain
+        assert draw_arm_frame(replace(END, **change), "").tobytes() != plain
 
 
 def test_the_reach_shows_hand_and_target_and_not_what_lies_beside():

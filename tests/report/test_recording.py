@@ -14,8 +14,15 @@ from infthor_eval.plans.replay_frames import (
     PlanTitle,
     RoomMap,
 )
-from infthor_eval.report.recordings.fonts import fitted, font, lines_of, one_line
-from infthor_eval.report.recordings.plan_pictures import END_HELD, SIZE, TITLE_HELD, draw_moment, draw_title, pictures
+from infthor_eval.report.recordings.fonts import break_lines, fit_line, font, one_line
+from infthor_eval.report.recordings.plan_pictures import (
+    END_REPEATS,
+    SIZE,
+    TITLE_REPEATS,
+    draw_plan_frame,
+    draw_plan_title,
+    pictures,
+)
 from infthor_eval.report.recordings.room_map import draw_map
 
 FLOOR = tuple((x * 0.25, z * 0.25) for x in range(8) for z in range(8))
@@ -42,61 +49,61 @@ def words(picture):
 
 def test_a_plan_has_its_title_its_start_and_its_end_held():
     found = list(pictures([START, END, START], "a run"))
-    assert len(found) == TITLE_HELD + 1 + END_HELD + TITLE_HELD + 1
+    assert len(found) == TITLE_REPEATS + 1 + END_REPEATS + TITLE_REPEATS + 1
     assert {(picture.size, picture.mode) for picture in found} == {(SIZE, "RGB")}
     assert all(side % 2 == 0 for side in SIZE)
 
 
 def test_of_a_plan_that_was_never_begun_the_title_alone_is_shown():
     idle = PlanFrame(title=TITLE, observation=None, rewards=START.rewards, ending="not attempted")
-    assert len(list(pictures([idle], "a run"))) == TITLE_HELD
-    assert RED in colours(draw_title(idle, "a run"))
-    assert RED not in colours(draw_title(START, "a run"))
+    assert len(list(pictures([idle], "a run"))) == TITLE_REPEATS
+    assert RED in colours(draw_plan_title(idle, "a run"))
+    assert RED not in colours(draw_plan_title(START, "a run"))
     with pytest.raises(ValueError, match="nothing to be seen"):
-        draw_moment(idle, "a run")
+        draw_plan_frame(idle, "a run")
 
 
 def test_the_ending_is_green_where_the_plan_is_done_and_red_where_it_is_not():
     ends = [END, replace(END, ending="step limit", done=False)]
-    assert [draw_moment(moment, "").getpixel(BADGE) for moment in ends] == [GREEN, RED]
-    assert not {GREEN, RED} & colours(draw_moment(START, ""))
+    assert [draw_plan_frame(moment, "").getpixel(BADGE) for moment in ends] == [GREEN, RED]
+    assert not {GREEN, RED} & colours(draw_plan_frame(START, ""))
 
 
 def test_the_same_moments_are_the_same_pictures():
-    one, other = (draw_moment(END, "a run").tobytes() for _ in range(2))
+    one, other = (draw_plan_frame(END, "a run").tobytes() for _ in range(2))
     assert one == other
 
 
 def test_reply_fault_and_difference_are_each_written():
-    plain = draw_moment(END, "")
+    plain = draw_plan_frame(END, "")
     for change in (
         {"reply": "take it"},
         {"wrong": "no Mug in sight"},
         {"note": "it earns 2"},
         {"action": "RotateLeft"},
     ):
-        assert not np.array_equal(words(draw_moment(replace(END, **change), "")), words(plain))
+        assert not np.array_equal(words(draw_plan_frame(replace(END, **change), "")), words(plain))
 
 
 def test_whatever_a_model_says_there_is_room_for_it():
     wild = f"{LONG}\n\x1b[31m\u202e\x00{'x' * 5000}"
     title = replace(TITLE, text=wild, goal=wild)
     moment = replace(END, title=title, action=wild, reply=wild, wrong=wild, note=wild, ending=wild)
-    shown = np.asarray(draw_moment(moment, wild))
+    shown = np.asarray(draw_plan_frame(moment, wild))
     assert (shown[-4:] == 255).all()  # nothing runs out at the bottom
     assert (shown[660:, 858:876] == 255).all()  # nor into the rewards
-    draw_title(moment, wild)
+    draw_plan_title(moment, wild)
 
 
 def test_lines_are_broken_between_words_and_cut():
     face = font(16)
-    lines = lines_of(LONG, face, 300, 2)
+    lines = break_lines(LONG, face, 300, 2)
     assert len(lines) == 2
     assert all(face.getlength(line) <= 300 for line in lines)
     assert lines[1].endswith("…")
-    assert lines_of("", face, 300, 2) == []
-    assert lines_of("x" * 900, face, 300, 3)[0].endswith("…")
-    assert fitted("short", face, 300) == "short"
+    assert break_lines("", face, 300, 2) == []
+    assert break_lines("x" * 900, face, 300, 3)[0].endswith("…")
+    assert fit_line("short", face, 300) == "short"
     assert one_line("a\n b\x1b") == "a b\\x1b"
 
 

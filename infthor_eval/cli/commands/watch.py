@@ -62,7 +62,7 @@ def command(
     from infthor_eval.errors import UsageError
     from infthor_eval.formats.animations import require_animation_name
     from infthor_eval.formats.files import prepare_file
-    from infthor_eval.report.presenter import Selection
+    from infthor_eval.report.presenter import EpisodeSelection
     from infthor_eval.report.runs import read_report_runs
     from infthor_eval.suites import find_presenter, find_suite
 
@@ -75,7 +75,9 @@ def command(
     _refuse_options(recorded, replay, {"--plans": plans, "--episode": episode, "--sheet": sheet})
     if sheet is not None and out is not None:
         raise UsageError("--sheet and --out: one picture or a recording; give one of the two")
-    selection = Selection(task, trajectory, plans, episode, most=replay.sheet_rows if sheet is not None else None)
+    selection = EpisodeSelection(
+        task, trajectory, plans, episode, most=replay.sheet_rows if sheet is not None else None
+    )
     recording = replay.select(recorded, selection)
     choice = [text.strip() for text in (plans, episode) if text is not None]
     parts = [recorded.header.name, *recording.tasks, recording.trajectory, *choice]

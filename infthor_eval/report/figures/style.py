@@ -20,9 +20,8 @@ from infthor_eval.terminal import printable
 
 __all__ = ["BOUND", "LEGEND", "Look", "add_legend", "add_words", "inline_svg", "looks_of", "save_figure"]
 
-# Okabe and Ito's colours, which colour-blind readers can tell apart, without yellow (too faint for a line) and black (the
-# bound's). If there are more runs than colours, the next ones take them again with another style of line; dashes are
-# the bound's.
+# Okabe and Ito's colours, which colour-blind readers can tell apart, without yellow (too faint for a line) and black
+# (the bound's). Runs beyond their number take them again with another style of line; dashes are the bound's.
 _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 _STYLES = ("solid", "dotted", "dashdot")
 _SETTINGS: dict[Any, Any] = {

@@ -1,4 +1,4 @@
-"""Moments of an arm as pictures for people: frame and reach beside each other, and beneath them what was asked."""
+"""Frames of an arm's replayed episodes as pictures: the view beside the arm's reach, and the request below."""
 
 from collections.abc import Iterable, Iterator
 
@@ -9,12 +9,12 @@ from infthor_eval.report.recordings.canvas import (
     BAD,
     FAINT,
     PANE,
-    TITLE_HELD,
+    TITLE_REPEATS,
     WARN,
     Line,
-    card,
-    held,
-    page,
+    draw_panes,
+    repeat_end,
+    title_card,
     write_in_hand,
     write_lines,
     write_numbers,
@@ -22,68 +22,70 @@ from infthor_eval.report.recordings.canvas import (
 from infthor_eval.report.recordings.fonts import one_line
 from infthor_eval.report.recordings.reach_view import draw_reach
 
-__all__ = ["arm_pictures", "draw_arm_moment", "draw_arm_title"]
+__all__ = ["arm_pictures", "draw_arm_frame", "draw_arm_title"]
 
 
-def arm_pictures(moments: Iterable[ArmFrame], heading: str) -> Iterator[Image.Image]:
-    """All pictures of some moments: before each episode its title, and its end held.
+def arm_pictures(frames: Iterable[ArmFrame], heading: str) -> Iterator[Image.Image]:
+    """Draw all pictures of some frames: before each episode its title, and its end several times.
 
     Args:
-        moments: in time order.
-        heading: above each picture: which run, which trajectory.
+        frames: frames in time order.
+        heading: text above each picture: run and trajectory.
     """
-    for moment in moments:
-        if moment.number == 0:
-            yield from [draw_arm_title(moment, heading)] * TITLE_HELD
-        if moment.observation is not None:
-            yield from held(draw_arm_moment(moment, heading), is_end=bool(moment.ending))
+    for frame in frames:
+        if frame.number == 0:
+            yield from [draw_arm_title(frame, heading)] * TITLE_REPEATS
+        if frame.observation is not None:
+            yield from repeat_end(draw_arm_frame(frame, heading), is_end=bool(frame.ending))
 
 
-def draw_arm_title(moment: ArmFrame, heading: str) -> Image.Image:
-    """The card before an episode; of one in which nobody acted it says why."""
-    title = moment.title
+def draw_arm_title(frame: ArmFrame, heading: str) -> Image.Image:
+    """Draw the card before an episode; for an episode in which nobody acted it has the reason."""
+    title = frame.title
     place = f"{title.kind}, episode {title.number} of {title.n_episodes} (the expert's action {title.action})"
-    told = f"radius of the hand's sphere {title.radius:g} m; a success earns {moment.max_reward:g} points"
+    told = f"radius of the hand's sphere {title.radius:g} m; a success earns {frame.max_reward:g} points"
     lines = [
         Line("", place, 26, colour=FAINT),
         Line("", one_line(title.instruction), 46, "-Bold", most=2),
         Line("", told, 20, colour=FAINT),
-        Line("", one_line(moment.ending) if moment.observation is None else "", 24, "-Bold", BAD, most=3),
+        Line("", one_line(frame.ending) if frame.observation is None else "", 24, "-Bold", BAD, most=3),
     ]
-    return card(heading, lines)
+    return title_card(heading, lines)
 
 
-def draw_arm_moment(moment: ArmFrame, heading: str) -> Image.Image:
-    """A moment that there is something to be seen of.
+def draw_arm_frame(frame: ArmFrame, heading: str) -> Image.Image:
+    """Draw a frame.
 
     Raises:
-        ValueError: there is not.
+        ValueError: it has no observation.
     """
-    if moment.observation is None:
-        raise ValueError("there is nothing to be seen of this moment")
-    picture, pen = page(heading, Image.fromarray(moment.observation.frame), draw_reach(moment.observation.reach, PANE))
-    write_lines(pen, _lines(moment))
+    if frame.observation is None:
+        raise ValueError("the frame has no observation")
+    picture, pen = draw_panes(
+        heading, Image.fromarray(frame.observation.frame), draw_reach(frame.observation.reach, PANE)
+    )
+    write_lines(pen, _lines(frame))
     numbers = [
-        ("distance to the target", _metres(moment.distance)),
-        ("closest so far", _metres(moment.closest)),
-        ("collisions so far", str(moment.n_collisions)),
+        ("distance to the target", _metres(frame.distance)),
+        ("closest so far", _metres(frame.closest)),
+        ("collisions so far", str(frame.n_collisions)),
     ]
     write_numbers(pen, numbers)
-    reward = f": {moment.reward:g} of {moment.max_reward:g} points" if moment.ending else ""
-    write_in_hand(pen, moment.observation.held, moment.ending + reward, is_good=moment.done)
+    reward = f": {frame.reward:g} of {frame.max_reward:g} points" if frame.ending else ""
+    write_in_hand(pen, frame.observation.held, frame.ending + reward, is_good=frame.done)
     return picture
 
 
-def _lines(moment: ArmFrame) -> list[Line]:
-    title = moment.title
+def _lines(frame: ArmFrame) -> list[Line]:
+    title = frame.title
     lines = [Line(f"{title.kind} {title.number} of {title.n_episodes}", title.instruction, 22, "-Bold")]
-    label = f"step {moment.number} of {title.n_steps}"
-    if moment.number:
-        lines += [Line(label if not n else "", text, 16, "Mono", most=2) for n, text in enumerate(moment.requests)]
+    label = f"step {frame.number} of {title.n_steps}"
+    if frame.number:
+        lines += [Line(label if not n else "", text, 16, "Mono", most=2) for n, text in enumerate(frame.requests)]
     else:
         lines.append(Line("", "the episode begins", 18, colour=FAINT))
-    lines += [Line("refused", "; ".join(moment.refusals), 16, colour=BAD, most=2)] if moment.refusals else []
-    lines += [Line("differs", moment.note, 15, colour=WARN, most=2)] if moment.note else []
+    lines += [Line("refused", "; ".join(frame.refusals), 16, colour=BAD, most=2)] if frame.refusals else []
+    lines += [Line("differs", frame.note, 15, colour=WARN, most=2)] if frame.note else []
     return lines
 
 

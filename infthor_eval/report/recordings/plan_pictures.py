@@ -1,4 +1,4 @@
-"""Moments of an agent as pictures for people: frame and map beside each other, and beneath them what was done."""
+"""Frames of replayed plans as pictures: the agent's view beside a map, and the action below."""
 
 from collections.abc import Iterable, Iterator
 
@@ -7,16 +7,16 @@ from PIL import Image
 from infthor_eval.plans.replay_frames import PlanFrame, PlanTitle
 from infthor_eval.report.recordings.canvas import (
     BAD,
-    END_HELD,
+    END_REPEATS,
     FAINT,
     PANE,
     SIZE,
-    TITLE_HELD,
+    TITLE_REPEATS,
     WARN,
     Line,
-    card,
-    held,
-    page,
+    draw_panes,
+    repeat_end,
+    title_card,
     write_bar,
     write_in_hand,
     write_lines,
@@ -25,75 +25,75 @@ from infthor_eval.report.recordings.canvas import (
 from infthor_eval.report.recordings.fonts import one_line
 from infthor_eval.report.recordings.room_map import draw_map
 
-__all__ = ["END_HELD", "SIZE", "TITLE_HELD", "draw_moment", "draw_title", "pictures"]
+__all__ = ["END_REPEATS", "SIZE", "TITLE_REPEATS", "draw_plan_frame", "draw_plan_title", "plan_pictures"]
 
 
-def pictures(moments: Iterable[PlanFrame], heading: str) -> Iterator[Image.Image]:
-    """All pictures of some moments: before each plan its title, and its end held.
+def plan_pictures(frames: Iterable[PlanFrame], heading: str) -> Iterator[Image.Image]:
+    """Draw all pictures of some frames: before each plan its title, and its end several times.
 
     Args:
-        moments: in time order.
-        heading: above each picture: which run, which trajectory.
+        frames: frames in time order.
+        heading: text above each picture: run and trajectory.
     """
-    for moment in moments:
-        if moment.number == 0:
-            title = draw_title(moment, heading)
-            yield from [title] * TITLE_HELD
-        if moment.observation is not None:
-            yield from held(draw_moment(moment, heading), is_end=bool(moment.ending))
+    for frame in frames:
+        if frame.number == 0:
+            title = draw_plan_title(frame, heading)
+            yield from [title] * TITLE_REPEATS
+        if frame.observation is not None:
+            yield from repeat_end(draw_plan_frame(frame, heading), is_end=bool(frame.ending))
 
 
-def draw_title(moment: PlanFrame, heading: str) -> Image.Image:
-    """The card before a plan; of one that was never begun it says why."""
-    title = moment.title
-    expert = f"the expert took {_counted(title.n_expert, 'action')}"
-    most = moment.rewards.max_of_plan
+def draw_plan_title(frame: PlanFrame, heading: str) -> Image.Image:
+    """Draw the card before a plan; for a plan that was never started it has the reason."""
+    title = frame.title
+    expert = f"the expert took {title.n_expert} {'action' if title.n_expert == 1 else 'actions'}"
+    most = frame.rewards.max_of_plan
     lines = [
         Line("", _place(title), 26, colour=FAINT),
         Line("", one_line(title.text), 46, "-Bold", most=2),
         Line("", f"goal: {one_line(title.goal)}", 24, most=3),
-        Line("", expert if most is None else f"{expert}; at most {_points(most)}", 20, colour=FAINT),
-        Line("", one_line(moment.ending), 24, "-Bold", BAD, most=3),
+        Line("", expert if most is None else f"{expert}; at most {most:.1f} points", 20, colour=FAINT),
+        Line("", one_line(frame.ending), 24, "-Bold", BAD, most=3),
     ]
-    return card(heading, lines)
+    return title_card(heading, lines)
 
 
-def draw_moment(moment: PlanFrame, heading: str) -> Image.Image:
-    """A moment that there is something to be seen of.
+def draw_plan_frame(frame: PlanFrame, heading: str) -> Image.Image:
+    """Draw a frame.
 
     Raises:
-        ValueError: there is not.
+        ValueError: it has no observation.
     """
-    if moment.observation is None:
-        raise ValueError("there is nothing to be seen of this moment")
-    picture, pen = page(heading, Image.fromarray(moment.observation.frame), draw_map(moment.observation, PANE))
-    write_lines(pen, _lines(moment))
-    rewards = moment.rewards
+    if frame.observation is None:
+        raise ValueError("the frame has no observation")
+    picture, pen = draw_panes(heading, Image.fromarray(frame.observation.frame), draw_map(frame.observation, PANE))
+    write_lines(pen, _lines(frame))
+    rewards = frame.rewards
     step = "-" if rewards.step is None else f"{rewards.step:+.1f}"
     plan = _share(rewards.plan, rewards.max_of_plan)
     write_numbers(
         pen, [("this action", step), ("this plan", plan), ("so far", _share(rewards.so_far, rewards.max_so_far))]
     )
     write_bar(pen, min(max(rewards.so_far / rewards.max_so_far, 0.0), 1.0) if rewards.max_so_far > 0 else 0.0)
-    ending = one_line(moment.ending) + (", and the goal is reached" if moment.goal_reached else "")
-    write_in_hand(pen, moment.observation.held, ending if moment.ending else "", is_good=moment.done)
+    ending = one_line(frame.ending) + (", and the goal is reached" if frame.goal_reached else "")
+    write_in_hand(pen, frame.observation.held, ending if frame.ending else "", is_good=frame.done)
     return picture
 
 
-def _lines(moment: PlanFrame) -> list[Line]:
-    title = moment.title
+def _lines(frame: PlanFrame) -> list[Line]:
+    title = frame.title
     lines = [
         Line("goal", title.goal, 17, most=2),
-        Line(f"plan {title.number} of {title.n_plans}", title.text, 22, "-Bold"),
+        Line(_place(title), title.text, 22, "-Bold"),
     ]
-    if moment.number:
-        action = Line("", moment.action, 20, "Mono") if moment.action else Line("", "none that could be tried", 18)
-        lines.append(action._replace(label=f"action {moment.number} of {title.n_actions}"))
+    if frame.number:
+        action = Line("", frame.action, 20, "Mono") if frame.action else Line("", "no valid action", 18)
+        lines.append(action._replace(label=f"action {frame.number} of {title.n_actions}"))
     else:
-        lines.append(Line("", "the plan begins", 18, colour=FAINT))
-    lines += [Line("model said", moment.reply, 16, "Mono")] if moment.reply else []
-    lines += [Line("wrong", moment.wrong, 16, colour=BAD, most=2)] if moment.wrong else []
-    lines += [Line("differs", moment.note, 15, colour=WARN, most=2)] if moment.note else []
+        lines.append(Line("", "the plan starts", 18, colour=FAINT))
+    lines += [Line("model said", frame.reply, 16, "Mono")] if frame.reply else []
+    lines += [Line("wrong", frame.wrong, 16, colour=BAD, most=2)] if frame.wrong else []
+    lines += [Line("differs", frame.note, 15, colour=WARN, most=2)] if frame.note else []
     return lines
 
 
@@ -103,11 +103,3 @@ def _place(title: PlanTitle) -> str:
 
 def _share(value: float, most: float | None) -> str:
     return f"{value:.1f}" if most is None else f"{value:.1f} of {most:.1f}"
-
-
-def _points(value: float) -> str:
-    return f"{value:.1f} points"
-
-
-def _counted(count: int, what: str) -> str:
-    return f"1 {what}" if count == 1 else f"{count} {what}s"

@@ -13,7 +13,7 @@ from infthor_eval.manipulation.radii import success_by_radius
 from infthor_eval.manipulation.recorded_runs import ArmRun, label_by_radius
 from infthor_eval.manipulation.records import ArmRecord
 from infthor_eval.report.plain import PlainPresenter
-from infthor_eval.report.presenter import Description, Figure, FigureRequest, FigureResult, Recording, Selection
+from infthor_eval.report.presenter import Description, EpisodeSelection, Figure, FigureRequest, FigureResult, Recording
 from infthor_eval.report.recordings.arm_pictures import arm_pictures
 from infthor_eval.report.recordings.episode_sheet import MOST_ROWS, draw_sheet, sheet_rows
 from infthor_eval.report.recordings.reach_view import draw_reach
@@ -38,7 +38,7 @@ class ArmEpisodesReplay:
     options: Collection[str] = ("--episode", "--sheet")
     sheet_rows = MOST_ROWS
 
-    def select(self, run: ReportRun, selection: Selection) -> Recording:
+    def select(self, run: ReportRun, selection: EpisodeSelection) -> Recording:
         """See `Replay.select`."""
         from infthor_eval.manipulation.replaying import recorded_episodes, replay_episodes
 
@@ -64,7 +64,7 @@ class ArmEpisodesReplay:
         return draw_sheet(list(sheet_rows(frames)), heading)
 
 
-def _select_episodes(recorded: "RecordedEpisodes", selection: Selection) -> Sequence[Record]:
+def _select_episodes(recorded: "RecordedEpisodes", selection: EpisodeSelection) -> Sequence[Record]:
     most = selection.most
     if selection.episode is None:
         every = recorded.records

@@ -9,7 +9,7 @@ from infthor_eval.report.plain import PlainPresenter
 from infthor_eval.report.presenter import Description, Timelines
 from infthor_eval.report.runs import ReportRun
 from infthor_eval.report.web.sections import Chart
-from infthor_eval.report.web.thumbnails import Thumbnails
+from infthor_eval.report.web.thumbnails import ThumbnailStore
 from infthor_eval.runs import UnitRecord
 
 __all__ = ["NiehPresenter"]
@@ -50,7 +50,7 @@ class NiehPresenter(PlainPresenter):
         """See `Presenter.details`: the page shows all of it elsewhere."""
         return {}
 
-    def timelines(self, runs: Sequence[ReportRun], data: Path | None, thumbnails: Thumbnails) -> Timelines:
+    def timelines(self, runs: Sequence[ReportRun], data: Path | None, thumbnails: ThumbnailStore) -> Timelines:
         """See `Presenter.timelines`."""
         from infthor_eval.report.suites.nieh_frames import find_timelines
 

@@ -12,8 +12,8 @@ from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.nieh.samples import find_set
 from infthor_eval.report.presenter import Timelines
 from infthor_eval.report.runs import ReportRun, records_by_unit
-from infthor_eval.report.web.samples import Frame, Timeline
-from infthor_eval.report.web.thumbnails import Thumbnails
+from infthor_eval.report.web.samples import Timeline, TimelineFrame
+from infthor_eval.report.web.thumbnails import ThumbnailStore
 from infthor_eval.runs import UnitKey, UnitRecord
 
 __all__ = ["find_timelines"]
@@ -22,13 +22,13 @@ Record = UnitRecord[NiehAnswer]
 _OVERVIEW = 5  # frames of a trajectory that are shown for a question without clues
 
 
-def find_timelines(runs: Sequence[ReportRun], data: Path | None, thumbnails: Thumbnails) -> Timelines:
+def find_timelines(runs: Sequence[ReportRun], data: Path | None, thumbnails: ThumbnailStore) -> Timelines:
     """See `Presenter.timelines`; a set that is missing or has changed since the run has a note.
 
     Clues of all questions get their pictures before any neighbour does, as there is a limit on the size of all.
     """
     sets = _Sets(runs, data)
-    chosen: dict[UnitKey, _Choice] = {}
+    chosen: dict[UnitKey, _FrameChoice] = {}
     for key, records in records_by_unit(runs).items():
         choice = sets.choose_frames(key, next(record for record in records if record))
         if choice is not None:
@@ -41,7 +41,7 @@ def find_timelines(runs: Sequence[ReportRun], data: Path | None, thumbnails: Thu
 
 
 @dataclass(frozen=True)
-class _Choice:
+class _FrameChoice:
     """Frames to show for a question.
 
     Attributes:
@@ -71,7 +71,7 @@ class _Sets:
         """Reasons why frames are missing, each once."""
         return list(self._problems)
 
-    def choose_frames(self, key: UnitKey, record: Record) -> _Choice | None:
+    def choose_frames(self, key: UnitKey, record: Record) -> _FrameChoice | None:
         """Choose frames of a record's question; None if its set is missing or has another question there."""
         known = self._sets[key.task]
         if known is None:
@@ -96,7 +96,7 @@ class _Sets:
         return questions, {question.id: question for question in questions.questions}
 
 
-def _choose_frames(data: NiehSet, question: Question) -> _Choice | None:
+def _choose_frames(data: NiehSet, question: Question) -> _FrameChoice | None:
     try:
         frames = data.frames(question.traj_id)
         clue_frames = set(data.clue_frames(question))
@@ -107,19 +107,19 @@ def _choose_frames(data: NiehSet, question: Question) -> _Choice | None:
     others = {near for index in clues for near in (index - 1, index + 1) if 0 <= near <= last}
     if not clues:
         others = {round(number * last / (_OVERVIEW - 1)) for number in range(_OVERVIEW)}
-    return _Choice(frames, clues, frozenset(others - clues))
+    return _FrameChoice(frames, clues, frozenset(others - clues))
 
 
-def _timeline(choice: _Choice, thumbnails: Thumbnails) -> Timeline:
+def _timeline(choice: _FrameChoice, thumbnails: ThumbnailStore) -> Timeline:
     frames = (
-        Frame(index, _picture(choice.frames[index], thumbnails), index in choice.clues)
+        TimelineFrame(index, _picture(choice.frames[index], thumbnails), index in choice.clues)
         for index in sorted(choice.clues | choice.others)
     )
     note = "" if choice.clues else "absence question: no frame is evidence, so five frames are shown, evenly spaced"
     return Timeline(len(choice.frames), tuple(frames), note)
 
 
-def _picture(frame: FrameRef, thumbnails: Thumbnails) -> int | None:
+def _picture(frame: FrameRef, thumbnails: ThumbnailStore) -> int | None:
     try:
         return thumbnails.add(str(frame.path), frame.load)
     except DataError:  # an unreadable frame has its place on the timeline, without a picture

@@ -12,8 +12,8 @@ from infthor_eval.plans.curves import plan_curves
 from infthor_eval.plans.recorded_runs import PlansRun
 from infthor_eval.plans.records import PlanRecord
 from infthor_eval.report.plain import PlainPresenter
-from infthor_eval.report.presenter import Description, Figure, FigureRequest, FigureResult, Recording, Selection
-from infthor_eval.report.recordings.plan_pictures import pictures
+from infthor_eval.report.presenter import Description, EpisodeSelection, Figure, FigureRequest, FigureResult, Recording
+from infthor_eval.report.recordings.plan_pictures import plan_pictures
 from infthor_eval.report.recordings.room_map import draw_map
 from infthor_eval.report.runs import ReportRun
 from infthor_eval.report.web.samples import StepRow
@@ -36,7 +36,7 @@ class PlansReplay:
     options: Collection[str] = ("--plans",)
     sheet_rows = 0
 
-    def select(self, run: ReportRun, selection: Selection) -> Recording:
+    def select(self, run: ReportRun, selection: EpisodeSelection) -> Recording:
         """See `Replay.select`."""
         from infthor_eval.plans.replaying import recorded_plans, replay_plans
 
@@ -55,7 +55,7 @@ class PlansReplay:
 
     def pictures(self, frames: Iterable["PlanFrame"], heading: str) -> Iterator[Image.Image]:
         """See `Replay.pictures`."""
-        return pictures(frames, heading)
+        return plan_pictures(frames, heading)
 
     def draw_sheet(self, frames: Iterable["PlanFrame"], heading: str) -> Image.Image:
         """See `Replay.draw_sheet`: plans have none."""

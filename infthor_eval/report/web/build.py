@@ -14,9 +14,9 @@ from infthor_eval.report.web.page import About, Page, SuiteLabels
 from infthor_eval.report.web.replays import EpisodeReplays, ReplayProgress
 from infthor_eval.report.web.run_tables import costs_table, left_out_table, primary_metrics_table
 from infthor_eval.report.web.sample_list import build_samples
-from infthor_eval.report.web.samples import Sample
+from infthor_eval.report.web.samples import PageSample
 from infthor_eval.report.web.sections import Section
-from infthor_eval.report.web.thumbnails import Thumbnails
+from infthor_eval.report.web.thumbnails import ThumbnailStore
 
 __all__ = ["PageRequest", "build_page"]
 
@@ -57,9 +57,9 @@ def build_page(runs: Sequence[ReportRun], request: PageRequest, progress: Replay
     left_out = left_out_table(runs)
     if left_out is not None:
         sections.append(Section("left-out", "Failed, skipped, excluded", tables=(left_out,)))
-    thumbnails = Thumbnails(request.pictures)
+    thumbnails = ThumbnailStore(request.pictures)
     replays = EpisodeReplays(runs, request.episodes, (request.data, request.scenes), thumbnails, progress)
-    samples: list[Sample] = []
+    samples: list[PageSample] = []
     notes: list[str] = []
     for same in by_suite.values():
         of_suite, remarks = build_samples(same, request.data, replays, thumbnails)
@@ -117,7 +117,7 @@ def _labels(runs: Sequence[ReportRun], same: Sequence[ReportRun]) -> SuiteLabels
     return SuiteLabels(places, presenter.target_label, presenter.reply_label, presenter.compares_scorers)
 
 
-def _metrics(runs: Sequence[ReportRun], samples: Sequence[Sample]) -> list[str]:
+def _metrics(runs: Sequence[ReportRun], samples: Sequence[PageSample]) -> list[str]:
     """Names of all metrics; those that decide the outcome first."""
     main = {run.presenter.main_metric for run in runs}
     names = dict.fromkeys(

@@ -15,7 +15,7 @@ from markupsafe import Markup
 
 from infthor_eval.errors import wrap_errors
 from infthor_eval.formats.files import write_atomically
-from infthor_eval.report.web.samples import Sample
+from infthor_eval.report.web.samples import PageSample
 from infthor_eval.report.web.sections import Section
 
 __all__ = ["About", "Page", "SuiteLabels", "write_page"]
@@ -78,7 +78,7 @@ class Page:
     runs: Sequence[About]
     suites: Mapping[str, SuiteLabels]
     sections: Sequence[Section]
-    samples: Sequence[Sample]
+    samples: Sequence[PageSample]
     metrics: Sequence[str]
     pictures: Sequence[str]
     notes: Sequence[str] = ()

@@ -8,9 +8,9 @@ from typing import Any, NamedTuple, Protocol
 from PIL import Image
 
 from infthor_eval.errors import InfthorError
-from infthor_eval.report.presenter import Replay, ReplaySession, Selection
+from infthor_eval.report.presenter import EpisodeSelection, OpenReplay, Replay
 from infthor_eval.report.runs import ReportRun
-from infthor_eval.report.web.thumbnails import Thumbnails
+from infthor_eval.report.web.thumbnails import ThumbnailStore
 from infthor_eval.runs import UnitKey, UnitRecord
 
 __all__ = ["EpisodePictures", "EpisodeReplays", "ReplayProgress"]
@@ -54,7 +54,7 @@ class EpisodeReplays:
         runs: Sequence[ReportRun],
         most: int,
         folders: tuple[Path | None, Path | None],
-        thumbnails: Thumbnails,
+        thumbnails: ThumbnailStore,
         progress: ReplayProgress | None,
     ) -> None:
         """Choose the episodes.
@@ -89,7 +89,7 @@ class EpisodeReplays:
         for (task, trajectory), group in groupby(chosen, key=lambda record: (record.task, record.cluster)):
             records = list(group)
             try:
-                recording = replay.select(run, Selection(task, trajectory))
+                recording = replay.select(run, EpisodeSelection(task, trajectory))
                 with recording.open(self._data or run.data, self._scenes) as session:
                     while records:
                         pictures[records[0].key] = self._draw(replay, session, run, records[0])
@@ -105,7 +105,7 @@ class EpisodeReplays:
         if self._progress is not None:
             self._progress.advance(run.label, trajectory)
 
-    def _draw(self, replay: Replay, session: ReplaySession, run: ReportRun, record: Record) -> EpisodePictures:
+    def _draw(self, replay: Replay, session: OpenReplay, run: ReportRun, record: Record) -> EpisodePictures:
         frames = list(session.frames([record]))
         seen = [frame.observation for frame in frames if frame.observation is not None]
         if not seen:

@@ -8,8 +8,8 @@ import msgspec
 
 from infthor_eval.report.runs import ReportRun, records_by_unit
 from infthor_eval.report.web.replays import EpisodePictures, EpisodeReplays
-from infthor_eval.report.web.samples import Result, Sample, StepRow, Timeline
-from infthor_eval.report.web.thumbnails import Thumbnails
+from infthor_eval.report.web.samples import PageSample, SampleResult, StepRow, Timeline
+from infthor_eval.report.web.thumbnails import ThumbnailStore
 from infthor_eval.runs import UnitKey, UnitRecord
 
 __all__ = ["build_samples"]
@@ -18,8 +18,8 @@ Record = UnitRecord[Any]
 
 
 def build_samples(
-    runs: Sequence[ReportRun], data: Path | None, replays: EpisodeReplays, thumbnails: Thumbnails
-) -> tuple[list[Sample], list[str]]:
+    runs: Sequence[ReportRun], data: Path | None, replays: EpisodeReplays, thumbnails: ThumbnailStore
+) -> tuple[list[PageSample], list[str]]:
     """Build the samples of all units that have a record, in the order of their keys.
 
     Args:
@@ -46,13 +46,13 @@ def _sample(
     records: Sequence[Record | None],
     pictures: Sequence[EpisodePictures | None],
     timelines: Mapping[UnitKey, Timeline],
-) -> Sample:
+) -> PageSample:
     first = next(record for record in records if record is not None)
     results = (
         None if record is None else _result(run, record, shown or EpisodePictures())
         for run, record, shown in zip(runs, records, pictures, strict=True)
     )
-    return Sample(
+    return PageSample(
         suite=runs[0].suite.name,
         task=key.task,
         id=key.id,
@@ -64,9 +64,9 @@ def _sample(
     )
 
 
-def _result(run: ReportRun, record: Record, pictures: EpisodePictures) -> Result:
+def _result(run: ReportRun, record: Record, pictures: EpisodePictures) -> SampleResult:
     presenter, tokens = run.presenter, record.tokens
-    return Result(
+    return SampleResult(
         outcome=_outcome(record, run.main_score(record)),
         reply=presenter.reply(record),
         scores=run.suite.scores(record),

@@ -4,10 +4,10 @@ from collections.abc import Mapping, Sequence
 
 import msgspec
 
-__all__ = ["Frame", "Result", "Sample", "StepRow", "Timeline"]
+__all__ = ["PageSample", "SampleResult", "StepRow", "Timeline", "TimelineFrame"]
 
 
-class Frame(msgspec.Struct, frozen=True, omit_defaults=True):
+class TimelineFrame(msgspec.Struct, frozen=True, omit_defaults=True):
     """A frame of a trajectory.
 
     Attributes:
@@ -31,7 +31,7 @@ class Timeline(msgspec.Struct, frozen=True, omit_defaults=True):
     """
 
     n_frames: int
-    frames: tuple[Frame, ...] = ()
+    frames: tuple[TimelineFrame, ...] = ()
     note: str = ""
 
 
@@ -55,7 +55,7 @@ class StepRow(msgspec.Struct, frozen=True, omit_defaults=True):
     picture: int | None = None
 
 
-class Result(msgspec.Struct, frozen=True, omit_defaults=True):
+class SampleResult(msgspec.Struct, frozen=True, omit_defaults=True):
     """The result of a run on a sample.
 
     Attributes:
@@ -87,7 +87,7 @@ class Result(msgspec.Struct, frozen=True, omit_defaults=True):
     note: str = ""
 
 
-class Sample(msgspec.Struct, frozen=True, omit_defaults=True):
+class PageSample(msgspec.Struct, frozen=True, omit_defaults=True):
     """A question or an episode, with the result of each run of the page.
 
     Attributes:
@@ -109,16 +109,16 @@ class Sample(msgspec.Struct, frozen=True, omit_defaults=True):
     id: str
     cluster: str
     title: str
-    results: tuple[Result | None, ...]
+    results: tuple[SampleResult | None, ...]
     variant: str = ""
     kind: str = ""
     clues: str = ""
     target: str = ""
     timeline: Timeline | None = None
 
-    def spread_over(self, n_runs: int, places: Sequence[int]) -> "Sample":
+    def spread_over(self, n_runs: int, places: Sequence[int]) -> "PageSample":
         """Return the same sample for a page of more runs: `places` are those of its results."""
-        results: list[Result | None] = [None] * n_runs
+        results: list[SampleResult | None] = [None] * n_runs
         for place, result in zip(places, self.results, strict=True):
             results[place] = result
         return msgspec.structs.replace(self, results=tuple(results))

@@ -6,12 +6,12 @@ from collections.abc import Callable
 
 from PIL import Image
 
-__all__ = ["Thumbnails"]
+__all__ = ["ThumbnailStore"]
 
 _QUALITY = 55  # of WebP: about 3 kB for a frame of 132 pixels, so that thousands fit into a page
 
 
-class Thumbnails:
+class ThumbnailStore:
     """Thumbnails by number; pictures that come first get the room."""
 
     def __init__(self, budget: int, side: int = 132) -> None:

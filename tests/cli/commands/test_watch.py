@@ -9,7 +9,7 @@ from PIL import Image
 
 from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.plans.records import RECORDS
-from infthor_eval.report.recordings.plan_pictures import END_HELD, SIZE, TITLE_HELD
+from infthor_eval.report.recordings.plan_pictures import END_REPEATS, SIZE, TITLE_REPEATS
 from infthor_eval.runs import read_run
 from infthor_eval.runs.journal import Journal
 
@@ -29,7 +29,7 @@ def refused(found, *said):
 def n_pictures(folder, *numbers):
     """Of plans by their numbers."""
     plans = {record.payload.index + 1: record.payload for record in read_run(folder, RECORDS)[1]}
-    return sum(TITLE_HELD + len(plans[number].steps) + END_HELD for number in numbers)
+    return sum(TITLE_REPEATS + len(plans[number].steps) + END_REPEATS for number in numbers)
 
 
 def test_two_plans_become_an_mp4(scripted_run, tmp_path, run):

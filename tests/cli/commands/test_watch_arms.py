@@ -7,7 +7,7 @@ from PIL import Image
 
 from infthor_eval.cli import main
 from infthor_eval.manipulation.records import RECORDS
-from infthor_eval.report.recordings.canvas import END_HELD, SIZE, TITLE_HELD
+from infthor_eval.report.recordings.canvas import END_REPEATS, SIZE, TITLE_REPEATS
 from infthor_eval.runs import read_run
 from infthor_eval.runs.journal import Journal
 
@@ -59,7 +59,7 @@ def test_episodes_become_an_mp4_and_go_as_they_were_recorded(arm_run, episodes, 
     chosen = [episodes[0], next(payload for payload in episodes if payload.kind == "put")]
     numbers = ",".join(str(payload.index) for payload in chosen)
     code, said, err = run("watch", arm_run, "--trajectory", trajectory, "--episode", numbers, "--out", out)
-    wanted = sum(TITLE_HELD + len(payload.steps) + END_HELD for payload in chosen)
+    wanted = sum(TITLE_REPEATS + len(payload.steps) + END_REPEATS for payload in chosen)
     assert (code, remarks(err)) == (0, [])
     assert said.splitlines() == [f"2 of 4 episodes, {wanted / 2:.0f} s: {out}"]
     video, sizes = cv2.VideoCapture(str(out)), []
@@ -99,7 +99,7 @@ def test_episodes_in_which_nobody_acted_have_the_title_alone(arm_run, episodes, 
 
     folder = rewritten(arm_run, tmp_path / "run", failed)
     code, said, _ = run("watch", folder, "--episode", episodes[0].index, "--out", tmp_path / "a.gif", "--fps", 1)
-    assert (code, said.splitlines()) == (0, [f"1 of 4 episodes, {TITLE_HELD} s: {tmp_path / 'a.gif'}"])
+    assert (code, said.splitlines()) == (0, [f"1 of 4 episodes, {TITLE_REPEATS} s: {tmp_path / 'a.gif'}"])
     assert run("watch", folder, "--sheet", tmp_path / "sheet.png")[0] == 0
 
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from infthor_eval.errors import DataError
 from infthor_eval.report.web.page import About, Page, SuiteLabels, write_page
-from infthor_eval.report.web.samples import Result, Sample
+from infthor_eval.report.web.samples import PageSample, SampleResult
 from infthor_eval.report.web.sections import Section
 from infthor_eval.tables import Column, Row, Table
 
@@ -20,7 +20,9 @@ TEXT = st.text(st.characters(blacklist_categories=["Cs"]), min_size=1, max_size=
 
 
 def page_of(text, n_samples=1):
-    sample = Sample("nieh", text, text, text, text, (Result("right", text, {"strict": 1.0}, text),), text, text)
+    sample = PageSample(
+        "nieh", text, text, text, text, (SampleResult("right", text, {"strict": 1.0}, text),), text, text
+    )
     table = Table(text, (Column(text),), (Row((text,)),), (text,))
     about = About(text, ((text, text),), text, text)
     labels = {"nieh": SuiteLabels((0,), text, text, True)}
