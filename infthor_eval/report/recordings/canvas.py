@@ -132,7 +132,7 @@ def write_bar(pen: ImageDraw.ImageDraw, share: float) -> None:
 
 
 def write_in_hand(pen: ImageDraw.ImageDraw, objects: Sequence[str], ending: str, *, is_good: bool) -> None:
-    """Write the objects in the hand, and how the episode ended; an empty `ending` stands for an episode that goes on."""
+    """Write the objects in the hand, and how the episode ended; `ending` is empty while it goes on."""
     y = _BELOW + 112.0
     names = ", ".join(objects)
     pen.text((_RIGHT, y + 16), "in hand", font=font(14), fill=FAINT, anchor="ls")

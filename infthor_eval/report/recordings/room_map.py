@@ -171,7 +171,7 @@ class _Name(NamedTuple):
 
 
 def _name(item: MapObject, scale: _Scale, size: int) -> _Name | None:
-    """Place a name in the object's box, in one line or several; or beside it if the plan names it and it is too small."""
+    """Place a name in the object's box, or beside it if the plan names it and it is too small."""
     face = font(14, "-Bold") if item.is_named else font(12)
     x, y = scale.at(_middle(item))
     wide, high = ((high - low) * scale.per_metre for low, high in zip(item.low, item.high, strict=True))
