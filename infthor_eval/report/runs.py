@@ -82,8 +82,8 @@ def read_report_runs(
 
     Args:
         folders: folders of the runs, at least one.
-        suite_named: returns a suite by name.
-        presenter_of: returns the presenter of a suite by the suite's name.
+        find_suite: returns a suite by name.
+        find_presenter: returns the presenter of a suite by the suite's name.
 
     Raises:
         UsageError: a folder is given twice.

@@ -7,7 +7,7 @@ import pytest
 from infthor_eval.cli import main
 from infthor_eval.report.runs import read_report_runs
 from infthor_eval.report.web.build import PageRequest, build_page
-from infthor_eval.suites import presenter_of, suite_named
+from infthor_eval.suites import find_presenter, find_suite
 
 from ..report.web.conftest import browser, open_page  # noqa: F401
 
@@ -28,7 +28,7 @@ def folders(install, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def page(folders):
-    return build_page(read_report_runs(folders, suite_named, presenter_of), PageRequest())
+    return build_page(read_report_runs(folders, find_suite, find_presenter), PageRequest())
 
 
 def test_its_results_are_shown_and_exported(folders, run):

@@ -21,7 +21,7 @@ from infthor_eval.report.recordings.plan_pictures import (
     TITLE_REPEATS,
     draw_plan_frame,
     draw_plan_title,
-    pictures,
+    plan_pictures,
 )
 from infthor_eval.report.recordings.room_map import draw_map
 
@@ -48,7 +48,7 @@ def words(picture):
 
 
 def test_a_plan_has_its_title_its_start_and_its_end_held():
-    found = list(pictures([START, END, START], "a run"))
+    found = list(plan_pictures([START, END, START], "a run"))
     assert len(found) == TITLE_REPEATS + 1 + END_REPEATS + TITLE_REPEATS + 1
     assert {(picture.size, picture.mode) for picture in found} == {(SIZE, "RGB")}
     assert all(side % 2 == 0 for side in SIZE)
@@ -56,7 +56,7 @@ def test_a_plan_has_its_title_its_start_and_its_end_held():
 
 def test_of_a_plan_that_was_never_begun_the_title_alone_is_shown():
     idle = PlanFrame(title=TITLE, observation=None, rewards=START.rewards, ending="not attempted")
-    assert len(list(pictures([idle], "a run"))) == TITLE_REPEATS
+    assert len(list(plan_pictures([idle], "a run"))) == TITLE_REPEATS
     assert RED in colours(draw_plan_title(idle, "a run"))
     assert RED not in colours(draw_plan_title(START, "a run"))
     with pytest.raises(ValueError, match="nothing to be seen"):
