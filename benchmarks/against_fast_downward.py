@@ -20,7 +20,7 @@ from infthor_eval.household.pddl import DOMAIN, problem
 from infthor_eval.household.planner import plan
 from infthor_eval.household.symbolic import SymbolicRoom, room_of
 from infthor_eval.household.tasks import Task, TaskType
-from infthor_eval.thor.launch import embedded
+from infthor_eval.thor.launch import embedded_launch
 from infthor_eval.thor.simulator import Simulator
 
 _SCENES = ("kitchen-1", "kitchen-2", "kitchen-3", "living-room-1", "living-room-2", "bedroom-1", "bedroom-2")
@@ -45,7 +45,7 @@ def main() -> None:
 def sampled(number: int, seed: int) -> Iterator[tuple[Task, SymbolicRoom]]:
     """Tasks of all types in the rooms as they are at first, that have a plan and are not done yet."""
     rng = random.Random(seed)
-    with Simulator(embedded()) as simulator:
+    with Simulator(embedded_launch()) as simulator:
         rooms = []
         for scene in _SCENES:
             view = simulator.reset(scene)

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from infthor_eval.manipulation.conversion import Conversion
 from infthor_eval.thor.frames import FrameFolder
-from infthor_eval.thor.launch import embedded
+from infthor_eval.thor.launch import embedded_launch
 from infthor_eval.thor.simulator import Simulator
 from model_adapters import ArmDelta, Policy, load
 
@@ -56,7 +56,7 @@ def _arguments() -> argparse.Namespace:
 
 
 def _simulator(image: bool) -> Simulator:
-    simulator = Simulator(embedded(), image=image, instances=False, agentMode="arm")
+    simulator = Simulator(embedded_launch(), image=image, instances=False, agentMode="arm")
     simulator.reset(_SCENE)
     simulator.step("MoveArmBase", y=0.8)
     return simulator

@@ -15,7 +15,7 @@ from pathlib import Path
 from infthor_eval.formats.trajectory import iter_trajectories
 from infthor_eval.generation.generate_set import generate_set
 from infthor_eval.generation.settings import TrajectorySettings
-from infthor_eval.thor.launch import embedded
+from infthor_eval.thor.launch import embedded_launch
 from infthor_eval.thor.simulator import Simulator
 
 
@@ -56,7 +56,7 @@ def make(settings: TrajectorySettings) -> tuple[float, int, int, float]:
     """Seconds, low-level actions, sub-goals and the simulator's peak memory (MB) of one trajectory."""
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder)
-        with Simulator(embedded()) as simulator:
+        with Simulator(embedded_launch()) as simulator:
             began = time.perf_counter()
             result = generate_set([settings], simulator, out)
             seconds = time.perf_counter() - began

@@ -37,7 +37,7 @@ from infthor_eval.plans.plan import Plan, PlanKind
 from infthor_eval.thor import simulator as simulators
 from infthor_eval.thor.controller import SafeController
 from infthor_eval.thor.frames import FrameFolder, NoFrames
-from infthor_eval.thor.launch import embedded
+from infthor_eval.thor.launch import embedded_launch
 from infthor_eval.thor.simulator import Simulator
 
 Spent = dict[str, float]  # milliseconds, by place
@@ -74,7 +74,7 @@ def _arguments() -> argparse.Namespace:
 
 def made(out: Path) -> Path:
     """A folder with a long trajectory."""
-    with Simulator(embedded()) as simulator:
+    with Simulator(embedded_launch()) as simulator:
         result = generate_set([TrajectorySettings("kitchen-1", 1, 700, 20, max_fail=700)], simulator, out)
     if result.failures:
         raise SystemExit(result.failures[0])
@@ -84,7 +84,7 @@ def made(out: Path) -> Path:
 def prepare(trajectory: Trajectory, seen: bool, options: argparse.Namespace) -> None:
     """Measure one way of acting and print its tables."""
     with (
-        Simulator(embedded(), image=seen, instances=False, max_copies=512) as simulator,
+        Simulator(embedded_launch(), image=seen, instances=False, max_copies=512) as simulator,
         tempfile.TemporaryDirectory() as folder,
         watched() as own,
     ):

@@ -57,5 +57,5 @@ class Simulators:
 
 def _launch_of(name: str, scenes: Path | None, supplement: Path | None) -> Launch:
     if name == "embedded":
-        return launch.embedded(scenes, supplement)
-    return launch.unity(None if name == "unity" else Path(name))
+        return launch.embedded_launch(scenes, supplement)
+    return launch.unity_launch(None if name == "unity" else Path(name))

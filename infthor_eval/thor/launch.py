@@ -5,7 +5,7 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-__all__ = ["Launch", "embedded", "unity"]
+__all__ = ["Launch", "embedded_launch", "unity_launch"]
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Launch:
     start_timeout: float = 300.0
 
 
-def embedded(
+def embedded_launch(
     data: Path | None = None,
     supplement: Path | None = None,
     *,
@@ -52,6 +52,6 @@ def embedded(
     return Launch(shlex.join(words), "embedded", timeout=timeout, start_timeout=start_timeout)
 
 
-def unity(executable: Path | None = None, *, platform: str | None = None) -> Launch:
+def unity_launch(executable: Path | None = None, *, platform: str | None = None) -> Launch:
     """Return the launch of a Unity build of AI2-THOR: a local executable, or the build that ai2thor downloads."""
     return Launch(None if executable is None else shlex.quote(str(executable)), platform=platform)

@@ -7,7 +7,7 @@ from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Any
 
-from infthor_eval.thor.launch import embedded
+from infthor_eval.thor.launch import embedded_launch
 from infthor_eval.thor.simulator import Simulator
 
 Options = tuple[tuple[str, Any], ...]
@@ -26,7 +26,7 @@ class Pool:
         try:
             simulator = idle.get_nowait()
         except Empty:
-            simulator = self.open.enter_context(Simulator(embedded(), max_copies=64, **options))
+            simulator = self.open.enter_context(Simulator(embedded_launch(), max_copies=64, **options))
         try:
             yield simulator
         finally:

@@ -7,13 +7,13 @@ import pytest
 
 from infthor_eval.episodes.retries import with_retries
 from infthor_eval.errors import SceneError, SimulatorError
-from infthor_eval.thor.launch import embedded
+from infthor_eval.thor.launch import embedded_launch
 from infthor_eval.thor.simulator import Simulator
 
 
 @pytest.fixture(scope="module")
 def simulator():
-    with Simulator(embedded(), image=False, instances=False) as simulator:
+    with Simulator(embedded_launch(), image=False, instances=False) as simulator:
         simulator.reset("bedroom-1")
         yield simulator
 

@@ -6,7 +6,7 @@ from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.generation.bundle import MANIFEST, build_bundle, read_manifest
 from infthor_eval.generation.questions.generate import generate_questions
-from infthor_eval.thor.launch import embedded
+from infthor_eval.thor.launch import embedded_launch
 from infthor_eval.thor.simulator import Simulator
 
 BUNDLED = packaged_folder("sets/nieh_mini")
@@ -34,7 +34,7 @@ def test_the_bundled_questions_follow_from_the_bundled_logs():
 def test_bundled_trajectories_come_out_again_bit_for_bit(tmp_path):
     manifest = read_manifest(BUNDLED / MANIFEST)
     part = msgspec.structs.replace(manifest, trajectories=manifest.trajectories[-1:])
-    with Simulator(embedded()) as simulator:
+    with Simulator(embedded_launch()) as simulator:
         again, _ = build_bundle(part, simulator, tmp_path / "set")
     files = {name: digest for name, digest in again.files.items() if name.startswith("metadata/")}
     assert len(files) > 75
@@ -44,7 +44,7 @@ def test_bundled_trajectories_come_out_again_bit_for_bit(tmp_path):
 def test_a_folder_that_is_not_empty_and_a_scene_that_is_not_there_are_refused(tmp_path):
     manifest = read_manifest(BUNDLED / MANIFEST)
     (tmp_path / "file").write_text("")
-    with Simulator(embedded()) as simulator:
+    with Simulator(embedded_launch()) as simulator:
         with pytest.raises(DataError, match="not empty"):
             build_bundle(manifest, simulator, tmp_path)
         nowhere = msgspec.structs.replace(

@@ -15,7 +15,7 @@ from infthor_eval.generation.replay_set import replay_set, select
 from infthor_eval.generation.replay_summary import summarise
 from infthor_eval.generation.settings import TrajectorySettings
 from infthor_eval.household.tasks import TaskType
-from infthor_eval.thor.launch import embedded
+from infthor_eval.thor.launch import embedded_launch
 from infthor_eval.thor.simulator import Simulator
 
 SHARED = Path(__file__).parents[2] / "../shared/data"
@@ -23,7 +23,7 @@ SHARED = Path(__file__).parents[2] / "../shared/data"
 
 @pytest.fixture(scope="module")
 def simulator():
-    with Simulator(embedded()) as simulator:
+    with Simulator(embedded_launch()) as simulator:
         yield simulator
 
 
@@ -72,9 +72,9 @@ def test_looking_for_places_leaves_no_trace(scene, seed, tmp_path):
     data = SHARED if scene.startswith("FloorPlan") else None
     if data is not None and not data.is_dir():
         pytest.skip("recorded floor plans not at ../shared/data")
-    with Simulator(embedded(data)) as simulator:
+    with Simulator(embedded_launch(data)) as simulator:
         (path,) = generate_set([TrajectorySettings(scene, seed, 150, 1)], simulator, tmp_path / "trajectories").paths
-    with Simulator(embedded(data)) as simulator:
+    with Simulator(embedded_launch(data)) as simulator:
         summary = summarise(replay_set(select([path]), simulator, tmp_path / "set"))
     assert summary.complete == 1, summary.diverged
     trajectory = next(iter_trajectories(path))

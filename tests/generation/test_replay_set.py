@@ -17,7 +17,7 @@ from infthor_eval.generation.settings import TrajectorySettings
 from infthor_eval.nieh.baselines import BASELINES
 from infthor_eval.nieh.contexts import Sample
 from infthor_eval.nieh.scoring import score
-from infthor_eval.thor.launch import embedded
+from infthor_eval.thor.launch import embedded_launch
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.supplement import write_supplement
 
@@ -29,14 +29,14 @@ JOB = TrajectorySettings("kitchen-3", 4, min_steps=40, min_subgoals=1)
 @pytest.fixture(scope="module")
 def generated(tmp_path_factory):
     out = tmp_path_factory.mktemp("generated")
-    with Simulator(embedded()) as simulator:
+    with Simulator(embedded_launch()) as simulator:
         result = generate_set([JOB], simulator, out)
     assert not result.failures
     return result.paths[0]
 
 
 def test_a_generated_trajectory_replays_whole(generated, tmp_path):
-    with Simulator(embedded()) as simulator:
+    with Simulator(embedded_launch()) as simulator:
         replayed = replay_set(select([generated]), simulator, tmp_path)
         again = replay_set(select([generated]), simulator, tmp_path)
     trajectory = next(iter_trajectories(generated))
@@ -62,7 +62,7 @@ def test_a_generated_trajectory_replays_whole(generated, tmp_path):
 
 
 def test_several_frames_per_move(generated, tmp_path):
-    with Simulator(embedded()) as simulator:
+    with Simulator(embedded_launch()) as simulator:
         replayed = replay_set(select([generated]), simulator, tmp_path, frames=3)
         again = replay_set(select([generated]), simulator, tmp_path)
     assert summarise(replayed).complete == 1
@@ -77,7 +77,7 @@ def test_several_frames_per_move(generated, tmp_path):
 
 
 def test_the_seed_decides_and_what_exists_is_kept(generated, tmp_path):
-    with Simulator(embedded()) as simulator:
+    with Simulator(embedded_launch()) as simulator:
         generate_set([JOB], simulator, tmp_path)
         assert (tmp_path / generated.name).read_bytes() == generated.read_bytes()
         assert generate_set([JOB], simulator, tmp_path).resumed == 1
@@ -92,7 +92,7 @@ def test_one_bad_trajectory_does_not_stop_the_others(generated, tmp_path):
     lines = [json.dumps(nowhere).encode(), b"{broken", json.dumps(json.loads(good)).encode()]
     path = tmp_path / "all.jsonl.gz"
     path.write_bytes(gzip.compress(b"\n".join(lines)))
-    with Simulator(embedded()) as simulator:
+    with Simulator(embedded_launch()) as simulator:
         replayed = replay_set(select([path]), simulator, tmp_path / "set")
     assert len(replayed.reports) == 1
     assert sorted(failure.place.rpartition(":")[2] for failure in replayed.failures) == ["1", "2"]
@@ -103,7 +103,7 @@ def test_another_trajectory_of_the_same_name_is_refused(generated, tmp_path):
     changed = json.loads(generated.read_bytes())
     changed["plan"]["low_actions"] = changed["plan"]["low_actions"][:2]
     (tmp_path / "short.json").write_text(json.dumps(changed))
-    with Simulator(embedded()) as simulator:
+    with Simulator(embedded_launch()) as simulator:
         replay_set(select([tmp_path / "short.json"]), simulator, tmp_path / "set")
         replayed = replay_set(select([generated]), simulator, tmp_path / "set")
     assert "another trajectory" in replayed.failures[0].message
@@ -113,7 +113,7 @@ def test_another_trajectory_of_the_same_name_is_refused(generated, tmp_path):
 def test_recorded_trajectories_replay(tmp_path):
     selection = select([SHARED / "alfred/valid_seen.jsonl.gz"], limit=3, per_floor_plan=1)
     write_supplement((trajectory for _, trajectory in selection.items), tmp_path / "supplement.json")
-    with Simulator(embedded(SHARED, tmp_path / "supplement.json")) as simulator:
+    with Simulator(embedded_launch(SHARED, tmp_path / "supplement.json")) as simulator:
         replayed = replay_set(selection, simulator, tmp_path)
     summary = summarise(replayed)
     assert summary.trajectories == summary.floor_plans == 3
@@ -128,7 +128,7 @@ def test_recorded_trajectories_replay(tmp_path):
 def test_what_the_published_saver_writes_is_replayed_asked_about_and_evaluated(tmp_path):
     selection = select([PUBLISHED / f"floorplan28_{split}.json" for split in ("train", "test")])
     write_supplement((item for _, item in selection.items), tmp_path / "supplement.json")
-    with Simulator(embedded(SHARED, tmp_path / "supplement.json")) as simulator:
+    with Simulator(embedded_launch(SHARED, tmp_path / "supplement.json")) as simulator:
         summary = summarise(replay_set(selection, simulator, tmp_path / "set"))
     assert (summary.trajectories, summary.complete, summary.floor_plans) == (2, 2, 1), summary.diverged
     training, test = (item for _, item in selection.items)
@@ -161,5 +161,5 @@ def test_overlap_of_boxes():
 
 
 def test_the_simulator_error_is_told(tmp_path):
-    with Simulator(embedded()) as simulator, pytest.raises(SimulatorError, match="FloorPlan1"):
+    with Simulator(embedded_launch()) as simulator, pytest.raises(SimulatorError, match="FloorPlan1"):
         simulator.reset("FloorPlan1")

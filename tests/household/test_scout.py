@@ -3,13 +3,13 @@
 import pytest
 
 from infthor_eval.household.scout import find_viewpoint, reachable_grid
-from infthor_eval.thor.launch import embedded
+from infthor_eval.thor.launch import embedded_launch
 from infthor_eval.thor.simulator import Simulator
 
 
 @pytest.fixture(scope="module")
 def simulator():
-    with Simulator(embedded()) as simulator:
+    with Simulator(embedded_launch()) as simulator:
         yield simulator
 
 

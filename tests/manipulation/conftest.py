@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from infthor_eval.runs import PreparedRun
-from infthor_eval.thor.launch import embedded
+from infthor_eval.thor.launch import embedded_launch
 from infthor_eval.thor.simulator import Simulator
 
 from ..episodes.pool import Pool
@@ -39,7 +39,7 @@ def arena(pool: Pool, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Call
             if (name, n_plans) not in made:
                 data = write(tmp_path_factory.mktemp("arena") / "data", cut(name, n_plans))
                 options = {"image": False, "instances": False}
-                arm = Simulator(embedded(), max_copies=64, agentMode="arm", **options)  # type: ignore[arg-type]
+                arm = Simulator(embedded_launch(), max_copies=64, agentMode="arm", **options)  # type: ignore[arg-type]
                 opened.enter_context(arm)
                 with pool.one(**options) as expert:
                     made[name, n_plans] = Arena(data, expert, arm)

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from infthor_eval.manipulation.conversion import Conversion
-from infthor_eval.thor.launch import embedded
+from infthor_eval.thor.launch import embedded_launch
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import Vector
 from model_adapters import ArmDelta
@@ -27,7 +27,7 @@ def simulator():
     corners = [{"x": x, "y": 0, "z": z} for x, z in ((0, 0), (0, 4), (4, 4), (4, 0))]
     room = {"id": "room|1", "roomType": "Kitchen", "floorPolygon": corners, "ceilings": [], "children": []}
     house = {"rooms": [room], "walls": [], "objects": [], "doors": [], "windows": [], "proceduralParameters": {}}
-    with Simulator(embedded(), image=False, instances=False, agentMode="arm") as simulator:
+    with Simulator(embedded_launch(), image=False, instances=False, agentMode="arm") as simulator:
         simulator.reset(house)
         yield simulator
 

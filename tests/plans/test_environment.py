@@ -13,7 +13,7 @@ from infthor_eval.formats.trajectory import Trajectory, iter_trajectories
 from infthor_eval.plans.environment import Ended, PlanEnvironment
 from infthor_eval.plans.expert import ExpertRefusedError
 from infthor_eval.thor.frames import FrameFolder
-from infthor_eval.thor.launch import embedded
+from infthor_eval.thor.launch import embedded_launch
 from infthor_eval.thor.simulator import Simulator
 
 SET = packaged_folder("sets/nieh_mini")
@@ -21,7 +21,7 @@ SET = packaged_folder("sets/nieh_mini")
 
 @pytest.fixture(scope="module")
 def simulator():
-    with Simulator(embedded(), instances=False, max_copies=64) as simulator:
+    with Simulator(embedded_launch(), instances=False, max_copies=64) as simulator:
         yield simulator
 
 
@@ -143,7 +143,7 @@ class _FullFor(FrameFolder):
 
 @pytest.fixture(scope="module")
 def segmenting_simulator():
-    with Simulator(embedded(), max_copies=64) as simulator:
+    with Simulator(embedded_launch(), max_copies=64) as simulator:
         yield simulator
 
 

@@ -10,7 +10,7 @@ from infthor_eval.plans.plan import PlanKind, plans_of, tasks_of
 from infthor_eval.plans.rewards import PlanReward, max_reward, reward_rules
 from infthor_eval.plans.targets import PlanTarget, target_of
 from infthor_eval.thor.grounding import Grounding
-from infthor_eval.thor.launch import embedded
+from infthor_eval.thor.launch import embedded_launch
 from infthor_eval.thor.recorded import translate
 from infthor_eval.thor.restore import restore
 from infthor_eval.thor.simulator import Simulator
@@ -20,7 +20,7 @@ from .test_plans import ours
 
 @pytest.fixture(scope="module")
 def simulator():
-    with Simulator(embedded(), instances=False, renderImage=False) as simulator:
+    with Simulator(embedded_launch(), instances=False, renderImage=False) as simulator:
         yield simulator
 
 

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from infthor_eval.formats.trajectory import InitAction, ObjectPose, Scene, Toggle
-from infthor_eval.thor.launch import embedded
+from infthor_eval.thor.launch import embedded_launch
 from infthor_eval.thor.restore import restore
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import ThorObject, Vector
@@ -13,7 +13,7 @@ from infthor_eval.thor.view import ThorObject, Vector
 
 @pytest.fixture(scope="module")
 def simulator():
-    with Simulator(embedded(), width=100, height=100, agentMode="arm") as simulator:
+    with Simulator(embedded_launch(), width=100, height=100, agentMode="arm") as simulator:
         yield simulator
 
 
@@ -77,7 +77,7 @@ def test_a_recorded_scene_is_restored_for_the_arm_as_for_the_default_agent(simul
     assert restored.refused == restored.dropped == []
     by_arm = simulator.view
     assert (by_arm.agent.rotation, by_arm.agent.horizon, by_arm.arm.held) == (90, 30, [])
-    with Simulator(embedded(), width=100, height=100) as default:
+    with Simulator(embedded_launch(), width=100, height=100) as default:
         restore(default, scene)
         assert default.view.arm is None
         assert default.view.agent == by_arm.agent

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from infthor_eval.errors import SimulatorError
-from infthor_eval.thor.launch import Launch, embedded
+from infthor_eval.thor.launch import Launch, embedded_launch
 from infthor_eval.thor.simulator import Simulator
 
 from .test_simulator import children, open_files, scripted
@@ -22,7 +22,7 @@ def test_an_episode_survives_the_death_of_its_simulator():
     actions = ["MoveAhead", "RotateRight", "MoveAhead", "LookDown", "RotateLeft", "MoveAhead"]
     frames = []
     for deadly in (None, 3):
-        with Simulator(embedded()) as simulator:
+        with Simulator(embedded_launch()) as simulator:
             simulator.reset(SCENE)
             for index, action in enumerate(actions):
                 if index == deadly:
@@ -35,7 +35,7 @@ def test_an_episode_survives_the_death_of_its_simulator():
 
 
 def test_a_query_is_no_part_of_the_episode():
-    with Simulator(embedded()) as simulator:
+    with Simulator(embedded_launch()) as simulator:
         before = simulator.reset(SCENE)
         assert simulator.query("GetReachablePositions").result
         assert simulator.view is before
@@ -44,7 +44,7 @@ def test_a_query_is_no_part_of_the_episode():
 
 @pytest.mark.parametrize("actions", [["MoveAhead", "RotateRight", "LookDown"], ["RotateLeft", "Crouch", "MoveAhead"]])
 def test_rewinding_brings_the_world_back(actions):
-    with Simulator(embedded()) as simulator:
+    with Simulator(embedded_launch()) as simulator:
         simulator.reset(SCENE)
         there = simulator.step("RotateRight")
         mark = simulator.mark()
@@ -61,7 +61,7 @@ def test_rewinding_brings_the_world_back(actions):
 
 
 def test_the_last_two_marks_are_gone_back_to_without_repeating_the_episode(monkeypatch):
-    with Simulator(embedded()) as simulator:
+    with Simulator(embedded_launch()) as simulator:
         simulator.reset(SCENE)
         monkeypatch.setattr(simulator, "reset", lambda _: pytest.fail("the episode was repeated"))
         marks, views = [], []
@@ -80,7 +80,7 @@ def test_the_last_two_marks_are_gone_back_to_without_repeating_the_episode(monke
 
 
 def test_nothing_is_drawn_to_rewind():
-    with Simulator(embedded(), depth=True) as simulator:
+    with Simulator(embedded_launch(), depth=True) as simulator:
         simulator.reset(SCENE)
         mark = simulator.mark()
         simulator.step("RotateRight")
@@ -92,7 +92,7 @@ def test_nothing_is_drawn_to_rewind():
 
 @pytest.mark.parametrize("exactly", [False, True])
 def test_any_mark_of_the_scene_can_be_gone_to_from_any_moment(exactly):
-    with Simulator(embedded(), max_copies=8) as simulator:
+    with Simulator(embedded_launch(), max_copies=8) as simulator:
         simulator.reset(SCENE)
         marks = []
         for action in ("RotateRight", "MoveAhead", "Crouch", "RotateRight", "MoveAhead"):
@@ -112,7 +112,7 @@ def test_any_mark_of_the_scene_can_be_gone_to_from_any_moment(exactly):
 
 
 def test_without_copies_the_way_is_gone_again():
-    with Simulator(embedded(), max_copies=1) as simulator:
+    with Simulator(embedded_launch(), max_copies=1) as simulator:
         simulator.reset(SCENE)
         marks = []
         for action in ("RotateRight", "MoveAhead", "Crouch"):
@@ -127,7 +127,7 @@ def test_without_copies_the_way_is_gone_again():
 
 @pytest.mark.parametrize("scene", ["FloorPlan9999", "nowhere"])
 def test_an_unknown_scene_is_one_line(scene):
-    with Simulator(embedded()) as simulator, pytest.raises(SimulatorError, match=scene) as caught:
+    with Simulator(embedded_launch()) as simulator, pytest.raises(SimulatorError, match=scene) as caught:
         simulator.reset(scene)
     assert "\n" not in str(caught.value)
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from infthor_eval.errors import SimulatorError
-from infthor_eval.thor.launch import Launch, embedded
+from infthor_eval.thor.launch import Launch, embedded_launch
 from infthor_eval.thor.simulator import Simulator
 
 from ..waiting import PATIENCE_S
@@ -110,7 +110,7 @@ def test_an_episode_may_survive_as_many_failures_from_each_mark_on(tmp_path):
 
 
 def test_what_is_repeated_to_come_to_a_mark_is_kept_for_the_next_time():
-    with Simulator(embedded(), instances=False, image=False) as simulator:
+    with Simulator(embedded_launch(), instances=False, image=False) as simulator:
         simulator.reset("kitchen-2")
         simulator.step("RotateRight")
         mark = simulator.mark()

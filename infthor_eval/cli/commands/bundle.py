@@ -26,12 +26,12 @@ def command(manifest: Path, out: Path) -> int:
     from infthor_eval.formats.files import prepare_folder
     from infthor_eval.generation.bundle import build_bundle, differing_files, read_manifest
     from infthor_eval.terminal import error_console, print_line, progress_bar
-    from infthor_eval.thor.launch import embedded
+    from infthor_eval.thor.launch import embedded_launch
     from infthor_eval.thor.simulator import Simulator
 
     expected = read_manifest(manifest)
     prepare_folder(out)
-    with Simulator(embedded()) as simulator, progress_bar(error_console()) as progress:
+    with Simulator(embedded_launch()) as simulator, progress_bar(error_console()) as progress:
         bar = PacedBar(progress, expected.name, 2 * len(expected.trajectories))
         built, questions = build_bundle(expected, simulator, out, bar.advance)
     size = sum(path.stat().st_size for path in out.rglob("*") if path.is_file())

@@ -74,7 +74,7 @@ def command(
     from infthor_eval.generation.generate_set import generate_with_workers
     from infthor_eval.generation.jobs import trajectory_jobs, without_bathrooms
     from infthor_eval.terminal import console, error_console, progress_bar
-    from infthor_eval.thor.launch import embedded
+    from infthor_eval.thor.launch import embedded_launch
 
     worker_settings = parse_worker_settings(**workers)
     notes = error_console()
@@ -93,7 +93,7 @@ def command(
     prepare_folder(out)
     with progress_bar(notes) as progress:
         bar = PacedBar(progress, "generate", len(jobs))
-        result = generate_with_workers(jobs, embedded(data), out, worker_settings, bar.advance, notes.print)
+        result = generate_with_workers(jobs, embedded_launch(data), out, worker_settings, bar.advance, notes.print)
     if as_json:
         import msgspec
 

@@ -64,7 +64,7 @@ def command(
     prepare_folder(out)
     selection = select(trajectories, limit, per_floor_plan)
     with supplement_file(trajectory for _, trajectory in selection.items) as supplement:
-        start = launch.unity() if unity else launch.embedded(data, supplement)
+        start = launch.unity_launch() if unity else launch.embedded_launch(data, supplement)
         with progress_bar(notes) as progress:
             bar = PacedBar(progress, "replay", len(selection.items))
             replayed = replay_with_workers(selection, start, out, worker_settings, frames, bar.advance, notes.print)

@@ -38,14 +38,14 @@ def show(name: str, data: Path | None, out: Path | None, size: int, overwrite: b
     from infthor_eval.errors import wrap_errors
     from infthor_eval.formats.files import prepare_file, refuse_overwrite, write_atomically
     from infthor_eval.terminal import print_line
-    from infthor_eval.thor.launch import embedded
+    from infthor_eval.thor.launch import embedded_launch
     from infthor_eval.thor.scenes import scene_pictures
     from infthor_eval.thor.simulator import Simulator
 
     path = prepare_file(out or Path(f"{name}.png"))
     if path.suffix.lower() not in _PICTURES:
         raise click.UsageError(f"--out {path}: not an image; use {', '.join(_PICTURES)}")
-    with Simulator(embedded(data), width=size, height=size, quality="Ultra") as simulator:
+    with Simulator(embedded_launch(data), width=size, height=size, quality="Ultra") as simulator:
         above, first = scene_pictures(simulator, name)
     sheet = Image.new("RGB", (2 * size, size))
     sheet.paste(Image.fromarray(above), (0, 0))
@@ -87,7 +87,7 @@ def dump(
     from infthor_eval.thor.simulator import Simulator
 
     prepare_folder(out)
-    start = launch.embedded(data) if is_embedded else launch.unity(unity)
+    start = launch.embedded_launch(data) if is_embedded else launch.unity_launch(unity)
     with Simulator(start) as simulator:
         for name in names:
             print_line(f"{name}: {dump_scene(simulator, name, out, overwrite)} objects in {out}")

@@ -204,7 +204,7 @@ def _generate_data(scenes: SceneSettings, seed: int, out: Path, worker_settings:
     from infthor_eval.generation.jobs import trajectory_jobs
     from infthor_eval.generation.questions.generate import generate_questions
     from infthor_eval.generation.replay_set import replay_with_workers, select
-    from infthor_eval.thor.launch import embedded
+    from infthor_eval.thor.launch import embedded_launch
 
     trajectories, replayed_set = prepare_folder(out / "trajectories"), prepare_folder(out / "set")
     jobs = trajectory_jobs(
@@ -212,10 +212,14 @@ def _generate_data(scenes: SceneSettings, seed: int, out: Path, worker_settings:
     )
     with progress_bar(NOTES) as progress:
         bar = PacedBar(progress, "trajectories", len(jobs))
-        generated = generate_with_workers(jobs, embedded(), trajectories, worker_settings, bar.advance, print_note)
+        generated = generate_with_workers(
+            jobs, embedded_launch(), trajectories, worker_settings, bar.advance, print_note
+        )
         bar = PacedBar(progress, "frames", len(jobs))
         selection = select([trajectories])
-        replayed = replay_with_workers(selection, embedded(), replayed_set, worker_settings, 1, bar.advance, print_note)
+        replayed = replay_with_workers(
+            selection, embedded_launch(), replayed_set, worker_settings, 1, bar.advance, print_note
+        )
     failures = [str(item) for item in generated.failures]
     failures += [f"{item.place}: {item.message}" for item in replayed.failures]
     if failures:

@@ -7,7 +7,7 @@ import pytest
 from infthor_eval.generation.questions import contents, counting, final_state, location, open_state, presence
 from infthor_eval.generation.questions.checker import Checker
 from infthor_eval.generation.questions.history import DEFAULT_SHARE, TrajectoryHistory
-from infthor_eval.thor.launch import embedded
+from infthor_eval.thor.launch import embedded_launch
 from infthor_eval.thor.recorder import Recorder
 from infthor_eval.thor.simulator import Simulator
 
@@ -133,7 +133,7 @@ def test_no_room_is_meant_in_a_house_of_several():
 
 
 def test_the_rules_know_a_house_by_its_floors():
-    with Simulator(embedded()) as simulator:
+    with Simulator(embedded_launch()) as simulator:
         for scene, has_rooms in (("house-1", True), ("kitchen-1", False)):
             recorder = Recorder()
             recorder.record(simulator.reset(scene))

@@ -16,7 +16,7 @@ from infthor_eval.generation.replay_set import replay_set, select
 from infthor_eval.generation.replay_summary import summarise
 from infthor_eval.generation.settings import TrajectorySettings
 from infthor_eval.nieh.scoring import score
-from infthor_eval.thor.launch import embedded
+from infthor_eval.thor.launch import embedded_launch
 from infthor_eval.thor.simulator import Simulator
 
 QUESTION_TYPES = {
@@ -70,7 +70,7 @@ TABLE_3 = {
 def replayed(tmp_path_factory):
     folder = tmp_path_factory.mktemp("set")
     jobs = [TrajectorySettings(scene, 3, 110, 1) for scene in ("kitchen-3", "kitchen-5")]
-    with Simulator(embedded()) as simulator:
+    with Simulator(embedded_launch()) as simulator:
         generate_set(jobs, simulator, folder / "trajectories")
         assert summarise(replay_set(select([folder / "trajectories"]), simulator, folder)).complete == 2
     return folder
