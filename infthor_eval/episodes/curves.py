@@ -4,11 +4,12 @@ from bisect import bisect_right
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import accumulate
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
-from infthor_eval.episodes.recorded_runs import EpisodePayload, RecordedRun
+from infthor_eval.episodes.recorded_runs import RecordedRun
+from infthor_eval.episodes.records import P
 from infthor_eval.episodes.shared_units import SharedUnits
 from infthor_eval.runs.records import UnitRecord
 from infthor_eval.statistics import MeanEstimate, mean_over_clusters
@@ -27,8 +28,6 @@ __all__ = [
 
 AT_MOST = "at most"  # label of the bound if no planner is among the runs
 _MAX_POINTS = 400  # of a grid; a picture resolves no more
-
-P = TypeVar("P", bound=EpisodePayload)
 
 
 @dataclass(frozen=True)

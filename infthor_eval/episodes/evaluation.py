@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Generic, Self, TypeVar
 
 from infthor_eval.episodes.options import SimulatorOptions
-from infthor_eval.episodes.recorded_runs import EpisodePayload
+from infthor_eval.episodes.records import P
 from infthor_eval.episodes.simulators import Simulators
 from infthor_eval.episodes.tasks import EpisodeTask
 from infthor_eval.episodes.trajectory_sets import TaskTrajectory
@@ -20,7 +20,6 @@ from infthor_eval.runs import Group, Session, Skipped, TaskFile, TaskRequest, Un
 
 __all__ = ["BoundEpisodes", "EpisodeEvaluation", "EpisodeUnit"]
 
-P = TypeVar("P", bound=EpisodePayload)
 T = TypeVar("T", bound=TaskTrajectory)
 E = TypeVar("E")
 K = TypeVar("K", bound=EpisodeTask[Any, Any])

@@ -4,55 +4,17 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, ClassVar, Generic, Protocol, Self, TypeVar
+from typing import Any, ClassVar, Generic, Self, TypeVar
 
 import msgspec
 
+from infthor_eval.episodes.records import P
 from infthor_eval.errors import wrap_errors
 from infthor_eval.runs import RecordTypes, RunHeader, UnitRecord, read_run
 
-__all__ = ["EpisodePayload", "RecordedRun", "RunConfig", "TaskConfig"]
+__all__ = ["RecordedRun", "RunConfig", "TaskConfig"]
 
 _EMBEDDED = "embedded"  # as the option --simulator names it
-
-
-class EpisodePayload(Protocol):
-    """What the records of plans and of arms have in common."""
-
-    @property
-    def index(self) -> int:
-        """Place in the trajectory."""
-        ...
-
-    @property
-    def steps(self) -> Sequence[Any]:
-        """Steps that the subject took."""
-        ...
-
-    @property
-    def reward(self) -> float:
-        """Reward of all steps."""
-        ...
-
-    @property
-    def max_reward(self) -> float | None:
-        """The highest possible reward; None if it is not known."""
-        ...
-
-    @property
-    def ended(self) -> str:
-        """How the episode ended; empty if it failed or was excluded."""
-        ...
-
-    @property
-    def attempted(self) -> bool:
-        """Whether the subject acted in it."""
-        ...
-
-    @property
-    def done(self) -> bool:
-        """Whether it is a success."""
-        ...
 
 
 class TaskConfig(msgspec.Struct, frozen=True, kw_only=True):
@@ -73,7 +35,6 @@ class TaskConfig(msgspec.Struct, frozen=True, kw_only=True):
         return settings if isinstance(settings, Mapping) else {}
 
 
-P = TypeVar("P", bound=EpisodePayload)
 T = TypeVar("T", bound=TaskConfig)
 
 

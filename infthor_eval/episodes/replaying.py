@@ -12,7 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Generic, Protocol, TypeVar
 
-from infthor_eval.episodes.recorded_runs import EpisodePayload, RecordedRun
+from infthor_eval.episodes.recorded_runs import RecordedRun
+from infthor_eval.episodes.records import P
 from infthor_eval.episodes.replay_frames import EpisodeFrame
 from infthor_eval.episodes.shared_units import only_name
 from infthor_eval.episodes.simulators import Simulators
@@ -24,14 +25,13 @@ from infthor_eval.thor.simulator import Simulator
 
 __all__ = [
     "EpisodeInReplay",
+    "EpisodeReplay",
     "RecordedTrajectory",
-    "ReplaySession",
     "ending_of",
     "records_of_trajectory",
     "restore_trajectory",
 ]
 
-P = TypeVar("P", bound=EpisodePayload)
 R = TypeVar("R", bound=RecordedRun[Any, Any])
 T = TypeVar("T", bound=TaskTrajectory)
 F = TypeVar("F", bound=EpisodeFrame[Any, Any])
@@ -138,7 +138,7 @@ class EpisodeInReplay(Protocol):
         ...
 
 
-class ReplaySession(ABC, Generic[P, F]):
+class EpisodeReplay(ABC, Generic[P, F]):
     """A simulator in which recorded episodes of one trajectory are replayed."""
 
     @property

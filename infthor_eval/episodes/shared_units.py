@@ -4,13 +4,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
-from infthor_eval.episodes.recorded_runs import EpisodePayload, RecordedRun, TaskConfig
+from infthor_eval.episodes.recorded_runs import RecordedRun, TaskConfig
+from infthor_eval.episodes.records import P
 from infthor_eval.errors import DataError, UsageError, unknown_name
 from infthor_eval.runs.records import UnitRecord
 
 __all__ = ["SharedUnits", "difference_notes", "only_name", "shared_tasks", "shared_units"]
 
-P = TypeVar("P", bound=EpisodePayload)
 T = TypeVar("T", bound=TaskConfig)
 Units = Mapping[str, Mapping[Any, UnitRecord[P]]]  # by trajectory, then by their order in time
 

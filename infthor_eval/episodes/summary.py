@@ -6,7 +6,7 @@ from typing import Any, Generic, TypeVar
 
 import msgspec
 
-from infthor_eval.episodes.recorded_runs import EpisodePayload
+from infthor_eval.episodes.records import P
 from infthor_eval.rates import Rate, clustered_rate
 from infthor_eval.runs import UnitRecord
 
@@ -16,10 +16,8 @@ __all__ = [
     "common_results",
     "counted_records",
     "success_rate",
-    "summarise_tasks",
+    "summarise_episodes",
 ]
-
-P = TypeVar("P", bound=EpisodePayload)
 
 
 class EpisodeTaskSummary(msgspec.Struct, frozen=True, kw_only=True):
@@ -55,12 +53,12 @@ class EpisodesSummary(msgspec.Struct, Generic[T], frozen=True):
     tasks: dict[str, T]
 
 
-def summarise_tasks(
+def summarise_episodes(
     config: Mapping[str, Any],
     records: Sequence[UnitRecord[P]],
     summarise_task: Callable[[Mapping[str, Any], list[UnitRecord[P]]], T],
-) -> dict[str, T]:
-    """Return the results of a run's tasks, by name.
+) -> EpisodesSummary[T]:
+    """Summarise a run.
 
     Args:
         config: config of the run.
@@ -68,10 +66,11 @@ def summarise_tasks(
         summarise_task: returns the results of a task, given its config and its records in order.
     """
     ordered = sorted(records, key=lambda record: record.key)
-    return {
+    tasks = {
         name: summarise_task(of_task, [record for record in ordered if record.task == name])
         for name, of_task in config["tasks"].items()
     }
+    return EpisodesSummary(str(config["simulator"]), tasks)
 
 
 def counted_records(records: Sequence[UnitRecord[P]]) -> list[UnitRecord[P]]:

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, TypeVar
 
-from infthor_eval.episodes.summary import EpisodesSummary, EpisodeTaskSummary
+from infthor_eval.episodes.summary import EpisodeTaskSummary
 from infthor_eval.runs import RunHeader, RunSummary
 from infthor_eval.tables import Column, Row, Table, left_out_notes
 
@@ -21,10 +21,9 @@ def run_name(header: RunHeader) -> str:
     return header.name if frames == "shown" else f"{header.name}, {frames} frames"
 
 
-def named_tasks(runs: Sequence[RunSummary], kind: type[EpisodesSummary[T]]) -> Iterator[tuple[str, str, T]]:
-    """Yield the run's name, the task's name and the task's results, for all runs."""
+def named_tasks(runs: Sequence[RunSummary]) -> Iterator[tuple[str, str, Any]]:
+    """Yield the run's name, the task's name and the task's results (`EpisodeTaskSummary`), for all runs."""
     for run in runs:
-        assert isinstance(run.summary, kind)
         for task_name, task in run.summary.tasks.items():
             yield run_name(run.header), task_name, task
 

@@ -5,6 +5,7 @@ from typing import Any
 
 import msgspec
 
+from infthor_eval.episodes.records import EpisodeRecord
 from infthor_eval.runs.records import RecordTypes
 
 __all__ = ["RECORDS", "ArmEnded", "ArmRecord", "ArmStep"]
@@ -47,12 +48,10 @@ class ArmStep(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
         return sum(text.startswith(_COLLIDED) for text in self.refusals)
 
 
-class ArmRecord(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, tag_field="type", tag="arm"):
-    """One episode, and what an arm did in it.
+class ArmRecord(EpisodeRecord, frozen=True, kw_only=True, omit_defaults=True, tag_field="type", tag="arm"):
+    """One pick-up or put, and what an arm did in it; `index` is that of the expert's low-level action it replaces.
 
     Attributes:
-        index: index of the expert's low-level action that the episode replaces.
-        kind: "pickup" or "put".
         instruction: instruction of a policy.
         object_id: id of the object that is picked up or put, in this simulator.
         receptacle_id: id of the receptacle that it is put into; None for pick-ups.
@@ -60,13 +59,9 @@ class ArmRecord(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, t
         starts_inside: whether the object is in the hand's sphere at the start; for pick-ups alone.
         start_distance: metres from the centre of the hand's sphere to the target's box at the start.
         closest: smallest such distance.
-        reward: reward of the episode.
-        max_reward: highest possible reward.
-        ended: how it ended, see `ArmEnded`; empty if nobody acted.
+        max_reward: reward of a success.
     """
 
-    index: int
-    kind: str
     instruction: str
     object_id: str = ""
     receptacle_id: str | None = None
@@ -74,19 +69,7 @@ class ArmRecord(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, t
     starts_inside: bool = False
     start_distance: float = 0.0
     closest: float = 0.0
-    reward: float = 0.0
     max_reward: float = 0.0
-    ended: str = ""
-
-    @property
-    def attempted(self) -> bool:
-        """Whether the arm acted in the episode; an actor that gives up at once has taken no step."""
-        return bool(self.ended)
-
-    @property
-    def done(self) -> bool:
-        """Whether the episode is a success."""
-        return self.ended == ArmEnded.DONE
 
     @property
     def n_collisions(self) -> int:

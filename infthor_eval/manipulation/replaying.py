@@ -10,8 +10,8 @@ from pathlib import Path
 import msgspec
 
 from infthor_eval.episodes.replaying import (
+    EpisodeReplay,
     RecordedTrajectory,
-    ReplaySession,
     ending_of,
     records_of_trajectory,
     restore_trajectory,
@@ -84,7 +84,7 @@ def replay_episodes(recorded: RecordedEpisodes, data: Path | None, scenes: Path 
         yield ArmReplay(recorded, trajectory, start_simulator)
 
 
-class ArmReplay(ReplaySession[ArmRecord, ArmFrame]):
+class ArmReplay(EpisodeReplay[ArmRecord, ArmFrame]):
     """Simulators in which recorded episodes are replayed. They are started for the first episode."""
 
     def __init__(

@@ -10,7 +10,7 @@ from infthor_eval.episodes.summary import (
     common_results,
     counted_records,
     success_rate,
-    summarise_tasks,
+    summarise_episodes,
 )
 from infthor_eval.manipulation.records import ArmRecord
 from infthor_eval.rates import Rate, clustered_rate
@@ -43,8 +43,7 @@ class ArmTaskSummary(EpisodeTaskSummary, frozen=True, kw_only=True):
     collisions: float | None
 
 
-class ManipulationSummary(EpisodesSummary[ArmTaskSummary], frozen=True):
-    """Results of a run of manipulation."""
+ManipulationSummary = EpisodesSummary[ArmTaskSummary]
 
 
 def summarise_manipulation(config: Mapping[str, Any], records: Sequence[Record]) -> ManipulationSummary:
@@ -54,7 +53,7 @@ def summarise_manipulation(config: Mapping[str, Any], records: Sequence[Record])
         config: config of the run.
         records: records of all its episodes.
     """
-    return ManipulationSummary(str(config["simulator"]), summarise_tasks(config, records, _summarise_task))
+    return summarise_episodes(config, records, _summarise_task)
 
 
 def _summarise_task(config: Mapping[str, Any], records: Sequence[Record]) -> ArmTaskSummary:

@@ -6,7 +6,7 @@ from itertools import zip_longest
 from infthor_eval.episodes.tables import NAME_COLUMNS, endings_table, named_tasks, result_notes, run_name
 from infthor_eval.formats.published import published_tables
 from infthor_eval.manipulation.kinds import ManipulationKind
-from infthor_eval.manipulation.summary import ArmTaskSummary, ManipulationSummary
+from infthor_eval.manipulation.summary import ArmTaskSummary
 from infthor_eval.rates import format_percent
 from infthor_eval.runs import RunSummary
 from infthor_eval.tables import Column, Row, Table
@@ -26,7 +26,7 @@ def overview_table(runs: Sequence[RunSummary]) -> Table:
 
 def result_tables(runs: Sequence[RunSummary]) -> list[Table]:
     """Return all tables of some runs."""
-    tasks = list(named_tasks(runs, ManipulationSummary))
+    tasks = list(named_tasks(runs))
     return [_success_table(runs), _episodes_table(tasks), endings_table("How episodes ended", tasks)]
 
 

@@ -7,8 +7,9 @@ from collections.abc import Mapping, Sequence
 from enum import StrEnum
 
 from infthor_eval.episodes.curves import Earned, Facet, Functions, RewardCurves, StepFunction, compute_curves
+from infthor_eval.episodes.records import NOT_ATTEMPTED
 from infthor_eval.plans.recorded_runs import PlansRun, shared_plans
-from infthor_eval.plans.records import NOT_ATTEMPTED, PlanRecord
+from infthor_eval.plans.records import PlanRecord
 from infthor_eval.runs import UnitRecord
 
 __all__ = ["FACETS", "Axis", "plan_curves"]

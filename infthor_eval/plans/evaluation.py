@@ -5,11 +5,12 @@ from functools import partial
 from itertools import groupby
 
 from infthor_eval.episodes.evaluation import BoundEpisodes, EpisodeEvaluation, EpisodeUnit
+from infthor_eval.episodes.records import NOT_ATTEMPTED
 from infthor_eval.formats.scratch import ScratchFolder
 from infthor_eval.plans.actor_factory import ActorFactory, actor_factory
 from infthor_eval.plans.options import PlansOptions
 from infthor_eval.plans.plan import Plan
-from infthor_eval.plans.records import NOT_ATTEMPTED, PlanRecord
+from infthor_eval.plans.records import PlanRecord
 from infthor_eval.plans.runner import PlanRunner, plan_record
 from infthor_eval.plans.task import PlansTask
 from infthor_eval.plans.trajectories import PlanTrajectory

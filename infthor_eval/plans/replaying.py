@@ -7,8 +7,8 @@ from pathlib import Path
 import msgspec
 
 from infthor_eval.episodes.replaying import (
+    EpisodeReplay,
     RecordedTrajectory,
-    ReplaySession,
     ending_of,
     records_of_trajectory,
     restore_trajectory,
@@ -85,7 +85,7 @@ def replay_plans(recorded: RecordedPlans, data: Path | None, scenes: Path | None
         yield PlanReplay(recorded, trajectory, start_simulator)
 
 
-class PlanReplay(ReplaySession[PlanRecord, PlanFrame]):
+class PlanReplay(EpisodeReplay[PlanRecord, PlanFrame]):
     """A simulator in which recorded plans are replayed. It is started, and the scene restored, for the first plan."""
 
     def __init__(

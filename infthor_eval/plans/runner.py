@@ -5,12 +5,13 @@ from pathlib import Path
 
 import msgspec
 
+from infthor_eval.episodes.records import NOT_ATTEMPTED
 from infthor_eval.episodes.running import EpisodeResult, EpisodeRunner
 from infthor_eval.plans.actor_factory import ActorFactory
 from infthor_eval.plans.actors import Act, PlanSituation
 from infthor_eval.plans.environment import PlanEnvironment, StepOutcome
 from infthor_eval.plans.plan import Plan
-from infthor_eval.plans.records import NOT_ATTEMPTED, PlanRecord, StepRecord
+from infthor_eval.plans.records import PlanRecord, StepRecord
 from infthor_eval.plans.task import PlansTask
 from infthor_eval.plans.trajectories import PlanTrajectory
 from infthor_eval.runs import Tokens, Usage

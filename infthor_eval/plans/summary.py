@@ -9,7 +9,7 @@ from infthor_eval.episodes.summary import (
     common_results,
     counted_records,
     success_rate,
-    summarise_tasks,
+    summarise_episodes,
 )
 from infthor_eval.plans.plan import PlanKind
 from infthor_eval.plans.records import PlanRecord
@@ -52,8 +52,7 @@ class PlanTaskSummary(EpisodeTaskSummary, frozen=True, kw_only=True):
     n_actions: int
 
 
-class PlansSummary(EpisodesSummary[PlanTaskSummary], frozen=True):
-    """Results of a run of plans."""
+PlansSummary = EpisodesSummary[PlanTaskSummary]
 
 
 def summarise_plans(config: Mapping[str, Any], records: Sequence[Record]) -> PlansSummary:
@@ -63,7 +62,7 @@ def summarise_plans(config: Mapping[str, Any], records: Sequence[Record]) -> Pla
         config: config of the run.
         records: records of all its plans.
     """
-    return PlansSummary(str(config["simulator"]), summarise_tasks(config, records, _summarise_task))
+    return summarise_episodes(config, records, _summarise_task)
 
 
 def _summarise_task(config: Mapping[str, Any], records: Sequence[Record]) -> PlanTaskSummary:

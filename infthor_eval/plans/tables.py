@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from infthor_eval.episodes.tables import NAME_COLUMNS, endings_table, named_tasks, result_notes
 from infthor_eval.formats.published import published_tables
-from infthor_eval.plans.summary import FINAL_COLUMNS, PlansSummary, PlanTaskSummary
+from infthor_eval.plans.summary import FINAL_COLUMNS, PlanTaskSummary
 from infthor_eval.rates import format_number, format_percent
 from infthor_eval.runs import RunSummary
 from infthor_eval.tables import Column, Row, Table
@@ -16,7 +16,7 @@ def overview_table(runs: Sequence[RunSummary]) -> Table:
     """Return completed plans and reward, one number a task."""
     rows = [
         Row((*names, format_percent(task.success.get("total")), format_percent(task.reward_share), *_sizes(task)[:2]))
-        for *names, task in named_tasks(runs, PlansSummary)
+        for *names, task in named_tasks(runs)
     ]
     columns = (*NAME_COLUMNS, *map(Column, ("completed, %", "reward, % of the most", "plans", "trajectories")))
     return Table("Plans, 95 % interval in brackets", columns, tuple(rows), result_notes(runs))
@@ -24,7 +24,7 @@ def overview_table(runs: Sequence[RunSummary]) -> Table:
 
 def result_tables(runs: Sequence[RunSummary]) -> list[Table]:
     """Return all tables of some runs."""
-    tasks = list(named_tasks(runs, PlansSummary))
+    tasks = list(named_tasks(runs))
     endings = endings_table("How plans ended", tasks, "actions", lambda task: task.n_actions)
     return [_success_table(runs, tasks), _reward_table(tasks), endings]
 

@@ -4,8 +4,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from infthor_eval.episodes.records import DONE
 from infthor_eval.plans.recorded_runs import PlansRun
-from infthor_eval.plans.records import DONE, RECORDS, PlanRecord, StepRecord
+from infthor_eval.plans.records import RECORDS, PlanRecord, StepRecord
 from infthor_eval.runs import RunHeader, Tokens, UnitRecord
 from infthor_eval.runs.journal import Journal
 

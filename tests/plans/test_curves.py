@@ -4,9 +4,9 @@ import msgspec
 import pytest
 
 from infthor_eval.episodes.curves import AT_MOST, StepFunction
+from infthor_eval.episodes.records import NOT_ATTEMPTED
 from infthor_eval.errors import DataError, UsageError
 from infthor_eval.plans.curves import Axis, plan_curves
-from infthor_eval.plans.records import NOT_ATTEMPTED
 
 from .made_runs import TASK, made_run, plan, planner_run
 

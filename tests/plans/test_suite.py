@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from infthor_eval.episodes.records import NOT_ATTEMPTED
 from infthor_eval.errors import DataError, UsageError
 from infthor_eval.formats.published import PublishedRow, PublishedTable
-from infthor_eval.plans.records import NOT_ATTEMPTED
 from infthor_eval.runs import execute
 
 from .cut import CANDLE, FORK, MUG, cut, write

@@ -1,0 +1,43 @@
+"""Records of episodes, as far as plans and arms have them alike."""
+
+from typing import Any, TypeVar
+
+import msgspec
+
+__all__ = ["DONE", "NOT_ATTEMPTED", "EpisodeRecord", "P"]
+
+DONE, NOT_ATTEMPTED = "done", "not attempted"  # two of the ways in which an episode ends
+
+
+class EpisodeRecord(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """One episode, and what the subject did in it.
+
+    Attributes:
+        index: place in the trajectory.
+        kind: kind of the episode.
+        steps: steps of the subject.
+        reward: reward of all steps.
+        max_reward: highest possible reward; None if it is not known.
+        ended: how it ended; "not attempted" if an earlier one ended the trajectory, and empty if the subject failed or
+            the episode is excluded.
+    """
+
+    index: int
+    kind: str
+    steps: tuple[Any, ...] = ()
+    reward: float = 0.0
+    max_reward: float | None = None
+    ended: str = ""
+
+    @property
+    def attempted(self) -> bool:
+        """Whether the subject acted in it up to its end."""
+        return self.ended not in ("", NOT_ATTEMPTED)
+
+    @property
+    def done(self) -> bool:
+        """Whether it is a success."""
+        return self.ended == DONE
+
+
+P = TypeVar("P", bound=EpisodeRecord)
