@@ -1,4 +1,4 @@
-"""The page of all commands, made of their own help (a hook of mkdocs)."""
+"""The page of all commands, generated from their help (a hook of mkdocs)."""
 
 import inspect
 from collections.abc import Iterator
@@ -6,6 +6,7 @@ from typing import Any
 
 import click
 
+from infthor_eval.cli.help import ExampleCommand, ExampleGroup
 from infthor_eval.cli.main import _infthor_eval
 
 __all__ = ["commands", "on_page_markdown"]
@@ -14,18 +15,18 @@ _PLACE = "<!-- commands -->"
 
 
 def on_page_markdown(markdown: str, **_: Any) -> str:
-    """Put the commands where a page wants them."""
+    """Insert the commands into a page that has the place for them."""
     return markdown.replace(_PLACE, commands()) if _PLACE in markdown else markdown
 
 
 def commands() -> str:
-    """A section for each command: its usage, what it says of itself, its options."""
+    """Return a section for each command: example, usage, help, options."""
     top = click.Context(_infthor_eval, info_name="infthor-eval")
     return "\n\n".join(_section(context) for context in _all(top))
 
 
 def _all(parent: click.Context) -> Iterator[click.Context]:
-    """The commands below a group, and those below groups among them."""
+    """Yield the commands of a group, and those of the groups among them."""
     assert isinstance(parent.command, click.Group)
     for name in parent.command.list_commands(parent):
         command = parent.command.get_command(parent, name)
@@ -40,9 +41,11 @@ def _section(context: click.Context) -> str:
     command = context.command
     usage = " ".join([context.command_path, *command.collect_usage_pieces(context)])
     rows = [record for option in command.get_params(context) if (record := option.get_help_record(context))]
-    table = [f"| `{names}` | {_cell(said)} |" for names, said in rows]
-    told = inspect.cleandoc(command.help or "")
-    return "\n".join([f"## {context.command_path}", f"`{usage}`", "", told, "", "| option | |", "|---|---|", *table])
+    table = [f"| `{names}` | {_cell(help_text)} |" for names, help_text in rows]
+    text = inspect.cleandoc(command.help or "")
+    example = ["```", command.example, "```", ""] if isinstance(command, ExampleCommand | ExampleGroup) else []
+    head = [f"## {context.command_path}", *example, f"`{usage}`", "", text, ""]
+    return "\n".join([*head, "| option | |", "|---|---|", *table])
 
 
 def _cell(text: str) -> str:
