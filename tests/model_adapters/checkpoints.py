@@ -165,8 +165,8 @@ OTHERS: dict[str, Callable[[Path], None]] = {
 def twin(family: str) -> Twin:
     """What the tiny model of one of our families is made from."""
     module, _, name = BUILT_IN[f"{family}-tiny"].adapter.partition(":")
-    found: Twin = getattr(import_module(module), name).twin
-    return found
+    description: Twin = getattr(import_module(module), name).twin
+    return description
 
 
 def save(name: str, folder: Path) -> None:

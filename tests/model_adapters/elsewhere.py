@@ -47,7 +47,7 @@ class _Elsewhere(torch.Tensor):
 
     @staticmethod
     def __new__(cls, held: torch.Tensor, seen: Seen) -> "_Elsewhere":
-        made: _Elsewhere = torch.Tensor._make_wrapper_subclass(
+        tensor: _Elsewhere = torch.Tensor._make_wrapper_subclass(
             cls,
             held.shape,
             strides=held.stride(),
@@ -55,8 +55,8 @@ class _Elsewhere(torch.Tensor):
             dtype=held.dtype,
             device=_ELSEWHERE,
         )
-        made.held, made.seen = held, seen
-        return made
+        tensor.held, tensor.seen = held, seen
+        return tensor
 
     @classmethod
     def __torch_function__(cls, func: Any, types: Any, args: Any = (), kwargs: Any = None) -> Any:
@@ -172,11 +172,11 @@ class _Making(TorchFunctionMode):
         kwargs = kwargs or {}
         if func not in (torch.tensor, torch.as_tensor) or kwargs.get("device") != _ELSEWHERE:
             return func(*args, **kwargs)
-        made = func(*args, **(kwargs | {"device": None}))
-        if isinstance(made, _Elsewhere):
-            return made
+        tensor = func(*args, **(kwargs | {"device": None}))
+        if isinstance(tensor, _Elsewhere):
+            return tensor
         self._seen.brought["tensor"] += 1
-        return _Elsewhere(made, self._seen)
+        return _Elsewhere(tensor, self._seen)
 
 
 class _Dispatching(TorchDispatchMode):

@@ -61,9 +61,9 @@ class HashConversation(Transcript):
     def reply(self, decoding: Decoding) -> Reply:
         check_decoding("hash", self.capabilities, decoding)
         check_turns("hash", self.turns)
-        return self.said(decoding)
+        return self.hash_reply(decoding)
 
-    def said(self, decoding: Decoding) -> Reply:
+    def hash_reply(self, decoding: Decoding) -> Reply:
         """The reply, whatever is asked."""
         text = self.text(decoding)
         ids = tuple(map(ord, text))
@@ -73,8 +73,8 @@ class HashConversation(Transcript):
         return Reply(text, *counted, ids if self.capabilities.token_ids else None)
 
     def text(self, decoding: Decoding) -> str:
-        said = [(turn.role, part) for turn in self.turns for part in turn.parts]
-        key = "\n".join(f"{role}:{part if isinstance(part, str) else part.digest}" for role, part in said)
+        parts = [(turn.role, part) for turn in self.turns for part in turn.parts]
+        key = "\n".join(f"{role}:{part if isinstance(part, str) else part.digest}" for role, part in parts)
         if not decoding.greedy:
             key += f"\n{decoding.seed}"
         if not self.capabilities.deterministic:
@@ -147,14 +147,14 @@ def _reply_that_remembers_what_was_rewound(self: Any, decoding: Decoding) -> Rep
 
 def _reply_to_anything(self: Any, decoding: Decoding) -> Reply:
     check_decoding("hash", self.capabilities, decoding)
-    return self.said(decoding)
+    return self.hash_reply(decoding)
 
 
 def _reply_to_the_assistant(self: Any, decoding: Decoding) -> Reply:
     check_decoding("hash", self.capabilities, decoding)
     if not self.turns:
         raise ModelError("nothing")
-    return self.said(decoding)
+    return self.hash_reply(decoding)
 
 
 def _reply_without_ids(self: Any, decoding: Decoding) -> Reply:
@@ -268,7 +268,7 @@ def test_a_wrong_count_of_a_frames_tokens_is_named(count: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("told", "clause"),
+    ("claims", "clause"),
     [
         ({"counts_tokens": False}, "n_tokens is not None though counts_tokens is false"),
         ({"token_ids": False}, "a reply has token_ids though token_ids is false"),
@@ -276,8 +276,8 @@ def test_a_wrong_count_of_a_frames_tokens_is_named(count: int) -> None:
         ({"max_in_flight": 0}, "max_in_flight is below 1"),
     ],
 )
-def test_capabilities_that_are_not_the_models_are_named(told: dict[str, Any], clause: str) -> None:
-    broken = type("Broken", (HashModel,), {"capabilities": Capabilities(**told)})()
+def test_capabilities_that_are_not_the_models_are_named(claims: dict[str, Any], clause: str) -> None:
+    broken = type("Broken", (HashModel,), {"capabilities": Capabilities(**claims)})()
     broken.conversation = HashConversation
     with pytest.raises(ContractError, match=clause):
         check_adapter(broken)

@@ -203,7 +203,7 @@ def test_any_label_is_one_component_of_a_path(pretrained: str, tmp_path: Path, m
     folder = tmp_path / "here" / "there"
     folder.mkdir(parents=True)
     monkeypatch.chdir(folder)
-    found = label("hf-vlm", {"pretrained": pretrained})
-    assert Path(found).name == found
-    assert found not in ("", ".", "..")
-    assert pretrained != "." or found == "there"
+    name = label("hf-vlm", {"pretrained": pretrained})
+    assert Path(name).name == name
+    assert name not in ("", ".", "..")
+    assert pretrained != "." or name == "there"

@@ -50,26 +50,26 @@ SAID = st.lists(
 )
 
 
-def _append(talk: Transcript, said: Any, frames: list[FrameRef]) -> None:
-    for role, numbered in said:
+def _append(talk: Transcript, message: Any, frames: list[FrameRef]) -> None:
+    for role, numbered in message:
         talk.append(*(frames[part] if isinstance(part, int) else part for part in numbered), role=role)
 
 
-def _letters(said: Any) -> list[tuple[Role, str | int]]:
-    whole = [(role, part if isinstance(part, str) else [part]) for role, parts in said for part in parts]
+def _letters(message: Any) -> list[tuple[Role, str | int]]:
+    whole = [(role, part if isinstance(part, str) else [part]) for role, parts in message for part in parts]
     return [(role, each) for role, part in whole for each in part]
 
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(said=SAID, more=SAID)
-def test_turns_hold_what_was_said_and_leave_no_joint(frames: list[FrameRef], said: Any, more: Any) -> None:
+@given(message=SAID, more=SAID)
+def test_turns_hold_what_was_said_and_leave_no_joint(frames: list[FrameRef], message: Any, more: Any) -> None:
     talk = Transcript()
-    _append(talk, said, frames)
+    _append(talk, message, frames)
     turns, here = talk.turns, talk.mark()
     numbered = [
         (turn.role, [part if isinstance(part, str) else frames.index(part) for part in turn.parts]) for turn in turns
     ]
-    assert _letters(numbered) == _letters(said)
+    assert _letters(numbered) == _letters(message)
     assert all(turn.parts for turn in turns)
     assert all(one.role != other.role for one, other in pairwise(turns))
     assert not any(

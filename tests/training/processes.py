@@ -110,9 +110,9 @@ def train(checkpoint: LoadedCheckpoint, folder: Path, frames: list[FrameRef], ra
         for number, answer in enumerate(ANSWERS)
     ]
     settings = LoopSettings(learning_rate=1e-3, warmup_ratio=0.5, max_steps=2, sequences_per_step=3)
-    told: list[Progress] = []
-    Loop(model, PAD, sequences, settings, folder, ranks=ranks, on_step=told.append).run()
-    return told
+    steps: list[Progress] = []
+    Loop(model, PAD, sequences, settings, folder, ranks=ranks, on_step=steps.append).run()
+    return steps
 
 
 def work(rank: int, folder: Path, frames: list[FrameRef]) -> None:
@@ -163,16 +163,16 @@ def _refusals(frames: list[FrameRef], ranks: Ranks) -> dict[str, str]:
     case = CASES[0]
     model, batch = model_of(case), batch_of(case, frames)
     assert ranks.context_group is not None
-    found = {}
+    results = {}
     with context_parallel(model, ranks.context_group) as parallel:
         for layer in model.decoder.layers:
             layer.self_attn.sliding_window = 8
         try:
             parallel.loss(batch, 1)
         except InfthorError as error:
-            found["sliding"] = str(error)
+            results["sliding"] = str(error)
     try:
         assign_ranks(3)
     except InfthorError as error:
-        found["three"] = str(error)
-    return found
+        results["three"] = str(error)
+    return results

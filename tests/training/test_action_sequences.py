@@ -35,14 +35,14 @@ def text_of(parts):
     return "".join(part if isinstance(part, str) else "<image>" for part in parts)
 
 
-def said(encoder, pieces):
+def text_of_ids(encoder, pieces):
     """Text of what loss is taken on, by the tokenizer alone."""
     return encoder._tokenizer.decode(pieces, skip_special_tokens=False)
 
 
 def trained_text(encoder, sequence):
     runs = itertools.groupby(zip(sequence.pieces, sequence.has_loss, strict=True), key=lambda pair: pair[1])
-    return [said(encoder, [piece for piece, _ in run]) for trained, run in runs if trained]
+    return [text_of_ids(encoder, [piece for piece, _ in run]) for trained, run in runs if trained]
 
 
 def test_a_recorded_history_says_what_the_replay_wrote(bundled_set):
@@ -60,14 +60,14 @@ def test_windows_have_every_action_once_and_each_begins_as_a_trajectory_does(bun
     for name in names_in(bundled_set)[:3]:
         history = segments_of(bundled_set, name)
         goals = {segment.goal for segment in history}
-        made = list(windows(encoder, name, history, 5000))
-        assert len(made) > 1
-        assert all(window.n_tokens <= 5000 for window in made)
-        for window in made:
+        windows_of_history = list(windows(encoder, name, history, 5000))
+        assert len(windows_of_history) > 1
+        assert all(window.n_tokens <= 5000 for window in windows_of_history)
+        for window in windows_of_history:
             text = encoder._tokenizer.decode([piece for piece in window.pieces if isinstance(piece, int)])
             goal = re.match(r"<\|goal\|>Your main goal: (.*?)<\|goal\|>", text)
             assert goal[1] in goals
-        actions = [text for window in made for text in trained_text(encoder, window)]
+        actions = [text for window in windows_of_history for text in trained_text(encoder, window)]
         assert actions == [f"{ACT}{action}{ACT}" for segment in history for action, _ in segment.steps]
 
 
@@ -76,17 +76,20 @@ def test_single_plans_have_every_action_once_and_each_begins_as_a_trajectory_doe
         segments = segments_of(bundled_set, name)
         alone = list(single_plans(encoder, name, segments))
         assert len(alone) == sum(bool(segment.steps) for segment in segments)
-        found = [_ACTION.findall(said(encoder, [one for one in plan.pieces if isinstance(one, int)])) for plan in alone]
-        assert found == [[action for action, _ in segment.steps] for segment in segments if segment.steps]
-        assert all(said(encoder, plan.pieces[:1]) == "<|goal|>" for plan in alone)
+        actions = [
+            _ACTION.findall(text_of_ids(encoder, [one for one in plan.pieces if isinstance(one, int)]))
+            for plan in alone
+        ]
+        assert actions == [[action for action, _ in segment.steps] for segment in segments if segment.steps]
+        assert all(text_of_ids(encoder, plan.pieces[:1]) == "<|goal|>" for plan in alone)
 
 
 def test_windows_cannot_hold_another_plan(bundled_set, encoder):
     name = names_in(bundled_set)[0]
     history = segments_of(bundled_set, name)
-    made = list(windows(encoder, name, history, 5000))
-    ends = itertools.accumulate(window_plans(window) for window in made)
-    for window, end in zip(made[:-1], ends, strict=False):
+    windows_of_history = list(windows(encoder, name, history, 5000))
+    ends = itertools.accumulate(window_plans(window) for window in windows_of_history)
+    for window, end in zip(windows_of_history[:-1], ends, strict=False):
         more = encoder.pieces(list(history[end].parts()))
         assert window.n_tokens + sum(1 if isinstance(piece, int) else len(piece.ids) for piece in more) > 5000
 
@@ -101,9 +104,9 @@ def test_a_plan_that_is_too_long_is_left_out_and_told(bundled_set, encoder):
     history = segments_of(bundled_set, name)
     least = min(len(segment.steps) for segment in history)
     limit = 150 + least * 130
-    made = list(windows(encoder, name, history, limit))
-    left = [item for item in made if isinstance(item, SkippedItem)]
-    kept = [item for item in made if isinstance(item, TrainingSequence)]
+    windows_of_history = list(windows(encoder, name, history, limit))
+    left = [item for item in windows_of_history if isinstance(item, SkippedItem)]
+    kept = [item for item in windows_of_history if isinstance(item, TrainingSequence)]
     assert left
     assert {item.reason for item in left} == {f"longer than {limit} tokens"}
     assert len(left) + sum(map(window_plans, kept)) == len(history)
@@ -161,10 +164,10 @@ def test_windows_of_any_history(lengths, limit, encoder, bundled_set):
         )
         for number, length in enumerate(lengths)
     ]
-    made = list(windows(encoder, "any", history, limit))
-    kept = [item for item in made if isinstance(item, TrainingSequence)]
+    windows_of_history = list(windows(encoder, "any", history, limit))
+    kept = [item for item in windows_of_history if isinstance(item, TrainingSequence)]
     assert all(window.n_tokens <= limit for window in kept)
-    assert sum(map(window_plans, kept)) + len(made) - len(kept) == len(history)
+    assert sum(map(window_plans, kept)) + len(windows_of_history) - len(kept) == len(history)
 
 
 def test_a_sequence_of_130k_tokens_is_built_and_its_labels_are_right(bundled_set, encoder):

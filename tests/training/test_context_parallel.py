@@ -22,8 +22,8 @@ def test_shares_are_all_of_the_sequence(n_tokens: int) -> None:
     whole = torch.arange(3 * n_tokens).reshape(3, 1, n_tokens)
     shares = [SequenceSplit(rank, 4).local_part(whole, -1) for rank in range(4)]
     assert len({share.shape for share in shares}) == 1
-    found = torch.cat(shares, dim=-1)
-    assert sorted(found[found >= 0].tolist()) == whole.flatten().tolist()
+    result = torch.cat(shares, dim=-1)
+    assert sorted(result[result >= 0].tolist()) == whole.flatten().tolist()
 
 
 # On the CPU the second kernel uses the mask, too, by the same call.
@@ -36,8 +36,8 @@ def test_the_last_queries_see_what_they_see_in_the_whole(kernel: Kernel, n_own: 
     weights = torch.randn(2, 4, n_own, 8)
     whole = scaled_dot_product_attention(query, key, value, is_causal=True, scale=0.5, enable_gqa=True)[:, :, -n_own:]
     expected = torch.autograd.grad((whole * weights).sum(), (query, key, value))
-    found = kernel(query[:, :, -n_own:], key, value, 0.0, 0.5)
-    torch.testing.assert_close(found, whole)
-    gradients = torch.autograd.grad((found * weights).sum(), (query, key, value))
+    result = kernel(query[:, :, -n_own:], key, value, 0.0, 0.5)
+    torch.testing.assert_close(result, whole)
+    gradients = torch.autograd.grad((result * weights).sum(), (query, key, value))
     for one, other in zip(gradients, expected, strict=True):
         torch.testing.assert_close(one, other, atol=1e-5, rtol=1e-4)

@@ -45,9 +45,9 @@ def recipe(tmp_path):
 
 
 def train(recipe, data, out, **changes):
-    told = []
+    steps = []
     run = prepare_run(read_recipe(recipe, changes), [data])
-    return fine_tune(run, out, told.append), told
+    return fine_tune(run, out, steps.append), steps
 
 
 def command(recipe, data, out, *more):
@@ -66,9 +66,9 @@ def same(first, second):
 
 @pytest.mark.slow
 def test_a_trained_model_answers_as_it_was_trained_to_behind_its_familys_adapter(recipe, data, tmp_path):
-    checkpoint, told = train(recipe, data, tmp_path / "out", epochs=40, save_every=1000)
-    assert [done.step for done in told] == list(range(1, told[-1].n_steps + 1))
-    assert told[-1].loss < told[0].loss / 20
+    checkpoint, steps = train(recipe, data, tmp_path / "out", epochs=40, save_every=1000)
+    assert [done.step for done in steps] == list(range(1, steps[-1].n_steps + 1))
+    assert steps[-1].loss < steps[0].loss / 20
     model = load("qwen2.5-vl", {"pretrained": str(checkpoint), "dtype": "float32", "max_tokens": "0"}, seed=0)
     samples = find_samples({"data": str(data), "context": "clues"})
     for sample in samples.samples:
@@ -84,7 +84,7 @@ from pathlib import Path
 from infthor_eval.training.fine_tuning import fine_tune, prepared
 from infthor_eval.training.recipe import read_recipe
 told = []
-fine_tune(prepared(read_recipe(sys.argv[1]), [Path(sys.argv[2])]), Path(sys.argv[3]), told.append)
+fine_tune(prepare_run(read_recipe(sys.argv[1]), [Path(sys.argv[2])]), Path(sys.argv[3]), told.append)
 print(told[0].step, told[-1].step)
 """
 
@@ -138,7 +138,7 @@ def test_adapters_are_trained_and_merged(recipe, data, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("changes", "said"),
+    ("changes", "message"),
     [
         ({"optimizer.lr": "0"}, "optimizer.lr is 0"),
         ({"optimiser.lr": "1"}, "unknown field `optimiser`"),
@@ -148,7 +148,7 @@ def test_adapters_are_trained_and_merged(recipe, data, tmp_path):
         ({"max_tokens": "10"}, "no sequence to train on \\(longer than 10 tokens\\)"),
     ],
 )
-def test_what_cannot_be_is_refused(recipe, data, tmp_path, changes, said):
-    with pytest.raises(InfthorError, match=said):
+def test_what_cannot_be_is_refused(recipe, data, tmp_path, changes, message):
+    with pytest.raises(InfthorError, match=message):
         train(recipe, data, tmp_path / "out", **changes)
     assert not (tmp_path / "out").exists()

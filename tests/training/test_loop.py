@@ -32,9 +32,9 @@ def sequences(frames: list[FrameRef]) -> list[TrainingSequence]:
 
 @pytest.fixture
 def model() -> SequenceModel:
-    made = SequenceModel(loaded("qwen2.5-vl"))
-    freeze(made, ["vision", "embeddings"])
-    return made
+    network = SequenceModel(loaded("qwen2.5-vl"))
+    freeze(network, ["vision", "embeddings"])
+    return network
 
 
 def _settings(**changed: Any) -> LoopSettings:
@@ -60,13 +60,13 @@ def _dying_after(step: int) -> Report:
 
 
 def test_the_loss_falls(model: SequenceModel, sequences: list[TrainingSequence], tmp_path: Path) -> None:
-    told: list[Progress] = []
-    _run(model, sequences, tmp_path, told.append, max_steps=20, sequences_per_step=5)
-    assert [progress.step for progress in told] == list(range(1, 21))
-    assert told[-1].loss < told[0].loss / 4
-    assert told[0].learning_rate == 0
-    assert told[4].learning_rate == pytest.approx(3e-3)
-    assert all(progress.tokens_per_second > 0 and progress.gradient_norm > 0 for progress in told)
+    steps: list[Progress] = []
+    _run(model, sequences, tmp_path, steps.append, max_steps=20, sequences_per_step=5)
+    assert [progress.step for progress in steps] == list(range(1, 21))
+    assert steps[-1].loss < steps[0].loss / 4
+    assert steps[0].learning_rate == 0
+    assert steps[4].learning_rate == pytest.approx(3e-3)
+    assert all(progress.tokens_per_second > 0 and progress.gradient_norm > 0 for progress in steps)
     assert not model.training
 
 
@@ -80,9 +80,9 @@ def test_a_run_that_was_killed_goes_on_to_the_same_weights(
         _run(killed, sequences, tmp_path / "killed", _dying_after(4), save_every=3)
     again = SequenceModel(loaded("qwen2.5-vl"))
     freeze(again, ["vision", "embeddings"])
-    told: list[Progress] = []
-    _run(again, sequences, tmp_path / "killed", told.append)
-    assert [progress.step for progress in told] == [4, 5]
+    steps: list[Progress] = []
+    _run(again, sequences, tmp_path / "killed", steps.append)
+    assert [progress.step for progress in steps] == [4, 5]
     whole, resumed = (load_file(tmp_path / name / "step-000005/model.safetensors") for name in ("whole", "killed"))
     assert whole.keys() == resumed.keys()
     assert all(torch.equal(whole[name], resumed[name]) for name in whole)
@@ -105,9 +105,9 @@ def test_the_last_checkpoint_alone_is_kept(
 
 def test_a_run_at_its_end_does_nothing(model: SequenceModel, sequences: list[TrainingSequence], tmp_path: Path) -> None:
     _run(model, sequences, tmp_path)
-    told: list[Progress] = []
-    _run(model, sequences, tmp_path, told.append)
-    assert told == []
+    steps: list[Progress] = []
+    _run(model, sequences, tmp_path, steps.append)
+    assert steps == []
 
 
 def test_accumulated_sequences_weigh_by_their_tokens(
@@ -115,11 +115,11 @@ def test_accumulated_sequences_weigh_by_their_tokens(
 ) -> None:
     from infthor_eval.training.batches import collate
 
-    told: list[Progress] = []
+    steps: list[Progress] = []
     with torch.no_grad():
         expected = model(**collate(sequences, model.family, PAD))["loss"]
-    _run(model, sequences, tmp_path, told.append, max_steps=1, sequences_per_step=5)
-    assert told[0].loss == pytest.approx(expected.item(), rel=1e-5)
+    _run(model, sequences, tmp_path, steps.append, max_steps=1, sequences_per_step=5)
+    assert steps[0].loss == pytest.approx(expected.item(), rel=1e-5)
 
 
 def test_frozen_parts_stay_as_they_are(model: SequenceModel, sequences: list[TrainingSequence], tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ from infthor_eval.training.batches import IGNORED, n_labels
 from infthor_eval.training.context_parallel import SequenceSplit
 from infthor_eval.training.ranks import Ranks
 
-from .processes import CASES, N_RANKS, RESULTS, Case, Found, batch_of, gradients_of, model_of, train, work
+from .processes import CASES, N_RANKS, RESULTS, Case, Result, batch_of, gradients_of, model_of, train, work
 from .twins import loaded, write_frames
 
 TOLERANCE = 1e-5
@@ -39,33 +39,33 @@ def results(folder: Path, frames: list[FrameRef]) -> Any:
 
 
 @pytest.fixture(scope="module", params=CASES, ids=str)
-def alone(request: pytest.FixtureRequest, frames: list[FrameRef]) -> tuple[Case, Found]:
+def alone(request: pytest.FixtureRequest, frames: list[FrameRef]) -> tuple[Case, Result]:
     """A case, and what comes of it in one process without recomputation."""
     case: Case = request.param
     model, batch = model_of(case), batch_of(case, frames)
     model.gradient_checkpointing_disable()
     loss = model(**batch)["loss"]
     loss.backward()
-    return case, Found([loss.item()], gradients_of(model))
+    return case, Result([loss.item()], gradients_of(model))
 
 
-def _assert_equal(found: dict[str, Tensor], expected: dict[str, Tensor]) -> None:
-    assert found.keys() == expected.keys()
+def _assert_equal(result: dict[str, Tensor], expected: dict[str, Tensor]) -> None:
+    assert result.keys() == expected.keys()
     whole = torch.stack([one.norm() for one in expected.values()]).norm()
     for name, one in expected.items():
         # Some gradients are 0 but for rounding (those of the biases of keys): these are held against the whole.
         scale = max(one.norm(), 1e-3 * whole)
-        assert (found[name] - one).norm() <= TOLERANCE * scale, name
+        assert (result[name] - one).norm() <= TOLERANCE * scale, name
 
 
 @pytest.mark.parametrize("n_context", [2, 4])
 def test_a_cut_sequence_has_the_loss_and_gradients_of_the_whole(
-    results: Any, alone: tuple[Case, Found], n_context: int
+    results: Any, alone: tuple[Case, Result], n_context: int
 ) -> None:
     case, expected = alone
-    found: Found = results[case, n_context]
-    assert sum(found.shares) == pytest.approx(expected.shares[0], rel=TOLERANCE)
-    _assert_equal(found.gradients, expected.gradients)
+    result: Result = results[case, n_context]
+    assert sum(result.shares) == pytest.approx(expected.shares[0], rel=TOLERANCE)
+    _assert_equal(result.gradients, expected.gradients)
 
 
 def test_the_cases_are_the_hard_ones(results: Any, frames: list[FrameRef]) -> None:
@@ -87,10 +87,10 @@ def test_the_cases_are_the_hard_ones(results: Any, frames: list[FrameRef]) -> No
 def test_data_groups_of_cut_sequences_train_as_one_process(results: Any, frames: list[FrameRef], folder: Path) -> None:
     expected = train(loaded("qwen2.5-vl"), folder / "alone", frames, Ranks())
     assert len(expected) == 2
-    for found, one in zip(results["loop"], expected, strict=True):
-        assert found.loss == pytest.approx(one.loss, rel=TOLERANCE)
-        assert found.gradient_norm == pytest.approx(one.gradient_norm, rel=TOLERANCE)
-        assert (found.step, found.n_steps, found.learning_rate) == (one.step, one.n_steps, one.learning_rate)
+    for result, one in zip(results["loop"], expected, strict=True):
+        assert result.loss == pytest.approx(one.loss, rel=TOLERANCE)
+        assert result.gradient_norm == pytest.approx(one.gradient_norm, rel=TOLERANCE)
+        assert (result.step, result.n_steps, result.learning_rate) == (one.step, one.n_steps, one.learning_rate)
     ours, theirs = (_moments(folder / name) for name in ("loop", "alone"))
     _assert_equal(ours, theirs)
 

@@ -57,19 +57,19 @@ def _own_loss(checkpoint: LoadedCheckpoint, batch: Batch) -> Tensor:
 def test_the_loss_is_transformers_own(checkpoint: LoadedCheckpoint, tmp_path: Path) -> None:
     batch = _batch(checkpoint, tmp_path)
     with torch.no_grad():
-        found, expected = SequenceModel(checkpoint)(**batch)["loss"], _own_loss(checkpoint, batch)
-    torch.testing.assert_close(found, expected, rtol=1e-5, atol=0)
+        result, expected = SequenceModel(checkpoint)(**batch)["loss"], _own_loss(checkpoint, batch)
+    torch.testing.assert_close(result, expected, rtol=1e-5, atol=0)
 
 
 def test_gradients_are_transformers_own(qwen: LoadedCheckpoint, tmp_path: Path) -> None:
     batch = _batch(qwen, tmp_path)
     model = SequenceModel(qwen)
-    found = _gradients(model, batch)
+    result = _gradients(model, batch)
     model.zero_grad()
     _own_loss(qwen, batch).backward()
     for name, one in model.named_parameters():
         assert one.grad is not None
-        torch.testing.assert_close(found[name], one.grad, rtol=1e-4, atol=1e-5)
+        torch.testing.assert_close(result[name], one.grad, rtol=1e-4, atol=1e-5)
 
 
 def test_a_batch_has_the_loss_of_its_sequences_by_tokens(checkpoint: LoadedCheckpoint, tmp_path: Path) -> None:

@@ -25,9 +25,9 @@ def saved(loaded, folder, prefix, *, without=(), more=None):
 def test_weights_are_taken_over_whatever_stands_before_their_names(tmp_path, prefix):
     trained, other = tiny(1), tiny(0)
     moments = {f"optim.state.{name}.exp_avg": tensor for name, tensor in list(trained.model.state_dict().items())[:5]}
-    found = import_weights(other, saved(trained, tmp_path / "dcp", prefix, without=("vision_tower",), more=moments))
-    assert found.n_ignored == 5
-    assert found.n_kept > 0
+    imported = import_weights(other, saved(trained, tmp_path / "dcp", prefix, without=("vision_tower",), more=moments))
+    assert imported.n_ignored == 5
+    assert imported.n_kept > 0
     begun = tiny(0).model.state_dict()
     for name, tensor in other.model.state_dict().items():
         wanted = begun if "vision_tower" in name else trained.model.state_dict()

@@ -11,7 +11,7 @@ from infthor_eval.training.starting_model import load_starting_model
 from model_adapters import Turn
 
 
-def made(encoder, root, context="clues", limit=100_000):
+def build(encoder, root, context="clues", limit=100_000):
     return list(question_sequences(encoder, find_samples({"data": str(root), "context": context}), limit))
 
 
@@ -24,7 +24,7 @@ def test_questions_are_asked_as_the_evaluation_asks_them(bundled_set, chat_tiny,
     samples = find_samples({"data": str(bundled_set), "context": "clues"})
     for loaded in (chat_tiny, plain_tiny):
         encoder = Encoder(loaded)
-        sequences = made(encoder, bundled_set)
+        sequences = build(encoder, bundled_set)
         assert len(sequences) == len(samples.samples) == 147
         for sequence, sample in zip(sequences, samples.samples, strict=True):
             context, text = samples.request(sample)
@@ -38,13 +38,13 @@ def test_questions_are_asked_as_the_evaluation_asks_them(bundled_set, chat_tiny,
 
 def test_what_cannot_be_asked_is_told(make_nieh_set, encoder):
     root = make_nieh_set([Question("traj_a", "Is it?", (1,), ("yes",)), Question("traj_a", "Is it?", (77,), ("no",))])
-    sequence, left = sorted(made(encoder, root), key=lambda item: isinstance(item, SkippedItem))
+    sequence, left = sorted(build(encoder, root), key=lambda item: isinstance(item, SkippedItem))
     assert isinstance(sequence, TrainingSequence)
     assert "clue 77 is outside" in left.reason
-    (short, *_) = made(encoder, root, "trajectory", limit=100)
-    assert "longer than 100 tokens" in {short.reason, *(item.reason for item in made(encoder, root, limit=100))}
+    (short, *_) = build(encoder, root, "trajectory", limit=100)
+    assert "longer than 100 tokens" in {short.reason, *(item.reason for item in build(encoder, root, limit=100))}
 
 
 def test_notes_cannot_be_trained_on(make_nieh_set, encoder):
     with pytest.raises(UsageError, match="no notes yet"):
-        made(encoder, make_nieh_set(), "memory_notes")
+        build(encoder, make_nieh_set(), "memory_notes")

@@ -15,9 +15,9 @@ def test_the_papers_recipes_are_table_5():
     (table,) = published_tables("training")
     assert {"infthor_32k", "infthor_64k", "infthor_130k", "questions", "tiny"} == set(recipe_names())
     for row in table.rows:
-        recipe, told = read_recipe(row.name), dict(zip(table.columns, row.values, strict=True))
-        assert recipe.max_tokens == told["context tokens"]
-        assert recipe.parallel.context == told["context parallel"]
+        recipe, settings = read_recipe(row.name), dict(zip(table.columns, row.values, strict=True))
+        assert recipe.max_tokens == settings["context tokens"]
+        assert recipe.parallel.context == settings["context parallel"]
         assert recipe.model_args["pretrained"] in row.checkpoints
         assert (recipe.optimizer.lr, recipe.optimizer.warmup_ratio, recipe.epochs) == (1e-5, 0.03, 3)
         assert set(recipe.freeze) == {"vision", "embeddings"}

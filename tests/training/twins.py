@@ -22,8 +22,8 @@ PAD = 0
 def loaded(family: str) -> LoadedCheckpoint:
     """A tiny model of a family with the weights of seed 0."""
     model: Any = load(f"{family}-tiny", {}, seed=0)
-    found: LoadedCheckpoint = model._loaded
-    return found
+    checkpoint: LoadedCheckpoint = model._loaded
+    return checkpoint
 
 
 def write_frames(folder: Path, count: int) -> list[FrameRef]:

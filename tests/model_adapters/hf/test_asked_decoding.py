@@ -48,8 +48,8 @@ def test_every_way_of_running_gives_the_same_replies(
     ways: dict[str, Any], frames: list[FrameRef], decoding: Decoding
 ) -> None:
     assert isinstance(ways["uncached"], UncachedModel)
-    found = {way: _replies(model, frames, decoding) for way, model in ways.items()}
-    assert found["shared"] == found["batched"] == found["uncached"]
+    results = {way: _replies(model, frames, decoding) for way, model in ways.items()}
+    assert results["shared"] == results["batched"] == results["uncached"]
 
 
 @pytest.mark.parametrize("way", ["shared", "batched", "uncached"])
@@ -80,8 +80,8 @@ def test_choices_are_those_that_generate_makes_under_the_same_constraint(
 
     def allowed(_: int, ids: Any) -> list[int]:
         begun = ids[n_context:].tolist()
-        found = {ids[len(begun)] for ids in spelled if ids[: len(begun)] == begun and len(ids) > len(begun)}
-        return sorted(found | (loaded.generation.end_ids if begun in spelled else set()))
+        results = {ids[len(begun)] for ids in spelled if ids[: len(begun)] == begun and len(ids) > len(begun)}
+        return sorted(results | (loaded.generation.end_ids if begun in spelled else set()))
 
     output = loaded.model.generate(**inputs, do_sample=False, max_new_tokens=20, prefix_allowed_tokens_fn=allowed)
     expected = loaded.tokenizer.decode(output[0, n_context:], skip_special_tokens=True)
@@ -92,9 +92,9 @@ def test_choices_are_those_that_generate_makes_under_the_same_constraint(
 def test_what_is_said_in_choices_depends_on_what_is_asked(frames: list[FrameRef]) -> None:
     model: Any = load("qwen2.5-vl-tiny", {}, seed=0)
     heard = [reply for frame in frames for reply in _replies(model, [frame] * 4, up_to(12, choices=PLACES))]
-    found = {text for text, _ in heard}
-    assert found <= set(PLACES)
-    assert len(found) > 1
+    results = {text for text, _ in heard}
+    assert results <= set(PLACES)
+    assert len(results) > 1
 
 
 def test_a_stop_string_cuts_no_choice(ways: dict[str, Any], frames: list[FrameRef]) -> None:

@@ -70,15 +70,15 @@ def test_the_prefix_is_encoded_once_for_all(batching: Any, frames: list[FrameRef
 
 
 def test_penalties_are_each_rows_own(frames: list[FrameRef]) -> None:
-    found = []
+    replies = []
     for size in ("1", "4"):
         model: Any = load("qwen2.5-vl-tiny", {"batch_size": size}, seed=1)
         loaded = model._loaded
         model._loaded = replace(loaded, generation=replace(loaded.generation, repetition_penalty=1.4))
         talk = model.conversation()
         talk.append(frames[0])
-        found.append([reply.token_ids for reply in talk.replies([["mug"], ["\nWhere?"], ["\nWhy not?"]], up_to(40))])
-    assert found[0] == found[1]
+        replies.append([reply.token_ids for reply in talk.replies([["mug"], ["\nWhere?"], ["\nWhy not?"]], up_to(40))])
+    assert replies[0] == replies[1]
 
 
 def test_no_ending_no_reply(batching: Any) -> None:

@@ -148,11 +148,11 @@ def test_the_longer_choice_is_given_where_the_model_does_not_want_to_end() -> No
 
 def test_drawn_choices_are_all_given_at_some_time() -> None:
     choices = [(1,), (1, 2), (6, 6)]
-    found = set()
+    sampled = set()
     for seed in range(40):
         reply = _writing(up_to(3, temperature=3.0, seed=seed), choices=choices)
-        found.add(tuple(_written(reply, UNEVEN, lambda token: UNEVEN)))
-    assert found == set(choices)
+        sampled.add(tuple(_written(reply, UNEVEN, lambda token: UNEVEN)))
+    assert sampled == set(choices)
 
 
 @pytest.mark.parametrize(("eos", "ends"), [(None, set()), (3, {3}), ([3, 4], {3, 4})])

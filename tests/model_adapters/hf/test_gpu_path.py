@@ -83,7 +83,7 @@ def test_a_model_on_another_device_leaves_nothing_on_the_cpu(family: str, mode: 
 def _step(model: Any, seen: Seen, frames: Sequence[FrameRef], **decoding: Any) -> tuple[float, float, float]:
     """Of one decoded token on top of what is encoded: reads, tensors brought to the device, bytes allocated there."""
     few, more = 2, 8
-    found = []
+    counts = []
     with elsewhere(seen):
         _asked(model, frames, 1)
         for new in (few, more):
@@ -91,9 +91,9 @@ def _step(model: Any, seen: Seen, frames: Sequence[FrameRef], **decoding: Any) -
                 counter.clear()
             replies = _asked(model, frames, new, **decoding)
             assert {len(ids) for ids in replies} == {new}
-            found.append((seen.reads.total(), seen.brought.total(), seen.allocated.total()))
+            counts.append((seen.reads.total(), seen.brought.total(), seen.allocated.total()))
     n_steps = (more - few) * (1 if model.capabilities.batch_size > 1 else len(QUESTIONS))
-    reads, brought, allocated = ((after - before) / n_steps for before, after in zip(*found, strict=True))
+    reads, brought, allocated = ((after - before) / n_steps for before, after in zip(*counts, strict=True))
     return reads, brought, allocated
 
 
@@ -169,16 +169,16 @@ def _failing_after(function: Callable[..., Any], n_calls: int) -> Callable[..., 
 @pytest.fixture
 def buffers(monkeypatch: pytest.MonkeyPatch) -> list[weakref.ref[torch.Tensor]]:
     """The buffers of keys and values that are made from now on."""
-    made: list[weakref.ref[torch.Tensor]] = []
+    created: list[weakref.ref[torch.Tensor]] = []
     grown = BufferedLayer._grown
 
     def noting(*args: Any) -> torch.Tensor:
         buffer = grown(*args)
-        made.append(weakref.ref(buffer))
+        created.append(weakref.ref(buffer))
         return buffer
 
     monkeypatch.setattr(BufferedLayer, "_grown", noting)
-    return made
+    return created
 
 
 @pytest.mark.parametrize("batch_size", ["1", "3"])
@@ -202,5 +202,5 @@ def test_memory_that_runs_out_is_free_for_the_next_request(
             _asked(model, frames)
     assert "\n" not in str(caught.value)
     assert len(buffers) > 0
-    assert [made for made in buffers if made() is not None] == []  # though the error is still there
+    assert [created for created in buffers if created() is not None] == []  # though the error is still there
     assert _asked(model, frames) == _asked(_tiny("qwen2.5-vl", {}), frames)

@@ -38,22 +38,22 @@ def _steps(frames: Sequence[FrameRef], n: int) -> Iterator[list[Part]]:
 
 def _small_vision(config: Callable[[Mapping[str, int], int], Any]) -> Callable[[Mapping[str, int], int], Any]:
     def smaller(ids: Mapping[str, int], vocab_size: int) -> Any:
-        made = config(ids, vocab_size)
-        made.vision_config.image_size = 56
-        made.image_grid_pinpoints = [[56, 56]]
-        return made
+        small_config = config(ids, vocab_size)
+        small_config.vision_config.image_size = 56
+        small_config.image_grid_pinpoints = [[56, 56]]
+        return small_config
 
     return smaller
 
 
 def _small(family: str) -> Twin:
     """A twin whose frames take few tokens, for many of them."""
-    found = twin(family)
+    usual = twin(family)
     if family != "llava-onevision":
-        return found
+        return usual
     pinpoints = [[56, 56]]
     settings = {"size": {"height": 56, "width": 56}, "image_grid_pinpoints": pinpoints}
-    return replace(found, config=_small_vision(found.config), image_settings=settings)
+    return replace(usual, config=_small_vision(usual.config), image_settings=settings)
 
 
 def _add_tokens(folder: Path) -> None:
@@ -73,13 +73,13 @@ def _add_tokens(folder: Path) -> None:
 def folders(tmp_path_factory: pytest.TempPathFactory) -> dict[tuple[str, str], Path]:
     """Checkpoints of two families, with the usual tokenizer and with one that has the tokens of plans."""
     root = tmp_path_factory.mktemp("growing")
-    found = {}
+    by_family = {}
     for family in ("qwen2.5-vl", "llava-onevision"):
         for tokens in ("usual", "added"):
-            found[family, tokens] = root / f"{family}-{tokens}"
-            _small(family).save(found[family, tokens], seed=0)
-        _add_tokens(found[family, "added"])
-    return found
+            by_family[family, tokens] = root / f"{family}-{tokens}"
+            _small(family).save(by_family[family, tokens], seed=0)
+        _add_tokens(by_family[family, "added"])
+    return by_family
 
 
 def _load(folders: Mapping[tuple[str, str], Path], family: str, tokens: str, **options: str) -> Any:

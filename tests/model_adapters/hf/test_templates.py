@@ -48,7 +48,7 @@ TEMPLATE = """\
 
 
 @pytest.fixture(scope="module")
-def said(frames: list[FrameRef]) -> list[tuple[Turn, ...]]:
+def conversations(frames: list[FrameRef]) -> list[tuple[Turn, ...]]:
     return [
         (Turn("user", ("<|goal|>Wash {{ it }}.  <|goal|>", *frames[:2], "\nMove", frames[2], "Ahead ")),),
         (
@@ -72,18 +72,18 @@ def _without_template(checkpoint: Path, folder: Path) -> Path:
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_turns_are_written_one_after_the_other(family: str, said: list[tuple[Turn, ...]]) -> None:
+def test_turns_are_written_one_after_the_other(family: str, conversations: list[tuple[Turn, ...]]) -> None:
     model: Any = load(f"{family}-tiny", {"prompt": "plain"}, seed=0)
     placeholder = model._loaded.family.placeholder_id
     texts = ["<|goal|>Wash {{ it }}.  <|goal|>@@\nMove@Ahead ", "You wash.\n@LookUpNow? @"]
-    for turns, text in zip(said, texts, strict=True):
+    for turns, text in zip(conversations, texts, strict=True):
         ids = [piece if isinstance(piece, int) else placeholder for piece in model.pieces(turns)]
         assert model._loaded.tokenizer.decode(ids) == BEGINS[family] + text.replace("@", IMAGES[family])
 
 
 @pytest.mark.slow
 def test_ids_and_replies_are_those_of_transformers_on_the_bare_sequence(
-    checkpoints: dict[str, Path], tmp_path: Path, said: list[tuple[Turn, ...]], answer_plainly: Any
+    checkpoints: dict[str, Path], tmp_path: Path, conversations: list[tuple[Turn, ...]], answer_plainly: Any
 ) -> None:
     names = (*FAMILIES, *OTHERS)
     folders = {name: _without_template(checkpoints[name], tmp_path / name) for name in names}
@@ -92,10 +92,10 @@ def test_ids_and_replies_are_those_of_transformers_on_the_bare_sequence(
         models[name].append(_load(name, folders[name], chunk_tokens="50"))
     for name in names:
         (folders[name] / "chat_template.jinja").write_text(TEMPLATE.replace("IMAGE", IMAGES[name]))
-    plainly = answer_plainly(dict.fromkeys(folders.values(), said), NEW)
+    plainly = answer_plainly(dict.fromkeys(folders.values(), conversations), NEW)
     for name in names:
         for model in models[name]:
-            for turns, (ids, reply) in zip(said, plainly[folders[name]], strict=True):
+            for turns, (ids, reply) in zip(conversations, plainly[folders[name]], strict=True):
                 require_same(model, turns, ids, reply, NEW)
 
 
@@ -112,12 +112,12 @@ def test_a_checkpoint_without_a_template_is_asked_plainly_or_not_at_all(
 
 def test_the_way_of_asking_is_part_of_the_identity(checkpoints: dict[str, Path]) -> None:
     for share_prefix in ("true", "false"):
-        found = [
+        identities = [
             _load("llava", checkpoints["llava"], share_prefix=share_prefix, **asked).identity()
             for asked in ({}, {"prompt": "chat"})
         ]
-        assert [identity["prompt"] for identity in found] == ["plain", "chat"]
-        assert found[0]["chat_template"] != found[1]["chat_template"]
+        assert [identity["prompt"] for identity in identities] == ["plain", "chat"]
+        assert identities[0]["chat_template"] != identities[1]["chat_template"]
     default, chat = (load("qwen2.5-vl-tiny", asked, seed=0).identity() for asked in ({}, {"prompt": "chat"}))
     assert default == chat
 

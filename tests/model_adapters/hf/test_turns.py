@@ -85,12 +85,12 @@ def test_every_round_encodes_what_is_new_in_it_only(family: str, frames: list[Fr
 
 
 def test_batches_go_on_from_several_turns(conversations: list[tuple[Turn, ...]]) -> None:
-    found = []
+    results = []
     for size in ("1", "3"):
         talk = talk_of(load("qwen2.5-vl-tiny", {"batch_size": size}, seed=0), conversations[1][:-1])
         replies = talk.replies([["What?"], [*conversations[1][-1].parts], ["\nWhy not?"]], up_to(NEW))
-        found.append([(reply.text, reply.token_ids, reply.n_context_tokens) for reply in replies])
-    assert found[0] == found[1]
+        results.append([(reply.text, reply.token_ids, reply.n_context_tokens) for reply in replies])
+    assert results[0] == results[1]
 
 
 @pytest.mark.parametrize("role", ["system", "assistant"])

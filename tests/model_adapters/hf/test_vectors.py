@@ -16,9 +16,9 @@ def test_vectors_are_found_by_key_also_by_the_next_process(tmp_path: Path) -> No
     assert A not in vectors
     vectors.add([A, B], np.stack([ONES, TWOS]))
     vectors.add([C], THREES[None])
-    for found in (vectors, VectorFile(path, 4)):
-        assert A in found
-        assert found.get([C, A, A]).tolist() == [THREES.tolist(), ONES.tolist(), ONES.tolist()]
+    for file in (vectors, VectorFile(path, 4)):
+        assert A in file
+        assert file.get([C, A, A]).tolist() == [THREES.tolist(), ONES.tolist(), ONES.tolist()]
 
 
 def test_two_processes_add_to_one_file_and_the_first_vector_of_a_key_stays(tmp_path: Path) -> None:
@@ -26,8 +26,8 @@ def test_two_processes_add_to_one_file_and_the_first_vector_of_a_key_stays(tmp_p
     one.add([A], ONES[None])
     other.add([A, B], np.stack([THREES, TWOS]))
     one.add([C], THREES[None])
-    for found in (one, other, VectorFile(tmp_path / "vectors.f32", 4)):
-        assert found.get([A]).tolist() == [ONES.tolist()]
+    for file in (one, other, VectorFile(tmp_path / "vectors.f32", 4)):
+        assert file.get([A]).tolist() == [ONES.tolist()]
     assert one.get([B, C]).tolist() == [TWOS.tolist(), THREES.tolist()]
 
 

@@ -21,10 +21,10 @@ PATH = "/v1/chat/completions"
 
 def completion(text: str | None = "yes", usage: Any = (10, 2), **choice: Any) -> dict[str, Any]:
     """What a server answers: the text, and tokens read, written and (third, if there) cached."""
-    told = None
+    counts = None
     if usage is not None:
-        told = {"prompt_tokens": usage[0], "completion_tokens": usage[1], "total_tokens": usage[0] + usage[1]}
-        told |= {"prompt_tokens_details": {"cached_tokens": usage[2]}} if len(usage) > 2 else {}
+        counts = {"prompt_tokens": usage[0], "completion_tokens": usage[1], "total_tokens": usage[0] + usage[1]}
+        counts |= {"prompt_tokens_details": {"cached_tokens": usage[2]}} if len(usage) > 2 else {}
     message = {"role": "assistant", "content": text} | choice.pop("message", {})
     return {
         "id": "c",
@@ -32,7 +32,7 @@ def completion(text: str | None = "yes", usage: Any = (10, 2), **choice: Any) ->
         "created": 0,
         "model": "m",
         "choices": [{"index": 0, "message": message, "finish_reason": "stop"} | choice],
-        "usage": told,
+        "usage": counts,
     }
 
 

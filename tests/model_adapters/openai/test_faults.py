@@ -37,12 +37,12 @@ def _ask(model: Any) -> Reply:
 def _refused(answer: Answer, **options: object) -> str:
     with opened(answer, **options) as model, pytest.raises(ModelError) as caught:
         _ask(model)
-    said = str(caught.value)
-    assert said.startswith("http://127.0.0.1:")
-    assert "\n" not in said
-    assert "; " in said  # a mend
-    assert len(said) < 600
-    return said
+    message = str(caught.value)
+    assert message.startswith("http://127.0.0.1:")
+    assert "\n" not in message
+    assert "; " in message  # a mend
+    assert len(message) < 600
+    return message
 
 
 def _sends(status: int, body: bytes, headers: dict[str, str] | None = None) -> Answer:
@@ -110,7 +110,7 @@ SHAPES: dict[str, tuple[Answer, str]] = {
 
 @pytest.mark.parametrize("shape", SHAPES)
 def test_a_reply_of_any_shape_is_one_line_and_not_asked_for_again(shape: str) -> None:
-    answer, said = SHAPES[shape]
+    answer, message = SHAPES[shape]
     n_asked = 0
 
     def counted(request: Any, handler: Handler) -> Any:
@@ -118,7 +118,7 @@ def test_a_reply_of_any_shape_is_one_line_and_not_asked_for_again(shape: str) ->
         n_asked += 1
         return answer(request, handler)
 
-    assert said in _refused(counted, retries=3)
+    assert message in _refused(counted, retries=3)
     assert n_asked == 1
 
 
@@ -205,7 +205,7 @@ PASSING: dict[str, tuple[Answer, str]] = {
 
 @pytest.mark.parametrize("fault", PASSING)
 def test_what_passes_is_sent_again_and_told(fault: str) -> None:
-    fail, said = PASSING[fault]
+    fail, message = PASSING[fault]
     n_asked = 0
 
     def answer(request: Any, handler: Handler) -> Any:
@@ -218,11 +218,11 @@ def test_what_passes_is_sent_again_and_told(fault: str) -> None:
     assert n_asked == 3
     assert len(reply.faults) == 2
     for line in reply.faults:
-        assert said in line
+        assert message in line
         assert line.startswith("http://127.0.0.1:")
         assert "\n" not in line
     n_asked = 0
-    assert f"{said}" in (line := _refused(answer, retries=1))
+    assert f"{message}" in (line := _refused(answer, retries=1))
     assert ", in 2 attempts; " in line
     assert n_asked == 2
 
@@ -303,9 +303,9 @@ def test_without_one_each_wait_is_longer(monkeypatch: pytest.MonkeyPatch) -> Non
 
 @pytest.mark.parametrize("asked", ["100000", "9" * 400])
 def test_a_wait_without_end_is_not_kept(asked: str) -> None:
-    said = _refused(_sends(429, b"come back later", {"Retry-After": asked}), retries=3)
-    assert "answers 429 Too Many Requests: 'come back later', and asks to wait " in said
-    assert "run the same command again then" in said
+    message = _refused(_sends(429, b"come back later", {"Retry-After": asked}), retries=3)
+    assert "answers 429 Too Many Requests: 'come back later', and asks to wait " in message
+    assert "run the same command again then" in message
 
 
 @settings(max_examples=200)
@@ -334,10 +334,10 @@ def test_a_server_that_takes_too_long_is_given_up_in_the_end(slow: str) -> None:
             drip(request, handler)
 
     try:
-        said = _refused(answer, timeout_s=0.3, retries=1)
+        message = _refused(answer, timeout_s=0.3, retries=1)
     finally:
         done.set()
-    assert "does not answer within 0.3 s, in 2 attempts; raise timeout_s if it is slow" in said
+    assert "does not answer within 0.3 s, in 2 attempts; raise timeout_s if it is slow" in message
 
 
 @pytest.mark.parametrize("status", [200, 400, 500])
@@ -380,12 +380,12 @@ def test_a_server_that_says_the_key_again_does_not_have_it_told(status: int, mon
 
     if status == 200:
         with opened(answer) as model:
-            said = _ask(model).text
-        assert said == "The key is Bearer [key]."
+            message = _ask(model).text
+        assert message == "The key is Bearer [key]."
     else:
-        said = _refused(answer)
+        message = _refused(answer)
     assert set(heard) == {f"Bearer {KEY}"}
-    assert KEY[:8] not in said
+    assert KEY[:8] not in message
 
 
 def test_a_short_key_keeps_no_secret(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -152,9 +152,9 @@ def test_as_many_requests_are_in_flight_as_there_are_threads_and_conversations_a
 
 @pytest.fixture
 def waits(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[float]]:
-    found: list[float] = []
-    monkeypatch.setattr(served.RateLimiter, "wait", lambda pace, amount=1.0: found.append(amount))
-    return found
+    amounts: list[float] = []
+    monkeypatch.setattr(served.RateLimiter, "wait", lambda pace, amount=1.0: amounts.append(amount))
+    return amounts
 
 
 def test_what_is_in_flight_ends_when_the_model_is_closed() -> None:

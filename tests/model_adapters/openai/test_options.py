@@ -10,7 +10,7 @@ ASKED = {"model": "m"}
 
 
 @pytest.mark.parametrize(
-    ("given", "said"),
+    ("given", "message"),
     [
         ({"model": ""}, "it needs model="),
         ({"base_url": "localhost:8000"}, "base_url is not the address of a server"),
@@ -39,10 +39,10 @@ ASKED = {"model": "m"}
         ({"price_per_m_cached": "1", "price_per_m_input": "1"}, "price_per_m_input needs price_per_m_input and"),
     ],
 )
-def test_misuse_is_refused_in_one_line_that_tells_no_secret(given: dict[str, str], said: str) -> None:
+def test_misuse_is_refused_in_one_line_that_tells_no_secret(given: dict[str, str], message: str) -> None:
     with pytest.raises(UsageError) as caught:
         check_options("openai", ASKED | given)
-    assert said in str(caught.value)
+    assert message in str(caught.value)
     assert SECRET not in str(caught.value)
     assert "\n" not in str(caught.value)
 

@@ -83,7 +83,7 @@ def test_money_is_capped_likewise(ask: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "given", "said"),
+    ("options", "given", "message"),
     [
         (("--max-cost", 1), {}, "max_cost needs price_per_m_input and price_per_m_output; give both"),
         (("--max-cost", 1), {"max_cost": 2}, "--max-cost and max_cost= in --model-args are the same option"),
@@ -94,11 +94,11 @@ def test_money_is_capped_likewise(ask: Any) -> None:
     ],
 )
 def test_misuse_is_one_line_before_anything_is_read(
-    options: tuple[object, ...], given: dict[str, object], said: str, ask: Any, tmp_path: Path
+    options: tuple[object, ...], given: dict[str, object], message: str, ask: Any, tmp_path: Path
 ) -> None:
     code, out, err = ask("http://127.0.0.1:1/v1", *options, **given)
     assert (code, out, len(err.splitlines())) == (2, "", 1)
-    assert said in err
+    assert message in err
     assert KEY not in err
     assert not (tmp_path / "out").exists()
 
@@ -176,9 +176,9 @@ def test_the_key_is_in_no_file_and_in_nothing_that_is_said(
     assert {"worker-0.jsonl", "results.json"} <= {path.name for path in files}
     written = b"".join(path.read_bytes() for path in files)
     assert b"Bearer [key]" in written
-    for said in (written.decode("utf-8", "replace"), out, err, caplog.text):
-        assert KEY not in said
-        assert KEY[3:] not in said
+    for message in (written.decode("utf-8", "replace"), out, err, caplog.text):
+        assert KEY not in message
+        assert KEY[3:] not in message
 
 
 @pytest.mark.parametrize("in_flight", [pytest.param(1, marks=pytest.mark.slow), 4])

@@ -85,15 +85,15 @@ def both(served: Served, tmp_path: Path, run: Any) -> Callable[..., list[list[Un
 
     def both(*arguments: object, **more: str) -> list[list[UnitRecord[Any]]]:
         here = {"pretrained": served.folder, "device": "cpu", "dtype": "float32", "max_tokens": 100_000}
-        found = []
+        records = []
         for model, given in (("openai", served.options | more), ("hf-vlm", here)):
             options = ",".join(f"{name}={value}" for name, value in given.items())
             typed = ["--model", model, "--model-args", options, "--name", model, "--output", tmp_path / "out"]
             code, _, err = run(*typed, *arguments)
             assert code == 0, err
             (results,) = (tmp_path / "out" / model).rglob("results.json")
-            found.append(read_run(results.parent, find_suite(read_header(results.parent).suite).records)[1])
-        return found
+            records.append(read_run(results.parent, find_suite(read_header(results.parent).suite).records)[1])
+        return records
 
     return both
 

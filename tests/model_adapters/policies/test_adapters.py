@@ -94,7 +94,7 @@ def test_the_checkpoint_s_own_type_is_taken(family: str, altered: Altered) -> No
 def test_tied_embeddings_are_written_by_what_they_are_read_by(altered: Altered) -> None:
     def tie(folder: Path) -> None:
         json_edit("config.json", lambda config: config["text_config"].update(tie_word_embeddings=True))(folder)
-        weights_edit(lambda found: {key: value for key, value in found.items() if "lm_head" not in key})(folder)
+        weights_edit(lambda weights: {key: value for key, value in weights.items() if "lm_head" not in key})(folder)
 
     policy = _load("spatialvla", altered("spatialvla", tie))
     model = policy._network.weights.language_model
@@ -124,24 +124,26 @@ KEYS = {
 
 @pytest.mark.parametrize(("family", "key"), [(family, key) for family in FAMILIES for key in KEYS[family]])
 def test_a_missing_key_ends_the_loading(family: str, key: str, altered: Altered) -> None:
-    folder = altered(family, weights_edit(lambda found: {name: value for name, value in found.items() if name != key}))
+    folder = altered(
+        family, weights_edit(lambda weights: {name: value for name, value in weights.items() if name != key})
+    )
     with pytest.raises(ModelError, match=f"the checkpoint lacks {key}"):
         _load(family, folder)
 
 
 @pytest.mark.parametrize("family", FAMILIES)
 def test_an_unknown_key_or_another_shape_ends_the_loading(family: str, altered: Altered) -> None:
-    def change(found: dict[str, torch.Tensor]) -> dict[str, torch.Tensor]:
-        return found | {"action_head.weight": torch.zeros(1), KEYS[family][0]: torch.zeros(2)}
+    def change(weights: dict[str, torch.Tensor]) -> dict[str, torch.Tensor]:
+        return weights | {"action_head.weight": torch.zeros(1), KEYS[family][0]: torch.zeros(2)}
 
     with pytest.raises(ModelError, match=rf"unknown action_head\.weight; has another shape in {KEYS[family][0]} \[2\]"):
         _load(family, altered(family, weights_edit(change)))
 
 
 def test_a_depth_model_under_its_new_names_is_no_checkpoint_of_ours(altered: Altered) -> None:
-    def renamed(found: dict[str, torch.Tensor]) -> dict[str, torch.Tensor]:
+    def renamed(weights: dict[str, torch.Tensor]) -> dict[str, torch.Tensor]:
         return {
-            name.replace("backbone.encoder.layer.", "backbone.beit.layers."): value for name, value in found.items()
+            name.replace("backbone.encoder.layer.", "backbone.beit.layers."): value for name, value in weights.items()
         }
 
     with pytest.raises(ModelError, match=r"lacks vision_zoe_model\.backbone\.encoder.*; has unknown vision_zoe"):
@@ -156,7 +158,7 @@ def test_a_checkpoint_of_another_family_is_named(family: str, other: str, policy
 
 @pytest.mark.parametrize("family", FAMILIES)
 @pytest.mark.parametrize(
-    ("edit", "said"),
+    ("edit", "message"),
     [
         (lambda folder: (folder / "model.safetensors").unlink(), "no *.safetensors"),
         (lambda folder: (folder / "model.safetensors").write_bytes(b"cut"), "cannot be loaded"),
@@ -170,10 +172,10 @@ def test_a_checkpoint_of_another_family_is_named(family: str, other: str, policy
         (json_edit("config.json", lambda config: config.pop("torch_dtype")), "has no type of weights; give dtype="),
     ],
 )
-def test_a_damaged_checkpoint_is_one_line(family: str, edit: Edit, said: str, altered: Altered) -> None:
+def test_a_damaged_checkpoint_is_one_line(family: str, edit: Edit, message: str, altered: Altered) -> None:
     with pytest.raises(InfthorError) as caught:
         _load(family, altered(family, edit))
-    assert said in str(caught.value)
+    assert message in str(caught.value)
     assert "\n" not in str(caught.value)
     assert caught.value.exit_code == 2
 
@@ -207,7 +209,7 @@ def test_statistics_of_a_fine_tuned_openvla_are_in_a_file_of_their_own(altered: 
 
 
 @pytest.mark.parametrize(
-    ("family", "file", "change", "said"),
+    ("family", "file", "change", "message"),
     [
         ("openvla", "config.json", {"timm_model_ids": ["vit_tiny", "vit_small"]}, "has the vision towers"),
         ("openvla", "config.json", {"image_resize_strategy": "letterbox"}, "only the preparation of openvla"),
@@ -221,9 +223,9 @@ def test_statistics_of_a_fine_tuned_openvla_are_in_a_file_of_their_own(altered: 
     ],
 )
 def test_a_variant_that_is_not_run_here_is_refused(
-    family: str, file: str, change: dict[str, Any], said: str, altered: Altered
+    family: str, file: str, change: dict[str, Any], message: str, altered: Altered
 ) -> None:
-    with pytest.raises((ModelError, DataError), match=said):
+    with pytest.raises((ModelError, DataError), match=message):
         _load(family, altered(family, json_edit(file, lambda content: content.update(change))))
 
 
@@ -238,7 +240,7 @@ def test_weights_that_are_no_numbers_are_refused_when_it_acts(
     family: str, altered: Altered, plain_frames: tuple[FrameRef, FrameRef]
 ) -> None:
     key = "language_model.lm_head.weight"
-    folder = altered(family, weights_edit(lambda found: found | {key: found[key] * torch.nan}))
+    folder = altered(family, weights_edit(lambda weights: weights | {key: weights[key] * torch.nan}))
     with pytest.raises(ModelError, match="action token 1 has no finite score"):
         _load(family, folder).act(plain_frames[0], "pick up the mug")
 

@@ -17,11 +17,11 @@ def _firsts(ensemble: ExponentialEnsemble, *chunks: np.ndarray) -> list[float]:
 
 
 def test_what_several_chunks_say_of_a_step_is_averaged_the_newest_counting_most() -> None:
-    found = _firsts(
+    averages = _firsts(
         ExponentialEnsemble(), _chunk(1, 10, 100), _chunk(2, 20, 200), _chunk(3, 30, 300), _chunk(4, 40, 400)
     )
     one, two = math.exp(0.8), math.exp(1.6)
-    assert found == pytest.approx(
+    assert averages == pytest.approx(
         [
             1,
             (10 + one * 2) / (1 + one),

@@ -49,31 +49,31 @@ def test_the_same_policy_behind_a_server_is_equal(
     given = {"pretrained": str(policy_checkpoints[family]), "device": "cpu"}
     theirs = load_policy(family, given)
     with synthetic_frames() as frames, serving(policy_answers(theirs)) as url:
-        found = compare_policies(load_policy(family, given), reference_policy(url, None), frames, INSTRUCTIONS, 1e-6)
+        report = compare_policies(load_policy(family, given), reference_policy(url, None), frames, INSTRUCTIONS, 1e-6)
         apart = compare_policies(policies["openvla"], reference_policy(url, None), frames[:1], INSTRUCTIONS[:1], 1e-6)
-    assert found.equal
-    assert [row.cells[1] for row in found.table().rows] == ["6"] * 3
-    assert {row.cells[2] for row in found.table().rows} == {"1" if family == "openvla" else "4"}
+    assert report.equal
+    assert [row.cells[1] for row in report.table().rows] == ["6"] * 3
+    assert {row.cells[2] for row in report.table().rows} == {"1" if family == "openvla" else "4"}
     assert apart.equal == (family == "openvla")
 
 
 def test_differences_are_told_by_kind(plain_frames: tuple[FrameRef, FrameRef]) -> None:
     ours: Any = Still(STEP)
     theirs: Any = Still(OTHER)
-    found = compare_policies(ours, theirs, plain_frames, ["pick up the mug"], 0.4)
-    assert not found.equal
-    assert found.table().rows[0].cells == ("pick up the mug", "2", "1", "0.25", "0.5", "1")
-    assert ": different." in found.table().notes[0]
+    report = compare_policies(ours, theirs, plain_frames, ["pick up the mug"], 0.4)
+    assert not report.equal
+    assert report.table().rows[0].cells == ("pick up the mug", "2", "1", "0.25", "0.5", "1")
+    assert ": different." in report.table().notes[0]
     assert compare_policies(ours, theirs, plain_frames, ["x"], 1.0).equal
 
 
 def test_more_steps_than_the_other_gives_is_a_difference(plain_frames: tuple[FrameRef, FrameRef]) -> None:
     ours: Any = Still(STEP, STEP)
     theirs: Any = Still(STEP)
-    found = compare_policies(ours, theirs, plain_frames, ["x"], 1e9)
-    assert not found.equal
-    assert found.rows[0].largest == math.inf
-    assert found.table().rows[0].cells[2] == "2 and 1"
+    report = compare_policies(ours, theirs, plain_frames, ["x"], 1e9)
+    assert not report.equal
+    assert report.rows[0].largest == math.inf
+    assert report.table().rows[0].cells[2] == "2 and 1"
 
 
 def test_pictures_of_a_folder_are_taken_by_name(tmp_path: Path) -> None:

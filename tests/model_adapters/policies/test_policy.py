@@ -72,7 +72,7 @@ def test_the_gripper_is_held_between_closed_and_open() -> None:
 
 
 @pytest.mark.parametrize(
-    ("chunk", "said"),
+    ("chunk", "message"),
     [
         ([[*STEP[:3], float("nan"), *STEP[4:]]], "scripted gave an action that is not finite"),
         ([[float("inf"), *STEP[1:]]], "no number"),
@@ -80,8 +80,8 @@ def test_the_gripper_is_held_between_closed_and_open() -> None:
         (MemoryError("none left"), "scripted fails on the request"),
     ],
 )
-def test_what_is_no_action_is_refused(chunk: Any, said: str, plain_frames: tuple[FrameRef, FrameRef]) -> None:
-    with pytest.raises(ModelError, match=said):
+def test_what_is_no_action_is_refused(chunk: Any, message: str, plain_frames: tuple[FrameRef, FrameRef]) -> None:
+    with pytest.raises(ModelError, match=message):
         _policy(chunk).act(plain_frames[0], "x")
 
 
@@ -113,7 +113,7 @@ def test_the_identity_tells_how_chunks_are_used() -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "message"),
     [
         ({"ensemble": "mean"}, "ensemble=mean is not none or exp"),
         ({"execute": 0}, "execute=0"),
@@ -121,6 +121,6 @@ def test_the_identity_tells_how_chunks_are_used() -> None:
         ({"attn_implementation": "someone/kernel"}, "is code on the hub"),
     ],
 )
-def test_options_that_do_not_fit_are_refused(options: dict[str, Any], said: str) -> None:
-    with pytest.raises(ValueError, match=said):
+def test_options_that_do_not_fit_are_refused(options: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
         PolicyOptions(**options)

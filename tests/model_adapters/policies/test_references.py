@@ -41,20 +41,20 @@ def frame(tmp_path_factory: pytest.TempPathFactory) -> FrameRef:
 @torch.inference_mode()
 def _features(family: str, network: Any, image: Image.Image) -> torch.Tensor:
     if family == "openvla":
-        found: torch.Tensor = network.weights.vision_backbone(resize(image, network.image_size)[None])
-        return found
+        values: torch.Tensor = network.weights.vision_backbone(resize(image, network.image_size)[None])
+        return values
     return network.features(image)  # type: ignore[no-any-return]
 
 
 @pytest.mark.parametrize("family", FEATURES)
 def test_features_are_theirs(family: str, policies: dict[str, VlaPolicy], frame: FrameRef) -> None:
-    found = _features(family, policies[family]._network, frame.load())
-    assert found[0, 5, ::16].tolist() == pytest.approx(FEATURES[family], abs=2e-4)
+    values = _features(family, policies[family]._network, frame.load())
+    assert values[0, 5, ::16].tolist() == pytest.approx(FEATURES[family], abs=2e-4)
 
 
 @pytest.mark.parametrize("family", ACTIONS)
 def test_actions_are_theirs(family: str, policy_checkpoints: dict[str, Path], frame: FrameRef) -> None:
     given = {"pretrained": str(policy_checkpoints[family]), "device": "cpu", "ensemble": "none"}
     steps = load(family, given, 0).act(frame, "pick up the mug")  # type: ignore[union-attr]
-    found = [(*step.translation, *step.rotation, step.gripper) for step in steps]
-    assert np.array(found) == pytest.approx(np.array(ACTIONS[family]), abs=2e-6)
+    values = [(*step.translation, *step.rotation, step.gripper) for step in steps]
+    assert np.array(values) == pytest.approx(np.array(ACTIONS[family]), abs=2e-6)

@@ -44,7 +44,7 @@ def test_an_unknown_dataset_lists_the_known(known: dict[str, object]) -> None:
 
 
 @pytest.mark.parametrize(
-    ("action", "said"),
+    ("action", "message"),
     [
         ({"q01": [0.0] * 6, "q99": [1.0] * 6}, r"have \[6\] numbers, not 7"),
         ({"q01": [0.0] * 7, "q99": [1.0] * 8}, r"have \[7, 8\] numbers"),
@@ -52,8 +52,8 @@ def test_an_unknown_dataset_lists_the_known(known: dict[str, object]) -> None:
         ({"q01": "left", "q99": [1.0] * 7}, "damaged"),
     ],
 )
-def test_statistics_of_another_robot_or_none_are_refused(action: object, said: str) -> None:
-    with pytest.raises(ModelError, match=said):
+def test_statistics_of_another_robot_or_none_are_refused(action: object, message: str) -> None:
+    with pytest.raises(ModelError, match=message):
         select_statistics({"a": {"action": action}}, "a", "mine")
 
 

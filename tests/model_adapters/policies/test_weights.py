@@ -61,7 +61,7 @@ def test_parameters_take_no_memory_before_they_are_loaded() -> None:
 
 
 @pytest.mark.parametrize(
-    ("without", "also", "said"),
+    ("without", "also", "message"),
     [
         ("norm.bias", {}, r"of mine .*: the checkpoint lacks norm\.bias$"),
         ("head.weight", {}, r"lacks head\.weight"),
@@ -77,10 +77,10 @@ def test_parameters_take_no_memory_before_they_are_loaded() -> None:
     ],
 )
 def test_any_other_key_or_shape_ends_the_loading(
-    tmp_path: Path, without: str | None, also: dict[str, torch.Tensor], said: str
+    tmp_path: Path, without: str | None, also: dict[str, torch.Tensor], message: str
 ) -> None:
     save_file({key: value for key, value in WHOLE.items() if key != without} | also, tmp_path / "model.safetensors")
-    with pytest.raises(ModelError, match=said):
+    with pytest.raises(ModelError, match=message):
         _loaded(tmp_path)
 
 

@@ -86,16 +86,16 @@ class _Vlm:
         self.limit: int = located.config.get_text_config().max_position_embeddings
 
     def read(self, ids: Sequence[int], images: Sequence[Image.Image], names: Sequence[str]) -> _Read:
-        family, found, frames = self._loaded.family, _Read([], []), iter(zip(images, names, strict=True))
+        family, prompt_read, frames = self._loaded.family, _Read([], []), iter(zip(images, names, strict=True))
         for token in ids:
             expanded, name = (token,), ""
             if token == family.placeholder_id:
                 image, name = next(frames)
                 expanded = family.frame_ids(image.size)
-            found.ids.extend(expanded)
-            found.keys.extend((each, name) for each in expanded)
+            prompt_read.ids.extend(expanded)
+            prompt_read.keys.extend((each, name) for each in expanded)
         assert next(frames, None) is None, "more images than placeholders"
-        return found
+        return prompt_read
 
     def write(self, ids: list[int], images: Sequence[Image.Image], params: SamplingParams) -> tuple[list[int], str]:
         tokenizer, model = self._loaded.tokenizer, self._loaded.model
@@ -140,8 +140,8 @@ class _Vlm:
         inputs: dict[str, Any] = {"input_ids": rows, "attention_mask": torch.ones_like(rows)}
         takes = inspect.signature(self._loaded.model.forward).parameters
         if images:
-            made = self._loaded.family._image_processor(images=list(images), return_tensors="pt")
-            inputs |= {name: value for name, value in made.items() if name in takes}
+            processed = self._loaded.family._image_processor(images=list(images), return_tensors="pt")
+            inputs |= {name: value for name, value in processed.items() if name in takes}
         if "mm_token_type_ids" in takes:
             inputs["mm_token_type_ids"] = (rows == self._loaded.family.slot_id).int()
         return inputs
@@ -175,8 +175,8 @@ class _OpenVLA:
     def read(self, ids: Sequence[int], images: Sequence[Image.Image], names: Sequence[str]) -> _Read:
         assert len(images) == 1, "OpenVLA takes one image"
         n_patches = self._patches(images[0]).shape[1]
-        found = [ids[0], *[32_000] * n_patches, *ids[1:]]
-        return _Read(found, [(token, names[0] if token == 32_000 else "") for token in found])
+        expanded = [ids[0], *[32_000] * n_patches, *ids[1:]]
+        return _Read(expanded, [(token, names[0] if token == 32_000 else "") for token in expanded])
 
     @torch.inference_mode()
     def write(self, ids: list[int], images: Sequence[Image.Image], params: SamplingParams) -> tuple[list[int], str]:
@@ -196,8 +196,10 @@ class _OpenVLA:
     @torch.inference_mode()
     def _patches(self, image: Image.Image) -> torch.Tensor:
         weights = self._network.weights
-        found: torch.Tensor = weights.projector(weights.vision_backbone(resize(image, self._network.image_size)[None]))
-        return found
+        patches: torch.Tensor = weights.projector(
+            weights.vision_backbone(resize(image, self._network.image_size)[None])
+        )
+        return patches
 
 
 @dataclass
@@ -263,11 +265,11 @@ class _LLM:
         if double.fails is not None:
             raise double.fails
         read = [self._read(prompt) for prompt in prompts]
-        cached = [self._cached(found.keys) for found in read]
-        self._seen.extend(found.keys for found in read)
+        cached = [self._cached(prompt_read.keys) for prompt_read in read]
+        self._seen.extend(prompt_read.keys for prompt_read in read)
         return [
-            self._output(prompt, found, n, double.calls[-1].params)
-            for prompt, found, n in zip(prompts, read, cached, strict=True)
+            self._output(prompt, prompt_read, n, double.calls[-1].params)
+            for prompt, prompt_read, n in zip(prompts, read, cached, strict=True)
         ]
 
     def _read(self, prompt: dict[str, Any]) -> _Read:
@@ -276,10 +278,10 @@ class _LLM:
         names = prompt.get("multi_modal_uuids", {}).get("image") or [_hash(image) for image in images]
         if len(images) > self._most_frames:
             raise ValueError(f"At most {self._most_frames} image(s) may be provided in one prompt.")
-        found = self._model.read(prompt["prompt_token_ids"], images, names)
-        if len(found.ids) >= self._limit:
+        prompt_read = self._model.read(prompt["prompt_token_ids"], images, names)
+        if len(prompt_read.ids) >= self._limit:
             raise ValueError(f"longer than the maximum model length of {self._limit}")
-        return found
+        return prompt_read
 
     def _cached(self, keys: list[tuple[int, str]]) -> int:
         if not self._caches:

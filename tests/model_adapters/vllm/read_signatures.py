@@ -24,7 +24,7 @@ _WANTED = {
 }
 
 
-def _found(tree: ast.Module, path: str) -> ast.ClassDef | ast.FunctionDef:
+def _definition(tree: ast.Module, path: str) -> ast.ClassDef | ast.FunctionDef:
     """A class, or the last definition of a method: overloads come before it."""
     name, _, method = path.partition(".")
     (of_class,) = [node for node in tree.body if isinstance(node, ast.ClassDef) and node.name == name]
@@ -50,13 +50,13 @@ def _names(tree: ast.Module, node: ast.ClassDef | ast.FunctionDef) -> Iterator[s
 
 def signatures(wheel: Path) -> dict[str, str | list[str]]:
     """Names by what they belong to, and the version."""
-    found: dict[str, str | list[str]] = {"version": wheel.name.split("-")[1]}
+    names: dict[str, str | list[str]] = {"version": wheel.name.split("-")[1]}
     with zipfile.ZipFile(wheel) as archive:
         for file, wanted in _WANTED.items():
             tree = ast.parse(archive.read(file))
             for name, path in wanted.items():
-                found[name] = list(_names(tree, _found(tree, path)))
-    return found
+                names[name] = list(_names(tree, _definition(tree, path)))
+    return names
 
 
 if __name__ == "__main__":

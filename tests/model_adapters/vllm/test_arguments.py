@@ -159,7 +159,7 @@ def test_an_extension_that_would_lose_the_three_axes_is_refused(rope: str) -> No
 
 
 @pytest.mark.parametrize(
-    ("given", "said"),
+    ("given", "message"),
     [
         ({"dtype": "int8"}, "dtype=int8 is not auto, bfloat16"),
         ({"gpu_memory_utilization": "0"}, "gpu_memory_utilization=0.0 is not above 0"),
@@ -175,8 +175,8 @@ def test_an_extension_that_would_lose_the_three_axes_is_refused(rope: str) -> No
         ({"device": "cpu"}, "has no option device"),
     ],
 )
-def test_options_that_cannot_be_are_refused_at_once(given: dict[str, str], said: str) -> None:
-    with pytest.raises(UsageError, match=said):
+def test_options_that_cannot_be_are_refused_at_once(given: dict[str, str], message: str) -> None:
+    with pytest.raises(UsageError, match=message):
         check_options("qwen2.5-vl@vllm", given)
 
 

@@ -46,12 +46,12 @@ def test_replies_and_counts_are_those_of_transformers(
 ) -> None:
     ours, theirs = start(family, _name(family)), in_process(family, _name(family))
     assert ours.tokens_per_frame(frames[0]) == theirs.tokens_per_frame(frames[0])
-    told: list[tuple[Part, ...]] = [
+    prompts: list[tuple[Part, ...]] = [
         ("What do you see?",),
         (frames[0], "\nWhat is it?"),
         ("First ", frames[1], " then ", frames[2], "?"),
     ]
-    for parts in told:
+    for parts in prompts:
         talks = [model.conversation() for model in (ours, theirs)]
         for talk in talks:
             talk.append(*parts)
@@ -118,7 +118,7 @@ SPECIAL = "<|im_start|>"
 
 
 @pytest.mark.parametrize(
-    ("said", "stop", "text"),
+    ("message", "stop", "text"),
     [
         (f"mug on{SPECIAL}table", (SPECIAL,), "mug on"),
         (f"mug on{SPECIAL}table", ("never", "ta"), "mug on"),
@@ -128,11 +128,11 @@ SPECIAL = "<|im_start|>"
     ],
 )
 def test_special_tokens_stop_a_reply_and_are_no_text(
-    said: str, stop: tuple[str, ...], text: str, start: Start, vllm: Double
+    message: str, stop: tuple[str, ...], text: str, start: Start, vllm: Double
 ) -> None:
     model = start()
     tokenizer = model._loaded.tokenizer
-    vllm.would_say = tokenizer(said, add_special_tokens=False)["input_ids"]
+    vllm.would_say = tokenizer(message, add_special_tokens=False)["input_ids"]
     reply = model.answer(user("x"), up_to(50, stop=stop))
     assert reply.text == text
     assert len(reply.token_ids) == reply.n_reply_tokens

@@ -16,9 +16,9 @@ from .double import Double
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    made = tmp_path_factory.mktemp("openvla")
-    OpenVLATiny.twin.save(made, seed=0)
-    return made
+    checkpoint = tmp_path_factory.mktemp("openvla")
+    OpenVLATiny.twin.save(checkpoint, seed=0)
+    return checkpoint
 
 
 @pytest.fixture
@@ -72,9 +72,9 @@ def test_too_few_tokens_are_told(
 
 
 def test_its_identity_has_engine_and_dataset(policy: Callable[..., Any]) -> None:
-    found = policy().identity()
-    assert (found["engine"], found["unnorm_key"], found["adapter"]) == ("vllm", "bridge_orig", "openvla@vllm")
-    assert found != policy(enforce_eager=True).identity()
+    identity = policy().identity()
+    assert (identity["engine"], identity["unnorm_key"], identity["adapter"]) == ("vllm", "bridge_orig", "openvla@vllm")
+    assert identity != policy(enforce_eager=True).identity()
 
 
 def test_what_is_wrong_with_checkpoint_or_key_is_told_as_in_the_native_port(

@@ -84,7 +84,7 @@ def test_a_policy_behind_a_server_acts_as_it_does_here(policies: dict[str, VlaPo
 
 
 @pytest.mark.parametrize(
-    ("reply", "said"),
+    ("reply", "message"),
     [
         (ACTION[:6], r"gave actions of shape [1, 6], not one or more of 7 numbers"),
         ([], "gave actions of shape [1, 0]"),
@@ -97,8 +97,8 @@ def test_a_policy_behind_a_server_acts_as_it_does_here(policies: dict[str, VlaPo
         ([10**400, *ACTION[1:]], "answers without an action of numbers"),
     ],
 )
-def test_a_reply_that_is_no_action_is_refused(reply: Any, said: str, plain_frames: Frames) -> None:
-    assert said in _refused(lambda *_: reply, plain_frames[0])
+def test_a_reply_that_is_no_action_is_refused(reply: Any, message: str, plain_frames: Frames) -> None:
+    assert message in _refused(lambda *_: reply, plain_frames[0])
 
 
 def test_an_error_of_the_server_is_told_and_not_tried_again(plain_frames: Frames) -> None:
@@ -114,8 +114,8 @@ def test_an_error_of_the_server_is_told_and_not_tried_again(plain_frames: Frames
 
 
 def test_what_is_no_json_is_refused(plain_frames: Frames) -> None:
-    said = _refused(lambda _, handler: send(handler, 200, b"<html>hello</html>"), plain_frames[0])
-    assert "does not answer in JSON: '<html>hello</html>'" in said
+    message = _refused(lambda _, handler: send(handler, 200, b"<html>hello</html>"), plain_frames[0])
+    assert "does not answer in JSON: '<html>hello</html>'" in message
 
 
 def test_a_redirect_is_not_followed(plain_frames: Frames) -> None:
@@ -140,10 +140,10 @@ def test_a_server_that_takes_too_long_is_not_waited_for(slow: str, plain_frames:
                 handler.wfile.write(b"0.1,")
 
     try:
-        said = _refused(answer, plain_frames[0], timeout_s="0.3")
+        message = _refused(answer, plain_frames[0], timeout_s="0.3")
     finally:
         done.set()
-    assert "does not answer within 0.3 s; raise timeout_s" in said
+    assert "does not answer within 0.3 s; raise timeout_s" in message
 
 
 @pytest.mark.parametrize(
@@ -184,8 +184,8 @@ def test_a_server_that_is_not_there_is_one_line(plain_frames: Frames) -> None:
 
 def test_a_reply_without_end_is_not_read(monkeypatch: pytest.MonkeyPatch, plain_frames: Frames) -> None:
     monkeypatch.setattr(client, "_LARGEST", 1000)
-    said = _refused(lambda _, handler: send(handler, 200, b"[" + b"0.1," * 5000), plain_frames[0])
-    assert "answers more than 1000 bytes" in said
+    message = _refused(lambda _, handler: send(handler, 200, b"[" + b"0.1," * 5000), plain_frames[0])
+    assert "answers more than 1000 bytes" in message
 
 
 def test_a_frame_that_is_not_there_is_a_fault_of_the_data(plain_frames: Frames) -> None:
@@ -194,7 +194,7 @@ def test_a_frame_that_is_not_there_is_a_fault_of_the_data(plain_frames: Frames) 
 
 
 @pytest.mark.parametrize(
-    ("given", "said"),
+    ("given", "message"),
     [
         ({"url": "localhost:8000"}, "url is not the address of a server"),
         ({"url": "file:///etc/passwd"}, "url is not the address of a server"),
@@ -208,8 +208,8 @@ def test_a_frame_that_is_not_there_is_a_fault_of_the_data(plain_frames: Frames) 
         ({"execute": "0"}, "execute=0"),
     ],
 )
-def test_misuse_is_refused_and_no_secret_told(given: dict[str, str], said: str) -> None:
-    with pytest.raises(UsageError, match=said) as caught:
+def test_misuse_is_refused_and_no_secret_told(given: dict[str, str], message: str) -> None:
+    with pytest.raises(UsageError, match=message) as caught:
         load("vla-http", given, 0)
     assert "secret" not in str(caught.value)
 

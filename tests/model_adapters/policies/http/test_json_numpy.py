@@ -45,7 +45,7 @@ def test_numbers_come_in_several_forms(value: Any, expected: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    ("value", "said"),
+    ("value", "message"),
     [
         ("error", "the text 'error'"),
         ({"action": NUMBERS}, "dict"),
@@ -60,6 +60,6 @@ def test_numbers_come_in_several_forms(value: Any, expected: Any) -> None:
         ({"__numpy__": ARRAY["__numpy__"]}, "damaged array"),
     ],
 )
-def test_anything_else_is_refused(value: Any, said: str) -> None:
-    with pytest.raises(ValueError, match=said):
+def test_anything_else_is_refused(value: Any, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
         decode_numbers(value)

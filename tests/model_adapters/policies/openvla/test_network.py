@@ -17,9 +17,9 @@ from model_adapters.policies.preprocessing import normalise, resize
 
 @pytest.fixture
 def network(policies: dict[str, VlaPolicy]) -> OpenVLANetwork:
-    found = policies["openvla"]._network
-    assert isinstance(found, OpenVLANetwork)
-    return found
+    port = policies["openvla"]._network
+    assert isinstance(port, OpenVLANetwork)
+    return port
 
 
 def test_the_prompt_is_the_one_of_training_in_lower_case() -> None:

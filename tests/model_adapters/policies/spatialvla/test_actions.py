@@ -66,10 +66,10 @@ def test_every_bin_lies_between_its_borders(bins: SpatialBins, axis: str) -> Non
     borders = BINS[axis]
     for number in range(len(borders) - 1):
         x, y, z = bins.decode([BEGIN + base + number * step, *STILL])[0, :3].tolist()
-        found = {"theta": math.atan2(math.hypot(x, y), z), "phi": math.atan2(y, x), "r": math.hypot(x, y, z)}[axis]
+        value = {"theta": math.atan2(math.hypot(x, y), z), "phi": math.atan2(y, x), "r": math.hypot(x, y, z)}[axis]
         clipped = axis == "r" and number == 7
         middle = (borders[number] + borders[number + 1]) / 2
-        assert clipped or found == pytest.approx(middle, abs=1e-9)
+        assert clipped or value == pytest.approx(middle, abs=1e-9)
 
 
 def test_a_translation_beyond_one_is_clipped(bins: SpatialBins) -> None:
@@ -125,7 +125,7 @@ def test_bins_are_read_from_the_processor_s_config(bins: SpatialBins) -> None:
 
 
 @pytest.mark.parametrize(
-    ("changes", "n_tokens", "said"),
+    ("changes", "n_tokens", "message"),
     [
         ({"action_config__num_bins__translation__r_bins": 9}, 8194, r"do not fit \(r_bins\)"),
         ({"action_config__num_bins__gripper": 3}, 8194, "do not fit"),
@@ -133,6 +133,6 @@ def test_bins_are_read_from_the_processor_s_config(bins: SpatialBins) -> None:
         ({}, 8190, "mine has 8190 action tokens and 8194 bins"),
     ],
 )
-def test_bins_that_do_not_fit_the_tokens_are_refused(changes: dict[str, Any], n_tokens: int, said: str) -> None:
-    with pytest.raises(ModelError, match=said):
+def test_bins_that_do_not_fit_the_tokens_are_refused(changes: dict[str, Any], n_tokens: int, message: str) -> None:
+    with pytest.raises(ModelError, match=message):
         SpatialBins.of(_config(**changes), BEGIN, n_tokens, "mine")

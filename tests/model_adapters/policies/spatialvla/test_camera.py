@@ -14,10 +14,10 @@ OTHER = CameraIntrinsics(224, 224, [[100, 0, 112], [0, 100, 112], [0, 0, 1]])
 
 
 def test_the_published_camera_is_squashed_with_the_frame() -> None:
-    found = published_intrinsics({"default": DEFAULT}, "bridge_orig/1.0.0", 224, "mine")
+    intrinsics = published_intrinsics({"default": DEFAULT}, "bridge_orig/1.0.0", 224, "mine")
     # 623.588 * 224/640, 319.501 * 224/640; 623.588 * 224/480, 239.545 * 224/480
     rows = [[218.2558, 0, 111.82535], [0, 291.007733, 111.787667], [0, 0, 1]]
-    assert found.tolist() == [pytest.approx(row) for row in rows]
+    assert intrinsics.tolist() == [pytest.approx(row) for row in rows]
 
 
 def test_a_dataset_s_own_camera_comes_before_the_default() -> None:
@@ -34,10 +34,10 @@ def test_thor_s_camera_of_a_square_frame() -> None:
 
 def test_the_field_of_view_is_vertical() -> None:
     # f = 100 / tan 30 = 173.205 pixels of a frame of 400 x 200; squashed to 224: 96.9948 across, 193.9897 down.
-    found = thor_intrinsics(60, (400, 200), 224)
+    intrinsics = thor_intrinsics(60, (400, 200), 224)
     focal = 100 / math.tan(math.pi / 6)
-    assert [found[0, 0], found[1, 1]] == pytest.approx([focal * 224 / 400, focal * 224 / 200])
-    assert [found[0, 2], found[1, 2]] == [112, 112]
+    assert [intrinsics[0, 0], intrinsics[1, 1]] == pytest.approx([focal * 224 / 400, focal * 224 / 200])
+    assert [intrinsics[0, 2], intrinsics[1, 2]] == [112, 112]
 
 
 def test_the_option_is_read() -> None:

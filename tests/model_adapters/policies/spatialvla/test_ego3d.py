@@ -67,7 +67,7 @@ def test_coordinates_are_taken_around_two_metres_ahead_and_encoded_by_frequencie
     module = Ego3DEmbedding(n_points=1, n_freqs=2, width=15)
     module.position_embedding_head = nn.Sequential(nn.Identity())
     module.register_parameter("dtype_of", nn.Parameter(torch.zeros(1)))
-    (found,) = module(torch.tensor([[[1.0, -2.0, 3.0]]]))[0].tolist()
+    (features,) = module(torch.tensor([[[1.0, -2.0, 3.0]]]))[0].tolist()
     near = (0.5, -1.0, 0.5)  # (x, y, z - 2) / 2
     expected = [value for a in near for value in (a, math.sin(a), math.sin(2 * a), math.cos(a), math.cos(2 * a))]
-    assert found == pytest.approx(expected, abs=1e-6)
+    assert features == pytest.approx(expected, abs=1e-6)

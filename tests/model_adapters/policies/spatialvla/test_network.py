@@ -18,17 +18,17 @@ N_ACTIONS, N_PATCHES, HIDDEN = 8194, 16, 64
 
 @pytest.fixture
 def network(policies: dict[str, VlaPolicy]) -> SpatialVLANetwork:
-    found = policies["spatialvla"]._network
-    assert isinstance(found, SpatialVLANetwork)
-    return found
+    result = policies["spatialvla"]._network
+    assert isinstance(result, SpatialVLANetwork)
+    return result
 
 
 def test_the_prompt_stands_behind_the_image_tokens_and_ends_a_line(network: SpatialVLANetwork) -> None:
     ids = network.prompt_ids("pick up the Mug")
     assert ids[:N_PATCHES] == [network.image_id] * N_PATCHES
     assert ids[N_PATCHES] == network.tokenizer.token_to_id("<bos>")
-    said = network.tokenizer.decode(ids[N_PATCHES + 1 :])
-    assert said == "What action should the robot take to pick up the Mug?\n" == f"{prompt('pick up the Mug')}\n"
+    text = network.tokenizer.decode(ids[N_PATCHES + 1 :])
+    assert text == "What action should the robot take to pick up the Mug?\n" == f"{prompt('pick up the Mug')}\n"
 
 
 def test_a_tokenizer_without_image_tokens_is_refused(network: SpatialVLANetwork) -> None:
@@ -43,11 +43,11 @@ def test_action_tokens_have_the_embeddings_kept_apart_and_all_are_scaled(
     kept = load_file(policy_checkpoints["spatialvla"] / "model.safetensors")
     model = network.weights.language_model
     begin = network.bins.begin
-    found = embed_ids(model, [5, begin, begin + N_ACTIONS - 1])[0]
+    result = embed_ids(model, [5, begin, begin + N_ACTIONS - 1])[0]
     of_text = kept["language_model.model.embed_tokens.weight"][5]
     spatial = kept["spatial_embed_tokens.weight"]
     expected = torch.stack([of_text, spatial[0], spatial[-1]]) * HIDDEN**0.5
-    torch.testing.assert_close(found, expected)
+    torch.testing.assert_close(result, expected)
     # What writes tokens is not tied in the published checkpoint, and stays as it was.
     torch.testing.assert_close(model.lm_head.weight.data, kept["language_model.lm_head.weight"])
 
