@@ -49,7 +49,7 @@ class Turn:
 
 @dataclass(frozen=True, kw_only=True)
 class Decoding:
-    """How a reply is decoded.
+    """Settings of decoding a reply.
 
     Attributes:
         max_new_tokens: most tokens of the reply, at least 1.
@@ -84,7 +84,7 @@ class Decoding:
 
     @property
     def greedy(self) -> bool:
-        """Whether decoding is greedy."""
+        """True if decoding is greedy."""
         return self.temperature == 0
 
     def document(self) -> dict[str, Any]:

@@ -64,7 +64,7 @@ class ServedModel:
         """Return None: only the server counts, and only sent requests."""
 
     def conversation(self) -> Conversation:
-        """A new, empty conversation."""
+        """Return a new, empty conversation."""
         return BackendConversation(self)
 
     def count(self, turns: Sequence[Turn]) -> None:

@@ -10,9 +10,10 @@ from typing import Any
 import pytest
 
 from infthor_eval.errors import ModelError, UsageError
-from model_adapters import Capabilities, Policy, adapter_identity, label, load, names, options, registry
+from model_adapters import Capabilities, Policy, adapter_identity, label, load, model_note, names, options, registry
 from model_adapters.built_in import BUILT_IN
 from model_adapters.options import NoOptions
+from model_adapters.registry import model_description
 
 
 def test_names_and_help_need_neither_torch_nor_transformers() -> None:
@@ -207,3 +208,14 @@ def test_any_label_is_one_component_of_a_path(pretrained: str, tmp_path: Path, m
     assert Path(name).name == name
     assert name not in ("", ".", "..")
     assert pretrained != "." or name == "there"
+
+
+def test_tiny_models_are_described_as_random_and_the_nano_model_as_trained() -> None:
+    tiny = [name for name in names() if name.endswith("-tiny")]
+    assert len(tiny) == 6
+    for name in tiny:
+        assert (
+            model_description(name) == model_note(name) == "random weights, for trying the harness; scores are near 0"
+        )
+    assert model_description("qwen2.5-vl-nano") == "small, trained, bundled with the package"
+    assert (model_note("qwen2.5-vl-nano"), model_description("qwen2.5-vl")) == ("", "")
