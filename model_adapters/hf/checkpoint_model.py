@@ -1,7 +1,10 @@
-"""Base of models of a checkpoint, however its weights are run."""
+"""Bases of models of a checkpoint."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from typing import Any
+
+import torch
 
 from infthor_eval.formats.frames import FrameRef
 from model_adapters.backend import BackendConversation
@@ -9,9 +12,10 @@ from model_adapters.hf.limits import wrap_model_errors
 from model_adapters.hf.loaded import LoadedCheckpoint
 from model_adapters.hf.prompt import Piece, Prompter, n_tokens
 from model_adapters.hf.threads import torch_threads
+from model_adapters.options.checkpoints import HfOptions
 from model_adapters.protocols import Capabilities, Decoding, Reply, Turn
 
-__all__ = ["CheckpointModel"]
+__all__ = ["CheckpointModel", "HfModel"]
 
 
 class CheckpointModel(ABC):
@@ -65,3 +69,61 @@ class CheckpointModel(ABC):
     @abstractmethod
     def answer_each(self, conversations: Sequence[Sequence[Turn]], decoding: Decoding) -> list[Reply]:
         """Answer several conversations; see `Conversation.replies`."""
+
+
+class HfModel(CheckpointModel):
+    """A model whose weights transformers runs in this process.
+
+    Args:
+        name: name in the registry.
+        loaded: the checkpoint.
+        options: inference options.
+    """
+
+    def __init__(self, name: str, loaded: LoadedCheckpoint, options: HfOptions) -> None:
+        super().__init__(name, loaded, options.threads)
+        self._options = options
+
+    @property
+    def capabilities(self) -> Capabilities:
+        """Sampling and choices, one request at a time, `_batch_size` continuations of a shared prefix together."""
+        text_config = self._loaded.model.config.get_text_config()
+        return Capabilities(
+            sampling=True,
+            choices=True,
+            batch_size=self._batch_size,
+            max_tokens=self._context_limit,
+            max_tokens_before_extension=None if self._options.rope is None else text_config.max_position_embeddings,
+        )
+
+    def identity(self) -> dict[str, Any]:
+        """Return checkpoint, precision, kernels, versions and generation settings, as JSON values."""
+        options, generation = self._options, self._loaded.generation
+        return self._loaded.identity | {
+            "adapter": self.name,
+            "max_tokens": self._context_limit,
+            "prompt": options.prompt,
+            "share_prefix": options.share_prefix,
+            "chunk_tokens": options.chunk_tokens,
+            "batch_size": options.batch_size,
+            "generation": {
+                "repetition_penalty": generation.repetition_penalty,
+                "end_ids": sorted(generation.end_ids),
+            },
+        }
+
+    def close(self) -> None:
+        """Free the weights."""
+        del self._loaded, self._prompter
+        if torch.cuda.is_available():
+            torch.cuda.empty_cache()
+
+    @property
+    def _batch_size(self) -> int:
+        return 1
+
+    @property
+    def _context_limit(self) -> int | None:
+        """Context limit of the options, else of the checkpoint, or None."""
+        options = self._options
+        return (self._loaded.max_tokens if options.max_tokens is None else options.max_tokens) or None

@@ -1,15 +1,13 @@
 """Any transformers model of a known family as a `Model`: conversations that share one encoded prefix."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import torch
 
 from infthor_eval.errors import ModelError
 from model_adapters.hf.batch import answer_together
-from model_adapters.hf.checkpoint_model import CheckpointModel
+from model_adapters.hf.checkpoint_model import HfModel
 from model_adapters.hf.decoding import ReplyState, decode_replies
-from model_adapters.hf.description import capabilities, identity
 from model_adapters.hf.embedding import Embedder
 from model_adapters.hf.features import FeatureCache
 from model_adapters.hf.limits import check_limit, wrap_memory_errors, wrap_model_errors
@@ -20,12 +18,12 @@ from model_adapters.hf.replies import begin_reply, end_reply
 from model_adapters.hf.rope import take_length_rope
 from model_adapters.hf.threads import torch_threads
 from model_adapters.options.checkpoints import HfOptions
-from model_adapters.protocols import Capabilities, Decoding, Reply, Turn
+from model_adapters.protocols import Decoding, Reply, Turn
 
 __all__ = ["TransformersModel"]
 
 
-class TransformersModel(CheckpointModel):
+class TransformersModel(HfModel):
     """A loaded checkpoint behind the `Model` protocol.
 
     All conversations of a model share one encoded sequence. A reply reuses what its prompt has in common with the
@@ -38,8 +36,7 @@ class TransformersModel(CheckpointModel):
     """
 
     def __init__(self, name: str, loaded: LoadedCheckpoint, options: HfOptions) -> None:
-        super().__init__(name, loaded, options.threads)
-        self._options = options
+        super().__init__(name, loaded, options)
         cache_bytes = options.feature_cache_mb * 2**20 if options.share_prefix else 0
         self._features = FeatureCache(loaded.family, cache_bytes)
         self._embed = Embedder(loaded.model, loaded.family, self._features)
@@ -53,22 +50,12 @@ class TransformersModel(CheckpointModel):
             storage=torch.device("cpu") if options.kv_offload else None,
         )
 
-    @property
-    def capabilities(self) -> Capabilities:
-        """Sampling and choices, one request at a time, several continuations of a shared prefix together."""
-        return capabilities(self._loaded, self._options, self._batch_size)
-
-    def identity(self) -> dict[str, Any]:
-        """Return checkpoint, precision, kernels, versions and generation settings, as JSON values."""
-        return identity(self.name, self._loaded, self._options)
-
     def close(self) -> None:
         """Free the KV cache, the features and the weights."""
         self._prefix.reset()
         self._features.clear()
-        del self._prefix, self._embed, self._features, self._rope, self._prompter, self._loaded
-        if torch.cuda.is_available():
-            torch.cuda.empty_cache()
+        del self._prefix, self._embed, self._features, self._rope
+        super().close()
 
     def encode(self, pieces: Sequence[Piece]) -> torch.Tensor:
         """Encode a prompt from scratch, in two parts; return the logits of the next token, (vocabulary,)."""

@@ -13,16 +13,15 @@ from transformers import LogitsProcessor, LogitsProcessorList, StoppingCriteria,
 
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
-from model_adapters.hf.checkpoint_model import CheckpointModel
+from model_adapters.hf.checkpoint_model import HfModel
 from model_adapters.hf.decoding import ReplyState, extend_replies
-from model_adapters.hf.description import capabilities, identity
 from model_adapters.hf.limits import check_limit, wrap_memory_errors, wrap_model_errors
 from model_adapters.hf.loaded import LoadedCheckpoint
 from model_adapters.hf.rendering import render, starts_with_bos
 from model_adapters.hf.replies import begin_reply, end_reply
 from model_adapters.hf.threads import torch_threads
 from model_adapters.options.checkpoints import HfOptions
-from model_adapters.protocols import Capabilities, Decoding, Reply, Turn
+from model_adapters.protocols import Decoding, Reply, Turn
 
 __all__ = ["UncachedModel", "expand_image_token", "image_token", "process_turns"]
 
@@ -88,7 +87,7 @@ class _StopWithReply(StoppingCriteria):
         return torch.tensor([self._reply.done], device=input_ids.device)
 
 
-class UncachedModel(CheckpointModel):
+class UncachedModel(HfModel):
     """A loaded checkpoint behind the `Model` protocol, without a shared prefix.
 
     Args:
@@ -99,18 +98,8 @@ class UncachedModel(CheckpointModel):
     """
 
     def __init__(self, name: str, loaded: LoadedCheckpoint, processor: Any, options: HfOptions) -> None:
-        super().__init__(name, loaded, options.threads)
+        super().__init__(name, loaded, options)
         self._processor = processor
-        self._options = options
-
-    @property
-    def capabilities(self) -> Capabilities:
-        """Sampling and choices, one request at a time."""
-        return capabilities(self._loaded, self._options, batch_size=1)
-
-    def identity(self) -> dict[str, Any]:
-        """Return checkpoint, precision, kernels, versions and generation settings, as JSON values."""
-        return identity(self.name, self._loaded, self._options)
 
     def tokens_per_frame(self, frame: FrameRef) -> int:
         """Return the tokens of one frame, as the checkpoint's processor expands it."""
@@ -119,9 +108,8 @@ class UncachedModel(CheckpointModel):
 
     def close(self) -> None:
         """Free the weights."""
-        del self._loaded, self._processor, self._prompter
-        if torch.cuda.is_available():
-            torch.cuda.empty_cache()
+        del self._processor
+        super().close()
 
     def count(self, turns: Sequence[Turn]) -> int:
         """Return the context size of a reply to these turns, in tokens."""
