@@ -10,12 +10,14 @@ from pathlib import Path
 import pytest
 
 from infthor_eval.errors import InfthorError, UsageError
+from infthor_eval.report.plain import PlainPresenter
 from infthor_eval.runs import Catalog
-from infthor_eval.suites import find_suite, options_class, suite_code, suite_names
+from infthor_eval.suites import find_presenter, find_suite, options_class, suite_code, suite_names
 
 ROOT = Path(__file__).parents[1]
 SUITE = """
 from dataclasses import dataclass, field
+from infthor_eval.report.plain import PlainPresenter
 from tests.runs.toy import ToySuite
 
 @dataclass(frozen=True)
@@ -24,6 +26,9 @@ class Options:
 
 class SumsSuite(ToySuite):
     name, options = "sums", Options
+
+class Shown(PlainPresenter):
+    title = "Sums!"
 
 class Renamed(SumsSuite):
     name = "other"
@@ -85,6 +90,17 @@ def test_it_is_found_by_name_behind_the_built_in_ones(package):
 
 
 @pytest.fixture
+def add_presenter(package):
+    """Names a class the presenter of the package's suite."""
+
+    def add_presenter(target):
+        file = package / "Sums-1.0.dist-info" / "entry_points.txt"
+        file.write_text(f"{file.read_text()}[infthor_eval.presenters]\nsums = {target}\n")
+
+    return add_presenter
+
+
+@pytest.fixture
 def point(package, monkeypatch):
     """Makes another target the suite `sums`, or the folder of the tasks."""
 
@@ -121,6 +137,27 @@ def test_a_fault_in_the_module_of_a_suite_is_told_with_its_place(point, package)
     assert str(caught.value) == (
         f"the suite sums cannot be imported from broken_suite:Sums ({place}); fix its package, or uninstall it"
     )
+
+
+def test_a_suite_without_a_presenter_has_the_plain_one_and_a_package_may_bring_one(package, add_presenter):
+    assert type(find_presenter("sums")) is PlainPresenter
+    assert find_presenter("nieh").title == "Questions"
+    add_presenter("sums_suite:Shown")
+    assert find_presenter("sums").title == "Sums!"
+
+
+@pytest.mark.parametrize(
+    ("target", "said"),
+    [
+        ("sums_suite:Nothing", "the presenter sums cannot be imported from sums_suite:Nothing"),
+        ("sums_suite:Options", "the presenter sums of another package lacks title, measure"),
+    ],
+)
+def test_what_is_no_presenter_is_refused_in_one_line(package, add_presenter, target, said):
+    add_presenter(target)
+    with pytest.raises(InfthorError, match=said) as caught:
+        find_presenter("sums")
+    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("target", ["no_such_package.tasks", "sums_tasks.nowhere", "sums_suite"])

@@ -29,14 +29,14 @@ def write_inspection_page(path: Path, items: Sequence[Judged], data: NiehSet) ->
     template = resources.files(__package__).joinpath("inspection.html").read_text(encoding="utf-8")
     # Questions and replies come from data files and models: whatever they hold is shown as text.
     page = Environment(autoescape=True).from_string(template)
-    text = page.render(items=[_shown(item, data, path.parent) for item in items], choices=DECISIONS)
+    text = page.render(items=[_describe(item, data, path.parent) for item in items], choices=DECISIONS)
     try:
         path.write_text(text, encoding="utf-8")
     except OSError as error:
         raise DataError(f"{path}: cannot be written ({error.strerror}); give another --out") from error
 
 
-def _shown(item: Judged, data: NiehSet, folder: Path) -> dict[str, object]:
+def _describe(item: Judged, data: NiehSet, folder: Path) -> dict[str, object]:
     question = item.question
     frames = zip(question.clues, data.clue_frames(question), strict=True)
     return {

@@ -12,40 +12,40 @@ from infthor_eval.terminal import console, printable
 
 __all__ = ["print_table", "table_console"]
 
-_LINE = 100  # of a note
-_WIDTH = 180  # on a narrower terminal lines wrap; cut-off numbers would be worse
+_LINE = 100  # letters in a line of a note
+_WIDTH = 180  # on a narrower terminal lines wrap, which is better than numbers that are cut off
 
 
 def table_console() -> Console:
-    """Standard output for tables of results."""
+    """Return the console of standard output, wide enough for tables of results."""
     return console(width=max(Console().width, _WIDTH))
 
 
 def print_table(table: Table, on: Console) -> None:
-    """Show a table; whatever its cells hold is shown as text."""
-    drawn = RichTable(
+    """Print a table; whatever its cells hold is shown as text."""
+    rich_table = RichTable(
         box=box.SIMPLE_HEAD,
         title=Text(printable(table.title)) if table.title else None,
         title_justify="left",
         caption_justify="left",
     )
     for column in table.columns:
-        _add_column(drawn, column)
+        _add_column(rich_table, column)
     for row in table.rows:
-        _add_row(drawn, row)
+        _add_row(rich_table, row)
     if table.notes:
-        drawn.caption = Text("\n".join(textwrap.fill(printable(note), _LINE) for note in table.notes))
-    on.print(drawn)
+        rich_table.caption = Text("\n".join(textwrap.fill(printable(note), _LINE) for note in table.notes))
+    on.print(rich_table)
 
 
-def _add_column(drawn: RichTable, column: Column) -> None:
+def _add_column(rich_table: RichTable, column: Column) -> None:
     if column.is_number:
-        drawn.add_column(Text(printable(column.name)), justify="right", overflow="fold")
+        rich_table.add_column(Text(printable(column.name)), justify="right", overflow="fold")
     else:
-        drawn.add_column(Text(printable(column.name)), no_wrap=True, overflow="fold")
+        rich_table.add_column(Text(printable(column.name)), no_wrap=True, overflow="fold")
 
 
-def _add_row(drawn: RichTable, row: Row) -> None:
-    drawn.add_row(*(Text(printable(cell)) for cell in row.cells), style="dim" if row.is_published else "")
+def _add_row(rich_table: RichTable, row: Row) -> None:
+    rich_table.add_row(*(Text(printable(cell)) for cell in row.cells), style="dim" if row.is_published else "")
     if row.ends_section:
-        drawn.add_section()
+        rich_table.add_section()

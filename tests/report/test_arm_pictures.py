@@ -104,7 +104,7 @@ def test_an_episode_has_its_title_its_start_and_its_end_held():
     idle = replace(START, observation=None, ending="left out: no room")
     assert len(list(arm_pictures([idle], "a run"))) == TITLE_REPEATS
     assert RED in colours(draw_arm_title(idle, ""))
-    with pytest.raises(ValueError, match="nothing to be seen"):
+    with pytest.raises(ValueError, match="no observation"):
         draw_arm_frame(idle, "")
 
 

@@ -59,7 +59,7 @@ def test_of_a_plan_that_was_never_begun_the_title_alone_is_shown():
     assert len(list(plan_pictures([idle], "a run"))) == TITLE_REPEATS
     assert RED in colours(draw_plan_title(idle, "a run"))
     assert RED not in colours(draw_plan_title(START, "a run"))
-    with pytest.raises(ValueError, match="nothing to be seen"):
+    with pytest.raises(ValueError, match="no observation"):
         draw_plan_frame(idle, "a run")
 
 

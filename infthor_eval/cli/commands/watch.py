@@ -75,10 +75,8 @@ def command(
     _refuse_options(recorded, replay, {"--plans": plans, "--episode": episode, "--sheet": sheet})
     if sheet is not None and out is not None:
         raise UsageError("--sheet and --out: one picture or a recording; give one of the two")
-    selection = EpisodeSelection(
-        task, trajectory, plans, episode, most=replay.sheet_rows if sheet is not None else None
-    )
-    recording = replay.select(recorded, selection)
+    most = None if sheet is None else replay.sheet_rows
+    recording = replay.select(recorded, EpisodeSelection(task, trajectory, plans, episode, most))
     choice = [text.strip() for text in (plans, episode) if text is not None]
     parts = [recorded.header.name, *recording.tasks, recording.trajectory, *choice]
     path = prepare_file(sheet or out or _default_file(parts))

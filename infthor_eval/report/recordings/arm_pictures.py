@@ -61,9 +61,8 @@ def draw_arm_frame(frame: ArmFrame, heading: str) -> Image.Image:
     """
     if frame.observation is None:
         raise ValueError("the frame has no observation")
-    picture, pen = draw_panes(
-        heading, Image.fromarray(frame.observation.frame), draw_reach(frame.observation.reach, PANE)
-    )
+    seen = frame.observation
+    picture, pen = draw_panes(heading, Image.fromarray(seen.frame), draw_reach(seen.reach, PANE))
     write_lines(pen, _lines(frame))
     numbers = [
         ("distance to the target", _metres(frame.distance)),
@@ -72,7 +71,7 @@ def draw_arm_frame(frame: ArmFrame, heading: str) -> Image.Image:
     ]
     write_numbers(pen, numbers)
     reward = f": {frame.reward:g} of {frame.max_reward:g} points" if frame.ending else ""
-    write_in_hand(pen, frame.observation.held, frame.ending + reward, is_good=frame.done)
+    write_in_hand(pen, seen.held, frame.ending + reward, is_good=frame.done)
     return picture
 
 

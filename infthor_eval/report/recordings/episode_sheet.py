@@ -34,9 +34,8 @@ def draw_sheet(episodes: Sequence[Sequence[ArmFrame]], heading: str) -> Image.Im
     picture = Image.new("RGB", (_WIDTH, _TOP + len(episodes) * row), "white")
     pen = ImageDraw.Draw(picture)
     face = font(16)
-    pen.text(
-        (_EDGE, _TOP / 2), fit_line(one_line(heading), face, _WIDTH - 2 * _EDGE), font=face, fill=FAINT, anchor="lm"
-    )
+    text = fit_line(one_line(heading), face, _WIDTH - 2 * _EDGE)
+    pen.text((_EDGE, _TOP / 2), text, font=face, fill=FAINT, anchor="lm")
     for number, frames in enumerate(episodes):
         top = _TOP + number * row
         if number:

@@ -171,7 +171,7 @@ class _Name(NamedTuple):
 
 
 def _name(item: MapObject, scale: _Scale, size: int) -> _Name | None:
-    """Place a name in the object's box, or beside it if the plan names it and it is too small."""
+    """Place a name in the object's box, or beside it if the plan names it and the box is too small."""
     face = font(14, "-Bold") if item.is_named else font(12)
     x, y = scale.at(_middle(item))
     wide, high = ((high - low) * scale.per_metre for low, high in zip(item.low, item.high, strict=True))
@@ -213,12 +213,11 @@ def _legend(observation: PlanObservation) -> list[tuple[str, str]]:
 
 def _draw_legend(pen: ImageDraw.ImageDraw, observation: PlanObservation, size: int) -> None:
     """Draw the dots of the legend; its text is written into the final picture, as letters need no oversampling."""
-    fine, y = size * OVERSAMPLING, (size - _LEGEND / 2) * OVERSAMPLING
+    fine, radius, y = size * OVERSAMPLING, 6 * OVERSAMPLING, (size - _LEGEND / 2) * OVERSAMPLING
     pen.rectangle((0, fine - _LEGEND * OVERSAMPLING, fine, fine), fill="white")
-    for x, _, colour in _places(_legend(observation)):
-        pen.ellipse(
-            (x * OVERSAMPLING, y - 6 * OVERSAMPLING, (x + 12) * OVERSAMPLING, y + 6 * OVERSAMPLING), fill=colour
-        )
+    for left, _, colour in _places(_legend(observation)):
+        x = left * OVERSAMPLING
+        pen.ellipse((x, y - radius, x + 2 * radius, y + radius), fill=colour)
 
 
 def _write_legend(pen: ImageDraw.ImageDraw, observation: PlanObservation, size: int) -> None:

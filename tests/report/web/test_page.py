@@ -20,9 +20,8 @@ TEXT = st.text(st.characters(blacklist_categories=["Cs"]), min_size=1, max_size=
 
 
 def page_of(text, n_samples=1):
-    sample = PageSample(
-        "nieh", text, text, text, text, (SampleResult("right", text, {"strict": 1.0}, text),), text, text
-    )
+    result = SampleResult("right", text, {"strict": 1.0}, text)
+    sample = PageSample("nieh", text, text, text, text, (result,), text, text)
     table = Table(text, (Column(text),), (Row((text,)),), (text,))
     about = About(text, ((text, text),), text, text)
     labels = {"nieh": SuiteLabels((0,), text, text, True)}
