@@ -19,6 +19,7 @@ _OUTSIDE = {  # where a file lies in the repository: where its page stands in th
     "CONTRIBUTING.md": "CONTRIBUTING.md",
     "benchmarks/README.md": "benchmarks/README.md",
     "benchmarks/gpu.md": "benchmarks/gpu.md",
+    "examples/sums/README.md": "examples/sums/README.md",
     "examples/thumbnails/README.md": "examples/thumbnails/README.md",
     "results/README.md": "results/README.md",
 }
