@@ -55,7 +55,7 @@ def test_a_folder_that_cannot_be_written_is_told_before_the_work(typed, tmp_path
     def work(*_: object, **__: object) -> None:
         raise AssertionError("work was begun")
 
-    for begins in ("thor.simulator.Simulator.__init__", "runs.executor.subject_of", "formats.hub_data._download"):
+    for begins in ("thor.simulator.Simulator.__init__", "runs.binding._load_subject", "formats.hub_data._download"):
         monkeypatch.setattr(f"infthor_eval.{begins}", work)
     (tmp_path / "file.json").write_text("{}")
     where, said = PLACES[place]
@@ -92,10 +92,10 @@ TYPED = [
     ([*GENERATE, "--out", "OUT", "--seed", "9" * 30], "--seed"),
     ([*RUN, "--output", "OUT", "--seed", "9" * 30], "--seed"),
     ([*RUN, "--output", "OUT", "--limit", "9" * 30], "--limit"),
-    ([*TINY, "dtype=int8"], "dtype=int8 is no type of weights"),
-    ([*TINY, "dtype=complex64"], "dtype=complex64 is no type of weights"),
-    ([*TINY, "dtype=float8_e4m3fn"], "dtype=float8_e4m3fn is no type of weights"),
-    ([*TINY, "dtype=nn"], "dtype=nn is no type of weights"),
+    ([*TINY, "dtype=int8"], "dtype=int8 is not a type of weights"),
+    ([*TINY, "dtype=complex64"], "dtype=complex64 is not a type of weights"),
+    ([*TINY, "dtype=float8_e4m3fn"], "dtype=float8_e4m3fn is not a type of weights"),
+    ([*TINY, "dtype=nn"], "dtype=nn is not a type of weights"),
     ([*TINY, "device=xpu"], "device=xpu: torch"),
     ([*TINY, "device=mps"], "device=mps: torch"),
     ([*TINY, "device=hpu"], "device=hpu: torch"),
@@ -117,7 +117,7 @@ TYPED = [
     ([*TINY, "min_pixels=40000000"], "min_pixels is 40000000 and max_pixels"),
     (["validate", "SET", "--models", "oracle", "--out", "SET"], "is the set itself"),
     (["validate", "SET", "--models", "oracle", "--out", "OUT", "--decisions", "file"], "no column question_id"),
-    (["validate", "SET", "--models", "a:x=1,oracle,a:x=1", "--out", "OUT"], "--models a: 'x' is given twice"),
+    (["validate", "SET", "--models", "oracle,a:x=1,x=1", "--out", "OUT"], "--models a: 'x' is given twice"),
     (
         ["train", "--recipe", "infthor_32k", "--data", "SET", "--out", "OUT", "--gpus", 4],
         "--gpus and --tflops are for --dry-run; add it",

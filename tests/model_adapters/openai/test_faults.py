@@ -74,10 +74,13 @@ SHAPES: dict[str, tuple[Answer, str]] = {
     "deep": (_sends(200, b"[" * 200_000), "does not answer with a chat completion"),
     "half": (_sends(200, json.dumps(completion()).encode()[:-20]), "does not answer with a chat completion"),
     "a list": (_answers([completion()]), "(Expected `object`, got `array`)"),
-    "a stream": (_sends(200, b"data: {}\n\ndata: [DONE]\n\n", {"Content-Type": "text/event-stream"}), "is no chat"),
+    "a stream": (
+        _sends(200, b"data: {}\n\ndata: [DONE]\n\n", {"Content-Type": "text/event-stream"}),
+        "does not answer with a chat completion",
+    ),
     "another object": (_answers({"detail": "hello"}), "(Object missing required field `choices`)"),
     "choices of another type": (_answers(completion() | {"choices": "yes"}), "(Expected `array`, got `str` - at"),
-    "no choices": (_answers(completion() | {"choices": []}), "answers without a choice"),
+    "no choices": (_answers(completion() | {"choices": []}), "answers without choices"),
     "choices that are none": (_answers(completion() | {"choices": [None]}), "(Expected `object`, got `null` - at"),
     "a choice without a message": (_answers(completion() | {"choices": [{"text": "yes"}]}), "field `message` - at"),
     "content of another type": (_answers(completion(message={"content": 7})), "(Expected `str | null`, got `int` - at"),
@@ -311,7 +314,7 @@ def test_a_wait_without_end_is_not_kept(asked: str) -> None:
 @settings(max_examples=200)
 @given(st.sampled_from(["retry-after", "retry-after-ms"]), st.text(max_size=20))
 def test_no_head_is_a_traceback(name: str, value: str) -> None:
-    waited = endpoint._asked_wait_s({name: value})
+    waited = endpoint._retry_after_s({name: value})
     assert waited is None or waited >= 0
 
 

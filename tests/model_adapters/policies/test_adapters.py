@@ -212,9 +212,9 @@ def test_statistics_of_a_fine_tuned_openvla_are_in_a_file_of_their_own(altered: 
     ("family", "file", "change", "message"),
     [
         ("openvla", "config.json", {"timm_model_ids": ["vit_tiny", "vit_small"]}, "has the vision towers"),
-        ("openvla", "config.json", {"image_resize_strategy": "letterbox"}, "only the preparation of openvla"),
-        ("openvla", "config.json", {"image_sizes": [56, 70]}, "only the preparation of openvla"),
-        ("openvla", "config.json", {"timm_override_act_layers": ["quick_gelu", None]}, "only the preparation"),
+        ("openvla", "config.json", {"image_resize_strategy": "letterbox"}, "only the preprocessing of openvla"),
+        ("openvla", "config.json", {"image_sizes": [56, 70]}, "only the preprocessing of openvla"),
+        ("openvla", "config.json", {"timm_override_act_layers": ["quick_gelu", None]}, "only the preprocessing"),
         ("spatialvla", "config.json", {"use_vision_zoe": False}, "only SpatialVLA with use_spatial_token"),
         ("spatialvla", "config.json", {"action_token_begin_idx": 600}, "actions begin at 600 in the config and at 605"),
         ("spatialvla", "config.json", {"spatial_token_num": 8190}, "has 8190 action tokens and 8194 bins"),
