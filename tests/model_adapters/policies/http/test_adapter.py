@@ -90,8 +90,8 @@ def test_a_policy_behind_a_server_acts_as_it_does_here(policies: dict[str, VlaPo
         ([], "gave actions of shape [1, 0]"),
         ([[]], "gave actions of shape [1, 0]"),
         ([[ACTION]], "gave actions of shape [1, 1, 7]"),
-        ([*ACTION[:6], float("nan")], "no number"),
-        ([float("inf"), *ACTION[1:]], "no number"),
+        ([*ACTION[:6], float("nan")], "not finite"),
+        ([float("inf"), *ACTION[1:]], "not finite"),
         ("error", "answers without an action of numbers: the text 'error'"),
         ({"detail": "no such key"}, "answers without an action of numbers"),
         ([10**400, *ACTION[1:]], "answers without an action of numbers"),
@@ -115,7 +115,7 @@ def test_an_error_of_the_server_is_told_and_not_tried_again(plain_frames: Frames
 
 def test_what_is_no_json_is_refused(plain_frames: Frames) -> None:
     message = _refused(lambda _, handler: send(handler, 200, b"<html>hello</html>"), plain_frames[0])
-    assert "does not answer in JSON: '<html>hello</html>'" in message
+    assert "answers with something that is not JSON: '<html>hello</html>'" in message
 
 
 def test_a_redirect_is_not_followed(plain_frames: Frames) -> None:
