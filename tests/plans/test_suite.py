@@ -72,7 +72,7 @@ def test_the_planner_carries_every_plan_out_and_earns_all_there_is(prepared, dat
     }
     assert (task.goals.mean, task.goals.n) == (0.5, 2)  # the mug's task is cut off
     assert task.endings == {"done": 6}
-    shown = cells(outcome, "Plans carried out")
+    shown = cells(outcome, "Plans completed")
     assert (shown["total"][:5], shown["plans"], shown["excluded"]) == ("100.0", "6", "0")
     assert cells(outcome, "Reward")["% of it"].startswith("100.0")
     assert outcome.run.suite.scores(outcome.records[-1]) == {"success": 1.0, "reward": 11.0}
@@ -162,7 +162,7 @@ def test_plans_that_the_expert_cannot_do_here_count_for_nobody(prepared, tmp_pat
         assert reason.startswith("the expert's action 15 (OpenObject Wardrobe, in plan 2) is refused here: ")
         assert number == 2
         assert {name: rate.n for name, rate in task.success.items()} == {"Go to": 1, "Pick up": 1, "total": 2}
-        assert cells(outcome, "Plans carried out")["excluded"] == "2"
+        assert cells(outcome, "Plans completed")["excluded"] == "2"
         (table, *_) = outcome.run.suite.tables([outcome.summary])
         assert f"2 left out: {reason}" in table.notes
 
@@ -246,7 +246,7 @@ def test_files_that_cannot_be_read_are_skipped_too(prepared, data):
     assert {record.cluster for record in outcome.records} == {FORK, "sound"}
     task = summary(outcome)
     assert (sum(task.skipped.values()), task.n_trajectories) == (3, 2)
-    assert cells(outcome, "Plans carried out")["skipped"] == "3"
+    assert cells(outcome, "Plans completed")["skipped"] == "3"
     assert all(any(name in reason for reason in task.skipped) for name in ("a.jsonl.gz", "c.json", "d.jsonl:2"))
 
 

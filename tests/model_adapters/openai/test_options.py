@@ -22,7 +22,7 @@ ASKED = {"model": "m"}
         ({"base_url": "http://localhost.example.org/v1"}, "without encryption"),
         ({"base_url": "http://0.0.0.0:8000/v1"}, "without encryption"),
         ({"api_key_env": SECRET}, "api_key_env is not the name of an environment variable"),
-        ({"api_key_env": ""}, "api_key_env is no name"),
+        ({"api_key_env": ""}, "api_key_env is not the name"),
         ({"api_key": SECRET}, "no option api_key; did you mean api_key_env"),
         ({"image_format": "gif"}, "image_format=gif is not png or jpeg"),
         ({"detail": "fine"}, "detail=fine is not auto or low or high"),
