@@ -251,5 +251,5 @@ def test_ctrl_c_finishes_the_unit_in_hand_and_shows_what_is_there_and_again_stop
     results = json.loads((folder / "results.json").read_text())
     assert results["n_missing"] == (3 if again else 2)
     if not again:
-        assert "2 not come to; the same command goes on" in said
+        assert "2 not attempted; run the same command to continue" in said
         assert ["adder", "2"] in [line.split() for line in shown.splitlines()]

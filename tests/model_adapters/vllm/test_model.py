@@ -281,7 +281,7 @@ def test_a_vllm_that_counts_otherwise_is_not_believed(start: Start, vllm: Double
 def test_what_vllm_says_to_a_request_is_one_line(error: Exception, start: Start, vllm: Double) -> None:
     model = start()
     vllm.fails = error
-    with pytest.raises(ModelError, match=r"qwen2.5-vl@vllm: vLLM 0\.33\.0 fails on the request \(.*\); use fewer") as raised:
+    with pytest.raises(ModelError, match=r"@vllm: vLLM 0\.33\.0 fails on the request \(.*\); use fewer") as raised:
         model.answer(user("x"), up_to(2))
     assert "\n" not in str(raised.value)
     assert " ".join(str(error).split()) in str(raised.value)

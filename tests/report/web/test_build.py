@@ -99,7 +99,7 @@ def test_a_run_that_was_stopped_and_has_failures_says_so(make_page, nieh_runs, t
     (table,) = next(section.tables for section in page.sections if section.key == "left-out")
     told = {row.cells[2]: row.cells[3:] for row in table.rows}
     assert told["failed"] == ("1", "the frame is gone")
-    assert told["not come to"][0] == "3"
+    assert told["not attempted"][0] == "3"
     assert sum(sample.results[0].outcome == "failed" for sample in page.samples) == 1
 
 
