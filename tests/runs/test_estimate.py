@@ -92,7 +92,7 @@ def test_the_command_prints_units_tokens_time_memory_and_money(run, tmp_path):
     (row,) = [line.split() for line in said.splitlines() if line.startswith("  nieh_mini_gt")]
     assert (row[1], row[2], row[4]) == ("6", "3", "6")
     assert "by 2 workers, loading not counted" in said
-    assert " MB at most while it was measured" in said
+    assert " MB at most while measuring" in said
     assert "US dollars of machines at 2.5 an hour" in said
     assert "contexts, the longest request" in err
     assert not (tmp_path / "out").exists() or not list((tmp_path / "out").rglob("*.jsonl"))
@@ -102,4 +102,4 @@ def test_a_cap_on_what_is_spent_holds_for_one_process_and_says_so(run, tmp_path)
     words = ("--model", "openai", "--model-args", "model=m", "--tasks", "nieh_mini_gt", "--output", tmp_path)
     code, _, err = run(*words, "--max-tokens-total", 100, "--workers", 2)
     assert code == 2
-    assert "max_tokens_total counts what one process asks for; leave out --workers, or the cap" in err
+    assert "max_tokens_total counts the requests of one process; leave out --workers, or the cap" in err
