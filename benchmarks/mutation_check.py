@@ -238,7 +238,7 @@ def _passes(tree: Path, module: str, source: str, tests: Sequence[str], timeout_
         with contextlib.suppress(ProcessLookupError):
             os.killpg(process.pid, signal.SIGKILL)
         process.wait()
-    if code in _NO_VERDICT:
+    if code < 0 or code in _NO_VERDICT:  # killed from outside, which says nothing of the mutant
         raise SystemExit(f"{' '.join(command)}: ended with {code}")
     return code == 0
 
