@@ -26,7 +26,7 @@ from model_adapters.hf.loaded import LoadedCheckpoint
 
 from .twins import PAD, everywhere, loaded, sequence
 
-__all__ = ["CASES", "N_RANKS", "RESULTS", "Case", "Found", "batch_of", "gradients_of", "model_of", "train", "work"]
+__all__ = ["CASES", "N_RANKS", "RESULTS", "Case", "CaseResult", "batch_of", "gradients_of", "model_of", "train", "work"]
 
 N_RANKS = 4
 RESULTS = "results.pt"
@@ -53,7 +53,7 @@ class Case:
 
 
 @dataclass(frozen=True)
-class Found:
+class CaseResult:
     """What came of a case: each rank's share of the loss, and the gradients by name."""
 
     shares: list[float]
@@ -136,7 +136,7 @@ def work(rank: int, folder: Path, frames: list[FrameRef]) -> None:
     dist.destroy_process_group()
 
 
-def _run(case: Case, frames: list[FrameRef], ranks: Ranks) -> Found:
+def _run(case: Case, frames: list[FrameRef], ranks: Ranks) -> CaseResult:
     model, batch = model_of(case), batch_of(case, frames)
     group = ranks.context_group
     assert group is not None
@@ -146,7 +146,7 @@ def _run(case: Case, frames: list[FrameRef], ranks: Ranks) -> Found:
     sum_gradients(model.parameters(), group)
     shares = [0.0] * ranks.n_context
     dist.all_gather_object(shares, loss.item(), group)
-    return Found(shares, gradients_of(model))
+    return CaseResult(shares, gradients_of(model))
 
 
 def _out_of_shards() -> bool:

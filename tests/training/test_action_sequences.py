@@ -150,7 +150,7 @@ def test_ids_and_labels_of_a_short_history(tmp_path, encoder, bundled_set):
 
 def test_a_text_that_holds_a_mark_is_refused(encoder, bundled_set):
     first, second = NiehSet(bundled_set).frames(names_in(bundled_set)[0])[:2]
-    with pytest.raises(DataError, match=r"bad: a goal, a plan or an action holds <\|act\|>"):
+    with pytest.raises(DataError, match=r"bad: a goal, a plan or an action contains <\|act\|>"):
         encoder.actions("bad", [PlanSegment(f"go {ACT}", "goal", first, (("MoveAhead", second),))])
 
 

@@ -14,7 +14,7 @@ from infthor_eval.training.batches import IGNORED, n_labels
 from infthor_eval.training.context_parallel import SequenceSplit
 from infthor_eval.training.ranks import Ranks
 
-from .processes import CASES, N_RANKS, RESULTS, Case, Result, batch_of, gradients_of, model_of, train, work
+from .processes import CASES, N_RANKS, RESULTS, Case, CaseResult, batch_of, gradients_of, model_of, train, work
 from .twins import loaded, write_frames
 
 TOLERANCE = 1e-5
@@ -39,14 +39,14 @@ def results(folder: Path, frames: list[FrameRef]) -> Any:
 
 
 @pytest.fixture(scope="module", params=CASES, ids=str)
-def alone(request: pytest.FixtureRequest, frames: list[FrameRef]) -> tuple[Case, Result]:
+def alone(request: pytest.FixtureRequest, frames: list[FrameRef]) -> tuple[Case, CaseResult]:
     """A case, and what comes of it in one process without recomputation."""
     case: Case = request.param
     model, batch = model_of(case), batch_of(case, frames)
     model.gradient_checkpointing_disable()
     loss = model(**batch)["loss"]
     loss.backward()
-    return case, Result([loss.item()], gradients_of(model))
+    return case, CaseResult([loss.item()], gradients_of(model))
 
 
 def _assert_equal(result: dict[str, Tensor], expected: dict[str, Tensor]) -> None:
@@ -60,10 +60,10 @@ def _assert_equal(result: dict[str, Tensor], expected: dict[str, Tensor]) -> Non
 
 @pytest.mark.parametrize("n_context", [2, 4])
 def test_a_cut_sequence_has_the_loss_and_gradients_of_the_whole(
-    results: Any, alone: tuple[Case, Result], n_context: int
+    results: Any, alone: tuple[Case, CaseResult], n_context: int
 ) -> None:
     case, expected = alone
-    result: Result = results[case, n_context]
+    result: CaseResult = results[case, n_context]
     assert sum(result.shares) == pytest.approx(expected.shares[0], rel=TOLERANCE)
     _assert_equal(result.gradients, expected.gradients)
 

@@ -46,5 +46,5 @@ def test_what_cannot_be_asked_is_told(make_nieh_set, encoder):
 
 
 def test_notes_cannot_be_trained_on(make_nieh_set, encoder):
-    with pytest.raises(UsageError, match="no notes yet"):
+    with pytest.raises(UsageError, match="training has no notes of a model"):
         build(encoder, make_nieh_set(), "memory_notes")

@@ -48,4 +48,4 @@ def sequence(
 
 def everywhere(encoded: TrainingSequence) -> TrainingSequence:
     """The same sequence with loss on every token of text."""
-    return replace(encoded, trained=tuple(isinstance(piece, int) for piece in encoded.pieces))
+    return replace(encoded, has_loss=tuple(isinstance(piece, int) for piece in encoded.pieces))
