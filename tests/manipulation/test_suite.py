@@ -187,9 +187,9 @@ BAD = {
     "a gripper that is none": ((ArmDelta(GOOD, GOOD, math.nan),), "numbers that are not finite"),
     "an infinite way": ((ArmDelta((math.inf, 0.0, 0.0), GOOD, 1.0),), "numbers that are not finite"),
     "a text": ((ArmDelta(("far", 0.0, 0.0), GOOD, 1.0),), "numbers that are not finite"),
-    "too few": ((ArmDelta((0.0, 0.0), GOOD, 1.0),), "gives 6 numbers for a step; it takes 7"),
-    "too many": ((ArmDelta(GOOD, (0.0,) * 4, 1.0),), "gives 8 numbers for a step; it takes 7"),
-    "bare numbers": (((0.0,) * 7,), "it takes an ArmDelta"),
+    "too few": ((ArmDelta((0.0, 0.0), GOOD, 1.0),), "gives 6 numbers for a step; it must be 7"),
+    "too many": ((ArmDelta(GOOD, (0.0,) * 4, 1.0),), "gives 8 numbers for a step; it must be 7"),
+    "bare numbers": (((0.0,) * 7,), "it must be an ArmDelta"),
     "no step": ((), "gives no movement; a policy gives at least one"),
     "bad after good": ((STILL, ArmDelta(GOOD, GOOD, math.inf)), "numbers that are not finite"),
 }

@@ -241,7 +241,7 @@ def test_tokens_that_nobody_counts_cannot_be_limited(acting, monkeypatch):
     monkeypatch.setattr("tests.plans.scripting.Talk.n_tokens", None)
     outcome, _ = acting(lambda *_: "", history="last:500")
     assert {record.failure for record in outcome.records} == {
-        "the model counts no tokens, so --history last:N cannot be held; use full"
+        "the model counts no tokens, so --history last:N cannot be used; use full"
     }
 
 

@@ -37,8 +37,9 @@ def suite_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def suite_values(given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the options of all suites among the parameters of a command."""
-    return {name: given[name] for name in _options_by_name()}
+    """Return the options of all suites among the parameters of a command; None where not given."""
+    # A suite that was installed after the command was imported has options that the command does not know.
+    return {name: given.get(name) for name in _options_by_name()}
 
 
 def expand_suite_options(suite: str, given: Mapping[str, Any], used: Collection[str]) -> list[Any]:

@@ -170,14 +170,14 @@ def _failing_after(function: Callable[..., Any], n_calls: int) -> Callable[..., 
 def buffers(monkeypatch: pytest.MonkeyPatch) -> list[weakref.ref[torch.Tensor]]:
     """The buffers of keys and values that are made from now on."""
     created: list[weakref.ref[torch.Tensor]] = []
-    grown = BufferedLayer._grown
+    grow = BufferedLayer._grow
 
     def noting(*args: Any) -> torch.Tensor:
-        buffer = grown(*args)
+        buffer = grow(*args)
         created.append(weakref.ref(buffer))
         return buffer
 
-    monkeypatch.setattr(BufferedLayer, "_grown", noting)
+    monkeypatch.setattr(BufferedLayer, "_grow", noting)
     return created
 
 

@@ -75,7 +75,7 @@ def test_the_gripper_is_held_between_closed_and_open() -> None:
     ("chunk", "message"),
     [
         ([[*STEP[:3], float("nan"), *STEP[4:]]], "scripted gave an action that is not finite"),
-        ([[float("inf"), *STEP[1:]]], "no number"),
+        ([[float("inf"), *STEP[1:]]], "not finite"),
         (RuntimeError("CUDA out of memory. Tried to allocate"), "scripted fails on the request .*out of memory"),
         (MemoryError("none left"), "scripted fails on the request"),
     ],

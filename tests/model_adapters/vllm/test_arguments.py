@@ -154,7 +154,7 @@ def test_a_model_of_one_part_has_its_extension_at_the_top(rope_type: str, longer
 
 @pytest.mark.parametrize("rope", ["linear:2", "dynamic:2", "longrope:2"])
 def test_an_extension_that_would_lose_the_three_axes_is_refused(rope: str) -> None:
-    with pytest.raises(ModelError, match=r"qwen2_5_vl, whose positions have three axes, .* yarn alone; use yarn:2"):
+    with pytest.raises(ModelError, match=r"qwen2_5_vl, which has three-axis positions, .* only yarn; use yarn:2"):
         rope_overrides(_qwen(rope), rope)
 
 
@@ -168,7 +168,7 @@ def test_an_extension_that_would_lose_the_three_axes_is_refused(rope: str) -> No
         ({"tensor_parallel_size": "0"}, "tensor_parallel_size=0 is not from 1"),
         ({"max_frames": "0"}, "max_frames=0 is not from 1"),
         ({"mm_processor_cache_gb": "-1"}, "mm_processor_cache_gb=-1.0 is not from 0"),
-        ({"data_parallel_size": "2"}, "refused by vLLM in one process, .* use --workers 2"),
+        ({"data_parallel_size": "2"}, "needs distributed_executor_backend=external_launcher in vLLM; use --workers 2 instead"),
         ({"rope": "yarn"}, "rope=yarn is not TYPE:FACTOR"),
         ({"prompt": "loud"}, "prompt=loud is not chat or plain"),
         ({"max_pixels": "0"}, "max_pixels=0 is not between"),
