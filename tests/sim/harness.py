@@ -15,7 +15,7 @@ INIT = {"gridSize": 0.25, "visibilityDistance": 1.5, "fieldOfView": 60}
 
 
 class Bench:
-    """Steps a simulator in this process; what it returns went through the wire's encoding."""
+    """Steps a simulator in this process; replies are packed and unpacked as on the wire."""
 
     def __init__(self, catalogue: Catalogue | None = None, size: int = 100) -> None:
         self.sim = Simulation(catalogue or Catalogue(), Display(size, size))
@@ -46,14 +46,14 @@ class Bench:
     def object(self, object_id: str) -> dict[str, Any]:
         return next(o for o in self.metadata["objects"] if o["objectId"] == object_id)
 
-    def first(self, object_type: str, **wanted: Any) -> str:
+    def first(self, object_type: str, **values: Any) -> str:
         return next(
             o["objectId"] for o in self.metadata["objects"]
-            if o["objectType"] == object_type and all(o[k] == v for k, v in wanted.items())
+            if o["objectType"] == object_type and all(o[k] == v for k, v in values.items())
         )  # fmt: skip
 
     def stand_before(self, object_id: str) -> None:
-        """Teleports the agent to where it sees the object within reach."""
+        """Teleport the agent to a place near the object from which it sees it."""
         item = self.sim.world.objects[object_id]
         cells = sorted(self.sim.world.nav, key=lambda c: np.hypot(c[0] - item.center[0], c[1] - item.center[2]))
         height = float(self.sim.world.agent.position[1])
@@ -63,4 +63,4 @@ class Bench:
                     self.step("Teleport", position={"x": x, "y": height, "z": z}, rotation={"y": yaw}, horizon=horizon)
                     if self.metadata["lastActionSuccess"] and self.object(object_id)["visible"]:
                         return
-        raise AssertionError(f"{object_id} is seen from nowhere near it")
+        raise AssertionError(f"{object_id} is visible from no place near it")

@@ -66,7 +66,7 @@ def test_a_camera_keeps_what_is_not_given(kitchen):
         assert refused.metadata["thirdPartyCameras"] == [camera]
 
 
-def test_a_camera_can_be_made_orthographic_and_back(kitchen):
+def test_a_camera_becomes_orthographic_and_back(kitchen):
     kitchen.reset("kitchen-1")
     above = {"position": {"x": 0, "y": 2.5, "z": 0}, "rotation": {"x": 90, "y": 0, "z": 0}}
     plain = kitchen.step("AddThirdPartyCamera", **above).third_party_camera_frames[0]

@@ -85,22 +85,22 @@ def test_a_supplement_adds_cells_height_and_objects(folder):
     fridge = next(o for o in plain.objects.values() if o.object_type == "Fridge")
     x, y, z = fridge.position
     table = next(o for o in plain.objects.values() if o.object_type == "DiningTable")
-    wanted = [
+    ids = [
         f"Fridge|{x + 0.04:+06.2f}|{y:+06.2f}|{z:+06.2f}",
         f"Desk|{table.position[0]:+06.2f}|+00.70|{table.position[2]:+06.2f}",
         "Dresser|+01.00|+00.02|-01.00",
         "Mug|+00.00|+01.00|+00.00",
     ]
-    path = supplement(folder, cells=[[5.0, 5.0]], floor_y=1.25, objects=wanted)
+    path = supplement(folder, cells=[[5.0, 5.0]], floor_y=1.25, objects=ids)
     world = Catalogue(folder, path).load("FloorPlan901")
     assert world.nav.can_stand(5.0, 5.0)
     assert world.agent.position[1] == 1.25
-    assert wanted[0] in world.objects
+    assert ids[0] in world.objects
     assert fridge.object_id not in world.objects
-    assert world.objects[wanted[1]].object_type == "Desk"
+    assert world.objects[ids[1]].object_type == "Desk"
     assert table.object_id not in world.objects
-    assert world.objects[wanted[2]].type.receptacle
-    assert wanted[3] not in world.objects, "loose objects come with a trajectory's own poses"
+    assert world.objects[ids[2]].type.receptacle
+    assert ids[3] not in world.objects, "loose objects come with a trajectory's own poses"
 
 
 @pytest.mark.parametrize("content", ["[]", "{", '{"A": {"cells": [1]}}', '{"A": 3}'])

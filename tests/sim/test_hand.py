@@ -8,11 +8,11 @@ from .harness import Bench
 
 @pytest.fixture
 def bench() -> Bench:
-    made = Bench(size=40)
-    made.reset("kitchen-1")
-    made.ok("RotateLook", rotation={"y": 180})
-    made.ok("PickupObject", objectId=made.first("SoapBottle"), forceAction=True)
-    return made
+    new = Bench(size=40)
+    new.reset("kitchen-1")
+    new.ok("RotateLook", rotation={"y": 180})
+    new.ok("PickupObject", objectId=new.first("SoapBottle"), forceAction=True)
+    return new
 
 
 def change(bench: Bench, before: dict, pose: str) -> list[float]:
@@ -72,7 +72,7 @@ def test_turns_about_its_own_axes(bench, turn, difference):
     assert change(bench, before, "position") == pytest.approx([0, 0, 0], abs=1e-6)
 
 
-def test_three_turns_at_once_are_told_as_unity_tells_them(bench):
+def test_three_turns_at_once_are_reported_as_by_unity(bench):
     bench.ok("RotateHeldObject", pitch=90, yaw=90, roll=90)
     assert bench.metadata["hand"]["rotation"] == {"x": 90, "y": 0, "z": 0}
 

@@ -58,9 +58,9 @@ def test_a_house_through_the_controller(launch):
     controller = launch(house())
     event = controller.last_event
     check(event.metadata)
-    found = {o["objectId"]: o for o in event.metadata["objects"]}
-    assert set(found) >= {"Fridge|2|1", "DiningTable|2|2", "Bed|3|1", "Apple|surface|2|4", "room|2", "room|3"}
-    assert found["Apple|surface|2|4"]["parentReceptacles"] == ["DiningTable|2|2"]
+    objects = {o["objectId"]: o for o in event.metadata["objects"]}
+    assert set(objects) >= {"Fridge|2|1", "DiningTable|2|2", "Bed|3|1", "Apple|surface|2|4", "room|2", "room|3"}
+    assert objects["Apple|surface|2|4"]["parentReceptacles"] == ["DiningTable|2|2"]
     assert event.metadata["agent"]["position"]["x"] == pytest.approx(2.5, abs=0.13)
     assert event.metadata["agent"]["cameraHorizon"] == 30
     cells = {(p["x"], p["z"]) for p in controller.step("GetReachablePositions").metadata["actionReturn"]}

@@ -9,9 +9,9 @@ from .harness import Bench
 
 @pytest.fixture(scope="module")
 def bench() -> Bench:
-    made = Bench(size=20)
-    made.reset("bathroom-1")
-    return made
+    new = Bench(size=20)
+    new.reset("bathroom-1")
+    return new
 
 
 @pytest.mark.parametrize(
@@ -42,13 +42,13 @@ def test_wording(bench, call, message, code):
     assert not bench.metadata["lastActionSuccess"]
 
 
-def test_unknown_arguments_are_named_with_those_that_are_taken(kitchen):
+def test_unknown_arguments_are_named_with_the_accepted_ones(kitchen):
     kitchen.reset("kitchen-1")
     with pytest.raises(ValueError, match="called with invalid argument: 'z'") as raised:
         kitchen.step("PutObject", x=0.0, y=0.0, z=1.0, forceAction=False, placeStationary=True)
-    told = str(raised.value)
-    assert "Expected arguments: String objectId = , float x = , float y = , Boolean forceAction = False" in told
-    assert "Your arguments: 'x', 'y', 'z', 'forceAction', 'placeStationary'" in told
+    message = str(raised.value)
+    assert "Expected arguments: String objectId = , float x = , float y = , Boolean forceAction = False" in message
+    assert "Your arguments: 'x', 'y', 'z', 'forceAction', 'placeStationary'" in message
     with pytest.raises(ValueError, match="invalid arguments: 'noise', 'pace'"):
         kitchen.step("MoveAhead", noise=1, pace=2)
 

@@ -47,7 +47,7 @@ def test_every_argument_of_every_action(name):
 
 
 @pytest.mark.parametrize("message", [{}, {"action": 3}, {"action": None}, {"action": "reset"}, {"action": "__init__"}])
-def test_messages_without_a_known_action(message):
+def test_messages_with_an_unknown_action(message):
     bench = Bench(size=20)
     outcome, _ = bench.server.run(message)
     assert outcome.code == "InvalidAction"

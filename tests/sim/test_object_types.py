@@ -21,9 +21,9 @@ CRATE = ObjectType("Crate", (0.4, 0.3, 0.4), receptacle=True, takes=("food", "Wh
 def bench(monkeypatch: pytest.MonkeyPatch) -> Bench:
     for declared in (WHISK, CRATE):
         monkeypatch.setitem(OBJECT_TYPES, declared.name, declared)
-    made = Bench(size=150)
-    made.reset("kitchen-1", renderInstanceSegmentation=True)
-    return made
+    new = Bench(size=150)
+    new.reset("kitchen-1", renderInstanceSegmentation=True)
+    return new
 
 
 def lay_on_table(bench: Bench, object_type: str) -> tuple[str, str]:

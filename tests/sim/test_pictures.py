@@ -45,7 +45,7 @@ def test_depth_is_that_of_geometry(name, form, depth):
 
 
 @RASTERIZERS
-def test_one_looks_into_a_cup_from_above(name):
+def test_a_cup_shows_its_inside_from_above(name):
     above = PinholeCamera(np.array([0.0, 2.0, 0.0]), euler_matrix((90, 0, 0)), 60.0, 101, 101)
     for form, depth in ((Form.CYLINDER, 1.5), (Form.CUP, 2.5), (Form.BOWL, 2.5)):
         drawn = rows([ShapePart(form, (0, 0, 0), (0.5,) * 3, (1, 1, 1))], np.zeros(3), STRAIGHT, 0)
@@ -215,7 +215,7 @@ def test_unknown_types_are_plain_boxes():
     assert len(shape(item)) == 1
 
 
-def test_kernels_are_compiled_anew_when_a_source_changes(tmp_path):
+def test_kernels_are_recompiled_when_a_source_changes(tmp_path):
     from infthor_eval.sim.render import kernel_cache
 
     for name in kernel_cache._SOURCES:

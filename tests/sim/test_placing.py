@@ -12,9 +12,9 @@ from .harness import Bench
 
 @pytest.fixture
 def bench() -> Bench:
-    made = Bench(size=40)
-    made.reset("kitchen-1")
-    return made
+    new = Bench(size=40)
+    new.reset("kitchen-1")
+    return new
 
 
 def bottom(bench: Bench, object_id: str) -> float:
@@ -47,8 +47,8 @@ def test_vessels_are_hollow(bench, vessel, kind):
     )
     if kind == "Pencil":  # upright
         item.box_size, item.box_center = item.box_size[[0, 2, 1]], np.array([0.0, item.box_size[2] / 2, 0.0])
-    for made in (around, item):
-        bench.sim.world.add(made)
+    for new in (around, item):
+        bench.sim.world.add(new)
     (cavity,) = surfaces(around)
     bench.ok("PlaceObjectAtPoint", objectId=item.object_id, position=to_xyz(cavity.center))
     assert bench.object(item.object_id)["parentReceptacles"] == [around.object_id]
@@ -61,8 +61,8 @@ def test_vessels_are_hollow(bench, vessel, kind):
 
 def test_a_closed_box_is_solid_and_so_is_what_is_too_small(bench):
     carton, bowl = (default_object(kind, np.array([0.0, 1.2, 0.0])) for kind in ("Box", "Bowl"))
-    for made in (carton, bowl):
-        bench.sim.world.add(made)
+    for new in (carton, bowl):
+        bench.sim.world.add(new)
     inside = to_xyz(surfaces(carton)[0].center)
     bench.ok("PlaceObjectAtPoint", objectId=bowl.object_id, position=inside)
     bench.ok("PlaceObjectAtPoint", objectId=bowl.object_id, position={**inside, "y": 2.0})
@@ -140,7 +140,7 @@ def test_a_disabled_object_is_gone_until_it_is_enabled(bench):
     bench.refused("EnableObject", objectId="Mug|+09.00|+09.00|+09.00")
 
 
-def test_contents_of_a_disabled_receptacle_find_back_to_it(bench):
+def test_contents_of_a_disabled_receptacle_return_to_it(bench):
     world = bench.sim.world
     drawer = next(o for o in world.objects.values() if o.object_type == "Drawer" and o.contents)
     inside = list(drawer.contents)

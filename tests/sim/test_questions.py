@@ -15,16 +15,16 @@ from .harness import Bench
 
 @pytest.fixture
 def bench() -> Bench:
-    made = Bench(size=60)
-    made.reset("kitchen-1")
-    return made
+    new = Bench(size=60)
+    new.reset("kitchen-1")
+    return new
 
 
 def positions(bench: Bench, **arguments: object) -> set[tuple[float, float]]:
     return {(p["x"], p["z"]) for p in bench.ok("GetReachablePositions", **arguments)["actionReturn"]}
 
 
-def test_the_grid_of_standing_places(bench):
+def test_the_grid_of_reachable_positions(bench):
     usual, fine = positions(bench), positions(bench, gridSize=0.125)
     assert usual < fine
     assert len(fine) > 3 * len(usual)
@@ -36,7 +36,7 @@ def test_the_grid_of_standing_places(bench):
     bench.refused("GetReachablePositions", maxStepCount=1)
 
 
-def test_standing_places_in_the_directions_of_the_agent(bench):
+def test_reachable_positions_in_the_directions_of_the_agent(bench):
     usual = positions(bench)
     bench.ok("RotateRight", degrees=30)
     assert positions(bench) == usual
@@ -70,14 +70,14 @@ def test_interactable_poses_are_those_whose_whole_picture_shows_the_object(rende
     world = bench.sim.world
     places = bench.ok("GetReachablePositions")["actionReturn"][::24]
     for target in map(bench.first, kinds):
-        told = bench.ok("GetInteractablePoses", objectId=target, positions=places)["actionReturn"]
+        poses = bench.ok("GetInteractablePoses", objectId=target, positions=places)["actionReturn"]
         slow = []
         for pose in product(places, (-30.0, 0.0, 30.0, 60.0), (0.0, 90.0, 180.0, 270.0), (True, False)):
             place, tilt, turn, standing = pose
             world.agent = Agent(to_array(place), turn, tilt, standing)
             if target in bench.sim.vision.visible_ids():
                 slow.append({**place, "rotation": turn, "standing": standing, "horizon": tilt})
-        assert told == slow
+        assert poses == slow
         assert slow
 
 
@@ -111,7 +111,7 @@ def test_outlines_from_above(bench):
     bench.refused("Get2DSemanticHulls", objectIds=[table], objectTypes=["Mug"])
 
 
-def test_points_that_the_frame_shows(bench):
+def test_points_in_the_frame(bench):
     fridge = bench.first("Fridge")
     bench.stand_before(fridge)
     camera = bench.metadata["cameraPosition"]
@@ -122,7 +122,7 @@ def test_points_that_the_frame_shows(bench):
         depth = picture.depth[int((1 - y) * 60), int(x * 60)]
         assert away[2] == pytest.approx(depth, rel=0.05)
         slope = math.tan(math.radians(30))
-        # The lens stands where the metadata says, to 5 digits.
+        # The camera is where the metadata says, to 5 digits.
         assert away[0] / away[2] / slope == pytest.approx(2 * x - 1, abs=2e-5)
         assert away[1] / away[2] / slope == pytest.approx(1 - 2 * y, abs=2e-5)
     for x, y in ((1.5, 0.5), (-0.1, 0.8)):
@@ -143,14 +143,14 @@ def test_a_wall_is_no_object(bench):
     assert seen == {True, False}
 
 
-def test_replies_tell_of_the_wanted_objects_only(bench):
+def test_replies_list_the_filtered_objects_only(bench):
     every = [o["objectId"] for o in bench.metadata["objects"]]
-    wanted = [bench.first("Fridge"), bench.first("Mug")]
-    told = bench.ok("SetObjectFilter", objectIds=wanted)["objects"]
-    assert {o["objectId"] for o in told} == set(wanted)
+    kept = [bench.first("Fridge"), bench.first("Mug")]
+    listed = bench.ok("SetObjectFilter", objectIds=kept)["objects"]
+    assert {o["objectId"] for o in listed} == set(kept)
     assert bench.ok("SetObjectFilter", objectIds=[])["objects"] == []
-    bench.ok("OpenObject", objectId=wanted[0], forceAction=True)
+    bench.ok("OpenObject", objectId=kept[0], forceAction=True)
     assert [o["objectId"] for o in bench.ok("ResetObjectFilter")["objects"]] == every
-    assert bench.object(wanted[0])["isOpen"]
+    assert bench.object(kept[0])["isOpen"]
     bench.ok("SetObjectFilter", objectIds=[])
     assert len(bench.reset("kitchen-1")["objects"]) == len(every)

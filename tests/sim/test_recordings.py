@@ -25,11 +25,11 @@ def trajectories() -> list[dict[str, Any]]:
 
 
 def additions(listed: list[dict[str, Any]]) -> dict[str, Any]:
-    """What the trajectories visit and touch, in the form of a supplement."""
-    found: dict[str, Any] = {}
+    """Cells and objects of the trajectories, in the form of a supplement."""
+    supplements: dict[str, Any] = {}
     for trajectory in listed:
         start = trajectory["scene"]["init_action"]
-        entry = found.setdefault(
+        entry = supplements.setdefault(
             trajectory["scene"]["floor_plan"], {"cells": [], "floor_y": start["y"], "objects": []}
         )  # fmt: skip
         x, z, yaw = start["x"], start["z"], start["rotation"]
@@ -44,7 +44,7 @@ def additions(listed: list[dict[str, Any]]) -> dict[str, Any]:
             if call["action"] not in {"PickupObject", "PutObject", "SliceObject"} and "objectId" in call:
                 entry["objects"].append(call["objectId"])
             entry["objects"] += [call["receptacleObjectId"]] if "receptacleObjectId" in call else []
-    return found
+    return supplements
 
 
 def as_call(call: dict[str, Any]) -> dict[str, Any]:

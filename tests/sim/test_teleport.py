@@ -7,9 +7,9 @@ from .harness import Bench
 
 @pytest.fixture
 def bench() -> Bench:
-    made = Bench(size=40)
-    made.reset("kitchen-1")
-    return made
+    new = Bench(size=40)
+    new.reset("kitchen-1")
+    return new
 
 
 def there(bench: Bench) -> dict[str, float]:

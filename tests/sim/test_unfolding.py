@@ -23,9 +23,9 @@ CASES = {
 
 @pytest.fixture
 def bench() -> Bench:
-    made = Bench(size=40)
-    made.reset("bedroom-1")
-    return made
+    new = Bench(size=40)
+    new.reset("bedroom-1")
+    return new
 
 
 def box(bench: Bench, object_id: str) -> tuple[np.ndarray, np.ndarray]:
@@ -71,12 +71,12 @@ def test_the_picture_fills_the_box_and_no_more(bench, kind, front):
     for openness in (0.5, 1.0):
         bench.step("CloseObject", objectId=item.object_id, forceAction=True)
         for _ in range(2):  # closed, then open
-            made = rows(shape(item), item.position, item.matrix, 0)
+            parts = rows(shape(item), item.position, item.matrix, 0)
             low, high = item.bounds()
-            centers = made[:, CENTER : CENTER + 3]
+            centers = parts[:, CENTER : CENTER + 3]
             assert (centers > low - 0.012).all()
             assert (centers < high + 0.012).all()
-            assert (2 * made[:, HALF : HALF + 3].max() <= 1.15 * max(item.box_size)).all()
+            assert (2 * parts[:, HALF : HALF + 3].max() <= 1.15 * max(item.box_size)).all()
             bench.step("OpenObject", objectId=item.object_id, openness=openness, forceAction=True)
 
 

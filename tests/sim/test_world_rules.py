@@ -9,9 +9,9 @@ from .harness import Bench
 
 @pytest.fixture
 def bench() -> Bench:
-    made = Bench()
-    made.reset("kitchen-1")
-    return made
+    new = Bench()
+    new.reset("kitchen-1")
+    return new
 
 
 def take(bench: Bench, object_type: str) -> str:

@@ -11,7 +11,7 @@ from infthor_eval.sim.actions.registry import action
 from infthor_eval.sim.appearance import Finish
 from infthor_eval.sim.errors import ActionError
 from infthor_eval.sim.geometry import Array
-from infthor_eval.sim.render.finishes import PATTERNS
+from infthor_eval.sim.render.finishes import RANDOM_PATTERNS
 from infthor_eval.sim.render.shell import SHELL_NAMES
 from infthor_eval.sim.simulation import Simulation
 
@@ -41,8 +41,8 @@ def randomize_materials(
     if inRoomTypes is not None and room is not None and room not in inRoomTypes:
         listed = ", ".join(inRoomTypes)
         raise ActionError(f"inRoomTypes must include the scene's own room type {room}, not only {listed}")
-    _draw_finishes(sim, PATTERNS)
-    return {**used, "totalMaterialsConsidered": len(PATTERNS)}
+    _draw_finishes(sim, RANDOM_PATTERNS)
+    return {**used, "totalMaterialsConsidered": len(RANDOM_PATTERNS)}
 
 
 @action("RandomizeColors")

@@ -8,9 +8,9 @@ from infthor_eval.sim.appearance import Appearance
 from infthor_eval.sim.geometry import Array
 from infthor_eval.sim.render.primitives import COLOR, INSTANCE, MATERIAL, Material
 
-__all__ = ["PATTERNS", "apply_finishes"]
+__all__ = ["RANDOM_PATTERNS", "apply_finishes"]
 
-PATTERNS = tuple(int(m) for m in Material if m not in (Material.GLASS, Material.PLAIN))
+RANDOM_PATTERNS = tuple(int(m) for m in Material if m not in (Material.GLASS, Material.PLAIN))
 """Patterns that a randomized surface may have."""
 
 

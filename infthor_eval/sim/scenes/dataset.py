@@ -33,10 +33,6 @@ class FloorPlanData:
         self._root = root
         self._lines: dict[str, str] | None = None
 
-    def names(self) -> list[str]:
-        """Return the names of the floor plans that the folder has objects of."""
-        return list(self._index())
-
     def objects(self, scene: str) -> list[dict[str, Any]]:
         """Return the metadata of every object of a floor plan.
 

@@ -11,7 +11,7 @@ from infthor_eval.sim.scenes.bathroom import furnish_bathroom
 from infthor_eval.sim.scenes.bedroom import furnish_bedroom
 from infthor_eval.sim.scenes.kitchen import furnish_kitchen
 from infthor_eval.sim.scenes.living_room import furnish_living_room
-from infthor_eval.sim.scenes.roomplan import RoomPlan, finish
+from infthor_eval.sim.scenes.roomplan import RoomPlan, build_world
 from infthor_eval.sim.world import FLOOR_STYLES, RoomShell, World
 
 __all__ = ["SCENE_TYPES", "build_scene"]
@@ -50,7 +50,7 @@ def build_scene(scene_type: str, seed: int) -> World:
         else:
             plans, doors = [RoomPlan(_shell(scene_type, random, seed), random)], []
             _furnish(plans[0], scene_type)
-        world = finish(f"{scene_type}-{seed}", seed, plans, doors)
+        world = build_world(f"{scene_type}-{seed}", seed, plans, doors)
         if all(_is_accessible(world, plan) for plan in plans):
             return world
     raise SimulatorError(f"{scene_type}-{seed}: all {_DRAWS} draws of furniture block the way; use another seed")

@@ -13,7 +13,7 @@ from infthor_eval.sim.objects import SimObject
 from infthor_eval.sim.receptacles import find_place
 from infthor_eval.sim.world import RoomShell, World
 
-__all__ = ["RoomPlan", "finish"]
+__all__ = ["RoomPlan", "build_world"]
 
 _BODY = 0.23  # the agent's radius and a margin, metres
 _KNEE, _HEAD = 0.1, 1.6  # heights in metres between which an object takes floor from the agent
@@ -58,7 +58,7 @@ class RoomPlan:
         self.objects.append(named)
         return named
 
-    def against(
+    def place_against(
         self,
         side: str,
         object_type: str,
@@ -111,7 +111,7 @@ class RoomPlan:
             start, end = self.span(side)
             places = np.arange(start + width / 2 + 0.1, end - width / 2 - 0.1 + 1e-6, 0.15)
             for at in self.random.permutation(places):
-                item = self.against(side, object_type, round(float(at), 2), y, size, gap=0.02 if y == 0 else 0.0)
+                item = self.place_against(side, object_type, round(float(at), 2), y, size, gap=0.02 if y == 0 else 0.0)
                 self.objects.pop()
                 low, high = item.bounds()
                 blocked = any(s == side and a - width / 2 < at < b + width / 2 for s, a, b in self.room.openings)
@@ -147,7 +147,7 @@ class RoomPlan:
         return [(float(x), float(z)) for x, z in cells]
 
 
-def finish(name: str, seed: int, plans: list[RoomPlan], doors: list[tuple[float, float]] | None = None) -> World:
+def build_world(name: str, seed: int, plans: list[RoomPlan], doors: list[tuple[float, float]] | None = None) -> World:
     """Return the world of furnished rooms, with the agent on the free floor and loose objects in the furniture.
 
     Args:

@@ -61,8 +61,8 @@ def test_candidates_narrow_what_is_picked_up():
     bench = arm_bench()
     plate = loose(bench, "Plate")
     hand_to(bench, plate)
-    told = bench.refused("PickupObject", objectIdCandidates=[loose(bench, "Potato")])
-    assert told == "No objects (specified by objectId) were valid to be picked up by the arm"
+    message = bench.refused("PickupObject", objectIdCandidates=[loose(bench, "Potato")])
+    assert message == "No objects (specified by objectId) were valid to be picked up by the arm"
     bench.ok("PickupObject", objectIdCandidates=[plate, "Nothing|1"])
 
 
@@ -198,8 +198,8 @@ def test_held_things_collide():
     bench.ok("PickupObject")
     bench.ok("MoveArmRelative", offset={"y": 0.1})
     at = wrist(bench)
-    told = bench.refused("MoveArmRelative", offset={"y": -0.2}, returnToStart=False)
-    assert "CounterTop" in told
+    message = bench.refused("MoveArmRelative", offset={"y": -0.2}, returnToStart=False)
+    assert "CounterTop" in message
     # It stops with the plate on the counter, so the wrist is where it was before lifting, give or take a step.
     assert at[1] - wrist(bench)[1] == pytest.approx(0.1, abs=0.021)
     low = bench.sim.world.objects[plate].bounds()[0][1]
@@ -238,7 +238,7 @@ def test_a_heavy_thing_stops_the_arm_where_a_threshold_says_so(threshold, passes
 
 
 @pytest.mark.parametrize("spared", [False, True])
-def test_what_falls_far_breaks_unless_its_type_was_made_unbreakable(spared):
+def test_a_far_fall_breaks_objects_unless_their_type_is_unbreakable(spared):
     bench = arm_bench()
     plate = loose(bench, "Plate")
     bench.ok("PausePhysicsAutoSim")

@@ -75,12 +75,12 @@ def test_many_poses_at_once_are_each_alone(rig):
     ("line", "allowed"),
     [((0, 0, 0.63), True), ((0.6, 0.1, 0), True), ((0, 0, 0.633), False), ((0, 0, -0.01), False)],
 )
-def test_only_restricted_movements_have_a_front_and_a_reach(line, allowed):
+def test_restricted_movements_have_a_front_and_a_reach(line, allowed):
     assert Kinova().allows(SHOULDER + np.array(line)) == allowed
 
 
 @given(st.tuples(*[st.floats(-180, 180)] * 3))
-def test_axis_and_angle_make_the_rotation_again(angles):
+def test_axis_and_angle_give_the_same_rotation(angles):
     turn = euler_matrix(angles)
     axis, degrees = axis_angle(turn)
     assert rotation(axis, degrees) == pytest.approx(turn, abs=1e-5)
@@ -91,7 +91,7 @@ def test_axis_and_angle_make_the_rotation_again(angles):
 
 
 @given(st.floats(0, 1e9))
-def test_long_ways_are_looked_at_in_few_steps(distance):
+def test_long_paths_are_checked_in_few_steps(distance):
     steps = path_distances(distance)
     assert len(steps) < 400
     assert steps[-1] == pytest.approx(distance)

@@ -15,9 +15,9 @@ JOINT = {"name", "position", "rootRelativePosition", "rotation", "rootRelativeRo
 
 @pytest.fixture
 def bench() -> Bench:
-    made = arm_bench()
-    made.ok("MoveArmBase", y=0.8)
-    return made
+    new = arm_bench()
+    new.ok("MoveArmBase", y=0.8)
+    return new
 
 
 def arm(bench: Bench) -> dict:
@@ -155,8 +155,9 @@ def test_walls_are_structures():
     world = bench.sim.world
     world.agent.position[[0, 2]] = (0.0, low[2] + 0.7)
     bench.ok("RotateAgent", degrees=180 - bench.metadata["agent"]["rotation"]["y"])
-    told = bench.refused("MoveArm", position={"x": 0, "y": 0, "z": 0.8})
-    assert told == "Collided with static structure in scene: 'Wall', could not reach target: " + told.split(": ")[-1]
+    message = bench.refused("MoveArm", position={"x": 0, "y": 0, "z": 0.8})
+    target = message.split(": ")[-1]
+    assert message == "Collided with static structure in scene: 'Wall', could not reach target: " + target
     bench.ok("MoveArm", position={"x": 0, "y": 0, "z": 0.6})
 
 
@@ -211,8 +212,8 @@ def test_actions_belong_to_modes():
     )
     bench = arm_bench()
     assert "isn't holding anything" in bench.refused("PutObject", objectId=bench.first("CounterTop"))
-    told = bench.refused("PickupObject", objectId=bench.first("Apple"))
-    assert told == "You are passing in iTHOR PickupObject parameters (objectId) to the arm agent!"
+    message = bench.refused("PickupObject", objectId=bench.first("Apple"))
+    assert message == "You are passing in iTHOR PickupObject parameters (objectId) to the arm agent!"
     assert bench.refused("PickupObject") == "No objects were valid to be picked up by the arm"
     bench.step("RotateElbowRelative")
     assert bench.metadata["errorCode"] == "MissingArguments"
@@ -265,7 +266,7 @@ def test_the_arm_is_put_into_a_pose_at_once(bench):
     assert relative(bench) == [0, 0, 0.4] and arm(bench)["joints"][0]["armBaseHeight"] == -0.003
     bench.ok("TeleportArm", position=xyz(there), worldRelative=True, armHeight=0.5)
     assert wrist(bench) == pytest.approx(there, abs=1e-5)
-    told = "collision detected at desired transform, cannot teleport"
-    assert bench.refused("TeleportArm", position={"x": 0, "y": -0.6, "z": 0.4}, armHeight=-0.45) == told
+    message = "collision detected at desired transform, cannot teleport"
+    assert bench.refused("TeleportArm", position={"x": 0, "y": -0.6, "z": 0.4}, armHeight=-0.45) == message
     bench.ok("TeleportArm", position={"x": 0, "y": -0.6, "z": 0.4}, armHeight=-0.45, forceAction=True)
     assert "axis" in bench.refused("TeleportArm", rotation={"w": 10})

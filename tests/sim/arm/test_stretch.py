@@ -9,11 +9,11 @@ from .harness import arm_bench, xyz
 
 @pytest.fixture
 def bench() -> Bench:
-    made = arm_bench(agentMode="stretch")
-    world = made.sim.world
+    new = arm_bench(agentMode="stretch")
+    world = new.sim.world
     x, z = max(world.nav, key=lambda c: world.nav.count_free_ahead(*c, 90.0))
-    made.ok("TeleportFull", position={"x": x, "y": 0.9009992, "z": z}, rotation={"y": 0}, horizon=30, standing=False)
-    return made
+    new.ok("TeleportFull", position={"x": x, "y": 0.9009992, "z": z}, rotation={"y": 0}, horizon=30, standing=False)
+    return new
 
 
 def sphere(bench: Bench) -> np.ndarray:

@@ -11,9 +11,9 @@ from .harness import Bench
 
 @pytest.fixture
 def bench() -> Bench:
-    made = Bench(size=60)
-    made.reset("kitchen-1")
-    return made
+    new = Bench(size=60)
+    new.reset("kitchen-1")
+    return new
 
 
 def frame(bench: Bench) -> np.ndarray:
@@ -21,7 +21,7 @@ def frame(bench: Bench) -> np.ndarray:
 
 
 @pytest.mark.parametrize("action", ["RandomizeMaterials", "RandomizeColors"])
-def test_all_looks_other_and_usual_again(bench, action):
+def test_looks_change_and_are_reset(bench, action):
     usual = frame(bench)
     objects = bench.metadata["objects"]
     assert bench.ok(action)["objects"] == objects
@@ -59,10 +59,10 @@ def test_light(bench):
 
 
 def test_sets_of_materials(bench):
-    told = bench.ok("RandomizeMaterials")["actionReturn"]
-    assert told["useTrainMaterials"]
-    assert not told["useValMaterials"]
-    assert told["totalMaterialsConsidered"] > 0
+    reported = bench.ok("RandomizeMaterials")["actionReturn"]
+    assert reported["useTrainMaterials"]
+    assert not reported["useValMaterials"]
+    assert reported["totalMaterialsConsidered"] > 0
     bench.refused("RandomizeMaterials", useTrainMaterials=False)
     bench.ok("RandomizeMaterials", inRoomTypes=["Kitchen", "LivingRoom"])
     bench.refused("RandomizeMaterials", inRoomTypes=["LivingRoom"])
@@ -71,13 +71,13 @@ def test_sets_of_materials(bench):
 @pytest.mark.parametrize(
     ("scene", "split"), [("FloorPlan20", "Train"), ("FloorPlan221", "Val"), ("FloorPlan326", "Test")]
 )
-def test_the_scene_tells_the_sets(scene, split):
+def test_the_scene_decides_on_the_sets(scene, split):
     from infthor_eval.sim.scenes.catalogue import Catalogue
 
     bench = Bench(Catalogue(need_data()), size=20)
     bench.reset(scene)
-    told = bench.ok("RandomizeMaterials")["actionReturn"]
-    assert [name for name in ("Train", "Val", "Test") if told[f"use{name}Materials"]] == [split]
+    reported = bench.ok("RandomizeMaterials")["actionReturn"]
+    assert [name for name in ("Train", "Val", "Test") if reported[f"use{name}Materials"]] == [split]
 
 
 def test_a_restored_state_looks_as_it_did(bench):
