@@ -1,8 +1,8 @@
-"""Whether our plans are optimal: their length against the cost that Fast Downward finds for the PDDL we write.
+"""Check that our plans are optimal: compare their length with the cost that Fast Downward finds for our PDDL.
 
 python benchmarks/against_fast_downward.py --fast-downward PATH/fast-downward.py [--problems 60] [--seed 0]
 
-Fast Downward is no dependency: `pip install up-fast-downward` in an environment of its own brings the script
+Fast Downward is not a dependency: `pip install up-fast-downward` in a separate environment has the script
 (`up_fast_downward/downward/fast-downward.py`). It searches with A* and the LM-cut heuristic, which is optimal.
 """
 
@@ -27,23 +27,24 @@ _SCENES = ("kitchen-1", "kitchen-2", "kitchen-3", "living-room-1", "living-room-
 
 
 def main() -> None:
-    """Plan sampled tasks both ways and print how many costs are equal."""
+    """Plan sampled tasks both ways and print the number of equal costs."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--fast-downward", type=Path, required=True)
     parser.add_argument("--problems", type=int, default=60)
     parser.add_argument("--seed", type=int, default=0)
-    chosen = parser.parse_args()
+    options = parser.parse_args()
     equal = 0
-    for number, (task, room) in enumerate(sampled(chosen.problems, chosen.seed)):
-        ours, theirs = len(plan(task, room) or ()), cost(chosen.fast_downward, problem(task, room, f"p{number}"))
+    for number, (task, room) in enumerate(sample_tasks(options.problems, options.seed)):
+        ours = len(plan(task, room) or ())
+        theirs = optimal_cost(options.fast_downward, problem(task, room, f"p{number}"))
         equal += ours == theirs
         if ours != theirs:
             print(f"  {task}: {ours} against {theirs}")
-    print(f"{equal} of {chosen.problems} plans have the cost that Fast Downward finds")
+    print(f"{equal} of {options.problems} plans have the cost that Fast Downward finds")
 
 
-def sampled(number: int, seed: int) -> Iterator[tuple[Task, SymbolicRoom]]:
-    """Tasks of all types in the rooms as they are at first, that have a plan and are not done yet."""
+def sample_tasks(number: int, seed: int) -> Iterator[tuple[Task, SymbolicRoom]]:
+    """Yield tasks of all types in the initial rooms that have a plan and are not done yet."""
     rng = random.Random(seed)
     with Simulator(embedded_launch()) as simulator:
         rooms = []
@@ -58,16 +59,16 @@ def sampled(number: int, seed: int) -> Iterator[tuple[Task, SymbolicRoom]]:
         yield task, room
 
 
-def cost(script: Path, text: str) -> int | None:
-    """The cost of an optimal plan for a problem; None where Fast Downward finds none."""
+def optimal_cost(script: Path, text: str) -> int | None:
+    """Return the cost of an optimal plan for a problem, or None if Fast Downward finds none."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         (folder / "domain.pddl").write_text(DOMAIN)
         (folder / "problem.pddl").write_text(text)
         command = [sys.executable, script, "domain.pddl", "problem.pddl", "--search", "astar(lmcut())"]
-        ended = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
-    found = re.search(r"Plan cost: (\d+)", ended.stdout)
-    return int(found[1]) if found else None
+        result = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    match = re.search(r"Plan cost: (\d+)", result.stdout)
+    return int(match[1]) if match else None
 
 
 if __name__ == "__main__":

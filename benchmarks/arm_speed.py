@@ -1,9 +1,9 @@
-"""What a step of an arm costs through the real Controller, and of a tiny policy; several simulators against one.
+"""Measure the speed of an arm through the real Controller, of several simulators together, and of tiny policies.
 
     python benchmarks/arm_speed.py [--steps 200] [--simulators 4]
 
-An arm is moved to and fro in a kitchen, with frames and without; each tiny policy looks at such a frame. Then as many
-simulators as asked are moved at the same time, each in a thread, against one.
+An arm moves to and fro in a kitchen, with and without frames. Then several simulators do so at the same time, each in a
+thread. Each tiny policy acts on such a frame.
 """
 
 import argparse
@@ -25,7 +25,7 @@ _ACTS = 10
 
 
 def main() -> None:
-    """Print a line for each."""
+    """Print one line for each measurement."""
     options = _arguments()
     single = 0.0
     for image in (True, False):
@@ -33,8 +33,8 @@ def main() -> None:
             rate = steps_per_second(simulator, options.steps)
             single = single if not image else rate
             print(f"arm, {'frames' if image else 'no frames'}: {rate:.0f} steps/s", flush=True)
-    together = several(options.simulators, options.steps)
-    print(f"arm, frames, {options.simulators} simulators: {together:.0f} steps/s, {together / single:.2f} of one's")
+    together = steps_per_second_together(options.simulators, options.steps)
+    print(f"arm, frames, {options.simulators} simulators: {together:.0f} steps/s, {together / single:.2f} times one")
     with tempfile.TemporaryDirectory() as folder, _simulator(True) as simulator:
         frame = FrameFolder(Path(folder)).keep(simulator.view)
         assert frame is not None
@@ -43,15 +43,15 @@ def main() -> None:
             assert isinstance(policy, Policy)
             policy.reset()
             policy.act(frame, "pick up the mug")
-            seconds = timed(lambda policy=policy: policy.act(frame, "pick up the mug"), _ACTS)
+            seconds = seconds_per_call(lambda policy=policy: policy.act(frame, "pick up the mug"), _ACTS)
             print(f"{name}: {1 / seconds:.1f} chunks/s, {1000 * seconds:.0f} ms each", flush=True)
             policy.close()
 
 
 def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--steps", type=int, default=200, help="of each simulator")
-    parser.add_argument("--simulators", type=int, default=4, help="at once")
+    parser.add_argument("--steps", type=int, default=200, help="steps of each simulator")
+    parser.add_argument("--simulators", type=int, default=4, help="simulators at the same time")
     return parser.parse_args()
 
 
@@ -63,7 +63,7 @@ def _simulator(image: bool) -> Simulator:
 
 
 def steps_per_second(simulator: Simulator, n_steps: int) -> float:
-    """Steps of 5 cm to and fro, each a translation and a turn of the wrist as a policy's."""
+    """Return the rate of steps of 5 cm to and fro, each with a translation and a wrist rotation like a policy's."""
     conversion = Conversion()
 
     def step(number: int) -> None:
@@ -72,31 +72,31 @@ def steps_per_second(simulator: Simulator, n_steps: int) -> float:
             simulator.step(**call)
 
     step(0)
-    began = time.perf_counter()
+    start = time.perf_counter()
     for number in range(1, n_steps + 1):
         step(number)
-    return n_steps / (time.perf_counter() - began)
+    return n_steps / (time.perf_counter() - start)
 
 
-def several(n_simulators: int, n_steps: int) -> float:
-    """Steps a second of several simulators together."""
+def steps_per_second_together(n_simulators: int, n_steps: int) -> float:
+    """Return the total rate of several simulators."""
     simulators = [_simulator(True) for _ in range(n_simulators)]
     try:
-        began = time.perf_counter()
+        start = time.perf_counter()
         with ThreadPoolExecutor(n_simulators) as pool:
             list(pool.map(lambda simulator: steps_per_second(simulator, n_steps), simulators))
-        return n_simulators * n_steps / (time.perf_counter() - began)
+        return n_simulators * n_steps / (time.perf_counter() - start)
     finally:
         for simulator in simulators:
             simulator.close()
 
 
-def timed(do: Callable[[], object], n_times: int) -> float:
-    """Seconds of one call, on average."""
-    began = time.perf_counter()
+def seconds_per_call(do: Callable[[], object], n_times: int) -> float:
+    """Return the mean seconds of a call."""
+    start = time.perf_counter()
     for _ in range(n_times):
         do()
-    return (time.perf_counter() - began) / n_times
+    return (time.perf_counter() - start) / n_times
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
-"""Draws `docs/contact_sheet.png`: rooms, close-ups of shapes, and what the hand holds.
+"""Draw `docs/contact_sheet.png`: rooms, close-ups of shapes, and held objects.
 
-Three procedural rooms of each type, each from its most telling view; then shapes that took care to tell apart, from
-near; then frames in which the agent holds something.
+It has three procedural rooms of each type, each from the view that shows most; then close-ups of shapes that are easily
+confused; then frames in which the agent holds an object.
 
 python benchmarks/contact_sheet.py [OUT.png]
 """
@@ -37,18 +37,18 @@ _HELD = (("kitchen-1", "Pan"), ("kitchen-2", "Bread"), ("bedroom-1", "BaseballBa
 
 
 def do(sim: Simulation, action: str, **arguments: object) -> None:
-    """Does one action."""
-    found, checked = bind({"action": action, **arguments})
-    found.run(sim, **checked)
+    """Execute one action."""
+    method, checked = bind({"action": action, **arguments})
+    method.run(sim, **checked)
 
 
 def picture(sim: Simulation) -> Image.Image:
-    """The agent's frame."""
+    """Return the agent's frame."""
     return Image.fromarray(np.ascontiguousarray(sim.views.colours(sim.views.agent_frame())[::-1]))
 
 
 def interest(sim: Simulation) -> float:
-    """How much a view shows: objects by the logarithm of their pixels, so that many middling ones beat one large."""
+    """Return how much a view shows: the sum of log pixels, by which several medium objects beat a large one."""
     seen = sim.views.agent_view()
     counts = np.bincount(seen.instances.ravel() + 1, minlength=len(seen.names) + 1)[1:]
     shown = [c for c, name in zip(counts, seen.names, strict=True) if "|" in name and c > 40]
@@ -57,7 +57,7 @@ def interest(sim: Simulation) -> float:
 
 
 def best_view(sim: Simulation, name: str) -> Image.Image:
-    """The picture of the view with the most to see."""
+    """Return the frame of the view that shows most."""
     do(sim, "Reset", sceneName=name)
     do(sim, "Initialize", fieldOfView=75)
     views = []
@@ -71,7 +71,7 @@ def best_view(sim: Simulation, name: str) -> Image.Image:
 
 
 def close_up(object_type: str) -> Image.Image:
-    """A thing of the usual size on stone, from above and from its front's side."""
+    """Return a picture of an object of the usual size on stone, from above and from its front side."""
     item: SimObject = default_object(object_type, np.zeros(3))
     item.state.openness = float(object_type in _OPEN)
     item.hinge = -1
@@ -87,7 +87,7 @@ def close_up(object_type: str) -> Image.Image:
 
 
 def in_hand(sim: Simulation, name: str, object_type: str) -> Image.Image:
-    """The frame of the view with the most to see, something in the hand."""
+    """Return the frame of the view that shows most, with an object in the hand."""
     best_view(sim, name)
     do(sim, "Initialize", fieldOfView=60)
     item = next(o for o in sim.world.objects.values() if o.object_type == object_type)
@@ -96,7 +96,7 @@ def in_hand(sim: Simulation, name: str, object_type: str) -> Image.Image:
 
 
 def main() -> None:
-    """Draws the sheet."""
+    """Draw the sheet."""
     out = Path(sys.argv[1] if len(sys.argv) > 1 else "docs/contact_sheet.png")
     sim = Simulation(Catalogue(), Display(_SIZE, _SIZE))
     tiles = [
@@ -108,7 +108,7 @@ def main() -> None:
 
 
 def lay(tiles: list[tuple[str, Image.Image]]) -> Image.Image:
-    """The sheet of named pictures, in lines as wide as four rooms."""
+    """Return the sheet of the named pictures, in lines as wide as four rooms."""
     places, x, y = [], 0, 0
     for _, tile in tiles:
         places.append((x, y))

@@ -1,10 +1,10 @@
-"""Memory of each process when one sequence is cut over 1, 2 and 4 of them.
+"""Measure the memory of each process when a sequence is split over 1, 2 and 4 processes.
 
-One step of training on a sequence of frames and text: forward and backward pass of a tiny Qwen2.5-VL with more and
-wider layers, vision tower and embeddings frozen, loss on all text. "Kept" is what lies in memory between the two passes
-for the gradient, without the weights; with layers recomputed it is little more than each layer's input. "Peak" is the
-growth of the process at its highest, with layers recomputed (Linux only, VmHWM). Of several processes the largest
-counts.
+The work is one training step on a sequence of frames and text: forward and backward pass of a tiny Qwen2.5-VL with more
+and wider layers, with vision tower and embeddings frozen and the loss on all text. "Kept" is the memory between the two
+passes that the gradient needs, without the weights. With recomputed layers it is little more than the input of each
+layer. "Peak" is the maximum growth of the process with recomputed layers (Linux only, VmHWM). Of several processes the
+largest number is printed.
 
     python benchmarks/context_parallel.py [--tokens 4096]
 """
@@ -35,8 +35,8 @@ from model_adapters.hf.prompt import Prompter
 from model_adapters.options.tiny import TinyOptions
 from model_adapters.tiny.qwen2_5_vl import Qwen25VLTiny
 
-N_FRAMES = 8  # different ones, which stand in the sequence again and again
-WORDS = 60  # tokens of text behind each frame of 121
+N_FRAMES = 8  # different frames, which the sequence repeats
+WORDS = 60  # tokens of text after each frame of 121 tokens
 
 
 def _wider(ids: Mapping[str, int], vocabulary: int) -> Any:
@@ -52,7 +52,7 @@ def _wider(ids: Mapping[str, int], vocabulary: int) -> Any:
 
 
 class Wider(Qwen25VLTiny):
-    """A Qwen2.5-VL with 6 layers of 256, of which keys and values are a small part, as in real ones."""
+    """A Qwen2.5-VL with 6 layers of width 256, in which keys and values are a small part, as in real models."""
 
     twin = replace(Qwen25VLTiny.twin, config=_wider)
 
@@ -61,21 +61,21 @@ def main() -> None:
     """Measure and print a row for each number of processes."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--tokens", type=int, default=4096)
-    chosen = parser.parse_args()
+    options = parser.parse_args()
     print(f"{'processes':>9} {'kept MB':>9} {'recomputed':>11} {'peak MB':>9} {'seconds':>8} {'loss':>9}")
     for n_ranks in (1, 2, 4):
         with tempfile.TemporaryDirectory() as name:
             folder = Path(name)
             write_frames(folder)
-            torch.multiprocessing.spawn(measure, (n_ranks, chosen.tokens, folder), nprocs=n_ranks)
-            found = [torch.load(folder / f"{rank}.pt") for rank in range(n_ranks)]
-        kept, recomputed, peak, seconds = (max(one[field] for one in found) for field in range(4))
-        loss = sum(one[4] for one in found)
+            torch.multiprocessing.spawn(measure, (n_ranks, options.tokens, folder), nprocs=n_ranks)
+            numbers = [torch.load(folder / f"{rank}.pt") for rank in range(n_ranks)]
+        kept, recomputed, peak, seconds = (max(one[field] for one in numbers) for field in range(4))
+        loss = sum(one[4] for one in numbers)
         print(f"{n_ranks:9} {kept:9.1f} {recomputed:11.1f} {peak:9.0f} {seconds:8.1f} {loss:9.5f}", flush=True)
 
 
 def measure(rank: int, n_ranks: int, n_tokens: int, folder: Path) -> None:
-    """One process's numbers, written into the folder: MB kept, kept if recomputed, at the peak; seconds; loss."""
+    """Write the numbers of one process: MB kept, kept if recomputed, at the peak; seconds; loss."""
     torch.set_num_threads(1)
     dist.init_process_group("gloo", f"file://{folder / 'meeting'}", world_size=n_ranks, rank=rank)
     loaded = Wider.build("wider", TinyOptions(), 0)._loaded
@@ -84,12 +84,12 @@ def measure(rank: int, n_ranks: int, n_tokens: int, folder: Path) -> None:
     long, short = (batch_of(loaded, folder, length) for length in (n_tokens, n_tokens // 16))
     group = assign_ranks(n_ranks).context_group or dist.group.WORLD
     model.gradient_checkpointing_enable()
-    step(model, short, group)  # what is made once is made here
+    step(model, short, group)  # allocates what is allocated only once
     before = megabytes("VmRSS")
     (PROCESS / "clear_refs").write_text("5")  # the peak counts from here on
-    began = time.perf_counter()
+    start = time.perf_counter()
     recomputed, loss = step(model, long, group)
-    seconds, peak = time.perf_counter() - began, megabytes("VmHWM") - before
+    seconds, peak = time.perf_counter() - start, megabytes("VmHWM") - before
     model.gradient_checkpointing_disable()
     kept, _ = step(model, long, group)
     torch.save((kept, recomputed, peak, seconds, loss), folder / f"{rank}.pt")
@@ -97,7 +97,7 @@ def measure(rank: int, n_ranks: int, n_tokens: int, folder: Path) -> None:
 
 
 def step(model: SequenceModel, batch: Batch, group: Any) -> tuple[float, float]:
-    """Forward and backward pass; gives MB that were kept in between, and this process's share of the loss."""
+    """Run a forward and backward pass; returns the MB kept in between, and this process's share of the loss."""
     weights = {one.untyped_storage().data_ptr() for one in model.parameters()}
     kept: dict[int, int] = {}
 
@@ -116,7 +116,7 @@ def step(model: SequenceModel, batch: Batch, group: Any) -> tuple[float, float]:
 
 
 def batch_of(loaded: LoadedCheckpoint, folder: Path, n_tokens: int) -> Batch:
-    """A sequence of this length, frames between stretches of text."""
+    """Return a sequence of this length, with frames between texts."""
     prompter = Prompter(loaded.tokenizer, loaded.template, loaded.family)
     frames = [prompter.frame(FrameRef(folder / f"{number}.png")) for number in range(N_FRAMES)]
     pieces: list[Any] = []
@@ -130,7 +130,7 @@ def batch_of(loaded: LoadedCheckpoint, folder: Path, n_tokens: int) -> Batch:
 
 
 def write_frames(folder: Path) -> None:
-    """Frames of noise."""
+    """Write frames of noise."""
     draw = np.random.default_rng(0)
     for number in range(N_FRAMES):
         Image.fromarray(draw.integers(0, 256, (300, 300, 3), dtype=np.uint8)).save(folder / f"{number}.png")

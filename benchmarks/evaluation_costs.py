@@ -1,7 +1,7 @@
-"""What requests to a model take: seconds, memory and GPUs.
+"""Seconds, memory and GPUs that requests to a model take.
 
-`published_evaluation.py` adds them up; docs/cost.md has the formulae. Units are tokens, seconds, bytes and FLOP; a
-machine's numbers are of one GPU.
+`published_evaluation.py` sums them up; docs/cost.md has the formulae. Units are tokens, seconds, bytes and FLOP. The
+numbers of a machine are per GPU.
 """
 
 import heapq
@@ -10,24 +10,24 @@ from dataclasses import dataclass
 
 from infthor_eval.errors import UsageError
 
-_BYTES = 2  # of a bfloat16
+_BYTES = 2  # per bfloat16 number
 
 
 @dataclass(frozen=True)
 class Shape:
-    """A model, as its checkpoint's config has it.
+    """The shape of a model, as in its checkpoint's config.
 
     Attributes:
-        name: as on the command line.
-        parameters: all of them.
-        layers: of the language model.
-        heads: for queries, in each layer.
-        kv_heads: for keys and values, in each layer.
-        head_size: numbers in each.
-        frame_tokens: that one frame of 300x300 takes.
-        limit: tokens of context without an extension.
-        vision_flop: of one frame in the vision tower.
-        frame_seconds: to read and scale one frame on the CPU.
+        name: name on the command line.
+        parameters: number of all parameters.
+        layers: layers of the language model.
+        heads: query heads per layer.
+        kv_heads: key and value heads per layer.
+        head_size: size of a head.
+        frame_tokens: tokens of one frame of 300x300.
+        limit: maximum context without extension, tokens.
+        vision_flop: FLOP of one frame in the vision tower.
+        frame_seconds: CPU seconds to read and scale one frame.
     """
 
     name: str
@@ -48,18 +48,18 @@ class Shape:
 
     @property
     def kv_bytes(self) -> int:
-        """Bytes of keys and values that one token of context takes."""
+        """Bytes of keys and values per token of context."""
         return 2 * self.layers * self.kv_heads * self.head_size * _BYTES
 
     @property
     def pair_flop(self) -> int:
-        """FLOP of attention for one token that looks at one other."""
+        """FLOP of attention for one pair of tokens."""
         return 4 * self.layers * self.heads * self.head_size
 
 
-# Tokens per frame as measured with the processors (Qwen2.5-VL: 121 and 2 markers), limits and shapes from the
-# checkpoints' configs, parameters as in Table 4. Vision: 2 FLOP for each parameter of the tower and patch of a frame of
-# 300x300. Reading and scaling a frame was measured on one CPU core, with the processors at the checkpoints' sizes.
+# Tokens per frame are measured with the processors (Qwen2.5-VL: 121 and 2 markers). Limits and shapes are those of the
+# checkpoints' configs, parameters those of Table 4. Vision takes 2 FLOP per parameter of the tower and patch of a frame
+# of 300x300. Reading and scaling a frame is measured on one CPU core, with the processors at the checkpoints' sizes.
 MODELS = (
     Shape(
         name="llava-onevision",
@@ -114,21 +114,21 @@ MODELS = (
 
 @dataclass(frozen=True)
 class Machine:
-    """A machine and what is bought with it; see the options of `published_evaluation.py` for where numbers come from.
+    """A machine; the options of `published_evaluation.py` say where the numbers come from.
 
     Attributes:
-        tflops: reached in matrix products, in 1e12 FLOP/s.
-        attention_tflops: reached in attention.
-        bandwidth: of a GPU's memory as reached, bytes/s.
-        step_overhead: seconds that a decoded token takes beside reading weights and cache.
-        memory: of one GPU, bytes.
-        usable: share of it that weights, cache and what attention needs may take.
-        gpus_per_node: most GPUs that one worker can have.
-        attention: sdpa or flash_attention_2, for memory.
-        chunk_tokens: encoded in one pass.
-        parallel: layers (device_map: one GPU of a worker computes at a time) or tensor (all do).
-        tensor_efficiency: share of the speed of several GPUs that tensor parallelism reaches.
-        load_seconds: until a worker has its model.
+        tflops: achieved rate of matrix products, 1e12 FLOP/s.
+        attention_tflops: achieved rate of attention, 1e12 FLOP/s.
+        bandwidth: achieved memory bandwidth of a GPU, bytes/s.
+        step_overhead: seconds per decoded token beside reading weights and cache.
+        memory: memory of a GPU, bytes.
+        usable: share of the memory for weights, cache and attention.
+        gpus_per_node: maximum number of GPUs of one worker.
+        attention: sdpa or flash_attention_2, which differ in memory.
+        chunk_tokens: tokens encoded in one pass.
+        parallel: layers (device_map: one GPU of a worker computes at a time) or tensor (all compute).
+        tensor_efficiency: share of the speed of several GPUs that tensor parallelism achieves.
+        load_seconds: seconds until a worker has loaded its model.
     """
 
     tflops: float
@@ -145,19 +145,19 @@ class Machine:
     load_seconds: float
 
     def speed(self, n_gpus: int) -> float:
-        """Of a worker with so many GPUs, against one with one."""
+        """Return the speed of a worker with this number of GPUs, relative to one GPU."""
         return 1.0 if n_gpus == 1 or self.parallel == "layers" else n_gpus * self.tensor_efficiency
 
 
 @dataclass(frozen=True)
 class Rates:
-    """Of one model on one GPU.
+    """Rates of one model on one GPU.
 
     Attributes:
-        token: seconds to encode a token, without attention to others.
-        pair: seconds of attention for one token that looks at one other.
+        token: seconds to encode a token, without attention.
+        pair: seconds of attention per pair of tokens.
         step: seconds to decode a token on a short context.
-        cached_token: seconds by which one more token of context lengthens that.
+        cached_token: additional seconds of a decoding step per token of context.
     """
 
     token: float
@@ -168,11 +168,11 @@ class Rates:
 
 @dataclass(frozen=True)
 class Request:
-    """One reply.
+    """One request for a reply.
 
     Attributes:
-        context: tokens that it is made from.
-        cached: how many of them the request before left encoded.
+        context: tokens of the context.
+        cached: tokens of it that the request before has encoded.
         reply: tokens of the reply.
     """
 
@@ -181,8 +181,8 @@ class Request:
     reply: int
 
 
-def estimated(shape: Shape, machine: Machine) -> Rates:
-    """Rates from what a model has to compute and read; the GPU waits while frames are read."""
+def estimate_rates(shape: Shape, machine: Machine) -> Rates:
+    """Estimate rates from what a model computes and reads, if the GPU waits while frames are read."""
     frame = shape.vision_flop / (machine.tflops * 1e12) + shape.frame_seconds
     return Rates(
         token=2 * shape.parameters / (machine.tflops * 1e12) + frame / shape.frame_tokens,
@@ -192,13 +192,13 @@ def estimated(shape: Shape, machine: Machine) -> Rates:
     )
 
 
-def measured_prefill(rates: Rates, short: tuple[int, float], long: tuple[int, float]) -> Rates:
-    """Rates with those of encoding from two measurements: tokens of a context, and tokens/s on it.
+def rates_from_prefill(rates: Rates, short: tuple[int, float], long: tuple[int, float]) -> Rates:
+    """Return rates with encoding rates from two measurements: tokens of a context, and tokens/s on it.
 
     Encoding n tokens takes token * n + pair * n^2 / 2.
 
     Raises:
-        UsageError: no such rates give both measurements.
+        UsageError: no encoding rates explain both measurements.
     """
     (n_short, slow_short), (n_long, slow_long) = ((n, 1 / rate) for n, rate in (short, long))
     if n_long <= n_short or slow_long < slow_short:
@@ -211,7 +211,7 @@ def measured_prefill(rates: Rates, short: tuple[int, float], long: tuple[int, fl
 
 
 def seconds(request: Request, rates: Rates, reuse: bool = True) -> float:
-    """What one GPU takes for a reply, encoding what is not there yet, or everything."""
+    """Return the seconds of a request on one GPU, encoding only what is not cached, or everything."""
     cached = request.cached if reuse else 0
     new = request.context - cached
     decoding = request.reply * (rates.step + rates.cached_token * request.context)
@@ -219,22 +219,22 @@ def seconds(request: Request, rates: Rates, reuse: bool = True) -> float:
 
 
 def context_bytes(shape: Shape, machine: Machine) -> float:
-    """Bytes for each token of context: keys and values, and what attention makes on its way for a layer and a chunk."""
+    """Return the bytes per token of context: keys, values, and the temporary memory of attention."""
     if machine.attention != "sdpa":
         return shape.kv_bytes
-    # A mask makes SDPA repeat keys and values for every head; the mask itself is of 1 byte, and of 2 in the kernel.
+    # With a mask, SDPA repeats keys and values for every head; the mask itself has 1 byte, and 2 in the kernel.
     repeated = 2 * shape.heads * shape.head_size * _BYTES if shape.heads > shape.kv_heads else 0
     return shape.kv_bytes + repeated + 3 * max(machine.chunk_tokens, shape.frame_tokens)
 
 
 def largest_context(shape: Shape, machine: Machine, n_gpus: int) -> int:
-    """Tokens of context that so many GPUs have the memory for beside the weights."""
+    """Return the maximum context for which this number of GPUs has the memory beside the weights, tokens."""
     room = n_gpus * machine.memory * machine.usable - shape.weights
     return max(0, int(room / context_bytes(shape, machine)))
 
 
 def gpus_for(shape: Shape, machine: Machine, context: int) -> int | None:
-    """GPUs that a worker needs for contexts of so many tokens, a power of two; None where a node has too few."""
+    """Return the number of GPUs, a power of two, that a context requires, or None if a node has too few."""
     n_gpus = 1
     while n_gpus <= machine.gpus_per_node:
         if context <= largest_context(shape, machine, n_gpus):
@@ -244,7 +244,7 @@ def gpus_for(shape: Shape, machine: Machine, context: int) -> int | None:
 
 
 def makespan(jobs: Sequence[float], n_workers: int) -> float:
-    """Seconds until all jobs are done, the longest first and each to the worker that is free first."""
+    """Return the seconds until all jobs are done, the longest first, each by the first free worker."""
     free = [0.0] * n_workers
     for job in sorted(jobs, reverse=True):
         heapq.heapreplace(free, free[0] + job)

@@ -1,7 +1,7 @@
-"""Whether making a trajectory stays linear: time per step and memory of a short and a long one from the same scene.
+"""Measure whether generation is linear: time per step and memory of a short and a long trajectory in one scene.
 
-The ratio is of processor time, of this process and the simulator's together: other work on the machine, which comes
-and goes during a long run, stretches the time on the clock and hardly that.
+The ratio is that of processor time, of this process and the simulator's together, because other work on the machine
+changes wall time much more.
 
 python benchmarks/generation_growth.py [--scene kitchen-1] [--steps 1000 10000] [--seed 1]
 """
@@ -20,46 +20,46 @@ from infthor_eval.thor.simulator import Simulator
 
 
 def main() -> None:
-    """Make one trajectory of each length and print time per step and peak memory."""
+    """Generate one trajectory of each length, and print time per step and peak memory."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--scene", default="kitchen-1")
     parser.add_argument("--steps", type=int, nargs="+", default=[1000, 10_000])
     parser.add_argument("--seed", type=int, default=1)
-    chosen = parser.parse_args()
+    options = parser.parse_args()
     print(
         f"{'steps':>7} {'sub-goals':>9} {'seconds':>8} {'ms/step':>8} {'CPU ms/step':>12} {'peak MB':>8} "
         f"{'peak MB, simulator':>19}"
     )
     per_step = []
-    for steps in chosen.steps:
+    for steps in options.steps:
         before = processor_seconds()
-        seconds, made, subgoals, simulator_mb = make(
-            TrajectorySettings(chosen.scene, chosen.seed, steps, 1, max_fail=steps)
+        seconds, n_steps, subgoals, simulator_mb = generate_one(
+            TrajectorySettings(options.scene, options.seed, steps, 1, max_fail=steps)
         )
-        per_step.append(1000 * (processor_seconds() - before) / made)
+        per_step.append(1000 * (processor_seconds() - before) / n_steps)
         own_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
         print(
-            f"{made:7} {subgoals:9} {seconds:8.1f} {1000 * seconds / made:8.2f} {per_step[-1]:12.2f} {own_mb:8.0f} "
-            f"{simulator_mb:19.0f}",
+            f"{n_steps:7} {subgoals:9} {seconds:8.1f} {1000 * seconds / n_steps:8.2f} {per_step[-1]:12.2f} "
+            f"{own_mb:8.0f} {simulator_mb:19.0f}",
             flush=True,
         )
     print(f"processor time per step, longest over shortest: {per_step[-1] / per_step[0]:.2f} (aim <= 1.3)")
 
 
 def processor_seconds() -> float:
-    """Processor time so far, of this process and of simulators that have ended."""
+    """Return the processor time so far of this process and of simulators that have ended."""
     used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
     return sum(item.ru_utime + item.ru_stime for item in used)
 
 
-def make(settings: TrajectorySettings) -> tuple[float, int, int, float]:
-    """Seconds, low-level actions, sub-goals and the simulator's peak memory (MB) of one trajectory."""
+def generate_one(settings: TrajectorySettings) -> tuple[float, int, int, float]:
+    """Generate a trajectory; returns seconds, low-level actions, sub-goals and the simulator's peak memory (MB)."""
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder)
         with Simulator(embedded_launch()) as simulator:
-            began = time.perf_counter()
+            start = time.perf_counter()
             result = generate_set([settings], simulator, out)
-            seconds = time.perf_counter() - began
+            seconds = time.perf_counter() - start
         if result.failures:
             raise SystemExit(result.failures[0])
         (trajectory,) = iter_trajectories(out)

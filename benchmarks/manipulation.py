@@ -1,10 +1,10 @@
-"""What arms reach in the pick-ups and puts of long trajectories: the upper bound, chance, standing still, by radius.
+"""Measure baselines of arms on the pick-ups and puts of long trajectories, by the radius of the hand's sphere.
 
     python benchmarks/manipulation.py --trajectories DIR [--data FOLDER] [--episodes 300] [--radii 0.06,0.5] [--out DIR]
 
-Takes trajectories evenly out of all in DIR until they have so many pick-ups and so many puts, and runs planner-arm,
-still and random-arm on them through the command line, once for each radius of the hand's sphere. What planner-arm does
-not reach is told by what stopped it. Stopped and started again with the same --out it goes on.
+It takes trajectories evenly spaced in DIR until they have enough pick-ups and puts. It runs planner-arm, still and
+random-arm on them with the command line, for each radius. It prints what stopped planner-arm in episodes without
+success. The same command with the same --out resumes.
 """
 
 import argparse
@@ -26,18 +26,19 @@ from infthor_eval.runs import UnitRecord, read_run
 
 _BASELINES = ("planner-arm", "still", "random-arm")
 _TASKS = {ManipulationKind.PICKUP: "manipulathor_pickup", ManipulationKind.PUT: "manipulathor_put"}
-_NAME = re.compile(r"'(\w+?)_\w+'")  # of what an arm met: its type
+_NAME = re.compile(r"'(\w+?)_\w+'")  # name of an object that blocked an arm; the group is its type
 
 
 def main() -> None:
-    """Choose, run, and print."""
+    """Choose trajectories, run the baselines, and print the results."""
     options = _arguments()
     with tempfile.TemporaryDirectory() as scratch:
         out = options.out or Path(scratch)
         out.mkdir(parents=True, exist_ok=True)
         data = out / "trajectories.jsonl"
         if not data.exists():
-            data.write_bytes(b"".join(source.raw.replace(b"\n", b" ").strip() + b"\n" for source in chosen(options)))
+            lines = (source.raw.replace(b"\n", b" ").strip() + b"\n" for source in choose_trajectories(options))
+            data.write_bytes(b"".join(lines))
         for radius in options.radii.split(","):
             for name in _BASELINES:
                 show(name, radius, run(name, radius, data, out, options))
@@ -45,19 +46,19 @@ def main() -> None:
 
 def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--trajectories", type=Path, required=True, help="folder with generated ones")
-    parser.add_argument("--data", type=Path, help="folder with recorded floor plans")
-    parser.add_argument("--episodes", type=int, default=300, help="of each kind, at least")
-    parser.add_argument("--radii", default="0.5", help="of the hand's sphere, metres, with commas")
-    parser.add_argument("--out", type=Path, help="kept there; else in a folder that is removed")
+    parser.add_argument("--trajectories", type=Path, required=True, help="folder of generated trajectories")
+    parser.add_argument("--data", type=Path, help="folder of recorded floor plans")
+    parser.add_argument("--episodes", type=int, default=300, help="minimum number of episodes of each kind")
+    parser.add_argument("--radii", default="0.5", help="radii of the hand's sphere in metres, separated by commas")
+    parser.add_argument("--out", type=Path, help="folder of the results; default: temporary")
     return parser.parse_args()
 
 
-def chosen(options: argparse.Namespace) -> Iterator[TrajectorySource]:
-    """Trajectories, evenly out of all, until they have enough episodes of both kinds."""
+def choose_trajectories(options: argparse.Namespace) -> Iterator[TrajectorySource]:
+    """Yield trajectories, evenly spaced among all, until they have enough episodes of both kinds."""
     every = list(iter_sources(options.trajectories))
     counts: Counter[ManipulationKind] = Counter()
-    step = max(1, round(len(every) * 0.618))  # goes through them without favouring a scene
+    step = max(1, round(len(every) * 0.618))  # the golden ratio spreads them over the scenes
     for number in range(len(every)):
         source = every[number * step % len(every)]
         counts.update(episode.kind for episode in arm_episodes(source.read()))
@@ -67,20 +68,20 @@ def chosen(options: argparse.Namespace) -> Iterator[TrajectorySource]:
 
 
 def run(name: str, radius: str, data: Path, out: Path, options: argparse.Namespace) -> Path:
-    """Run a baseline; the folder of its run."""
+    """Run a baseline and return the folder of its run."""
     results = out / f"radius-{radius}"
     scenes = ["--scenes", str(options.data)] if options.data else []
     arguments = ["--tasks", "manipulathor", "--data", data, "--radius", radius, "--output", results, *scenes]
     command = [Path(sys.executable).with_name("infthor-eval"), "run", "--model", name, *arguments]
-    ended = subprocess.run(list(map(str, command)), check=False, stdout=subprocess.DEVNULL)
+    result = subprocess.run(list(map(str, command)), check=False, stdout=subprocess.DEVNULL)
     folders = list((results / name).glob("manipulathor-*"))
     if len(folders) != 1:
-        raise SystemExit(f"{name} ended with {ended.returncode}, and {results / name} has {len(folders)} runs")
+        raise SystemExit(f"{name} ended with {result.returncode}, and {results / name} has {len(folders)} runs")
     return folders[0]
 
 
 def show(name: str, radius: str, folder: Path) -> None:
-    """One line a kind, and what stopped the upper bound."""
+    """Print one line per kind, and what stopped the upper bound."""
     header, records = read_run(folder, ManipulationSuite.records)
     summary = ManipulationSuite().summarise(header, records)
     for kind, task in _TASKS.items():
@@ -96,22 +97,22 @@ def show(name: str, radius: str, folder: Path) -> None:
             flush=True,
         )
         if name == "planner-arm":
-            for what, number in stopped(same):
-                print(f"    {number} not reached: {what}", flush=True)
+            for obstacle, number in count_obstacles(same):
+                print(f"    {number} without success: {obstacle}", flush=True)
 
 
-def stopped(records: Sequence[UnitRecord[ArmRecord]]) -> list[tuple[str, int]]:
-    """What episodes without success ended with: what the arm met most, or that it met nothing."""
-    found: Counter[str] = Counter()
+def count_obstacles(records: Sequence[UnitRecord[ArmRecord]]) -> list[tuple[str, int]]:
+    """Count what blocked the arm most in episodes without success."""
+    counts: Counter[str] = Counter()
     for record in records:
         payload = record.payload
         if payload.done:
             continue
-        met = Counter(name for step in payload.steps for text in step.refusals for name in _NAME.findall(text))
-        most = ", ".join(name for name, _ in met.most_common(2)) or "nothing in the way"
+        blocking = Counter(name for step in payload.steps for text in step.refusals for name in _NAME.findall(text))
+        most = ", ".join(name for name, _ in blocking.most_common(2)) or "nothing"
         target = (payload.receptacle_id or payload.object_id).split("|")[0]
-        found[f"{payload.kind} {target}: {payload.ended}; met {most}"] += 1
-    return found.most_common()
+        counts[f"{payload.kind} {target}: {payload.ended}; blocked by {most}"] += 1
+    return counts.most_common()
 
 
 if __name__ == "__main__":

@@ -1,10 +1,10 @@
-"""How often a model's next action is the expert's on trajectories that it never saw, beside what needs no frame.
+"""Measure how often a model predicts the expert's next action on held-out trajectories, and baselines without frames.
 
     python benchmarks/next_action.py --data SET [--model qwen2.5-vl-nano] [--model-args k=v,...] [--frames shown,blank]
 
-SET is a replayed set (`infthor-eval replay`). At every action the model has the true history up to it (teacher forcing)
-and replies greedily. `history` is what experts did next in the set's other scenes after the same action in a plan of
-the same words (infthor_eval/plans/habits.py), `most frequent` the one action that is right most often.
+SET is a replayed set (`infthor-eval replay`). At every action the model gets the true history up to it (teacher
+forcing) and replies greedily. `history` predicts what experts did next in other scenes after the same action in a plan
+of the same words (infthor_eval/plans/habits.py). `most frequent` always predicts the most frequent action.
 """
 
 import argparse
@@ -30,21 +30,23 @@ _SHOWN: dict[str, Show] = {"shown": lambda frame: frame, "blank": blank_like}
 
 
 def main() -> None:
-    """Ask, count, print."""
+    """Predict all actions and print the accuracies."""
     options = _arguments()
     data = NiehSet(options.data)
-    found = [read_history(data, name) for name in trajectory_names(data)]
-    clusters = [trajectory.traj_id for trajectory, segments in found for segment in segments for _ in segment.steps]
+    histories = [read_history(data, name) for name in trajectory_names(data)]
+    clusters = [trajectory.traj_id for trajectory, segments in histories for segment in segments for _ in segment.steps]
     rows = {
-        "most frequent": [float(hit) for hit in most_frequent(found)],
-        "history": [float(hit) for hit in habitual(found)],
+        "most frequent": [float(hit) for hit in most_frequent_hits(histories)],
+        "history": [float(hit) for hit in habit_hits(histories)],
     }
     model: Any = load(options.model, parse_model_args(options.model_args), seed=0)
     for way in options.frames.split(","):
         rows[f"{options.model}, frames {way}"] = [
-            float(hit) for _, segments in found for hit in said(model, segments, _SHOWN[way])
+            float(hit) for _, segments in histories for hit in model_hits(model, segments, _SHOWN[way])
         ]
-    print(f"{len(clusters)} actions of {len(found)} trajectories; next action right, %, with its 95 % interval")
+    print(
+        f"{len(clusters)} actions of {len(histories)} trajectories; accuracy of the next action, %, with 95 % interval"
+    )
     for name, hits in rows.items():
         print(f"{name:40} {_interval(clustered_mean(hits, clusters))}", end="")
         print(f"   over history {_interval(paired_difference(rows['history'], hits, clusters).estimate)}")
@@ -59,18 +61,18 @@ def _arguments() -> argparse.Namespace:
     return parser.parse_args()
 
 
-def most_frequent(found: Sequence[tuple[Trajectory, Sequence[PlanSegment]]]) -> list[bool]:
-    """Whether each action is the most frequent one of all."""
-    actions = [action for _, segments in found for segment in segments for action, _ in segment.steps]
+def most_frequent_hits(histories: Sequence[tuple[Trajectory, Sequence[PlanSegment]]]) -> list[bool]:
+    """Return True for each action that is the most frequent one."""
+    actions = [action for _, segments in histories for segment in segments for action, _ in segment.steps]
     ((first, _),) = Counter(actions).most_common(1)
     return [action == first for action in actions]
 
 
-def habitual(found: Sequence[tuple[Trajectory, Sequence[PlanSegment]]]) -> Iterator[bool]:
-    """Whether habits of the other scenes lead to each action."""
-    for trajectory, segments in found:
+def habit_hits(histories: Sequence[tuple[Trajectory, Sequence[PlanSegment]]]) -> Iterator[bool]:
+    """Yield True for each action that the habits of the other scenes predict."""
+    for trajectory, segments in histories:
         scene = trajectory.scene.floor_plan
-        habits = Habits(other for other, _ in found if other.scene.floor_plan != scene)
+        habits = Habits(other for other, _ in histories if other.scene.floor_plan != scene)
         for segment in segments:
             done: list[str] = []
             for action, _ in segment.steps:
@@ -78,8 +80,8 @@ def habitual(found: Sequence[tuple[Trajectory, Sequence[PlanSegment]]]) -> Itera
                 done.append(action)
 
 
-def said(model: Any, segments: Sequence[PlanSegment], show: Show) -> Iterator[bool]:
-    """Whether a model's replies are the actions, each on the true history before it."""
+def model_hits(model: Any, segments: Sequence[PlanSegment], show: Show) -> Iterator[bool]:
+    """Yield True for each action that a model predicts, given the true history before it."""
     talk, decoding = model.conversation(), Decoding(max_new_tokens=10, stop=(ACT,))
     for segment in segments:
         talk.append(*(part if isinstance(part, str) else show(part) for part in segment.opening()))

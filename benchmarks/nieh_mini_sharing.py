@@ -1,6 +1,6 @@
-"""How much faster `nieh_mini` is when questions share the frames' prefix, and whether the replies are the same.
+"""Measure the speed-up of `nieh_mini` by sharing the frames' prefix between questions, and compare the replies.
 
-Both runs go through the whole runner (suite, journal) in one process; the times are those of answering.
+Both runs use the whole runner (suite, journal) in one process; the times are those of answering.
 
     python benchmarks/nieh_mini_sharing.py [--model qwen2.5-vl-tiny] [--tasks nieh_mini]
 """
@@ -16,23 +16,23 @@ from infthor_eval.runs import UnitKey, UnitRecord, execute, prepare
 
 
 def answer(model: str, tasks: str, shared: bool, output: Path) -> list[UnitRecord]:
-    """Every record of a run with sharing on or off."""
+    """Return the records of a run with or without sharing."""
     models = (ModelSpec(model, {"share_prefix": str(shared).lower()}),)
     ((request, suite),) = RunOptions(models, (tasks,), None, output).requests()
     return execute(prepare(request, suite)).records
 
 
 def main() -> None:
-    """Run both and print seconds, factor and equality by task."""
+    """Run both, and print seconds, factor and equality by task."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--model", default="qwen2.5-vl-tiny")
     parser.add_argument("--tasks", default="nieh_mini")
-    chosen = parser.parse_args()
+    options = parser.parse_args()
     seconds: defaultdict[str, dict[bool, float]] = defaultdict(dict)
     replies: dict[bool, dict[UnitKey, str | None]] = {}
     with tempfile.TemporaryDirectory() as folder:
         for shared in (True, False):
-            records = answer(chosen.model, chosen.tasks, shared, Path(folder))
+            records = answer(options.model, options.tasks, shared, Path(folder))
             replies[shared] = {record.key: record.payload.reply for record in records}
             for record in records:
                 seconds[record.task][shared] = seconds[record.task].get(shared, 0.0) + record.seconds

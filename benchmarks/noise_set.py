@@ -1,4 +1,4 @@
-"""What benchmarks are run on: frames of noise, and an NIEH set of one trajectory of them."""
+"""Input of benchmarks: frames of noise, and an NIEH set of one trajectory of them."""
 
 import json
 from pathlib import Path
@@ -16,12 +16,12 @@ _SIDE = 300  # pixels, as in the published data
 
 
 def question_texts(count: int) -> list[str]:
-    """So many questions, all different."""
+    """Return this many different questions."""
     return [f"Did you see {number} {_OBJECTS[number % len(_OBJECTS)]}s?" for number in range(count)]
 
 
 def write_frames(folder: Path, count: int, seed: int = 0) -> list[Path]:
-    """Write frames of 300x300 of coarse coloured noise, all different, into a folder that exists."""
+    """Write different frames of coarse coloured noise, 300x300, into an existing folder."""
     draw = np.random.default_rng(seed)
     paths = [folder / f"{index:09d}.png" for index in range(count)]
     for path in paths:
@@ -37,8 +37,8 @@ def write_set(root: Path, n_frames: int, n_questions: int) -> None:
     names = [path.name for path in write_frames(trajectory / "img", n_frames)]
     entries = [{"img_idx": i, "img_filename": name, "step": i, "object_log": {}} for i, name in enumerate(names)]
     (trajectory / "metadata.json").write_text(json.dumps(entries))
-    asked = [
+    questions = [
         Question("t", text, (number % n_frames,), ("yes",), "object_presence")
         for number, text in enumerate(question_texts(n_questions))
     ]
-    write_questions(root / "qa_set.csv", asked)
+    write_questions(root / "qa_set.csv", questions)

@@ -1,12 +1,12 @@
-"""What the yardsticks of plans earn on long trajectories: the expert, chance, the plan's words, and habit.
+"""Measure the baselines of plans on long trajectories: planner, random, scripted and history.
 
     python benchmarks/plans.py --trajectories DIR --data FOLDER [--count 40] [--alfred 20] [--out FOLDER]
 
-Takes so many generated trajectories of at least --min-steps steps, evenly out of all in DIR, and the first ALFRED
-demonstrations (FOLDER/alfred/valid_seen.jsonl.gz) that replay whole, and runs planner, random, scripted and history on
-each of the two through the command line. planner is to carry out every plan and earn the most there is; random is to
-stay under a tenth of it. What planner does not is told plan by plan. Stopped and started again with the same --out it
-goes on.
+It takes --count generated trajectories of at least --min-steps steps, evenly spaced in DIR, and the first ALFRED
+demonstrations (FOLDER/alfred/valid_seen.jsonl.gz) that replay without a refused action. It runs the baselines on each
+of these two sets with the command line. planner should complete every plan with the maximum reward, and random should
+have less than a tenth of it. The plans in which planner falls short are printed. The same command with the same --out
+resumes.
 """
 
 import argparse
@@ -32,24 +32,24 @@ from infthor_eval.runs import UnitRecord, read_run
 
 _BASELINES = ("planner", "random", "scripted", "history")
 _TASK = "infthor_plans"
-_SMALL = 1e-4  # of rewards
+_SMALL = 1e-4  # tolerance of rewards
 Record = UnitRecord[PlanRecord]
 
 
 class Run(NamedTuple):
-    """What came of a baseline."""
+    """Results of a baseline."""
 
     about: PlanTaskSummary
     records: list[Record]
 
 
 def main() -> None:
-    """Choose, run, and print one table."""
+    """Choose trajectories, run the baselines, and print the tables."""
     options = _arguments()
     with tempfile.TemporaryDirectory() as scratch:
         out = options.out or Path(scratch)
         runs: dict[str, dict[str, Run]] = {}
-        for name, chosen in (("generated", generated(options)), ("ALFRED", demonstrations(options))):
+        for name, chosen in (("generated", generated_sources(options)), ("ALFRED", demonstrations(options))):
             sources = list(chosen)
             if sources:
                 runs[name] = run(sources, options.data, out / name.lower())
@@ -58,44 +58,46 @@ def main() -> None:
 
 def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--trajectories", type=Path, required=True, help="folder with generated ones")
-    parser.add_argument("--data", type=Path, required=True, help="folder with recorded floor plans, and ALFRED's")
+    parser.add_argument("--trajectories", type=Path, required=True, help="folder of generated trajectories")
+    parser.add_argument(
+        "--data", type=Path, required=True, help="folder of recorded floor plans and ALFRED's trajectories"
+    )
     parser.add_argument("--count", type=int, default=40, help="generated trajectories")
     parser.add_argument("--alfred", type=int, default=20, help="demonstrations")
-    parser.add_argument("--min-steps", type=int, default=300, help="of a generated trajectory")
-    parser.add_argument("--out", type=Path, help="kept there; else in a folder that is removed")
+    parser.add_argument("--min-steps", type=int, default=300, help="minimum steps of a generated trajectory")
+    parser.add_argument("--out", type=Path, help="folder of the results; default: temporary")
     return parser.parse_args()
 
 
-def generated(options: argparse.Namespace) -> list[TrajectorySource]:
-    """Long trajectories, evenly out of all."""
-    found = [source for source in iter_sources(options.trajectories) if is_long(source, options.min_steps)]
-    if len(found) < options.count:
-        raise SystemExit(f"{options.trajectories} has {len(found)} trajectories of {options.min_steps} steps")
-    return [found[index * len(found) // options.count] for index in range(options.count)]
+def generated_sources(options: argparse.Namespace) -> list[TrajectorySource]:
+    """Return long trajectories, evenly spaced among all."""
+    sources = [source for source in iter_sources(options.trajectories) if is_long(source, options.min_steps)]
+    if len(sources) < options.count:
+        raise SystemExit(f"{options.trajectories} has {len(sources)} trajectories of {options.min_steps} steps")
+    return [sources[index * len(sources) // options.count] for index in range(options.count)]
 
 
 def is_long(source: TrajectorySource, min_steps: int) -> bool:
-    """Whether a trajectory has so many steps."""
+    """Return True if a trajectory has at least this many steps."""
     return len(source.read().plan.low_actions) >= min_steps
 
 
 def demonstrations(options: argparse.Namespace) -> Iterator[TrajectorySource]:
-    """The first demonstrations that the simulator carries out whole."""
-    wanted = options.alfred
-    sources = list(iter_sources(options.data / "alfred" / "valid_seen.jsonl.gz")) if wanted else []
+    """Yield the first demonstrations that the simulator replays without a refused action."""
+    remaining = options.alfred
+    sources = list(iter_sources(options.data / "alfred" / "valid_seen.jsonl.gz")) if remaining else []
     trajectories = [source.read() for source in sources]
     with closing(Simulators("embedded", options.data, trajectories, image=False)) as simulators:
         for source in sources:
-            if not wanted:
+            if not remaining:
                 return
             if is_whole(source, simulators):
-                wanted -= 1
+                remaining -= 1
                 yield source
 
 
 def is_whole(source: TrajectorySource, simulators: Simulators) -> bool:
-    """Whether no action of a demonstration is refused."""
+    """Return True if no action of a demonstration is refused."""
     with simulators.one() as simulator:
         try:
             environment = PlanEnvironment(source.read(), simulator)
@@ -117,27 +119,27 @@ def run(sources: Sequence[TrajectorySource], scenes: Path, out: Path) -> dict[st
     runs = {}
     for name in _BASELINES:
         command = [Path(sys.executable).with_name("infthor-eval"), "run", "--model", name, *arguments]
-        ended = subprocess.run(list(map(str, command)), check=False)
+        result = subprocess.run(list(map(str, command)), check=False)
         folders = list((results / name).glob(f"{_TASK}-*"))
         if len(folders) != 1:
-            raise SystemExit(f"{name} ended with {ended.returncode}, and {results / name} has {len(folders)} runs")
+            raise SystemExit(f"{name} ended with {result.returncode}, and {results / name} has {len(folders)} runs")
         header, records = read_run(folders[0], PlansSuite.records)
         runs[name] = Run(PlansSuite().summarise(header, records).tasks[_TASK], records)
     return runs
 
 
-def show(found: dict[str, dict[str, Run]]) -> None:
-    """Print the table, and what there is to look into."""
-    columns = ("trajectories", "plans", "carried out, %", "reward", "at most", "% of it", "excluded", "failed")
+def show(results: dict[str, dict[str, Run]]) -> None:
+    """Print the table, and the plans in which planner falls short."""
+    columns = ("trajectories", "plans", "completed, %", "reward", "maximum", "% of it", "excluded", "failed")
     print(f"\n{'':20}" + "".join(f"{name:>24}" for name in columns))
-    for kind, runs in found.items():
+    for kind, runs in results.items():
         for name, (about, _) in runs.items():
             rates = (about.success["total"], 100), (about.reward, 1), (about.max_reward, 1), (about.reward_share, 100)
-            cells = about.n_trajectories, about.n_plans, *(told(rate, factor) for rate, factor in rates)
+            cells = about.n_trajectories, about.n_plans, *(format_rate(rate, factor) for rate, factor in rates)
             cells = *cells, sum(about.excluded.values()), about.n_failed
             print(f"{kind:10} {name:9}" + "".join(f"{cell:>24}" for cell in cells))
-    for kind, runs in found.items():
-        print(f"\n{kind}: by kind of plan, % of the most that it can earn")
+    for kind, runs in results.items():
+        print(f"\n{kind}: by kind of plan, % of the maximum reward")
         for name, (_, records) in runs.items():
             print(f"  {name:9} " + ", ".join(by_kind(records)))
         for reason, number in runs["planner"].about.excluded.items():
@@ -146,8 +148,8 @@ def show(found: dict[str, dict[str, Run]]) -> None:
             print(f"  planner: {line}")
 
 
-def told(rate: Rate | None, factor: float) -> str:
-    """A rate with its interval."""
+def format_rate(rate: Rate | None, factor: float) -> str:
+    """Return a rate with its interval as text."""
     if rate is None:
         return "-"
     ends = "" if rate.low is None or rate.high is None else f" [{factor * rate.low:.1f}, {factor * rate.high:.1f}]"
@@ -155,22 +157,23 @@ def told(rate: Rate | None, factor: float) -> str:
 
 
 def by_kind(records: Iterable[Record]) -> Iterator[str]:
-    """What plans of each kind earned of what they can, how many there are, and how many were carried out."""
+    """Yield the share of the maximum reward, and the number of completed plans, by kind of plan."""
     kinds: dict[str, list[PlanRecord]] = defaultdict(list)
     for record in records:
         if record.excluded is None:
             kinds[record.payload.kind].append(record.payload)
     for kind, plans in sorted(kinds.items()):
-        got, most = sum(plan.reward for plan in plans), sum(plan.max_reward or 0.0 for plan in plans)
-        yield f"{kind} {100 * got / most if most else 0:.1f} ({sum(plan.done for plan in plans)} of {len(plans)} done)"
+        reward, most = sum(plan.reward for plan in plans), sum(plan.max_reward or 0.0 for plan in plans)
+        n_done = sum(plan.done for plan in plans)
+        yield f"{kind} {100 * reward / most if most else 0:.1f} ({n_done} of {len(plans)} done)"
 
 
 def shortcoming(record: Record) -> str:
-    """What the expert did not earn in a plan, and how it ended; empty where it earned the most there is."""
+    """Return the missing reward of the expert in a plan, and how it ended; empty if none is missing."""
     plan = record.payload
     if record.excluded is not None or (plan.done and abs(plan.reward - (plan.max_reward or 0.0)) < _SMALL):
         return ""
-    last = f"{plan.steps[-1].action} ({plan.steps[-1].message or 'carried out'})" if plan.steps else "no action"
+    last = f"{plan.steps[-1].action} ({plan.steps[-1].message or 'accepted'})" if plan.steps else "no action"
     ended = record.failure or plan.ended
     return f"{record.key.id}: {plan.plan}: {plan.reward} of {plan.max_reward}; {ended}; last {last}"
 

@@ -1,15 +1,15 @@
-"""What sharing the frame prefix between the questions of one trajectory saves.
+"""Measure what sharing the frame prefix between the questions of one trajectory saves.
 
-One run measures, on the same Qwen2.5-VL with random weights, the same frames and questions:
-  shared   our conversation: frames appended once, then append, reply, rewind per question;
-  batched  the same with all questions handed over at once and answered --batch-size at a time;
-  plain    the first way with share_prefix=false: everything is encoded for every question, as a plain loop does;
-  floor    transformers alone, written out: one chunked prefill of the frames into its own cache, then per question the
-           question's tokens and the reply's. Nothing can be faster without another model.
+One run measures, with the same Qwen2.5-VL with random weights and the same frames and questions:
+  shared   our conversation: frames are appended once, then append, reply and rewind per question;
+  batched  the same with all questions passed at once and answered --batch-size at a time;
+  plain    as shared with share_prefix=false: everything is encoded for every question, as in a plain loop;
+  floor    transformers alone: one chunked prefill of the frames into its own cache, then per question the tokens of the
+           question and the reply. Nothing can be faster with the same model.
 
     python benchmarks/prefix_sharing.py --frames 120 --questions 24
 
-On a machine with a GPU it also tells tokens per second, as published_evaluation.py takes them, peak memory and the
+On a machine with a GPU it also prints tokens per second in the form of published_evaluation.py, peak memory and the
 largest context that fits, for random weights of the real shape:
 
     python benchmarks/prefix_sharing.py --device cuda --model-size 7b --largest --attention flash_attention_2
@@ -44,7 +44,7 @@ Timed = tuple[float, Replies]
 
 
 def main() -> None:
-    """Run the four ways and print seconds, factors and whether the replies are equal."""
+    """Run the four ways, and print seconds, factors and whether the replies are equal."""
     options = _arguments()
     torch.set_num_threads(options.threads)
     questions = question_texts(options.questions)
@@ -52,19 +52,19 @@ def main() -> None:
         frames = [FrameRef(path) for path in write_frames(Path(folder), options.frames, options.seed)]
         sharing = build(options)
         not_sharing = TransformersModel("plain", sharing._loaded, replace(sharing._options, share_prefix=False))
-        conversation(sharing, frames[:1], questions[:1], 2)  # imports, threads and kernels warm up here
+        answer_one_by_one(sharing, frames[:1], questions[:1], 2)  # warms up imports, threads and kernels
         ways = {
-            "shared": lambda: conversation(sharing, *work),
-            "batched": lambda: together(sharing, *work),
-            "floor": lambda: transformers_alone(sharing, *work),
+            "shared": lambda: answer_one_by_one(sharing, *work),
+            "batched": lambda: answer_in_batches(sharing, *work),
+            "floor": lambda: answer_with_transformers(sharing, *work),
         }
         work = frames, questions, options.new_tokens
         measured: dict[str, list[Timed]] = {name: [] for name in ways}
         for _ in range(options.repeats):
-            for name, way in ways.items():  # in turn, so that a busy machine is busy for all
-                forget(sharing)
-                measured[name].append(_timed(way))
-        measured["plain"] = [_timed(lambda: conversation(not_sharing, *work))]
+            for name, way in ways.items():  # alternating, so that other work on the machine affects all alike
+                clear_cache(sharing)
+                measured[name].append(_time(way))
+        measured["plain"] = [_time(lambda: answer_one_by_one(not_sharing, *work))]
         report(measured, options)
         machine_report(sharing, frames, options)
 
@@ -74,7 +74,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--frames", type=int, default=120)
     parser.add_argument("--questions", type=int, default=24)
     parser.add_argument("--new-tokens", type=int, default=16)
-    parser.add_argument("--repeats", type=int, default=3, help="runs of all but plain; the best counts")
+    parser.add_argument("--repeats", type=int, default=3, help="runs of all ways but plain; the fastest is printed")
     parser.add_argument("--batch-size", type=int, default=8)
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--seed", type=int, default=0)
@@ -85,12 +85,12 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--largest", action="store_true", help="find the largest context that fits")
     options = parser.parse_args()
     if options.largest and not options.device.startswith("cuda"):
-        parser.error("--largest needs --device cuda: a CPU's memory is swapped, not used up")
+        parser.error("--largest needs --device cuda, as a CPU swaps memory and has no clear limit")
     return options
 
 
 def build(options: argparse.Namespace) -> TransformersModel:
-    """Qwen2.5-VL with random weights, tiny in float32 or of the 7B model's shape in bfloat16."""
+    """Build a Qwen2.5-VL with random weights, tiny in float32 or of the 7B model's shape in bfloat16."""
     twin, dtype = Qwen25VLTiny.twin, "float32"
     if options.model_size == "7b":
         twin, dtype = replace(twin, config=_real_shape), "bfloat16"
@@ -118,8 +118,8 @@ def _real_shape(ids: Mapping[str, int], vocab_size: int) -> Qwen2_5_VLConfig:  #
     return config
 
 
-def forget(model: TransformersModel) -> None:
-    """Have the model start from nothing."""
+def clear_cache(model: TransformersModel) -> None:
+    """Clear the caches of a model."""
     model._prefix.reset()
     model._features.clear()
 
@@ -131,8 +131,8 @@ def machine_report(model: TransformersModel, frames: Sequence[FrameRef], options
         torch.cuda.reset_peak_memory_stats()
     points = []
     for some in (frames[: max(1, len(frames) // 8)], frames):
-        forget(model)
-        seconds, replies = _timed(lambda some=some: [_prefill(model, some)])
+        clear_cache(model)
+        seconds, replies = _time(lambda some=some: [_prefill(model, some)])
         points.append(f"{replies[0][0]}:{replies[0][0] / seconds:.0f}")
     print(f"prefill          {','.join(points)} (tokens:tokens/s)")
     print(f"decode           {_decoding_speed(model, frames[:1]):.1f} tokens/s")
@@ -143,11 +143,11 @@ def machine_report(model: TransformersModel, frames: Sequence[FrameRef], options
 
 
 def _decoding_speed(model: TransformersModel, frames: Sequence[FrameRef], few: int = 2, more: int = 34) -> float:
-    """Tokens per second of a reply on a short context, by the difference of two replies."""
+    """Return the tokens per second of a reply on a short context, from the difference of two replies."""
     times, lengths = [], []
     for new in (few, more):
-        conversation(model, frames, [""], new)
-        seconds, replies = _timed(lambda new=new: conversation(model, frames, [""], new))
+        answer_one_by_one(model, frames, [""], new)
+        seconds, replies = _time(lambda new=new: answer_one_by_one(model, frames, [""], new))
         times.append(seconds)
         lengths.append(len(replies[0]))
     return (lengths[1] - lengths[0]) / (times[1] - times[0])
@@ -163,7 +163,7 @@ def _largest(model: TransformersModel, frames: Sequence[FrameRef]) -> int:
     fits = 0
     repeated = list(frames)
     while True:
-        forget(model)
+        clear_cache(model)
         try:
             fits = _prefill(model, repeated)[0]
         except ModelError:
@@ -172,7 +172,7 @@ def _largest(model: TransformersModel, frames: Sequence[FrameRef]) -> int:
 
 
 def report(measured: dict[str, list[Timed]], options: argparse.Namespace) -> None:
-    """Print the best time of each way, the factors, and whether all replies are equal."""
+    """Print the fastest time of each way, the factors, and whether all replies are equal."""
     best = {name: min(seconds for seconds, _ in runs) for name, runs in measured.items()}
     replies = [reply for runs in measured.values() for _, reply in runs]
     print(f"{options.frames} frames, {options.questions} questions, {options.new_tokens} new tokens each")
@@ -184,7 +184,7 @@ def report(measured: dict[str, list[Timed]], options: argparse.Namespace) -> Non
     print(f"replies equal    {'yes' if all(reply == replies[0] for reply in replies) else 'NO'}")
 
 
-def conversation(model: Any, frames: Sequence[FrameRef], questions: Sequence[str], new_tokens: int) -> Replies:
+def answer_one_by_one(model: Any, frames: Sequence[FrameRef], questions: Sequence[str], new_tokens: int) -> Replies:
     """Answer all questions on one prefix, as the NIEH runner does."""
     talk = model.conversation()
     talk.append(*frames)
@@ -197,7 +197,7 @@ def conversation(model: Any, frames: Sequence[FrameRef], questions: Sequence[str
     return replies
 
 
-def together(model: Any, frames: Sequence[FrameRef], questions: Sequence[str], new_tokens: int) -> Replies:
+def answer_in_batches(model: Any, frames: Sequence[FrameRef], questions: Sequence[str], new_tokens: int) -> Replies:
     """Answer all questions on one prefix, several at a time."""
     talk, decoding = model.conversation(), Decoding(max_new_tokens=new_tokens)
     talk.append(*frames)
@@ -205,10 +205,10 @@ def together(model: Any, frames: Sequence[FrameRef], questions: Sequence[str], n
 
 
 @torch.inference_mode()
-def transformers_alone(
+def answer_with_transformers(
     model: Any, frames: Sequence[FrameRef], questions: Sequence[str], new_tokens: int, chunk_frames: int = 8
 ) -> Replies:
-    """The same answers with the bare model: what has to be computed, and nothing around it."""
+    """Answer all questions with the bare model, computing only what is necessary."""
     bare, tokenizer = model._loaded.model, model._loaded.tokenizer
     processor, pad = model._loaded.family._image_processor, bare.config.image_token_id
     content: list[dict[str, str]] = [{"type": "image"}] * len(frames) + [{"type": "text", "text": "@"}]
@@ -224,7 +224,7 @@ def transformers_alone(
     grids = torch.tensor([[1, 22, 22]] * len(frames))
     positions, _ = bare.model.get_rope_index(ids, (ids == pad).int(), image_grid_thw=grids)
     cache = DynamicCache()
-    # Frames are cut behind their end marker; the first chunk also holds the template's opening.
+    # Chunks end after the end marker of a frame; the first chunk also has the start of the template.
     ends = [ids.shape[1] - 123 * left for left in range(len(frames) - 1, -1, -1)]
     for at in range(0, len(frames), chunk_frames):
         some = frames[at : at + chunk_frames]
@@ -267,7 +267,7 @@ def _decode(model: Any, cache: DynamicCache, ids: list[int], position: int, new_
     return tuple(reply)
 
 
-def _timed(run: Callable[[], Replies]) -> Timed:
+def _time(run: Callable[[], Replies]) -> Timed:
     start = time.perf_counter()
     result = run()
     return time.perf_counter() - start, result

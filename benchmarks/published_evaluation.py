@@ -1,14 +1,15 @@
-"""What a full published evaluation would take on 1, 8 and 64 GPUs: requests, hours, cost, and what sharing saves.
+"""Simulate a full published evaluation on 1, 8 and 64 GPUs: requests, hours, cost, and savings by sharing.
 
-225 trajectories with their questions, drawn from the seed, are asked about in every mode by four models, as the harness
-does it: a group is a trajectory, its contexts are in the order in which they begin alike, and a request encodes what
-the one before it did not. Groups go to workers longest first; a worker has as many GPUs as its longest context needs.
+225 trajectories with questions are sampled from the seed. Four models answer them in every mode, as the harness does: a
+group is a trajectory, its contexts are sorted by their common prefixes, and a request encodes only what the one before
+did not. Workers take the longest groups first; a worker has as many GPUs as its longest context requires.
 
     python benchmarks/published_evaluation.py
     python benchmarks/published_evaluation.py --prefill qwen2.5-vl=8000:9000,128000:5000 --decode qwen2.5-vl=35
 
-The last line puts in what was measured on a GPU (benchmarks/gpu.md): tokens/s of encoding at two lengths, tokens/s of
-decoding at a short one. What is not measured is reckoned from the machine's numbers. docs/cost.md has the formulae.
+The second command uses measurements on a GPU (benchmarks/gpu.md): tokens/s of encoding at two lengths, and tokens/s of
+decoding at a short one. Rates without measurements are estimated from the machine's numbers. docs/cost.md has the
+formulae.
 """
 
 import argparse
@@ -24,11 +25,11 @@ from evaluation_costs import (
     Rates,
     Request,
     Shape,
-    estimated,
+    estimate_rates,
     gpus_for,
     largest_context,
     makespan,
-    measured_prefill,
+    rates_from_prefill,
     seconds,
 )
 
@@ -39,11 +40,11 @@ GPUS = (1, 8, 64)
 
 @dataclass(frozen=True)
 class Trajectory:
-    """A trajectory, by what costs.
+    """The parts of a trajectory that determine costs.
 
     Attributes:
-        n_frames: frames; of as many steps.
-        questions: places of the clues, for each.
+        n_frames: number of frames and steps.
+        questions: positions of the clues of each question.
     """
 
     n_frames: int
@@ -52,12 +53,13 @@ class Trajectory:
 
 @dataclass(frozen=True)
 class Mode:
-    """A way to evaluate.
+    """A mode of evaluation.
 
     Attributes:
-        name: of the task.
-        contexts: the contexts of a trajectory, as places of frames, and how many there are not; None for plans.
-        step_seconds: in the simulator, for each reply.
+        name: name of the task.
+        contexts: returns the contexts of a trajectory, as positions of frames, and the number of impossible ones; None
+            for plans.
+        step_seconds: seconds in the simulator per reply.
     """
 
     name: str
@@ -70,15 +72,15 @@ class Run:
     """One model in one mode.
 
     Attributes:
-        mode: its name.
-        model: its name.
-        n_requests: that are answered.
-        n_skipped: that there is no such context for, that are too long, or that no node has the memory for.
-        tokens: of all contexts together.
-        encoded: of them, not found in the cache.
+        mode: name of the mode.
+        model: shape of the model.
+        n_requests: number of answered requests.
+        n_skipped: numbers of requests without a context, with a too long one, and with one that exceeds the memory.
+        tokens: tokens of all contexts.
+        encoded: tokens that were not in the cache.
         largest: tokens of the longest context.
-        n_gpus: of one worker; 0 where there is nothing to do.
-        jobs: seconds of each group, and of each without any sharing.
+        n_gpus: GPUs of one worker; 0 without requests.
+        jobs: seconds of each group, with and without sharing.
     """
 
     mode: str
@@ -92,7 +94,7 @@ class Run:
     jobs: tuple[tuple[float, ...], tuple[float, ...]]
 
     def hours(self, n_gpus: int, load: float, reuse: bool = True) -> float | None:
-        """On so many GPUs; None where they are too few for one worker."""
+        """Return the hours on a number of GPUs, or None if they are too few for one worker."""
         if not self.n_gpus:
             return 0.0
         if n_gpus < self.n_gpus:
@@ -101,7 +103,7 @@ class Run:
 
 
 def main() -> None:
-    """Print the set, a line for each run, and sums."""
+    """Print the set, a line per run, and sums."""
     options = _arguments()
     machine = machine_of(options)
     trajectories = draw(options)
@@ -127,24 +129,35 @@ def _arguments(given: Sequence[str] | None = None) -> argparse.Namespace:
     )
     work = parser.add_argument_group("the work")
     work.add_argument("--trajectories", type=int, default=225, help="published")
-    work.add_argument("--frames", type=float, default=600, help="mean of a trajectory; assumed")
-    work.add_argument("--frames-spread", type=float, default=350, help="their standard deviation; assumed")
-    work.add_argument("--frames-least", type=int, default=300, help="published: steps of a generated trajectory")
-    work.add_argument("--frames-most", type=int, default=2287, help="published: the longest trajectory")
+    work.add_argument("--frames", type=float, default=600, help="mean frames of a trajectory; assumed")
+    work.add_argument("--frames-spread", type=float, default=350, help="standard deviation of the frames; assumed")
     work.add_argument(
-        "--questions", type=float, default=24, help="mean of a trajectory; as our questions choose, 475/20"
+        "--frames-least", type=int, default=300, help="minimum frames; published: steps of a generated trajectory"
+    )
+    work.add_argument("--frames-most", type=int, default=2287, help="maximum frames; published: the longest trajectory")
+    work.add_argument(
+        "--questions", type=float, default=24, help="mean questions of a trajectory; as in our sets, 475/20"
     )
     work.add_argument("--one-clue", type=float, default=0.635, help="share of questions; from the published totals")
-    work.add_argument("--two-clues", type=float, default=0.165, help="likewise")
-    work.add_argument("--puts", type=float, default=0.5, help="share of two clues that follow each other; assumed")
-    work.add_argument("--most-clues", type=int, default=6, help="of a question with three and more; assumed")
-    work.add_argument("--text-tokens", type=int, default=60, help="of a question with its instruction; assumed")
-    work.add_argument("--reply-tokens", type=int, default=6, help="mean of a reply, at most 50; assumed")
-    work.add_argument("--step-tokens", type=int, default=20, help="words of a plan's step beside its frame; assumed")
-    work.add_argument("--step-seconds", type=float, default=0.024, help="simulator; measured, benchmarks/README.md")
+    work.add_argument("--two-clues", type=float, default=0.165, help="share of questions; from the published totals")
+    work.add_argument(
+        "--puts", type=float, default=0.5, help="share of two-clue questions with successive clues; assumed"
+    )
+    work.add_argument("--most-clues", type=int, default=6, help="maximum clues of a question; assumed")
+    work.add_argument("--text-tokens", type=int, default=60, help="tokens of a question with its instruction; assumed")
+    work.add_argument("--reply-tokens", type=int, default=6, help="mean tokens of a reply, at most 50; assumed")
+    work.add_argument("--step-tokens", type=int, default=20, help="tokens of a plan's step beside its frame; assumed")
+    work.add_argument(
+        "--step-seconds",
+        type=float,
+        default=0.024,
+        help="seconds of a step in the simulator; measured, benchmarks/README.md",
+    )
     work.add_argument("--haystack", default="8,32,128,512,1000", help="sizes in kilo-tokens, as in tasks/nieh/contexts")
-    work.add_argument("--max-context", type=int, default=1_010_000, help="contexts beyond are refused; RoPE extended")
-    work.add_argument("--seed", type=int, default=0, help="of what is drawn")
+    work.add_argument(
+        "--max-context", type=int, default=1_010_000, help="longer contexts are refused; with extended RoPE"
+    )
+    work.add_argument("--seed", type=int, default=0, help="seed of the sampling")
     _machine_arguments(parser.add_argument_group("the machine, one GPU of it"))
     return parser.parse_args(given)
 
@@ -169,7 +182,7 @@ def _machine_arguments(group: argparse._ArgumentGroup) -> None:
 
 
 def machine_of(options: argparse.Namespace) -> Machine:
-    """The machine that the options describe."""
+    """Return the machine of the options."""
     return Machine(
         tflops=options.tflops,
         attention_tflops=options.attention_tflops,
@@ -187,14 +200,14 @@ def machine_of(options: argparse.Namespace) -> Machine:
 
 
 def rates_of(shape: Shape, machine: Machine, options: argparse.Namespace) -> Rates:
-    """A model's rates: measured where they were, else reckoned."""
+    """Return a model's rates, measured ones if they are given, else estimated."""
     if options.frame_seconds is not None:
         shape = replace(shape, frame_seconds=options.frame_seconds)
-    rates = estimated(shape, machine)
+    rates = estimate_rates(shape, machine)
     for name, _, text in (given.partition("=") for given in options.prefill):
         if name == shape.name:
             short, long = (point.split(":") for point in text.split(","))
-            rates = measured_prefill(rates, (int(short[0]), float(short[1])), (int(long[0]), float(long[1])))
+            rates = rates_from_prefill(rates, (int(short[0]), float(short[1])), (int(long[0]), float(long[1])))
     for name, _, text in (given.partition("=") for given in options.decode):
         if name == shape.name:
             rates = replace(rates, step=1 / float(text))
@@ -202,33 +215,33 @@ def rates_of(shape: Shape, machine: Machine, options: argparse.Namespace) -> Rat
 
 
 def draw(options: argparse.Namespace) -> list[Trajectory]:
-    """Trajectories of differing length (log-normal, cut at both ends), with their questions' clues."""
-    dice = np.random.default_rng(options.seed)
+    """Sample trajectories of different lengths (log-normal, clipped), with the clues of their questions."""
+    rng = np.random.default_rng(options.seed)
     spread = np.log1p((options.frames_spread / options.frames) ** 2)
-    lengths = dice.lognormal(np.log(options.frames) - spread / 2, np.sqrt(spread), options.trajectories)
-    found = []
+    lengths = rng.lognormal(np.log(options.frames) - spread / 2, np.sqrt(spread), options.trajectories)
+    trajectories = []
     for n_frames in lengths.clip(options.frames_least, options.frames_most).astype(int).tolist():
-        n_questions = max(1, int(dice.poisson(options.questions)))
-        found.append(Trajectory(n_frames, tuple(_clues(n_frames, dice, options) for _ in range(n_questions))))
-    return found
+        n_questions = max(1, int(rng.poisson(options.questions)))
+        trajectories.append(Trajectory(n_frames, tuple(_clues(n_frames, rng, options) for _ in range(n_questions))))
+    return trajectories
 
 
-def _clues(n_frames: int, dice: np.random.Generator, options: argparse.Namespace) -> tuple[int, ...]:
-    kind = dice.random()
+def _clues(n_frames: int, rng: np.random.Generator, options: argparse.Namespace) -> tuple[int, ...]:
+    kind = rng.random()
     if kind < options.one_clue:
-        return (int(dice.integers(n_frames)),)
+        return (int(rng.integers(n_frames)),)
     if kind < options.one_clue + options.two_clues:
-        if dice.random() < options.puts:
-            first = int(dice.integers(n_frames - 1))
+        if rng.random() < options.puts:
+            first = int(rng.integers(n_frames - 1))
             return (first, first + 1)
         n_clues = 2
     else:
-        n_clues = int(dice.integers(3, options.most_clues + 1))
-    return tuple(sorted(dice.choice(n_frames, n_clues, replace=False).tolist()))
+        n_clues = int(rng.integers(3, options.most_clues + 1))
+    return tuple(sorted(rng.choice(n_frames, n_clues, replace=False).tolist()))
 
 
 def modes(options: argparse.Namespace) -> list[Mode]:
-    """All that is evaluated."""
+    """Return all modes."""
     sizes = [int(size) for size in options.haystack.split(",")]
     return [
         Mode("nieh_gt", lambda trajectory, _: (list(trajectory.questions), 0)),
@@ -240,13 +253,13 @@ def modes(options: argparse.Namespace) -> list[Mode]:
 
 def _haystack_of(size: int, seed: int) -> Callable[[Trajectory, Shape], tuple[list[tuple[int, ...]], int]]:
     def contexts(trajectory: Trajectory, shape: Shape) -> tuple[list[tuple[int, ...]], int]:
-        dice = random.Random(seed)
+        rng = random.Random(seed)
         n = size * 1000 // shape.frame_tokens
         windows = [
-            _window(clues, trajectory.n_frames, n, depth, dice) for clues in trajectory.questions for depth in range(5)
+            _window(clues, trajectory.n_frames, n, depth, rng) for clues in trajectory.questions for depth in range(5)
         ]
-        found = [window for window in windows if not isinstance(window, str)]
-        return found, len(windows) - len(found)
+        possible = [window for window in windows if not isinstance(window, str)]
+        return possible, len(windows) - len(possible)
 
     return contexts
 
@@ -254,25 +267,25 @@ def _haystack_of(size: int, seed: int) -> Callable[[Trajectory, Shape], tuple[li
 def requests(
     trajectory: Trajectory, mode: Mode, shape: Shape, options: argparse.Namespace
 ) -> tuple[list[Request], int]:
-    """The requests of a group, and how many there are not because there is no such context."""
+    """Return the requests of a group, and the number of impossible contexts."""
     if mode.contexts is None:
         return list(_plan_requests(trajectory, shape, options)), 0
     contexts, n_missing = mode.contexts(trajectory, shape)
-    found, before = [], ()
+    result, before = [], ()
     for frames in sorted(contexts):
-        n_shared = len(frames) if frames == before else _n_alike(frames, before)
+        n_shared = len(frames) if frames == before else _n_common(frames, before)
         tokens = len(frames) * shape.frame_tokens + options.text_tokens
-        found.append(Request(tokens, n_shared * shape.frame_tokens, options.reply_tokens))
+        result.append(Request(tokens, n_shared * shape.frame_tokens, options.reply_tokens))
         before = frames
-    return found, n_missing
+    return result, n_missing
 
 
-def _n_alike(one: Sequence[int], other: Sequence[int]) -> int:
+def _n_common(one: Sequence[int], other: Sequence[int]) -> int:
     return sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], zip(one, other, strict=False)))
 
 
 def _plan_requests(trajectory: Trajectory, shape: Shape, options: argparse.Namespace) -> Iterator[Request]:
-    """An agent's: for each step the whole history, which grows by a frame and an action."""
+    """Yield the requests of an agent: for each step the whole history, which grows by a frame and an action."""
     step = shape.frame_tokens + options.step_tokens
     for number in range(1, trajectory.n_frames + 1):
         yield Request(number * step, (number - 1) * step, options.reply_tokens)
@@ -286,20 +299,20 @@ def run(
     machine: Machine,
     options: argparse.Namespace,
 ) -> Run:
-    """What one model in one mode takes."""
+    """Simulate one model in one mode."""
     n_absent = n_long = n_large = 0
     groups: list[list[Request]] = []
     for trajectory in trajectories:
-        found, n_missing = requests(trajectory, mode, shape, options)
-        short = [request for request in found if request.context <= options.max_context]
+        group, n_missing = requests(trajectory, mode, shape, options)
+        short = [request for request in group if request.context <= options.max_context]
         fitting = [request for request in short if gpus_for(shape, machine, request.context) is not None]
-        n_absent, n_long = n_absent + n_missing, n_long + len(found) - len(short)
+        n_absent, n_long = n_absent + n_missing, n_long + len(group) - len(short)
         n_large += len(short) - len(fitting)
         if fitting:
             groups.append(fitting)
-    asked = [request for group in groups for request in group]
-    largest = max((request.context for request in asked), default=0)
-    n_gpus = (gpus_for(shape, machine, largest) or 0) if asked else 0
+    answered = [request for group in groups for request in group]
+    largest = max((request.context for request in answered), default=0)
+    n_gpus = (gpus_for(shape, machine, largest) or 0) if answered else 0
     jobs = [
         tuple(
             sum(seconds(request, rates, reuse) / machine.speed(n_gpus) + mode.step_seconds for request in group)
@@ -310,10 +323,10 @@ def run(
     return Run(
         mode.name,
         shape,
-        len(asked),
+        len(answered),
         (n_absent, n_long, n_large),
-        sum(request.context for request in asked),
-        sum(request.context - request.cached for request in asked),
+        sum(request.context for request in answered),
+        sum(request.context - request.cached for request in answered),
         largest,
         n_gpus,
         (jobs[0], jobs[1]),
@@ -328,7 +341,7 @@ _HEAD = (
 
 
 def table(runs: Sequence[Run], load: float, price: float) -> str:
-    """A line for each run, and one for the sum over each model's and over all."""
+    """Return a line for each run, one for the sum of each model, and one for the sum of all."""
     lines = [_HEAD]
     for one in runs:
         extension = one.largest / one.model.limit
@@ -347,7 +360,7 @@ def table(runs: Sequence[Run], load: float, price: float) -> str:
 
 
 def _times(runs: Sequence[Run], load: float, price: float) -> str:
-    """Hours, cost and saving of runs one after the other; a dash where one of them cannot be run on so few GPUs."""
+    """Return hours, cost and saving of successive runs, with a dash if one of them needs more GPUs."""
     hours = {n: _sum([one.hours(n, load) for one in runs]) for n in GPUS}
     without = _sum([one.hours(8, load, reuse=False) for one in runs])
     shown = f"{_number(hours[1], 9)}{_number(hours[8], 9)}{_number(hours[64], 8)}"

@@ -1,9 +1,9 @@
-"""How far the questions of a set can be trusted: a second opinion on all of them, and what can be had without looking.
+"""Check the questions on a set: the independent checker on all candidates, and baselines that do not see frames.
 
 python benchmarks/question_checks.py SET [--per-trajectory 25] [--seed 0] [--further]
 
-The checker answers every question that the rules can make, from the log, by another way than the rules; then once from
-the entries of the clue frames alone, and once with each clue left out. The baselines are those of the chosen questions.
+The checker answers every candidate of the rules in another way: from the whole log, from the entries of the clue
+frames, and with each clue left out. The baselines answer the questions that are chosen from the candidates.
 """
 
 import argparse
@@ -30,39 +30,41 @@ def main() -> None:
     parser.add_argument("--per-trajectory", type=int, default=25)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--further", action="store_true", help="choose among the further forms too")
-    chosen = parser.parse_args()
-    check_all(chosen.set)
-    made = generate_questions(
-        chosen.set, seed=chosen.seed, per_trajectory=chosen.per_trajectory, further=chosen.further
+    options = parser.parse_args()
+    check_all(options.set)
+    generated = generate_questions(
+        options.set, seed=options.seed, per_trajectory=options.per_trajectory, further=options.further
     )
-    print(f"chosen: {len(made.questions)}, by number of clues {made.by_clues()}, by type {made.by_type()}")
-    asked = [Sample(question, question.clues) for question in made.questions]
-    yes_no = [item for item in asked if item.question.answers[0] in _YES_NO]
+    print(
+        f"chosen: {len(generated.questions)}, by number of clues {generated.by_clues()}, by type {generated.by_type()}"
+    )
+    samples = [Sample(question, question.clues) for question in generated.questions]
+    yes_no = [item for item in samples if item.question.answers[0] in _YES_NO]
     for name in ("oracle", "blind", "blind-count"):
-        predict = BASELINES[name](0).fit(asked)
-        print(f"{name}, strict: {mean(predict, asked):.3f}; yes/no alone {mean(predict, yes_no):.3f}")
+        predict = BASELINES[name](0).fit(samples)
+        print(f"{name}, strict: {mean(predict, samples):.3f}; yes/no alone {mean(predict, yes_no):.3f}")
 
 
 def check_all(folder: Path) -> None:
-    """Print how often the checker agrees with every candidate, and why not."""
+    """Print how many candidates the checker confirms, and those that it does not."""
     histories = [TrajectoryHistory(path.name, read_steps(path)) for path in sorted((folder / "metadata").iterdir())]
     vocabulary = frozenset[str]().union(*(history.all_object_types for history in histories))
-    found: Counter[str] = Counter()
+    counts: Counter[str] = Counter()
     for history in histories:
         checker = Checker(history.steps, DEFAULT_SHARE)
         rng = random.Random(history.traj_id)
         for candidate in (*candidates_of(history, vocabulary, rng), *further_candidates_of(history, rng)):
             question = candidate.question(history.traj_id)
             verdict = checker.verdict(question)
-            found.update(["all", *(name for name in ("right", "sufficient", "minimal") if getattr(verdict, name))])
+            counts.update(["all", *(name for name in ("right", "sufficient", "minimal") if getattr(verdict, name))])
             if not verdict.sound:
                 print(f"  {question.traj_id}: {question.text} {question.answers} {question.clues}: {verdict}")
-    shares = ", ".join(f"{name} {found[name]}" for name in ("right", "sufficient", "minimal"))
-    print(f"{len(histories)} trajectories, {found['all']} candidates: {shares}")
+    shares = ", ".join(f"{name} {counts[name]}" for name in ("right", "sufficient", "minimal"))
+    print(f"{len(histories)} trajectories, {counts['all']} candidates: {shares}")
 
 
 def mean(predict: Predict, samples: Sequence[Sample]) -> float:
-    """A baseline's mean under the strict scorer."""
+    """Return the mean of a baseline with the strict scorer."""
     return sum(score(predict(item), item.question.answers, "strict") for item in samples) / len(samples)
 
 

@@ -1,12 +1,12 @@
-"""OpenVLA and SpatialVLA on the libraries that they were published with, behind `/act`, for `check-parity`.
+"""Serve OpenVLA and SpatialVLA with the libraries of their publication, behind `/act`, for `check-parity`.
 
 pip install --no-deps --target OLD timm==0.9.16 transformers==4.47.0 tokenizers==0.21.0 huggingface_hub==0.27.0
 PYTHONPATH=OLD python benchmarks/reference_policies.py openvla CHECKPOINT --port 8000
 infthor-eval check-parity openvla --model-args pretrained=CHECKPOINT,dtype=float32 --reference-url http://127.0.0.1:8000
 
-A second opinion that shares no line with `model_adapters`: towers are timm's, the rest transformers 4.47's, read
-strictly by the checkpoint's own names; every token is chosen from the whole sequence anew, without a cache. CHECKPOINT
-may be a twin's: `OpenVLATiny.twin.save(folder, seed=0)`. In float32, on the CPU; one process per policy.
+This implementation shares no code with `model_adapters`. Towers are timm's, all else is from transformers 4.47, loaded
+strictly by the checkpoint's own names. Every token is computed from the whole sequence, without a cache. CHECKPOINT can
+be that of a tiny model: `OpenVLATiny.twin.save(folder, seed=0)`. It runs in float32 on the CPU, one process per policy.
 """
 
 import argparse
@@ -32,21 +32,23 @@ Weights = dict[str, torch.Tensor]
 
 
 def main() -> None:
-    """Serve one of the policies until stopped."""
+    """Serve one of the policies until it is stopped."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("policy", choices=["openvla", "spatialvla"])
     parser.add_argument("checkpoint", type=Path)
     parser.add_argument("--port", type=int, default=8000)
     parser.add_argument("--unnorm-key")
-    parser.add_argument("--without-torchvision", action="store_true", help="Only its Python half is on the path.")
-    chosen = parser.parse_args()
-    if chosen.without_torchvision:
+    parser.add_argument(
+        "--without-torchvision", action="store_true", help="Only the Python half of torchvision is installed."
+    )
+    options = parser.parse_args()
+    if options.without_torchvision:
         library = torch.library.Library("torchvision", "DEF")
         for name in ("nms", "qnms"):
             library.define(f"{name}(Tensor dets, Tensor scores, float iou_threshold) -> Tensor")
-    make = {"openvla": openvla, "spatialvla": spatialvla}[chosen.policy]
+    make = {"openvla": openvla, "spatialvla": spatialvla}[options.policy]
     with torch.inference_mode():
-        serve(make(chosen.checkpoint, chosen.unnorm_key), chosen.port)
+        serve(make(options.checkpoint, options.unnorm_key), options.port)
 
 
 def serve(act: Act, port: int) -> None:
@@ -54,10 +56,10 @@ def serve(act: Act, port: int) -> None:
 
     class Handler(BaseHTTPRequestHandler):
         def do_POST(self) -> None:
-            asked = json.loads(self.rfile.read(int(self.headers["Content-Length"])))
-            sent = asked["image"]
+            request = json.loads(self.rfile.read(int(self.headers["Content-Length"])))
+            sent = request["image"]
             pixels = np.frombuffer(base64.b64decode(sent["__numpy__"]), np.uint8).reshape(sent["shape"])
-            body = json.dumps(act(Image.fromarray(pixels), asked["instruction"]).tolist()).encode()
+            body = json.dumps(act(Image.fromarray(pixels), request["instruction"]).tolist()).encode()
             self.send_response(200)
             self.send_header("Content-Length", str(len(body)))
             self.end_headers()
@@ -71,7 +73,7 @@ def serve(act: Act, port: int) -> None:
 
 
 def read(folder: Path) -> tuple[dict[str, Any], Weights, Tokenizer]:
-    """Config, weights in float32, and tokenizer of a checkpoint."""
+    """Return config, weights in float32, and tokenizer of a checkpoint."""
     weights: Weights = {}
     for path in sorted(folder.glob("*.safetensors")):
         weights |= {key: value.float() for key, value in load_file(path).items()}
@@ -83,34 +85,34 @@ def read(folder: Path) -> tuple[dict[str, Any], Weights, Tokenizer]:
 
 
 def part(weights: Weights, prefix: str, **renamed: str) -> Weights:
-    """The weights below a prefix, without it."""
-    found = {key.removeprefix(prefix): value for key, value in weights.items() if key.startswith(prefix)}
+    """Return the weights below a prefix, without the prefix in their names."""
+    selected = {key.removeprefix(prefix): value for key, value in weights.items() if key.startswith(prefix)}
     for old, new in renamed.items():
-        found = {key.replace(old, new): value for key, value in found.items()}
-    return found
+        selected = {key.replace(old, new): value for key, value in selected.items()}
+    return selected
 
 
 def pixels_of(image: Image.Image, size: int) -> torch.Tensor:
-    """(1, 3, size, size), between 0 and 1."""
-    squashed = np.asarray(image.convert("RGB").resize((size, size), Image.Resampling.BICUBIC), dtype=np.float32)
-    return torch.from_numpy(squashed / 255).permute(2, 0, 1)[None]
+    """Return the pixels [1, 3, size, size], from 0 to 1."""
+    resized = np.asarray(image.convert("RGB").resize((size, size), Image.Resampling.BICUBIC), dtype=np.float32)
+    return torch.from_numpy(resized / 255).permute(2, 0, 1)[None]
 
 
-def scaled(actions: np.ndarray, known: dict[str, Any], key: str | None) -> np.ndarray:
-    """Actions in the units of a data set; the only one where none is named."""
-    found = known[key or next(iter(known))]["action"]
-    low, high = np.array(found["q01"]), np.array(found["q99"])
-    return np.where(found.get("mask", [True] * len(low)), 0.5 * (actions + 1) * (high - low) + low, actions)
+def unnormalize(actions: np.ndarray, known: dict[str, Any], key: str | None) -> np.ndarray:
+    """Return actions in the units of a data set, the only one if `key` is None."""
+    statistics = known[key or next(iter(known))]["action"]
+    low, high = np.array(statistics["q01"]), np.array(statistics["q99"])
+    return np.where(statistics.get("mask", [True] * len(low)), 0.5 * (actions + 1) * (high - low) + low, actions)
 
 
 def towers(config: dict[str, Any], weights: Weights) -> list[nn.Module]:
-    """OpenVLA's two towers as timm has them."""
+    """Build OpenVLA's two towers with timm."""
     import timm
     from timm.models.vision_transformer import VisionTransformer
 
-    found = []
+    result = []
     for number, name in enumerate(("featurizer", "fused_featurizer")):
-        if "vision_towers" in config:  # a twin's
+        if "vision_towers" in config:  # of a tiny model
             shape = config["vision_towers"][number]
             kinds = {
                 "dinov2": {"init_values": 1e-5, "reg_tokens": 4, "no_embed_class": True},
@@ -130,12 +132,12 @@ def towers(config: dict[str, Any], weights: Weights) -> list[nn.Module]:
             size = config["image_sizes"][number]
             tower = timm.create_model(config["timm_model_ids"][number], num_classes=0, img_size=size)
         tower.load_state_dict(part(weights, f"vision_backbone.{name}.", scale_factor="gamma"))
-        found.append(tower.eval())
-    return found
+        result.append(tower.eval())
+    return result
 
 
 def openvla(folder: Path, key: str | None) -> Act:
-    """OpenVLA on timm's towers and transformers' Llama."""
+    """Load OpenVLA with timm's towers and transformers' Llama."""
     from transformers import LlamaConfig, LlamaForCausalLM
 
     config, weights, tokenizer = read(folder)
@@ -167,13 +169,13 @@ def openvla(folder: Path, key: str | None) -> Act:
             written.append(last - 256 + int(logits[0, -1, last - 256 : last].argmax()))
         borders = np.linspace(-1, 1, 256)
         middles = (borders[:-1] + borders[1:]) / 2
-        return scaled(middles[np.clip(last - np.array(written) - 1, 0, 254)], config["norm_stats"], key)
+        return unnormalize(middles[np.clip(last - np.array(written) - 1, 0, 254)], config["norm_stats"], key)
 
     return act
 
 
 def spatialvla(folder: Path, key: str | None) -> Act:
-    """SpatialVLA on transformers 4.47's SigLIP, ZoeDepth and Gemma 2."""
+    """Load SpatialVLA with SigLIP, ZoeDepth and Gemma 2 of transformers 4.47."""
     from transformers import (
         AutoModel,
         Gemma2Config,
@@ -237,15 +239,15 @@ def spatialvla(folder: Path, key: str | None) -> Act:
             start, stop = places[number % 3]
             written.append(start + int(output.logits[0, -1, start:stop].argmax()))
         steps = np.array(
-            [decoded(written[at : at + 3], places, processor["bin_policy"]) for at in range(0, len(written), 3)]
+            [decode_action(written[at : at + 3], places, processor["bin_policy"]) for at in range(0, len(written), 3)]
         )
-        return scaled(steps, processor["statistics"], key)
+        return unnormalize(steps, processor["statistics"], key)
 
     return act
 
 
 def points(depth: torch.Tensor, camera: dict[str, Any], size: int, patch: int) -> torch.Tensor:
-    """Four points of each patch in front of the camera."""
+    """Return four points per patch in camera coordinates."""
     matrix = torch.tensor(camera["intrinsic"]).float()
     matrix[:2] *= torch.tensor([size / camera["width"], size / camera["height"]])[:, None]
     y, x = torch.meshgrid(torch.arange(0, size, patch // 2), torch.arange(0, size, patch // 2), indexing="ij")
@@ -257,7 +259,7 @@ def points(depth: torch.Tensor, camera: dict[str, Any], size: int, patch: int) -
 
 
 def places_of(begin: int, bins: dict[str, dict[str, list[float]]]) -> list[tuple[int, int]]:
-    """The ids of translations, rotations and grippers."""
+    """Return the ranges of token ids of translations, rotations and grippers."""
     n_translations, n_rotations = (
         math.prod(len(axis) - 1 for axis in bins[kind].values()) for kind in ("translation", "rotation")
     )
@@ -265,19 +267,21 @@ def places_of(begin: int, bins: dict[str, dict[str, list[float]]]) -> list[tuple
     return [(ends[0], ends[1]), (ends[1], ends[2]), (ends[2], ends[2] + 2)]
 
 
-def decoded(ids: list[int], places: list[tuple[int, int]], bins: dict[str, dict[str, list[float]]]) -> list[float]:
-    """The seven numbers that three tokens mean."""
+def decode_action(
+    ids: list[int], places: list[tuple[int, int]], bins: dict[str, dict[str, list[float]]]
+) -> list[float]:
+    """Return the seven numbers that three tokens encode."""
     numbers = [token - start for token, (start, _) in zip(ids, places, strict=True)]
     middles = []
     for number, kind, names in zip(
         numbers, ("translation", "rotation"), (("theta", "phi", "r"), ("roll", "pitch", "yaw")), strict=False
     ):
-        left, found = number, {}
+        left, values = number, {}
         for name in reversed(names):
             axis = bins[kind][f"{name}_bins"]
             left, at = divmod(left, len(axis) - 1)
-            found[name] = 0.5 * (axis[at] + axis[at + 1])
-        middles += [found[name] for name in names]
+            values[name] = 0.5 * (axis[at] + axis[at + 1])
+        middles += [values[name] for name in names]
     theta, phi, r, *rotation = middles
     xyz = (r * math.sin(theta) * math.cos(phi), r * math.sin(theta) * math.sin(phi), r * math.cos(theta))
     return [*(min(max(x, -1.0), 1.0) for x in xyz), *rotation, float(numbers[2] != 0)]

@@ -1,11 +1,11 @@
-"""Whether what the factory makes holds: trajectories with final tasks, replayed in a fresh simulator and checked.
+"""Check generated trajectories with final tasks by replaying them in a new simulator.
 
 python benchmarks/replayed_trajectories.py --data FOLDER [--procedural 20] [--recorded 20] [--count 100]
     [--min-steps 300] [--min-subgoals 10] [--out FOLDER]
 
-Uses the commands as a person does: `generate --test-set`, then `replay`. A trajectory holds if every action of it is
-carried out again, the object log comes out the same in every step, and its final task is about types seen at both ends
-of the log. Stopped and started again with the same --out it goes on.
+It runs the commands `generate --test-set` and `replay`. A trajectory is correct if the replay accepts every action, the
+object log is the same in every step, and the types of its final task were seen at both ends of the log. The same
+command with the same --out resumes.
 """
 
 import argparse
@@ -29,7 +29,7 @@ _BATHROOMS = range(401, 431)
 
 
 def main() -> None:
-    """Make, replay and check, and print the counts."""
+    """Generate, replay, check, and print the counts."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--data", type=Path, required=True, help="folder with recorded floor plans")
     parser.add_argument("--procedural", type=int, default=20, help="procedural scenes")
@@ -37,59 +37,59 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=100, help="trajectories")
     parser.add_argument("--min-steps", type=int, default=300)
     parser.add_argument("--min-subgoals", type=int, default=10)
-    parser.add_argument("--out", type=Path, help="kept there; else in a folder that is removed")
-    chosen = parser.parse_args()
+    parser.add_argument("--out", type=Path, help="folder of the results; default: temporary")
+    options = parser.parse_args()
     with tempfile.TemporaryDirectory() as scratch:
-        out = chosen.out or Path(scratch)
-        scenes = procedural(chosen.procedural) + recorded(chosen.data, chosen.recorded)
-        generated = make(scenes, chosen, out / "trajectories")
-        command = ["replay", out / "trajectories", "--data", chosen.data, "--out", out / "set", "--json"]
+        out = options.out or Path(scratch)
+        scenes = procedural_scenes(options.procedural) + recorded_scenes(options.data, options.recorded)
+        generated = generate_all(scenes, options, out / "trajectories")
+        command = ["replay", out / "trajectories", "--data", options.data, "--out", out / "set", "--json"]
         replayed = run(command)
         trajectories = list(iter_trajectories(out / "trajectories"))
         same = sum(has_same_log(item, out / "set" / "metadata" / folder_name(item.traj_id)) for item in trajectories)
     show(generated, replayed, trajectories, same)
 
 
-def procedural(number: int) -> list[str]:
-    """Names of so many procedural scenes, room by room."""
+def procedural_scenes(number: int) -> list[str]:
+    """Return the names of this many procedural scenes, alternating between room types."""
     return [f"{_ROOMS[index % len(_ROOMS)]}-{1 + index // len(_ROOMS)}" for index in range(number)]
 
 
-def recorded(data: Path, number: int) -> list[str]:
-    """Names of so many recorded floor plans without the bathrooms, evenly out of all."""
+def recorded_scenes(data: Path, number: int) -> list[str]:
+    """Return the names of this many recorded floor plans without bathrooms, evenly spaced among all."""
     names = [name for name in floor_plan_names(data) if int(name.removeprefix("FloorPlan")) not in _BATHROOMS]
     return [names[index * len(names) // number] for index in range(number)]
 
 
-def make(scenes: list[str], chosen: argparse.Namespace, out: Path) -> dict[str, Any]:
-    """Generate: each scene as often as it takes, with another seed each time."""
-    per_scene, more = divmod(chosen.count, len(scenes))
+def generate_all(scenes: list[str], options: argparse.Namespace, out: Path) -> dict[str, Any]:
+    """Generate the trajectories, with as many seeds per scene as are needed."""
+    per_scene, more = divmod(options.count, len(scenes))
     total: dict[str, Any] = {"failures": []}
     for names, count in ((scenes[:more], per_scene + 1), (scenes[more:], per_scene)):
         if not names or not count:
             continue
-        options = [word for name in names for word in ("--scene", name)]
-        options += ["--min-steps", str(chosen.min_steps), "--min-subgoals", str(chosen.min_subgoals)]
-        options += ["--count", str(count), "--test-set", "--data", chosen.data]
-        document = run(["generate", *options, "--out", out, "--json"])
+        words = [word for name in names for word in ("--scene", name)]
+        words += ["--min-steps", str(options.min_steps), "--min-subgoals", str(options.min_subgoals)]
+        words += ["--count", str(count), "--test-set", "--data", options.data]
+        document = run(["generate", *words, "--out", out, "--json"])
         total["failures"] += document["failures"]
     return total
 
 
 def run(arguments: list[Any]) -> dict[str, Any]:
-    """What a command prints with --json."""
+    """Return what a command prints with --json."""
     command = [str(Path(sys.executable).with_name("infthor-eval")), *map(str, arguments)]
-    ended = subprocess.run(command, stdout=subprocess.PIPE, check=False)
-    if not ended.stdout:
-        raise SystemExit(f"{' '.join(command)}: ended with {ended.returncode} and printed nothing")
-    document: dict[str, Any] = json.loads(ended.stdout)
+    result = subprocess.run(command, stdout=subprocess.PIPE, check=False)
+    if not result.stdout:
+        raise SystemExit(f"{' '.join(command)}: ended with {result.returncode} and printed nothing")
+    document: dict[str, Any] = json.loads(result.stdout)
     return document
 
 
 def has_same_log(trajectory: Trajectory, folder: Path) -> bool:
-    """Whether the replay saw in every step what the making did."""
-    made = [{key: value for key, value in entry.items() if key != "step"} for entry in trajectory.object_log]
-    return made == [msgspec.to_builtins(step.object_log) for step in read_steps(folder)]
+    """Return True if replay and generation have the same log in every step."""
+    logged = [{key: value for key, value in entry.items() if key != "step"} for entry in trajectory.object_log]
+    return logged == [msgspec.to_builtins(step.object_log) for step in read_steps(folder)]
 
 
 def show(generated: dict[str, Any], replayed: dict[str, Any], trajectories: list[Trajectory], same: int) -> None:
@@ -102,11 +102,11 @@ def show(generated: dict[str, Any], replayed: dict[str, Any], trajectories: list
     for name in sorted(tried):
         print(f"{name:45} {tried[name]:6} {accepted[name]:9} {tried[name] - accepted[name]:8}")
     steps = [len(item.plan.low_actions) for item in trajectories]
-    broken = [found for item in trajectories if (found := violation(item))]
-    print(f"made: {len(trajectories)}, {len({item.scene.floor_plan for item in trajectories})} scenes; ", end="")
-    print(f"{min(steps)} to {max(steps)} steps, {sum(steps)} together; not made: {len(generated['failures'])}")
-    print(f"replayed whole, action for action: {replayed['whole']} of {len(trajectories)}; same object log: {same}")
-    print(f"final tasks that meet the rule of both ends: {len(trajectories) - len(broken)} of {len(trajectories)}")
+    broken = [problem for item in trajectories if (problem := violation(item))]
+    print(f"generated: {len(trajectories)}, {len({item.scene.floor_plan for item in trajectories})} scenes; ", end="")
+    print(f"{min(steps)} to {max(steps)} steps, {sum(steps)} together; not generated: {len(generated['failures'])}")
+    print(f"replayed without a refused action: {replayed['whole']} of {len(trajectories)}; same object log: {same}")
+    print(f"final tasks that satisfy the rule of both ends: {len(trajectories) - len(broken)} of {len(trajectories)}")
     for line in [*generated["failures"], *broken, *map(str, replayed["diverged"]), *map(str, replayed["failures"])]:
         print(f"  {line}")
 

@@ -1,13 +1,13 @@
-"""How fast the embedded simulator is through the real Controller, beside the transport's own rate.
+"""Measure the speed of the embedded simulator through the real Controller, and of the transport alone.
 
     python benchmarks/sim_speed.py [--scene kitchen-1] [--steps 600] [--against CHECKOUT]
 
-Prints one JSON object: steps per second with RGB, with RGB, ids and depth, and of a process that answers every
-action with the same ready-made reply of the same size ("transport"); seconds from start to first frame; megabytes of
-the simulator's process at the start and at the end. The frames are 300x300.
+It prints one JSON object: steps per second with RGB, with RGB, ids and depth, and of a process that answers every
+action with one prepared reply of the same size ("transport"); seconds from start to first frame; megabytes of the
+simulator's process at the start and at the end. The frames are 300x300.
 
-With --against it compares this simulator with that of another checkout instead, both at work in turn: steps per second
-(median of eight rounds) and the process's own milliseconds of processor time a step, with and without smooth edges.
+With --against it compares this simulator with that of another checkout, in alternation: steps per second (median of
+eight rounds) and processor milliseconds per step, with and without smooth edges.
 """
 
 import argparse
@@ -26,7 +26,7 @@ _FULL = {"renderInstanceSegmentation": True, "renderDepthImage": True}
 
 
 def controller(command: str, scene: str, **init: Any) -> Any:
-    """A Controller on a stand-in started by `command`."""
+    """Return a Controller of the simulator that `command` starts."""
     from ai2thor.controller import Controller
 
     return Controller(
@@ -36,7 +36,7 @@ def controller(command: str, scene: str, **init: Any) -> Any:
 
 
 def rate(client: Any, steps: int) -> float:
-    """Steps per second over a fixed mixture of moves."""
+    """Return the steps per second of a fixed sequence of moves."""
     for index in range(20):
         client.step(_MOVES[index % len(_MOVES)])
     start = time.perf_counter()
@@ -46,14 +46,14 @@ def rate(client: Any, steps: int) -> float:
 
 
 def memory(client: Any) -> float:
-    """Resident megabytes of the stand-in."""
+    """Return the resident megabytes of the simulator."""
     status = Path(f"/proc/{client.server.unity_proc.pid}/status").read_text(encoding="ascii")
     line = next(line for line in status.splitlines() if line.startswith("VmRSS"))
     return int(line.split()[1]) / 1024
 
 
 def echo(scene: str, full: bool) -> None:
-    """Answers every action with one ready-made reply: what the transport and the client cost by themselves."""
+    """Answer every action with one prepared reply, to measure transport and client alone."""
     from infthor_eval.sim.fifo import FifoPipes
     from infthor_eval.sim.scenes.catalogue import Catalogue
     from infthor_eval.sim.server import SimulatorServer
@@ -78,7 +78,7 @@ def echo(scene: str, full: bool) -> None:
 
 
 def measure(scene: str, steps: int) -> dict[str, Any]:
-    """All numbers; see the module."""
+    """Return all numbers, see the module's docstring."""
     python = shlex.quote(sys.executable)
     result: dict[str, Any] = {"scene": scene, "steps": steps}
     for name, init in (("rgb", {}), ("rgb_ids_depth", _FULL)):
@@ -98,14 +98,14 @@ def measure(scene: str, steps: int) -> dict[str, Any]:
 
 
 def processor_time(client: Any) -> float:
-    """Milliseconds that the stand-in has computed so far."""
+    """Return the processor milliseconds of the simulator so far."""
     status = Path(f"/proc/{client.server.unity_proc.pid}/stat").read_text(encoding="ascii")
     ticks = status.rpartition(")")[2].split()[11:13]
     return sum(map(int, ticks)) * 1000 / os.sysconf("SC_CLK_TCK")
 
 
 def compare(scene: str, steps: int, other: str) -> dict[str, Any]:
-    """This simulator and another checkout's; see the module."""
+    """Compare this simulator with that of another checkout, see the module's docstring."""
     python, here = shlex.quote(sys.executable), str(Path(__file__).parents[1])
     result: dict[str, Any] = {"scene": scene, "rounds": 8}
     for load, init in (("rgb", {}), ("rgb_ids_depth", _FULL)):
@@ -113,13 +113,13 @@ def compare(scene: str, steps: int, other: str) -> dict[str, Any]:
         for name, root, more in (("other", other, {}), ("ours", here, {}), ("ours_low", here, {"quality": "Low"})):
             os.environ["PYTHONPATH"] = root
             clients[name] = controller(f"{python} -m infthor_eval.sim", scene, **init, **more)
-        began = {name: processor_time(client) for name, client in clients.items()}
+        before = {name: processor_time(client) for name, client in clients.items()}
         rates = [{name: rate(client, steps // 8) for name, client in clients.items()} for _ in range(8)]
         n_steps = 8 * (steps // 8 + 20)
         result[load] = {
             name: {
-                "steps_per_second": round(statistics.median(found[name] for found in rates), 1),
-                "processor_ms_a_step": round((processor_time(client) - began[name]) / n_steps, 2),
+                "steps_per_second": round(statistics.median(round_rates[name] for round_rates in rates), 1),
+                "processor_ms_a_step": round((processor_time(client) - before[name]) / n_steps, 2),
             }
             for name, client in clients.items()
         }
@@ -129,7 +129,7 @@ def compare(scene: str, steps: int, other: str) -> dict[str, Any]:
 
 
 def main() -> None:
-    """Parses the arguments; see the module."""
+    """Parse the arguments and print the numbers."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--scene", default="kitchen-1")
     parser.add_argument("--steps", type=int, default=600)
@@ -141,12 +141,12 @@ def main() -> None:
         return
     with tempfile.TemporaryDirectory() as home:
         os.environ["HOME"] = home  # ai2thor writes logs below HOME and prunes what it finds there
-        found = (
+        result = (
             compare(options.scene, options.steps, str(Path(options.against).resolve()))
             if options.against
             else measure(options.scene, options.steps)
         )
-        print(json.dumps(found, indent=1))
+        print(json.dumps(result, indent=1))
 
 
 if __name__ == "__main__":

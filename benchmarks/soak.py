@@ -1,13 +1,13 @@
-"""Long runs with a fault every few units: what they find is what runs find that nobody disturbs.
+"""Check that long runs with injected faults have the same results as undisturbed runs.
 
     python benchmarks/soak.py --questions SET --trajectories DIR [--data FOLDER] [--n-questions 2000]
         [--n-episodes 300] [--every 20] [--out DIR]
 
-Questions are asked of a server (in this script; its replies follow from the request) by two workers; episodes are
-pick-ups of planner-arm, by two workers with their simulators. Each is run twice: undisturbed, in one process, and
-disturbed. The faults, in turn: a worker is killed; a simulator is killed; the whole run is killed, and the last line
-of a shard cut in the middle; the same with a line garbled (--recover); and the server answers 500, 429, stalls, or
-breaks the connection.
+Two workers ask questions of a server in this script, whose replies depend only on the request. Two workers with their
+simulators run pick-ups of planner-arm. Each is run twice: undisturbed in one process, and disturbed. The faults
+alternate: a worker is killed; a simulator is killed; the whole run is killed and the last line of a shard is cut in the
+middle; the whole run is killed and a line is garbled (--recover); the server answers 500 or 429, stalls, or breaks the
+connection.
 """
 
 import argparse
@@ -38,7 +38,7 @@ _SERVER_FAULTS = ("500", "stall", "429", "reset")
 
 
 def main() -> None:
-    """Run, disturb, compare, print."""
+    """Run everything undisturbed and disturbed, and print the comparison."""
     options = _arguments()
     with tempfile.TemporaryDirectory() as scratch:
         out = options.out or Path(scratch)
@@ -58,22 +58,22 @@ def main() -> None:
 def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--questions", type=Path, required=True, help="an NIEH set")
-    parser.add_argument("--trajectories", type=Path, required=True, help="folder with generated ones")
-    parser.add_argument("--data", type=Path, help="folder with recorded floor plans")
+    parser.add_argument("--trajectories", type=Path, required=True, help="folder of generated trajectories")
+    parser.add_argument("--data", type=Path, help="folder of recorded floor plans")
     parser.add_argument("--n-questions", type=int, default=2000)
     parser.add_argument("--n-episodes", type=int, default=300)
     parser.add_argument("--every", type=int, default=20, help="units, and requests, between two faults")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--out", type=Path, help="kept there; else in a folder that is removed")
+    parser.add_argument("--out", type=Path, help="folder of the results; default: temporary")
     return parser.parse_args()
 
 
 def _with_pick_ups(folder: Path, n: int) -> Iterator[bytes]:
-    found = 0
+    n_found = 0
     for source in iter_sources(folder):
-        if found >= n:
+        if n_found >= n:
             return
-        found += sum(episode.kind is ManipulationKind.PICKUP for episode in arm_episodes(source.read()))
+        n_found += sum(episode.kind is ManipulationKind.PICKUP for episode in arm_episodes(source.read()))
         yield source.raw.replace(b"\n", b" ").strip() + b"\n"
 
 
@@ -85,38 +85,38 @@ def soak(
     options: argparse.Namespace,
     server: "_Server | None" = None,
 ) -> None:
-    """Run the same twice, and say whether what was found is equal."""
+    """Run the same work twice, and print whether the results are equal."""
     began = time.monotonic()
     calm = _Run([*words, "--output", str(out / name / "calm")], out / name / "calm")
     calm.start()
     calm.wait()
-    calmly, began = time.monotonic() - began, time.monotonic()
+    calm_seconds, began = time.monotonic() - began, time.monotonic()
     if server is not None:
         server.disturbing = True
     harsh = _Run([*words, "--workers", "2", "--output", str(out / name / "harsh")], out / name / "harsh")
-    injected = _disturbed(harsh, itertools.cycle(faults), options.every, random.Random(options.seed))
+    injected = _run_disturbed(harsh, itertools.cycle(faults), options.every, random.Random(options.seed))
     if server is not None:
         injected += server.injected
     one, other = calm.units(), harsh.units()
     equal = sum(_plain(one[key]) == _plain(other.get(key, {})) for key in one)
-    told = sum(len(record.get("faults", ())) for record in other.values())
-    failed = [sum("failure" in record for record in found.values()) for found in (one, other)]
+    n_recorded = sum(len(record.get("faults", ())) for record in other.values())
+    failed = [sum("failure" in record for record in units.values()) for units in (one, other)]
     print(
         f"{name}: {len(one)} and {len(other)} units, {equal} equal; results "
         f"{'equal' if calm.summary() == harsh.summary() else 'DIFFER'}; failed {failed[0]} and {failed[1]}; "
-        f"faults injected {dict(sorted(injected.items()))}, {told} told in records; "
-        f"{calmly:.0f} s undisturbed, {time.monotonic() - began:.0f} s disturbed",
+        f"faults injected {dict(sorted(injected.items()))}, {n_recorded} recorded; "
+        f"{calm_seconds:.0f} s undisturbed, {time.monotonic() - began:.0f} s disturbed",
         flush=True,
     )
 
 
 def _plain(record: dict[str, Any]) -> dict[str, Any]:
-    """What is to be equal: all but times, attempts, faults, and what a server's cache held."""
+    """Return what must be equal: all fields but times, attempts, faults and cached tokens."""
     return {name: value for name, value in record.items() if name not in ("seconds", "attempt", "faults", "tokens")}
 
 
-def _disturbed(run: "_Run", faults: Iterator[str], every: int, draw: random.Random) -> Counter[str]:
-    """Let a run come to its end with a fault every so many units; which there were."""
+def _run_disturbed(run: "_Run", faults: Iterator[str], every: int, draw: random.Random) -> Counter[str]:
+    """Finish a run with a fault every `every` units; returns the injected faults."""
     injected: Counter[str] = Counter()
     threshold = every
     run.start()
@@ -131,7 +131,7 @@ def _disturbed(run: "_Run", faults: Iterator[str], every: int, draw: random.Rand
 
 
 def _inject(fault: str, run: "_Run", draw: random.Random) -> bool:
-    """Do it; whether there was anything to do it to."""
+    """Inject a fault; returns False if there is nothing to kill."""
     if fault in ("worker", "simulator"):
         return run.kill(fault, draw)
     run.kill_all()
@@ -142,7 +142,7 @@ def _inject(fault: str, run: "_Run", draw: random.Random) -> bool:
 
 @dataclass
 class _Run:
-    """A run of our command, in processes of its own."""
+    """A run of our command."""
 
     words: Sequence[str]
     output: Path
@@ -151,8 +151,8 @@ class _Run:
     def start(self, more: str | None = None) -> None:
         command = [Path(sys.executable).with_name("infthor-eval"), "run", *self.words, *([more] if more else [])]
         self.output.mkdir(parents=True, exist_ok=True)
-        with (self.output / "said.txt").open("ab") as said:
-            self.process = subprocess.Popen(list(map(str, command)), stdout=said, stderr=said)
+        with (self.output / "output.txt").open("ab") as log:
+            self.process = subprocess.Popen(list(map(str, command)), stdout=log, stderr=log)
 
     def wait(self) -> None:
         assert self.process is not None
@@ -169,7 +169,9 @@ class _Run:
     def _require_end(self) -> None:
         assert self.process is not None
         if self.process.returncode not in (0, 1):
-            raise SystemExit(f"{' '.join(self.words)} ended with {self.process.returncode}: see {self.output}/said.txt")
+            raise SystemExit(
+                f"{' '.join(self.words)} ended with {self.process.returncode}: see {self.output}/output.txt"
+            )
 
     def shards(self) -> list[Path]:
         return [path for path in self.output.rglob("journal/worker-*.jsonl") if path.stat().st_size]
@@ -178,15 +180,15 @@ class _Run:
         return sum(path.read_bytes().count(b'"type":"unit"') for path in self.shards())
 
     def units(self) -> dict[tuple[str, str, str], dict[str, Any]]:
-        """The latest record of each unit."""
-        found: dict[tuple[str, str, str], dict[str, Any]] = {}
+        """Return the last record of each unit."""
+        units: dict[tuple[str, str, str], dict[str, Any]] = {}
         for path in self.shards():
             for line in path.read_bytes().splitlines():
                 record = json.loads(line)
                 key = (record.get("task", ""), record.get("id", ""), record.get("variant", ""))
-                if record["type"] == "unit" and record.get("attempt", 1) >= found.get(key, {}).get("attempt", 1):
-                    found[key] = record
-        return found
+                if record["type"] == "unit" and record.get("attempt", 1) >= units.get(key, {}).get("attempt", 1):
+                    units[key] = record
+        return units
 
     def summary(self) -> Any:
         (path,) = self.output.rglob("results.json")
@@ -194,17 +196,17 @@ class _Run:
         return document["summary"], document["n_missing"]
 
     def kill(self, kind: str, draw: random.Random) -> bool:
-        """Kill one of its workers, or of their simulators."""
+        """Kill a worker of the run, or a simulator."""
         assert self.process is not None
         mark = {"worker": b"multiprocessing.spawn", "simulator": b"infthor_eval.sim"}[kind]
-        found = [pid for pid in _descendants(self.process.pid) if mark in _command(pid)]
-        if not found:
+        pids = [pid for pid in _descendants(self.process.pid) if mark in _command(pid)]
+        if not pids:
             return False
-        _kill(draw.choice(sorted(found)))
+        _kill(draw.choice(sorted(pids)))
         return True
 
     def kill_all(self) -> None:
-        """Kill the driver, and wait until what it had started has ended by itself."""
+        """Kill the driver, and wait until the processes that it started have ended."""
         assert self.process is not None
         below = _descendants(self.process.pid)
         self.process.kill()
@@ -212,7 +214,7 @@ class _Run:
         deadline = time.monotonic() + 60
         while any(Path(f"/proc/{pid}").exists() for pid in below):
             if time.monotonic() > deadline:
-                raise SystemExit(f"processes {below} outlive their driver")
+                raise SystemExit(f"processes {below} did not end with their driver")
             time.sleep(0.05)
 
     def cut(self, draw: random.Random) -> None:
@@ -224,7 +226,7 @@ class _Run:
             path.write_bytes(content[: len(content) - 1 - len(last) // 2])
 
     def garble(self, draw: random.Random) -> None:
-        """Overwrite some bytes amid a line of a shard."""
+        """Overwrite some bytes in the middle of a line of a shard."""
         path = draw.choice(sorted(self.shards()))
         lines = path.read_bytes().splitlines(keepends=True)
         number = draw.randrange(1, len(lines)) if len(lines) > 1 else 0
@@ -238,32 +240,32 @@ def _descendants(pid: int) -> list[int]:
         try:
             parent = int(path.read_text().rpartition(")")[2].split()[1])
         except OSError:
-            continue  # it has ended meanwhile
+            continue  # the process has ended
         children.setdefault(parent, []).append(int(path.parent.name))
-    found, waiting = [], [pid]
+    descendants, waiting = [], [pid]
     while waiting:
         below = children.get(waiting.pop(), [])
-        found += below
+        descendants += below
         waiting += below
-    return found
+    return descendants
 
 
 def _command(pid: int) -> bytes:
     try:
         return Path(f"/proc/{pid}/cmdline").read_bytes().replace(b"\0", b" ")
     except OSError:
-        return b""  # it has ended meanwhile
+        return b""  # the process has ended
 
 
 def _kill(pid: int) -> None:
     try:
         os.kill(pid, signal.SIGKILL)
     except ProcessLookupError:
-        return  # it has ended meanwhile
+        return  # the process has ended
 
 
 class _Listener(ThreadingHTTPServer):
-    """Says nothing of clients that were killed before they had their reply."""
+    """A server that does not report clients that were killed before they got their reply."""
 
     daemon_threads = True
 
@@ -273,7 +275,7 @@ class _Listener(ThreadingHTTPServer):
 
 
 class _Server:
-    """Chat completions whose text follows from the request; once disturbing, every so many requests go wrong."""
+    """A server of chat completions that depend only on the request; if `disturbing`, some requests fail."""
 
     def __init__(self, every: int) -> None:
         self.disturbing = False

@@ -52,7 +52,7 @@ def test_parts_of_a_context_take_what_the_whole_takes(costs: Any) -> None:
 
 def test_rates_give_back_what_was_measured(costs: Any) -> None:
     rates = costs.Rates(0, 0, 0, 0)
-    found = costs.measured_prefill(rates, (1000, 500.0), (3000, 250.0))
+    found = costs.rates_from_prefill(rates, (1000, 500.0), (3000, 250.0))
     for n, rate in ((1000, 500.0), (3000, 250.0)):
         assert n / costs.seconds(costs.Request(n, 0, 0), found) == pytest.approx(rate)
 
@@ -60,7 +60,7 @@ def test_rates_give_back_what_was_measured(costs: Any) -> None:
 @pytest.mark.parametrize("points", [((10, 1.0), (5, 0.5)), ((10, 1.0), (20, 2.0)), ((10, 1.0), (20, 0.1))])
 def test_measurements_that_cannot_be_are_refused(costs: Any, points: Any) -> None:
     with pytest.raises(UsageError, match=r"must come second|measure a shorter"):
-        costs.measured_prefill(costs.Rates(0, 0, 0, 0), *points)
+        costs.rates_from_prefill(costs.Rates(0, 0, 0, 0), *points)
 
 
 def test_memory_is_weights_and_what_each_token_takes(costs: Any, shape: Any, machine: Any) -> None:
