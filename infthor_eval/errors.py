@@ -11,12 +11,14 @@ from contextlib import contextmanager
 from pathlib import Path
 
 __all__ = [
+    "AdapterError",
     "DataError",
     "InfthorError",
     "ModelError",
     "SceneError",
     "SimulatorError",
     "UsageError",
+    "UserCodeError",
     "describe_exception",
     "in_one_line",
     "unknown_name",
@@ -42,6 +44,14 @@ class DataError(InfthorError):
 
 class ModelError(InfthorError):
     """A model cannot be loaded, or cannot do what is required of it."""
+
+
+class UserCodeError(InfthorError):
+    """Code that is not this package's raised an unexpected exception, which is the cause of this one."""
+
+
+class AdapterError(UserCodeError, ModelError):
+    """A model adapter raised an unexpected exception."""
 
 
 class SimulatorError(InfthorError):

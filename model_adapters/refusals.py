@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 
-from infthor_eval.errors import InfthorError, ModelError, describe_exception
+from infthor_eval.errors import AdapterError, InfthorError, ModelError, describe_exception
 from model_adapters.protocols import Capabilities, Decoding, Turn
 
 __all__ = ["check_decoding", "check_turns", "wrap_adapter_errors", "wrap_request_errors"]
@@ -45,22 +45,22 @@ def check_turns(name: str, turns: Sequence[Turn]) -> None:
 
 @contextmanager
 def wrap_adapter_errors(problem: str) -> Iterator[None]:
-    """Turn any error in an adapter's code into a `ModelError` of one line.
+    """Turn any error in an adapter's code into an `AdapterError` of one line.
 
-    The line has the place of the error. The error itself, with its traceback, is the cause of the `ModelError`.
+    The line has the place of the error. The error itself, with its traceback, is the cause of the `AdapterError`.
 
     Args:
         problem: the model and what it fails to do, for the message.
 
     Raises:
-        ModelError: the adapter raised an error that is not one of ours.
+        AdapterError: the adapter raised an error that is not one of ours.
     """
     try:
         yield
     except InfthorError:
         raise
     except Exception as error:  # an adapter may be anybody's code and raise anything
-        raise ModelError(f"{problem} ({describe_exception(error)}); fix the adapter, or report it") from error
+        raise AdapterError(f"{problem} ({describe_exception(error)}); fix the adapter, or report it") from error
 
 
 def wrap_request_errors(name: str) -> AbstractContextManager[None]:

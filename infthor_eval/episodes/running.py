@@ -8,7 +8,7 @@ from typing import Generic, TypeVar
 from infthor_eval.episodes.errors import InfeasibleError
 from infthor_eval.episodes.retries import with_retries
 from infthor_eval.errors import InfthorError, SceneError
-from infthor_eval.runs import NOTHING, Tokens, Unit, UnitRecord, Usage
+from infthor_eval.runs import NOTHING, Session, Tokens, Unit, UnitRecord, Usage
 from infthor_eval.thor.simulator import Simulator
 
 __all__ = ["EpisodeResult", "EpisodeRunner"]
@@ -60,13 +60,16 @@ class EpisodeRunner(Generic[E, P]):
             self._environment = self._build()
         return self._environment
 
-    def record(self, unit: Unit[P], fingerprint: str, run: Callable[[], EpisodeResult[P]]) -> UnitRecord[P]:
+    def record(
+        self, unit: Unit[P], fingerprint: str, run: Callable[[], EpisodeResult[P]], session: Session[P]
+    ) -> UnitRecord[P]:
         """Run an episode and return its record; errors become a record too.
 
         Args:
             unit: unit of the episode.
             fingerprint: fingerprint of its inputs.
             run: runs the episode in `environment`; called again if the simulator fails for good.
+            session: session of the run.
         """
         self.begun, self.usage = None, NOTHING
         start = time.perf_counter()
@@ -76,7 +79,7 @@ class EpisodeRunner(Generic[E, P]):
             return unit.excluded(str(error), fingerprint)
         except InfthorError as error:
             begun = unit if self.begun is None else replace(unit, payload=self.begun)
-            return begun.failed(str(error), fingerprint, usage=self.usage)
+            return begun.failed(session.describe_failure(unit, error), fingerprint, usage=self.usage)
         return unit.record(
             fingerprint,
             result.payload,

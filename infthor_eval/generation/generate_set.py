@@ -17,7 +17,7 @@ from infthor_eval.generation.simulator_jobs import StartSimulatorWorker, collect
 from infthor_eval.household.pddl import DOMAIN
 from infthor_eval.thor.launch import Launch
 from infthor_eval.thor.simulator import Simulator
-from infthor_eval.workers import WorkerSettings, shared_out
+from infthor_eval.workers import WorkerSettings, run_jobs
 
 __all__ = ["GeneratedSet", "GenerationSummary", "TaskCounts", "generate_set", "generate_with_workers"]
 
@@ -147,7 +147,7 @@ def generate_with_workers(
     """
     out.mkdir(parents=True, exist_ok=True)
     start = StartSimulatorWorker(launch, partial(_generate_one, out=out))
-    outcomes = shared_out(start, jobs, worker_settings, say)
+    outcomes = run_jobs(start, jobs, worker_settings, say)
     return _summarise(collect_outcomes(outcomes, _failure_outcome, progress))
 
 

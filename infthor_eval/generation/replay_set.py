@@ -26,7 +26,7 @@ from infthor_eval.generation.simulator_jobs import StartSimulatorWorker, collect
 from infthor_eval.thor.launch import Launch
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.supplement import agent_path
-from infthor_eval.workers import WorkerSettings, shared_out
+from infthor_eval.workers import WorkerSettings, run_jobs
 
 __all__ = ["ReplayFailure", "ReplayedSet", "Selection", "replay_set", "replay_with_workers", "select"]
 
@@ -158,7 +158,7 @@ def replay_with_workers(
     """
     metadata = _prepare_set(out, launch.label)
     start = StartSimulatorWorker(launch, partial(_replay_one, metadata=metadata, frames=frames))
-    return _collect(shared_out(start, selection.items, worker_settings, say), selection, progress)
+    return _collect(run_jobs(start, selection.items, worker_settings, say), selection, progress)
 
 
 def _prepare_set(out: Path, label: str) -> Path:

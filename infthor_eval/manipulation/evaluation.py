@@ -88,10 +88,14 @@ class BoundManipulation(BoundEpisodes[ArmUnit, ArmRecord]):
             if known[unit.key] is None:
                 by_camera.setdefault(self._tasks[unit.key.task].settings.camera, []).append(unit)
         for camera, units in by_camera.items():
-            yield from self._run_episodes(units, fingerprints, self._arms[camera])
+            yield from self._run_episodes(units, fingerprints, self._arms[camera], session)
 
     def _run_episodes(
-        self, units: Sequence[ArmUnit], fingerprints: Mapping[UnitKey, str], arms: Simulators
+        self,
+        units: Sequence[ArmUnit],
+        fingerprints: Mapping[UnitKey, str],
+        arms: Simulators,
+        session: Session[ArmRecord],
     ) -> Iterator[UnitRecord[ArmRecord]]:
         trajectory = units[0].trajectory.data
         try:
@@ -104,7 +108,7 @@ class BoundManipulation(BoundEpisodes[ArmUnit, ArmRecord]):
             runner = ArmRunner(trajectory, states, simulator, self._create_actor(), sees=self._sees, seed=self.seed)
             for unit in units:
                 run = partial(runner.run, self._tasks[unit.key.task], unit.episode)
-                record = runner.record(unit, fingerprints[unit.key], run)
+                record = runner.record(unit, fingerprints[unit.key], run, session)
                 yield msgspec.structs.replace(record, faults=(*faults, *record.faults))
                 faults = ()  # those of the expert's simulator are recorded once
 

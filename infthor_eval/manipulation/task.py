@@ -14,7 +14,7 @@ from infthor_eval.manipulation.kinds import KIND_NAMES, ManipulationKind
 from infthor_eval.manipulation.options import RADII, ManipulationOptions
 from infthor_eval.manipulation.trajectories import ArmEpisode, ArmTrajectory, read_arm_trajectory
 from infthor_eval.runs import TaskFile, TaskRequest
-from infthor_eval.runs.limiting import limited
+from infthor_eval.runs.limiting import limit_items
 
 __all__ = ["ArmTaskSettings", "ManipulationTask"]
 
@@ -118,7 +118,7 @@ class ManipulationTask(EpisodeTask[ArmTaskSettings, ArmTrajectory]):
             for episode in trajectory.episodes
             if episode.kind == self.kind
         ]
-        self.episodes = limited(episodes, lambda item: item[0].traj_id, request.seed, request.limit)
+        self.episodes = limit_items(episodes, lambda item: item[0].traj_id, request.seed, request.limit)
         if not self.episodes:
             raise UsageError(f"{self.name}: no trajectory there has a {KIND_NAMES[self.kind]}")
 

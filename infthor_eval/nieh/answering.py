@@ -15,6 +15,7 @@ from infthor_eval.formats.digests import fingerprint
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.nieh.baselines import Predict
 from infthor_eval.nieh.contexts import ContextPart, Sample
+from infthor_eval.nieh.metrics import MetricError
 from infthor_eval.nieh.notebook import Notebook
 from infthor_eval.nieh.notes import Notes
 from infthor_eval.nieh.records import NiehAnswer
@@ -87,13 +88,15 @@ class _Asked:
             }
         )
 
-    def record(self, reply: Reply, seconds: float, faults: tuple[str, ...], usage: Usage) -> UnitRecord[NiehAnswer]:
-        """The record of its reply; a failed one, with the reply, where the task's own metrics fail on it."""
+    def record(
+        self, reply: Reply, seconds: float, faults: tuple[str, ...], usage: Usage, session: Session[NiehAnswer]
+    ) -> UnitRecord[NiehAnswer]:
+        """Return the record of a reply; a failed one, with the reply, if the task's own metrics fail on it."""
         scores, failure = {}, None
         try:
             scores = self.prepared.metrics.scores(self.prepared.found, self.unit.sample, reply.text)
-        except DataError as error:
-            failure = str(error)
+        except MetricError as error:
+            failure = session.describe_failure(self.unit, error)
         return self.unit.record(
             self.fingerprint,
             self.unit.payload.with_reply(reply.text, scores),
@@ -204,7 +207,7 @@ def answered(
         try:
             asked.append(_Asked.of(unit, prepared))
         except DataError as error:
-            yield unit.failed(str(error))
+            yield unit.failed(session.describe_failure(unit, error))
     for _, in_one_context in groupby(sorted(asked, key=_names), key=_names):
         yield from _in_context(list(in_one_context), answerer, session)
 
@@ -225,7 +228,7 @@ def _in_context(
     try:
         context = answerer.read(asked[0].context)
     except (DataError, ModelError) as error:
-        yield from [item.unit.failed(str(error)) for item in asked]
+        yield from [item.unit.failed(session.describe_failure(item.unit, error)) for item in asked]
         return
     waiting = []
     for item in [replace(item, context=context) for item in asked]:
@@ -235,7 +238,7 @@ def _in_context(
         else:
             yield record
     for at in range(0, len(waiting), answerer.batch_size):
-        yield from _made(waiting[at : at + answerer.batch_size], answerer)
+        yield from _answer(waiting[at : at + answerer.batch_size], answerer, session)
 
 
 def _known(asked: _Asked, session: Session[NiehAnswer]) -> UnitRecord[NiehAnswer] | None:
@@ -243,22 +246,24 @@ def _known(asked: _Asked, session: Session[NiehAnswer]) -> UnitRecord[NiehAnswer
     try:
         return session.find_record(asked.unit, asked.fingerprint)
     except DataError as error:
-        return asked.unit.failed(str(error))
+        return asked.unit.failed(session.describe_failure(asked.unit, error))
 
 
-def _made(
-    asked: Sequence[_Asked], answerer: Answerer, faults: tuple[str, ...] = ()
+def _answer(
+    asked: Sequence[_Asked], answerer: Answerer, session: Session[NiehAnswer], faults: tuple[str, ...] = ()
 ) -> Iterator[UnitRecord[NiehAnswer]]:
     began = time.perf_counter()
     try:
         replies = answerer.answer(asked)
     except (DataError, ModelError) as error:
         if len(asked) == 1:
-            yield asked[0].unit.failed(str(error), asked[0].fingerprint, faults=faults)
+            (item,) = asked
+            failure = session.describe_failure(item.unit, error)
+            yield item.unit.failed(failure, item.fingerprint, faults=faults)
             return
         for item in asked:  # one of them may be to blame; the others are answered
-            yield from _made([item], answerer, (f"asked with {len(asked) - 1} others: {error}",))
+            yield from _answer([item], answerer, session, (f"asked with {len(asked) - 1} others: {error}",))
         return
     seconds = (time.perf_counter() - began) / len(asked)
     for item, reply in zip(asked, replies, strict=True):
-        yield item.record(reply, seconds, faults, answerer.usage(reply))
+        yield item.record(reply, seconds, faults, answerer.usage(reply), session)

@@ -13,7 +13,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from infthor_eval.errors import DataError
+from infthor_eval.errors import DataError, UserCodeError, describe_exception
 from infthor_eval.formats.digests import digest_of_file
 from infthor_eval.nieh.contexts import Sample
 from infthor_eval.nieh.docs import Doc, doc_of
@@ -21,10 +21,14 @@ from infthor_eval.nieh.samples import TaskSamples
 from infthor_eval.nieh.scoring import SCORERS, scores
 from infthor_eval.runs.catalog import TaskFile
 
-__all__ = ["PUBLISHED", "Metrics", "metrics_of"]
+__all__ = ["PUBLISHED", "MetricError", "Metrics", "metrics_of"]
 
 _OURS = "infthor_eval.harness.nieh_task.process_results"
 ProcessResults = Callable[[Doc, list[str]], Mapping[str, Any]]
+
+
+class MetricError(UserCodeError, DataError):
+    """The metrics function of a task raised an exception, or its result lacks a metric."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +49,7 @@ class Metrics:
         """The metrics of a reply.
 
         Raises:
-            DataError: the task's own function fails on it, or lacks a metric.
+            MetricError: the task's own function fails on it, or lacks a metric.
         """
         if self.process is None:
             return scores(reply, sample.question.answers)
@@ -53,8 +57,7 @@ class Metrics:
             made = self.process(doc_of(found, sample), [reply])
             return {name: _finite(name, made[name]) for name in self.names}
         except Exception as error:
-            said = " ".join(f"{type(error).__name__}: {error}".split())
-            raise DataError(f"process_results fails on {sample.question.id}: {said}") from error
+            raise MetricError(f"process_results fails on {sample.question.id}: {describe_exception(error)}") from error
 
 
 def _finite(name: str, value: Any) -> float:

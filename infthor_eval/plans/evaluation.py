@@ -72,7 +72,7 @@ class BoundPlans(BoundEpisodes[PlanUnit, PlanRecord]):
                 # A plan that was not attempted is, once an earlier one that failed by a fault is completed.
                 if record is None or (record.payload.ended == NOT_ATTEMPTED and not stopped):
                     run = partial(runner.pass_over if stopped else runner.run, unit.episode)
-                    record = runner.record(unit, fingerprints[unit.key], run)
+                    record = runner.record(unit, fingerprints[unit.key], run, session)
                 yield record
                 failed = record.excluded is None and not record.payload.done
                 stopped = stopped or (failed and task.settings.after_failure == "stop")

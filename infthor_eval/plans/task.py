@@ -16,7 +16,7 @@ from infthor_eval.plans.rewards import reward_rules
 from infthor_eval.plans.trajectories import PlanTrajectory, read_plan_trajectory
 from infthor_eval.runs import TaskFile, TaskRequest
 from infthor_eval.runs.generation_kwargs import decoding_of
-from infthor_eval.runs.limiting import limited
+from infthor_eval.runs.limiting import limit_items
 
 __all__ = ["PlanTaskSettings", "PlansTask"]
 
@@ -75,7 +75,7 @@ class PlansTask(EpisodeTask[PlanTaskSettings, PlanTrajectory]):
         self.memory = memory_named(settings.history, self._options.retriever)
         super().__init__(file, request, settings, read_plan_trajectory)
         having_plans = [trajectory for trajectory in self.trajectories.trajectories if self.plans(trajectory)]
-        self.evaluated_trajectories = limited(
+        self.evaluated_trajectories = limit_items(
             having_plans, lambda trajectory: trajectory.traj_id, request.seed, request.limit
         )
         if not self.evaluated_trajectories:

@@ -10,10 +10,10 @@ import msgspec
 
 from infthor_eval.errors import UsageError
 from infthor_eval.runs import RunHeader, RunSummary, Suite, UnitKey, UnitRecord, Usage, read_header
-from infthor_eval.runs.configuration import read_configuration
 from infthor_eval.runs.run_labels import label_runs
 from infthor_eval.runs.run_search import read_results
 from infthor_eval.runs.shards import read_shards
+from infthor_eval.runs.stored_command import read_stored_command
 
 if TYPE_CHECKING:
     from infthor_eval.report.presenter import Presenter
@@ -100,7 +100,7 @@ def read_report_runs(
 
 def _read(folder: Path, header: RunHeader, name: str, suite: Suite, presenter: "Presenter") -> ReportRun:
     log = read_shards(folder, suite.records.decoder())
-    results, configuration = read_results(folder), read_configuration(folder)
+    results, command = read_results(folder), read_stored_command(folder)
     return ReportRun(
         folder=folder,
         label=_with_frames(name, header),
@@ -111,8 +111,8 @@ def _read(folder: Path, header: RunHeader, name: str, suite: Suite, presenter: "
         records=tuple(log.records),
         usage=log.usage,
         n_missing=results.n_missing if results else None,
-        command=configuration.command if configuration else "",
-        data=configuration.data if configuration else None,
+        command=command.line if command else "",
+        data=command.data if command else None,
     )
 
 

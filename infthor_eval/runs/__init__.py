@@ -1,12 +1,12 @@
 """One run of any suite: its config, its journal, and the order of its work."""
 
 from infthor_eval.runs.catalog import Catalog, TaskFile
-from infthor_eval.runs.configuration import Configuration, read_configuration
 from infthor_eval.runs.driver import Observer, RunOutcome, Silent, execute
 from infthor_eval.runs.estimate import Estimate, TaskEstimate, estimate_run
 from infthor_eval.runs.records import RecordTypes, RunHeader, Tokens, Unit, UnitKey, UnitRecord
 from infthor_eval.runs.request import PreparedRun, RunRequest, prepare
 from infthor_eval.runs.shards import read_header, read_run
+from infthor_eval.runs.stored_command import StoredCommand, read_stored_command
 from infthor_eval.runs.suite import (
     BoundEvaluation,
     Cost,
@@ -26,7 +26,6 @@ __all__ = [
     "NOTHING",
     "BoundEvaluation",
     "Catalog",
-    "Configuration",
     "Cost",
     "Estimate",
     "Evaluation",
@@ -41,6 +40,7 @@ __all__ = [
     "Session",
     "Silent",
     "Skipped",
+    "StoredCommand",
     "Suite",
     "TaskEstimate",
     "TaskFile",
@@ -55,7 +55,7 @@ __all__ = [
     "estimate_run",
     "execute",
     "prepare",
-    "read_configuration",
     "read_header",
     "read_run",
+    "read_stored_command",
 ]

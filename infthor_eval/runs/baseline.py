@@ -1,4 +1,4 @@
-"""What the baselines of all suites have in common."""
+"""The base of the baselines of all suites."""
 
 from typing import Any
 
@@ -8,21 +8,17 @@ __all__ = ["BaselineSubject"]
 
 
 class BaselineSubject:
-    """A subject without options that sees no frame and holds nothing open."""
+    """A subject without options that sees no frame and holds no resource."""
 
     name = ""
     capabilities = Capabilities(counts_tokens=False, token_ids=False)
 
     def __init__(self, seed: int) -> None:
-        """Make it.
-
-        Args:
-            seed: of the run.
-        """
+        """Take the seed of the run."""
         self._seed = seed
 
     def identity(self) -> dict[str, Any]:
-        """The name alone: what is drawn depends on the run's own seed."""
+        """Return the name; what is drawn depends on the seed, which the run's config has anyway."""
         return {"baseline": self.name}
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""The tasks that there are: what `--tasks` can name. The package brings some, others and their user may add to them.
+"""The catalog of tasks that `--tasks` can name: this package's, those of other packages, and the user's own.
 
 The files are lm-eval's own format, and say which suite evaluates them (`metadata: {suite: NAME}`). lm-eval passes over
 a broken file without a word, so they are read and checked here first, without importing lm-eval.
@@ -21,9 +21,9 @@ from infthor_eval.formats.yaml_files import PlainLoader, read_yaml
 
 __all__ = ["ENTRY_POINTS", "Catalog", "TaskFile"]
 
-ENTRY_POINTS = "infthor_eval.tasks"  # of packages: "package.folder" with their task files
+ENTRY_POINTS = "infthor_eval.tasks"  # a package's entry is "package.folder" with its task files
 
-_MEND = "mend the task file"
+_HINT = "fix the task file"
 
 
 class _Loader(PlainLoader):
@@ -42,10 +42,10 @@ class TaskFile:
     """A single task.
 
     Attributes:
-        name: the task.
-        suite: the kind of evaluation that it belongs to.
-        path: its file.
-        settings: what the file says, with the included ones merged in; functions by name.
+        name: name of the task.
+        suite: name of its suite.
+        path: path of the file.
+        settings: contents of the file with those of the included files; functions by name.
         description: what the task evaluates, in a sentence; empty where the file has none.
     """
 
@@ -56,10 +56,10 @@ class TaskFile:
     description: str = ""
 
     def require(self, *keys: str) -> None:
-        """Refuse a file that lacks a key which its suite needs.
+        """Refuse a file that lacks keys which its suite needs.
 
         Raises:
-            DataError: names the missing ones.
+            DataError: names the missing keys.
         """
         missing = [key for key in keys if key not in self.settings]
         if missing:
@@ -71,9 +71,9 @@ class Catalog:
     """The task files below some folders.
 
     Attributes:
-        folder: with the task files of this package; those of other folders may include what its tasks share
+        folder: folder with the task files of this package; those of other folders may include what its tasks share
             (`include: _nieh.yaml`) as if it lay beside them.
-        more: the other folders.
+        more: other folders.
     """
 
     folder: Path
@@ -81,12 +81,12 @@ class Catalog:
 
     @classmethod
     def packaged(cls) -> "Catalog":
-        """The tasks of this package alone."""
+        """Return the catalog of this package's tasks alone."""
         return cls(packaged_folder("tasks"))
 
     @classmethod
     def installed(cls, include: Sequence[Path] = ()) -> "Catalog":
-        """The tasks of this package, of those installed beside it, and further ones.
+        """Return the catalog of the tasks of this package, of other installed packages, and of further folders.
 
         Args:
             include: folders with further task files.
@@ -99,47 +99,47 @@ class Catalog:
 
     @cached_property
     def tasks(self) -> dict[str, TaskFile]:
-        """Every single task by name."""
+        """All single tasks by name."""
         single = {name: entry for name, entry in self._entries.items() if "group" not in entry[1]}
         return {name: _task(name, path, settings) for name, (path, settings) in single.items()}
 
     @cached_property
     def groups(self) -> dict[str, list[str]]:
-        """Every group by name, with the names in it."""
+        """All groups by name, with the names of their tasks."""
         return {name: settings["task"] for name, (_, settings) in self._entries.items() if "group" in settings}
 
     def expand(self, names: Sequence[str]) -> list[TaskFile]:
-        """The single tasks behind names of tasks and groups, each once, in the order given.
+        """Return the single tasks behind names of tasks and groups, each once, in the order given.
 
         Raises:
-            UsageError: a name is unknown; the nearest known one is named.
+            UsageError: a name is unknown; the message has the nearest known one.
         """
-        found: dict[str, TaskFile] = {}
+        by_name: dict[str, TaskFile] = {}
         for name in names:
             if name in self.groups:
-                found.update((task.name, task) for task in self._members(name, (name,)))
+                by_name.update((task.name, task) for task in self._members(name, (name,)))
             elif name in self.tasks:
-                found[name] = self.tasks[name]
+                by_name[name] = self.tasks[name]
             else:
                 raise unknown_name("task", name, [*self.groups, *self.tasks])
-        return list(found.values())
+        return list(by_name.values())
 
     def _members(self, group: str, inside: tuple[str, ...]) -> list[TaskFile]:
-        """The single tasks of a group, and of the groups in it."""
-        found: list[TaskFile] = []
+        """Return the single tasks of a group and of the groups in it; `inside` has the groups around it."""
+        members: list[TaskFile] = []
         for name in self.groups[group]:
             if name in inside:
                 raise DataError(f"{self._entries[group][0]}: the group {name} is in itself; take it out")
-            found += self._members(name, (*inside, name)) if name in self.groups else self.expand([name])
-        return found
+            members += self._members(name, (*inside, name)) if name in self.groups else self.expand([name])
+        return members
 
     @cached_property
     def _entries(self) -> dict[str, tuple[Path, dict[str, Any]]]:
         entries: dict[str, tuple[Path, dict[str, Any]]] = {}
         for path in self._files():
             settings = _read(path, (), self._shared)
-            with wrap_errors(f"{path}: holds what JSON cannot", _MEND, catch=(TypeError, ValueError)):
-                canonical_json(settings)  # it is part of a run's identity
+            with wrap_errors(f"{path}: holds what JSON cannot", _HINT, catch=(TypeError, ValueError)):
+                canonical_json(settings)  # a part of the run's config
             name = settings.get("group") or settings.get("task")
             if not isinstance(name, str):
                 raise DataError(f"{path}: neither a task nor a group name; a task file has a key 'task' or 'group'")
@@ -156,21 +156,21 @@ class Catalog:
 
     @cached_property
     def _shared(self) -> dict[str, Path]:
-        """What tasks of this package share, by the names of the files."""
+        """Files that tasks of this package include, by name."""
         return {path.name: path for path in self.folder.rglob("_*.yaml")}
 
 
 def _folder_of(point: EntryPoint) -> Path:
-    """The folder of task files that a package names; nothing of it is imported."""
+    """Return the folder of task files that a package names, without importing the package."""
     package, *inside = point.value.split(".")
     spec = find_spec(package)
     places = spec.submodule_search_locations if spec is not None else None
-    found = [Path(place, *inside) for place in places or () if Path(place, *inside).is_dir()]
-    if not found:
+    folders = [Path(place, *inside) for place in places or () if Path(place, *inside).is_dir()]
+    if not folders:
         raise UsageError(
-            f"the tasks {point.name} of another package are not in {point.value}; mend its package, or uninstall it"
+            f"the tasks {point.name} of another package are not in {point.value}; fix its package, or uninstall it"
         )
-    return found[0]
+    return folders[0]
 
 
 def _task(name: str, path: Path, settings: Mapping[str, Any]) -> TaskFile:
@@ -189,16 +189,16 @@ def _are_names(value: object) -> bool:
 
 
 def _read(path: Path, including: tuple[Path, ...], shared: Mapping[str, Path]) -> dict[str, Any]:
-    config = read_yaml(path, _MEND, _Loader)
+    config = read_yaml(path, _HINT, _Loader)
     if not isinstance(config, dict) or not all(isinstance(key, str) for key in config):
-        raise DataError(f"{path}: not a mapping of settings; {_MEND}")
+        raise DataError(f"{path}: not a mapping of settings; {_HINT}")
     included = config.pop("include", None)
     if included is None:
         return config
     if not isinstance(included, str):
-        raise DataError(f"{path}: include is {included!r:.60}, not the name of a file; {_MEND}")
+        raise DataError(f"{path}: include is {included!r:.60}, not the name of a file; {_HINT}")
     beside = path.parent / included
     other = (beside if beside.exists() else shared.get(included, beside)).resolve()
     if other in (*including, path.resolve()):
-        raise DataError(f"{path}: includes {included}, which includes it; {_MEND}")
+        raise DataError(f"{path}: includes {included}, which includes it; {_HINT}")
     return {**_read(other, (*including, path.resolve()), shared), **config}

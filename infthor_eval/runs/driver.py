@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import Any, Generic, Protocol, TypeVar
 
 from infthor_eval.runs import journal as journals
-from infthor_eval.runs.configuration import write_configuration
 from infthor_eval.runs.executor import Executor, LocalExecutor
 from infthor_eval.runs.journal import Journal
 from infthor_eval.runs.records import Unit, UnitRecord
 from infthor_eval.runs.request import PreparedRun
 from infthor_eval.runs.results import results_document, write_results, write_scores, write_usage
 from infthor_eval.runs.samples import StoredSamples
+from infthor_eval.runs.stored_command import write_command
 from infthor_eval.runs.suite import RunSummary, UnitSample, Workload
 from infthor_eval.runs.usage import Usage
 from infthor_eval.runs.worker_executor import WorkerPoolExecutor
@@ -103,7 +103,7 @@ def execute(
             journals.set_aside(folder)
         n_recovered = journals.recover(folder, header, run.suite.records) if run.request.recover else 0
         with Journal(folder, header, run.suite.records) as journal:
-            write_configuration(folder, run.request)
+            write_command(folder, run.request)
             observer.begin(workload, n_recovered)
             try:
                 for record, resumed in executor.evaluate(folder, journal, should_stop):
@@ -130,7 +130,7 @@ def _write_results(
     """Write the results of the units that the journal has by now; return summary, records and usage."""
     asked = {unit.key for group in workload.groups for unit in group.units}  # the journal may hold more
     records = [record for record in journal.records if record.key in asked]
-    journal.require_there()
+    journal.check_file()
     summary = RunSummary(journal.header, run.suite.summarise(journal.header, records))
     n_missing = workload.n_units - len(records)
     usage = Usage.total([record.usage for record in records] + [artifact.usage for artifact in journal.artifacts])

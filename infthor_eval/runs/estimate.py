@@ -1,11 +1,9 @@
-"""What a run will take, before it begins: a few of its units are done, and the rest is reckoned from them.
+"""Estimates of a run's time, requests, tokens and money: a few units are done, and the rest is estimated from them.
 
-The first unit of a group pays for what the group shares (a trajectory that is encoded or gone through), the others
-for themselves. So a group of n units that look at f frames is taken to cost
+The first unit of a group pays for what the group shares (encoding or replaying a trajectory), the others only for
+themselves. So each quantity of a group with n units on f frames is estimated as
 
-    f * (what a first unit takes beyond a later one, per frame measured) + n * (what a later unit takes)
-
-of each quantity: seconds, requests, tokens, money.
+    f * (excess of a first unit over a later one, per measured frame) + n * (quantity of a later unit)
 """
 
 import time
@@ -17,31 +15,31 @@ from typing import Any, TypeVar
 
 from infthor_eval.runs.binding import bind_run
 from infthor_eval.runs.groups import group_records
-from infthor_eval.runs.records import Unit, UnitRecord
+from infthor_eval.runs.records import Unit, UnitRecord, describe_failure
 from infthor_eval.runs.request import RunRequest, prepare
 from infthor_eval.runs.suite import BoundEvaluation, Group, Suite, Workload
 from infthor_eval.runs.usage import NOTHING, Usage
 
-__all__ = ["Estimate", "Quantities", "TaskEstimate", "estimate_run", "estimated"]
+__all__ = ["Estimate", "Quantities", "TaskEstimate", "estimate_run", "estimate_tasks"]
 
 A = TypeVar("A")
 P = TypeVar("P")
 U = TypeVar("U", bound=Unit[Any])
 
-_UNITS_OF_A_GROUP = 3  # that are measured: the first, one amid it, the last
+_UNITS_OF_A_GROUP = 3  # measured units of a group: the first, the middle and the last
 
 
 @dataclass(frozen=True)
 class Quantities:
-    """What some units take.
+    """Time, requests, tokens and cost of some units.
 
     Attributes:
-        seconds: of one worker.
-        requests: to the model.
+        seconds: time of one worker.
+        requests: requests to the model.
         read: tokens of the requests, frames included.
-        encoded: those of them that are not found in a cache.
+        encoded: those of them that are not in a cache.
         written: tokens of the replies.
-        cost: in US dollars, by the prices that the model was given.
+        cost: cost in US dollars, by the prices given to the model.
     """
 
     seconds: float = 0.0
@@ -53,45 +51,45 @@ class Quantities:
 
     @classmethod
     def of(cls, record: UnitRecord[Any], seconds: float) -> "Quantities":
-        """What a unit took."""
+        """Return the quantities of a unit that took some seconds."""
         usage: Usage = record.usage
         encoded = usage.context - usage.cached
         return cls(seconds, usage.requests, usage.context, encoded, usage.reply, usage.cost or 0.0)
 
     def plus(self, other: "Quantities", times: float = 1.0) -> "Quantities":
-        """This and so many times the other."""
+        """Return these quantities plus a multiple of others."""
         return Quantities(*(getattr(self, f.name) + times * getattr(other, f.name) for f in fields(self)))
 
     def beyond(self, other: "Quantities") -> "Quantities":
-        """By how much it is more; never less than nothing."""
+        """Return the excess over other quantities, at least 0."""
         return Quantities(*(max(0.0, getattr(self, f.name) - getattr(other, f.name)) for f in fields(self)))
 
 
 @dataclass(frozen=True)
-class _Measured:
-    """Units of one group that were done.
+class _MeasuredGroup:
+    """Measured units of one group.
 
     Attributes:
-        frames: that the group looks at.
-        took: task, and what the unit took, in the order in which they were done.
-        failures: task, and why a unit of it failed.
+        frames: frames of the group.
+        quantities: task and quantities of each unit, in the order of work.
+        failures: task and reason of each failed unit.
     """
 
     frames: int
-    took: Sequence[tuple[str, Quantities]]
+    quantities: Sequence[tuple[str, Quantities]]
     failures: Sequence[tuple[str, str]] = ()
 
 
 @dataclass(frozen=True)
 class TaskEstimate:
-    """What one task takes.
+    """The estimate of one task.
 
     Attributes:
-        task: which.
-        n_units: how many units it has.
-        n_measured: how many of them were done to tell.
-        frames: that its units look at, each once for a group.
-        total: of all units.
+        task: name of the task.
+        n_units: number of its units.
+        n_measured: number of measured units.
+        frames: frames of its groups, each frame counted once in a group.
+        total: estimated quantities of all units.
     """
 
     task: str
@@ -103,12 +101,12 @@ class TaskEstimate:
 
 @dataclass(frozen=True)
 class Estimate:
-    """What a run takes.
+    """The estimate of a run.
 
     Attributes:
-        workload: all that there is to do.
-        tasks: what each of them takes; none where all units that were measured failed.
-        failures: task, and why a unit of it that was measured failed.
+        workload: all the work.
+        tasks: estimates of the tasks; empty if all measured units failed.
+        failures: task and reason of each measured unit that failed.
     """
 
     workload: Workload
@@ -125,6 +123,10 @@ class _MeasuringSession:
     def find_record(self, unit: Unit[Any], fingerprint: str) -> None:
         """Return None: there are no records."""
 
+    def describe_failure(self, unit: Unit[Any], error: Exception) -> str:
+        """See `Session`; nothing is written."""
+        return describe_failure(error)
+
     def find_artifact(self, fingerprint: str, kind: type[A]) -> A | None:
         """See `Session`."""
         return self._artifacts.get(fingerprint)
@@ -135,13 +137,13 @@ class _MeasuringSession:
 
 
 def estimate_run(request: RunRequest, suite: Suite[U, P], n_units: int, progress: Callable[[], None]) -> Estimate:
-    """Load the subject, do a few units of each task, and reckon what all of them take; nothing is written.
+    """Load the subject, do a few units of each task, and estimate the quantities of all; nothing is written.
 
     Args:
-        request: the run.
-        suite: its suite.
-        n_units: of each task, about.
-        progress: is called after each group that was measured.
+        request: request for the run.
+        suite: suite of the run.
+        n_units: approximate number of measured units of each task.
+        progress: called after each measured group.
 
     Raises:
         UsageError: as `execute`.
@@ -150,35 +152,36 @@ def estimate_run(request: RunRequest, suite: Suite[U, P], n_units: int, progress
     """
     with closing(bind_run(prepare(request, suite))) as bound:
         workload = bound.evaluation.workload
-        done = []
-        for item in _measured(bound.evaluation, n_units):
-            done.append(item)
+        groups = []
+        for group in _measure(bound.evaluation, n_units):
+            groups.append(group)
             progress()
-    failures = [failure for item in done for failure in item.failures]
-    return Estimate(workload, estimated(workload, done) if any(item.took for item in done) else (), failures)
+    failures = [failure for group in groups for failure in group.failures]
+    is_measured = any(group.quantities for group in groups)
+    return Estimate(workload, estimate_tasks(workload, groups) if is_measured else (), failures)
 
 
-def _measured(evaluation: BoundEvaluation[U, P], n_units: int) -> Iterator[_Measured]:
-    """Do a few units of each task: of groups of all sizes, of each the first, one amid it and the last."""
+def _measure(evaluation: BoundEvaluation[U, P], n_units: int) -> Iterator[_MeasuredGroup]:
+    """Do a few units of each task: of groups of all sizes, the first, the middle and the last unit."""
     session = _MeasuringSession()
-    for group in _chosen(evaluation.workload.groups, max(1, round(n_units / _UNITS_OF_A_GROUP))):
+    for group in _choose_groups(evaluation.workload.groups, max(1, round(n_units / _UNITS_OF_A_GROUP))):
         units = list(group.units)
         part = list(dict.fromkeys((0, len(units) // 2, len(units) - 1)))
-        took, failures = [], []
+        quantities, failures = [], []
         few = replace(group, units=[units[n] for n in part])
-        began = time.perf_counter()
+        start = time.perf_counter()
         for record in group_records(evaluation, few, session):
             now = time.perf_counter()
             if record.failure is None:
-                took.append((record.task, Quantities.of(record, now - began)))
+                quantities.append((record.task, Quantities.of(record, now - start)))
             else:
                 failures.append((record.task, record.failure))
-            began = now
-        yield _Measured(group.frames, took, failures)
+            start = now
+        yield _MeasuredGroup(group.frames, quantities, failures)
 
 
-def _chosen(groups: Sequence[Group[U]], n: int) -> Iterator[Group[U]]:
-    """So many groups of each task, evenly from the smallest to the largest."""
+def _choose_groups(groups: Sequence[Group[U]], n: int) -> Iterator[Group[U]]:
+    """Yield n groups of each task, evenly from the smallest to the largest."""
     by_task: dict[str, list[Group[U]]] = {}
     for group in groups:
         by_task.setdefault(group.units[0].key.task, []).append(group)
@@ -188,57 +191,59 @@ def _chosen(groups: Sequence[Group[U]], n: int) -> Iterator[Group[U]]:
         yield from (ordered[(2 * k + 1) * len(ordered) // (2 * n_taken)] for k in range(n_taken))
 
 
-def estimated(workload: Workload, done: Sequence[_Measured]) -> list[TaskEstimate]:
-    """What each task will take.
+def estimate_tasks(workload: Workload[Unit[Any]], measured: Sequence[_MeasuredGroup]) -> list[TaskEstimate]:
+    """Estimate each task.
 
     Args:
-        workload: all that there is to do.
-        done: units of it; at least one that has not failed.
+        workload: all the work.
+        measured: measured groups of it, with at least one unit that has not failed.
     """
-    later = _later(done)
-    opening = _opening(done, later)
-    found = []
+    later = _later_units(measured)
+    excess = _first_unit_excess(measured, later)
+    estimates = []
     for task in dict.fromkeys(unit.key.task for group in workload.groups for unit in group.units):
         shares = [(group, sum(unit.key.task == task for unit in group.units)) for group in workload.groups]
         total, n_units, frames = Quantities(), 0, 0
         for group, n in shares:
-            share = n / len(group.units)  # of a group of several tasks
-            total = total.plus(opening(group), group.frames * share).plus(later.get(task, later[""]), n)
+            share = n / len(group.units)  # a group may have units of several tasks
+            total = total.plus(excess(group), group.frames * share).plus(later.get(task, later[""]), n)
             n_units, frames = n_units + n, frames + round(group.frames * share)
-        n_measured = sum(name == task for item in done for name, _ in item.took)
-        found.append(TaskEstimate(task, n_units, n_measured, frames, total))
-    return found
+        n_measured = sum(name == task for group in measured for name, _ in group.quantities)
+        estimates.append(TaskEstimate(task, n_units, n_measured, frames, total))
+    return estimates
 
 
-def _later(done: Sequence[_Measured]) -> Mapping[str, Quantities]:
-    """What a unit that is not the first of its group takes, by task; under "" of all tasks."""
-    kept: dict[str, list[Quantities]] = {}
-    for item in done:
-        for task, took in item.took[1:] or item.took:
-            kept.setdefault(task, []).append(took)
-            kept.setdefault("", []).append(took)
-    return {task: _mean(same) for task, same in kept.items()}
+def _later_units(measured: Sequence[_MeasuredGroup]) -> Mapping[str, Quantities]:
+    """Return the mean quantities of units that are not the first of their group, by task; under "" of all tasks."""
+    by_task: dict[str, list[Quantities]] = {}
+    for group in measured:
+        for task, quantities in group.quantities[1:] or group.quantities:
+            by_task.setdefault(task, []).append(quantities)
+            by_task.setdefault("", []).append(quantities)
+    return {task: _mean(of_task) for task, of_task in by_task.items()}
 
 
-def _opening(done: Sequence[_Measured], later: Mapping[str, Quantities]) -> Callable[[Group], Quantities]:
-    """What the first unit of a group takes beyond a later one for each frame, in groups of the same task."""
+def _first_unit_excess(
+    measured: Sequence[_MeasuredGroup], later: Mapping[str, Quantities]
+) -> Callable[[Group[Unit[Any]]], Quantities]:
+    """Return a function of a group: the excess of a first unit over a later one per frame, in groups of its task."""
     totals: dict[str, Quantities] = {}
     frames: Counter[str] = Counter()
-    for item in done:
-        if len(item.took) > 1:
-            task, first = item.took[0]
+    for group in measured:
+        if len(group.quantities) > 1:
+            task, first = group.quantities[0]
             totals[task] = totals.get(task, Quantities()).plus(first.beyond(later[task]))
-            frames[task] += item.frames
+            frames[task] += group.frames
 
-    def of(group: Group) -> Quantities:
+    def excess(group: Group[Unit[Any]]) -> Quantities:
         task = next((unit.key.task for unit in group.units if unit.key.task in totals), None)
         return Quantities() if task is None else Quantities().plus(totals[task], 1 / frames[task])
 
-    return of
+    return excess
 
 
-def _mean(same: Sequence[Quantities]) -> Quantities:
+def _mean(items: Sequence[Quantities]) -> Quantities:
     total = Quantities()
-    for took in same:
-        total = total.plus(took, 1 / len(same))
+    for quantities in items:
+        total = total.plus(quantities, 1 / len(items))
     return total

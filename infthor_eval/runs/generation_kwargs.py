@@ -1,4 +1,4 @@
-"""How a task file's `generation_kwargs`, in lm-eval's words, decode a reply."""
+"""Decoding settings from `generation_kwargs` of a task file, in lm-eval's words."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -12,15 +12,15 @@ _KNOWN = ("until", "max_gen_toks", "do_sample", "temperature", "top_p", "choices
 
 
 def decoding_of(given: Mapping[str, Any], seed: int, place: str) -> Decoding:
-    """The decoding that settings ask for; each of them acts, or is refused.
+    """Return the decoding that settings describe; a setting without effect is refused.
 
     Args:
-        given: `generation_kwargs` of a task, or of one request of lm-eval's.
-        seed: of what is sampled.
-        place: the task, for messages.
+        given: `generation_kwargs` of a task, or of a request of lm-eval's.
+        seed: seed of the sampling.
+        place: name of the task, for messages.
 
     Raises:
-        UsageError: a setting that is not known, or that contradicts another.
+        UsageError: a setting is unknown, or contradicts another.
     """
     if not isinstance(given, Mapping):
         raise UsageError(f"{place}: generation_kwargs is {given!r:.60}; it is a mapping of settings")
@@ -41,7 +41,7 @@ def decoding_of(given: Mapping[str, Any], seed: int, place: str) -> Decoding:
 
 
 def _temperature(given: Mapping[str, Any], place: str) -> float:
-    """As lm-eval reads it: a temperature above 0 samples unless told otherwise, and sampling alone means 1."""
+    """Return the temperature as lm-eval reads it: above 0 implies sampling, and sampling alone implies 1."""
     temperature = None if given.get("temperature") is None else _number(given["temperature"], "temperature", place)
     samples = given.get("do_sample", bool(temperature))
     if not isinstance(samples, bool):

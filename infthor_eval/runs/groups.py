@@ -1,11 +1,11 @@
-"""The records of a group, whatever its suite does: what fails is recorded, and no other group with it."""
+"""The records of a group: whatever its suite raises fails the group alone, and is recorded."""
 
 from collections.abc import Iterator
 from typing import Any, TypeVar
 
 import msgspec
 
-from infthor_eval.errors import InfthorError, describe_exception
+from infthor_eval.errors import ModelError
 from infthor_eval.runs.records import Unit, UnitRecord
 from infthor_eval.runs.suite import BoundEvaluation, Group, Session
 
@@ -16,22 +16,20 @@ U = TypeVar("U", bound=Unit[Any])
 
 
 def group_records(evaluation: BoundEvaluation[U, P], group: Group[U], session: Session[P]) -> Iterator[UnitRecord[P]]:
-    """The records of a group; units that it came to no record of have failed, and no other group with them.
+    """Yield the records of a group; units without a record when it ends have failed.
 
     Raises:
-        MemoryError: the machine has no more; the run ends.
+        MemoryError: the machine has no more memory; the run ends.
     """
     waiting = {unit.key: unit for unit in group.units}
-    reason = "the suite gives no record of it; mend the suite"
+    fault: Exception = ModelError("the suite gives no record of it; fix the suite")
     try:
         for record in evaluation.run(group, session):
-            msgspec.json.encode(record)  # what cannot be written is to fail here, not where the journal writes it
+            msgspec.json.encode(record)  # a record that cannot be written must fail here, not in the journal
             waiting.pop(record.key, None)
             yield record
-    except InfthorError as error:
-        reason = str(error)
-    except MemoryError:  # of the machine, and not of the group alone
+    except MemoryError:  # the next group would have no more memory than this one
         raise
     except Exception as error:  # noqa: BLE001 - a suite is anybody's code, and may raise anything
-        reason = f"{describe_exception(error)}; mend the suite and run the same command again"
-    yield from (unit.failed(reason) for unit in waiting.values())
+        fault = error
+    yield from (unit.failed(session.describe_failure(unit, fault)) for unit in waiting.values())

@@ -1,8 +1,12 @@
 """The journal of a run: every finished unit, one JSON line each, on disk before it counts.
 
-A run's journal is a folder of shards, one per worker, that are read together. The first line of each says what run it
-is. A unit is found again by its key, and counts only if the fingerprint of its inputs is the same, so a result of other
-inputs is never taken for this one's. A line that a killed process left unfinished is cut off when its shard is opened
+A journal is a folder of shards, which are read together. A shard belongs to one worker: number 0 to the driver, the
+others to the workers of a pool. Only its owner writes it, and holds a lock on it while it does, so a line needs no
+coordination with other processes, and a second run in the same folder is refused. The first line of each shard is the
+run's header.
+
+A record is looked up by its unit's key, and counts only if the fingerprint of the unit's inputs is the same, so a
+result from other inputs is never used. A line that a killed process left unfinished is cut off when its shard is opened
 again.
 """
 
@@ -25,7 +29,17 @@ from infthor_eval.formats.digests import canonical_json
 from infthor_eval.formats.files import write_atomically
 from infthor_eval.formats.reading import require_file
 from infthor_eval.runs.records import ArtifactRecord, RecordTypes, RunHeader, UnitKey, UnitRecord
-from infthor_eval.runs.shards import BAD, FOLDER, Decoder, lines_in, read_shard, read_shards, shards_of
+from infthor_eval.runs.shards import (
+    BAD,
+    FOLDER,
+    Decoder,
+    RunLog,
+    check_format,
+    find_shards,
+    read_lines,
+    read_shard,
+    read_shards,
+)
 from infthor_eval.runs.usage import NOTHING, Usage
 
 __all__ = ["Journal", "recover", "set_aside"]
@@ -33,7 +47,7 @@ __all__ = ["Journal", "recover", "set_aside"]
 P = TypeVar("P")
 
 _SHARD = "worker-{:d}.jsonl"
-_GLANCE_S = 0.1  # between two tries to lock
+_RETRY_S = 0.1  # between two attempts to lock
 _BAD_LINES = "bad_lines.txt"
 
 
@@ -42,41 +56,43 @@ class Journal(Generic[P]):
 
     Attributes:
         header: header of the run.
+        folder: folder of the shards.
     """
 
     def __init__(
         self, run: Path, header: RunHeader, types: RecordTypes[P], worker: int = 0, wait_s: float = 0.0
     ) -> None:
-        """Open this worker's shard, or begin it, and read all others.
+        """Open or create a worker's shard, and read all others.
 
         Args:
             run: the run's folder.
-            header: who the run is.
+            header: header of the run.
             types: payloads of the suite.
-            worker: number of the shard.
+            worker: number of the worker.
             wait_s: seconds to wait for another process to release the shard.
 
         Raises:
             UsageError: another process is writing the shard, or it cannot be written.
-            DataError: a shard is no journal, has a bad line, or is another run's.
+            DataError: a shard is no journal's, has a bad line, or belongs to another run.
         """
         path = run / FOLDER / _SHARD.format(worker)
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             if path.exists():
                 require_file(path, "take it out of the run's folder")
-            # Unbuffered: what a full disk did not take is not tried again when the file is closed.
+            # Unbuffered: bytes that a full disk refused must not be written later, when the file is closed.
             self._file: FileIO = path.open("a+b", buffering=0)
         except OSError as error:
             raise UsageError(f"{path}: cannot be written ({in_one_line(error)}); give another --output") from error
         self._path = path
         self.header = header
+        self.folder = path.parent
         self._writing = Lock()
         try:
             _lock(self._file, path, wait_s)
             self._decoder = types.decoder()
-            self._log = read_shards(run, self._decoder)
-            self._begin(path)
+            self._log: RunLog[P] = read_shards(run, self._decoder)
+            self._start_shard()
         except (DataError, UsageError):
             self._file.close()
             raise
@@ -91,7 +107,7 @@ class Journal(Generic[P]):
 
     @property
     def records(self) -> list[UnitRecord[P]]:
-        """The latest record of each unit, of all shards."""
+        """The latest record of each unit in all shards."""
         return self._log.records
 
     def find_record(self, key: UnitKey, fingerprint: str) -> UnitRecord[P] | None:
@@ -131,19 +147,19 @@ class Journal(Generic[P]):
             read_shard(path, self._decoder, self._log)
 
     def holds(self, record: UnitRecord[P]) -> bool:
-        """Whether this very record is in it already."""
+        """Return whether this very object is in the journal: a record that the suite found there and yielded as is."""
         return self._log.units.get(record.key) is record
 
     def append(self, record: UnitRecord[P]) -> UnitRecord[P]:
-        """Record a unit; the record is on disk when this returns, numbered as the attempt that it is.
+        """Write a record; it is on disk when this returns. The returned record has the number of its attempt.
 
         Raises:
-            DataError: it cannot be written, or the journal is no longer there.
+            DataError: it cannot be written, or the shard was deleted or replaced.
         """
-        self.require_there()
-        known = self._log.units.get(record.key)
-        if known is not None:
-            record = msgspec.structs.replace(record, attempt=known.attempt + 1)
+        self.check_file()
+        earlier = self._log.units.get(record.key)
+        if earlier is not None:
+            record = msgspec.structs.replace(record, attempt=earlier.attempt + 1)
         self._write(record)
         self._log.add(record)
         return record
@@ -164,37 +180,38 @@ class Journal(Generic[P]):
         self._write(record)
         self._log.add(record)
 
-    def _begin(self, path: Path) -> None:
-        if self._log.header is not None and canonical_json(self._log.header.config) != canonical_json(
-            self.header.config
-        ):
-            raise DataError(f"{path.parent}: is the journal of another run; give another --output")
-        content = path.read_bytes()
-        whole = content.rfind(b"\n") + 1
-        if whole < len(content):
-            self._file.truncate(whole)
-        if not whole:
+    def _start_shard(self) -> None:
+        """Check the run, cut off an unfinished line, and write the header if there is none."""
+        other = self._log.header
+        if other is not None and canonical_json(other.config) != canonical_json(self.header.config):
+            raise DataError(f"{self.folder}: is the journal of another run; give another --output")
+        content = self._path.read_bytes()
+        end = content.rfind(b"\n") + 1
+        if end < len(content):  # or the next line would continue it, and be bad too
+            self._file.truncate(end)
+        if not end:
             self._write(self.header)
 
     def _write(self, record: msgspec.Struct) -> None:
         line = memoryview(msgspec.json.encode(record) + b"\n")
-        mend = "make room and run the same command again, which goes on where it was"
-        with self._writing, wrap_errors(f"{self._path}: cannot be written", mend):
-            while line:
+        hint = "make room and run the same command again, which resumes it"
+        with self._writing, wrap_errors(f"{self._path}: cannot be written", hint):  # threads must not mix their lines
+            while line:  # an unbuffered write may take a part of the line only
                 line = line[self._file.write(line) :]
+            # Before the record counts: after a crash of the machine a unit is done if and only if its line is there.
             os.fsync(self._file.fileno())
 
-    def require_there(self) -> None:
-        """Refuse to go on where the file is no longer where it was: nothing that is recorded would last.
+    def check_file(self) -> None:
+        """Check that the shard is still at its path: what is written to a deleted file is lost.
 
         Raises:
-            DataError: it was deleted, or another took its place.
+            DataError: it was deleted or replaced.
         """
         try:
-            there = os.path.samestat(self._path.stat(), os.fstat(self._file.fileno()))
+            is_same = os.path.samestat(self._path.stat(), os.fstat(self._file.fileno()))
         except OSError:
-            there = False
-        if not there:
+            is_same = False
+        if not is_same:
             raise DataError(f"{self._path}: was deleted or replaced while the run wrote it; run the same command again")
 
 
@@ -207,25 +224,25 @@ def _lock(file: BinaryIO | FileIO, path: Path, wait_s: float = 0.0) -> None:
         except OSError as error:
             if time.monotonic() >= end:
                 raise UsageError(f"{path}: another run is writing it; wait for it or stop it") from error
-        time.sleep(_GLANCE_S)
+        time.sleep(_RETRY_S)
 
 
 def recover(run: Path, header: RunHeader, types: RecordTypes[Any]) -> int:
-    """Take the bad lines out of a run's shards and keep them beside; the units that they told of are tried again.
+    """Move the bad lines of a run's shards to a file beside them; their units are tried again.
 
     Args:
         run: the run's folder.
-        header: who the run is; takes the place of a first line that is bad.
+        header: header of the run; replaces a bad first line.
         types: payloads of the suite.
 
     Returns:
-        How many lines were bad.
+        Number of bad lines.
 
     Raises:
         UsageError: another process is writing a shard.
-        DataError: a shard is another run's, or of another format.
+        DataError: a shard is of another format.
     """
-    return sum(_recover_shard(path, header, types) for path in shards_of(run))
+    return sum(_recover_shard(path, header, types) for path in find_shards(run))
 
 
 def _recover_shard(path: Path, header: RunHeader, types: RecordTypes[Any]) -> int:
@@ -234,14 +251,17 @@ def _recover_shard(path: Path, header: RunHeader, types: RecordTypes[Any]) -> in
         decoder = types.decoder()
         bad: list[bytes] = []
         good: list[bytes] = []
-        for number, line in enumerate(lines_in(path)):
+        lines = read_lines(path)
+        check_format(path, lines[0] if lines else b"")
+        for number, line in enumerate(lines):
             (good if _is_good(line, decoder, is_first=number == 0) else bad).append(line)
         if not bad:
             return 0
         if not (good and isinstance(decoder.decode(good[0]), RunHeader)):
             good.insert(0, msgspec.json.encode(header))
-        with (path.parent / _BAD_LINES).open("ab") as kept:
-            kept.write(b"".join(line + b"\n" for line in bad))
+        # The bad lines first: a crash between the two leaves them twice, not lost.
+        with (path.parent / _BAD_LINES).open("ab") as file_of_bad:
+            file_of_bad.write(b"".join(line + b"\n" for line in bad))
         with write_atomically(path) as partial:
             partial.write_bytes(b"".join(line + b"\n" for line in good))
         return len(bad)
@@ -255,15 +275,15 @@ def _is_good(line: bytes, decoder: Decoder, *, is_first: bool) -> bool:
 
 
 def set_aside(run: Path) -> None:
-    """Give the journal of a run another name, so that the run starts anew and nothing is lost.
+    """Rename the journal of a run, so that the run restarts and nothing is lost.
 
     Raises:
         UsageError: another process is writing it.
     """
     if not (run / FOLDER).exists():
         return
-    with ExitStack() as held:
-        for path in shards_of(run):
-            _lock(held.enter_context(path.open("rb")), path)
+    with ExitStack() as locks:  # of all shards, until the folder has its new name
+        for path in find_shards(run):
+            _lock(locks.enter_context(path.open("rb")), path)
         number = next(n for n in itertools.count(1) if not (run / f"{FOLDER}.{n}").exists())
         (run / FOLDER).rename(run / f"{FOLDER}.{number}")

@@ -1,7 +1,7 @@
-"""What a journal holds: who the run is, finished units, and what a suite found on the way to them.
+"""The lines of a journal: the run's header, records of units, and cached artifacts.
 
-A line is a JSON object whose `type` says which of the three it is. A unit's envelope is the same for every suite; what
-the suite itself has to say of it is the payload, tagged in turn.
+A line is a JSON object whose `type` is one of the three. A unit's envelope is the same for every suite. Its payload
+is the suite's own, and tagged in turn.
 """
 
 from dataclasses import dataclass
@@ -9,9 +9,20 @@ from typing import Any, Generic, NamedTuple, TypeVar
 
 import msgspec
 
+from infthor_eval.errors import InfthorError, describe_exception
 from infthor_eval.runs.usage import NOTHING, Usage
 
-__all__ = ["FORMAT", "ArtifactRecord", "RecordTypes", "RunHeader", "Tokens", "Unit", "UnitKey", "UnitRecord"]
+__all__ = [
+    "FORMAT",
+    "ArtifactRecord",
+    "RecordTypes",
+    "RunHeader",
+    "Tokens",
+    "Unit",
+    "UnitKey",
+    "UnitRecord",
+    "describe_failure",
+]
 
 FORMAT = 3
 
@@ -20,12 +31,12 @@ P_co = TypeVar("P_co", covariant=True)
 
 
 class UnitKey(NamedTuple):
-    """Which unit of a run.
+    """The key of a unit within its run.
 
     Attributes:
-        task: the task that asks.
-        id: the question, the episode: what is evaluated.
-        variant: which of the task's ways of evaluating it ("depth=0.4"); empty where there is one.
+        task: name of the task.
+        id: id of the question or the episode.
+        variant: variant of the task's evaluation of it ("depth=0.4"); empty where there is only one.
     """
 
     task: str
@@ -37,12 +48,12 @@ class UnitKey(NamedTuple):
 
 
 class Tokens(msgspec.Struct, frozen=True, omit_defaults=True):
-    """Tokens that a unit took; None where the model does not tell.
+    """Tokens of a unit; None where the model does not count them.
 
     Attributes:
-        context: length of its requests.
-        cached: how many of them were not encoded again.
-        reply: length of the replies.
+        context: tokens of its requests.
+        cached: those of them that were not encoded again.
+        reply: tokens of the replies.
     """
 
     context: int | None = None
@@ -51,13 +62,13 @@ class Tokens(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class RunHeader(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="run"):
-    """Who a run is: the first line of each of its shards.
+    """The header of a run: the first line of each shard.
 
     Attributes:
-        suite: the kind of evaluation, which knows the payloads.
-        name: what the run is called in tables and folders.
+        suite: name of the suite, which knows the payloads.
+        name: name of the run in tables and folders.
         config: everything that can change a number, as JSON values.
-        format: of the journal.
+        format: format of the journal.
     """
 
     suite: str
@@ -69,22 +80,22 @@ class RunHeader(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag
 class UnitRecord(
     msgspec.Struct, Generic[P], frozen=True, kw_only=True, omit_defaults=True, tag_field="type", tag="unit"
 ):
-    """One unit that was evaluated, or the reason why it could not be.
+    """A unit that was evaluated, or the reason why it could not be.
 
     Attributes:
         task: see `UnitKey`.
         id: see `UnitKey`.
         variant: see `UnitKey`.
-        cluster: what it shares with units that are right or wrong together (a trajectory); intervals cluster by it.
-        fingerprint: of all its inputs; empty where they could not be read.
-        payload: what the suite has to say of it.
-        attempt: how many times it has been tried, this one included.
-        failure: why there is no result; None where there is one.
-        excluded: why it does not count, through no fault of the subject; None where it does.
-        faults: what went wrong and was survived on the way, a line each.
-        seconds: time that it took.
-        tokens: tokens that it took.
-        usage: what all its requests took together.
+        cluster: name of what it shares with units that are right or wrong together (a trajectory), for intervals.
+        fingerprint: hash of all its inputs; empty if they could not be read.
+        payload: the suite's own struct.
+        attempt: number of the attempt, from 1.
+        failure: reason why there is no result; None if there is one.
+        excluded: reason why the unit does not count, through no fault of the subject; None if it counts.
+        faults: faults that were retried, a line each.
+        seconds: duration.
+        tokens: tokens of the unit.
+        usage: usage of all its requests.
     """
 
     task: str
@@ -103,7 +114,7 @@ class UnitRecord(
 
     @property
     def key(self) -> UnitKey:
-        """Which unit of the run this is."""
+        """Key of the unit."""
         return UnitKey(self.task, self.id, self.variant)
 
 
@@ -136,19 +147,26 @@ class RecordTypes(Generic[P_co]):
     artifact: type[Any] | None = None
 
     def decoder(self) -> msgspec.json.Decoder[Any]:
-        """The decoder of a journal's lines."""
+        """Return the decoder of a journal's lines."""
         lines: Any = RunHeader | UnitRecord[self.unit] | ArtifactRecord[self.artifact]  # type: ignore[name-defined]
         return msgspec.json.Decoder(lines)
 
 
+def describe_failure(error: Exception) -> str:
+    """Return the message of an expected error, or type, place and message of another exception, in one line."""
+    if isinstance(error, InfthorError):
+        return str(error)
+    return f"{describe_exception(error)}; fix the suite and run the same command again"
+
+
 @dataclass(frozen=True)
 class Unit(Generic[P]):
-    """The smallest piece of work that is recorded.
+    """The smallest piece of work with a record of its own: a sample or an episode.
 
     Attributes:
-        key: which one.
+        key: key of the unit.
         cluster: see `UnitRecord`.
-        payload: what can be said of it before it is evaluated; recorded as it is where it fails.
+        payload: payload before the unit is evaluated; recorded as it is if the unit fails.
     """
 
     key: UnitKey
@@ -156,15 +174,15 @@ class Unit(Generic[P]):
     payload: P
 
     def record(self, fingerprint: str, payload: P, **envelope: Any) -> UnitRecord[P]:
-        """Its record: the envelope's fields as keywords (see `UnitRecord`)."""
+        """Return its record; further fields of the envelope (see `UnitRecord`) are keywords."""
         return UnitRecord(
             **self.key._asdict(), cluster=self.cluster, fingerprint=fingerprint, payload=payload, **envelope
         )
 
     def failed(self, reason: str, fingerprint: str = "", **envelope: Any) -> UnitRecord[P]:
-        """Its record where there is no result."""
+        """Return its record if there is no result."""
         return self.record(fingerprint, self.payload, failure=reason, **envelope)
 
     def excluded(self, reason: str, fingerprint: str, **envelope: Any) -> UnitRecord[P]:
-        """Its record where it turns out, when its turn comes, that nobody could be evaluated on it."""
+        """Return its record if it turns out that no subject can be evaluated on it."""
         return self.record(fingerprint, self.payload, excluded=reason, **envelope)

@@ -1,4 +1,4 @@
-"""What a run is asked: checked before anything expensive is loaded."""
+"""The request for a run, checked before anything expensive is loaded."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -21,20 +21,20 @@ U = TypeVar("U", bound=Unit[Any])
 
 @dataclass(frozen=True)
 class RunRequest:
-    """What a user asked for.
+    """A request for a run.
 
     Attributes:
-        model: name of a model, a policy, or one of the suite's baselines.
-        tasks: what the suite is asked.
-        asked: the names of tasks and groups as typed, which name the run's folder.
-        output: folder that takes the run's own folder.
-        model_options: the model's options as typed.
-        name: what the run is called; None takes the checkpoint's name, or the model's.
-        fresh: set an earlier journal aside and start anew.
-        recover: go on without the bad lines of an earlier journal.
-        worker_settings: how many workers, and where; it changes no number.
-        include: folders with task files of one's own.
-        suite_code: what distinguishes the code of a suite that is not this package's, as JSON values.
+        model: name of a model, a policy, or a baseline of the suite.
+        tasks: the request to the suite.
+        asked: names of tasks and groups as typed, which name the run's folder.
+        output: folder above the run's folder.
+        model_options: options of the model as typed.
+        name: name of the run; None for the checkpoint's name, or the model's.
+        fresh: restart, and keep an earlier journal under another name.
+        recover: resume without the bad lines of an earlier journal.
+        worker_settings: number and place of the workers; no result depends on it.
+        include: folders with the user's own task files.
+        suite_code: package, version and digest of a suite that is not this package's, as JSON values.
     """
 
     model: str
@@ -51,11 +51,11 @@ class RunRequest:
 
     @property
     def label(self) -> str:
-        """What the run is called."""
+        """Name of the run."""
         return self.name or label(self.model, self.model_options)
 
     def folder(self, header: RunHeader) -> Path:
-        """The run's own folder, `<output>/<name>/<tasks>-<identity>`."""
+        """Return the run's folder, `<output>/<name>/<tasks>-<config hash>`."""
         return self.output / header.name / f"{'+'.join(self.asked)[:80]}-{fingerprint(header.config)}"
 
 
@@ -78,13 +78,13 @@ def prepare(request: RunRequest, suite: Suite[U, P]) -> PreparedRun[U, P]:
     """Check a request before anything expensive is loaded.
 
     Raises:
-        UsageError: an unknown model or option, or what the suite refuses.
-        DataError: the suite's data are not what their format says, or the results folder cannot be written to.
+        UsageError: the model or an option is unknown, or the suite refuses the request.
+        DataError: the suite's data do not match their format, or the results folder cannot be written.
     """
     if request.model not in suite.baselines and not is_known(request.model):
         raise unknown_name("model", request.model, [*suite.baselines, *names()])
     if request.model not in suite.baselines:
-        check_options(request.model, request.model_options)  # refused before the data are read
+        check_options(request.model, request.model_options)  # before the data are read, which may take minutes
     elif request.model_options:
         raise UsageError(f"{request.model} has no option {next(iter(request.model_options))}, nor any other")
     require_writable(request.output / request.label, "--output")

@@ -1,4 +1,4 @@
-"""The files that a run leaves beside its journal: what it found, and what it took."""
+"""The files that a run writes beside its journal: results, scores and usage."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -18,54 +18,54 @@ __all__ = ["RESULTS", "results_document", "write_results", "write_scores", "writ
 
 RESULTS = "results.json"
 _SCORES = "scores.jsonl"
-_TOOK = "usage.json"
+_USAGE = "usage.json"
 
 
-def results_document(found: RunSummary, suite: Suite[Any, Any], n_missing: int | None, usage: Usage) -> dict[str, Any]:
-    """What a run found, as it is written; docs/formats.md describes it.
+def results_document(run: RunSummary, suite: Suite[Any, Any], n_missing: int | None, usage: Usage) -> dict[str, Any]:
+    """Return the contents of `results.json`; docs/formats.md describes them.
 
     Args:
-        found: who it was, and what it found.
-        suite: that knows what the run is known by.
-        n_missing: how many units were not come to; None where that is not known.
-        usage: what all its requests took.
+        run: header and summary of the run.
+        suite: suite of the run.
+        n_missing: number of units that were not attempted; None if it is not known.
+        usage: usage of all requests.
     """
-    header = found.header
+    header = run.header
     return {
         "suite": header.suite,
         "name": header.name,
         "config": header.config,
         "n_missing": n_missing,
-        "primary_metrics": suite.primary_metrics(found.summary),
-        "summary": found.summary,
-        # Not what was cached: that differs between a run and the same run resumed, or shared out.
+        "primary_metrics": suite.primary_metrics(run.summary),
+        "summary": run.summary,
+        # Without cached tokens: their number differs between a run and the same run resumed, or run by workers.
         "usage": {name: getattr(usage, name) for name in ("requests", "context", "reply", "cost")},
     }
 
 
 def write_results(folder: Path, document: dict[str, Any]) -> None:
-    """Write what a run found; equal runs give equal bytes.
+    """Write `results.json`; equal runs give equal bytes.
 
     Args:
-        folder: the run's.
+        folder: folder of the run.
         document: see `results_document`.
 
     Raises:
-        DataError: it cannot be written.
+        DataError: the file cannot be written.
     """
     _write(folder / RESULTS, document)
 
 
 def write_scores(folder: Path, suite: Suite[Any, Any], records: Sequence[UnitRecord[Any]]) -> None:
-    """Write the scores of every unit, a JSON object a line; equal runs give equal bytes.
+    """Write the scores of every unit to `scores.jsonl`, a JSON object a line; equal runs give equal bytes.
 
     Args:
-        folder: the run's.
-        suite: that scores.
-        records: of the run's units.
+        folder: folder of the run.
+        suite: suite of the run.
+        records: records of the run's units.
 
     Raises:
-        DataError: it cannot be written.
+        DataError: the file cannot be written.
     """
     rows = (
         {
@@ -79,20 +79,20 @@ def write_scores(folder: Path, suite: Suite[Any, Any], records: Sequence[UnitRec
         }
         for record in records
     )
-    with _written(folder / _SCORES) as partial:
+    with _atomic_file(folder / _SCORES) as partial:
         partial.write_bytes(b"".join(msgspec.json.encode(row) + b"\n" for row in rows))
 
 
 def write_usage(folder: Path, records: Sequence[UnitRecord[Any]], usage: Usage) -> None:
-    """Write what a run took, which differs from run to run.
+    """Write requests, tokens, time and cost of a run, which differ from run to run, to `usage.json`.
 
     Args:
-        folder: the run's.
-        records: of its units.
-        usage: what all its requests took.
+        folder: folder of the run.
+        records: records of its units.
+        usage: usage of all requests.
 
     Raises:
-        DataError: it cannot be written.
+        DataError: the file cannot be written.
     """
     document = {
         "requests": usage.requests,
@@ -103,17 +103,17 @@ def write_usage(folder: Path, records: Sequence[UnitRecord[Any]], usage: Usage) 
         "seconds": round(math.fsum(record.seconds for record in records), 4),
         "cost": usage.cost,
     }
-    _write(folder / _TOOK, document)
+    _write(folder / _USAGE, document)
 
 
 def _write(path: Path, document: dict[str, Any]) -> None:
-    with _written(path) as partial:
+    with _atomic_file(path) as partial:
         encoded = msgspec.json.encode(document, order="sorted")
         partial.write_bytes(msgspec.json.format(encoded, indent=2) + b"\n")
 
 
 @contextmanager
-def _written(path: Path) -> Iterator[Path]:
+def _atomic_file(path: Path) -> Iterator[Path]:
     with (
         wrap_errors(f"{path}: cannot be written", "make room, the journal holds it all"),
         write_atomically(path) as partial,

@@ -4,8 +4,8 @@ from collections import defaultdict
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path, PurePath
 
-from infthor_eval.runs.configuration import read_configuration
 from infthor_eval.runs.records import RunHeader
+from infthor_eval.runs.stored_command import read_stored_command
 
 __all__ = ["label_runs"]
 
@@ -53,8 +53,8 @@ def _label_alike(runs: Sequence[tuple[Path, RunHeader]], ignore: Collection[str]
 
 def _options(folder: Path) -> dict[str, str]:
     """The options of a run's command, those of the model among them, as text."""
-    configuration = read_configuration(folder)
-    every = dict(configuration.options) if configuration else {}
+    command = read_stored_command(folder)
+    every = dict(command.options) if command else {}
     of_model = every.pop("model_args", None)
     if isinstance(of_model, Mapping):
         every |= of_model

@@ -1,4 +1,4 @@
-"""The runs below a folder, as far as that can be told without their suites."""
+"""Finding the runs below a folder, without their suites."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -11,25 +11,25 @@ from infthor_eval.formats.reading import read_bytes
 from infthor_eval.rates import Rate
 from infthor_eval.runs.records import RunHeader
 from infthor_eval.runs.results import RESULTS
-from infthor_eval.runs.shards import FOLDER, latest_outcomes, read_header
+from infthor_eval.runs.shards import FOLDER, read_failures, read_header
 
 __all__ = ["BrokenRun", "Results", "StoredRun", "find_runs", "read_results"]
 
-_DEPTH = 4  # folders below the one that is looked through: sets of frames lie in results too
+_DEPTH = 4  # levels of folders that are searched: results may hold sets with thousands of frames
 
 
 @dataclass(frozen=True)
 class StoredRun:
-    """A run.
+    """A run on disk.
 
     Attributes:
-        folder: its own.
-        header: who it is.
-        n_done: units that have a record, failed ones among them.
-        n_failed: units that the subject failed on.
-        n_missing: units that it did not come to; None where it was killed before it could tell.
-        headline: the number that each task is known by; none where there are no results yet.
-        changed: when it last recorded something, in seconds since 1970.
+        folder: folder of the run.
+        header: header of its journal.
+        n_done: number of units with a record, failed ones included.
+        n_failed: number of failed units.
+        n_missing: number of units that were not attempted; None if the run was killed before it wrote results.
+        primary_metrics: primary metric of each task; empty if there are no results yet.
+        changed: time of the last change to the journal, in seconds since 1970.
     """
 
     folder: Path
@@ -50,11 +50,11 @@ class BrokenRun:
 
 
 class Results(msgspec.Struct, frozen=True):
-    """What can be looked at in `results.json` without the suite.
+    """The fields of `results.json` that need no suite.
 
     Attributes:
-        n_missing: units that the run did not come to.
-        headline: the number that each task is known by.
+        n_missing: number of units that were not attempted.
+        primary_metrics: primary metric of each task.
     """
 
     n_missing: int
@@ -62,45 +62,45 @@ class Results(msgspec.Struct, frozen=True):
 
 
 def find_runs(folder: Path) -> Iterator[StoredRun | BrokenRun]:
-    """The runs below a folder, in the order of their places.
+    """Yield the runs below a folder, in the order of their paths.
 
     Raises:
-        DataError: there is no such folder, or it cannot be looked through.
+        DataError: there is no such folder, or it cannot be searched.
     """
     if not folder.is_dir():
         raise DataError(f"{folder}: no such folder; give the results folder of a run (`--output`, else results)")
-    for place in _places(folder, _DEPTH):
+    for run in _run_folders(folder, _DEPTH):
         try:
-            yield _found(place)
+            yield _read_run(run)
         except InfthorError as error:
-            yield BrokenRun(place, str(error))
+            yield BrokenRun(run, str(error))
 
 
 def read_results(folder: Path) -> Results | None:
-    """What a run left in `results.json`; None where there is none yet.
+    """Read `results.json` of a run; None if there is none yet.
 
     Raises:
-        DataError: it is not what it should be.
+        DataError: the file is not valid.
     """
-    path, mend = folder / RESULTS, "run the same command again"
+    path, hint = folder / RESULTS, "run the same command again"
     if not path.is_file():
         return None
-    with wrap_errors(f"{path}: not the results of a run", mend, catch=msgspec.DecodeError):
-        return msgspec.json.decode(read_bytes(path, mend), type=Results)
+    with wrap_errors(f"{path}: not the results of a run", hint, catch=msgspec.DecodeError):
+        return msgspec.json.decode(read_bytes(path, hint), type=Results)
 
 
-def _places(folder: Path, depth: int) -> Iterator[Path]:
+def _run_folders(folder: Path, depth: int) -> Iterator[Path]:
     if (folder / FOLDER).is_dir() or (folder / RESULTS).is_file():
         yield folder
     elif depth:
-        with wrap_errors(f"{folder}: cannot be looked through", "make it readable, or give another folder"):
+        with wrap_errors(f"{folder}: cannot be searched", "make it readable, or give another folder"):
             below = sorted(path for path in folder.iterdir() if path.is_dir() and not path.is_symlink())
         for path in below:
-            yield from _places(path, depth - 1)
+            yield from _run_folders(path, depth - 1)
 
 
-def _found(folder: Path) -> StoredRun:
-    header, failures, results = read_header(folder), latest_outcomes(folder), read_results(folder)
+def _read_run(folder: Path) -> StoredRun:
+    header, failures, results = read_header(folder), read_failures(folder), read_results(folder)
     return StoredRun(
         folder=folder,
         header=header,

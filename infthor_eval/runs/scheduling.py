@@ -1,4 +1,4 @@
-"""In which order, and how many at a time, groups are done."""
+"""Doing groups in order, several at a time where the subject takes several requests."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from queue import Empty, SimpleQueue
@@ -17,12 +17,12 @@ U = TypeVar("U", bound=Unit[Any])
 def run_groups(
     groups: Sequence[Group[U]], do: Callable[[Group[U]], Iterable[UnitRecord[P]]], max_in_flight: int
 ) -> Iterator[UnitRecord[P]]:
-    """The records of all groups, as they come.
+    """Yield the records of all groups as soon as they are there.
 
     Args:
-        groups: in the order in which they are begun.
-        do: does one group; called from several threads where several are in flight.
-        max_in_flight: how many groups are done at the same time.
+        groups: the groups in the order in which they are started.
+        do: does one group; called from several threads if several are in flight.
+        max_in_flight: number of groups that are done at the same time.
     """
     if max_in_flight == 1 or len(groups) <= 1:
         for group in groups:
@@ -37,15 +37,15 @@ def _in_threads(
     waiting: SimpleQueue[Group[U]] = SimpleQueue()
     for group in groups:
         waiting.put(group)
-    made: SimpleQueue[UnitRecord[P] | BaseException | None] = SimpleQueue()  # None: a thread has ended
+    results: SimpleQueue[UnitRecord[P] | BaseException | None] = SimpleQueue()  # None: a thread has ended
     stop = Event()
-    threads = [Thread(target=_work, args=(waiting, do, made, stop), daemon=True) for _ in range(n_threads)]
+    threads = [Thread(target=_work, args=(waiting, do, results, stop), daemon=True) for _ in range(n_threads)]
     for thread in threads:
         thread.start()
     running = n_threads
     try:
         while running:
-            item = made.get()
+            item = results.get()
             if isinstance(item, BaseException):
                 raise item
             if item is None:
@@ -59,24 +59,24 @@ def _in_threads(
 def _work(
     waiting: "SimpleQueue[Group[U]]",
     do: Callable[[Group[U]], Iterable[UnitRecord[P]]],
-    made: "SimpleQueue[UnitRecord[P] | BaseException | None]",
+    results: "SimpleQueue[UnitRecord[P] | BaseException | None]",
     stop: Event,
 ) -> None:
     try:
         while (group := _next(waiting)) is not None and not stop.is_set():
             for record in do(group):
-                made.put(record)
+                results.put(record)
                 if stop.is_set():
                     return
     except BaseException as error:  # noqa: BLE001 - raised again in the thread that waits for the records
-        made.put(error)
+        results.put(error)
     else:
-        made.put(None)
+        results.put(None)
 
 
 def _next(waiting: "SimpleQueue[Group[U]]") -> Group[U] | None:
-    """The next group; None where there is none. Not by asking first: another thread may take the last one meanwhile."""
-    try:
+    """Return the next group, or None if there is none."""
+    try:  # rather than a check whether it is empty: another thread may take the last group after it
         return waiting.get_nowait()
     except Empty:
         return None

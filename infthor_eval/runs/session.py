@@ -5,7 +5,8 @@ from typing import Any, Generic, TypeVar
 import msgspec
 
 from infthor_eval.runs.journal import Journal
-from infthor_eval.runs.records import Unit, UnitRecord
+from infthor_eval.runs.records import Unit, UnitRecord, describe_failure
+from infthor_eval.runs.tracebacks import TracebackFile
 from infthor_eval.runs.usage import NOTHING, Usage
 
 __all__ = ["JournalSession"]
@@ -19,10 +20,17 @@ class JournalSession(Generic[P]):
 
     def __init__(self, journal: Journal[P]) -> None:
         self.journal = journal
+        self._tracebacks = TracebackFile(journal.folder)
 
     def find_record(self, unit: Unit[P], fingerprint: str) -> UnitRecord[P] | None:
         """See `Session`."""
         return self.journal.find_record(unit.key, fingerprint)
+
+    def describe_failure(self, unit: Unit[P], error: Exception) -> str:
+        """See `Session`."""
+        attempt = 1 + max((record.attempt for record in self.journal.latest_records([unit.key])), default=0)
+        file = self._tracebacks.append(unit.key, attempt, error)
+        return describe_failure(error) + (f"; traceback in {file}" if file else "")
 
     def find_artifact(self, fingerprint: str, kind: type[A]) -> A | None:
         """See `Session`."""

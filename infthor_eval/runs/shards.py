@@ -1,8 +1,8 @@
-"""The shards of a run's journal, read: who the run is, and what they hold together."""
+"""Reading the shards of a run's journal."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import msgspec
 
@@ -17,38 +17,41 @@ __all__ = [
     "FOLDER",
     "Decoder",
     "RunLog",
-    "latest_outcomes",
-    "lines_in",
+    "check_format",
+    "find_shards",
+    "read_failures",
     "read_header",
+    "read_lines",
     "read_run",
     "read_shard",
     "read_shards",
-    "shards_of",
 ]
 
-FOLDER = "journal"  # of a run's folder
+P = TypeVar("P")
+
+FOLDER = "journal"  # within the run's folder
 Decoder = msgspec.json.Decoder[Any]
-BAD = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)  # what a line is that is none of a journal
-_OLD = "journal.jsonl"  # the one file of format 1, in the run's folder
-_MEND = "run the same command with --recover to go on without such lines, or with --fresh to start anew"
+BAD = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)  # raised on a line that is none of a journal's
+_FORMAT_1 = "journal.jsonl"  # the single file of format 1, in the run's folder
+_HINT = "run the same command with --recover to resume without such lines, or with --fresh to restart"
 
 
 @dataclass
-class RunLog:
-    """What the shards of a run hold together.
+class RunLog(Generic[P]):
+    """The contents of all shards of a run.
 
     Attributes:
-        header: who the run is; None where there is no shard yet.
+        header: header of the run; None if there is no shard yet.
         units: the latest record of each unit.
         artifacts: cached artifacts by fingerprint.
     """
 
     header: RunHeader | None = None
-    units: dict[UnitKey, UnitRecord[Any]] = field(default_factory=dict)
+    units: dict[UnitKey, UnitRecord[P]] = field(default_factory=dict)
     artifacts: dict[str, ArtifactRecord[Any]] = field(default_factory=dict)
 
-    def add(self, record: UnitRecord[Any] | ArtifactRecord[Any]) -> None:
-        """Take up a record; of a unit that was tried several times the last try counts, and of two the successful."""
+    def add(self, record: UnitRecord[P] | ArtifactRecord[Any]) -> None:
+        """Add a record. Of several of one unit the last attempt counts; of one attempt by two workers, the result."""
         if isinstance(record, ArtifactRecord):
             self.artifacts[record.fingerprint] = record
             return
@@ -57,13 +60,13 @@ class RunLog:
             self.units[record.key] = record
 
     @property
-    def records(self) -> list[UnitRecord[Any]]:
+    def records(self) -> list[UnitRecord[P]]:
         """The latest record of each unit, in the order of the units' keys."""
         return [self.units[key] for key in sorted(self.units)]
 
     @property
     def usage(self) -> Usage:
-        """What all requests took, those for cached artifacts included."""
+        """Usage of all requests, those for cached artifacts included."""
         return Usage.total(
             [*(unit.usage for unit in self.units.values()), *(artifact.usage for artifact in self.artifacts.values())]
         )
@@ -74,19 +77,21 @@ def _rank(record: UnitRecord[Any]) -> tuple[int, bool]:
 
 
 def read_header(run: Path) -> RunHeader:
-    """Who the run in a folder is.
+    """Read the header of the run in a folder.
 
     Raises:
-        DataError: there is no journal, or of another format.
+        DataError: there is no journal, or one of another format.
     """
-    shards = shards_of(run)
-    if not shards:
-        raise DataError(f"{run}: {_no_journal(run)}")
-    return _header(shards[0], lines_in(shards[0]))
+    shards = find_shards(run)
+    if shards:
+        return _read_header(shards[0], read_lines(shards[0]))
+    if (run / _FORMAT_1).is_file():
+        raise DataError(f"{run}: its journal is of format 1, this version reads {FORMAT}; run the evaluation again")
+    raise DataError(f"{run}: no journal in it; give the folder of a run")
 
 
-def read_run(run: Path, types: RecordTypes) -> tuple[RunHeader, list[UnitRecord[Any]]]:
-    """The run in a folder: who it is, and the latest record of each unit of all shards.
+def read_run(run: Path, types: RecordTypes[P]) -> tuple[RunHeader, list[UnitRecord[P]]]:
+    """Read the header of the run in a folder, and the latest record of each unit of all shards.
 
     Raises:
         DataError: there is no journal, or one with a bad line, or of another format.
@@ -95,8 +100,8 @@ def read_run(run: Path, types: RecordTypes) -> tuple[RunHeader, list[UnitRecord[
     return header, read_shards(run, types.decoder()).records
 
 
-class _Outcome(msgspec.Struct, tag_field="type", tag="unit"):
-    """What is looked at of a unit where its suite is not known."""
+class _UnitOutcome(msgspec.Struct, tag_field="type", tag="unit"):
+    """The fields of a unit's record that need no suite."""
 
     task: str
     id: str
@@ -105,41 +110,35 @@ class _Outcome(msgspec.Struct, tag_field="type", tag="unit"):
     failure: str | None = None
 
 
-class _Artifact(msgspec.Struct, tag_field="type", tag="artifact"):
-    """Nothing is looked at."""
+class _AnyArtifact(msgspec.Struct, tag_field="type", tag="artifact"):
+    """An artifact; no field of it is read."""
 
 
-def latest_outcomes(run: Path) -> dict[UnitKey, bool]:
-    """Whether each unit that has a record failed, whatever suite it is of.
+def read_failures(run: Path) -> dict[UnitKey, bool]:
+    """Return for each unit with a record whether its latest attempt failed; needs no suite.
 
     Raises:
         DataError: a line is bad.
     """
-    decoder = msgspec.json.Decoder(_Outcome | _Artifact | RunHeader)
-    found: dict[UnitKey, tuple[int, bool]] = {}
-    for path in shards_of(run):
-        for number, line in enumerate(lines_in(path), 1):
+    decoder = msgspec.json.Decoder(_UnitOutcome | _AnyArtifact | RunHeader)
+    latest: dict[UnitKey, tuple[int, bool]] = {}
+    for path in find_shards(run):
+        for number, line in enumerate(read_lines(path), 1):
             try:
                 unit = decoder.decode(line)
             except BAD as error:
-                raise DataError(f"{path}, line {number}: not a line of a journal ({error}); {_MEND}") from error
-            if isinstance(unit, _Outcome):
+                raise DataError(f"{path}, line {number}: not a line of a journal ({error}); {_HINT}") from error
+            if isinstance(unit, _UnitOutcome):
                 key, rank = UnitKey(unit.task, unit.id, unit.variant), (unit.attempt, unit.failure is None)
-                found[key] = max(found.get(key, rank), rank)
-    return {key: not succeeded for key, (_, succeeded) in found.items()}
+                latest[key] = max(latest.get(key, rank), rank)
+    return {key: not succeeded for key, (_, succeeded) in latest.items()}
 
 
-def _no_journal(run: Path) -> str:
-    if (run / _OLD).is_file():
-        return f"its journal is of format 1, this version reads {FORMAT}; run the evaluation again"
-    return "no journal in it; give the folder of a run"
-
-
-def shards_of(run: Path) -> list[Path]:
-    """The files of a run's shards.
+def find_shards(run: Path) -> list[Path]:
+    """Return the files of a run's shards.
 
     Raises:
-        DataError: one of them is no file.
+        DataError: a shard is not a file.
     """
     shards = sorted((run / FOLDER).glob("worker-*.jsonl"))
     for path in shards:
@@ -147,24 +146,24 @@ def shards_of(run: Path) -> list[Path]:
     return shards
 
 
-def read_shards(run: Path, decoder: Decoder) -> RunLog:
-    """All that the shards of a run hold together; nothing where there is none.
+def read_shards(run: Path, decoder: Decoder) -> RunLog[Any]:
+    """Read all shards of a run; an empty log if there is none.
 
     Raises:
         DataError: a shard has a bad line, is of another format, or of another run than the others.
     """
-    log = RunLog()
-    for path in shards_of(run):
+    log: RunLog[Any] = RunLog()
+    for path in find_shards(run):
         read_shard(path, decoder, log)
     return log
 
 
-def read_shard(path: Path, decoder: Decoder, log: RunLog) -> None:
-    """Take up all that a shard holds."""
-    lines = lines_in(path)
+def read_shard(path: Path, decoder: Decoder, log: RunLog[Any]) -> None:
+    """Add the contents of a shard to a log."""
+    lines = read_lines(path)
     if not lines:
-        return  # begun by a worker that was killed before it said who it is
-    header = _header(path, lines)
+        return  # created by a worker that was killed before it wrote the header
+    header = _read_header(path, lines)
     if log.header is not None and canonical_json(header.config) != canonical_json(log.header.config):
         raise DataError(f"{path}: belongs to another run than the shards beside it; take it out of the folder")
     log.header = header
@@ -172,14 +171,14 @@ def read_shard(path: Path, decoder: Decoder, log: RunLog) -> None:
         try:
             record = decoder.decode(line)
         except BAD as error:
-            raise DataError(f"{path}, line {number}: not a line of a journal ({error}); {_MEND}") from error
+            raise DataError(f"{path}, line {number}: not a line of a journal ({error}); {_HINT}") from error
         if isinstance(record, RunHeader):
-            raise DataError(f"{path}, line {number}: the first line of a journal amid its records; {_MEND}")
+            raise DataError(f"{path}, line {number}: a second header in the middle of the records; {_HINT}")
         log.add(record)
 
 
-def lines_in(path: Path) -> list[bytes]:
-    """The whole lines of a shard; one that is not finished is none yet."""
+def read_lines(path: Path) -> list[bytes]:
+    """Return the complete lines of a shard; a last line without its end is still being written, or never will be."""
     content = read_bytes(path, "restore the file")
     return content[: content.rfind(b"\n") + 1].splitlines()
 
@@ -188,17 +187,30 @@ class _AnyFormat(msgspec.Struct):
     format: int
 
 
-def _header(path: Path, lines: list[bytes]) -> RunHeader:
-    first = lines[0] if lines else b""
+def check_format(path: Path, line: bytes) -> None:
+    """Refuse a shard of another format.
+
+    Args:
+        path: path of the shard.
+        line: its first line; one that is no header passes.
+
+    Raises:
+        DataError: names both formats, and what to do.
+    """
     try:
-        version = msgspec.json.decode(first, type=_AnyFormat).format
-    except BAD as error:
-        raise DataError(f"{path}, line 1: not the first line of a journal ({error}); {_MEND}") from error
+        version = msgspec.json.decode(line, type=_AnyFormat).format
+    except BAD:
+        return
     if version != FORMAT:
         raise DataError(
             f"{path}: a journal of format {version}, this version reads {FORMAT}; run the command again with --fresh"
         )
+
+
+def _read_header(path: Path, lines: list[bytes]) -> RunHeader:
+    first = lines[0] if lines else b""
+    check_format(path, first)
     try:
         return msgspec.json.decode(first, type=RunHeader)
     except BAD as error:
-        raise DataError(f"{path}, line 1: not the first line of a journal ({error}); {_MEND}") from error
+        raise DataError(f"{path}, line 1: not the first line of a journal ({error}); {_HINT}") from error

@@ -130,6 +130,10 @@ class Session(Protocol[P]):
         """Return the record of a unit that already has a result from these very inputs, or None."""
         ...
 
+    def describe_failure(self, unit: Unit[P], error: Exception) -> str:
+        """Return the reason why a unit failed by an exception, and keep the traceback of an unexpected one."""
+        ...
+
     def find_artifact(self, fingerprint: str, kind: type[A]) -> A | None:
         """Return the cached artifact of these inputs, or None."""
         ...

@@ -1,4 +1,4 @@
-"""What the requests of a run took: how many, their tokens, and their cost."""
+"""Usage: the number of requests, their tokens and their cost."""
 
 import math
 from collections.abc import Iterable
@@ -9,18 +9,18 @@ from model_adapters import Reply
 
 __all__ = ["NOTHING", "Usage"]
 
-_DIGITS = 9  # of dollars: what is beyond is rounding
+_DIGITS = 9  # of dollars; further digits depend on the order of the sum
 
 
 class Usage(msgspec.Struct, frozen=True, omit_defaults=True):
-    """What some requests took, all together; a count that the model does not tell is left out.
+    """Usage of some requests together; a count that the model does not report is left out.
 
     Attributes:
-        requests: that were answered.
-        context: their tokens, frames included.
-        cached: how many of these were not encoded again.
+        requests: number of answered requests.
+        context: tokens of the requests, frames included.
+        cached: those of them that were not encoded again.
         reply: tokens of the replies.
-        cost: in US dollars, by the prices given when they were asked; None where none were.
+        cost: cost in US dollars by the prices given for the run; None without prices.
     """
 
     requests: int = 0
@@ -31,7 +31,7 @@ class Usage(msgspec.Struct, frozen=True, omit_defaults=True):
 
     @classmethod
     def of(cls, replies: Iterable[Reply]) -> "Usage":
-        """What these replies took."""
+        """Return the usage of replies."""
         return cls.total(
             cls(1, reply.n_context_tokens or 0, reply.n_cached_tokens or 0, reply.n_reply_tokens or 0, reply.cost)
             for reply in replies
@@ -39,25 +39,25 @@ class Usage(msgspec.Struct, frozen=True, omit_defaults=True):
 
     @classmethod
     def total(cls, usages: Iterable["Usage"]) -> "Usage":
-        """All of them together."""
-        kept = list(usages)
-        costs = [usage.cost for usage in kept if usage.cost is not None]
+        """Return the sum of several usages."""
+        items = list(usages)
+        costs = [usage.cost for usage in items if usage.cost is not None]
         return cls(
-            requests=sum(usage.requests for usage in kept),
-            context=sum(usage.context for usage in kept),
-            cached=sum(usage.cached for usage in kept),
-            reply=sum(usage.reply for usage in kept),
+            requests=sum(usage.requests for usage in items),
+            context=sum(usage.context for usage in items),
+            cached=sum(usage.cached for usage in items),
+            reply=sum(usage.reply for usage in items),
             cost=round(math.fsum(costs), _DIGITS) if costs else None,
         )
 
     @property
     def hit_rate(self) -> float | None:
-        """The share of the context's tokens that were not encoded again, 0 to 1; None where none were counted."""
+        """Share of the context's tokens that were not encoded again, 0 to 1; None if none were counted."""
         return self.cached / self.context if self.context else None
 
     @property
     def description(self) -> str:
-        """In words."""
+        """The usage in words."""
         cost = "" if self.cost is None else f", {self.cost:.4f} US dollars"
         share = "" if self.hit_rate is None else f", {100 * self.hit_rate:.1f} %"
         return (

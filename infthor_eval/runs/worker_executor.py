@@ -18,7 +18,7 @@ from infthor_eval.runs.records import RunHeader, Unit, UnitKey, UnitRecord
 from infthor_eval.runs.request import PreparedRun
 from infthor_eval.runs.session import JournalSession
 from infthor_eval.runs.suite import Group, UnitSample, Workload
-from infthor_eval.workers import Event, GivenUp, Lost, Made, Pool, Withdrawn, WorkerLostError
+from infthor_eval.workers import Event, JobFailed, JobResult, Pool, WorkerLost, WorkerLostError, WorkerWithdrawn
 
 __all__ = ["WorkerPoolExecutor"]
 
@@ -210,16 +210,16 @@ class WorkerPoolExecutor(Generic[U, P]):
 
         for event in self._pool.run(len(portions), job, progress.should_stop, max_losses):
             self._report_loss(event)
-            if isinstance(event, Made):
+            if isinstance(event, JobResult):
                 record, resumed = event.result
                 if not resumed:
                     journal.add_from(event.worker, record)
                 if record.key not in progress.done:
                     progress.done.add(record.key)
                     yield record, resumed
-            elif isinstance(event, Lost | GivenUp):
+            elif isinstance(event, WorkerLost | JobFailed):
                 journal.reread(event.worker)  # it may have written records that it could no longer send
-            if isinstance(event, GivenUp):
+            if isinstance(event, JobFailed):
                 given_up[portions[event.job]] = event.reason
         return given_up
 
@@ -234,11 +234,11 @@ class WorkerPoolExecutor(Generic[U, P]):
         for job in jobs:
             converted: list[UnitSample] = []
             for event in self._pool.run(1, lambda _, job=job: job):  # type: ignore[misc]
-                if isinstance(event, Made):
+                if isinstance(event, JobResult):
                     converted.append(event.result)
-                elif isinstance(event, Lost):
+                elif isinstance(event, WorkerLost):
                     converted.clear()  # another worker begins the job again
-                elif isinstance(event, GivenUp):
+                elif isinstance(event, JobFailed):
                     raise WorkerLostError(f"worker after worker was lost at it ({event.reason}); run it again")
             yield from converted
 
@@ -257,7 +257,7 @@ class WorkerPoolExecutor(Generic[U, P]):
             raise UsageError(f"the workers differ in {', '.join(differing)}; give all nodes the same versions and data")
 
     def _report_loss(self, event: Event) -> None:
-        if isinstance(event, Lost):
+        if isinstance(event, WorkerLost):
             self._report(f"{event.reason}; what it had not finished goes to another")
-        elif isinstance(event, Withdrawn):
+        elif isinstance(event, WorkerWithdrawn):
             self._report(f"worker {event.worker} cannot be started, the others go on: {event.reason}")

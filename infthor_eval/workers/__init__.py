@@ -1,24 +1,24 @@
-"""Several workers at one piece of work: processes of this machine, or a Ray cluster's. It knows no evaluation."""
+"""Workers that share jobs: processes of this machine, or actors of a Ray cluster. Nothing here knows evaluations."""
 
+from infthor_eval.workers.host import WorkerHost
+from infthor_eval.workers.jobs import run_jobs
 from infthor_eval.workers.link import Connect, Link, OpenWorker, Worker, WorkerLostError
-from infthor_eval.workers.pool import Event, GivenUp, Lost, Made, Pool, Withdrawn
-from infthor_eval.workers.serving import Serving
+from infthor_eval.workers.pool import Event, JobFailed, JobResult, Pool, WorkerLost, WorkerWithdrawn
 from infthor_eval.workers.settings import WorkerSettings
-from infthor_eval.workers.sharing import shared_out
 
 __all__ = [
     "Connect",
     "Event",
-    "GivenUp",
+    "JobFailed",
+    "JobResult",
     "Link",
-    "Lost",
-    "Made",
     "OpenWorker",
     "Pool",
-    "Serving",
-    "Withdrawn",
     "Worker",
+    "WorkerHost",
+    "WorkerLost",
     "WorkerLostError",
     "WorkerSettings",
-    "shared_out",
+    "WorkerWithdrawn",
+    "run_jobs",
 ]

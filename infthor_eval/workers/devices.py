@@ -1,31 +1,31 @@
-"""A worker's share of its machine: processor threads and GPUs."""
+"""The share of a worker in its machine: processor threads and GPUs."""
 
 import os
 from pathlib import Path
 
-__all__ = ["gpus", "own_devices"]
+__all__ = ["limit_devices", "visible_gpus"]
 
 _VISIBLE = "CUDA_VISIBLE_DEVICES"
 _THREADS = "OMP_NUM_THREADS"
 _DRIVER = Path("/proc/driver/nvidia/gpus")
 
 
-def gpus() -> list[str]:
-    """The GPUs that this process may use, as CUDA names them; found without importing torch, which would hold them."""
+def visible_gpus() -> list[str]:
+    """Return the GPUs that this process may use, as CUDA names them, without torch, which would occupy them."""
     visible = os.environ.get(_VISIBLE)
     if visible is not None:
         return [name.strip() for name in visible.split(",") if name.strip()]
     return [str(number) for number in range(len(list(_DRIVER.iterdir())))] if _DRIVER.is_dir() else []
 
 
-def own_devices(number: int, count: int) -> None:
-    """Leave this process its share; what the environment says of threads already stands.
+def limit_devices(number: int, count: int) -> None:
+    """Limit this process to its share; a number of threads that the environment sets already is kept.
 
     Args:
-        number: of the worker, from 1.
-        count: how many workers there are.
+        number: number of the worker, from 1.
+        count: number of workers.
     """
     os.environ.setdefault(_THREADS, str(max(1, (os.cpu_count() or 1) // count)))
-    every = gpus()
-    if every and count > 1:
-        os.environ[_VISIBLE] = ",".join(every[(number - 1) % len(every) :: count])
+    all_gpus = visible_gpus()
+    if all_gpus and count > 1:
+        os.environ[_VISIBLE] = ",".join(all_gpus[(number - 1) % len(all_gpus) :: count])

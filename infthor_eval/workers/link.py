@@ -1,4 +1,4 @@
-"""A worker and the wire to it: what does jobs elsewhere, and how the driver sees it."""
+"""The protocols of a worker, which does jobs in another process, and of the driver's link to it."""
 
 from collections.abc import Callable, Iterator
 from typing import Any, Protocol
@@ -9,68 +9,68 @@ __all__ = ["Connect", "Link", "OpenWorker", "Worker", "WorkerLostError"]
 
 
 class WorkerLostError(InfthorError):
-    """A worker is not there any more: its process was killed, its machine is gone."""
+    """A worker is gone: its process was killed, or its machine is down."""
 
     exit_code = 1
 
 
 class Worker(Protocol):
-    """What does jobs, one after the other, in a process of its own."""
+    """Does jobs, one after the other, in its own process."""
 
     @property
     def greeting(self) -> Any:
-        """What the driver is told of it before its first job; it can be pickled."""
+        """What the driver learns before the first job; it can be pickled."""
         ...
 
     def do(self, job: Any) -> Iterator[Any]:
-        """Do a job: results as they come, which can be pickled. It may be left off after any of them."""
+        """Do a job and yield its results, which can be pickled. The caller may stop after any of them."""
         ...
 
     def close(self) -> None:
-        """Let go of what it holds."""
+        """Release all resources."""
         ...
 
 
 class OpenWorker(Protocol):
-    """How a worker is made where it is to work; it is pickled and sent there."""
+    """Creates a worker in the process where it works; it is pickled and sent there."""
 
     def __call__(self, number: int) -> Worker:
-        """Make it.
+        """Create the worker.
 
         Args:
-            number: of the worker, from 1.
+            number: number of the worker, from 1.
         """
         ...
 
 
 class Link(Protocol):
-    """One worker as the driver sees it; one thread opens it and gives it jobs, another may stop it."""
+    """The driver's link to one worker. One thread opens it and gives it jobs; another may stop it."""
 
     def open(self) -> Any:
-        """Start the worker, anew where it was lost; its greeting.
+        """Start the worker, or start it again after it was lost, and return its greeting.
 
         Raises:
-            WorkerLostError: it ended before it was ready.
-            InfthorError: it says that it cannot be made.
+            WorkerLostError: the worker ended before it was ready.
+            InfthorError: the worker cannot be created, for the reason that it sent.
         """
         ...
 
     def do(self, job: Any) -> Iterator[Any]:
-        """The results of a job, as they come.
+        """Yield the results of a job as they arrive.
 
         Raises:
-            WorkerLostError: it ended before the job did; results that came are good.
-            InfthorError: what the worker raised, likewise OSError and MemoryError.
+            WorkerLostError: the worker ended before the job did; the results so far are valid.
+            InfthorError: the worker raised it, likewise OSError and MemoryError.
         """
         ...
 
     def stop(self) -> None:
-        """Have the job in hand left off after its next result."""
+        """Stop the present job after its next result."""
         ...
 
     def close(self) -> None:
-        """End the worker, whatever it does."""
+        """End the worker, whatever it is doing."""
         ...
 
 
-Connect = Callable[[int], Link]  # of a worker's number
+Connect = Callable[[int], Link]  # given the number of a worker

@@ -1,4 +1,4 @@
-"""Jobs shared out to workers: to whoever is free, again where a worker was lost, until all are done."""
+"""Jobs done by several workers: a job goes to whoever is free, and again to another if its worker is lost."""
 
 import contextlib
 from collections import Counter, deque
@@ -11,16 +11,16 @@ from typing import Any
 from infthor_eval.errors import InfthorError
 from infthor_eval.workers.link import Connect, Link, WorkerLostError
 
-__all__ = ["Event", "GivenUp", "Lost", "Made", "Pool", "Withdrawn"]
+__all__ = ["Event", "JobFailed", "JobResult", "Pool", "WorkerLost", "WorkerWithdrawn"]
 
-_PATIENCE = 3  # losses in a row, of one job or of one worker's openings
-_PARTING_S = 10.0  # for a thread whose worker is gone
-_GLANCE_S = 0.2  # between two looks at whether to stop
+_MAX_LOSSES = 3  # in a row, of one job or while one worker opens
+_EXIT_WAIT_S = 10.0  # for the thread of a closed link
+_STOP_CHECK_S = 0.2  # between two checks whether to stop
 
 
 @dataclass(frozen=True)
-class Made:
-    """A result of a job has come."""
+class JobResult:
+    """A result of a job has arrived."""
 
     worker: int
     job: int
@@ -28,7 +28,7 @@ class Made:
 
 
 @dataclass(frozen=True)
-class Lost:
+class WorkerLost:
     """A worker was lost at a job, which goes to another."""
 
     worker: int
@@ -37,8 +37,8 @@ class Lost:
 
 
 @dataclass(frozen=True)
-class GivenUp:
-    """A job that lost one worker after the other; what it had not given by now, it will not give."""
+class JobFailed:
+    """A job lost worker after worker, and is given up; its results so far are valid."""
 
     worker: int
     job: int
@@ -46,38 +46,38 @@ class GivenUp:
 
 
 @dataclass(frozen=True)
-class Withdrawn:
-    """A worker that cannot be opened (again); the others go on."""
+class WorkerWithdrawn:
+    """A worker cannot be opened (again); the others go on."""
 
     worker: int
     reason: str
 
 
 @dataclass(frozen=True)
-class _Ended:
-    """A job has come to its end, or was left off."""
+class _JobEnded:
+    """A job has ended, or was stopped."""
 
     job: int
 
 
-Event = Made | Lost | GivenUp | Withdrawn
+Event = JobResult | WorkerLost | JobFailed | WorkerWithdrawn
 
 
-class _Board:
-    """What is to be done: the jobs that wait, and whether any more will come."""
+class _JobQueue:
+    """Waiting jobs, each with the function that creates what its worker is sent."""
 
     def __init__(self) -> None:
         self._waiting: deque[tuple[int, Callable[[], Any]]] = deque()
         self._changed = Condition()
         self._closed = False
 
-    def add(self, job: int, make: Callable[[], Any], *, first: bool = False) -> None:
+    def add(self, job: int, create: Callable[[], Any], *, first: bool = False) -> None:
         with self._changed:
-            (self._waiting.appendleft if first else self._waiting.append)((job, make))
+            (self._waiting.appendleft if first else self._waiting.append)((job, create))
             self._changed.notify()
 
     def clear(self) -> int:
-        """Take all jobs down; how many there were."""
+        """Remove all jobs; return their number."""
         with self._changed:
             n_waiting = len(self._waiting)
             self._waiting.clear()
@@ -93,7 +93,7 @@ class _Board:
         return self._closed
 
     def take(self) -> tuple[int, Callable[[], Any]] | None:
-        """The next job, once there is one; None where none will come."""
+        """Wait for the next job and return it; None once the queue is closed."""
         with self._changed:
             self._changed.wait_for(lambda: self._waiting or self._closed)
             return None if self._closed else self._waiting.popleft()
@@ -102,34 +102,35 @@ class _Board:
 class Pool:
     """Workers, each behind a thread of the driver that gives it jobs.
 
-    Workers open at their own time: who is ready works, who comes late (a node that joins a cluster) joins in.
+    Each worker opens at its own pace: one that is ready works, and one that comes late (a node that joins a cluster)
+    joins in.
 
     Args:
-        connect: gives the link to a worker.
-        count: how many workers.
-        accept: is told each worker's greeting before it gets a job; an InfthorError that it raises ends the pool.
+        connect: returns the link to a worker.
+        count: number of workers.
+        accept: called with each worker's greeting before its first job; an InfthorError that it raises ends the pool.
     """
 
     def __init__(self, connect: Connect, count: int, accept: Callable[[Any], None] = lambda _: None) -> None:
         self._links = {number: connect(number) for number in range(1, count + 1)}
         self._accept = accept
-        self._board = _Board()
-        self._events: SimpleQueue[Event | _Ended | Exception] = SimpleQueue()
-        self._ready: SimpleQueue[Any] = SimpleQueue()  # greetings, and in the end why there are none
-        self._patience = _PATIENCE
-        self._losses: Counter[int] = Counter()  # by job, since it last got further
-        self._furthest: Counter[int] = Counter()  # results, by job
-        self._present = count
-        self._leaving = Lock()
+        self._jobs = _JobQueue()
+        self._events: SimpleQueue[Event | _JobEnded | Exception] = SimpleQueue()
+        self._ready: SimpleQueue[Any] = SimpleQueue()  # greetings; an exception once no worker can be opened
+        self._max_losses = _MAX_LOSSES
+        self._losses: Counter[int] = Counter()  # by job, since its last new result
+        self._n_results: Counter[int] = Counter()  # by job, most of all its workers
+        self._n_present = count
+        self._withdrawing = Lock()
         self._threads = [
             Thread(target=self._attend, args=(number, link), daemon=True) for number, link in self._links.items()
         ]
 
     def open(self) -> Any:
-        """Start all workers, and wait for the first of them; its greeting.
+        """Start all workers, wait for the first of them, and return its greeting.
 
         Raises:
-            InfthorError: none of them can be opened; why the last one cannot.
+            InfthorError: no worker can be opened; the reason of the last one.
         """
         for thread in self._threads:
             thread.start()
@@ -140,56 +141,56 @@ class Pool:
 
     def run(
         self,
-        jobs: int,
-        order: Callable[[int], Any],
+        n_jobs: int,
+        create: Callable[[int], Any],
         should_stop: Callable[[], bool] = lambda: False,
-        patience: int = _PATIENCE,
+        max_losses: int = _MAX_LOSSES,
     ) -> Iterator[Event]:
-        """Have jobs done; what happens, as it happens. Each job that is not stopped ends, or is given up.
+        """Have jobs done and yield what happens. Each job that is not stopped ends, or is given up.
 
         Args:
-            jobs: how many; they are numbered from 0.
-            order: what a worker is sent for a job, made when its turn comes.
-            should_stop: is asked all the time; once it says so the jobs in hand are left off after their next
-                result, and no further one is begun.
-            patience: losses in a row of a job, without a further result between them, before it is given up.
+            n_jobs: number of jobs, which are numbered from 0.
+            create: creates what a worker is sent for a job, when a worker is free for it.
+            should_stop: asked all the time; once it returns True, the present jobs are stopped after their next
+                result, and no further one is started.
+            max_losses: losses in a row of a job, without a further result between them, before it is given up.
 
         Raises:
-            Exception: what a worker raised on a job, or why the last of them withdrew.
+            Exception: a worker raised it on a job, or the last worker withdrew for this reason.
         """
-        self._patience = patience
+        self._max_losses = max_losses
         self._losses.clear()
-        self._furthest.clear()
-        for job in range(jobs):
-            self._board.add(job, lambda job=job: order(job))  # type: ignore[misc]
-        left, stopped = jobs, False
-        while left:
+        self._n_results.clear()
+        for job in range(n_jobs):
+            self._jobs.add(job, lambda job=job: create(job))  # type: ignore[misc]
+        n_left, stopped = n_jobs, False
+        while n_left:
             if not stopped and should_stop():
                 stopped = True
-                left -= self._board.clear()
+                n_left -= self._jobs.clear()
                 self._stop_all()
                 continue
             event = self._next_event()
-            if isinstance(event, Lost):
+            if isinstance(event, WorkerLost):
                 if stopped:
-                    left -= 1
-                else:
-                    self._board.add(event.job, lambda job=event.job: order(job), first=True)  # type: ignore[misc]
-            left -= isinstance(event, _Ended | GivenUp)
+                    n_left -= 1
+                else:  # first in the queue: its results so far are fresh in the journal, and its group is half done
+                    self._jobs.add(event.job, lambda job=event.job: create(job), first=True)  # type: ignore[misc]
+            n_left -= isinstance(event, _JobEnded | JobFailed)
             if isinstance(event, Event):
                 yield event
 
     def close(self) -> None:
-        """End all workers, whatever they do."""
-        self._board.close()
+        """End all workers, whatever they are doing."""
+        self._jobs.close()
         for number, link in self._links.items():
             link.close()
-            self._threads[number - 1].join(_PARTING_S)
-            link.close()  # which the thread was about to open
+            self._threads[number - 1].join(_EXIT_WAIT_S)
+            link.close()  # again: the thread may have opened it in between
 
-    def _next_event(self) -> Event | _Ended | None:
+    def _next_event(self) -> Event | _JobEnded | None:
         try:
-            event = self._events.get(timeout=_GLANCE_S)
+            event = self._events.get(timeout=_STOP_CHECK_S)
         except Empty:
             return None
         if isinstance(event, Exception):
@@ -198,58 +199,58 @@ class Pool:
 
     def _stop_all(self) -> None:
         for link in self._links.values():
-            with contextlib.suppress(WorkerLostError):  # its own thread finds that out, and says so
+            with contextlib.suppress(WorkerLostError):  # its own thread notices and reports it
                 link.stop()
 
     # -- a thread for each worker
 
     def _attend(self, number: int, link: Link) -> None:
         try:
-            while self._opened(number, link) and not self._served(number, link):
+            while self._open_worker(number, link) and not self._do_jobs(number, link):
                 pass
-        except Exception as error:  # noqa: BLE001 - raised again where the events are looked at
+        except Exception as error:  # noqa: BLE001 - raised again in the thread that waits for greetings and events
             self._ready.put(error)
             self._events.put(error)
 
-    def _opened(self, number: int, link: Link) -> bool:
-        """Whether a worker is ready for jobs; one that is lost while it opens is tried again."""
+    def _open_worker(self, number: int, link: Link) -> bool:
+        """Open a worker, several times if it is lost meanwhile; return whether it is ready for jobs."""
         reason: InfthorError = WorkerLostError("the pool is closed")
-        for _ in range(_PATIENCE):
-            if self._board.closed:
+        for _ in range(_MAX_LOSSES):
+            if self._jobs.closed:
                 return False
             try:
                 greeting = link.open()
             except WorkerLostError as error:
                 reason = error
-            except InfthorError as error:
+            except InfthorError as error:  # it says why it cannot be created: another try would end the same way
                 reason = error
                 break
             else:
                 self._accept(greeting)
                 self._ready.put(greeting)
                 return True
-        with self._leaving:
-            self._present -= 1
-            last = not self._present
-        if last:
+        with self._withdrawing:
+            self._n_present -= 1
+            is_last = not self._n_present
+        if is_last:
             raise reason
-        self._events.put(Withdrawn(number, str(reason)))
+        self._events.put(WorkerWithdrawn(number, str(reason)))
         return False
 
-    def _served(self, number: int, link: Link) -> bool:
-        """Do jobs; whether there are no more, and not that the worker was lost."""
-        while (taken := self._board.take()) is not None:
-            job, make = taken
+    def _do_jobs(self, number: int, link: Link) -> bool:
+        """Have a worker do jobs; return True when there are no more, False when the worker was lost."""
+        while (taken := self._jobs.take()) is not None:
+            job, create = taken
             try:
-                for count, result in enumerate(link.do(make()), 1):
-                    if count > self._furthest[job]:  # what it gave another worker before is no progress
-                        self._furthest[job] = count
+                for count, result in enumerate(link.do(create()), 1):
+                    if count > self._n_results[job]:  # results that another worker gave before are no progress
+                        self._n_results[job] = count
                         self._losses.pop(job, None)
-                    self._events.put(Made(number, job, result))
+                    self._events.put(JobResult(number, job, result))
             except WorkerLostError as error:
                 self._losses[job] += 1
-                given_up = self._losses[job] >= self._patience
-                self._events.put((GivenUp if given_up else Lost)(number, job, str(error)))
+                is_given_up = self._losses[job] >= self._max_losses
+                self._events.put((JobFailed if is_given_up else WorkerLost)(number, job, str(error)))
                 return False
-            self._events.put(_Ended(job))
+            self._events.put(_JobEnded(job))
         return True

@@ -10,36 +10,36 @@ from threading import Lock, Thread
 from types import FrameType
 from typing import Any
 
-from infthor_eval.workers.devices import own_devices
+from infthor_eval.workers.devices import limit_devices
+from infthor_eval.workers.host import WorkerHost, to_portable_error
 from infthor_eval.workers.link import Connect, OpenWorker, WorkerLostError
-from infthor_eval.workers.serving import Serving, portable
 
 __all__ = ["ProcessLink", "processes"]
 
 _STOP = "stop"
-_PATIENCE_S = 10.0  # for a process that was told to end
-# Spawned, not forked: a fork of a process with threads, a GPU or a simulator is none that works.
+_EXIT_WAIT_S = 10.0  # for a process to end
+# Spawned, not forked: a fork of a process with threads, a GPU or a simulator does not work.
 _SPAWN = get_context("spawn")
 
 
 def processes(open_worker: OpenWorker, count: int) -> Connect:
-    """Links to processes of this machine, each with its share of processors and GPUs.
+    """Return links to processes of this machine, each with its share of processors and GPUs.
 
     Args:
-        open_worker: makes a worker; must be picklable.
-        count: how many there will be.
+        open_worker: creates a worker; must be picklable.
+        count: number of workers.
     """
     return lambda number: ProcessLink(open_worker, number, count)
 
 
 class ProcessLink:
-    """A worker in a process of its own; see `Link`."""
+    """A worker in its own process; see `Link`."""
 
     def __init__(self, open_worker: OpenWorker, number: int, count: int) -> None:
         self._open_worker = open_worker
         self._number = number
         self._count = count
-        self._changing = Lock()  # it is opened by one thread and closed by another
+        self._changing = Lock()  # one thread opens the link, another closes it
         self._process: Any = None  # of multiprocessing's spawn context, whose class has no public name
         self._connection: Connection[Any, Any] | None = None
 
@@ -49,13 +49,13 @@ class ProcessLink:
         with self._changing:
             self._start()
         self._send(self._open_worker)
-        return self._received()[1]
+        return self._receive()[1]
 
     def do(self, job: Any) -> Iterator[Any]:
         """See `Link`."""
         self._send(job)
         while True:
-            more, value = self._received()
+            more, value = self._receive()
             if not more:
                 return
             yield value
@@ -66,12 +66,12 @@ class ProcessLink:
             self._send(_STOP)
 
     def close(self) -> None:
-        """See `Link`. The connection stays: a thread may be reading it, and is to find it at its end."""
+        """See `Link`. The connection stays open: a thread may be reading it, and must see its end."""
         with self._changing:
             if self._process is None:
                 return
             self._process.terminate()
-            self._process.join(_PATIENCE_S)
+            self._process.join(_EXIT_WAIT_S)
             if self._process.is_alive():
                 self._process.kill()
                 self._process.join()
@@ -89,69 +89,69 @@ class ProcessLink:
         try:
             self._connection.send(message)
         except (BrokenPipeError, ConnectionResetError) as error:
-            raise self._lost() from error
+            raise self._lost_error() from error
 
-    def _received(self) -> tuple[bool, Any]:
-        """Whether the job goes on, and what came; raises what the worker raised."""
+    def _receive(self) -> tuple[bool, Any]:
+        """Return True while the job goes on, and what the worker sent; raise what the worker raised."""
         assert self._connection is not None
         try:
             message = self._connection.recv()
         except (EOFError, OSError) as error:
-            raise self._lost() from error
+            raise self._lost_error() from error
         if isinstance(message, Exception):
             raise message
         more, value = message
         return more, value
 
-    def _lost(self) -> WorkerLostError:
-        self._process.join(_PATIENCE_S)
+    def _lost_error(self) -> WorkerLostError:
+        self._process.join(_EXIT_WAIT_S)
         return WorkerLostError(f"worker {self._number} died (exit status {self._process.exitcode})")
 
 
 def _serve(connection: "Connection[Any, Any]", number: int, count: int) -> None:
-    """The worker's process: opens the worker that it is sent, and does jobs until the driver is gone."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal sends Ctrl-C to all; the driver says what follows
+    """Run a worker's process: create the worker that it is sent, and do jobs until the driver is gone."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal sends Ctrl-C to all processes; the driver decides
     signal.signal(signal.SIGTERM, _end)
-    own_devices(number, count)  # before anything is imported that looks at them once
+    limit_devices(number, count)  # before imports that read them only once
     Thread(target=_end_with_driver, daemon=True).start()
     try:
-        serving = Serving(connection.recv(), number)
-    except Exception as error:  # noqa: BLE001 - told to the driver, whatever it is
-        _told(connection, portable(error))
+        host = WorkerHost(connection.recv(), number)
+    except Exception as error:  # noqa: BLE001 - sent to the driver, whatever it is
+        _send(connection, to_portable_error(error))
         return
     try:
-        _told(connection, (True, serving.greeting))
+        _send(connection, (True, host.greeting))
         while (job := _next_job(connection)) is not None:
-            _do(serving, job, connection)
+            _do(host, job, connection)
     finally:
-        serving.close()
+        host.close()
 
 
-def _do(serving: Serving, job: Any, connection: "Connection[Any, Any]") -> None:
+def _do(host: WorkerHost, job: Any, connection: "Connection[Any, Any]") -> None:
     try:
-        for result in serving.do(job):
+        for result in host.do(job):
             connection.send((True, result))
             if connection.poll():
-                assert connection.recv() == _STOP  # nothing else is said while a job is in hand
-                serving.stop()
+                assert connection.recv() == _STOP  # nothing else is sent during a job
+                host.stop()
         connection.send((False, None))
     except (BrokenPipeError, ConnectionResetError):
         sys.exit(1)  # the driver is gone
-    except Exception as error:  # noqa: BLE001 - told to the driver, whatever it is
-        _told(connection, portable(error))
+    except Exception as error:  # noqa: BLE001 - sent to the driver, whatever it is
+        _send(connection, to_portable_error(error))
 
 
 def _next_job(connection: "Connection[Any, Any]") -> Any | None:
-    """The next job; None where the driver is gone."""
+    """Return the next job, or None if the driver is gone."""
     try:
-        while (message := connection.recv()) == _STOP:  # said as the last job ended
+        while (message := connection.recv()) == _STOP:  # sent while the last job was ending
             pass
     except (EOFError, OSError):
         return None
     return message
 
 
-def _told(connection: "Connection[Any, Any]", message: Any) -> None:
+def _send(connection: "Connection[Any, Any]", message: Any) -> None:
     try:
         connection.send(message)
     except (BrokenPipeError, ConnectionResetError):
@@ -163,7 +163,7 @@ def _end(_number: int, _frame: FrameType | None) -> None:
 
 
 def _end_with_driver() -> None:
-    """A driver that was killed says nothing: its worker would go on with a unit that nobody waits for."""
+    """End this process with its driver: a killed driver sends nothing, and its worker would go on for nobody."""
     parent = parent_process()
     if parent is not None:
         wait([parent.sentinel])

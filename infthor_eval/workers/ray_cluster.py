@@ -1,27 +1,27 @@
-"""Workers as actors of a Ray cluster: on whatever nodes it has now, or gets later."""
+"""Workers as actors of a Ray cluster, on the nodes that it has now or gets later."""
 
 import contextlib
 from collections.abc import Iterator
 from typing import Any
 
 from infthor_eval.errors import InfthorError, UsageError, in_one_line
+from infthor_eval.workers.host import WorkerHost, to_portable_error
 from infthor_eval.workers.link import Connect, OpenWorker, WorkerLostError
-from infthor_eval.workers.serving import Serving, portable
 
 __all__ = ["RayLink", "ray_actors"]
 
-_PARTING_S = 5.0  # for an actor to close what it holds
+_CLOSE_WAIT_S = 5.0  # for an actor to release its resources
 
 
 def ray_actors(open_worker: OpenWorker, address: str, gpus_per_worker: float | None) -> Connect:
-    """Links to actors of a cluster.
+    """Return links to actors of a cluster.
 
-    The package is installed on every node, and the folders of data and results are the same on all of them.
+    The package must be installed on every node, and the folders of data and results must be the same on all of them.
 
     Args:
-        open_worker: makes a worker.
-        address: of the cluster, as `ray.init` takes it.
-        gpus_per_worker: that are set aside for each; None takes one where the cluster has any.
+        open_worker: creates a worker.
+        address: address of the cluster, as `ray.init` takes it.
+        gpus_per_worker: GPUs that are reserved for each worker; None for one if the cluster has any.
 
     Raises:
         UsageError: Ray is not installed, or there is no cluster at the address.
@@ -37,40 +37,40 @@ def ray_actors(open_worker: OpenWorker, address: str, gpus_per_worker: float | N
         raise UsageError(f"--ray-address {address}: no Ray cluster there ({in_one_line(error)}); start one") from error
     if gpus_per_worker is None:
         gpus_per_worker = 1.0 if ray.cluster_resources().get("GPU", 0) else 0.0
-    # Two calls at once: a job, and the word to stop it.
+    # Two calls at a time: a job, and the call that stops it.
     actor = ray.remote(max_concurrency=2, num_cpus=1, num_gpus=gpus_per_worker)(_Actor)
     return lambda number: RayLink(actor, open_worker, number)
 
 
 class _Actor:
-    """Runs on a node."""
+    """A worker on a node of the cluster."""
 
     def __init__(self, open_worker: OpenWorker, number: int) -> None:
         self._open_worker = open_worker
         self._number = number
-        self._serving: Serving | None = None
+        self._host: WorkerHost | None = None
 
     def open(self) -> Any:
         try:
-            self._serving = Serving(self._open_worker, self._number)
-        except Exception as error:  # noqa: BLE001 - told to the driver, whatever it is
-            return portable(error)
-        return self._serving.greeting
+            self._host = WorkerHost(self._open_worker, self._number)
+        except Exception as error:  # noqa: BLE001 - sent to the driver, whatever it is
+            return to_portable_error(error)
+        return self._host.greeting
 
     def do(self, job: Any) -> Iterator[Any]:
-        assert self._serving is not None
+        assert self._host is not None
         try:
-            yield from self._serving.do(job)
-        except Exception as error:  # noqa: BLE001 - told to the driver, whatever it is
-            yield portable(error)
+            yield from self._host.do(job)
+        except Exception as error:  # noqa: BLE001 - sent to the driver, whatever it is
+            yield to_portable_error(error)
 
     def stop(self) -> None:
-        if self._serving is not None:
-            self._serving.stop()
+        if self._host is not None:
+            self._host.stop()
 
     def close(self) -> None:
-        if self._serving is not None:
-            self._serving.close()
+        if self._host is not None:
+            self._host.close()
 
 
 class RayLink:
@@ -83,15 +83,15 @@ class RayLink:
         self._actor: Any = None
 
     def open(self) -> Any:
-        """See `Link`; waits until a node has room for it."""
+        """See `Link`; waits until a node has room for the worker."""
         self.close()
         self._actor = self._actor_class.remote(self._open_worker, self._number)
-        return self._value(self._actor.open.remote())
+        return self._resolve(self._actor.open.remote())
 
     def do(self, job: Any) -> Iterator[Any]:
         """See `Link`."""
         for reference in self._actor.do.options(num_returns="streaming").remote(job):
-            yield self._value(reference)
+            yield self._resolve(reference)
 
     def stop(self) -> None:
         """See `Link`."""
@@ -103,11 +103,11 @@ class RayLink:
         import ray
 
         if self._actor is not None:
-            with contextlib.suppress(ray.exceptions.RayError):  # gone already, or at work: it is ended either way
-                ray.get(self._actor.close.remote(), timeout=_PARTING_S)
+            with contextlib.suppress(ray.exceptions.RayError):  # it is gone, or busy; it is killed in either case
+                ray.get(self._actor.close.remote(), timeout=_CLOSE_WAIT_S)
             ray.kill(self._actor)
 
-    def _value(self, reference: Any) -> Any:
+    def _resolve(self, reference: Any) -> Any:
         import ray
 
         try:

@@ -1,4 +1,4 @@
-"""How many workers, and where: what every command that takes --workers is told."""
+"""Number and place of workers, as --workers and its companions give them."""
 
 from dataclasses import dataclass
 
@@ -10,12 +10,12 @@ __all__ = ["WorkerSettings"]
 
 @dataclass(frozen=True)
 class WorkerSettings:
-    """How work is shared out; it changes no result.
+    """Number and place of workers; no result depends on it.
 
     Attributes:
-        workers: how many; 1 without a cluster is this process itself.
-        ray_address: of a Ray cluster ("auto" for the one of this machine); None for processes of this machine.
-        gpus_per_worker: that Ray sets aside for each; None takes one where the cluster has any.
+        workers: number of workers; 1 without a cluster is this process itself.
+        ray_address: address of a Ray cluster ("auto" for this machine's); None for processes of this machine.
+        gpus_per_worker: GPUs that Ray reserves for each worker; None for one if the cluster has any.
     """
 
     workers: int = 1
@@ -24,11 +24,11 @@ class WorkerSettings:
 
     @property
     def is_local(self) -> bool:
-        """Whether this process does it all."""
+        """True if this process does all the work."""
         return self.workers == 1 and self.ray_address is None
 
     def connect(self, open_worker: OpenWorker) -> Connect:
-        """Links to the workers.
+        """Return links to the workers.
 
         Raises:
             UsageError: Ray is not installed, or there is no cluster at the address.

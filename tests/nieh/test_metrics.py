@@ -76,23 +76,29 @@ def test_another_source_of_the_function_is_another_run(prepared, own):
 
 
 BAD_REPLIES = [
-    ("def measure(doc, results):\n    return {'letters': 1 / 0, 'plain': 1}\n", "ZeroDivisionError: division by zero"),
-    ("def measure(doc, results):\n    return {'letters': 1.0}\n", "KeyError: 'plain'"),
-    ("def measure(doc, results):\n    return {'letters': 'many', 'plain': 1}\n", "ValueError: could not convert"),
-    ("def measure(doc, results):\n    return {'letters': float('nan'), 'plain': 1}\n", "ValueError: letters is nan"),
-    ("def measure(doc, results):\n    return {'letters': 1, 'plain': float('inf')}\n", "ValueError: plain is inf"),
-    ("measure = 3\n", "TypeError: 'int' object is not callable"),
+    ("    return {'letters': 1 / 0, 'plain': 1}\n", "ZeroDivisionError in own.py:2 (measure)", "division by zero"),
+    ("    return {'letters': 1.0}\n", "KeyError in metrics.py:", "no 'plain'"),
+    (
+        "    return {'letters': 'many', 'plain': 1}\n",
+        "ValueError in metrics.py:",
+        "could not convert string to float: 'many'",
+    ),
+    ("    return {'letters': float('nan'), 'plain': 1}\n", "ValueError in metrics.py:", "letters is nan"),
+    ("    return {'letters': 1, 'plain': float('inf')}\n", "ValueError in metrics.py:", "plain is inf"),
+    ("    pass\nmeasure = 3\n", "TypeError in metrics.py:", "'int' object is not callable"),
 ]
 
 
-@pytest.mark.parametrize(("function", "said"), BAD_REPLIES, ids=[said for _, said in BAD_REPLIES])
-def test_a_function_that_fails_fails_the_sample_by_name(prepared, own, function, said):
-    own(function)
+@pytest.mark.parametrize(("body", "place", "said"), BAD_REPLIES, ids=[said for _, _, said in BAD_REPLIES])
+def test_a_function_that_fails_fails_the_sample_by_name_and_place(prepared, own, body, place, said):
+    own(f"def measure(doc, results):\n{body}")
     outcome = execute(prepared(tasks=("nieh_own",)))
     assert len(outcome.records) == 5
     for record in outcome.records:
-        assert record.failure.startswith(f"process_results fails on {record.id}: {said}")
+        assert record.failure.startswith(f"process_results fails on {record.id}: {place}")
+        assert record.failure.endswith(f": {said}; traceback in journal/tracebacks.txt")
         assert "\n" not in record.failure
+    assert (outcome.folder / "journal" / "tracebacks.txt").read_text().count("attempt 1\nTraceback (most") == 1
     again = execute(prepared(tasks=("nieh_own",)))  # its journal can be read
     assert {record.attempt for record in again.records} == {2}
 
@@ -102,7 +108,8 @@ def test_a_function_that_fails_on_one_reply_costs_one_sample(prepared, own):
     outcome = execute(prepared(tasks=("nieh_own",)))
     (failed,) = [record for record in outcome.records if record.failure]
     assert failed.payload.question == "Is there a sink?"
-    assert failed.failure.endswith("AssertionError: no sink")
+    assert "AssertionError in own.py:" in failed.failure
+    assert failed.failure.endswith(" (measure): no sink; traceback in journal/tracebacks.txt")
     assert outcome.summary.summary.tasks["nieh_own"].by_clues["total"].n_failed == 1
 
 

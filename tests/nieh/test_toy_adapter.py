@@ -1,12 +1,13 @@
 """An adapter that counts no tokens and knows no ids keeps the contract, and is evaluated like any other."""
 
 import json
+from pathlib import Path
 
 import pytest
 
 from model_adapters import check_adapter
 from model_adapters.built_in import BUILT_IN, BuiltIn
-from tests.model_adapters.toy_adapter import Toy
+from tests.model_adapters.toy_adapter import Talk, Toy
 
 
 @pytest.fixture(autouse=True)
@@ -28,6 +29,25 @@ def test_it_runs_the_bundled_set(tmp_path, run):
     row = next(line.split() for line in out.splitlines() if line.split()[:1] == ["toy"])
     assert row[-1] == "147"
     assert "0 evaluated now, 294 resumed" in run("--model", "toy", "--tasks", "nieh_mini", "--output", tmp_path)[2]
+
+
+def test_an_error_in_its_code_has_its_place_and_its_traceback_is_kept(make_nieh_set, tmp_path, run, monkeypatch):
+    def reply(self, decoding):
+        return self.turns[0].parts[99]
+
+    monkeypatch.setattr(Talk, "reply", reply)
+    data = make_nieh_set(size=56)
+    code, _, err = run("--model", "toy", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out")
+    place = f"{Path(__file__).name}:{reply.__code__.co_firstlineno + 1} (reply)"
+    failure = (
+        f"toy fails on the request (IndexError in {place}: tuple index out of range); fix the adapter, or report it"
+    )
+    assert code == 1
+    assert f"nieh_gt: 5 sample(s) failed, counted as wrong: {failure}; traceback in journal/tracebacks.txt" in err
+    (text,) = [path.read_text() for path in (tmp_path / "out").rglob("journal/tracebacks.txt")]
+    assert text.count("Traceback (most recent call last)") == 1
+    assert text.count("\nas for nieh_gt: ") == 4
+    assert "in reply\n    return self.turns[0].parts[99]\n" in text
 
 
 def test_a_context_that_is_measured_in_tokens_wants_their_number(make_nieh_set, tmp_path, run):

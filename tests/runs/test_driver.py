@@ -95,12 +95,12 @@ def broken_by(error, answered=0):
 
 
 FAULTS = {
-    "a value": (ValueError("no such\nsum"), "ValueError in test_driver.py:", ": no such sum; mend the suite"),
-    "a key": (KeyError("sum"), "KeyError in test_driver.py:", ": no 'sum'; mend the suite"),
-    "a bug": (RuntimeError(), "RuntimeError in test_driver.py:", ": RuntimeError; mend the suite"),
-    "of the system": (OSError(5, "Input/output error"), "OSError in test_driver.py:", ": Input/output error; mend"),
-    "an assertion": (AssertionError("odd"), "AssertionError in test_driver.py:", "(run): odd; mend the suite"),
-    "no record": (None, "the suite gives no record of it", "; mend the suite"),
+    "a value": (ValueError("no such\nsum"), "ValueError in test_driver.py:", ": no such sum; fix the suite"),
+    "a key": (KeyError("sum"), "KeyError in test_driver.py:", ": no 'sum'; fix the suite"),
+    "a bug": (RuntimeError(), "RuntimeError in test_driver.py:", ": RuntimeError; fix the suite"),
+    "of the system": (OSError(5, "Input/output error"), "OSError in test_driver.py:", ": Input/output error; fix"),
+    "an assertion": (AssertionError("odd"), "AssertionError in test_driver.py:", "(run): odd; fix the suite"),
+    "no record": (None, "the suite gives no record of it", "; fix the suite"),
 }
 
 
@@ -116,6 +116,27 @@ def test_a_programming_error_in_a_group_fails_its_units_alone_with_type_place_an
         assert why in failure
         assert "\n" not in failure
     assert [resumed for _, _, resumed in run(request(tmp_path))[1].seen[:2]] == [True, True]
+
+
+def test_tracebacks_are_kept_beside_the_shards_by_unit_and_attempt(tmp_path):
+    first = run(request(tmp_path), broken_by(ZeroDivisionError("of its own")))[0]
+    failures = [record.failure for record in first.records[2:]]
+    assert [failure.endswith("; traceback in journal/tracebacks.txt") for failure in failures] == [True, True]
+    file = first.folder / "journal" / "tracebacks.txt"
+    once, again = file.read_text().split("== sums: ")[1:]
+    assert once.startswith("2+3, attempt 1\nTraceback (most recent call last):\n")
+    assert f'File "{__file__}", line ' in once
+    assert "ZeroDivisionError: of its own" in once
+    assert again == "2+4, attempt 1\nas for sums: 2+3, attempt 1\n\n"
+    run(request(tmp_path), broken_by(ZeroDivisionError("of its own")))
+    assert file.read_text().count("== sums: 2+3, attempt ") == 2
+    assert "== sums: 2+4, attempt 2\nas for sums: 2+3, attempt 2\n" in file.read_text()
+
+
+def test_what_a_suite_says_itself_needs_no_traceback(tmp_path):
+    outcome, _ = run(request(tmp_path))
+    assert {record.failure for record in outcome.records[2:]} == {"the abacus is broken"}
+    assert not (outcome.folder / "journal" / "tracebacks.txt").exists()
 
 
 def test_a_record_that_cannot_be_written_fails_alone(tmp_path):

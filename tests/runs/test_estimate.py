@@ -7,7 +7,7 @@ import pytest
 
 from infthor_eval.errors import ModelError
 from infthor_eval.runs import Group, Unit, UnitKey, Usage, Workload, estimate_run
-from infthor_eval.runs.estimate import Quantities, _Measured, estimated
+from infthor_eval.runs.estimate import Quantities, _MeasuredGroup, estimate_tasks
 
 from .toy import Sum, Sums, ToySuite, suite_of
 from .toy_command import request
@@ -24,10 +24,12 @@ def took(seconds, read, encoded):
 def test_the_first_unit_of_a_group_pays_for_its_frames_and_every_unit_for_itself():
     work = Workload([group("full", "a", 10, 100), group("full", "b", 4, 300), group("gt", "c", 7, 9)])
     done = [
-        _Measured(100, [("full", took(21, 1000, 1100)), ("full", took(1, 1000, 100)), ("full", took(1, 1000, 100))]),
-        _Measured(9, [("gt", took(2, 50, 50)), ("gt", took(2, 50, 50))]),
+        _MeasuredGroup(
+            100, [("full", took(21, 1000, 1100)), ("full", took(1, 1000, 100)), ("full", took(1, 1000, 100))]
+        ),
+        _MeasuredGroup(9, [("gt", took(2, 50, 50)), ("gt", took(2, 50, 50))]),
     ]
-    full, gt = estimated(work, done)
+    full, gt = estimate_tasks(work, done)
     # 20 s and 1,000 tokens for 100 frames, then 1 s and 100 tokens a unit.
     assert (full.n_units, full.n_measured, full.frames) == (14, 3, 400)
     assert astuple(full.total) == pytest.approx((0.2 * 400 + 14, 14, 14_000, 10 * 400 + 1_400, 70, 3.5))
@@ -36,8 +38,8 @@ def test_the_first_unit_of_a_group_pays_for_its_frames_and_every_unit_for_itself
 
 def test_groups_of_several_tasks_share_their_frames_by_units():
     mixed = Group([*group("pick", "a", 3, 1).units, *group("put", "b", 1, 1).units], frames=40)
-    done = [_Measured(40, [("pick", took(5, 0, 0)), ("pick", took(1, 0, 0)), ("put", took(3, 0, 0))])]
-    pick, put = estimated(Workload([mixed]), done)
+    done = [_MeasuredGroup(40, [("pick", took(5, 0, 0)), ("pick", took(1, 0, 0)), ("put", took(3, 0, 0))])]
+    pick, put = estimate_tasks(Workload([mixed]), done)
     assert pick.total.seconds == pytest.approx(4 * 3 / 4 + 3 * 1)
     assert put.total.seconds == pytest.approx(4 * 1 / 4 + 1 * 3)
     assert (pick.frames, put.frames) == (30, 10)

@@ -167,6 +167,18 @@ def test_journals_of_other_formats_are_refused_in_one_line(tmp_path):
             opened(tmp_path)
 
 
+def test_a_journal_of_another_format_is_not_taken_for_a_damaged_one(tmp_path):
+    opened(tmp_path).__exit__(None, None, None)
+    old = b'{"type":"run","format":2,"identity":{}}\n{"type":"memo","fingerprint":"f","payload":{}}\n'
+    shard(tmp_path).write_bytes(old)
+    with pytest.raises(DataError, match="format 2, this version reads 3; run the command again with --fresh"):
+        recover(tmp_path, HEADER, TYPES)
+    assert shard(tmp_path).read_bytes() == old
+    set_aside(tmp_path)
+    opened(tmp_path).__exit__(None, None, None)
+    assert read_header(tmp_path) == HEADER
+
+
 def test_an_earlier_journal_is_kept_under_another_name(tmp_path):
     for number in (1, 2):
         opened(tmp_path).__exit__(None, None, None)

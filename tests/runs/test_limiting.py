@@ -5,7 +5,7 @@ from collections import Counter
 from hypothesis import given
 from hypothesis import strategies as st
 
-from infthor_eval.runs.limiting import limited, spread
+from infthor_eval.runs.limiting import limit_items, spread
 
 ITEMS = st.lists(st.tuples(st.sampled_from("abcdef"), st.integers()), unique=True, max_size=40)
 
@@ -21,7 +21,7 @@ def test_every_item_has_its_place(items, seed):
 
 @given(ITEMS, st.integers(), st.integers(1, 50))
 def test_no_trajectory_is_asked_twice_before_every_other_is_asked_once(items, seed, limit):
-    taken, there = Counter(map(of, limited(items, of, seed, limit))), Counter(map(of, items))
+    taken, there = Counter(map(of, limit_items(items, of, seed, limit))), Counter(map(of, items))
     assert sum(taken.values()) == min(limit, len(items))
     most = max(taken.values(), default=0)
     assert all(taken[cluster] >= min(most - 1, n) for cluster, n in there.items())
@@ -29,14 +29,14 @@ def test_no_trajectory_is_asked_twice_before_every_other_is_asked_once(items, se
 
 @given(ITEMS, st.integers(), st.integers(1, 50))
 def test_a_larger_limit_takes_more_of_the_same_in_their_own_order(items, seed, limit):
-    few, more = (limited(items, of, seed, n) for n in (limit, limit + 1))
+    few, more = (limit_items(items, of, seed, n) for n in (limit, limit + 1))
     assert set(few) <= set(more)
     assert more == [item for item in items if item in more]
-    assert limited(items, of, seed, None) == items
+    assert limit_items(items, of, seed, None) == items
 
 
 def test_another_seed_takes_others():
     items = [(cluster, number) for cluster in "ab" for number in range(50)]
-    taken = {tuple(limited(items, of, seed, 4)) for seed in range(5)}
+    taken = {tuple(limit_items(items, of, seed, 4)) for seed in range(5)}
     assert len(taken) == 5
-    assert limited(items, of, 3, 4) == limited(items, of, 3, 4)
+    assert limit_items(items, of, 3, 4) == limit_items(items, of, 3, 4)

@@ -112,6 +112,35 @@ def test_several_workers_find_what_one_process_finds_and_each_writes_a_shard(tmp
     assert all(resumed for _, resumed in run(request(tmp_path / "1", worker_settings=TWO), suite)[1].seen)
 
 
+class Faulty(Sums):
+    """Raises in every group."""
+
+    def run(self, group, session):
+        raise ZeroDivisionError("of its own")
+        yield
+
+
+class FaultySuite(ToySuite):
+    """Gives `Faulty`."""
+
+    def prepare(self, asked):
+        return Prepared(Faulty)
+
+
+@pytest.mark.timeout(120)
+def test_tracebacks_of_workers_are_kept_too(tmp_path):
+    outcome, _ = run(request(tmp_path, worker_settings=TWO), FaultySuite())
+    assert len(outcome.records) == 4
+    for record in outcome.records:
+        assert record.failure.startswith("ZeroDivisionError in test_worker_executor.py:")
+        assert record.failure.endswith("; traceback in journal/tracebacks.txt")
+    text = (outcome.folder / "journal" / "tracebacks.txt").read_text()
+    assert sorted(line for line in text.splitlines() if line.startswith("== ")) == [
+        f"== sums: {record.id}, attempt 1" for record in outcome.records
+    ]
+    assert "ZeroDivisionError: of its own" in text
+
+
 def test_workers_that_are_killed_lose_nothing_that_was_finished(tmp_path):
     alone, _ = run(request(tmp_path / "1"), DeadlySuite(tmp_path, {}))
     killing = DeadlySuite(tmp_path, {"0+2": 1, "3+0": 2, "5+3": 1})

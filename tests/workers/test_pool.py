@@ -9,7 +9,16 @@ from pathlib import Path
 import pytest
 
 from infthor_eval.errors import DataError, InfthorError, ModelError, UsageError
-from infthor_eval.workers import GivenUp, Lost, Made, Pool, Withdrawn, WorkerLostError, WorkerSettings, shared_out
+from infthor_eval.workers import (
+    JobFailed,
+    JobResult,
+    Pool,
+    WorkerLost,
+    WorkerLostError,
+    WorkerSettings,
+    WorkerWithdrawn,
+    run_jobs,
+)
 
 from ..clusters import two_nodes
 from ..waiting import wait_until
@@ -40,7 +49,7 @@ def pool(request):
 
 
 def counts(events, job):
-    return [event.result[1] for event in events if isinstance(event, Made) and event.job == job]
+    return [event.result[1] for event in events if isinstance(event, JobResult) and event.job == job]
 
 
 def of(events, kind):
@@ -61,7 +70,7 @@ def test_a_job_whose_worker_dies_goes_to_another_and_loses_only_what_had_not_com
     shared.open()
     jobs = [Job(3), Job(4, dies=2, once=tmp_path / "died"), Job(2)]
     events = list(shared.run(3, jobs.__getitem__))
-    (lost,) = of(events, Lost)
+    (lost,) = of(events, WorkerLost)
     assert (lost.job, "worker" in lost.reason) == (1, True)
     assert counts(events, 1) in ([0, 1, 0, 1, 2, 3], [0, 0, 1, 2, 3], [0, 1, 2, 3])  # what was sent may die with it
     assert (counts(events, 0), counts(events, 2)) == ([0, 1, 2], [0, 1])
@@ -72,8 +81,8 @@ def test_a_job_that_kills_one_worker_after_the_other_is_given_up_and_the_others_
     shared.open()
     jobs = [Job(3, dies=0), Job(2), Job(2)]
     events = list(shared.run(3, jobs.__getitem__))
-    assert [event.job for event in of(events, GivenUp)] == [0]
-    assert len(of(events, Lost)) == 2
+    assert [event.job for event in of(events, JobFailed)] == [0]
+    assert len(of(events, WorkerLost)) == 2
     assert (counts(events, 1), counts(events, 2)) == ([0, 1], [0, 1])
 
 
@@ -83,7 +92,7 @@ def test_a_job_that_kills_one_worker_after_the_other_is_given_up_and_the_others_
         (broken(), DataError, "the abacus is broken; buy another"),
         (OSError(28, "No space left on device", "shard"), OSError, "No space left on device"),
         (MemoryError("all of it"), MemoryError, "all of it"),
-        (ZeroDivisionError("of its own"), InfthorError, r"ZeroDivisionError in toys.py:\d+ \(do\): of its own; mend"),
+        (ZeroDivisionError("of its own"), InfthorError, r"ZeroDivisionError in toys.py:\d+ \(do\): of its own; fix"),
     ],
 )
 def test_what_a_worker_raises_is_raised(pool, error, kind, said):
@@ -100,11 +109,11 @@ def test_a_worker_that_cannot_be_made_is_told_and_the_others_do_the_work(pool, o
     events = []
     for event in shared.run(200, lambda _: Job(1, slow=0.05)):
         events.append(event)
-        if of(events, Withdrawn) and of(events, Made):
+        if of(events, WorkerWithdrawn) and of(events, JobResult):
             break
-    (withdrawn,) = of(events, Withdrawn)
+    (withdrawn,) = of(events, WorkerWithdrawn)
     assert withdrawn.worker == 2
-    assert {event.worker for event in of(events, Made)} == {1}
+    assert {event.worker for event in of(events, JobResult)} == {1}
 
 
 def test_where_no_worker_can_be_made_the_reason_is_raised(pool):
@@ -168,11 +177,11 @@ def is_running(pid):
 def test_jobs_of_one_result_come_with_their_numbers_and_what_is_given_up_is_an_error():
     told = []
     jobs = [Job(1), Job(1, dies=0), Job(1)]
-    found = dict(shared_out(OpenCounter(), jobs, WorkerSettings(2), told.append))
+    found = dict(run_jobs(OpenCounter(), jobs, WorkerSettings(2), told.append))
     assert (found[0][1], found[2][1]) == (0, 0)
     assert isinstance(found[1], WorkerLostError)
     assert len(told) == 2
-    alone = dict(shared_out(OpenCounter(), jobs[:1], WorkerSettings(1), told.append))
+    alone = dict(run_jobs(OpenCounter(), jobs[:1], WorkerSettings(1), told.append))
     assert alone == {0: (os.getpid(), 0)}
 
 

@@ -22,7 +22,7 @@ from infthor_eval.runs import (
     Workload,
 )
 from infthor_eval.runs.generation_kwargs import decoding_of
-from infthor_eval.runs.limiting import limited
+from infthor_eval.runs.limiting import limit_items
 from infthor_sums.suite import Calculator, Sum
 from model_adapters import Decoding, Reply, Subject, wrap_request_errors
 
@@ -46,7 +46,7 @@ class SumsEvaluation:
             self.decodings[task.name] = decoding_of(task.settings.get("generation_kwargs", {}), request.seed, task.name)
             self.settings[task.name] = task.settings.get("dataset_kwargs", {})
             units = [_unit(task.name, payload) for payload in _draw_sums(task)]
-            self.units += limited(units, lambda unit: unit.cluster, request.seed, request.limit)
+            self.units += limit_items(units, lambda unit: unit.cluster, request.seed, request.limit)
 
     def bind(self, subject: Subject) -> "BoundSums":
         """See `Evaluation.bind`."""

@@ -17,7 +17,7 @@ def _read_file(context: click.Context, option: click.Parameter, path: Path | Non
     """Use the options in the file as defaults of the command."""
     if path is None:
         return
-    from infthor_eval.runs.configuration import read_options
+    from infthor_eval.runs.stored_command import read_options
 
     known = {_long_name(item): item for item in context.command.params if item is not option}
     context.default_map = {}

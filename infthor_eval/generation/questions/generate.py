@@ -26,7 +26,7 @@ from infthor_eval.generation.questions import (
 from infthor_eval.generation.questions.candidates import Candidate
 from infthor_eval.generation.questions.checker import Checker
 from infthor_eval.generation.questions.history import DEFAULT_SHARE, TrajectoryHistory
-from infthor_eval.workers import WorkerSettings, shared_out
+from infthor_eval.workers import WorkerSettings, run_jobs
 
 __all__ = ["GeneratedQuestions", "candidates_of", "further_candidates_of", "generate_questions"]
 
@@ -178,7 +178,7 @@ def _share_out(
 ) -> dict[Path, Any]:
     """Return the results of the jobs by trajectory; a trajectory at which several workers were lost is skipped."""
     results: dict[Path, Any] = {}
-    for number, outcome in shared_out(_QuestionWorker, jobs, worker_settings, say):
+    for number, outcome in run_jobs(_QuestionWorker, jobs, worker_settings, say):
         if isinstance(outcome, InfthorError):
             result.skipped.append(f"{jobs[number].path}: {outcome}")
         else:

@@ -21,7 +21,7 @@ def arm_run(tmp_path_factory):
     words = ("--model", "random-arm", "--tasks", "manipulathor_mini", "--limit", 2, "--output", output)
     with pytest.MonkeyPatch.context() as patched, pytest.raises(SystemExit) as ended:
         # The first ones, which are of one trajectory; a limit takes them from all.
-        patched.setattr("infthor_eval.manipulation.task.limited", lambda episodes, *_: episodes[:2])
+        patched.setattr("infthor_eval.manipulation.task.limit_items", lambda episodes, *_: episodes[:2])
         main([str(word) for word in words])
     assert ended.value.code == 0
     (folder,) = (output / "random-arm").iterdir()

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from infthor_eval.cli.options.run import RunOptions, run_options
 from infthor_eval.cli.options.values import ModelList
-from infthor_eval.runs import RunRequest, Suite, read_configuration
+from infthor_eval.runs import RunRequest, Suite, read_stored_command
 from tests.faults.told import said_in_one_line
 
 KEY = "sk-of-nobody-0123456789"
@@ -63,8 +63,8 @@ def test_the_file_of_a_run_resumes_that_run(config, tmp_path, run, monkeypatch):
 
 def test_the_command_of_the_file_is_the_run(config, run):
     run("--config", config(limit=2, frames="blank"))
-    configuration = read_configuration(only(config().parent / "out", "run.yaml").parent)
-    _, _, err = run(*shlex.split(configuration.command)[1:])
+    command = read_stored_command(only(config().parent / "out", "run.yaml").parent)
+    _, _, err = run(*shlex.split(command.line)[1:])
     assert "oracle: 0 evaluated now, 2 resumed" in err
 
 

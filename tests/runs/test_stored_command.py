@@ -9,8 +9,8 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from infthor_eval.runs import Configuration, TaskRequest, execute, prepare, read_configuration
-from infthor_eval.runs.configuration import write_configuration
+from infthor_eval.runs import StoredCommand, TaskRequest, execute, prepare, read_stored_command
+from infthor_eval.runs.stored_command import write_command
 from infthor_eval.workers import WorkerSettings
 from tests.faults.told import refused
 from tests.runs.toy import ToySuite
@@ -24,9 +24,9 @@ class Options:
     history: str = "full"
 
 
-def written(folder: Path, asked: object) -> Configuration:
-    write_configuration(folder, asked)
-    found = read_configuration(folder)
+def written(folder: Path, asked: object) -> StoredCommand:
+    write_command(folder, asked)
+    found = read_stored_command(folder)
     assert found is not None
     return found
 
@@ -36,7 +36,7 @@ def test_every_run_leaves_it_and_equal_runs_leave_the_same(tmp_path: Path) -> No
     first = (folder / "run.yaml").read_bytes()
     execute(prepare(request(tmp_path), ToySuite()))
     assert (folder / "run.yaml").read_bytes() == first
-    found = read_configuration(folder)
+    found = read_stored_command(folder)
     assert found is not None
     assert found.options == {"model": "adder", "tasks": ["sums"], "seed": 0, "output": str(tmp_path)}
     assert (
@@ -100,15 +100,15 @@ def test_whatever_the_options_of_a_model_are_they_come_back(tmp_path_factory, op
 
 
 def test_a_run_of_an_earlier_version_has_none(tmp_path: Path) -> None:
-    assert read_configuration(tmp_path) is None
+    assert read_stored_command(tmp_path) is None
 
 
 @pytest.mark.parametrize("text", ["- a\n", "1: 2\n", "", "a: [\n", "model_args: [1]\n"])
 def test_a_file_without_options_is_named(tmp_path: Path, text: str) -> None:
     (tmp_path / "run.yaml").write_text(text)
-    refused(lambda: read_configuration(tmp_path), str(tmp_path / "run.yaml"))
+    refused(lambda: read_stored_command(tmp_path), str(tmp_path / "run.yaml"))
 
 
 def test_the_file_is_plain_yaml(tmp_path: Path) -> None:
-    write_configuration(tmp_path, request(tmp_path))
+    write_command(tmp_path, request(tmp_path))
     assert yaml.safe_load((tmp_path / "run.yaml").read_text())["tasks"] == ["sums"]

@@ -1,4 +1,4 @@
-"""What runs in a worker, however its driver reaches it: the worker, the job in hand, and what goes wrong there."""
+"""The worker's end of a link, whatever carries it: the worker, its present job, and its errors."""
 
 from collections.abc import Iterator
 from threading import Event
@@ -7,14 +7,14 @@ from typing import Any
 from infthor_eval.errors import InfthorError, describe_exception
 from infthor_eval.workers.link import OpenWorker, Worker
 
-__all__ = ["Serving", "portable"]
+__all__ = ["WorkerHost", "to_portable_error"]
 
 
-class Serving:
-    """A worker with a way to leave off its job."""
+class WorkerHost:
+    """A worker whose job can be stopped."""
 
     def __init__(self, open_worker: OpenWorker, number: int) -> None:
-        """Make the worker; raises what that raises."""
+        """Create the worker; raises what that raises."""
         self._worker: Worker = open_worker(number)
         self._stopped = Event()
 
@@ -32,7 +32,7 @@ class Serving:
                 return
 
     def stop(self) -> None:
-        """Leave off the job in hand after its next result."""
+        """Stop the present job after its next result."""
         self._stopped.set()
 
     def close(self) -> None:
@@ -40,13 +40,13 @@ class Serving:
         self._worker.close()
 
 
-def portable(error: BaseException) -> Exception:
-    """An error as it is sent to the driver: errors for people and of the machine as they are, others in words."""
+def to_portable_error(error: BaseException) -> Exception:
+    """Return an error that the driver can unpickle: our own and the system's as they are, others as a description."""
     if isinstance(error, InfthorError):
         return type(error)(str(error))
     if isinstance(error, MemoryError):
         return MemoryError(str(error))
     if isinstance(error, OSError):
         return OSError(error.errno, error.strerror, error.filename)
-    told = describe_exception(error) if isinstance(error, Exception) else type(error).__name__
-    return InfthorError(f"a worker failed: {told}; mend what is named and run the same command again")
+    description = describe_exception(error) if isinstance(error, Exception) else type(error).__name__
+    return InfthorError(f"a worker failed: {description}; fix the named code and run the same command again")

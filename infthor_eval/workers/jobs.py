@@ -1,0 +1,54 @@
+"""Jobs of one result each, done by workers: what generating, replaying and asking do with --workers."""
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+from infthor_eval.errors import InfthorError
+from infthor_eval.workers.link import OpenWorker, WorkerLostError
+from infthor_eval.workers.pool import JobFailed, JobResult, Pool, WorkerLost, WorkerWithdrawn
+from infthor_eval.workers.settings import WorkerSettings
+
+__all__ = ["run_jobs"]
+
+
+def run_jobs(
+    open_worker: OpenWorker, jobs: Sequence[Any], worker_settings: WorkerSettings, report: Callable[[str], None]
+) -> Iterator[tuple[int, Any | InfthorError]]:
+    """Yield the number of each job with its result, or with an error if worker after worker was lost at it.
+
+    Args:
+        open_worker: creates a worker, which gives one result for each job.
+        jobs: the jobs.
+        worker_settings: number and place of the workers; a local one does the jobs in this process, in order.
+        report: called with a line when a worker is lost or cannot be started.
+
+    Raises:
+        Exception: a worker raised it; all workers are ended.
+    """
+    if worker_settings.is_local:
+        yield from _run_here(open_worker, jobs)
+        return
+    pool = Pool(worker_settings.connect(open_worker), min(worker_settings.workers, max(1, len(jobs))))
+    try:
+        pool.open()
+        for event in pool.run(len(jobs), lambda number: jobs[number]):
+            if isinstance(event, JobResult):
+                yield event.job, event.result
+            elif isinstance(event, JobFailed):
+                yield event.job, WorkerLostError(f"worker after worker was lost at it ({event.reason})")
+            elif isinstance(event, WorkerLost):
+                report(f"{event.reason}; its work goes to another")
+            elif isinstance(event, WorkerWithdrawn):
+                report(f"worker {event.worker} cannot be started, the others go on: {event.reason}")
+    finally:
+        pool.close()
+
+
+def _run_here(open_worker: OpenWorker, jobs: Sequence[Any]) -> Iterator[tuple[int, Any]]:
+    worker = open_worker(1)
+    try:
+        for number, job in enumerate(jobs):
+            for result in worker.do(job):
+                yield number, result
+    finally:
+        worker.close()
