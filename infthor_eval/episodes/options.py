@@ -29,7 +29,7 @@ class SimulatorOptions:
     )
     frames: str = field(
         default="shown",
-        metadata={"help": "Show what in the frames' places, a run with each.", "metavar": "HOW,...", "each": True},
+        metadata={"help": "Frames to show, a run with each: shown, blank.", "metavar": "HOW,...", "each": True},
     )
 
     def __post_init__(self) -> None:

@@ -23,7 +23,7 @@ from infthor_eval.nieh.task import PreparedTask
 from infthor_eval.runs import NOTHING, Session, Tokens, Unit, UnitKey, UnitRecord, Usage
 from model_adapters import Model, Reply, wrap_request_errors
 
-__all__ = ["Answerer", "BaselineAnswerer", "ModelAnswerer", "NiehUnit", "answered"]
+__all__ = ["Answerer", "BaselineAnswerer", "ModelAnswerer", "NiehUnit", "answer_units"]
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class _Asked:
 
     @classmethod
     def of(cls, unit: NiehUnit, prepared: PreparedTask) -> "_Asked":
-        context, text = prepared.found.request(unit.sample)
+        context, text = prepared.task_samples.request(unit.sample)
         return cls(unit, prepared, tuple(context), text)
 
     @property
@@ -94,7 +94,7 @@ class _Asked:
         """Return the record of a reply; a failed one, with the reply, if the task's own metrics fail on it."""
         scores, failure = {}, None
         try:
-            scores = self.prepared.metrics.scores(self.prepared.found, self.unit.sample, reply.text)
+            scores = self.prepared.metrics.scores(self.prepared.task_samples, self.unit.sample, reply.text)
         except MetricError as error:
             failure = session.describe_failure(self.unit, error)
         return self.unit.record(
@@ -194,7 +194,7 @@ class BaselineAnswerer:
         return NOTHING
 
 
-def answered(
+def answer_units(
     units: Sequence[NiehUnit], prepared: PreparedTask, answerer: Answerer, session: Session[NiehAnswer]
 ) -> Iterator[UnitRecord[NiehAnswer]]:
     """The records of units on one trajectory: those in the same context together, several at a time where that pays.
@@ -218,7 +218,7 @@ def _names(asked: _Asked) -> list[str]:
 
 def _names_in(part: ContextPart) -> list[str]:
     if isinstance(part, Notes):
-        return [f"notes of {part.taking}", *(frame.path.name for frame in part.frames)]
+        return [f"notes of {part.settings}", *(frame.path.name for frame in part.frames)]
     return [part.path.name if isinstance(part, FrameRef) else part]
 
 

@@ -1,4 +1,4 @@
-"""What the requests of a task cost in tokens, told before the first of them is computed."""
+"""Tokens of a task's requests against the model's limit, counted before the first request."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -18,13 +18,13 @@ class Budget:
     """Tokens of one task's requests against the model's limit.
 
     Attributes:
-        longest: tokens of its longest request, room for the reply included.
-        limit: the model's limit, None where it has none.
-        limit_before: the limit that a RoPE extension raised to this one, None where nothing is extended.
-        n_contexts: different contexts that the task asks in.
-        n_truncated: how many of them leave out frames of their trajectory to keep their size.
-        n_extended: how many fit because of the extension alone.
-        n_refused: how many are beyond the limit; their questions will be recorded as failed.
+        longest: tokens of its longest request, with room for the reply.
+        limit: the model's limit; None if it has none.
+        limit_before: the limit without a RoPE extension; None if nothing is extended.
+        n_contexts: number of different contexts.
+        n_truncated: number of contexts without some frames of their trajectory, to keep their size.
+        n_extended: number of contexts that fit only with the extension.
+        n_refused: number of contexts beyond the limit; their questions will be recorded as failed.
     """
 
     longest: int
@@ -37,7 +37,7 @@ class Budget:
 
     @property
     def description(self) -> str:
-        """What it costs and what will happen, in words."""
+        """The budget and its consequences in words."""
         limit = "no limit" if self.limit is None else f"limit {self.limit:,}"
         limit += "" if self.limit_before is None else f", {self.limit_before:,} before its extension"
         return f"{self.n_contexts} contexts, the longest request {self.longest:,} tokens ({limit}): {self._outcome}"
@@ -59,14 +59,14 @@ def budget_of(prepared: PreparedTask, model: Model) -> Budget:
 
     Args:
         prepared: the task.
-        model: whose tokens; one that counts them.
+        model: a model that counts tokens.
 
     Raises:
         ModelError: the model can take none of the requests, whatever their length.
     """
     capabilities = model.capabilities
     limit, before = capabilities.max_tokens, capabilities.max_tokens_before_extension
-    longest = _longest_questions(prepared.found.samples)
+    longest = _longest_questions(prepared.task_samples.samples)
     counts = _counts(model, prepared, longest)
     fitting = [count for count in counts if limit is None or count <= limit]
     return Budget(
@@ -81,7 +81,7 @@ def budget_of(prepared: PreparedTask, model: Model) -> Budget:
 
 
 def _longest_questions(samples: Iterable[Sample]) -> list[Sample]:
-    """One sample per context: that of its longest question."""
+    """Return one sample per context: that of its longest question."""
     longest: dict[tuple[str, tuple[int, ...]], Sample] = {}
     for sample in samples:
         key = sample.question.traj_id, sample.frames
@@ -94,10 +94,10 @@ def _counts(model: Model, prepared: PreparedTask, samples: Sequence[Sample]) -> 
     counts: list[int] = []
     refusals: list[ModelError] = []
     for sample in samples:
-        context, text = prepared.found.request(sample)
+        context, text = prepared.task_samples.request(sample)
         try:
             counts.append(_most_tokens(model, [*context, text], prepared.decoding.max_new_tokens))
-        except ModelError as error:  # one question's text may be to blame; the run records it as failed
+        except ModelError as error:  # one question's text may be the reason; the run records it as failed
             refusals.append(error)
     if refusals and not counts:
         raise refusals[0]
@@ -105,14 +105,16 @@ def _counts(model: Model, prepared: PreparedTask, samples: Sequence[Sample]) -> 
 
 
 def _most_tokens(model: Model, parts: Sequence[ContextPart], max_new_tokens: int) -> int:
-    """Tokens of a request and its reply, or of the longest one for a note that is shown in it, if that is longer.
+    """Return the tokens of a request and its reply, or of the longest request for one of its notes, if that is longer.
 
-    Notes are not written yet; each is counted with all the tokens that it may have.
+    Notes are not written yet; each counts as long as it may be.
     """
     notes = [part for part in parts if isinstance(part, Notes)]
     empty = [part.text([""] * len(part.windows)) if isinstance(part, Notes) else part for part in parts]
-    room = sum(len(item.windows) * item.taking.max_new_tokens for item in notes)
-    reading = [_tokens(model, window.request) + item.taking.max_new_tokens for item in notes for window in item.windows]
+    room = sum(len(item.windows) * item.settings.max_new_tokens for item in notes)
+    reading = [
+        _tokens(model, window.request) + item.settings.max_new_tokens for item in notes for window in item.windows
+    ]
     return max([_tokens(model, empty) + room + max_new_tokens, *reading])
 
 
@@ -121,5 +123,5 @@ def _tokens(model: Model, parts: Sequence[str | FrameRef]) -> int:
     conversation.append(*parts)
     try:
         return conversation.n_tokens or 0
-    except DataError:  # a frame that cannot be read costs nothing; the run records its questions as failed
+    except DataError:  # the run records questions on an unreadable frame as failed
         return 0

@@ -1,7 +1,7 @@
-"""Samples as the docs that lm-eval's task functions pass around, and back.
+"""Conversion between samples and the docs of lm-eval's task functions.
 
-A doc refers to its frames by their places in the trajectory; the set is opened once per process. So docs stay small for
-trajectories of thousands of frames.
+A doc refers to its frames by their positions in the trajectory, and the set is opened once per process. So docs stay
+small for trajectories of thousands of frames.
 """
 
 import json
@@ -12,23 +12,23 @@ from typing import Any
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.question import Question
 from infthor_eval.nieh.contexts import ContextPart, Sample, context_named
-from infthor_eval.nieh.notes import Notes, Notetaking
+from infthor_eval.nieh.frame_ablations import FrameAblation
+from infthor_eval.nieh.notes import Notes, NoteSettings
 from infthor_eval.nieh.samples import TaskSamples, open_set
-from infthor_eval.nieh.stand_ins import StandIns
 
 __all__ = ["Doc", "doc_of", "doc_parts", "doc_prompt", "doc_target", "prompt_of", "sample_of", "samples_of"]
 
 Doc = dict[str, Any]
-_PLACEHOLDERS = {FrameRef: "<image>", Notes: "<notes>"}  # the first is lm-eval's own mark for an image in a text
+_PLACEHOLDERS = {FrameRef: "<image>", Notes: "<notes>"}  # the first is lm-eval's own mark of an image in a text
 
 
-def doc_of(found: TaskSamples, sample: Sample, pixels: bool = False) -> Doc:
-    """The doc of a sample.
+def doc_of(task_samples: TaskSamples, sample: Sample, pixels: bool = False) -> Doc:
+    """Return the doc of a sample.
 
     Args:
-        found: what the task asks.
-        sample: one of it.
-        pixels: whether requests hold decoded images, as lm-eval's own models want them.
+        task_samples: the samples of the task.
+        sample: one of them.
+        pixels: True if requests are to hold decoded images, as lm-eval's own models need them.
     """
     question = sample.question
     return {
@@ -40,19 +40,19 @@ def doc_of(found: TaskSamples, sample: Sample, pixels: bool = False) -> Doc:
         "absence": question.absence,
         "clues": list(question.clues),
         "answers": json.dumps(question.answers),
-        "context": found.context_name,
+        "context": task_samples.context_name,
         "variant": sample.variant,
         "frames": list(sample.frames),
         "notes": [sample.notes.window, sample.notes.max_new_tokens] if sample.notes else [],
-        "set": str(found.data.root),
-        "stand_ins": asdict(found.stand_ins),
-        "trajectories": str(found.data.trajectories or ""),
+        "set": str(task_samples.data.root),
+        "frame_ablation": asdict(task_samples.frame_ablation),
+        "trajectories": str(task_samples.data.trajectories or ""),
         "pixels": pixels,
     }
 
 
 def sample_of(doc: Doc) -> Sample:
-    """The sample of a doc."""
+    """Return the sample of a doc."""
     question = Question(
         traj_id=doc["traj_id"],
         text=doc["question"],
@@ -61,7 +61,7 @@ def sample_of(doc: Doc) -> Sample:
         question_type=doc["question_type"] or None,
         absence=doc["absence"],
     )
-    notes = Notetaking(*doc["notes"]) if doc["notes"] else None
+    notes = NoteSettings(*doc["notes"]) if doc["notes"] else None
     return Sample(question, tuple(doc["frames"]), doc["variant"], notes=notes)
 
 
@@ -70,27 +70,27 @@ def samples_of(docs: Sequence[Doc]) -> TaskSamples:
     doc = docs[0]
     context = context_named(doc["context"])
     data = open_set(doc["set"], doc["trajectories"] or None)
-    stand_ins = StandIns(**doc["stand_ins"])
-    return TaskSamples(data, doc["context"], context, [sample_of(doc) for doc in docs], [], {}, stand_ins)
+    frame_ablation = FrameAblation(**doc["frame_ablation"])
+    return TaskSamples(data, doc["context"], context, [sample_of(doc) for doc in docs], [], {}, frame_ablation)
 
 
 def doc_parts(doc: Doc) -> list[ContextPart]:
-    """All that a model is shown and told for a doc, the text with the question last."""
+    """Return the request of a doc, with the question's text last."""
     context, text = samples_of([doc]).request(sample_of(doc))
     return [*context, text]
 
 
 def doc_prompt(doc: Doc) -> str:
-    """The request's text, with a placeholder where each frame, and the model's notes, go."""
+    """Return the text of a doc's request, with placeholders for frames and notes."""
     return prompt_of(samples_of([doc]), sample_of(doc))
 
 
-def prompt_of(found: TaskSamples, sample: Sample) -> str:
-    """A sample's request as text; see `doc_prompt`."""
-    context, text = found.request(sample)
+def prompt_of(task_samples: TaskSamples, sample: Sample) -> str:
+    """Return the text of a sample's request, with placeholders for frames and notes."""
+    context, text = task_samples.request(sample)
     return "".join(part if isinstance(part, str) else _PLACEHOLDERS[type(part)] for part in (*context, text))
 
 
 def doc_target(question: Question) -> str:
-    """The gold answers as one reply would give them."""
+    """Return the gold answers as one reply would give them."""
     return ", ".join(map(str, question.answers))

@@ -6,7 +6,7 @@ from itertools import groupby
 
 from infthor_eval.errors import DataError, InfthorError, ModelError, UsageError
 from infthor_eval.formats.nieh_set import NiehSet
-from infthor_eval.nieh.answering import NiehUnit, answered
+from infthor_eval.nieh.answering import NiehUnit, answer_units
 from infthor_eval.nieh.answering_models import AnsweringModel, OpenAnswerer, answering_model
 from infthor_eval.nieh.docs import doc_of, doc_target, prompt_of
 from infthor_eval.nieh.options import NiehOptions
@@ -43,7 +43,7 @@ class NiehEvaluation:
         open_set.cache_clear()  # its files may have changed since an earlier run of this process
         self._options = request.options
         self._tasks = [NiehTask(file, request) for file in request.tasks]
-        _refuse_nothing([task.found for task in self._tasks], self._tasks)
+        _refuse_empty([task.task_samples for task in self._tasks], self._tasks)
         self._refuse_unused()
 
     def bind(self, subject: Subject) -> "BoundNieh":
@@ -51,15 +51,17 @@ class NiehEvaluation:
         model = answering_model(subject)
         tokens = self._tokens_per_frame(model)
         tasks = {task.name: task for task in self._tasks}
-        prepared = {name: task.prepared(tokens) for name, task in tasks.items()}
-        _refuse_nothing([item.found for item in prepared.values()], self._tasks)
-        open_answerer = model.fit({name: partial(task.key, prepared[name], tokens) for name, task in tasks.items()})
+        prepared = {name: task.prepare(tokens) for name, task in tasks.items()}
+        _refuse_empty([item.task_samples for item in prepared.values()], self._tasks)
+        open_answerer = model.fit(
+            {name: partial(task.answer_key, prepared[name], tokens) for name, task in tasks.items()}
+        )
         costs = {name: model.cost(item) for name, item in prepared.items()}
         workload = Workload(
             groups=_groups(prepared),
-            skipped=[skipped for name, item in prepared.items() for skipped in _skipped(name, item.found)],
+            skipped=[skipped for name, item in prepared.items() for skipped in _skipped(name, item.task_samples)],
             config={
-                "tasks": {name: task.identity(prepared[name]) for name, task in tasks.items()},
+                "tasks": {name: task.config(prepared[name]) for name, task in tasks.items()},
                 "k_tokens": self._options.k_tokens,
                 "tokens_per_frame": tokens,
                 "frames": self._options.frames,
@@ -98,7 +100,7 @@ class NiehEvaluation:
 
     def _depends_on(self, source: str) -> bool:
         """Return whether a context of the tasks reads a source beside the set."""
-        return any(task.found is not None and source in task.found.sources for task in self._tasks)
+        return any(task.task_samples is not None and source in task.task_samples.sources for task in self._tasks)
 
 
 class PreparedEvaluation:
@@ -133,18 +135,18 @@ class BoundNieh:
     def run(self, group: Group[NiehUnit], session: Session[NiehAnswer]) -> Iterator[UnitRecord[NiehAnswer]]:
         """See `infthor_eval.runs.BoundEvaluation.run`."""
         task = group.units[0].key.task
-        yield from answered(group.units, self._prepared[task], self._open_answerer(task, session), session)
+        yield from answer_units(group.units, self._prepared[task], self._open_answerer(task, session), session)
 
     def to_sample(self, record: UnitRecord[NiehAnswer]) -> UnitSample:
         """See `infthor_eval.runs.BoundEvaluation.to_sample`."""
         prepared = self._prepared[record.task]
         number = self._numbers[record.key]
-        sample = prepared.found.samples[number]
+        sample = prepared.task_samples.samples[number]
         return UnitSample(
             number=number,
-            doc=doc_of(prepared.found, sample),
+            doc=doc_of(prepared.task_samples, sample),
             target=doc_target(sample.question),
-            prompt=prompt_of(prepared.found, sample),
+            prompt=prompt_of(prepared.task_samples, sample),
             settings=prepared.generation_kwargs,
             reply=record.payload.reply or "",
         )
@@ -158,7 +160,7 @@ class BoundNieh:
         return {
             UnitKey(name, sample.question.id, sample.variant): number
             for name, prepared in self._prepared.items()
-            for number, sample in enumerate(prepared.found.samples)
+            for number, sample in enumerate(prepared.task_samples.samples)
         }
 
 
@@ -166,7 +168,7 @@ def _groups(prepared: Mapping[str, PreparedTask]) -> list[Group[NiehUnit]]:
     """Return a group for each task and trajectory: its samples share what is encoded of the trajectory."""
     groups = []
     for task, item in prepared.items():
-        ordered = sorted(item.found.samples, key=lambda sample: sample.question.traj_id)
+        ordered = sorted(item.task_samples.samples, key=lambda sample: sample.question.traj_id)
         for _, samples in groupby(ordered, key=lambda sample: sample.question.traj_id):
             same = list(samples)
             frames = len({frame for sample in same for frame in sample.frames})
@@ -174,8 +176,8 @@ def _groups(prepared: Mapping[str, PreparedTask]) -> list[Group[NiehUnit]]:
     return groups
 
 
-def _skipped(task: str, found: TaskSamples) -> Iterator[Skipped]:
-    for item in found.skipped:
+def _skipped(task: str, samples: TaskSamples) -> Iterator[Skipped]:
+    for item in samples.skipped:
         yield Skipped(UnitKey(task, item.question.id, item.variant), item.reason)
 
 
@@ -189,13 +191,13 @@ def _measure_frame(data: NiehSet, model: AnsweringModel) -> int:
             except (DataError, ModelError) as error:
                 problems.append(error)
     reasons = [str(problem) for problem in problems] or sorted(data.reasons()) or ["its files are empty"]
-    raise UsageError(f"no question of {data.root} can be asked ({reasons[0]}); mend the set, or give another")
+    raise UsageError(f"no question of {data.root} can be asked ({reasons[0]}); fix the set, or give another")
 
 
-def _refuse_nothing(found: Sequence[TaskSamples | None], tasks: Sequence[NiehTask]) -> None:
+def _refuse_empty(task_samples: Sequence[TaskSamples | None], tasks: Sequence[NiehTask]) -> None:
     """Refuse tasks of which none has a question to ask; some may have none, where no window of their size fits."""
-    if any(samples is None or samples.samples for samples in found):
+    if any(samples is None or samples.samples for samples in task_samples):
         return
-    reasons = {item.reason for samples in found if samples is not None for item in samples.skipped}
-    said = "; ".join(sorted(reasons)[:3]) or "its files are empty"
-    raise UsageError(f"no question of {tasks[0].data.root} can be asked ({said}); mend the set, or give another")
+    reasons = {item.reason for samples in task_samples if samples is not None for item in samples.skipped}
+    listed = "; ".join(sorted(reasons)[:3]) or "its files are empty"
+    raise UsageError(f"no question of {tasks[0].data.root} can be asked ({listed}); fix the set, or give another")

@@ -1,7 +1,6 @@
-"""Which numbers a task makes of a reply: both scorers, or what its file says of its own.
+"""The metrics of a task's replies: both scorers, or the task's own function.
 
-A task file may name a function of its own under `process_results`, with `metric_list` for its metrics, as lm-eval reads
-them; our runs honour both.
+A task file may name its own function under `process_results`, with its metrics under `metric_list`, as in lm-eval.
 """
 
 import importlib
@@ -13,7 +12,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from infthor_eval.errors import DataError, UserCodeError, describe_exception
+from infthor_eval.errors import DataError, UserCodeError, describe_exception, in_one_line
 from infthor_eval.formats.digests import digest_of_file
 from infthor_eval.nieh.contexts import Sample
 from infthor_eval.nieh.docs import Doc, doc_of
@@ -36,26 +35,26 @@ class Metrics:
     """The metrics of a task.
 
     Attributes:
-        names: in the order shown.
-        process: the task's own function; None takes both scorers.
-        identity: of that function, as JSON values.
+        names: names of the metrics in the order of tables.
+        process: the task's own function; None for both scorers.
+        code: name and digest of that function's source, as JSON values.
     """
 
     names: tuple[str, ...]
     process: ProcessResults | None = None
-    identity: Mapping[str, str] = field(default_factory=dict)
+    code: Mapping[str, str] = field(default_factory=dict)
 
-    def scores(self, found: TaskSamples, sample: Sample, reply: str) -> dict[str, float]:
-        """The metrics of a reply.
+    def scores(self, task_samples: TaskSamples, sample: Sample, reply: str) -> dict[str, float]:
+        """Return the metrics of a reply.
 
         Raises:
-            MetricError: the task's own function fails on it, or lacks a metric.
+            MetricError: the task's own function raises an exception, or its result lacks a metric.
         """
         if self.process is None:
             return scores(reply, sample.question.answers)
         try:
-            made = self.process(doc_of(found, sample), [reply])
-            return {name: _finite(name, made[name]) for name in self.names}
+            results = self.process(doc_of(task_samples, sample), [reply])
+            return {name: _finite(name, results[name]) for name in self.names}
         except Exception as error:
             raise MetricError(f"process_results fails on {sample.question.id}: {describe_exception(error)}") from error
 
@@ -70,10 +69,10 @@ PUBLISHED = Metrics(SCORERS)
 
 
 def metrics_of(task: TaskFile) -> Metrics:
-    """The metrics of a task file.
+    """Return the metrics of a task file.
 
     Raises:
-        DataError: its function cannot be imported, or a metric is not averaged, or is better when lower.
+        DataError: its function cannot be imported, or a metric is not averaged or is better when lower.
     """
     name = task.settings["process_results"]
     if name == _OURS:
@@ -83,7 +82,7 @@ def metrics_of(task: TaskFile) -> Metrics:
         _check(item, f"{task.path}: metric_list: ")
     if not listed:
         raise DataError(f"{task.path}: a task with its own process_results names its metrics under metric_list")
-    module, attribute = _imported(task.path, name)
+    module, attribute = _import_function(task.path, name)
     source = {"process_results": name, "source": digest_of_file(Path(str(module.__file__)))}
     return Metrics(tuple(item["metric"] for item in listed), getattr(module, attribute), source)
 
@@ -93,24 +92,24 @@ def _check(item: object, place: str) -> None:
         raise DataError(f"{place}{item!r} is not a mapping with the metric's name (metric: NAME)")
     if item.get("aggregation", "mean") != "mean":
         raise DataError(f"{place}{item['metric']} is not averaged (aggregation: mean); use lm-eval")
-    if not item.get("higher_is_better", True):  # what fails counts as 0, which would be the best there is
-        raise DataError(f"{place}{item['metric']} is better when lower; turn it round, or use lm-eval")
+    if not item.get("higher_is_better", True):  # a failed sample counts as 0, which would be the best value
+        raise DataError(f"{place}{item['metric']} is better when lower; negate it, or use lm-eval")
 
 
-def _imported(task_file: Path, name: str) -> tuple[ModuleType, str]:
-    """The module of a function, found as lm-eval finds it: beside the file first, then on the path."""
+def _import_function(task_file: Path, name: str) -> tuple[ModuleType, str]:
+    """Import a function's module as lm-eval does: from beside the file, else from the path. Return its name too."""
     module, _, attribute = name.rpartition(".")
     beside = task_file.parent / f"{module.replace('.', '/')}.py"
     try:
         if beside.is_file():
             spec = importlib.util.spec_from_file_location(module, beside)
             assert spec is not None and spec.loader is not None  # a .py file has both
-            found = importlib.util.module_from_spec(spec)
-            spec.loader.exec_module(found)
+            imported = importlib.util.module_from_spec(spec)
+            spec.loader.exec_module(imported)
         else:
-            found = importlib.import_module(module)
-        getattr(found, attribute)
-    except Exception as error:  # whatever a module does when it is imported
-        said = " ".join(str(error).split())
-        raise DataError(f"{task_file}: process_results {name} cannot be imported ({said})") from error
-    return found, attribute
+            imported = importlib.import_module(module)
+        getattr(imported, attribute)
+    except Exception as error:  # a module may raise anything when it is imported
+        reason = in_one_line(error)
+        raise DataError(f"{task_file}: process_results {name} cannot be imported ({reason})") from error
+    return imported, attribute

@@ -1,4 +1,4 @@
-"""Having a model take notes on a trajectory, each of them once per run."""
+"""Notes that a model takes on trajectories, each of them once per run."""
 
 import time
 
@@ -12,7 +12,7 @@ __all__ = ["Notebook"]
 
 
 class Notebook:
-    """A model's notes, kept in the run's journal: a stopped run goes on with the same ones."""
+    """A model's notes, cached in the run's journal: a resumed run uses the same ones."""
 
     def __init__(self, model: Model, session: Session[NiehAnswer]) -> None:
         self._conversation = model.conversation()
@@ -20,7 +20,7 @@ class Notebook:
         self._session = session
 
     def text(self, notes: Notes) -> str:
-        """The notes as they are shown; the missing ones are taken first.
+        """Return the text of notes; missing ones are taken first.
 
         Raises:
             DataError: a frame cannot be read.
@@ -29,17 +29,17 @@ class Notebook:
         return notes.text([self._note(notes, window) for window in notes.windows])
 
     def _note(self, notes: Notes, window: Window) -> str:
-        decoding = Decoding(max_new_tokens=notes.taking.max_new_tokens)
+        decoding = Decoding(max_new_tokens=notes.settings.max_new_tokens)
         digests = [frame.digest for frame in window.frames]
         inputs = fingerprint({"frames": digests, "text": window.request[-1], "decoding": decoding.document()})
         note = self._session.find_artifact(inputs, NiehNote)
         if note is None:
-            note, usage = self._taken(notes, window, decoding)
+            note, usage = self._take_note(notes, window, decoding)
             self._session.cache_artifact(inputs, note, usage)
         return note.note
 
-    def _taken(self, notes: Notes, window: Window, decoding: Decoding) -> tuple[NiehNote, Usage]:
-        began = time.perf_counter()
+    def _take_note(self, notes: Notes, window: Window, decoding: Decoding) -> tuple[NiehNote, Usage]:
+        start = time.perf_counter()
         self._conversation.rewind(self._start)
         self._conversation.append(*window.request)
         reply = self._conversation.reply(decoding)
@@ -49,6 +49,6 @@ class Notebook:
             steps=window.steps,
             n_context_tokens=reply.n_context_tokens,
             n_reply_tokens=reply.n_reply_tokens,
-            seconds=round(time.perf_counter() - began, 4),
+            seconds=round(time.perf_counter() - start, 4),
         )
         return note, Usage.of([reply])

@@ -1,7 +1,7 @@
 """Notes that a model takes while it reads a trajectory, to be shown instead of the frames.
 
-What a model writes is known only once it has written it. So a context holds `Notes` where the text goes, and whoever
-runs the model has the notes written, window by window, and puts their text there (`infthor_eval.runs.notebook`).
+What a model writes is known only once it has written it. So a context holds `Notes` in the place of the text; the notes
+are written window by window when the model runs, and their text is put there (`infthor_eval.nieh.notebook`).
 """
 
 from collections.abc import Sequence
@@ -11,16 +11,16 @@ from functools import cached_property
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.nieh.prompts import note_text
 
-__all__ = ["Notes", "Notetaking", "Window"]
+__all__ = ["NoteSettings", "Notes", "Window"]
 
 
 @dataclass(frozen=True)
-class Notetaking:
-    """How notes are taken.
+class NoteSettings:
+    """Settings of note taking.
 
     Attributes:
-        window: frames read for one note.
-        max_new_tokens: most tokens of one note.
+        window: number of frames for one note.
+        max_new_tokens: limit of a note in tokens.
     """
 
     window: int
@@ -29,11 +29,11 @@ class Notetaking:
 
 @dataclass(frozen=True)
 class Window:
-    """Consecutive frames that one note is about.
+    """Consecutive frames of one note.
 
     Attributes:
-        first: position of the first in the trajectory's time order.
-        frames: at least one.
+        first: position of the first frame in the trajectory's time order.
+        frames: at least one frame.
     """
 
     first: int
@@ -41,13 +41,13 @@ class Window:
 
     @property
     def steps(self) -> str:
-        """Which steps these are, for the model and for people: "Steps 0-19"."""
+        """The steps in words: "Steps 0-19"."""
         last = self.first + len(self.frames) - 1
         return f"Step {last}" if last == self.first else f"Steps {self.first}-{last}"
 
     @property
     def request(self) -> tuple[FrameRef | str, ...]:
-        """What the model is shown and told to write the note."""
+        """The request for the note: frames and text."""
         return (*self.frames, note_text(self.steps))
 
 
@@ -58,20 +58,20 @@ class Notes:
     Attributes:
         traj_id: the trajectory.
         frames: its frames in time order.
-        taking: how the notes are taken.
+        settings: settings of note taking.
     """
 
     traj_id: str
     frames: tuple[FrameRef, ...]
-    taking: Notetaking
+    settings: NoteSettings
 
     @cached_property
     def windows(self) -> tuple[Window, ...]:
-        """The frames in the pieces that one note each is about."""
-        size = self.taking.window
+        """The windows, one for each note."""
+        size = self.settings.window
         return tuple(Window(at, self.frames[at : at + size]) for at in range(0, len(self.frames), size))
 
     def text(self, notes: Sequence[str]) -> str:
-        """What is shown: a line per window, given the note on each."""
+        """Return the text that is shown: a line for each window, given the notes on them."""
         pairs = zip(self.windows, notes, strict=True)
         return "".join(f"{window.steps}: {' '.join(note.split())}\n" for window, note in pairs)

@@ -1,39 +1,39 @@
-"""What NIEH can be told on the command line, beside its task files."""
+"""Options of NIEH on the command line, beside its task files."""
 
 from dataclasses import dataclass, field
 
 from infthor_eval.errors import UsageError
 
-__all__ = ["SHOWN", "NiehOptions", "check_frames"]
+__all__ = ["FRAMES", "SHOWN", "NiehOptions", "check_frames"]
 
 SHOWN = "shown"
-_FRAMES = (SHOWN, "blank", "shuffled", "other")  # see `infthor_eval.nieh.stand_ins`
+FRAMES = (SHOWN, "blank", "shuffled", "other")  # see `infthor_eval.nieh.frame_ablations`
 
 
 @dataclass(frozen=True, kw_only=True)
 class NiehOptions:
-    """Options of the suite; the help that people see stands with each.
+    """Options of the suite; each has its help text.
 
     Attributes:
-        k_tokens: tokens of a kilo-token in contexts of a given size; None takes each context's published value.
-        tokens_per_frame: tokens of one frame for such contexts; None asks the model.
-        retriever: CLIP model of contexts that retrieve frames, a hub id or a folder; None takes the published one.
-        retriever_revision: branch, tag or commit of it on the hub; None is the default branch.
-        trajectories: folder of the set's trajectories (the published scripts' `--traj_dir`); None where they lie in it.
-        frames: what is shown in the frames' places: they themselves, or stand-ins.
+        k_tokens: tokens of a kilo-token in contexts of a given size; None for each context's published value.
+        tokens_per_frame: tokens of one frame for such contexts; None to ask the model.
+        retriever: CLIP model of contexts that retrieve frames, a hub id or a folder; None for the published one.
+        retriever_revision: branch, tag or commit of it on the hub; None for the default branch.
+        trajectories: folder of the set's trajectories (`--traj_dir` of the published scripts); None for the set's own.
+        frames: the frames that are shown: the true ones, or a frame ablation.
     """
 
     k_tokens: int | None = field(
         default=None,
         metadata={
             "choices": ("1000", "1024"),
-            "help": "Tokens of a kilo-token where a context has a size; each context's published value if not given.",
+            "help": "Tokens of a kilo-token in contexts with a size; default: each context's published value.",
         },
     )
     tokens_per_frame: int | None = field(
         default=None,
         metadata={
-            "help": "Tokens of one frame where a context has a size, for models that count none.",
+            "help": "Tokens of one frame in contexts with a size, for models that count no tokens.",
             "metavar": "N",
         },
     )
@@ -47,7 +47,7 @@ class NiehOptions:
     trajectories: str | None = field(
         default=None,
         metadata={
-            "help": "Folder of the set's trajectories (TRAJ_ID.json or .txt) where they do not lie in the set.",
+            "help": "Folder of the set's trajectories (TRAJ_ID.json or .txt) if they are not in the set.",
             "metavar": "DIR",
             "is_place": True,
         },
@@ -55,17 +55,17 @@ class NiehOptions:
     frames: str = field(
         default=SHOWN,
         metadata={
-            "help": f"Show what in the frames' places, a run with each: {', '.join(_FRAMES)} (another trajectory's).",
+            "help": f"Frames to show, a run with each: {', '.join(FRAMES)} (of another trajectory).",
             "metavar": "HOW,...",
             "each": True,
         },
     )
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be.
+        """Check the values.
 
         Raises:
-            UsageError: a frame without tokens, or unknown stand-ins for frames.
+            UsageError: tokens_per_frame is below 1, or there is no such frame ablation.
         """
         check_frames(self.frames)
         if self.tokens_per_frame is not None and self.tokens_per_frame < 1:
@@ -73,10 +73,10 @@ class NiehOptions:
 
 
 def check_frames(frames: str) -> None:
-    """Refuse stand-ins for frames that there are not.
+    """Check the name of a frame ablation.
 
     Raises:
-        UsageError: names those that there are.
+        UsageError: there is no such ablation; the message has those that there are.
     """
-    if frames not in _FRAMES:
-        raise UsageError(f"--frames {frames}: there are {', '.join(_FRAMES)}")
+    if frames not in FRAMES:
+        raise UsageError(f"--frames {frames}: there are {', '.join(FRAMES)}")

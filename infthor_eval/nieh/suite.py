@@ -40,7 +40,7 @@ class NiehSuite:
         return record.payload.scores
 
     def primary_metrics(self, summary: NiehSummary) -> Mapping[str, Rate]:
-        """See `Suite.primary_metrics`: of the strict scorer, or of the task's own first metric."""
+        """See `Suite.primary_metrics`: the strict scorer, or the first of the task's own metrics."""
         return primary_metrics(summary)
 
     def overview(self, runs: Sequence[RunSummary]) -> list[Table]:

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 from infthor_eval.formats.published import PublishedRow, PublishedTable, published_tables
 from infthor_eval.formats.question import ABSENCE
-from infthor_eval.nieh.gains import Gain, frames_of, gains, name_of
+from infthor_eval.nieh.gains import Gain, find_gains, frames_of, name_of
 from infthor_eval.nieh.options import SHOWN
 from infthor_eval.nieh.summary import CLUE_COLUMNS, OPEN_ENDED, Cell, NiehSummary, TaskSummary, main_metric
 from infthor_eval.runs import RunSummary
@@ -211,7 +211,7 @@ def _beside(table: PublishedTable, runs: Sequence[RunSummary]) -> Table:
 
 def _gains_table(runs: Sequence[RunSummary]) -> Table | None:
     """What each run scores above the same run on blank frames; None where there is no such pair."""
-    rows = [Row((name_of(gain.run), gain.task, gain.metric, *_gain_cells(gain))) for gain in gains(runs)]
+    rows = [Row((name_of(gain.run), gain.task, gain.metric, *_gain_cells(gain))) for gain in find_gains(runs)]
     if not rows:
         return None
     note = "95 %: of the total, paired by question and clustered by trajectory, as `infthor-eval compare` has it."
@@ -221,7 +221,9 @@ def _gains_table(runs: Sequence[RunSummary]) -> Table | None:
 
 
 def _gain_cells(gain: Gain) -> tuple[str, ...]:
-    by_clues, apart = (tuple(map(_points, map(gain.of, names))) for names in (CLUE_COLUMNS, (OPEN_ENDED, ABSENCE)))
+    by_clues, apart = (
+        tuple(map(_points, map(gain.in_column, names))) for names in (CLUE_COLUMNS, (OPEN_ENDED, ABSENCE))
+    )
     return *by_clues, _points_interval(gain.total()), *apart
 
 

@@ -1,13 +1,14 @@
-"""A task of NIEH: what its file says, what it asks, and how its samples become records."""
+"""A task of NIEH: its file, its samples, and how their replies become records."""
 
 import difflib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from typing import Any
 
-from infthor_eval.errors import DataError
+from infthor_eval.errors import DataError, UsageError
 from infthor_eval.formats.nieh_set import NiehSet
-from infthor_eval.nieh.contexts import ContextSettings, Sample, context_named
+from infthor_eval.formats.packaged import packaged_folder
+from infthor_eval.nieh.contexts import CONTEXTS, ContextSettings, Sample
 from infthor_eval.nieh.metrics import PUBLISHED, Metrics, metrics_of
 from infthor_eval.nieh.options import NiehOptions
 from infthor_eval.nieh.samples import TaskSamples, find_samples, find_set
@@ -17,95 +18,122 @@ from model_adapters import Decoding
 
 __all__ = ["NiehTask", "PreparedTask"]
 
-_OF_SETS = ("context", "data", "bundled")  # what `dataset_kwargs` takes beside the settings of contexts
+_OF_SETS = ("context", "data", "bundled")  # keys of `dataset_kwargs` beside the settings of contexts
 _NEEDED = ("custom_dataset", "dataset_kwargs", "doc_to_text", "generation_kwargs", "process_results", "test_split")
 
 
 @dataclass(frozen=True)
 class PreparedTask:
-    """How a task's samples become records.
+    """A task with all that turns its samples into records.
 
     Attributes:
-        found: what it asks.
-        decoding: how replies are decoded.
+        task_samples: its samples.
+        decoding: decoding of replies.
         generation_kwargs: the same in lm-eval's words, as given.
-        metrics: what is made of them.
+        metrics: metrics of replies.
     """
 
-    found: TaskSamples
+    task_samples: TaskSamples
     decoding: Decoding
     generation_kwargs: Mapping[str, Any]
     metrics: Metrics = PUBLISHED
 
 
 class NiehTask:
-    """A task file, read: what is known of a task before the model is there."""
+    """A task file, as far as it can be read before the model is loaded.
+
+    Attributes:
+        name: name of the task.
+        settings: contents of its file.
+        decoding: decoding of replies.
+        metrics: metrics of replies.
+        data: the set.
+        needs_size: True if the samples depend on the model's tokens per frame.
+        task_samples: the samples; None if they depend on the model.
+    """
 
     def __init__(self, file: TaskFile, request: TaskRequest[NiehOptions]) -> None:
-        """Check the file and find what it asks, unless that depends on the model.
+        """Check the file and find its samples, unless they depend on the model.
 
         Raises:
-            UsageError: a setting that does not fit, or there is no set.
-            DataError: the file or the set is not what it should be.
+            UsageError: a setting does not fit, or there is no set.
+            DataError: the file or the set is not valid.
         """
         file.require(*_NEEDED)
         _check(file)
         self.name = file.name
         self.settings: Mapping[str, Any] = file.settings
         self._limit = request.limit
-        self._config: dict[str, Any] = _told(request) | file.settings["dataset_kwargs"]
-        self.decoding: Decoding = decoding_of(file.settings["generation_kwargs"], request.seed, file.name)
+        self._config: dict[str, Any] = _run_settings(request) | file.settings["dataset_kwargs"]
+        self.decoding: Decoding = decoding_of(file.settings["generation_kwargs"], request.seed, str(file.path))
         self.metrics: Metrics = metrics_of(file)
         self.data: NiehSet = find_set(**self._config)
-        self.needs_size = context_named(self._config["context"]).needs_model
-        self.found: TaskSamples | None = None if self.needs_size else find_samples(self._config, self._limit)
+        self.needs_size = CONTEXTS[self._config["context"]].needs_model
+        self.task_samples: TaskSamples | None = None if self.needs_size else find_samples(self._config, self._limit)
 
-    def prepared(self, tokens_per_frame: int | None) -> PreparedTask:
-        """How its samples become records, now that the size of a frame is known where it matters."""
-        samples = self.found
+    def prepare(self, tokens_per_frame: int | None) -> PreparedTask:
+        """Prepare the task for a model, given the tokens of a frame where the samples depend on them."""
+        samples = self.task_samples
         if samples is None:
             samples = find_samples(self._config | {"tokens_per_frame": tokens_per_frame}, self._limit)
         return PreparedTask(samples, self.decoding, self.settings["generation_kwargs"], self.metrics)
 
-    def key(self, prepared: PreparedTask, tokens_per_frame: int | None) -> Sequence[Sample]:
-        """All that it would ask without a limit: the answer key that a baseline is fitted to."""
+    def answer_key(self, prepared: PreparedTask, tokens_per_frame: int | None) -> Sequence[Sample]:
+        """Return the samples without a limit: the answer key that a baseline is fitted to."""
         if self._limit is None:
-            return prepared.found.samples
+            return prepared.task_samples.samples
         return find_samples(self._config | {"tokens_per_frame": tokens_per_frame}).samples
 
-    def identity(self, prepared: PreparedTask) -> dict[str, Any]:
-        """What its numbers depend on, as JSON values."""
-        found, names = prepared.found, prepared.metrics.names
-        skipped = [{"question_id": i.question.id, "variant": i.variant, "reason": i.reason} for i in found.skipped]
+    def config(self, prepared: PreparedTask) -> dict[str, Any]:
+        """Return everything that the numbers of the task depend on, as JSON values."""
+        samples, names = prepared.task_samples, prepared.metrics.names
+        skipped = [{"question_id": i.question.id, "variant": i.variant, "reason": i.reason} for i in samples.skipped]
         return {
             "config": dict(self.settings),
             "decoding": prepared.decoding.document(),
-            "metrics": {"names": list(names), **prepared.metrics.identity},
-            "data": found.data.fingerprint,
-            "simulator": found.data.simulator,
-            "sources": dict(found.sources),
-            "n_samples": len(found.samples),
+            "metrics": {"names": list(names), **prepared.metrics.code},
+            "data": samples.data.fingerprint,
+            "simulator": samples.data.simulator,
+            "sources": dict(samples.sources),
+            "n_samples": len(samples.samples),
             "skipped": skipped,
         }
 
 
 def _check(file: TaskFile) -> None:
-    """Refuse a file with a setting that would not act, as a slip of the pen has it."""
+    """Check the settings under `dataset_kwargs`, so that none is without effect, as a misspelt one would be.
+
+    Raises:
+        DataError: names the file and the setting.
+        UsageError: likewise.
+    """
+    place = f"{file.path}: dataset_kwargs"
     given = file.settings["dataset_kwargs"]
     if not isinstance(given, Mapping) or not isinstance(given.get("context"), str):
-        raise DataError(f"{file.path}: dataset_kwargs must be a mapping with the name of a context (context: NAME)")
+        raise DataError(f"{place} must be a mapping with the name of a context (context: NAME)")
     known = (*_OF_SETS, *(item.name for item in fields(ContextSettings)))
     for key in given:
         if key not in known:
             near = difflib.get_close_matches(str(key), known, n=1)
             hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(sorted(known))}"
-            raise DataError(f"{file.path}: dataset_kwargs: {key} is not known; {hint}")
+            raise DataError(f"{place}: {key} is not known; {hint}")
     for key in _OF_SETS:
         if not isinstance(given.get(key, ""), str):
-            raise DataError(f"{file.path}: dataset_kwargs: {key} is {given[key]!r:.60}; it is a name")
+            raise DataError(f"{place}: {key} is {given[key]!r:.60}; it is a name")
+    context = CONTEXTS.get(given["context"])
+    if context is None:
+        raise UsageError(f"{place}: context is {given['context']!r:.60}; it is one of {', '.join(CONTEXTS)}")
+    settings = ContextSettings.read(given, place)
+    if context.needs_model and settings.ctx_size is None:
+        raise UsageError(f"{place}: ctx_size is missing; {given['context']} needs it, a number of kilo-tokens above 0")
+    if "bundled" in given:
+        try:
+            packaged_folder(f"sets/{given['bundled']}")
+        except DataError as error:
+            raise DataError(f"{place}: bundled is {given['bundled']!r:.60}: {error}") from error
 
 
-def _told(request: TaskRequest[NiehOptions]) -> dict[str, Any]:
-    """What a run tells its tasks beside their files' own settings."""
-    ours = {"data": str(request.data) if request.data else None, **asdict(request.options)}
-    return {"seed": request.seed} | {key: value for key, value in ours.items() if value is not None}
+def _run_settings(request: TaskRequest[NiehOptions]) -> dict[str, Any]:
+    """Return the settings that a run gives to its tasks; those of their files go before them."""
+    options = {"data": str(request.data) if request.data else None, **asdict(request.options)}
+    return {"seed": request.seed} | {key: value for key, value in options.items() if value is not None}

@@ -11,27 +11,27 @@ from infthor_eval.errors import DataError, UsageError
 from infthor_eval.formats.files import prepare_folder, write_atomically
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.qa_csv import write_questions
-from infthor_eval.nieh.validation import Judged, Verdicts, read_decisions, write_inspection_list
+from infthor_eval.nieh.validation import JudgedQuestion, Verdicts, read_decisions, write_inspection_list
 
-__all__ = ["INSPECTION", "check_place", "write_validated_set"]
+__all__ = ["INSPECTION", "check_output", "write_validated_set"]
 
 INSPECTION = "inspection.csv"
 
 
-def check_place(out: Path, data: NiehSet) -> None:
-    """Refuse a folder in which the validated set would spoil what is there; called before the models run.
+def check_output(out: Path, data: NiehSet) -> None:
+    """Refuse an output folder whose contents the validated set would damage; called before the models run.
 
     Args:
         out: folder of the validated set.
-        data: the set that is to be validated.
+        data: the set to validate.
 
     Raises:
-        UsageError: it is the set itself.
-        DataError: it holds the frames of another set, or an inspection list that cannot be read.
+        UsageError: it is the folder of the set itself.
+        DataError: it has the frames of another set, or an inspection list that cannot be read.
     """
     prepare_folder(out)
     if out.resolve() == data.root.resolve():
-        raise UsageError(f"--out {out}: is the set itself, in which every question would stand twice; give another")
+        raise UsageError(f"--out {out}: is the set itself, in which every question would be listed twice; give another")
     link = out / "metadata"
     if os.path.lexists(link) and link.resolve() != (data.root / "metadata").resolve():
         raise DataError(f"{link}: holds the frames of another set; give another --out")
@@ -40,18 +40,18 @@ def check_place(out: Path, data: NiehSet) -> None:
 
 
 def write_validated_set(out: Path, data: NiehSet, verdicts: Verdicts) -> Path | None:
-    """Write a set that is whole enough to be evaluated: its frames stay where they are, linked.
+    """Write the validated set; its frames are linked, not copied.
 
     Args:
-        out: folder of the set; made where it does not exist.
+        out: folder of the validated set; created if it does not exist.
         data: the set that was validated.
-        verdicts: what became of its questions.
+        verdicts: the judged questions.
 
     Returns:
-        Where an earlier inspection list is kept, if it held decisions that the new one has no rows for.
+        New path of an existing inspection list, if it has decisions that the new one has no rows for.
 
     Raises:
-        DataError: it cannot be written.
+        DataError: a file cannot be written.
     """
     try:
         out.mkdir(parents=True, exist_ok=True)
@@ -69,7 +69,7 @@ def write_validated_set(out: Path, data: NiehSet, verdicts: Verdicts) -> Path | 
         raise DataError(f"{out}: cannot be written ({error.strerror}); give another --out") from error
 
 
-def _as_json(item: Judged) -> dict[str, Any]:
+def _as_json(item: JudgedQuestion) -> dict[str, Any]:
     question = item.question
     return {
         "question_id": question.id,

@@ -1,7 +1,7 @@
 """Cross-validation of questions (paper, A.1.3): a filter over the replies of several models to the clue frames.
 
-A question stays if at least one model answers it correctly. One with several clues that none answers may still be a
-good, hard question: a person looks at it and decides. The rest is rejected.
+A question is kept if at least one model answers it correctly. One with several clues that no model answers may still be
+a good, hard question: a person inspects it and decides. All others are rejected.
 """
 
 import itertools
@@ -15,21 +15,29 @@ from infthor_eval.formats.question import Question
 from infthor_eval.nieh.prompts import last_line
 from infthor_eval.nieh.scoring import Scorer, score
 
-__all__ = ["DECISIONS", "Judged", "Verdicts", "check_decisions", "judge", "read_decisions", "write_inspection_list"]
+__all__ = [
+    "DECISIONS",
+    "JudgedQuestion",
+    "Verdicts",
+    "check_decisions",
+    "judge_questions",
+    "read_decisions",
+    "write_inspection_list",
+]
 
 DECISIONS = ("keep", "drop")
 _COLUMNS = ("question_id", "traj_id", "question", "gt_img_idx", "answer", "replies", "decision")
 
 
 @dataclass(frozen=True)
-class Judged:
-    """A question and what the models said to it.
+class JudgedQuestion:
+    """A question and the models' replies to it.
 
     Attributes:
         question: the question.
-        replies: reply by model; None where the model failed.
-        right: the models that answered it correctly.
-        decision: what a person decided, "keep" or "drop"; None where nobody has.
+        replies: reply of each model; None where the model failed.
+        right: names of the models that answered it correctly.
+        decision: a person's decision, "keep" or "drop"; None if there is none.
     """
 
     question: Question
@@ -40,58 +48,58 @@ class Judged:
 
 @dataclass
 class Verdicts:
-    """The questions, sorted out.
+    """The judged questions.
 
     Attributes:
-        kept: at least one model was right, or a person decided to keep it.
-        rejected: no model was right, and one clue makes it or a person decided to drop it.
-        to_inspect: several clues, no model right, nobody has decided.
+        kept: questions that at least one model answered correctly, or that a person decided to keep.
+        rejected: questions that no model answered correctly, with one clue, or that a person decided to drop.
+        to_inspect: questions with several clues that no model answered correctly, without a decision.
     """
 
-    kept: list[Judged] = field(default_factory=list)
-    rejected: list[Judged] = field(default_factory=list)
-    to_inspect: list[Judged] = field(default_factory=list)
+    kept: list[JudgedQuestion] = field(default_factory=list)
+    rejected: list[JudgedQuestion] = field(default_factory=list)
+    to_inspect: list[JudgedQuestion] = field(default_factory=list)
 
 
-def judge(
+def judge_questions(
     questions: Sequence[Question],
     replies: Mapping[str, Mapping[str, str | None]],
     decisions: Mapping[str, str],
     scorer: Scorer = "strict",
 ) -> Verdicts:
-    """Sort questions out.
+    """Judge questions by the replies of models.
 
     Args:
-        questions: in the order in which they are to stay.
-        replies: model to question id to reply; None where the model failed.
-        decisions: question id to "keep" or "drop", for questions that were inspected.
-        scorer: full marks under it are a correct answer.
+        questions: the questions in the order of the set.
+        replies: replies by model, then by question id; None where the model failed.
+        decisions: decisions on inspected questions, "keep" or "drop", by question id.
+        scorer: scorer whose full marks are a correct answer.
 
     Raises:
-        DataError: a model was not asked one of the questions, or a decision is about a question that is not there.
+        DataError: a model was not asked one of the questions, or a decision is about a question of another set.
     """
     check_decisions(decisions, questions)
     verdicts = Verdicts()
     for question in questions:
-        said = {model: _reply(question, model, found) for model, found in replies.items()}
-        right = tuple(m for m, text in said.items() if text is not None and _correct(text, question, scorer))
-        judged = Judged(question, said, right, decisions.get(question.id))
-        _place(judged, verdicts).append(judged)
+        by_model = {model: _reply(question, model, of_model) for model, of_model in replies.items()}
+        right = tuple(m for m, text in by_model.items() if text is not None and _is_correct(text, question, scorer))
+        judged = JudgedQuestion(question, by_model, right, decisions.get(question.id))
+        _list_of(judged, verdicts).append(judged)
     return verdicts
 
 
 def check_decisions(decisions: Mapping[str, str], questions: Iterable[Question]) -> None:
-    """Refuse decisions that are about another set.
+    """Refuse decisions on another set.
 
     Raises:
-        DataError: one is about a question that is not there.
+        DataError: a decision is about a question that is not in the set.
     """
     unknown = sorted(set(decisions) - {question.id for question in questions})
     if unknown:
         raise DataError(f"the decisions are about {unknown[0]}, which is not in the set; take the list of this set")
 
 
-def _place(judged: Judged, verdicts: Verdicts) -> list[Judged]:
+def _list_of(judged: JudgedQuestion, verdicts: Verdicts) -> list[JudgedQuestion]:
     if judged.right:
         return verdicts.kept
     if len(judged.question.clues) == 1:
@@ -99,60 +107,59 @@ def _place(judged: Judged, verdicts: Verdicts) -> list[Judged]:
     return {"keep": verdicts.kept, "drop": verdicts.rejected, None: verdicts.to_inspect}[judged.decision]
 
 
-def _reply(question: Question, model: str, found: Mapping[str, str | None]) -> str | None:
-    if question.id not in found:
+def _reply(question: Question, model: str, replies: Mapping[str, str | None]) -> str | None:
+    if question.id not in replies:
         raise DataError(f"model {model} was not asked {question.id}; run it on the whole set")
-    return found[question.id]
+    return replies[question.id]
 
 
-def _correct(text: str, question: Question, scorer: Scorer) -> bool:
+def _is_correct(text: str, question: Question, scorer: Scorer) -> bool:
     return score(last_line(text), question.answers, scorer) >= 1.0
 
 
-def write_inspection_list(path: Path, items: Iterable[Judged]) -> Path | None:
-    """Write the questions that a person must decide on; the last column is to be filled with keep or drop.
+def write_inspection_list(path: Path, items: Iterable[JudgedQuestion]) -> Path | None:
+    """Write the questions that a person must decide on; the person fills the last column with keep or drop.
 
-    What was filled in already, in a list that is there, is taken over; a list with decisions on other questions is kept
-    under another name.
+    Decisions in an existing list are kept; a list with decisions on other questions is renamed.
 
     Returns:
-        Where the earlier list is kept; None where nothing of it would be lost.
+        New path of an existing list with decisions on other questions; None if no decision would be lost.
 
     Raises:
-        DataError: the list that is there cannot be read.
+        DataError: an existing list cannot be read.
         OSError: the list cannot be written.
     """
     earlier = read_decisions(path) if path.exists() else {}
     listed = list(items)
-    kept = None
+    renamed = None
     if earlier.keys() - {item.question.id for item in listed}:
         names = (path.with_name(f"{path.stem}.{number}{path.suffix}") for number in itertools.count(1))
-        kept = path.rename(next(name for name in names if not name.exists()))
+        renamed = path.rename(next(name for name in names if not name.exists()))
     write_sheet(path, _COLUMNS, (_row(item, earlier.get(item.question.id, "")) for item in listed))
-    return kept
+    return renamed
 
 
-def _row(item: Judged, decision: str) -> list[object]:
+def _row(item: JudgedQuestion, decision: str) -> list[object]:
     question = item.question
-    said = "; ".join(f"{model}: {text}" for model, text in item.replies.items())
+    replies = "; ".join(f"{model}: {text}" for model, text in item.replies.items())
     clues, answers = list(question.clues), list(question.answers)
-    return [question.id, question.traj_id, question.text, clues, answers, said, decision]
+    return [question.id, question.traj_id, question.text, clues, answers, replies, decision]
 
 
 def read_decisions(path: Path) -> dict[str, str]:
-    """Read an inspection list that a person has filled; rows without a decision are left open.
+    """Read an inspection list that a person has filled; rows without a decision are ignored.
 
     Raises:
         DataError: the file cannot be read, lacks a column, or a decision is neither keep nor drop.
     """
     decisions: dict[str, str] = {}
-    mend = "fill the list that `validate` wrote"
-    for place, row in read_rows(path, ("question_id", "decision"), mend, line_breaks=True):
+    hint = "fill the list that `validate` wrote"
+    for place, row in read_rows(path, ("question_id", "decision"), hint, line_breaks=True):
         name, decision = unshield(row["question_id"]), row["decision"].strip().lower()
         if decision and decision not in DECISIONS:
             raise DataError(f"{place}: decision is {decision!r:.60}; write keep or drop")
         if decisions.get(name, decision) != decision:
-            raise DataError(f"{place}: {name} is decided otherwise above; take one of the rows out")
+            raise DataError(f"{place}: {name} has another decision above; remove one of the rows")
         if decision:
             decisions[name] = decision
     return decisions

@@ -10,12 +10,12 @@ from jinja2 import Environment
 
 from infthor_eval.errors import DataError
 from infthor_eval.formats.nieh_set import NiehSet
-from infthor_eval.nieh.validation import DECISIONS, Judged
+from infthor_eval.nieh.validation import DECISIONS, JudgedQuestion
 
 __all__ = ["write_inspection_page"]
 
 
-def write_inspection_page(path: Path, items: Sequence[Judged], data: NiehSet) -> None:
+def write_inspection_page(path: Path, items: Sequence[JudgedQuestion], data: NiehSet) -> None:
     """Write the questions with their clue frames, gold answers and every reply; frames are linked, not copied.
 
     Args:
@@ -36,7 +36,7 @@ def write_inspection_page(path: Path, items: Sequence[Judged], data: NiehSet) ->
         raise DataError(f"{path}: cannot be written ({error.strerror}); give another --out") from error
 
 
-def _describe(item: Judged, data: NiehSet, folder: Path) -> dict[str, object]:
+def _describe(item: JudgedQuestion, data: NiehSet, folder: Path) -> dict[str, object]:
     question = item.question
     frames = zip(question.clues, data.clue_frames(question), strict=True)
     return {

@@ -134,7 +134,7 @@ CONTENTS = [
     ("questions", (ONE_ROW + f"\nt,q,[1],[{10**30}]\n").encode(), "an entry that no reply can match"),
     ("questions", (ONE_ROW + "\nt,q,[1],['\\ud800']\n").encode(), "an entry that no reply can match"),
     ("questions", (ONE_ROW + "\nt,\"q\"x,[1],['a']\n").encode(), "not a UTF-8 CSV file"),
-    ("decisions", b"question_id,decision\na,keep\na,drop\n", "is decided otherwise above"),
+    ("decisions", b"question_id,decision\na,keep\na,drop\n", "has another decision above"),
     ("decisions", b"question_id,decision,decision\na,keep,drop\n", "is there twice"),
     ("decisions", b"question_id,decision\na,keep,drop\n", "has 3 cells for 2 columns"),
     ("decisions", b'question_id,decision\n"a,keep\n', "not a UTF-8 CSV file"),

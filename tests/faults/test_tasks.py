@@ -4,6 +4,7 @@ import pytest
 
 from .told import said_in_one_line
 
+SETTING = "own.yaml: dataset_kwargs:"
 HEAD = "include: _nieh.yaml\ntask: own\n"
 CLUES = HEAD + "dataset_kwargs: {context: clues"
 BOMB = "a0: &a0 [1, 1, 1, 1, 1, 1, 1, 1, 1, 1]\n" + "".join(
@@ -14,21 +15,29 @@ FILES = [
     (CLUES + ", depthz: [0.2]}", "depthz is not known; did you mean depths?"),
     (CLUES + ", top-k: 3}", "top-k is not known; did you mean top_k?"),
     (CLUES + ", 5: 3}", "not"),
-    (CLUES + ", ctx_size: 8k}", "Expected `float"),
-    (CLUES + ", ctx_size: -8}", "ctx_size is -8"),
+    (CLUES + ", ctx_size: two}", f"{SETTING} ctx_size is 'two'; it is a number of kilo-tokens above 0"),
+    (CLUES + ", ctx_size: -8}", f"{SETTING} ctx_size is -8; it is a number of kilo-tokens above 0"),
     (CLUES + ", ctx_size: .nan}", "holds what JSON cannot"),
-    (CLUES + ", depths: 0.2}", "Expected `array`"),
-    (CLUES + ", depths: [a]}", "Expected `float`"),
-    (CLUES + ", depths: [2]}", "they are between 0 and 1"),
-    (CLUES + ", depths: []}", "they are between 0 and 1"),
-    (CLUES + ", top_k: true}", "Expected `int`"),
-    (CLUES + ", retriever: 5}", "Expected `str`"),
-    (CLUES + ", bundled: 5}", "bundled is 5; it is a name"),
+    (CLUES + ", depths: 0.2}", f"{SETTING} depths is 0.2; it is a list of numbers from 0 to 1"),
+    (CLUES + ", depths: [a]}", f"{SETTING} depths is ['a']; it is a list of numbers from 0 to 1"),
+    (CLUES + ", depths: [2]}", f"{SETTING} depths is [2]; it is a list of numbers from 0 to 1"),
+    (CLUES + ", depths: []}", f"{SETTING} depths is []; it is a list of numbers from 0 to 1"),
+    (CLUES + ", top_k: true}", f"{SETTING} top_k is True; it is a whole number from 1"),
+    (CLUES + ", note_window: 0}", f"{SETTING} note_window is 0; it is a whole number from 1"),
+    (CLUES + ", k_tokens: 1023}", f"{SETTING} k_tokens is 1023; it is 1000 or 1024"),
+    (CLUES + ", seed: x}", f"{SETTING} seed is 'x'; it is a whole number"),
+    (CLUES + ", frames: grey}", f"{SETTING} frames is 'grey'; it is one of shown, blank, shuffled, other"),
+    (CLUES + ", retriever: 5}", f"{SETTING} retriever is 5; it is a text"),
+    (CLUES + ", bundled: 5}", f"{SETTING} bundled is 5; it is a name"),
+    (CLUES + ", bundled: no}", f"{SETTING} bundled is False; it is a name"),
+    (CLUES + ", bundled: none}", f"{SETTING} bundled is 'none': the installation lacks its data folder"),
+    (HEAD + "dataset_kwargs: {context: clue}", f"{SETTING} context is 'clue'; it is one of clues, trajectory"),
+    (HEAD + "dataset_kwargs: {context: haystack}", f"{SETTING} ctx_size is missing; haystack needs it"),
     (HEAD + "dataset_kwargs: {context: [clues]}", "name of a context"),
     (HEAD + "dataset_kwargs: {}", "name of a context"),
     (HEAD + "dataset_kwargs: 5", "must be a mapping"),
     (HEAD + "dataset_kwargs: [context]", "must be a mapping"),
-    (CLUES + "}\ngeneration_kwargs: 5", "it is a mapping of settings"),
+    (CLUES + "}\ngeneration_kwargs: 5", "own.yaml: generation_kwargs is 5; it is a mapping of settings"),
     (CLUES + "}\ngeneration_kwargs: [until]", "it is a mapping of settings"),
     (CLUES + "}\ngeneration_kwargs: {max_gen_toks: 5, until: 5}", "it is a text or a list of texts"),
     (CLUES + "}\ngeneration_kwargs: {max_gen_toks: 5, until: {a: 1}}", "it is a text or a list of texts"),

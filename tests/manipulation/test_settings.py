@@ -79,7 +79,7 @@ def test_the_command_line_goes_before_the_file(data):
 
 
 @pytest.mark.parametrize("frames", ["", "Blank", "black", "shown,blank"])
-def test_stand_ins_for_frames_that_do_not_exist_are_refused(frames):
+def test_frame_ablations_for_frames_that_do_not_exist_are_refused(frames):
     with pytest.raises(UsageError, match="tasks in a simulator have shown, blank"):
         ManipulationOptions(frames=frames)
 

@@ -44,7 +44,7 @@ def as_text(part):
     if isinstance(part, str):
         return part
     if isinstance(part, Notes):
-        return f"notes {part.traj_id} {part.taking.window} {part.taking.max_new_tokens} {len(part.frames)}"
+        return f"notes {part.traj_id} {part.settings.window} {part.settings.max_new_tokens} {len(part.frames)}"
     return f"{part.path.parent.parent.name}/{part.path.name}"
 
 

@@ -15,8 +15,8 @@ from infthor_eval.cli.progress.runs import execute_with_progress
 from infthor_eval.nieh.samples import find_set
 from infthor_eval.nieh.scoring import Scorer
 from infthor_eval.nieh.tables import clues_table
-from infthor_eval.nieh.validated_set import check_place, write_validated_set
-from infthor_eval.nieh.validation import Verdicts, check_decisions, judge, read_decisions
+from infthor_eval.nieh.validated_set import check_output, write_validated_set
+from infthor_eval.nieh.validation import Verdicts, check_decisions, judge_questions, read_decisions
 from infthor_eval.report.inspection import write_inspection_page
 from infthor_eval.report.terminal import print_table, table_console
 from infthor_eval.runs import RunOutcome, RunRequest, RunSummary, Suite, prepare
@@ -82,7 +82,7 @@ def validate(
     decisions = read_decisions(decisions_file) if decisions_file else {}
     data = find_set(str(requests[0][0].tasks.data))
     check_decisions(decisions, data.questions)
-    check_place(out, data)
+    check_output(out, data)
     runs = [prepare(request, suite) for request, suite in requests]
     outcomes = []
     for run in runs:
@@ -92,7 +92,7 @@ def validate(
     answered = {record.id for record in outcomes[0].records}
     questions = [question for question in data.questions if question.id in answered]
     replies = [{record.id: record.payload.reply for record in outcome.records} for outcome in outcomes]
-    verdicts = judge(questions, dict(zip(_model_names(outcomes), replies, strict=True)), decisions, scorer)
+    verdicts = judge_questions(questions, dict(zip(_model_names(outcomes), replies, strict=True)), decisions, scorer)
     earlier = write_validated_set(out, data, verdicts)
     if earlier is not None:
         print_note(f"{earlier}: the earlier list; it has decisions on questions that need no inspection now")

@@ -16,7 +16,7 @@ from infthor_eval.formats.nieh_set import NiehSet, SkippedQuestion
 from infthor_eval.formats.question import Question
 from infthor_eval.nieh.contexts.base import ContextSettings, Sample, clue_positions
 
-__all__ = ["drawn_from", "haystack"]
+__all__ = ["haystack", "sampling_pool"]
 
 _K_TOKENS = 1000  # the published kilo-token
 _STEPS = 5  # depths of the published grid
@@ -49,7 +49,7 @@ def _window(clues: tuple[int, ...], n_all: int, n: int, d_index: int, draw: rand
     if _follow_each_other(clues):
         # Of a put the published code lets the window end one frame too late, and shows it one frame shorter.
         return _around(clues[0], n_all, n, *((d_index, n_all + 1) if len(clues) == 2 else (_STEPS - 1, n_all)))
-    pool, missing = drawn_from(clues, n_all, n), n - len(clues)
+    pool, missing = sampling_pool(clues, n_all, n), n - len(clues)
     if missing < 0:
         return "the clues do not fit the window"
     if missing > len(pool):
@@ -68,7 +68,7 @@ def _around(needle: int, n_all: int, n: int, d_index: int, last_end: int) -> tup
     return tuple(range(start, min(start + n, n_all)))
 
 
-def drawn_from(clues: Sequence[int], n_all: int, n: int) -> list[int]:
+def sampling_pool(clues: Sequence[int], n_all: int, n: int) -> list[int]:
     """What a window around clues that are apart is drawn from: the frames between them.
 
     Where those are too few, as many as are missing on either side of them too, clues among those as published: a clue

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from infthor_eval.formats.question import ABSENCE
-from infthor_eval.nieh.gains import gains, name_of
+from infthor_eval.nieh.gains import find_gains, name_of
 from infthor_eval.nieh.summary import CLUE_COLUMNS, Cell, Score, TaskSummary, main_metric
 from infthor_eval.report.figures.style import LEGEND, Look, add_legend, inline_svg, looks_of
 from infthor_eval.report.runs import ReportRun
@@ -123,7 +123,7 @@ def _gains_chart(runs: Sequence[ReportRun]) -> Chart | None:
     """Draw the gain of each run over blank frames, a row per task; None if no run on blank frames is among them."""
     rows = [
         (f"{name_of(gain.run)}, {gain.task}", total)
-        for gain in gains([run.summary for run in runs])
+        for gain in find_gains([run.summary for run in runs])
         if gain.metric == main_metric(gain.seeing) and (total := gain.total()) is not None
     ]
     if not rows:

@@ -168,7 +168,10 @@ def test_an_extension_that_would_lose_the_three_axes_is_refused(rope: str) -> No
         ({"tensor_parallel_size": "0"}, "tensor_parallel_size=0 is not from 1"),
         ({"max_frames": "0"}, "max_frames=0 is not from 1"),
         ({"mm_processor_cache_gb": "-1"}, "mm_processor_cache_gb=-1.0 is not from 0"),
-        ({"data_parallel_size": "2"}, "needs distributed_executor_backend=external_launcher in vLLM; use --workers 2 instead"),
+        (
+            {"data_parallel_size": "2"},
+            "external_launcher in vLLM; use --workers 2 instead",
+        ),
         ({"rope": "yarn"}, "rope=yarn is not TYPE:FACTOR"),
         ({"prompt": "loud"}, "prompt=loud is not chat or plain"),
         ({"max_pixels": "0"}, "max_pixels=0 is not between"),

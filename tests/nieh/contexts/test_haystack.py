@@ -13,7 +13,7 @@ from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import SkippedQuestion
 from infthor_eval.formats.question import Question
 from infthor_eval.nieh.contexts import CONTEXTS, ContextSettings, Sample
-from infthor_eval.nieh.contexts.haystack import drawn_from
+from infthor_eval.nieh.contexts.haystack import sampling_pool
 
 GOLDEN = Path(__file__).parents[2] / "goldens" / "haystack_multi.jsonl.gz"
 DEPTHS = (0, 0.2, 0.4, 0.6, 0.8)
@@ -76,7 +76,7 @@ def test_several_clues_give_the_published_windows():
         found = windows(case["frames"], case["clues"], **sizes)[case["depth"]]
         clues, shown = set(case["clues"]), list(found.frames) if isinstance(found, Sample) else []
         if case["drawn"]:
-            assert drawn_from(case["clues"], case["frames"], n) == case["pool"]
+            assert sampling_pool(case["clues"], case["frames"], n) == case["pool"]
             assert clues <= set(shown) <= clues | set(case["pool"])
             inside = len(clues & set(case["pool"]))
             assert case["n_drawn"] == n - len(clues)
@@ -109,7 +109,7 @@ def test_frames_between_several_clues_are_drawn_and_those_around_where_they_are_
         assert len(sample.frames) == 6
     for sample in windows(100, [40, 44], ctx_size=10, tokens_per_frame=1000):
         assert {40, 44} <= set(sample.frames) <= set(range(33, 52))
-    assert drawn_from([40, 44], 100, 10) == list(range(33, 52))
+    assert sampling_pool([40, 44], 100, 10) == list(range(33, 52))
 
 
 def test_several_clues_are_drawn_from_the_seed_at_each_depth_anew():

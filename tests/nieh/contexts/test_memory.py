@@ -7,7 +7,7 @@ from infthor_eval.harness import registration
 from infthor_eval.harness.nieh_task import dataset, doc_to_image, doc_to_text
 from infthor_eval.nieh.contexts import CONTEXTS
 from infthor_eval.nieh.docs import doc_parts, sample_of
-from infthor_eval.nieh.notes import Notes, Notetaking
+from infthor_eval.nieh.notes import Notes, NoteSettings
 from infthor_eval.nieh.samples import find_samples
 
 QUESTION = Question("t", "Is there a mug?", (1,), ("yes",))
@@ -15,7 +15,7 @@ QUESTION = Question("t", "Is there a mug?", (1,), ("yes",))
 
 def notes(n_frames, window):
     frames = tuple(FrameRef(f"{index}.png") for index in range(n_frames))
-    return Notes("t", frames, Notetaking(window, 8))
+    return Notes("t", frames, NoteSettings(window, 8))
 
 
 def test_windows_hold_every_frame_once_and_the_last_one_what_is_left():
@@ -39,7 +39,7 @@ def test_the_context_is_the_notes_the_last_frame_and_the_question(make_nieh_set)
     (sample,) = found.samples
     frames = found.data.frames("t")
     context, text = CONTEXTS["memory_notes"].request(found.data, sample)
-    assert context == [Notes("t", frames, Notetaking(3, 7)), frames[-1]]
+    assert context == [Notes("t", frames, NoteSettings(3, 7)), frames[-1]]
     assert text.endswith("Question: Is there a mug?")
 
 
@@ -53,7 +53,7 @@ def test_a_doc_carries_how_notes_are_taken(make_nieh_set, references):
     root = make_nieh_set([QUESTION], n_frames=5, size=56)
     config = {"context": "memory_notes", "data": str(root), "note_window": 3, "note_tokens": 7}
     (doc,) = dataset(**config)["test"]
-    assert doc_parts(doc)[0].taking == Notetaking(3, 7)
+    assert doc_parts(doc)[0].settings == NoteSettings(3, 7)
     assert doc_to_text(doc).startswith("<notes><image>\nAnswer the question given your notes")
     assert doc_to_image(doc) == []
     assert sample_of(doc) == find_samples(config).samples[0]

@@ -86,7 +86,7 @@ def test_notes_are_taken_on_what_stands_in(requests, frames):
     (_, (true_notes, true_last), _), *_ = requests("shown", "memory_notes")
     assert isinstance(notes, Notes)
     assert isinstance(last, FrameRef)
-    assert (notes.traj_id, notes.taking, len(notes.frames)) == ("a", true_notes.taking, 6)
+    assert (notes.traj_id, notes.settings, len(notes.frames)) == ("a", true_notes.settings, 6)
     assert [*notes.frames, last] != [*true_notes.frames, true_last]
 
 

@@ -1,4 +1,4 @@
-"""What is shown in the places of frames: they themselves or, to tell what a model owes to seeing them, stand-ins."""
+"""Frame ablations: other frames in the places of the true ones, to measure what a model gains from seeing them."""
 
 import random
 from collections.abc import Sequence
@@ -12,47 +12,47 @@ from infthor_eval.nieh.contexts import Context, ContextPart
 from infthor_eval.nieh.notes import Notes
 from infthor_eval.nieh.options import SHOWN, check_frames
 
-__all__ = ["StandIns"]
+__all__ = ["FrameAblation"]
 
 
 @dataclass(frozen=True)
-class StandIns:
-    """What is shown in the places of a request's frames; its text stays as it is.
+class FrameAblation:
+    """An ablation of the frames of requests; their text stays as it is.
 
     Attributes:
-        frames: "shown" (they themselves), "blank" (grey, of the same size), "shuffled" (they themselves in another
-            order) or "other" (those at the same places of another trajectory of the set).
-        seed: for the order and for which trajectory.
+        frames: "shown" (the true frames), "blank" (grey frames of the same size), "shuffled" (the true frames in
+            another order) or "other" (frames at the same positions of another trajectory of the set).
+        seed: seed of the order and of the choice of the other trajectory.
     """
 
     frames: str = SHOWN
     seed: int = 0
 
     def __post_init__(self) -> None:
-        """Refuse what is not known.
+        """Check `frames`.
 
         Raises:
-            UsageError: there are no such stand-ins.
+            UsageError: there is no such ablation.
         """
         check_frames(self.frames)
 
     def check(self, data: NiehSet) -> None:
-        """Refuse a set that has none.
+        """Check that a set allows the ablation.
 
         Raises:
-            UsageError: there is no other trajectory.
+            UsageError: the set has no other trajectory.
         """
         if self.frames == "other" and len(_trajectories(data)) < 2:
-            raise UsageError(f"--frames other: {data.root} has questions on one trajectory alone; take another set")
+            raise UsageError(f"--frames other: {data.root} has questions on one trajectory only; give another set")
 
-    def put(self, parts: Sequence[ContextPart], data: NiehSet, context: Context, traj_id: str) -> list[ContextPart]:
-        """The parts of a request with what is shown in the places of frames.
+    def apply(self, parts: Sequence[ContextPart], data: NiehSet, context: Context, traj_id: str) -> list[ContextPart]:
+        """Return the parts of a request with the frames replaced.
 
         Args:
-            parts: what a model is shown.
+            parts: parts of the request.
             data: the set.
-            context: the context that the parts are of.
-            traj_id: the trajectory that the frames are of.
+            context: context of the request.
+            traj_id: trajectory of the frames.
         """
         if self.frames == SHOWN:
             return list(parts)
@@ -60,14 +60,14 @@ class StandIns:
         if self.frames == "blank":
             shown = [blank_like(frame) for frame in frames]
         elif self.frames == "shuffled":
-            shown = self._shuffled(frames, traj_id)
+            shown = self._shuffle(frames, traj_id)
         else:
             shown = self._of_another(frames, data, context, traj_id)
         left = iter(shown)
         return [_with_frames(part, [next(left) for _ in _frames_in(part)]) for part in parts]
 
-    def _shuffled(self, frames: Sequence[FrameRef], traj_id: str) -> list[FrameRef]:
-        """In an order that is another one wherever there is one; the same for every question in one context."""
+    def _shuffle(self, frames: Sequence[FrameRef], traj_id: str) -> list[FrameRef]:
+        """Return the frames in another order if there is one; the same order for every question in a context."""
         draw = random.Random(f"{self.seed}/{traj_id}/{'/'.join(frame.path.name for frame in frames)}")
         shuffled = list(frames)
         while len(set(frames)) > 1 and shuffled == list(frames):
@@ -75,11 +75,11 @@ class StandIns:
         return shuffled
 
     def _of_another(self, frames: Sequence[FrameRef], data: NiehSet, context: Context, traj_id: str) -> list[FrameRef]:
-        """From the same places; where the other trajectory is shorter, counted on from its start."""
+        """Return the frames at the same positions of another trajectory; of a shorter one, modulo its length."""
         others = [other for other in _trajectories(data) if other != traj_id]
         shown = context.frames(data, random.Random(f"{self.seed}/{traj_id}").choice(others))
-        places = {frame: place for place, frame in enumerate(context.frames(data, traj_id))}
-        return [shown[places[frame] % len(shown)] for frame in frames]
+        positions = {frame: position for position, frame in enumerate(context.frames(data, traj_id))}
+        return [shown[positions[frame] % len(shown)] for frame in frames]
 
 
 def _trajectories(data: NiehSet) -> list[str]:
@@ -94,5 +94,5 @@ def _frames_in(part: ContextPart) -> tuple[FrameRef, ...]:
 
 def _with_frames(part: ContextPart, frames: Sequence[FrameRef]) -> ContextPart:
     if isinstance(part, Notes):
-        return Notes(part.traj_id, tuple(frames), part.taking)
+        return Notes(part.traj_id, tuple(frames), part.settings)
     return frames[0] if frames else part
