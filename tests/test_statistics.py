@@ -45,6 +45,16 @@ def test_no_right_answer_on_eight_trajectories_gives_wilsons_textbook_interval()
     for per_trajectory in (1, 5):  # questions that are all right or all wrong together count as one
         estimate = clustered_mean([0.0] * 8 * per_trajectory, list(range(8)) * per_trajectory)
         assert (estimate.low, estimate.high) == (0.0, pytest.approx(z**2 / (8 + z**2), abs=1e-6))
+        mirrored = clustered_mean([1.0] * 8 * per_trajectory, list(range(8)) * per_trajectory)
+        assert (mirrored.low, mirrored.high) == (pytest.approx(8 / (8 + z**2), abs=1e-6), 1.0)
+
+
+@given(scores)
+def test_the_interval_of_wrong_answers_mirrors_that_of_right_ones(pairs):
+    values, clusters = [value for value, _ in pairs], [cluster for _, cluster in pairs]
+    right, wrong = clustered_mean(values, clusters), clustered_mean([1 - value for value in values], clusters)
+    if right.stderr is not None:
+        assert (wrong.low, wrong.high) == (pytest.approx(1 - right.high), pytest.approx(1 - right.low))
 
 
 def test_the_ends_of_an_interval_of_shares_solve_wilsons_equation():
@@ -91,6 +101,7 @@ def test_the_bootstrap_agrees_with_the_formula_and_repeats():
     interval = bootstrap_interval(values, clusters, seed=3)
     assert interval == pytest.approx((estimate.low, estimate.high), abs=0.015)
     assert bootstrap_interval(values, clusters, seed=3) == interval
+    assert bootstrap_interval(values, clusters, seed=3, n_resamples=2000) == interval
     assert bootstrap_interval([1.0] * 4, [0, 0, 1, 1]) is None
     assert bootstrap_interval([1.0, 0.0], ["t", "t"]) is None
 

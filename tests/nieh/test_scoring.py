@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from infthor_eval.errors import UsageError
 from infthor_eval.nieh import score
+from infthor_eval.nieh.scoring import scores
 
 GOLDENS = Path(__file__).parents[1] / "goldens"
 names = st.from_regex(r"[a-z]{3,9}( [a-z]{3,9})?", fullmatch=True).filter(lambda name: "and" not in name.split())
@@ -128,6 +129,11 @@ def test_strict_does_not_depend_on_the_order_of_the_answers(gold, random):
 def test_reference_takes_any_response(response):
     for gold in (["mug"], ["yes"], [3], ["mug", "no"]):
         assert score(response, gold) >= 0.0
+
+
+def test_the_last_line_of_a_reply_counts():
+    assert scores("I think so.\nyes", ["yes"]) == {"reference": 1.0, "strict": 1.0}
+    assert scores("yes\nI think so.", ["yes"]) == {"reference": 0.0, "strict": 0.0}
 
 
 def test_word_to_number_failures_of_the_library_are_no_numbers():

@@ -379,7 +379,7 @@ def test_another_seed_draws_other_replies_from_the_same_weights(prepared, sampli
 )
 def test_settings_that_would_not_act_are_refused_before_a_model_is_loaded(prepared, sampling, settings, said):
     sampling(settings if "max_gen_toks" in settings else f"max_gen_toks: 12, {settings}")
-    with pytest.raises(UsageError, match=f"nieh_gt: generation_kwargs: {said}") as caught:
+    with pytest.raises(UsageError, match=rf"nieh_gt\.yaml: generation_kwargs: {said}") as caught:
         prepared(TINY, tasks=("nieh_gt",))
     assert "\n" not in str(caught.value)
 

@@ -532,6 +532,11 @@ def test_plans_that_nobody_can_carry_out(target, words):
         PlanReward(DEFAULT, target, ELSEWHERE, kitchen(), Treatments(), CORRIDOR)
 
 
+def test_a_way_needs_the_grid():
+    with pytest.raises(ValueError, match="needs the grid"):
+        PlanReward(DEFAULT, PlanTarget(PlanKind.GOTO, goal_stand=GridPose((0, 9), 0)), ELSEWHERE, kitchen())
+
+
 def test_after_the_end():
     plan = PlanReward(DEFAULT, PICKUP, ELSEWHERE, kitchen())
     assert plan.after({"action": "PickupObject", "objectId": MUG}, kitchen(), HOLDING) == StepReward(2.0, done=True)

@@ -13,7 +13,7 @@ from queue import SimpleQueue
 import msgspec
 import pytest
 
-from infthor_eval.errors import ModelError, UsageError
+from infthor_eval.errors import DataError, ModelError, UsageError
 from infthor_eval.runs import Group, RunRequest, Unit, UnitKey, execute, prepare, read_header, read_run
 from infthor_eval.runs.scheduling import run_groups
 from model_adapters import Capabilities
@@ -180,6 +180,18 @@ def test_what_is_known_is_not_done_again_and_what_failed_is_tried_again(tmp_path
     outcome, watching = run(request(tmp_path))
     assert [resumed for _, _, resumed in watching.seen] == [True, True, False, False]
     assert [record.attempt for record in outcome.records] == [1, 1, 2, 2]
+
+
+def test_a_shard_that_is_deleted_after_the_last_unit_gives_no_results(tmp_path, monkeypatch):
+    class Deleting(Watching):
+        def done(self, record, resumed):
+            super().done(record, resumed)
+            if len(self.seen) == self.begun[0]:
+                next((tmp_path / "adder").glob("*/journal/*.jsonl")).unlink()
+
+    with pytest.raises(DataError, match="was deleted or replaced"):
+        execute(prepare(request(tmp_path), ToySuite()), Deleting())
+    assert not list((tmp_path / "adder").glob("*/results.json"))
 
 
 def test_a_clock_that_goes_back_changes_nothing(tmp_path, monkeypatch):

@@ -145,7 +145,7 @@ def test_two_journals_in_one_file_are_named_and_recovered_from(ask, tmp_path):
     path.write_bytes(2 * content)
     code, out, err = ask(model="oracle")
     assert (code, out) == (2, "")
-    assert f"{path}, line 7: the first line of a journal amid its records" in err
+    assert f"{path}, line 7: a second header in the middle of the records" in err
     assert "Traceback" not in err
     code, _, err = ask("--recover", model="oracle")
     assert code == 0

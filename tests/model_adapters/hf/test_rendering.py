@@ -67,7 +67,7 @@ def test_a_turn_is_written_the_same_whatever_comes_after_it(tokenizer: Any, fram
     [
         (NO_SYSTEM, (SYSTEM, *SAID), r"refuses the turns system, user, assistant, user \(no system turns\)"),
         (ONLY_USERS, SAID, r"drops the text 'A mug.' of a turn \(assistant\)"),
-        (ONLY_USERS, (*SAID, Turn("assistant", ("Sure?",)), MORE), r"leaves out"),
+        (ONLY_USERS, (*SAID, Turn("assistant", ("Sure?",)), MORE), r"drops"),
         ("{{ messages[0].content[0].text.nothing.at_all }}", SAID, "refuses the turns user, assistant, user"),
         ("{{ 'a' + messages[0].content }}", SAID, "refuses the turns user, assistant, user"),
         ("{%- if -%}", SAID, "refuses the turns"),
@@ -91,7 +91,7 @@ def test_a_text_that_is_said_twice_and_written_once_is_left_out(tokenizer: Any) 
 def test_the_systems_words_are_a_string_where_the_template_joins_them(tokenizer: Any) -> None:
     text = "[Be brief.\n]<user>What?<assistant>A mug.<user>Sure?"
     assert _render(tokenizer, JOINED, SAID) == text.replace("Be brief.", "")
-    with pytest.raises(ModelError, match="leaves out"):  # a string is no list of texts for the assistant's turn
+    with pytest.raises(ModelError, match="drops"):  # a string is no list of texts for the assistant's turn
         _render(tokenizer, JOINED, (SYSTEM, *SAID))
     strings = BODY.replace("{%- for", "{%- if message.content is string -%}{{- message.content -}}{%- else -%}{%- for")
     template = JOINED.replace(BODY, strings + "{%- endif -%}")

@@ -87,7 +87,7 @@ def test_any_other_key_or_shape_ends_the_loading(
 def test_a_key_in_two_files_is_refused(tmp_path: Path) -> None:
     save_file(WHOLE, tmp_path / "a.safetensors")
     save_file({"old.bias": torch.zeros(2)}, tmp_path / "b.safetensors")
-    with pytest.raises(ModelError, match=r"two files of mine hold old\.bias"):
+    with pytest.raises(ModelError, match=r"two files of mine have old\.bias"):
         _loaded(tmp_path)
 
 
