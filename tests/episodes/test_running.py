@@ -14,6 +14,7 @@ from infthor_eval.runs import Tokens, Unit, UnitKey, Usage
 
 UNIT = Unit(UnitKey("task", "a/0001"), "a", ArmRecord(index=1, kind="put", instruction="put it down"))
 BEGUN = msgspec.structs.replace(UNIT.payload, object_id="Mug|1", start_distance=0.5)
+SESSION = SimpleNamespace(describe_failure=lambda unit, error: str(error))
 DONE = msgspec.structs.replace(BEGUN, ended="done")
 
 
@@ -35,7 +36,7 @@ def record(runner, *outcomes):
             raise outcome
         return outcome
 
-    return runner.record(UNIT, "print", run)
+    return runner.record(UNIT, "print", run, SESSION)
 
 
 def test_a_result_has_its_tokens_its_usage_and_the_faults_of_simulator_and_model(runner):
@@ -53,14 +54,14 @@ def test_the_time_of_tries_that_fail_counts(runner):
             raise SimulatorError("it hangs")
         return EpisodeResult(DONE)
 
-    assert runner.record(UNIT, "", run).seconds >= 0.04
+    assert runner.record(UNIT, "", run, SESSION).seconds >= 0.04
 
 
 def test_a_subject_that_fails_leaves_what_was_known_of_the_episode_when_it_began(runner):
     failed = record(runner, ModelError("out of memory"))
     assert (failed.failure, failed.payload, failed.usage) == ("out of memory", BEGUN, Usage(1))
     runner.begun = BEGUN  # of the episode before
-    with_nothing = runner.record(UNIT, "", lambda: (_ for _ in ()).throw(ModelError("at once")))
+    with_nothing = runner.record(UNIT, "", lambda: (_ for _ in ()).throw(ModelError("at once")), SESSION)
     assert (with_nothing.failure, with_nothing.payload) == ("at once", UNIT.payload)
 
 

@@ -54,10 +54,10 @@ def differences(here, wanted, held):
 @pytest.mark.parametrize("name", ["kitchen", "drawers"])
 def test_after_it_every_thing_is_where_and_as_it_should_be(name, request):
     arena = request.getfixturevalue(name)
-    start = start_of(arena)
+    initial = start_of(arena)
     assert len(arena.states.starts) == len(arena.episodes) > 5
     for start in arena.states.starts.values():
-        view = arena.simulator.rewind(start, exactly=True)
+        view = arena.simulator.rewind(initial, exactly=True)
         agent = view.agent
         assert transfer(arena.simulator, start.view) == []
         assert differences(arena.simulator.view, start.view, start.view.inventory) == []

@@ -91,8 +91,8 @@ def test_notes_are_taken_on_what_stands_in(requests, frames):
 
 
 def test_what_cannot_be_is_refused(requests, make_nieh_set):
-    with pytest.raises(UsageError, match="--frames none: there are shown, blank, shuffled, other"):
+    with pytest.raises(UsageError, match="frames is .none.; it is one of shown, blank, shuffled, other"):
         requests("none")
     root = make_nieh_set(QUESTIONS[:2], name="one")
-    with pytest.raises(UsageError, match="on one trajectory alone"):
+    with pytest.raises(UsageError, match="on one trajectory only"):
         find_samples({"context": "clues", "data": str(root), "frames": "other"})

@@ -39,9 +39,7 @@ def test_every_run_leaves_it_and_equal_runs_leave_the_same(tmp_path: Path) -> No
     found = read_stored_command(folder)
     assert found is not None
     assert found.options == {"model": "adder", "tasks": ["sums"], "seed": 0, "output": str(tmp_path)}
-    assert (
-        found.command == f"infthor-eval run --model adder --tasks sums --seed 0 --output {shlex.quote(str(tmp_path))}"
-    )
+    assert found.line == f"infthor-eval run --model adder --tasks sums --seed 0 --output {shlex.quote(str(tmp_path))}"
     assert found.data is None
 
 
@@ -76,7 +74,7 @@ def test_options_that_are_as_by_default_are_left_out_and_places_are_found_from_a
         "workers": 2,
     }
     assert found.data == tmp_path / "set"
-    words = shlex.split(found.command)
+    words = shlex.split(found.line)
     assert words[:4] == ["infthor-eval", "run", "--model", "m"]
     assert words[words.index("--scenes") + 1] == str(tmp_path / "plans of floors")
     assert words[-3:] == ["--greedy", "--workers", "2"]
@@ -92,7 +90,7 @@ def test_whatever_the_options_of_a_model_are_they_come_back(tmp_path_factory, op
     folder = tmp_path_factory.mktemp("run")
     found = written(folder, request(folder, model_options=options))
     assert found.options.get("model_args", {}) == options
-    words = shlex.split(found.command)
+    words = shlex.split(found.line)
     if any("," in value for value in options.values()):  # which cannot be typed
         assert words == ["infthor-eval", "run", "--config", str(folder / "run.yaml")]
     elif options:

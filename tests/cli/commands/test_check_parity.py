@@ -49,9 +49,12 @@ def test_different_policies_end_with_1(run: Run, tmp_path: Path) -> None:
     [
         (("openvla-tin", "--reference-url", "http://127.0.0.1:9"), "did you mean 'openvla-tiny'"),
         (("openvla-tiny",), "--reference-url"),
-        (("openvla-tiny", "--reference-url", "nowhere"), "--reference-url: url is no address"),
+        (("openvla-tiny", "--reference-url", "nowhere"), "--reference-url: url is not the address of a server"),
         (("openvla-tiny", "--reference-url", "http://x", "--frames", "/nowhere"), "has no pictures"),
-        (("openvla-tiny", "--reference-url", "http://x", "--model-args", "unnorm_key=a"), "unnorm_key=a is no dataset"),
+        (
+            ("openvla-tiny", "--reference-url", "http://x", "--model-args", "unnorm_key=a"),
+            "unnorm_key=a is not a dataset",
+        ),
     ],
 )
 def test_misuse_is_one_line(run: Run, words: tuple[str, ...], said: str) -> None:

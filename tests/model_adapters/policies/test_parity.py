@@ -90,7 +90,7 @@ def test_a_folder_without_pictures_is_refused(tmp_path: Path) -> None:
 
 
 def test_misuse_is_refused() -> None:
-    with pytest.raises(UsageError, match=r"--reference-url: url is no address"):
+    with pytest.raises(UsageError, match=r"--reference-url: url is not the address of a server"):
         reference_policy("host", None)
     with pytest.raises(UsageError, match=r"qwen2\.5-vl-tiny is not a policy; compare openvla or spatialvla"):
         load_policy("qwen2.5-vl-tiny", {})

@@ -80,7 +80,7 @@ def test_its_identity_has_engine_and_dataset(policy: Callable[..., Any]) -> None
 def test_what_is_wrong_with_checkpoint_or_key_is_told_as_in_the_native_port(
     policy: Callable[..., Any], vllm: Double, checkpoints: dict[str, Path]
 ) -> None:
-    with pytest.raises(UsageError, match="unnorm_key=x is no dataset"):
+    with pytest.raises(UsageError, match="unnorm_key=x is not a dataset"):
         policy(unnorm_key="x")
     with pytest.raises(ModelError, match="is a qwen2_5_vl checkpoint, not openvla"):
         policy(pretrained=checkpoints["qwen2.5-vl"])

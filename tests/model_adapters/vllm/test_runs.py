@@ -102,7 +102,7 @@ def test_plans_are_carried_out_alike(
 
 
 def test_engines_that_do_not_run_a_model_are_refused_in_one_line(run: Any, tmp_path: Path) -> None:
-    known = "there do: hf-vlm, llava-onevision, openvla, pixtral, qwen2.5-vl"
+    known = "these do: hf-vlm, llava-onevision, openvla, pixtral, qwen2.5-vl"
     for command in ("run", "plan"):
         code, _, err = run(command, "--model", "deepseek-vl", "--engine", "vllm", "--tasks", "nieh_mini")
         assert code == 2
