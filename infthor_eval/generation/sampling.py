@@ -24,12 +24,7 @@ class TaskPool:
     """Samples tasks; used and failed ones become less likely."""
 
     def __init__(self, task_types: Iterable[TaskType], rng: random.Random) -> None:
-        """Start without uses.
-
-        Args:
-            task_types: task types to sample from.
-            rng: source of all random choices.
-        """
+        """Start without uses; `rng` is the source of all random choices."""
         self._task_types = frozenset(task_types)
         self._rng = rng
         self._uses: Counter[tuple[int, str]] = Counter()  # of a value of the variable with this index
