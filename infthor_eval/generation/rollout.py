@@ -39,7 +39,7 @@ class Rollout:
         for number, operator in enumerate(operators, 1):
             if operator.name == "GotoLocation" and number == len(operators):
                 self._walker.go([operator.item])  # the plan ends at a lamp that is lit already
-            elif operator.name != "GotoLocation":  # each sub-goal walks by itself: only then is its object known
+            elif operator.name != "GotoLocation":  # each sub-goal includes its walk: its object is known only then
                 _SUBGOALS[operator.name](self, operator)
 
     # -- sub-goals

@@ -49,7 +49,7 @@ class TrainingSequence:
 
 @dataclass(frozen=True)
 class SkippedItem:
-    """A part of the data of which no sequence could be built.
+    """A part of the data that could not become a sequence.
 
     Attributes:
         name: name of the trajectory, plan or question.

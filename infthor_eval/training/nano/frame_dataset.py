@@ -35,7 +35,7 @@ class FrameDataset:
             time steps of a video; this has one of them.
         cells: types in each token's part of the frame, (frames, tokens, types).
         shown: types that the frame shows near enough to be visible in AI2-THOR's sense, (frames, types).
-        present: types of which any pixel is in the frame, (frames, types).
+        present: types with any pixel in the frame, (frames, types).
     """
 
     frames: tuple[FrameRef, ...]
