@@ -56,11 +56,7 @@ class GeneratedTrajectory:
 
 
 def generate(settings: TrajectorySettings, simulator: Simulator) -> GeneratedTrajectory:
-    """Generate one trajectory.
-
-    Args:
-        settings: settings of the trajectory.
-        simulator: simulator to generate it in; its scene is replaced.
+    """Generate one trajectory in a simulator, which loads its scene.
 
     Raises:
         UsageError: no task in the scene can be completed.

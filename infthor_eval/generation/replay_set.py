@@ -69,12 +69,7 @@ class ReplayedSet:
 
 
 def select(paths: Iterable[Path], limit: int | None = None, per_floor_plan: int | None = None) -> Selection:
-    """Read the trajectories to replay.
-
-    Args:
-        paths: files and folders of trajectories.
-        limit: maximum number of trajectories.
-        per_floor_plan: maximum number of trajectories on one floor plan.
+    """Read the trajectories of files and folders, at most `limit`, and at most `per_floor_plan` on one floor plan.
 
     Raises:
         DataError: a path has no trajectory file.

@@ -7,7 +7,7 @@ the room, without the planner's reductions, and the items of the task's types.
 
 from collections.abc import Iterable
 
-from infthor_eval.household.affordances import KNIVES, SLICEABLE, goes_into
+from infthor_eval.household.affordances import KNIVES, SLICEABLE
 from infthor_eval.household.planner import relevant_items
 from infthor_eval.household.symbolic import ABSENT, FLOOR, SymbolicRoom, slice_item
 from infthor_eval.household.tasks import Task, TaskType
@@ -140,8 +140,7 @@ def _rules(task: Task, room: SymbolicRoom, items: list[str], names: dict[str, st
         object_type = room.types[item]
         for holder in holders:
             usable = holder in room.places or room.types[holder] == task.movable
-            fits = goes_into(object_type, room.types[holder]) and (item, holder) not in room.refused
-            if usable and holder != item and fits:
+            if usable and holder != item and room.fits(item, holder):
                 yield f"fits {names[item]} {names[holder]}"
         if object_type in KNIVES and task.sliced:
             yield f"knife {names[item]}"

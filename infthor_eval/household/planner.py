@@ -10,7 +10,7 @@ import itertools
 from collections.abc import Iterator
 from dataclasses import replace
 
-from infthor_eval.household.affordances import KNIVES, goes_into
+from infthor_eval.household.affordances import KNIVES
 from infthor_eval.household.goals import APPLIANCE, lower_bound
 from infthor_eval.household.symbolic import ABSENT, FLOOR, Operator, State, SymbolicRoom, slice_item
 from infthor_eval.household.tasks import Task, TaskType
@@ -115,14 +115,9 @@ class _Problem:
         needed |= {place for item in items if (place := room.place_of(item, where)) in room.places and place}
         spare = set()  # one place per item to put it aside, see the module's docstring
         for item in sorted(items):
-            others = [place for place in sorted(room.places - needed) if self._fits(place, item)]
+            others = [place for place in sorted(room.places - needed) if room.fits(item, place)]
             spare |= set(others[:1])
         return sorted(needed | spare)
-
-    def _fits(self, receptacle: str, item: str) -> bool:
-        types = self._room.types
-        fits = receptacle in self._room.receptacles and goes_into(types[item], types[receptacle])
-        return fits and (item, receptacle) not in self._room.refused
 
     def _gotos(self, state: State, where: dict[str, str]) -> Iterator[tuple[Operator, State]]:
         loose = [item for item, parent in where.items() if parent == FLOOR]
@@ -137,7 +132,7 @@ class _Problem:
 
     def _puts(self, state: State, where: dict[str, str], held: str) -> Iterator[tuple[Operator, State]]:
         for receptacle in itertools.chain((state.at,), self._movables):
-            if receptacle is None or receptacle == held or not self._fits(receptacle, held):
+            if receptacle is None or receptacle == held or not self._room.fits(held, receptacle):
                 continue
             if self._room.place_of(receptacle, where) == state.at:
                 yield Operator("PutObject", held, receptacle), _move(state, held, receptacle, held=None)

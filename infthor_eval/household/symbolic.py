@@ -8,7 +8,7 @@ modelled: the rollout adds them where they are needed, as ALFRED does.
 from collections.abc import Container, Iterable
 from dataclasses import dataclass
 
-from infthor_eval.household.affordances import SLICEABLE
+from infthor_eval.household.affordances import SLICEABLE, goes_into
 from infthor_eval.household.containment import direct_parent
 from infthor_eval.thor.view import SimulatorView, ThorObject
 
@@ -80,6 +80,11 @@ class SymbolicRoom:
                 return item
             item = where[item]
         return item
+
+    def fits(self, item: str, receptacle: str) -> bool:
+        """Return True if a receptacle is made for an item's type and is not known to have no room for it."""
+        usual = receptacle in self.receptacles and goes_into(self.types[item], self.types[receptacle])
+        return usual and (item, receptacle) not in self.refused
 
 
 def room_of(view: SimulatorView, blocked: Container[str] = (), refused: Iterable[tuple[str, str]] = ()) -> SymbolicRoom:

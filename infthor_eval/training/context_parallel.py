@@ -170,12 +170,7 @@ class ContextParallel:
 
 @contextmanager
 def context_parallel(model: SequenceModel, group: dist.ProcessGroup) -> Iterator[ContextParallel]:
-    """Split sequences over the ranks of a group; the backward pass has to run within the context, too.
-
-    Args:
-        model: the model, the same on every rank of the group.
-        group: the ranks.
-    """
+    """Split sequences over the ranks of a group, with the same model on each; run the backward pass within, too."""
     parallel = ContextParallel(model, group)
     name = f"context_parallel_{id(parallel)}"
     config = model.decoder.config

@@ -61,11 +61,7 @@ class SkippedItem:
 
 
 class Encoder:
-    """Builds sequences for one checkpoint.
-
-    Args:
-        loaded: the checkpoint; its template also renders prompts in evaluation.
-    """
+    """Builds sequences for one checkpoint; its template also renders prompts in evaluation."""
 
     def __init__(self, loaded: LoadedCheckpoint) -> None:
         self._tokenizer: Any = loaded.tokenizer

@@ -27,12 +27,8 @@ def gather_weights(model: torch.nn.Module) -> dict[str, torch.Tensor] | None:
 def export(loaded: LoadedCheckpoint, folder: Path, weights: Mapping[str, torch.Tensor] | None = None) -> None:
     """Write weights (safetensors), configs, tokenizer with its template, and image processor.
 
-    The template is that of training, so that evaluation renders the same prompts.
-
-    Args:
-        loaded: the model.
-        folder: folder of the checkpoint; it is created.
-        weights: gathered weights of a sharded model, or None.
+    The template is that of training, so that evaluation renders the same prompts. The folder is created. `weights` are
+    the gathered ones of a sharded model.
 
     Raises:
         DataError: the checkpoint cannot be written.

@@ -38,13 +38,7 @@ class FrameFacts:
 
 
 def frame_facts(steps: Sequence[Step], share: float, frames: Container[int] | None = None) -> list[FrameFacts]:
-    """Return the facts of the whole log, or only what some frames show.
-
-    Args:
-        steps: the log.
-        share: share of the frame's pixels that an object must fill to be seen.
-        frames: the clue frames; None for the whole log.
-    """
+    """Return the facts of the whole log, or what clue frames show: objects that fill a share of the frame's pixels."""
     facts = []
     loose = frozenset(name for step in steps for name in step.object_log.pickupable)
     for step, states in zip(steps, iter_object_states(steps), strict=True):

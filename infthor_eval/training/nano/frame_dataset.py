@@ -56,11 +56,7 @@ class FrameDataset:
 
 
 def read_frame_dataset(folders: Iterable[Path], image_processor: Any) -> FrameDataset:
-    """Read all frames of replayed sets.
-
-    Args:
-        folders: folders of the sets.
-        image_processor: image processor of the model.
+    """Read all frames of the folders of replayed sets.
 
     Raises:
         DataError: a set cannot be read, or its step log does not list the objects in frames.
