@@ -156,8 +156,7 @@ class _Problem:
             whole = self._room.types[item] == self._task.pickup and parent != ABSENT
             if whole and slice_item(item, 1) in where and self._room.place_of(item, where) == state.at:
                 slices = {key: parent for key in where if key.startswith(f"{item}#")}
-                changed = tuple((key, slices.get(key, old)) for key, old in state.where)
-                after = replace(state, where=changed)
+                after = replace(state, where=tuple((key, slices.get(key, old)) for key, old in state.where))
                 yield Operator("SliceObject", item), _move(after, item, ABSENT, held=state.held)
 
 

@@ -123,7 +123,8 @@ def listing_question(question_type: str, form: str, events: Iterable[tuple[str, 
     Args:
         question_type: type of the question.
         form: the question, without names in it.
-        events: object type and frame (None if no frame shows it) of each event; each type must be shown once.
+        events: object type and frame (None if no frame shows it) of each event. If no frame shows one of the types,
+            there is no question.
     """
     types: set[str] = set()
     first: dict[str, int] = {}
