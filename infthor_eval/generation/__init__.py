@@ -1,3 +1,1 @@
 """Generating data: trajectories, their replay to frames and logs, and questions on them."""
-
-__all__: list[str] = []

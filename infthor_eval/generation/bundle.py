@@ -26,7 +26,7 @@ from infthor_eval.thor.simulator import Simulator
 __all__ = ["MANIFEST", "Manifest", "TrajectoryRecipe", "build_bundle", "differing_files", "read_manifest"]
 
 MANIFEST = "manifest.json"
-_NOT_SHIPPED = ("replay.json",)  # has wall times, which differ from build to build
+_NOT_SHIPPED = "replay.json"  # has wall times, which differ from build to build
 
 
 class TrajectoryRecipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -99,9 +99,8 @@ def build_bundle(
     write_questions(out / f"qa_set_{manifest.name}.csv", generated.questions)
     for frame in sorted(out.rglob("img/*.png")):
         _reduce_colors(frame, manifest.colors)
-    for name in _NOT_SHIPPED:
-        for path in out.rglob(name):
-            path.unlink()
+    for path in out.rglob(_NOT_SHIPPED):
+        path.unlink()
     finished = msgspec.structs.replace(manifest, files=_digests(out))
     (out / MANIFEST).write_bytes(msgspec.json.format(msgspec.json.encode(finished), indent=1) + b"\n")
     return finished, generated

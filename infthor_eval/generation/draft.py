@@ -4,6 +4,7 @@ from importlib.metadata import version
 from typing import Any, NamedTuple
 
 import msgspec
+from msgspec.structs import asdict
 
 from infthor_eval import __version__
 from infthor_eval.formats.trajectory import (
@@ -20,7 +21,7 @@ from infthor_eval.formats.trajectory import (
 from infthor_eval.generation.settings import TrajectorySettings
 from infthor_eval.generation.trace import Trace
 from infthor_eval.thor.recorder import object_log
-from infthor_eval.thor.view import SimulatorView, Vector
+from infthor_eval.thor.view import SimulatorView
 
 __all__ = ["Draft", "Length", "initial_scene"]
 
@@ -33,19 +34,13 @@ class Length(NamedTuple):
 
 
 def initial_scene(settings: TrajectorySettings, view: SimulatorView, start: InitAction) -> Scene:
-    """Return the initial state in the form of trajectories.
-
-    Args:
-        settings: settings of the trajectory.
-        view: state of the scene.
-        start: first pose of the agent.
-    """
+    """Return the initial state, with the first pose of the agent, in the form of trajectories."""
     return Scene(
         floor_plan=settings.scene,
         init_action=start,
-        scene_num=_number(settings.scene),
+        scene_num=int("".join(filter(str.isdigit, settings.scene)) or 0),
         object_poses=[
-            ObjectPose(item.name, _xyz(item.position), _xyz(item.rotation))
+            ObjectPose(item.name, asdict(item.position), asdict(item.rotation))
             for item in view.objects.values()
             if item.pickupable
         ],
@@ -57,13 +52,6 @@ class Draft:
     """The actions, sub-goals and tasks so far, and the log of every frame."""
 
     def __init__(self, settings: TrajectorySettings, scene: Scene, view: SimulatorView) -> None:
-        """Start with the log of the first frame.
-
-        Args:
-            settings: settings of the trajectory.
-            scene: the initial state.
-            view: state of the simulator at the first frame.
-        """
         self._settings = settings
         self._scene = scene
         self._low: list[LowAction] = []
@@ -98,13 +86,7 @@ class Draft:
         del self._low[length.low :], self._high[length.high :], self._log[length.low + 1 :]
 
     def add_task(self, task: SubTask, start: Length, end: Length) -> None:
-        """Add a completed task.
-
-        Args:
-            task: the task.
-            start: length before its first action.
-            end: length after its last action.
-        """
+        """Add a completed task, with the lengths before its first action and after its last one."""
         number = len(self._sub_tasks)
         self._sub_trajs.append(SubTrajectory(number, (start.high, end.high), (start.low, end.low), task.task_desc))
         self._sub_tasks.append(task)
@@ -118,12 +100,7 @@ class Draft:
         return [msgspec.json.decode(entry) for entry in self._log]
 
     def trajectory(self, tried: dict[str, int], accepted: dict[str, int]) -> Trajectory:
-        """Return the trajectory.
-
-        Args:
-            tried: numbers of tried tasks by type.
-            accepted: numbers of the tasks that are part of the trajectory, by type.
-        """
+        """Return the trajectory, with the numbers of tried tasks and of those in the trajectory, by type."""
         return Trajectory(
             scene=self._scene,
             plan=ExpertPlan(self._low, self._high),
@@ -147,16 +124,7 @@ class Draft:
         self._log.append(msgspec.json.encode(entry))
 
 
-def _number(scene: str) -> int:
-    digits = "".join(letter for letter in scene if letter.isdigit())
-    return int(digits) if digits else 0
-
-
 def _image(low: LowAction) -> dict[str, Any]:
     """Return the entry of the frame after an action, with its name in a replay; frame 0 is before the first action."""
     assert low.low_idx is not None
     return {"high_idx": low.high_idx, "low_idx": low.low_idx, "image_name": f"{low.low_idx + 1:09d}.png"}
-
-
-def _xyz(value: Vector) -> dict[str, float]:
-    return {"x": value.x, "y": value.y, "z": value.z}

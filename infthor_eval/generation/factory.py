@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.trajectory import InitAction, Trajectory
-from infthor_eval.generation.draft import Draft, Length, initial_scene
+from infthor_eval.generation.draft import Draft, initial_scene
 from infthor_eval.generation.final_task import end_types
 from infthor_eval.generation.known_failures import KnownFailures
 from infthor_eval.generation.rollout import Rollout
@@ -24,7 +24,7 @@ from infthor_eval.household.scout import reachable_grid
 from infthor_eval.household.symbolic import Operator, SymbolicRoom, room_of
 from infthor_eval.household.tasks import Task, sub_task
 from infthor_eval.thor.restore import restore
-from infthor_eval.thor.simulator import Simulator, SimulatorMark
+from infthor_eval.thor.simulator import Simulator
 
 __all__ = ["GeneratedTrajectory", "TaskStatistics", "generate"]
 
@@ -56,11 +56,7 @@ class GeneratedTrajectory:
 
 
 def generate(settings: TrajectorySettings, simulator: Simulator) -> GeneratedTrajectory:
-    """Generate one trajectory.
-
-    Args:
-        settings: settings of the trajectory.
-        simulator: simulator to generate it in; its scene is replaced.
+    """Generate one trajectory in a simulator, which loads its scene.
 
     Raises:
         UsageError: no task in the scene can be completed.
@@ -75,8 +71,6 @@ def generate(settings: TrajectorySettings, simulator: Simulator) -> GeneratedTra
 
 
 class _Factory:
-    """Generates one trajectory."""
-
     def __init__(self, settings: TrajectorySettings, simulator: Simulator) -> None:
         """Load the scene and place the agent at random."""
         self._settings = settings
@@ -104,12 +98,10 @@ class _Factory:
         return Draft(self._settings, scene, self._simulator.view)
 
     def long_enough(self) -> bool:
-        """Return True if the minimum length is reached."""
         draft, settings = self._draft, self._settings
         return draft.length.low >= settings.min_steps and draft.n_tasks >= settings.min_subgoals
 
     def result(self) -> GeneratedTrajectory:
-        """Return the trajectory so far."""
         statistics = self._statistics
         trajectory = self._draft.trajectory(dict(statistics.tried), dict(statistics.accepted))
         return GeneratedTrajectory(trajectory, statistics, self._problems)
@@ -183,7 +175,9 @@ class _Factory:
         if failure is None and not is_last:
             failure = self._put_down()
         if failure is not None:
-            self._go_back(mark, start)
+            if self._draft.length.low > start.low:
+                self._simulator.rewind(mark)
+                self._draft.cut(start)
             self._pool.note_failure(task)
             return failure
         self._statistics.accepted[name] += 1
@@ -207,9 +201,7 @@ class _Factory:
         held = room.start.held
         if held is None:
             return None
-        places = [
-            place for place in sorted(room.places & room.receptacles) if goes_into(room.types[held], room.types[place])
-        ]
+        places = sorted(key for key in room.places & room.receptacles if goes_into(room.types[held], room.types[key]))
         self._rng.shuffle(places)
         for place in places:
             if self._execute([Operator("PutObject", held, place)]) is None:
@@ -217,12 +209,6 @@ class _Factory:
         error = RolloutError(f"no receptacle has room for {room.types[held]}", held)
         self._statistics.reasons[str(error)] += 1
         return error
-
-    def _go_back(self, mark: SimulatorMark, length: Length) -> None:
-        """Remove what was added since a mark, at which the trajectory had this length."""
-        if self._draft.length.low > length.low:
-            self._simulator.rewind(mark)
-            self._draft.cut(length)
 
     def _execute(self, operators: Sequence[Operator]) -> RolloutError | None:
         """Run operators and add their actions; if one fails, the simulator is rewound and nothing is added."""

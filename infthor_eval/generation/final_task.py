@@ -42,11 +42,7 @@ class EndTypes:
 
 
 def end_types(object_log: Sequence[dict[str, Any]]) -> tuple[EndTypes, EndTypes]:
-    """Return the types of both directions: with the object early, and with the object late.
-
-    Args:
-        object_log: one entry per frame, with the types that are visible and pickupable there.
-    """
+    """Return the types at the ends of an object log (an entry per frame): with the object early, and with it late."""
     count = max(1, math.floor(SHARE * len(object_log)))
     first, last = object_log[:count], object_log[-count:]
     either = _types(first, "visible") | _types(last, "visible")

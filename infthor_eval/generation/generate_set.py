@@ -1,6 +1,6 @@
 """Generating many trajectories into a folder; an interrupted run is resumed by the same command."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -13,7 +13,7 @@ from infthor_eval.formats.trajectory import encode_trajectory, iter_sources
 from infthor_eval.generation.factory import GeneratedTrajectory, TaskStatistics, generate
 from infthor_eval.generation.garbage import freeze_existing_objects
 from infthor_eval.generation.settings import TrajectorySettings
-from infthor_eval.generation.simulator_jobs import StartSimulatorWorker, collect_outcomes
+from infthor_eval.generation.simulator_jobs import SimulatorWorker, collect_outcomes
 from infthor_eval.household.pddl import DOMAIN
 from infthor_eval.thor.launch import Launch
 from infthor_eval.thor.simulator import Simulator
@@ -121,7 +121,7 @@ def generate_set(
     """
     out.mkdir(parents=True, exist_ok=True)
     outcomes = (_generate_one(job, simulator, out) for job in jobs)
-    return _summarise(collect_outcomes(enumerate(outcomes), _failure_outcome, progress))
+    return _summarise(enumerate(outcomes), progress)
 
 
 def generate_with_workers(
@@ -132,32 +132,26 @@ def generate_with_workers(
     progress: Callable[[bool], None] = lambda _: None,
     say: Callable[[str], None] = lambda _: None,
 ) -> GeneratedSet:
-    """Generate as `generate_set` does, with the same files, by workers with a simulator each.
+    """Generate as `generate_set` does, with the same files and errors, by workers that share the folder.
 
     Args:
-        jobs: settings of the trajectories.
+        jobs: see `generate_set`.
         launch: simulator that each worker starts.
-        out: folder of the files, shared by all workers; created if it does not exist.
+        out: see `generate_set`.
         worker_settings: number and place of the workers.
-        progress: called after each trajectory, with True if it is of an earlier run.
+        progress: see `generate_set`.
         say: called with messages about the workers.
-
-    Raises:
-        DataError: a trajectory cannot be written; those before it remain.
     """
     out.mkdir(parents=True, exist_ok=True)
-    start = StartSimulatorWorker(launch, partial(_generate_one, out=out))
-    outcomes = run_jobs(start, jobs, worker_settings, say)
-    return _summarise(collect_outcomes(outcomes, _failure_outcome, progress))
+    start = partial(SimulatorWorker, launch, partial(_generate_one, out=out))
+    return _summarise(run_jobs(start, jobs, worker_settings, say), progress)
 
 
-def _failure_outcome(_number: int, error: InfthorError) -> _GenerationOutcome:
-    return _GenerationOutcome(failure=str(error))
-
-
-def _summarise(outcomes: Sequence[_GenerationOutcome]) -> GeneratedSet:
+def _summarise(
+    outcomes: Iterable[tuple[int, _GenerationOutcome | InfthorError]], progress: Callable[[bool], None]
+) -> GeneratedSet:
     result = GeneratedSet()
-    for outcome in outcomes:
+    for outcome in collect_outcomes(outcomes, lambda _, error: _GenerationOutcome(failure=str(error)), progress):
         if outcome.path is None:
             result.failures.append(str(outcome.failure))
             continue

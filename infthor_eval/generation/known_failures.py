@@ -2,6 +2,8 @@
 
 from collections.abc import Iterator
 
+from msgspec.structs import astuple
+
 from infthor_eval.household.containment import direct_parent
 from infthor_eval.household.symbolic import SymbolicRoom, room_of
 from infthor_eval.thor.view import SimulatorView, ThorObject
@@ -19,7 +21,7 @@ class KnownFailures:
     def __init__(self) -> None:
         self._n_tasks = 0
         # Number of the task at which an object failed, and its position then.
-        self._blocked: dict[str, tuple[int, tuple[float, float, float]]] = {}
+        self._blocked: dict[str, tuple[int, tuple[float, ...]]] = {}
         # Number of the task at which an object did not fit into a receptacle, and its contents then.
         self._refused: dict[tuple[str, str], tuple[int, frozenset[str]]] = {}
         self._sizes: dict[str, _Size | None] = {}
@@ -95,12 +97,11 @@ def _covers(one: _Size, other: _Size) -> bool:
     return all(a >= b - _NEAR for a, b in zip(one, other, strict=True))
 
 
-def _position(view: SimulatorView, item: str) -> tuple[float, float, float]:
-    at = view.objects[item].position
-    return at.x, at.y, at.z
+def _position(view: SimulatorView, item: str) -> tuple[float, ...]:
+    return astuple(view.objects[item].position)
 
 
-def _is_near(one: tuple[float, float, float], other: tuple[float, float, float]) -> bool:
+def _is_near(one: tuple[float, ...], other: tuple[float, ...]) -> bool:
     return all(abs(a - b) <= _NEAR for a, b in zip(one, other, strict=True))
 
 

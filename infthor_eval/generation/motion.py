@@ -33,11 +33,7 @@ def _interpolate(start: AgentPose, end: AgentPose, share: float) -> AgentPose:
     turn = (end.rotation - start.rotation + 180.0) % 360.0 - 180.0  # the shorter way round
     one, other = start.position, end.position
     return AgentPose(
-        Vector(
-            one.x + share * (other.x - one.x),
-            one.y + share * (other.y - one.y),
-            one.z + share * (other.z - one.z),
-        ),
+        Vector(one.x + share * (other.x - one.x), one.y + share * (other.y - one.y), one.z + share * (other.z - one.z)),
         (start.rotation + share * turn) % 360.0,
         start.horizon + share * (end.horizon - start.horizon),
         end.standing,

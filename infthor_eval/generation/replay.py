@@ -88,11 +88,11 @@ def replay(trajectory: Trajectory, simulator: Simulator, folder: Path, digest: s
     Raises:
         SimulatorError: the simulator fails, or has no such scene.
     """
-    run = _Run(simulator, ReplayReport(trajectory.traj_id, digest, trajectory.scene.floor_plan, frames))
+    report = ReplayReport(trajectory.traj_id, digest, trajectory.scene.floor_plan, frames)
     restored = restore(simulator, trajectory.scene)
-    run.report.restore = [f"no {name} here" for name in restored.dropped] + restored.refused
+    report.restore = [f"no {name} here" for name in restored.dropped] + restored.refused
     (folder / "img").mkdir()
-    run.begin(folder / "img")
+    run = _Run(simulator, report, folder / "img")
     for index, low in enumerate(trajectory.plan.low_actions):
         run.act(index, low)
     steps = run.recorder.steps
@@ -103,7 +103,7 @@ def replay(trajectory: Trajectory, simulator: Simulator, folder: Path, digest: s
     ends = {item.low_pddl_idx[1] - 1 for item in trajectory.sub_trajs} | {len(trajectory.plan.low_actions) - 1}
     summaries = {str(index): text for index, text in state_summaries(steps, ends).items()}
     (folder / "state_summary.json").write_bytes(msgspec.json.encode(summaries) + b"\n")
-    return run.report
+    return report
 
 
 def box_iou(one: tuple[int, int, int, int], other: tuple[int, int, int, int]) -> float:
@@ -119,28 +119,24 @@ def _area(box: tuple[int, int, int, int]) -> int:
 
 
 class _Run:
-    """One replay while it runs."""
+    """One replay, from the restored scene on."""
 
-    def __init__(self, simulator: Simulator, report: ReplayReport) -> None:
+    def __init__(self, simulator: Simulator, report: ReplayReport, images: Path) -> None:
         self._simulator = simulator
-        self.report = report
-
-    def begin(self, images: Path) -> None:
-        """Record the first frame of the restored scene."""
+        self._report = report
         self.recorder = Recorder(images)
-        self.recorder.record(self._simulator.view)
-        self._grounding = Grounding(self._simulator.view)
+        self.recorder.record(simulator.view)
+        self._grounding = Grounding(simulator.view)
 
     def act(self, index: int, low: LowAction) -> None:
-        """Run and record one action."""
         before, api = self._simulator.view, low.api_action
         text = str(text_of(api.action, api.object_id, api.receptacle_id))
         target, error = self._call(index, low, before)
         if error is None:
-            self.report.accepted[api.action] = self.report.accepted.get(api.action, 0) + 1
+            self._report.accepted[api.action] = self._report.accepted.get(api.action, 0) + 1
         else:
-            self.report.refusals.append(Refusal(index, text, error))
-        for view in intermediate_views(self._simulator, before.agent, self._simulator.view.agent, self.report.frames):
+            self._report.refusals.append(Refusal(index, text, error))
+        for view in intermediate_views(self._simulator, before.agent, self._simulator.view.agent, self._report.frames):
             self.recorder.record(view, step=index, high_idx=low.high_idx)
         putting = api.action == "PutObject"
         step = self.recorder.record(
@@ -173,4 +169,4 @@ class _Run:
         instance = before.instances.get(target)
         iou = 0.0 if instance is None else box_iou(recorded, instance.box)
         object_type = before.objects[target].object_type
-        self.report.overlaps.append(Overlap(index, low.api_action.action, object_type, round(iou, 4)))
+        self._report.overlaps.append(Overlap(index, low.api_action.action, object_type, round(iou, 4)))

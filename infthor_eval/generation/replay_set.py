@@ -22,7 +22,7 @@ from infthor_eval.formats.set_info import claim_for_simulator
 from infthor_eval.formats.trajectory import Trajectory, TrajectorySource, folder_name, iter_sources, trajectory_files
 from infthor_eval.generation.garbage import freeze_existing_objects
 from infthor_eval.generation.replay import ReplayReport, replay
-from infthor_eval.generation.simulator_jobs import StartSimulatorWorker, collect_outcomes
+from infthor_eval.generation.simulator_jobs import SimulatorWorker, collect_outcomes
 from infthor_eval.thor.launch import Launch
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.supplement import agent_path
@@ -32,6 +32,7 @@ __all__ = ["ReplayFailure", "ReplayedSet", "Selection", "replay_set", "replay_wi
 
 _REPORT = "replay.json"
 _TRAJECTORY = "traj_data.json"
+Item = tuple[TrajectorySource, Trajectory]
 
 
 @dataclass(frozen=True)
@@ -46,7 +47,7 @@ class ReplayFailure:
 class Selection:
     """The trajectories to replay, and those that could not be read."""
 
-    items: list[tuple[TrajectorySource, Trajectory]] = field(default_factory=list)
+    items: list[Item] = field(default_factory=list)
     failures: list[ReplayFailure] = field(default_factory=list)
 
 
@@ -68,12 +69,7 @@ class ReplayedSet:
 
 
 def select(paths: Iterable[Path], limit: int | None = None, per_floor_plan: int | None = None) -> Selection:
-    """Read the trajectories to replay.
-
-    Args:
-        paths: files and folders of trajectories.
-        limit: maximum number of trajectories.
-        per_floor_plan: maximum number of trajectories on one floor plan.
+    """Read the trajectories of files and folders, at most `limit`, and at most `per_floor_plan` on one floor plan.
 
     Raises:
         DataError: a path has no trajectory file.
@@ -95,9 +91,6 @@ def select(paths: Iterable[Path], limit: int | None = None, per_floor_plan: int 
             taken[floor_plan] += 1
             selection.items.append((source, trajectory))
     return selection
-
-
-Item = tuple[TrajectorySource, Trajectory]
 
 
 @dataclass(frozen=True)
@@ -145,19 +138,19 @@ def replay_with_workers(
     progress: Callable[[bool], None] = lambda _: None,
     say: Callable[[str], None] = lambda _: None,
 ) -> ReplayedSet:
-    """Replay as `replay_set` does, with the same files, by workers with a simulator each.
+    """Replay as `replay_set` does, with the same files, by workers that share the folder.
 
     Args:
         selection: the trajectories.
         launch: simulator that each worker starts.
-        out: folder of the set, shared by all workers; created if it does not exist.
+        out: see `replay_set`.
         worker_settings: number and place of the workers.
-        frames: number of frames of each action that moves the agent or its camera.
-        progress: called after each trajectory, with True if an earlier run replayed it.
+        frames: see `replay_set`.
+        progress: see `replay_set`.
         say: called with messages about the workers.
     """
     metadata = _prepare_set(out, launch.label)
-    start = StartSimulatorWorker(launch, partial(_replay_one, metadata=metadata, frames=frames))
+    start = partial(SimulatorWorker, launch, partial(_replay_one, metadata=metadata, frames=frames))
     return _collect(run_jobs(start, selection.items, worker_settings, say), selection, progress)
 
 

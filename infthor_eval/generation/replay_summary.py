@@ -80,7 +80,11 @@ def summarise(replayed: ReplayedSet) -> ReplaySummary:
         iou=_statistics(overlaps, lambda overlap: overlap.type),
         iou_by_action=_statistics(overlaps, lambda overlap: overlap.action),
         seconds=round(replayed.seconds, 2),
-        diverged=[_divergence(report) for report in reports if not report.complete],
+        diverged=[
+            Divergence(report.traj_id, first.step, first.action, first.error)
+            for report in reports
+            for first in report.refusals[:1]
+        ],
         failures=replayed.failures,
     )
 
@@ -103,8 +107,3 @@ def _statistics(overlaps: Sequence[Overlap], by: Callable[[Overlap], str]) -> di
         name: OverlapStatistics(len(values), round(statistics.median(values), 4), round(statistics.fmean(values), 4))
         for name, values in sorted(groups.items())
     }
-
-
-def _divergence(report: ReplayReport) -> Divergence:
-    first = report.refusals[0]
-    return Divergence(report.traj_id, first.step, first.action, first.error)

@@ -25,12 +25,7 @@ class Rollout:
     """
 
     def __init__(self, simulator: Simulator, first_high: int = 0) -> None:
-        """Start without actions.
-
-        Args:
-            simulator: simulator that executes the actions.
-            first_high: number of the first sub-goal.
-        """
+        """Start without actions, at the sub-goal with the number `first_high`."""
         self.trace = Trace(simulator, first_high)
         self._walker = Walker(self.trace)
         self._slices: dict[str, str] = {}  # real ids of planned slices
@@ -44,17 +39,17 @@ class Rollout:
         for number, operator in enumerate(operators, 1):
             if operator.name == "GotoLocation" and number == len(operators):
                 self._walker.go([operator.item])  # the plan ends at a lamp that is lit already
-            elif operator.name != "GotoLocation":  # each sub-goal walks by itself: only then is its object known
+            elif operator.name != "GotoLocation":  # each sub-goal includes its walk: its object is known only then
                 _SUBGOALS[operator.name](self, operator)
 
     # -- sub-goals
 
-    def _pickup(self, operator: Operator) -> None:
+    def _pickup_or_slice(self, operator: Operator) -> None:
         item = self._resolve(operator.item)
         holder = self._closed_around(item)
         self._walker.go([holder] if holder else [item], inside=item if holder else None)
-        self._begin("PickupObject", item)
-        self._inside(holder, lambda: self._interact("PickupObject", item))
+        self._begin(operator.name, item)
+        self._inside(holder, lambda: self._interact(operator.name, item))
 
     def _put(self, operator: Operator) -> None:
         item, receptacle = self._resolve(operator.item), self._resolve(operator.receptacle or "")
@@ -62,12 +57,6 @@ class Rollout:
         self._begin("PutObject", item, receptacle)
         holder = receptacle if self._is_closed(receptacle) else None
         self._inside(holder, lambda: self._interact("PutObject", item, receptacle))
-
-    def _slice(self, operator: Operator) -> None:
-        holder = self._closed_around(operator.item)
-        self._walker.go([holder] if holder else [operator.item], inside=operator.item if holder else None)
-        self._begin("SliceObject", operator.item)
-        self._inside(holder, lambda: self._interact("SliceObject", operator.item))
 
     def _toggle(self, operator: Operator) -> None:
         self._walker.go([operator.item])
@@ -84,21 +73,15 @@ class Rollout:
         self._interact("ToggleObjectOff", faucet)
         self._interact("PickupObject", item)
 
-    def _heat(self, operator: Operator) -> None:
-        item, oven = self._resolve(operator.item), operator.receptacle or ""
-        self._walker.go([oven])
-        self._begin("HeatObject", item, oven)
-        self._inside(oven, lambda: self._interact("PutObject", item, oven))
-        self._interact("ToggleObjectOn", oven)
-        self._interact("ToggleObjectOff", oven)
-        self._inside(oven, lambda: self._interact("PickupObject", item))
-
-    def _cool(self, operator: Operator) -> None:
-        item, fridge = self._resolve(operator.item), operator.receptacle or ""
-        self._walker.go([fridge])
-        self._begin("CoolObject", item, fridge)
-        self._inside(fridge, lambda: self._interact("PutObject", item, fridge))
-        self._inside(fridge, lambda: self._interact("PickupObject", item))
+    def _heat_or_cool(self, operator: Operator) -> None:
+        item, appliance = self._resolve(operator.item), operator.receptacle or ""
+        self._walker.go([appliance])
+        self._begin(operator.name, item, appliance)
+        self._inside(appliance, lambda: self._interact("PutObject", item, appliance))
+        if operator.name == "HeatObject":
+            self._interact("ToggleObjectOn", appliance)
+            self._interact("ToggleObjectOff", appliance)
+        self._inside(appliance, lambda: self._interact("PickupObject", item))
 
     # -- parts of sub-goals
 
@@ -174,11 +157,11 @@ class Rollout:
 
 
 _SUBGOALS: dict[str, Callable[[Rollout, Operator], None]] = {
-    "PickupObject": Rollout._pickup,
+    "PickupObject": Rollout._pickup_or_slice,
     "PutObject": Rollout._put,
-    "SliceObject": Rollout._slice,
+    "SliceObject": Rollout._pickup_or_slice,
     "ToggleObject": Rollout._toggle,
     "CleanObject": Rollout._clean,
-    "HeatObject": Rollout._heat,
-    "CoolObject": Rollout._cool,
+    "HeatObject": Rollout._heat_or_cool,
+    "CoolObject": Rollout._heat_or_cool,
 }

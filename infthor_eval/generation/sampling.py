@@ -24,12 +24,7 @@ class TaskPool:
     """Samples tasks; used and failed ones become less likely."""
 
     def __init__(self, task_types: Iterable[TaskType], rng: random.Random) -> None:
-        """Start without uses.
-
-        Args:
-            task_types: task types to sample from.
-            rng: source of all random choices.
-        """
+        """Start without uses; `rng` is the source of all random choices."""
         self._task_types = frozenset(task_types)
         self._rng = rng
         self._uses: Counter[tuple[int, str]] = Counter()  # of a value of the variable with this index
@@ -37,12 +32,7 @@ class TaskPool:
         self._failures: Counter[Task] = Counter()
 
     def sample(self, room: SymbolicRoom, extra_types: Iterable[str] = ()) -> Iterator[Task]:
-        """Yield the possible tasks in weighted random order.
-
-        Args:
-            room: the room in its current state.
-            extra_types: types of the objects that are neither items nor places (faucets).
-        """
+        """Yield the possible tasks in weighted random order; for `extra_types` see `tasks_of`."""
         tasks = [task for task in tasks_of(room, extra_types) if task.task_type in self._task_types]
         # Sorting by exponential waiting times is weighted sampling without replacement (Efraimidis and Spirakis 2006).
         waits = {task: self._rng.expovariate(probability) for task, probability in self._probabilities(tasks)}

@@ -41,5 +41,4 @@ class TrajectorySettings:
 
     def document(self) -> dict[str, Any]:
         """Return the settings as JSON values, as they are stored in trajectories."""
-        document: dict[str, Any] = msgspec.json.decode(msgspec.json.encode(self))
-        return document
+        return msgspec.json.decode(msgspec.json.encode(self), type=dict[str, Any])

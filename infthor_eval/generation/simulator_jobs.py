@@ -1,14 +1,13 @@
 """Jobs that each need a simulator, done by workers with one simulator each."""
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
 from typing import Any, Protocol, TypeVar
 
 from infthor_eval.errors import InfthorError
 from infthor_eval.thor.launch import Launch
 from infthor_eval.thor.simulator import Simulator
 
-__all__ = ["SimulatorWorker", "StartSimulatorWorker", "collect_outcomes"]
+__all__ = ["SimulatorWorker", "collect_outcomes"]
 
 
 class _JobOutcome(Protocol):
@@ -21,31 +20,20 @@ class _JobOutcome(Protocol):
 T = TypeVar("T", bound=_JobOutcome)
 
 
-@dataclass(frozen=True)
-class StartSimulatorWorker:
-    """Starts a worker; see `infthor_eval.workers.OpenWorker`.
+class SimulatorWorker:
+    """A worker with a simulator; see `infthor_eval.workers.Worker`. A `partial` with `launch` and `run_job` opens it.
 
-    Attributes:
+    Args:
         launch: the simulator to start.
         run_job: does one job in the simulator; it is pickled, so it must be a module's function or a `partial` of one.
+        number: number of the worker.
     """
-
-    launch: Launch
-    run_job: Callable[[Any, Simulator], Any]
-
-    def __call__(self, number: int) -> "SimulatorWorker":
-        """Return the worker with this number."""
-        return SimulatorWorker(self)
-
-
-class SimulatorWorker:
-    """A worker with a simulator; see `infthor_eval.workers.Worker`."""
 
     greeting = None
 
-    def __init__(self, settings: StartSimulatorWorker) -> None:
-        self._run_job = settings.run_job
-        self._simulator = Simulator(settings.launch)
+    def __init__(self, launch: Launch, run_job: Callable[[Any, Simulator], Any], number: int) -> None:
+        self._run_job = run_job
+        self._simulator = Simulator(launch)
 
     def do(self, job: Any) -> Iterator[Any]:
         """Yield the outcome of a job."""

@@ -44,9 +44,8 @@ def regular_numbers(summary: ReplaySummary) -> str:
     accepted = [counts.accepted for counts in summary.actions.values() if not counts.refused]
     exact = [overlap.count for overlap in summary.iou_by_action.values() if _is_exact(overlap)]
     parts = [f"{_all_or_other(accepted, summary.actions)}{sum(accepted)} actions accepted"] if accepted else []
-    parts += (
-        [f"{_all_or_other(exact, summary.iou_by_action)}{sum(exact)} boxes as recorded (IoU 1.00)"] if exact else []
-    )
+    if exact:
+        parts.append(f"{_all_or_other(exact, summary.iou_by_action)}{sum(exact)} boxes as recorded (IoU 1.00)")
     return f"{', '.join(parts) or 'nothing as recorded'} (--json has the numbers by action and object type)"
 
 

@@ -42,12 +42,7 @@ class Trace:
     """
 
     def __init__(self, simulator: Simulator, first_high: int = 0) -> None:
-        """Start without actions.
-
-        Args:
-            simulator: simulator that executes the actions.
-            first_high: number of the first sub-goal.
-        """
+        """Start without actions, at the sub-goal with the number `first_high`."""
         self.simulator = simulator
         self.actions: list[ExecutedAction] = []
         self.high: list[HighAction] = []
@@ -59,12 +54,7 @@ class Trace:
         return self.simulator.view
 
     def begin(self, words: list[str], action: PlannerAction) -> None:
-        """Begin a sub-goal, to which the following actions belong.
-
-        Args:
-            words: its object types in words.
-            action: the sub-goal in the planner's form.
-        """
+        """Begin a sub-goal with its object types in words; the following actions belong to it."""
         number = self._first_high + len(self.high)
         self.high.append(HighAction(number, DiscreteAction(action.action, words), action))
 
@@ -85,9 +75,8 @@ class Trace:
             raise RolloutError(f"{api.action}: {after.error}", api.object_id, api.receptacle_id)
         name = f"{api.action}_{suffix}" if suffix else api.action
         number = self._first_high + len(self.high) - 1
-        self.actions.append(
-            ExecutedAction(LowAction(api, number, DiscreteAction(name, _box(before, arguments))), after)
-        )
+        low = LowAction(api, number, DiscreteAction(name, _box(before, arguments)))
+        self.actions.append(ExecutedAction(low, after))
 
 
 def _box(view: SimulatorView, arguments: dict[str, Any]) -> dict[str, Any]:

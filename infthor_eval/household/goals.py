@@ -58,10 +58,8 @@ def lower_bound(task: Task, room: SymbolicRoom, state: State) -> int:
 
 def _n_to_slice(task: Task, room: SymbolicRoom, state: State, held: str | None) -> int:
     """Return the operators that slicing needs: picking up a knife, and the cut."""
-    if not task.sliced or any(parent for item, parent in state.where if room.types[item] == task.target):
-        return 0
-    in_hand = held == task.target
-    return 0 if in_hand else 1 + (held not in KNIVES)
+    is_cut = held == task.target or any(parent for item, parent in state.where if room.types[item] == task.target)
+    return 0 if is_cut or not task.sliced else 1 + (held not in KNIVES)
 
 
 def _n_to_treat(task: Task, state: State, here: str | None) -> int:

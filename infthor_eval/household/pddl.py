@@ -7,7 +7,7 @@ the room, without the planner's reductions, and the items of the task's types.
 
 from collections.abc import Iterable
 
-from infthor_eval.household.affordances import KNIVES, SLICEABLE, goes_into
+from infthor_eval.household.affordances import KNIVES, SLICEABLE
 from infthor_eval.household.planner import relevant_items
 from infthor_eval.household.symbolic import ABSENT, FLOOR, SymbolicRoom, slice_item
 from infthor_eval.household.tasks import Task, TaskType
@@ -39,12 +39,7 @@ _OPERATORS = (
         "(at ?p) (in ?c ?p) (in ?i ?c) (handempty)",
         "(not (in ?i ?c)) (not (handempty)) (holding ?i)",
     ),
-    (
-        "put",
-        "(?i - item ?p - place)",
-        "(at ?p) (holding ?i) (fits ?i ?p)",
-        "(not (holding ?i)) (handempty) (in ?i ?p)",
-    ),
+    ("put", "(?i - item ?p - place)", "(at ?p) (holding ?i) (fits ?i ?p)", "(not (holding ?i)) (handempty) (in ?i ?p)"),
     (
         "put-into",
         "(?i ?c - item ?p - place)",
@@ -71,7 +66,7 @@ _OPERATORS = (
 _APPLIANCES = {"SinkBasin": "basin", "Microwave": "oven", "Fridge": "fridge"}
 
 
-def _domain() -> str:
+def _build_domain() -> str:
     lines = [
         "(define (domain household)",
         " (:requirements :strips :typing :negative-preconditions :equality :action-costs)",
@@ -97,17 +92,11 @@ def _domain() -> str:
     return "\n".join([*lines, ")", ""])
 
 
-DOMAIN = _domain()
+DOMAIN = _build_domain()
 
 
 def problem(task: Task, room: SymbolicRoom, name: str = "task") -> str:
-    """Return a task in a room as a PDDL problem for `DOMAIN`.
-
-    Args:
-        task: the task.
-        room: the room in its current state.
-        name: name of the problem.
-    """
+    """Return a task in a room's current state as a PDDL problem for `DOMAIN`."""
     items = sorted(relevant_items(task, room))
     where = dict(room.start.where)
     on_floor = [item for item in items if where[item] == FLOOR]
@@ -117,20 +106,19 @@ def problem(task: Task, room: SymbolicRoom, name: str = "task") -> str:
     places = [names[key] for key in sorted(room.places)] + [f"floor-{names[key]}" for key in on_floor] + ["nowhere"]
     comments = [f" ; {short} {key}" for key, short in names.items()]
     facts = [*_state(room, items, names), *_rules(task, room, items, names), *_goal(task, room, items, names)]
-    return "\n".join(
-        [
-            f"(define (problem {name})",
-            " (:domain household)",
-            *comments,
-            f" (:objects {' '.join(names[key] for key in items)} - item {' '.join(places)} - place)",
-            " (:init (= (total-cost) 0)",
-            *(f"  ({fact})" for fact in facts),
-            " )",
-            " (:goal (done))",
-            " (:metric minimize (total-cost)))",
-            "",
-        ]
-    )
+    lines = [
+        f"(define (problem {name})",
+        " (:domain household)",
+        *comments,
+        f" (:objects {' '.join(names[key] for key in items)} - item {' '.join(places)} - place)",
+        " (:init (= (total-cost) 0)",
+        *(f"  ({fact})" for fact in facts),
+        " )",
+        " (:goal (done))",
+        " (:metric minimize (total-cost)))",
+        "",
+    ]
+    return "\n".join(lines)
 
 
 def _state(room: SymbolicRoom, items: list[str], names: dict[str, str]) -> Iterable[str]:
@@ -152,8 +140,7 @@ def _rules(task: Task, room: SymbolicRoom, items: list[str], names: dict[str, st
         object_type = room.types[item]
         for holder in holders:
             usable = holder in room.places or room.types[holder] == task.movable
-            fits = goes_into(object_type, room.types[holder]) and (item, holder) not in room.refused
-            if usable and holder != item and fits:
+            if usable and holder != item and room.fits(item, holder):
                 yield f"fits {names[item]} {names[holder]}"
         if object_type in KNIVES and task.sliced:
             yield f"knife {names[item]}"

@@ -10,7 +10,7 @@ import itertools
 from collections.abc import Iterator
 from dataclasses import replace
 
-from infthor_eval.household.affordances import KNIVES, goes_into
+from infthor_eval.household.affordances import KNIVES
 from infthor_eval.household.goals import APPLIANCE, lower_bound
 from infthor_eval.household.symbolic import ABSENT, FLOOR, Operator, State, SymbolicRoom, slice_item
 from infthor_eval.household.tasks import Task, TaskType
@@ -21,15 +21,7 @@ _LIMIT = 60_000  # states of a search; the hardest of the solvable problems trie
 
 
 def plan(task: Task, room: SymbolicRoom) -> list[Operator] | None:
-    """Return the shortest plan for a task.
-
-    Args:
-        task: the task.
-        room: the room in its current state.
-
-    Returns:
-        The operators in order; empty if the goal holds already, None if there is no plan.
-    """
+    """Return the shortest plan for a task in a room's current state: empty if the goal holds, None if there is none."""
     if _is_infeasible(task, room):
         return None
     problem = _Problem(task, room)
@@ -49,8 +41,8 @@ def plan(task: Task, room: SymbolicRoom) -> list[Operator] | None:
             if spent + 1 < cost.get(following, _LIMIT):
                 cost[following] = spent + 1
                 previous[following] = (state, operator)
-                rest = lower_bound(task, room, following)
-                heapq.heappush(queue, (spent + 1 + rest, next(order), spent + 1, following))
+                bound = spent + 1 + lower_bound(task, room, following)
+                heapq.heappush(queue, (bound, next(order), spent + 1, following))
     return None
 
 
@@ -94,14 +86,12 @@ class _Problem:
         self._room = room
         where = dict(room.start.where)
         relevant = relevant_items(task, room)
-        self.start = State(
-            room.start.at,
-            room.start.held,
-            tuple((item, parent) for item, parent in room.start.where if item in relevant),
-            room.start.clean & relevant,
-            room.start.hot & relevant,
-            room.start.cold & relevant,
-            room.start.lit,
+        self.start = replace(
+            room.start,
+            where=tuple((item, parent) for item, parent in room.start.where if item in relevant),
+            clean=room.start.clean & relevant,
+            hot=room.start.hot & relevant,
+            cold=room.start.cold & relevant,
         )
         self._movables = [item for item in sorted(relevant) if room.types[item] == task.movable]
         self._targets = self._relevant_places(relevant, where)
@@ -116,7 +106,7 @@ class _Problem:
             yield from self._puts(state, where, state.held)
             yield from self._treatments(state, where, state.held)
         if state.at is not None and self._room.types[state.at] == self._task.light and state.at not in state.lit:
-            yield Operator("ToggleObject", state.at), _with(state, lit=state.lit | {state.at})
+            yield Operator("ToggleObject", state.at), replace(state, lit=state.lit | {state.at})
 
     def _relevant_places(self, items: set[str], where: dict[str, str]) -> list[str]:
         room, task = self._room, self._task
@@ -125,20 +115,15 @@ class _Problem:
         needed |= {place for item in items if (place := room.place_of(item, where)) in room.places and place}
         spare = set()  # one place per item to put it aside, see the module's docstring
         for item in sorted(items):
-            others = [place for place in sorted(room.places - needed) if self._fits(place, item)]
+            others = [place for place in sorted(room.places - needed) if room.fits(item, place)]
             spare |= set(others[:1])
         return sorted(needed | spare)
-
-    def _fits(self, receptacle: str, item: str) -> bool:
-        types = self._room.types
-        fits = receptacle in self._room.receptacles and goes_into(types[item], types[receptacle])
-        return fits and (item, receptacle) not in self._room.refused
 
     def _gotos(self, state: State, where: dict[str, str]) -> Iterator[tuple[Operator, State]]:
         loose = [item for item, parent in where.items() if parent == FLOOR]
         for place in itertools.chain(self._targets, loose):
             if place != state.at:
-                yield Operator("GotoLocation", place), _with(state, at=place)
+                yield Operator("GotoLocation", place), replace(state, at=place)
 
     def _pickups(self, state: State, where: dict[str, str]) -> Iterator[tuple[Operator, State]]:
         for item, parent in where.items():
@@ -147,7 +132,7 @@ class _Problem:
 
     def _puts(self, state: State, where: dict[str, str], held: str) -> Iterator[tuple[Operator, State]]:
         for receptacle in itertools.chain((state.at,), self._movables):
-            if receptacle is None or receptacle == held or not self._fits(receptacle, held):
+            if receptacle is None or receptacle == held or not self._room.fits(held, receptacle):
                 continue
             if self._room.place_of(receptacle, where) == state.at:
                 yield Operator("PutObject", held, receptacle), _move(state, held, receptacle, held=None)
@@ -156,12 +141,12 @@ class _Problem:
         at = self._room.types.get(state.at or "")
         if at == APPLIANCE.get(self._task.task_type) and self._room.types[held] == self._task.target:
             if self._task.task_type == TaskType.CLEAN and held not in state.clean:
-                yield Operator("CleanObject", held, state.at), _with(state, clean=state.clean | {held})
+                yield Operator("CleanObject", held, state.at), replace(state, clean=state.clean | {held})
             if self._task.task_type == TaskType.HEAT and held not in state.hot:
-                after = _with(state, hot=state.hot | {held}, cold=state.cold - {held})
+                after = replace(state, hot=state.hot | {held}, cold=state.cold - {held})
                 yield Operator("HeatObject", held, state.at), after
             if self._task.task_type == TaskType.COOL and held not in state.cold:
-                after = _with(state, cold=state.cold | {held}, hot=state.hot - {held})
+                after = replace(state, cold=state.cold | {held}, hot=state.hot - {held})
                 yield Operator("CoolObject", held, state.at), after
         if self._task.sliced and self._room.types[held] in KNIVES:
             yield from self._slicings(state, where)
@@ -171,15 +156,10 @@ class _Problem:
             whole = self._room.types[item] == self._task.pickup and parent != ABSENT
             if whole and slice_item(item, 1) in where and self._room.place_of(item, where) == state.at:
                 slices = {key: parent for key in where if key.startswith(f"{item}#")}
-                changed = tuple((key, slices.get(key, old)) for key, old in state.where)
-                after = _with(state, where=changed)
+                after = replace(state, where=tuple((key, slices.get(key, old)) for key, old in state.where))
                 yield Operator("SliceObject", item), _move(after, item, ABSENT, held=state.held)
-
-
-def _with(state: State, **changes: object) -> State:
-    return replace(state, **changes)  # type: ignore[arg-type]
 
 
 def _move(state: State, item: str, parent: str, held: str | None) -> State:
     where = tuple((key, parent if key == item else old) for key, old in state.where)
-    return _with(state, where=where, held=held)
+    return replace(state, where=where, held=held)

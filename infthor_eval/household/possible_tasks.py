@@ -3,32 +3,25 @@
 from collections import Counter
 from collections.abc import Iterable, Iterator
 
-from infthor_eval.household.affordances import (
-    CLEANABLE,
-    COOLABLE,
-    HEATABLE,
-    KNIVES,
-    LIGHTS,
-    MOVABLE_RECEPTACLES,
-    SLICEABLE,
-    STOWABLE,
-    goes_into,
-)
+from infthor_eval.household import affordances
+from infthor_eval.household.affordances import KNIVES, LIGHTS, MOVABLE_RECEPTACLES, SLICEABLE, STOWABLE, goes_into
 from infthor_eval.household.symbolic import ABSENT, SymbolicRoom
 from infthor_eval.household.tasks import Task, TaskType
 
 __all__ = ["tasks_of"]
 
-_TREATED = {TaskType.CLEAN: CLEANABLE, TaskType.HEAT: HEATABLE, TaskType.COOL: COOLABLE}
+_TREATED = {
+    TaskType.CLEAN: affordances.CLEANABLE,
+    TaskType.HEAT: affordances.HEATABLE,
+    TaskType.COOL: affordances.COOLABLE,
+}
 _APPLIANCES = {TaskType.CLEAN: {"SinkBasin", "Faucet"}, TaskType.HEAT: {"Microwave"}, TaskType.COOL: {"Fridge"}}
 
 
 def tasks_of(room: SymbolicRoom, extra_types: Iterable[str] = ()) -> list[Task]:
     """Return all tasks that are possible with a room's objects, in a fixed order, which seeded sampling relies on.
 
-    Args:
-        room: the room in its current state.
-        extra_types: types of the objects that are neither items nor places (faucets).
+    `extra_types` are the types of the objects that are neither items nor places (faucets).
     """
     where = dict(room.start.where)
     items = {room.types[item] for item, parent in where.items() if parent != ABSENT or item == room.start.held}

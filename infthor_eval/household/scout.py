@@ -38,11 +38,7 @@ class Viewpoint:
 
 
 def find_viewpoint(
-    simulator: Simulator,
-    grid: Grid,
-    shown: list[str],
-    inside: str | None = None,
-    min_pixels: int = 0,
+    simulator: Simulator, grid: Grid, shown: list[str], inside: str | None = None, min_pixels: int = 0
 ) -> Viewpoint | None:
     """Return the viewpoint with the fewest actions to it from which all given objects are visible.
 

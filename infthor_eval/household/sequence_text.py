@@ -60,12 +60,7 @@ def action_part(action: str) -> str:
 
 
 def sequence_text(trajectory: Trajectory, steps: list[Step]) -> str:
-    """Return the whole trajectory as text.
-
-    Args:
-        trajectory: the trajectory, for its goals and sub-goals.
-        steps: log of its replay; only the last of several frames of one action is used.
-    """
+    """Return the whole trajectory as text, from its replay's log; of several frames of an action the last counts."""
     starts: dict[int, int | None] = {item.low_pddl_idx[0]: item.sub_traj_idx for item in trajectory.sub_trajs}
     starts = starts or {0: None}
     plans = {high.high_idx: plan_text(high) for high in trajectory.plan.high_pddl}

@@ -15,14 +15,8 @@ _SURROUNDINGS = frozenset({"Floor", "Wall", "Ceiling"})
 
 
 def state_summaries(steps: list[Step], at: set[int]) -> dict[int, str]:
-    """Return the summaries after some low-level actions, by index of the action.
-
-    Args:
-        steps: the log, with the fields that a replay adds.
-        at: indices of the actions.
-    """
+    """Return the summaries after the low-level actions with some indices, from a log with the fields of a replay."""
     known: dict[str, tuple[ObjectState, str | None]] = {}
-    held: list[str] = []
     summaries: dict[int, str] = {}
     for step, world in zip(steps, iter_object_states(steps), strict=True):
         held = [noun(state.type) for state in world.values() if state.held and state.exists]
@@ -37,9 +31,7 @@ def state_summaries(steps: list[Step], at: set[int]) -> dict[int, str]:
 
 
 def _summary(known: dict[str, tuple[ObjectState, str | None]], held: list[str]) -> str:
-    sentences = [
-        f"You are holding {' and '.join(with_article(item) for item in held)}." if held else "Your hands are free."
-    ]
+    sentences = [f"You are holding {' and '.join(map(with_article, held))}." if held else "Your hands are free."]
     inside: dict[str, list[str]] = {}
     for state, place in known.values():
         if place is not None:

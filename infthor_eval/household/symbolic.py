@@ -8,7 +8,7 @@ modelled: the rollout adds them where they are needed, as ALFRED does.
 from collections.abc import Container, Iterable
 from dataclasses import dataclass
 
-from infthor_eval.household.affordances import SLICEABLE
+from infthor_eval.household.affordances import SLICEABLE, goes_into
 from infthor_eval.household.containment import direct_parent
 from infthor_eval.thor.view import SimulatorView, ThorObject
 
@@ -81,15 +81,14 @@ class SymbolicRoom:
             item = where[item]
         return item
 
+    def fits(self, item: str, receptacle: str) -> bool:
+        """Return True if a receptacle is made for an item's type and is not known to have no room for it."""
+        usual = receptacle in self.receptacles and goes_into(self.types[item], self.types[receptacle])
+        return usual and (item, receptacle) not in self.refused
+
 
 def room_of(view: SimulatorView, blocked: Container[str] = (), refused: Iterable[tuple[str, str]] = ()) -> SymbolicRoom:
-    """Read a room from the simulator's state. The agent counts as being at no place.
-
-    Args:
-        view: the current state of the simulator.
-        blocked: ids of objects that cannot be acted on at present.
-        refused: see `SymbolicRoom.refused`.
-    """
+    """Read a room from the simulator's state, with the agent at no place; `blocked` objects cannot be acted on."""
     objects = {key: item for key, item in view.objects.items() if not _is_remains(item)}
     items = {key: item for key, item in objects.items() if item.pickupable and key not in blocked}
     places = {key for key, item in objects.items() if _is_place(item)}
@@ -126,8 +125,7 @@ def _parent_of(item: ThorObject, objects: dict[str, ThorObject], places: Iterabl
     if item.is_picked_up:
         return ABSENT
     parent = direct_parent(item, objects)
-    known = parent is not None and (parent in places or objects[parent].pickupable)
-    return parent if known and parent is not None else FLOOR
+    return parent if parent is not None and (parent in places or objects[parent].pickupable) else FLOOR
 
 
 def _is_remains(item: ThorObject) -> bool:

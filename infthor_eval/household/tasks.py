@@ -63,12 +63,7 @@ _ONTO = {"Plate"}  # objects are on these, not in them
 
 
 def sub_task(task: Task, scene: str) -> SubTask:
-    """Return the task in the form of trajectories, with a description in words.
-
-    Args:
-        task: the task.
-        scene: name of the scene.
-    """
+    """Return a task in a scene in the form of trajectories, with a description in words."""
     info = TaskInfo(str(task.task_type), task.pickup, task.movable, task.receptacle, scene)
     params = {
         "mrecep_target": task.movable or "",

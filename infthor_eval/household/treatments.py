@@ -7,6 +7,8 @@ it, and closing a fridge cools what is in it.
 import math
 from dataclasses import dataclass, replace
 
+from msgspec.structs import astuple
+
 from infthor_eval.household.containment import contents_of
 from infthor_eval.thor.view import SimulatorView, ThorObject
 
@@ -61,10 +63,5 @@ def _basin_of(faucet: ThorObject, view: SimulatorView) -> ThorObject | None:
     ALFRED considers only sink basins, so that there filling a bathtub washes what is in a sink across the room.
     """
     basins = [item for item in view.objects.values() if item.object_type in _BASINS]
-    return min(basins, key=lambda item: (_distance(item, faucet), item.object_id), default=None)
-
-
-def _distance(one: ThorObject, other: ThorObject) -> float:
-    return math.dist(
-        (one.position.x, one.position.y, one.position.z), (other.position.x, other.position.y, other.position.z)
-    )
+    at = astuple(faucet.position)
+    return min(basins, key=lambda item: (math.dist(astuple(item.position), at), item.object_id), default=None)

@@ -60,10 +60,7 @@ def windows(
         encoder: builds the sequences.
         name: name of the trajectory.
         segments: history of the trajectory.
-        limit: most tokens of a sequence, frames expanded.
-
-    Yields:
-        The sequences, and plans that exceed the limit alone.
+        limit: most tokens of a sequence, frames expanded; plans that exceed it alone are skipped items.
 
     Raises:
         DataError: a frame cannot be read, or a text of the history contains a mark.
@@ -83,11 +80,6 @@ def windows(
 
 def single_plans(encoder: Encoder, name: str, segments: Sequence[PlanSegment]) -> Iterator[TrainingSequence]:
     """Cut a history into sequences of one plan each, with its goal and the frame that it begins with.
-
-    Args:
-        encoder: builds the sequences.
-        name: name of the trajectory.
-        segments: history of the trajectory.
 
     Raises:
         DataError: a frame cannot be read, or a text of the history contains a mark.

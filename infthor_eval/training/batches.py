@@ -38,12 +38,7 @@ class Batch(TypedDict):
 
 
 def collate(sequences: Sequence[TrainingSequence], family: Family, pad_id: int) -> Batch:
-    """Combine sequences to a batch.
-
-    Args:
-        sequences: sequences, at least one.
-        family: family of the model.
-        pad_id: padding token.
+    """Combine one or more sequences to a batch.
 
     Raises:
         DataError: a sequence has no token with loss; the first token never has any, because nothing predicts it.

@@ -10,7 +10,7 @@ from typing import Any
 import torch
 from safetensors.torch import load_model, save_model
 
-from infthor_eval.errors import DataError, UsageError, wrap_errors
+from infthor_eval.errors import UsageError, wrap_errors
 from infthor_eval.formats.files import prepare_folder, write_atomically
 
 __all__ = ["Checkpoints"]
@@ -34,12 +34,7 @@ class Checkpoints:
     about: Mapping[str, Any]
 
     def save(self, step: int, model: torch.nn.Module, optimizer: torch.optim.Optimizer) -> None:
-        """Write a state, then remove the previous one.
-
-        Args:
-            step: number of finished steps.
-            model: the model after these steps.
-            optimizer: the optimizer after these steps.
+        """Write the state after some finished steps, then remove the previous one.
 
         Raises:
             DataError: the state cannot be written.
@@ -59,14 +54,7 @@ class Checkpoints:
                 shutil.rmtree(older)
 
     def restore(self, model: torch.nn.Module, optimizer: torch.optim.Optimizer) -> int:
-        """Load the last state, if there is one.
-
-        Args:
-            model: model that gets its weights.
-            optimizer: optimizer that gets its moments.
-
-        Returns:
-            Number of finished steps.
+        """Load the last state, if there is one, and return the number of finished steps.
 
         Raises:
             DataError: the state is damaged.
@@ -99,5 +87,5 @@ class Checkpoints:
 
 
 def _number(place: Path) -> int:
-    with wrap_errors(f"{place}: not a checkpoint", "remove it", catch=ValueError, raise_as=DataError):
+    with wrap_errors(f"{place}: not a checkpoint", "remove it", catch=ValueError):
         return int(place.name.removeprefix("step-"))

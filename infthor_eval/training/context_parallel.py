@@ -33,10 +33,6 @@ _HALF = (torch.float16, torch.bfloat16)
 class SequenceSplit:
     """Assignment of a sequence's chunks to a rank.
 
-    Args:
-        rank: the rank.
-        n_ranks: number of ranks.
-
     Attributes:
         chunks: numbers of the rank's two chunks of `2 * n_ranks`.
     """
@@ -61,12 +57,7 @@ class SequenceSplit:
 
 
 class ContextParallel:
-    """A model of which every rank computes its part of each sequence; see `context_parallel`.
-
-    Args:
-        model: the model, the same on every rank of the group.
-        group: the ranks.
-    """
+    """A model that every rank runs on its part of each sequence; see `context_parallel`."""
 
     def __init__(self, model: SequenceModel, group: dist.ProcessGroup) -> None:
         self._model = model
@@ -179,12 +170,7 @@ class ContextParallel:
 
 @contextmanager
 def context_parallel(model: SequenceModel, group: dist.ProcessGroup) -> Iterator[ContextParallel]:
-    """Split sequences over the ranks of a group; the backward pass has to run within the context, too.
-
-    Args:
-        model: the model, the same on every rank of the group.
-        group: the ranks.
-    """
+    """Split sequences over the ranks of a group, with the same model on each; run the backward pass within, too."""
     parallel = ContextParallel(model, group)
     name = f"context_parallel_{id(parallel)}"
     config = model.decoder.config

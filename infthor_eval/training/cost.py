@@ -47,14 +47,7 @@ class TrainingCost:
 
 
 def estimate_cost(recipe: Recipe, network: SequenceModel, data: TrainingData, n_processes: int) -> TrainingCost:
-    """Estimate the work and memory of a run.
-
-    Args:
-        recipe: recipe of the run.
-        network: model of the run, with its frozen parts.
-        data: training data of the run.
-        n_processes: number of processes.
-    """
+    """Estimate the work and memory of a run; the network must have its frozen parts."""
     parts = parameters_by_part(network)
     total = sum(parameter.nbytes for parameter in network.parameters())
     trained = sum(parameter.nbytes for parameter in network.parameters() if parameter.requires_grad)

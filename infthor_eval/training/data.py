@@ -26,7 +26,7 @@ class TrainingData:
 
     Attributes:
         sequences: sequences in the order of the sets.
-        skipped: items of which no sequence could be built.
+        skipped: items that could not become a sequence.
     """
 
     sequences: Sequence[TrainingSequence]
@@ -85,12 +85,9 @@ def _read_set(recipe: Recipe, encoder: Encoder, folder: Path) -> Iterator[Traini
 
 
 def action_sequences(data: NiehSet, encoder: Encoder, limit: int) -> Iterator[TrainingSequence | SkippedItem]:
-    """Yield the windows of every trajectory of a set, and the items of which no sequence could be built.
+    """Yield the windows of every trajectory of a set, and the items that could not become a sequence.
 
-    Args:
-        data: the set, which has to contain the trajectories.
-        encoder: builds the sequences.
-        limit: most tokens of a sequence, frames expanded.
+    The set has to contain the trajectories; `limit` is the most tokens of a sequence, frames expanded.
     """
     for name in trajectory_names(data):
         try:
@@ -106,10 +103,6 @@ def trajectory_names(data: NiehSet) -> list[str]:
 
 def read_history(data: NiehSet, name: str) -> tuple[Trajectory, list[PlanSegment]]:
     """Return a trajectory of a set and its true history.
-
-    Args:
-        data: the set.
-        name: name of the trajectory.
 
     Raises:
         DataError: the trajectory is not in the set, or does not match its replay.

@@ -49,7 +49,7 @@ class TrainingSequence:
 
 @dataclass(frozen=True)
 class SkippedItem:
-    """A part of the data of which no sequence could be built.
+    """A part of the data that could not become a sequence.
 
     Attributes:
         name: name of the trajectory, plan or question.
@@ -61,11 +61,7 @@ class SkippedItem:
 
 
 class Encoder:
-    """Builds sequences for one checkpoint.
-
-    Args:
-        loaded: the checkpoint; its template also renders prompts in evaluation.
-    """
+    """Builds sequences for one checkpoint; its template also renders prompts in evaluation."""
 
     def __init__(self, loaded: LoadedCheckpoint) -> None:
         self._tokenizer: Any = loaded.tokenizer

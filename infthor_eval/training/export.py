@@ -2,12 +2,11 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import torch
 from torch.distributed.tensor import DTensor
 
-from infthor_eval.errors import DataError, wrap_errors
+from infthor_eval.errors import wrap_errors
 from model_adapters.hf.loaded import LoadedCheckpoint
 from model_adapters.hf.quiet import hide_transformers_output
 
@@ -22,31 +21,22 @@ def gather_weights(model: torch.nn.Module) -> dict[str, torch.Tensor] | None:
     weights = model.state_dict()
     if not any(isinstance(tensor, DTensor) for tensor in weights.values()):
         return None
-    return {
-        name: tensor.full_tensor().cpu() if isinstance(tensor, DTensor) else tensor for name, tensor in weights.items()
-    }
+    return {name: item.full_tensor().cpu() if isinstance(item, DTensor) else item for name, item in weights.items()}
 
 
 def export(loaded: LoadedCheckpoint, folder: Path, weights: Mapping[str, torch.Tensor] | None = None) -> None:
     """Write weights (safetensors), configs, tokenizer with its template, and image processor.
 
-    The template is that of training, so that evaluation renders the same prompts.
-
-    Args:
-        loaded: the model.
-        folder: folder of the checkpoint; it is created.
-        weights: gathered weights of a sharded model, or None.
+    The template is that of training, so that evaluation renders the same prompts. The folder is created. `weights` are
+    the gathered ones of a sharded model.
 
     Raises:
         DataError: the checkpoint cannot be written.
     """
-    model: Any = loaded.model
-    with wrap_errors(
-        f"{folder}: the checkpoint cannot be written", "free some space, or choose another folder", raise_as=DataError
-    ):
+    with wrap_errors(f"{folder}: the checkpoint cannot be written", "free some space, or choose another folder"):
         folder.mkdir(parents=True, exist_ok=True)
         loaded.tokenizer.chat_template = loaded.template
         with hide_transformers_output():
             loaded.tokenizer.save_pretrained(folder)
             loaded.image_processor.save_pretrained(folder)
-            model.save_pretrained(folder, state_dict=None if weights is None else dict(weights))
+            loaded.model.save_pretrained(folder, state_dict=None if weights is None else dict(weights))

@@ -13,7 +13,7 @@ import msgspec
 import torch
 import torch.distributed as dist
 
-from infthor_eval.errors import DataError, UsageError, wrap_errors
+from infthor_eval.errors import UsageError, wrap_errors
 from infthor_eval.formats.digests import digest
 from infthor_eval.formats.files import prepare_folder, write_atomically
 from infthor_eval.training.batches import collate
@@ -64,11 +64,7 @@ class TrainingRun:
 
 
 def prepare_run(recipe: Recipe, folders: Sequence[Path]) -> TrainingRun:
-    """Load the model and build the sequences.
-
-    Args:
-        recipe: recipe of the run.
-        folders: folders of replayed sets.
+    """Load the model and build the sequences from folders of replayed sets.
 
     Raises:
         UsageError: the recipe's model or one of its settings is unknown.
@@ -108,7 +104,7 @@ def fine_tune(run: TrainingRun, out: Path, on_step: StepCallback) -> Path:
             network.gradient_checkpointing_enable()
         _train(run, network, out / _STATES, on_step)
         if adapters is not None:
-            adapters.merge()
+            adapters.merge_and_unload()
         weights = gather_weights(run.loaded.model)
         if is_first:
             export(run.loaded, out / _CHECKPOINT, weights)
@@ -163,7 +159,7 @@ def _claim_folder(out: Path, document: dict[str, Any]) -> None:
         with write_atomically(path) as partial_file:
             partial_file.write_text(json.dumps(document, indent=2, sort_keys=True) + "\n", encoding="utf-8")
         return
-    with wrap_errors(f"{path}: not JSON", "give another folder", catch=(OSError, ValueError), raise_as=DataError):
+    with wrap_errors(f"{path}: not JSON", "give another folder", catch=(OSError, ValueError)):
         earlier = json.loads(path.read_text(encoding="utf-8"))
     current = json.loads(json.dumps(document))
     if earlier != current:

@@ -6,30 +6,11 @@ from infthor_eval.errors import UsageError, wrap_errors
 from infthor_eval.training.network import SequenceModel
 from infthor_eval.training.recipe import Lora
 
-__all__ = ["Adapters", "add_adapters"]
+__all__ = ["add_adapters"]
 
 
-class Adapters:
-    """Adapters in a model.
-
-    Args:
-        tuner: peft's object for them.
-    """
-
-    def __init__(self, tuner: Any) -> None:
-        self._tuner = tuner
-
-    def merge(self) -> None:
-        """Add the adapters to the weights and remove them from the model."""
-        self._tuner.merge_and_unload()
-
-
-def add_adapters(network: SequenceModel, settings: Lora) -> Adapters:
-    """Add adapters to the decoder's linear layers, and freeze everything else.
-
-    Args:
-        network: the model.
-        settings: settings of the adapters.
+def add_adapters(network: SequenceModel, settings: Lora) -> Any:
+    """Add adapters to the decoder's linear layers, freeze everything else, and return peft's model of them.
 
     Raises:
         UsageError: peft is not installed, or the decoder has none of the target layers.
@@ -49,5 +30,4 @@ def add_adapters(network: SequenceModel, settings: Lora) -> Adapters:
     )
     problem = f"lora.targets {', '.join(settings.targets)}: the decoder has no such layers"
     with wrap_errors(problem, "name some of its linear layers", catch=ValueError, raise_as=UsageError):
-        tuner = peft.LoraModel(network.model, {"default": config}, "default")
-    return Adapters(tuner)
+        return peft.LoraModel(network.model, {"default": config}, "default")

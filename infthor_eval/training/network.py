@@ -56,8 +56,7 @@ class SequenceModel(torch.nn.Module):
     @property
     def device(self) -> torch.device:
         """Device of the embeddings and of the decoder's inputs."""
-        device: torch.device = self.model.get_input_embeddings().weight.device
-        return device
+        return self.model.get_input_embeddings().weight.device
 
     def forward(
         self,
@@ -69,15 +68,9 @@ class SequenceModel(torch.nn.Module):
         frames: Sequence[Frame],
         num_items_in_batch: Tensor | int | None = None,
     ) -> dict[str, Tensor]:
-        """Return the loss of a `Batch`.
+        """Return the loss of a `Batch`; all arguments but the last are its fields.
 
         Args:
-            input_ids: see `Batch`.
-            position_ids: see `Batch`.
-            attention_mask: see `Batch`.
-            labels: see `Batch`.
-            slots: see `Batch`.
-            frames: see `Batch`.
             num_items_in_batch: divisor of the sum of the tokens' losses; the labels of this batch where None.
 
         Returns:
@@ -146,8 +139,7 @@ class SequenceModel(torch.nn.Module):
             attention_mask=None if attention_mask is None else attention_mask.to(self.device),
             use_cache=False,
         )
-        hidden: Tensor = output.last_hidden_state
-        return hidden
+        return output.last_hidden_state
 
     def loss_sum(self, hidden: Tensor, targets: Tensor) -> Tensor:
         """Return the sum of the cross entropies of all tokens with a target, in nats; a float32 scalar.
@@ -163,9 +155,8 @@ class SequenceModel(torch.nn.Module):
         has_target = targets != IGNORED
         total = hidden.new_zeros((), dtype=torch.float32)
         # Without targets there is still one, empty, chunk: every rank of a split sequence needs a backward pass.
-        for states, chunk_targets in zip(
-            hidden[has_target].split(_LOGIT_ROWS), targets[has_target].split(_LOGIT_ROWS), strict=True
-        ):
+        chunks = (values[has_target].split(_LOGIT_ROWS) for values in (hidden, targets))
+        for states, chunk_targets in zip(*chunks, strict=True):
             total = total + checkpoint(self._cross_entropy, states, chunk_targets, use_reentrant=False)
         return total
 

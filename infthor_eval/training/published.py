@@ -4,6 +4,7 @@ The published trainer cannot export them. Their weights are put into the model t
 written like any other checkpoint.
 """
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -71,16 +72,15 @@ def import_weights(loaded: LoadedCheckpoint, folder: Path) -> ImportedWeights:
 
 def _key_prefix(sizes: Mapping[str, Any], weights: Mapping[str, Any], folder: Path) -> str:
     """Return the prefix of the weights' keys in the folder: the one that most keys agree with."""
-    counts: dict[str, int] = {}
+    counts: Counter[str] = Counter()
     for name in sizes:
         parts = name.split(".")
         for at in range(len(parts)):
             if ".".join(parts[at:]) in weights:
-                prefix = "".join(f"{part}." for part in parts[:at])
-                counts[prefix] = counts.get(prefix, 0) + 1
+                counts["".join(f"{part}." for part in parts[:at])] += 1
                 break
     # An optimizer's moments have the weights' names, too, with another prefix.
-    counts = {prefix: n for prefix, n in counts.items() if not prefix.startswith(("optim", "state"))}
-    if not counts:
+    prefixes = [prefix for prefix in counts if not prefix.startswith(("optim", "state"))]
+    if not prefixes:
         raise DataError(f"{folder}: has no weight of this model; {_HINT}")
-    return max(counts, key=lambda prefix: (counts[prefix], -len(prefix)))
+    return max(prefixes, key=lambda prefix: (counts[prefix], -len(prefix)))

@@ -13,15 +13,12 @@ __all__ = ["question_sequences"]
 
 
 def question_sequences(encoder: Encoder, task: TaskSamples, limit: int) -> Iterator[TrainingSequence | SkippedItem]:
-    """Build the sequences of a set's questions.
+    """Yield a sequence for each sample of a task in one context, or a skipped item if it cannot be used.
 
     Args:
         encoder: builds the sequences.
-        task: samples of a task in one context.
-        limit: most tokens of a sequence, frames expanded.
-
-    Yields:
-        A sequence for each sample, and samples that cannot be used or are too long.
+        task: the samples.
+        limit: most tokens of a sequence, frames expanded; longer ones are skipped.
 
     Raises:
         UsageError: the context needs a model's notes.

@@ -53,10 +53,8 @@ def assign_ranks(n_context: int = 1) -> Ranks:
         return Ranks()
     rank = dist.get_rank()
     data_rank, context_rank = divmod(rank, n_context)
-    group = None
-    if n_context > 1:
-        # Creating a group is collective: every process has to create every group.
-        firsts = range(0, world, n_context)
-        groups = [dist.new_group(list(range(first, first + n_context))) for first in firsts]
-        group = groups[data_rank]
+    # Creating a group is collective: every process has to create every group.
+    firsts = range(0, world, n_context) if n_context > 1 else ()
+    groups = [dist.new_group(list(range(first, first + n_context))) for first in firsts]
+    group = groups[data_rank] if groups else None
     return Ranks(rank, data_rank, world // n_context, context_rank, n_context, group)

@@ -178,10 +178,8 @@ def read_recipe(name: str, changes: Mapping[str, Any] | None = None) -> Recipe |
     if not path.is_file() and not name.endswith(".yaml"):
         raise unknown_name("recipe", name, recipe_names())
     document = read_yaml(path, "see infthor_eval/training/recipes for examples")
-    with wrap_errors(
-        f"{path}: not a recipe", "fix the setting", catch=(msgspec.ValidationError, TypeError), raise_as=UsageError
-    ):
-        settings = changes or {}
+    wrong, settings = (msgspec.ValidationError, TypeError), changes or {}
+    with wrap_errors(f"{path}: not a recipe", "fix the setting", catch=wrong, raise_as=UsageError):
         if settings.get("model", document.get("model")) != document.get("model"):
             document.pop("model_args", None)
         for key, value in settings.items():

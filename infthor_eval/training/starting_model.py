@@ -10,7 +10,7 @@ from model_adapters import has_option, load
 from model_adapters.hf.loaded import LoadedCheckpoint
 from model_adapters.hf.model import TransformersModel
 
-__all__ = ["add_marks", "load_starting_model"]
+__all__ = ["load_starting_model"]
 
 
 def load_starting_model(model: str, options: Mapping[str, str], prompt: str, seed: int) -> LoadedCheckpoint:
@@ -29,11 +29,11 @@ def load_starting_model(model: str, options: Mapping[str, str], prompt: str, see
     loaded_model = load(model, {**options, "prompt": prompt}, seed) if has_option(model, "prompt") else None
     if not isinstance(loaded_model, TransformersModel):
         raise UsageError(f"{model} cannot be trained here; use a model of a transformers family")
-    add_marks(loaded_model.loaded)
+    _add_marks(loaded_model.loaded)
     return loaded_model.loaded
 
 
-def add_marks(loaded: LoadedCheckpoint) -> None:
+def _add_marks(loaded: LoadedCheckpoint) -> None:
     """Make every mark of a sequence a single token, in a fixed order.
 
     The embedding of a new token is the mean of all others: the published training freezes input embeddings, so an

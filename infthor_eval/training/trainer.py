@@ -14,7 +14,7 @@ import torch
 import transformers
 from safetensors.torch import load_model, save_model
 
-from infthor_eval.errors import DataError, UsageError, wrap_errors
+from infthor_eval.errors import UsageError, wrap_errors
 from infthor_eval.training.encoding import TrainingSequence
 from infthor_eval.training.loop import Progress
 from infthor_eval.training.network import SequenceModel
@@ -33,15 +33,15 @@ class _SequenceTrainer(transformers.Trainer):
         folder.mkdir(parents=True, exist_ok=True)
         if state_dict is not None:  # gathered from shards
             super()._save(output_dir, state_dict)
-            return
-        save_model(self.accelerator.unwrap_model(self.model).model, str(folder / _WEIGHTS))
+        else:
+            save_model(self.accelerator.unwrap_model(self.model).model, str(folder / _WEIGHTS))
 
     def _load_from_checkpoint(self, resume_from_checkpoint: str, model: torch.nn.Module | None = None) -> None:
         if self.is_fsdp_enabled:
             super()._load_from_checkpoint(resume_from_checkpoint, model)
-            return
-        network = self.accelerator.unwrap_model(model or self.model)
-        load_model(network.model, Path(resume_from_checkpoint) / _WEIGHTS)
+        else:
+            network = self.accelerator.unwrap_model(model or self.model)
+            load_model(network.model, Path(resume_from_checkpoint) / _WEIGHTS)
 
 
 class _ReportSteps(transformers.TrainerCallback):
@@ -74,7 +74,7 @@ def train_with_trainer(
 
     Args:
         network: the network.
-        sequences: all sequences, of which each process uses its own.
+        sequences: all sequences; each process uses its own share.
         collate: combines sequences to a batch.
         recipe: recipe of the run.
         out: folder of the checkpoints.
@@ -94,10 +94,8 @@ def train_with_trainer(
     )
     trainer.remove_callback(transformers.trainer_callback.PrinterCallback)
     last = _last_complete_checkpoint(out)
-    problem = f"{last}: the checkpoint cannot be read"
-    with wrap_errors(
-        problem, "remove it to resume from the one before", catch=(OSError, ValueError, KeyError), raise_as=DataError
-    ):
+    problem, hint = f"{last}: the checkpoint cannot be read", "remove it to resume from the one before"
+    with wrap_errors(problem, hint, catch=(OSError, ValueError, KeyError)):
         trainer.train(resume_from_checkpoint=last)
 
 

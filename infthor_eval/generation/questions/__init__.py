@@ -1,3 +1,1 @@
 """Rules that generate NIEH questions from the step log of a replayed trajectory."""
-
-__all__: list[str] = []

@@ -16,6 +16,7 @@ __all__ = [
     "further_type",
     "in_or_on",
     "listing_question",
+    "type_question",
     "with_the",
 ]
 
@@ -103,25 +104,33 @@ def are_distinguishable(object_types: Sequence[str]) -> bool:
     return True
 
 
-def listing_question(
-    question_type: str, form: str, events: Iterable[tuple[str | None, int | None]]
+def type_question(
+    question_type: str,
+    form: str,
+    names: tuple[str, ...],
+    clues: tuple[int, ...],
+    types: Sequence[str],
+    subjects: tuple[str, ...] = (),
 ) -> Iterator[Candidate]:
+    """Yield a question with object types as answers, unless there are none, too many, or two that may be confused."""
+    if 0 < len(types) <= MANY and are_distinguishable(types):
+        yield Candidate(question_type, form, names, clues, tuple(map(answer_of, types)), (*subjects, *types))
+
+
+def listing_question(question_type: str, form: str, events: Iterable[tuple[str, int | None]]) -> Iterator[Candidate]:
     """Yield a question on all object types of some events, with the first frame that shows each type's event.
 
     Args:
         question_type: type of the question.
         form: the question, without names in it.
-        events: object type (None if it is ambiguous) and frame (None if no frame shows it) of each event.
-
-    Yields:
-        The question, unless a type is not shown or the types cannot be gold answers of one question.
+        events: object type and frame (None if no frame shows it) of each event. If no frame shows one of the types,
+            there is no question.
     """
-    all_events = list(events)
+    types: set[str] = set()
     first: dict[str, int] = {}
-    for name, frame in all_events:
-        if name is not None and frame is not None:
+    for name, frame in events:
+        types.add(canonical_type(name))
+        if frame is not None:
             first.setdefault(canonical_type(name), frame)
-    complete = all(name is not None and canonical_type(name) in first for name, _ in all_events)
-    if first and complete and len(first) <= MANY and are_distinguishable(list(first)):
-        answers = tuple(answer_of(name) for name in first)
-        yield Candidate(question_type, form, (), tuple(first.values()), answers, tuple(first))
+    if len(first) == len(types):
+        yield from type_question(question_type, form, (), tuple(first.values()), list(first))

@@ -39,12 +39,7 @@ class Checker:
     """Checks the questions on one trajectory."""
 
     def __init__(self, steps: Sequence[Step], share: float) -> None:
-        """Read the log.
-
-        Args:
-            steps: the log.
-            share: share of the frame's pixels that an object must fill to count as seen.
-        """
+        """Read the log; objects that fill this share of the frame's pixels count as seen."""
         self._whole = frame_facts(steps, share)
         self._single = {item.frame: item for item in frame_facts(steps, share, range(len(steps)))}
 

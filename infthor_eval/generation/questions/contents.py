@@ -7,15 +7,7 @@ gives the same answer (see `readings`). Our forms define it: objects that can be
 from collections import Counter
 from collections.abc import Iterator
 
-from infthor_eval.generation.questions.candidates import (
-    MANY,
-    Candidate,
-    answer_of,
-    are_distinguishable,
-    further_type,
-    in_or_on,
-    with_the,
-)
+from infthor_eval.generation.questions.candidates import Candidate, further_type, in_or_on, type_question, with_the
 from infthor_eval.generation.questions.evidence import minimal_cover
 from infthor_eval.generation.questions.history import Event, TrajectoryHistory, is_same_object
 from infthor_eval.generation.questions.readings import can_be_picked_up, is_plain
@@ -32,12 +24,9 @@ FormAndNames = tuple[str, tuple[str, ...]]
 def slicings(history: TrajectoryHistory) -> Iterator[Candidate]:
     """Yield the question on what the agent sliced."""
     events = [event for event in history.events if event.action == "SliceObject"]
-    types = [event.object_type for event in events]
-    shown = all(history.shows_slices(event.frame, event.target) for event in events)
-    if events and shown and len(set(types)) == len(types) and are_distinguishable(types):
-        answers = tuple(answer_of(item) for item in types)
-        clues = tuple(event.frame for event in events)
-        yield Candidate(SLICING, "What did you slice?", (), clues, answers, tuple(types))
+    if all(history.shows_slices(event.frame, event.target) for event in events):
+        clues, types = tuple(event.frame for event in events), [event.object_type for event in events]
+        yield from type_question(SLICING, "What did you slice?", (), clues, types)
 
 
 def at_slicing(history: TrajectoryHistory) -> Iterator[Candidate]:
@@ -92,9 +81,8 @@ def at_pickup(history: TrajectoryHistory) -> Iterator[Candidate]:
         if count[event.object_type] == 1 and place is not None and place in history.states(event.frame):
             place_type = history.states(event.frame)[place].type
             form = "Which other things that can be picked up were directly {} when you picked up {} from it?"
-            yield from _loose_contents_question(
-                history, (form, (in_or_on(place_type), with_the(event.object_type))), event, place
-            )
+            asked = form, (in_or_on(place_type), with_the(event.object_type))
+            yield from _loose_contents_question(history, asked, event, place)
 
 
 def _loose_contents_question(
@@ -129,11 +117,9 @@ def _contents_question(
         if history.shows(frame, place) and not _shows_similar_contents(history, frame, place)
     }
     clues = minimal_cover(items, shown, lambda frame, keys: history.clarity(frame, *keys)) if items else None
-    types = sorted(_whole_types(history, frames[0], items))
-    if clues is not None and len(set(types)) == len(types) <= MANY and are_distinguishable(types):
-        place_type = history.states(frames[0])[place].type
-        answers = tuple(answer_of(item) for item in types)
-        yield Candidate(question_type, *asked, clues, answers, (place_type, *types))
+    if clues is not None:
+        types = sorted(_whole_types(history, frames[0], items))
+        yield from type_question(question_type, *asked, clues, types, (history.states(frames[0])[place].type,))
 
 
 def _whole_types(history: TrajectoryHistory, frame: int, keys: frozenset[str]) -> list[str]:

@@ -33,19 +33,12 @@ def counts(history: TrajectoryHistory) -> Iterator[Candidate]:
         moves = history.moves_of(item)
         shown = all(history.shows(move.after, move.item, move.target) for move in moves)
         if len(items) == 1 and shown and len(moves) == history.pickups[item] > 1:
-            frames = [move.after for move in moves]
-            yield _count(
-                QUESTION_TYPE, "How many times did you move {}?", (with_the(object_type),), frames, object_type
-            )
+            form, frames = "How many times did you move {}?", [move.after for move in moves]
+            yield _count(QUESTION_TYPE, form, (with_the(object_type),), frames, object_type)
 
 
 def further_counts(history: TrajectoryHistory, rng: random.Random) -> Iterator[Candidate]:
-    """Yield all other counts, some of them with additional frames without an event.
-
-    Args:
-        history: the trajectory.
-        rng: source of the random choice of questions and frames.
-    """
+    """Yield all other counts, some of them, chosen at random, with additional frames without an event."""
     idle = sorted(set(range(1, len(history))) - {event.frame for event in history.events})
     for candidate in (*_openings(history), *_puts(history), *_items(history)):
         if idle and rng.random() < _SHARE_MIXED:
@@ -77,8 +70,7 @@ def _puts(history: TrajectoryHistory) -> Iterator[Candidate]:
     for target, moves in sorted(by_target.items()):
         shown = all(history.shows_put(move) for move in moves)
         if shown and all(history.is_only_one(move.after, target) for move in moves):
-            place_type = history.states(moves[0].after)[target].type
-            frames = [move.after for move in moves]
+            place_type, frames = history.target_type(moves[0]), [move.after for move in moves]
             form = "How many times did you put something {}?"
             yield _count(FURTHER, form, (in_or_on(place_type),), frames, place_type)
 

@@ -2,18 +2,10 @@
 
 from collections.abc import Iterator
 
-from infthor_eval.generation.questions.candidates import (
-    MANY,
-    Candidate,
-    answer_of,
-    are_distinguishable,
-    in_or_on,
-    with_the,
-)
+from infthor_eval.generation.questions.candidates import MANY, Candidate, in_or_on, type_question, with_the
 from infthor_eval.generation.questions.evidence import minimal_cover
 from infthor_eval.generation.questions.history import TrajectoryHistory
 from infthor_eval.generation.questions.readings import is_plain
-from infthor_eval.household.wording import canonical_type
 
 __all__ = ["QUESTION_TYPE", "final_states"]
 
@@ -37,12 +29,10 @@ def _inside(history: TrajectoryHistory, receptacle: str) -> Iterator[Candidate]:
     for item in sorted({move.item for move in history.moves if receptacle in {move.target, move.origin}}):
         move = history.moves_of(item)[-1]
         here = history.parent(last, item)
-        alone = (
-            item in states and history.is_only_one(last, item) and len(history.picked_up_by_type[move.object_type]) == 1
-        )
-        if not alone or here != move.target:  # ambiguous, or no longer where the last clue shows it
-            continue
-        if history.shows_put(move):
+        alone = item in states and history.is_only_one(last, item)
+        if not alone or len(history.picked_up_by_type[move.object_type]) > 1:
+            continue  # ambiguous
+        if here == move.target and history.shows_put(move):  # still where the last clue shows it
             place_type = states[receptacle].type
             names, subjects = (with_the(states[item].type), in_or_on(place_type)), (states[item].type, place_type)
             answer = "yes" if here == receptacle else "no"
@@ -70,9 +60,7 @@ def _what(history: TrajectoryHistory, receptacle: str) -> Iterator[Candidate]:
     types = sorted(states[key].type for key in inside)
     where, count = (in_or_on(place_type),), str(len(inside))
     yield Candidate(QUESTION_TYPE, "How many objects were {}?", where, clues, (count,), (place_type, "#"))
-    if len({canonical_type(item) for item in types}) == len(types) and are_distinguishable(types):
-        answers = tuple(answer_of(item) for item in types)
-        yield Candidate(QUESTION_TYPE, "What objects are {}?", where, clues, answers, (place_type, *types))
+    yield from type_question(QUESTION_TYPE, "What objects are {}?", where, clues, types, (place_type,))
 
 
 def _arrival(history: TrajectoryHistory, item: str, receptacle: str) -> int:

@@ -202,10 +202,7 @@ def _trajectory_folders(folder: Path) -> list[Path]:
 def candidates_of(history: TrajectoryHistory, vocabulary: frozenset[str], rng: random.Random) -> list[Candidate]:
     """Return all questions of Table 3's forms on one trajectory.
 
-    Args:
-        history: the trajectory.
-        vocabulary: object types of the whole set, for absence questions.
-        rng: source of the sampled frames of absence questions.
+    Absence questions use the object types of the whole set, `vocabulary`, and random frames.
     """
     return [
         *presence.yes_questions(history),
@@ -222,12 +219,7 @@ def candidates_of(history: TrajectoryHistory, vocabulary: frozenset[str], rng: r
 
 
 def further_candidates_of(history: TrajectoryHistory, rng: random.Random) -> list[Candidate]:
-    """Return all questions of our further forms on one trajectory.
-
-    Args:
-        history: the trajectory.
-        rng: source of the frames that are added to counting questions.
-    """
+    """Return all questions of our further forms on one trajectory; some counting questions get random frames."""
     return [
         *open_state.further_open_states(history),
         *location.further_locations(history),
@@ -269,9 +261,8 @@ class _Chooser:
         """Return True if the answer is already more frequent than all other answers to the form together."""
         if not item.is_closed:
             return False
-        same = self._answers[item.form, str(item.answers[0])]
-        others = sum(count for (form, _), count in self._answers.items() if form == item.form) - same
-        return same > others
+        total = sum(count for (form, _), count in self._answers.items() if form == item.form)
+        return 2 * self._answers[item.form, str(item.answers[0])] > total
 
     def _count(self, item: Candidate) -> None:
         group = _group(item)

@@ -10,10 +10,9 @@ from infthor_eval.formats.step_log import ObjectInFrame, ObjectState, Step, iter
 from infthor_eval.household.containment import logged_parent
 from infthor_eval.household.wording import canonical_type
 
-__all__ = ["DEFAULT_SHARE", "FRAME_PIXELS", "Event", "ObjectMove", "TrajectoryHistory", "is_same_object"]
+__all__ = ["DEFAULT_SHARE", "Event", "ObjectMove", "TrajectoryHistory", "is_same_object"]
 
 _SIDE = 300
-FRAME_PIXELS = _SIDE * _SIDE
 _MARGIN = 15  # distance from the frame's edge from which on an object is well inside, pixels
 DEFAULT_SHARE = 0.001  # of the frame: 90 pixels, about a fork on a table at arm's length
 
@@ -64,16 +63,11 @@ class TrajectoryHistory:
     Attributes:
         traj_id: name of the trajectory's folder.
         steps: the log.
-        min_pixels: minimum size of an object that counts as shown, pixels.
+        min_pixels: minimum size of an object that counts as shown, pixels: `share` of the frame.
     """
 
     def __init__(self, traj_id: str, steps: list[Step], share: float = DEFAULT_SHARE) -> None:
-        """Read a log.
-
-        Args:
-            traj_id: name of the trajectory's folder.
-            steps: the log, with the fields that a replay adds.
-            share: share of the frame's pixels that an object must fill to count as shown.
+        """Read a log with the fields that a replay adds.
 
         Raises:
             DataError: the log is empty, or lacks the fields that questions are generated from.
@@ -82,7 +76,7 @@ class TrajectoryHistory:
             raise DataError(f"{traj_id}: the log does not say what the frames show; replay the trajectory again")
         self.traj_id = traj_id
         self.steps = steps
-        self.min_pixels = share * FRAME_PIXELS
+        self.min_pixels = share * _SIDE**2
         self._states = list(_snapshots(steps))
 
     def __len__(self) -> int:
@@ -175,6 +169,10 @@ class TrajectoryHistory:
         """Return the moves of one object."""
         return tuple(move for move in self.moves if move.item == item)
 
+    def target_type(self, move: ObjectMove) -> str:
+        """Return the type of what an object was put into or onto."""
+        return self.states(move.after)[move.target].type
+
     @cached_property
     def pickups(self) -> Counter[str]:
         """Number of pick-ups of each object, by id."""
@@ -222,8 +220,7 @@ class TrajectoryHistory:
 
     def _type_of(self, frame: int, item: str) -> str:
         """Return the type of an object; one that the action consumed is looked up in the frame before."""
-        state = self.states(frame).get(item) or self.states(frame - 1)[item]
-        return state.type
+        return (self.states(frame).get(item) or self.states(frame - 1)[item]).type
 
 
 def is_same_object(one: str, other: str) -> bool:

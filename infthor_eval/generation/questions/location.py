@@ -5,20 +5,15 @@ It must be clear which pick-up or put is meant: "before you picked it up" is amb
 
 from collections.abc import Iterator, Sequence
 
-from infthor_eval.generation.questions.candidates import (
-    Candidate,
-    answer_of,
-    are_distinguishable,
-    further_type,
-    with_the,
-)
+from infthor_eval.generation.questions import candidates
+from infthor_eval.generation.questions.candidates import Candidate, with_the
 from infthor_eval.generation.questions.history import ObjectMove, TrajectoryHistory
 from infthor_eval.household.wording import canonical_type
 
 __all__ = ["FURTHER", "QUESTION_TYPE", "further_locations", "locations"]
 
 QUESTION_TYPE = "location_tracing"
-FURTHER = further_type(QUESTION_TYPE)
+FURTHER = candidates.further_type(QUESTION_TYPE)
 
 
 def locations(history: TrajectoryHistory) -> Iterator[Candidate]:
@@ -47,9 +42,9 @@ def _moves_by_type(history: TrajectoryHistory) -> Iterator[tuple[str, tuple[Obje
 def _before_put(history: TrajectoryHistory, object_type: str, moves: tuple[ObjectMove, ...]) -> Iterator[Candidate]:
     # Only for the first move, and only if no other leads to such a container: then there is one place before it.
     move = moves[0]
-    to = _end(history, move)
-    once = [_end(history, other) for other in moves].count(to) == 1
-    if once and _changes(history, move) and _left(history, move) and history.shows_put(move):
+    to = history.target_type(move)
+    once = [history.target_type(other) for other in moves].count(to) == 1
+    if once and _changes(history, move) and _shows_origin(history, move) and history.shows_put(move):
         form = "Where was {} before you put it to {}?"
         yield _candidate(QUESTION_TYPE, form, (move.before, move.after), [_start(history, move)], object_type, to)
 
@@ -57,13 +52,13 @@ def _before_put(history: TrajectoryHistory, object_type: str, moves: tuple[Objec
 def _moved_from(history: TrajectoryHistory, object_type: str, moves: tuple[ObjectMove, ...]) -> Iterator[Candidate]:
     # Only for the last move, and only if no other starts at such a container: then there is one place after it.
     move = moves[-1]
-    if not _left(history, move) or not history.shows_put(move) or not _is_down(history, move):
+    if not _shows_origin(history, move) or not history.shows_put(move) or not _is_down(history, move):
         return
     origin = _start(history, move)
     others = [_start(history, other) for other in moves[:-1]]
     if _changes(history, move) and origin not in others and None not in others:
-        form = "Where did you move {} from {}?"
-        yield _candidate(QUESTION_TYPE, form, (move.before, move.after), [_end(history, move)], object_type, origin)
+        form, clues = "Where did you move {} from {}?", (move.before, move.after)
+        yield _candidate(QUESTION_TYPE, form, clues, [history.target_type(move)], object_type, origin)
 
 
 def _now(history: TrajectoryHistory, object_type: str, moves: tuple[ObjectMove, ...]) -> Iterator[Candidate]:
@@ -76,7 +71,7 @@ def _now(history: TrajectoryHistory, object_type: str, moves: tuple[ObjectMove, 
 
 def _origin(history: TrajectoryHistory, object_type: str, moves: tuple[ObjectMove, ...]) -> Iterator[Candidate]:
     move = moves[0]
-    if _left(history, move):
+    if _shows_origin(history, move):
         when = "first picked it up" if history.pickups[move.item] > 1 else "picked it up"
         form = f"Where was {{}} before you {when}?"
         yield _candidate(FURTHER, form, (move.before,), [_start(history, move)], object_type)
@@ -85,15 +80,15 @@ def _origin(history: TrajectoryHistory, object_type: str, moves: tuple[ObjectMov
 def _destination(history: TrajectoryHistory, object_type: str, moves: tuple[ObjectMove, ...]) -> Iterator[Candidate]:
     move = moves[0]
     if history.pickups[move.item] == 1 and history.shows_put(move):
-        yield _candidate(FURTHER, "Where did you move {} to?", (move.after,), [_end(history, move)], object_type)
+        yield _candidate(FURTHER, "Where did you move {} to?", (move.after,), [history.target_type(move)], object_type)
 
 
 def _journey(history: TrajectoryHistory, object_type: str, moves: tuple[ObjectMove, ...]) -> Iterator[Candidate]:
     first = moves[0]
-    if not _left(history, first) or not all(history.shows_put(move) for move in moves):
+    if not _shows_origin(history, first) or not all(history.shows_put(move) for move in moves):
         return
-    places = [_start(history, first), *(_end(history, move) for move in moves)]
-    if are_distinguishable([place or "" for place in places]):
+    places = [_start(history, first), *(history.target_type(move) for move in moves)]
+    if candidates.are_distinguishable([place or "" for place in places]):
         clues = (first.before, *(move.after for move in moves))
         yield _candidate(FURTHER, "In which places was {}, from first to last?", clues, places, object_type)
 
@@ -103,15 +98,10 @@ def _start(history: TrajectoryHistory, move: ObjectMove) -> str | None:
     return None if move.origin is None else history.states(move.before)[move.origin].type
 
 
-def _end(history: TrajectoryHistory, move: ObjectMove) -> str:
-    """Return the type of what an object was put into or onto."""
-    return history.states(move.after)[move.target].type
-
-
 def _changes(history: TrajectoryHistory, move: ObjectMove) -> bool:
     """Return True if a move led to another type of receptacle; otherwise the question would contain the answer."""
     start = _start(history, move)
-    return start is not None and canonical_type(start) != canonical_type(_end(history, move))
+    return start is not None and canonical_type(start) != canonical_type(history.target_type(move))
 
 
 def _is_down(history: TrajectoryHistory, move: ObjectMove) -> bool:
@@ -119,7 +109,7 @@ def _is_down(history: TrajectoryHistory, move: ObjectMove) -> bool:
     return history.parent(len(history) - 1, move.item) == move.target
 
 
-def _left(history: TrajectoryHistory, move: ObjectMove) -> bool:
+def _shows_origin(history: TrajectoryHistory, move: ObjectMove) -> bool:
     """Return True if the frame before the pick-up shows the object where it was, and no other of its type."""
     shown = move.origin is not None and history.shows(move.before, move.item, move.origin)
     return shown and history.is_alone_in_frame(move.before, move.item)
@@ -136,5 +126,5 @@ def _candidate(
     """Return a question on an object, and on a place if the form names one."""
     types = [place for place in places if place is not None]
     names = [object_type] if named is None else [object_type, named]
-    answers = tuple(map(answer_of, types))
+    answers = tuple(map(candidates.answer_of, types))
     return Candidate(question_type, form, tuple(map(with_the, names)), clues, answers, (object_type, *types))

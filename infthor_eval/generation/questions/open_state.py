@@ -23,10 +23,8 @@ def open_states(history: TrajectoryHistory) -> Iterator[Candidate]:
         object_type = history.states(len(history) - 1)[key].type
         frame = history.clearest(open_at or frames, key)
         if object_type in _CONTAINERS and frame is not None:
-            answer = "yes" if open_at else "no"
-            yield Candidate(
-                QUESTION_TYPE, "Was {} open?", (with_the(object_type),), (frame,), (answer,), (object_type,)
-            )
+            names, answer = (with_the(object_type),), "yes" if open_at else "no"
+            yield Candidate(QUESTION_TYPE, "Was {} open?", names, (frame,), (answer,), (object_type,))
 
 
 def further_open_states(history: TrajectoryHistory) -> Iterator[Candidate]:
@@ -39,7 +37,9 @@ def further_open_states(history: TrajectoryHistory) -> Iterator[Candidate]:
             involved = key in {event.target, event.receptacle}  # then the action itself tells whether it was open
             if event.action in _ASKED_AT and phrases[phrase] == 1 and not involved:
                 yield from _then(history, key, event, phrase)
-    yield from _all_opened(history)
+    opened = (event for event in history.events if event.action == "OpenObject")
+    shown = ((event.object_type, event.frame if history.shows(event.frame, event.target) else None) for event in opened)
+    yield from listing_question(FURTHER, "What did you open?", shown)
 
 
 def _singles(history: TrajectoryHistory) -> list[str]:
@@ -92,15 +92,3 @@ def _now(history: TrajectoryHistory, key: str) -> Iterator[Candidate]:
 def _is_open(history: TrajectoryHistory, frame: int, key: str) -> bool | None:
     state = history.states(frame).get(key)
     return None if state is None else state.is_open
-
-
-def _all_opened(history: TrajectoryHistory) -> Iterator[Candidate]:
-    yield from listing_question(
-        FURTHER,
-        "What did you open?",
-        (
-            (event.object_type, event.frame if history.shows(event.frame, event.target) else None)
-            for event in history.events
-            if event.action == "OpenObject"
-        ),
-    )

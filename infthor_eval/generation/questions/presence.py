@@ -76,20 +76,13 @@ def yes_questions(history: TrajectoryHistory) -> Iterator[Candidate]:
 
 
 def no_questions(history: TrajectoryHistory, vocabulary: frozenset[str], rng: random.Random) -> Iterator[Candidate]:
-    """Yield no-questions on types that the scene does not have.
-
-    Args:
-        history: the trajectory.
-        vocabulary: object types of the whole set.
-        rng: source of the sampled frames.
-    """
-    frames = [frame for frame in range(len(history)) if _n_shown(history, frame) >= _BUSY] or [0]
+    """Yield no-questions with random frames on types of the whole set, `vocabulary`, that the scene does not have."""
+    frames = [frame for frame in range(len(history)) if _is_busy(history, frame)] or [0]
     types = _absent_types(history, vocabulary)
     if len(types) < _FEW:
         types |= _absent_types(history, _COMMON)
     for object_type in sorted(types):
-        frame = rng.choice(frames)
-        yield from _all_forms(history, object_type, frame, "no")
+        yield from _all_forms(history, object_type, rng.choice(frames), "no")
 
 
 def _all_forms(history: TrajectoryHistory, object_type: str, frame: int, answer: str) -> Iterator[Candidate]:
@@ -106,8 +99,8 @@ def _absent_types(history: TrajectoryHistory, vocabulary: frozenset[str]) -> set
     return {object_type for object_type in vocabulary - existing - similar if _is_nameable(object_type)}
 
 
-def _n_shown(history: TrajectoryHistory, frame: int) -> int:
-    return sum(seen.pixels >= history.min_pixels for seen in history.objects_in_frame(frame).values())
+def _is_busy(history: TrajectoryHistory, frame: int) -> bool:
+    return sum(history.shows(frame, key) for key in history.objects_in_frame(frame)) >= _BUSY
 
 
 def _is_nameable(object_type: str) -> bool:

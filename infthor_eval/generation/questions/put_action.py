@@ -5,21 +5,14 @@ Table 3's form has two successive frames as clues: the object in the hand, and t
 
 from collections.abc import Iterator, Sequence
 
-from infthor_eval.generation.questions.candidates import (
-    MANY,
-    Candidate,
-    answer_of,
-    are_distinguishable,
-    further_type,
-    in_or_on,
-    listing_question,
-)
+from infthor_eval.generation.questions import candidates
+from infthor_eval.generation.questions.candidates import Candidate, in_or_on, type_question
 from infthor_eval.generation.questions.history import ObjectMove, TrajectoryHistory
 
 __all__ = ["FURTHER", "QUESTION_TYPE", "further_puts", "puts"]
 
 QUESTION_TYPE = "put_action"
-FURTHER = further_type(QUESTION_TYPE)
+FURTHER = candidates.further_type(QUESTION_TYPE)
 
 
 def puts(history: TrajectoryHistory) -> Iterator[Candidate]:
@@ -28,11 +21,8 @@ def puts(history: TrajectoryHistory) -> Iterator[Candidate]:
         (move, *others) = moves
         before = move.after - 1
         if not others and history.shows(before, move.item) and history.shows_put(move):
-            names, subjects = (in_or_on(place_type),), (place_type, move.object_type)
-            answers = (answer_of(move.object_type),)
-            yield Candidate(
-                QUESTION_TYPE, "What object did you put {}?", names, (before, move.after), answers, subjects
-            )
+            form, names, clues = "What object did you put {}?", (in_or_on(place_type),), (before, move.after)
+            yield from type_question(QUESTION_TYPE, form, names, clues, [move.object_type], (place_type,))
 
 
 def further_puts(history: TrajectoryHistory) -> Iterator[Candidate]:
@@ -41,14 +31,15 @@ def further_puts(history: TrajectoryHistory) -> Iterator[Candidate]:
         if len(moves) > 1 and len({move.target for move in moves}) == 1:
             yield from _what(history, "What did you put {}?", (place_type,), moves)
     yield from _what(history, "What did you put down?", (), history.moves)
-    yield from _where(history)
+    shown = ((history.target_type(move), move.after if history.shows_put(move) else None) for move in history.moves)
+    yield from candidates.listing_question(FURTHER, "Where did you put things?", shown)
 
 
 def _by_type(history: TrajectoryHistory) -> dict[str, list[ObjectMove]]:
     """Return the moves by the type of their target receptacle."""
     by_type: dict[str, list[ObjectMove]] = {}
     for move in history.moves:
-        by_type.setdefault(history.states(move.after)[move.target].type, []).append(move)
+        by_type.setdefault(history.target_type(move), []).append(move)
     return by_type
 
 
@@ -57,21 +48,6 @@ def _what(
 ) -> Iterator[Candidate]:
     """Yield a question on the moved objects, with the frame after the first put of each."""
     first_puts = list({move.item: move for move in reversed(moves)}.values())[::-1]
-    items = [move.object_type for move in first_puts]
-    shown = all(history.shows_put(move) for move in first_puts)
-    if shown and len(set(items)) == len(items) and 0 < len(items) <= MANY and are_distinguishable(items):
-        answers = tuple(answer_of(item) for item in items)
-        clues = tuple(move.after for move in first_puts)
-        yield Candidate(FURTHER, form, tuple(map(in_or_on, places)), clues, answers, (*places, *items))
-
-
-def _where(history: TrajectoryHistory) -> Iterator[Candidate]:
-    """Yield the question on the types of receptacles that something was put into or onto."""
-    yield from listing_question(
-        FURTHER,
-        "Where did you put things?",
-        (
-            (history.states(move.after)[move.target].type, move.after if history.shows_put(move) else None)
-            for move in history.moves
-        ),
-    )
+    if all(history.shows_put(move) for move in first_puts):
+        clues, types = tuple(move.after for move in first_puts), [move.object_type for move in first_puts]
+        yield from type_question(FURTHER, form, tuple(map(in_or_on, places)), clues, types, places)

@@ -38,13 +38,7 @@ class FrameFacts:
 
 
 def frame_facts(steps: Sequence[Step], share: float, frames: Container[int] | None = None) -> list[FrameFacts]:
-    """Return the facts of the whole log, or only what some frames show.
-
-    Args:
-        steps: the log.
-        share: share of the frame's pixels that an object must fill to be seen.
-        frames: the clue frames; None for the whole log.
-    """
+    """Return the facts of the whole log, or what clue frames show: objects that fill a share of the frame's pixels."""
     facts = []
     loose = frozenset(name for step in steps for name in step.object_log.pickupable)
     for step, states in zip(steps, iter_object_states(steps), strict=True):
@@ -115,10 +109,6 @@ def _inside(glimpse: FrameFacts, words: str) -> set[str]:
     return {key for key in glimpse.objects if _place(glimpse, key) == _type_name(words)}
 
 
-def _names(glimpse: FrameFacts, keys: set[str]) -> list[str]:
-    return sorted(_name(glimpse.objects[key].type) for key in keys)
-
-
 def _events(facts: Sequence[FrameFacts], action: str, words: str | None = None) -> list[FrameFacts]:
     """Return the facts right after an action on an object of a type, if they include the object."""
     events = [item for item in facts if item.action == action and _is_target_known(item)]
@@ -183,11 +173,7 @@ def _before_put(facts: Sequence[FrameFacts], words: str, place: str) -> list[str
 def _moved_from(facts: Sequence[FrameFacts], words: str, place: str) -> list[str]:
     """Return where it went from a place, if it left that place once and then stayed."""
     places = _journey(facts, words)
-    return (
-        places[-1:]
-        if len(places) > 1 and places[-2] == _type_name(place) and places.count(_type_name(place)) == 1
-        else []
-    )
+    return places[-1:] if places[-2:-1] == [_type_name(place)] and places.count(_type_name(place)) == 1 else []
 
 
 def _moved_to(facts: Sequence[FrameFacts], words: str) -> list[str]:
@@ -204,12 +190,14 @@ def _journey(facts: Sequence[FrameFacts], words: str) -> list[str]:
     return places[:1] + [place for previous, place in pairwise(places) if place != previous]
 
 
-def _put_into(facts: Sequence[FrameFacts], _preposition: str, words: str) -> list[str]:
-    names: dict[str, str] = {}
-    for item in _events(facts, "PutObject"):
-        if item.target in item.objects and _place(item, item.target) == _type_name(words):
-            names.setdefault(item.target, _target_name(item))
-    return list(names.values())
+def _puts_at(facts: Sequence[FrameFacts], place: str, words: str | None = None) -> list[FrameFacts]:
+    """Return the facts right after puts (of an object of a type) into or onto a receptacle of a type."""
+    events = [item for item in _events(facts, "PutObject", words) if item.target in item.objects]
+    return [item for item in events if _place(item, item.target or "") == _type_name(place)]
+
+
+def _put_into(facts: Sequence[FrameFacts], _preposition: str, place: str) -> list[str]:
+    return list({item.target: _target_name(item) for item in _puts_at(facts, place)}.values())
 
 
 def _put_object(facts: Sequence[FrameFacts], _preposition: str, words: str) -> list[str]:
@@ -224,11 +212,8 @@ def _put_object(facts: Sequence[FrameFacts], _preposition: str, words: str) -> l
 
 
 def _put_down(facts: Sequence[FrameFacts]) -> list[str]:
-    names: dict[str, str] = {}
-    for item in _events(facts, "PutObject"):
-        if _place(item, item.target or "") is not None:
-            names.setdefault(item.target or "", _target_name(item))
-    return list(names.values())
+    puts = [item for item in _events(facts, "PutObject") if _place(item, item.target or "") is not None]
+    return list({item.target: _target_name(item) for item in puts}.values())
 
 
 def _put_places(facts: Sequence[FrameFacts]) -> list[str]:
@@ -262,11 +247,7 @@ def _open_then(facts: Sequence[FrameFacts], words: str, verb: str, item: str) ->
 
 
 def _open_at_put(facts: Sequence[FrameFacts], words: str, item: str, _preposition: str, place: str) -> list[str]:
-    events = [
-        event
-        for event in _events(facts, "PutObject", item)
-        if event.target in event.objects and _place(event, event.target) == _type_name(place)
-    ]
+    events = _puts_at(facts, place, item)
     return _open(events[0], words) if len(events) == 1 else []
 
 
@@ -295,7 +276,8 @@ def _left_at(facts: Sequence[FrameFacts], action: str, place: str, item: str) ->
     for previous, event in pairwise(facts):
         if event.action == action and event.target is not None and _target_is(event, item):
             holder = _whole(_holder(previous, event.target))
-            return _names(event, {key for key in event.objects if _whole(_holder(event, key)) == holder})
+            inside = [state.type for key, state in event.objects.items() if _whole(_holder(event, key)) == holder]
+            return sorted(map(_name, inside))
     return []
 
 
@@ -307,8 +289,7 @@ def _only_loose(item: FrameFacts) -> FrameFacts:
 
 def _all_contents(facts: Sequence[FrameFacts], _preposition: str, place: str) -> list[str]:
     """Return what is in a receptacle in any of the frames."""
-    names = {key: _name(item.objects[key].type) for item in facts for key in _inside(item, place)}
-    return sorted(names.values())
+    return sorted({key: _name(item.objects[key].type) for item in facts for key in _inside(item, place)}.values())
 
 
 def _is_in(facts: Sequence[FrameFacts], item: str, _preposition: str, place: str) -> list[str]:
@@ -352,9 +333,9 @@ def _openings(facts: Sequence[FrameFacts], words: str) -> list[str]:
     return [str(count)] if count else []
 
 
-def _puts(facts: Sequence[FrameFacts], _preposition: str, words: str) -> list[str]:
-    puts = [item for item in _events(facts, "PutObject") if _place(item, item.target or "") == _type_name(words)]
-    return [str(len(puts))] if puts else []
+def _puts(facts: Sequence[FrameFacts], _preposition: str, place: str) -> list[str]:
+    count = len(_puts_at(facts, place))
+    return [str(count)] if count else []
 
 
 def _n_picked_up(facts: Sequence[FrameFacts]) -> list[str]:

@@ -35,7 +35,7 @@ class FrameDataset:
             time steps of a video; this has one of them.
         cells: types in each token's part of the frame, (frames, tokens, types).
         shown: types that the frame shows near enough to be visible in AI2-THOR's sense, (frames, types).
-        present: types of which any pixel is in the frame, (frames, types).
+        present: types with any pixel in the frame, (frames, types).
     """
 
     frames: tuple[FrameRef, ...]
@@ -56,11 +56,7 @@ class FrameDataset:
 
 
 def read_frame_dataset(folders: Iterable[Path], image_processor: Any) -> FrameDataset:
-    """Read all frames of replayed sets.
-
-    Args:
-        folders: folders of the sets.
-        image_processor: image processor of the model.
+    """Read all frames of the folders of replayed sets.
 
     Raises:
         DataError: a set cannot be read, or its step log does not list the objects in frames.

@@ -76,9 +76,8 @@ class NanoNetwork(SequenceModel):
         if self._cached_features is not None:
             return self._cached_features[list(indices)]
         grid = torch.tensor([[1, *([int(self._dataset.pixels.shape[1] ** 0.5)] * 2)]]).expand(len(indices), 3)
-        output: Any = self.model.model.visual(self._dataset.tower_inputs(indices), grid_thw=grid)
-        features: Tensor = output.pooler_output
-        return features.reshape(len(indices), TOKENS, -1)
+        output = self.model.model.visual(self._dataset.tower_inputs(indices), grid_thw=grid)
+        return output.pooler_output.reshape(len(indices), TOKENS, -1)
 
     def vision_loss(self, features: Tensor, indices: Sequence[int], spelling: int) -> Tensor:
         """Return the loss of recognising objects by the features, a scalar.

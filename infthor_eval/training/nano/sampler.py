@@ -20,7 +20,6 @@ from infthor_eval.training.nano.frame_dataset import FrameDataset
 from infthor_eval.training.nano.network import spellings
 from infthor_eval.training.nano.synthetic_plans import SyntheticPlans
 from infthor_eval.training.question_sequences import question_sequences
-from model_adapters import Part
 
 __all__ = ["SequenceSampler", "corpus_texts", "question_intro"]
 
@@ -63,7 +62,7 @@ class SequenceSampler:
         seed: seed of the samples.
 
     Attributes:
-        skipped: items of which no sequence could be built.
+        skipped: items that could not become a sequence.
 
     Raises:
         DataError: there are no questions, no histories or no plans.
@@ -116,7 +115,7 @@ class SequenceSampler:
                 self.skipped.append(item)
 
     def questions(self, n: int, synthetic_share: float) -> list[TrainingSequence]:
-        """Return random questions with their answers, of which an expected share is synthetic."""
+        """Return random questions with their answers; each is synthetic with the probability `synthetic_share`."""
         return [
             self._presence_question() if self._rng.random() < synthetic_share else self._rng.choice(self._questions)
             for _ in range(n)
@@ -162,5 +161,5 @@ class SequenceSampler:
         words = noun(name)
         text = self._rng.choice(_QUESTIONS).format(with_article(words), words)
         prompt = question_text(CONTEXTS["clues"].intro, Question("", text, (), ()))
-        parts: list[Part] = [self._dataset.frames[index], prompt]
-        return self._encoder.answer("synthetic", parts, "yes" if self._dataset.shown[index, column] else "no")
+        answer = "yes" if self._dataset.shown[index, column] else "no"
+        return self._encoder.answer("synthetic", [self._dataset.frames[index], prompt], answer)

@@ -158,6 +158,4 @@ class _StageTrainer:
 
     def _token_loss(self, sequences: Sequence[TrainingSequence]) -> Tensor:
         """Return the mean loss per token of some sequences."""
-        batch = collate(sequences, self._network.family, pad_id=0)
-        loss: Tensor = self._network(**batch)["loss"]
-        return loss
+        return self._network(**collate(sequences, self._network.family, pad_id=0))["loss"]

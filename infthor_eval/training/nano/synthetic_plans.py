@@ -17,11 +17,7 @@ class SyntheticPlans:
     """Plans and actions of experts in which each object is replaced by one from the same place of a similar plan."""
 
     def __init__(self, recorded: Iterable[tuple[str, Sequence[str]]]) -> None:
-        """Group recorded plans by their kind; those whose actions name no object of the plan (ways) are ignored.
-
-        Args:
-            recorded: texts of recorded plans, each with its actions.
-        """
+        """Group recorded plans by their kind; those with actions that name no object of the plan (ways) are ignored."""
         kinds: dict[tuple[str, tuple[str, ...]], list[str]] = defaultdict(list)
         for plan, actions in recorded:
             templates = tuple(open_action(action, plan) for action in actions)
@@ -30,7 +26,7 @@ class SyntheticPlans:
         self._kinds = [(templates, plans) for (_, templates), plans in kinds.items()]
 
     def __bool__(self) -> bool:
-        """Return whether any plan can be sampled."""
+        """Return True if any plan can be sampled."""
         return bool(self._kinds)
 
     def sample(self, rng: random.Random) -> tuple[str, list[str]]:
