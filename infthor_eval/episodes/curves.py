@@ -106,7 +106,6 @@ class RunCurves:
     """The curves of one run.
 
     Attributes:
-        label: name of the run.
         is_bound: whether it is the upper bound: a planner, or the highest possible reward.
         is_embedded: whether its numbers are from the embedded simulator alone.
         curves: curves by facet; the first facet is always there.
@@ -125,11 +124,9 @@ class RewardCurves:
     """The curves of several runs on the same trajectories.
 
     Attributes:
-        task: name of the task, or of the tasks.
         facets: facets by name; the table is about the first one.
         runs: runs in the order given; the bound is last, so that it is drawn on top.
         n_trajectories: trajectories that every curve is the mean of.
-        notes: notes, a line each.
     """
 
     task: str
@@ -164,9 +161,6 @@ def compute_curves(
     planners (of other settings) are runs like the others, as none of them bounds them all.
 
     Args:
-        runs: at least one run.
-        shared: the episodes that they share.
-        facets: facets by name.
         functions_of: returns the step functions of a run's trajectories, by facet.
         count: returns the counts of some episodes by description, the number of all first.
     """

@@ -22,7 +22,6 @@ class TaskConfig(msgspec.Struct, frozen=True, kw_only=True):
 
     Attributes:
         trajectories: digests of the trajectories, by name.
-        config: settings of the task file.
     """
 
     trajectories: dict[str, str]
@@ -39,13 +38,7 @@ T = TypeVar("T", bound=TaskConfig)
 
 
 class RunConfig(msgspec.Struct, Generic[T], frozen=True):
-    """The part of a run's config that curves and replays need.
-
-    Attributes:
-        model: name and options of the subject.
-        simulator: simulator that it acted in.
-        tasks: configs of the tasks, by name.
-    """
+    """The part of a run's config that curves and replays need; `model` has the subject's name and options."""
 
     model: dict[str, Any]
     simulator: str
@@ -54,13 +47,7 @@ class RunConfig(msgspec.Struct, Generic[T], frozen=True):
 
 @dataclass(frozen=True)
 class RecordedRun(Generic[P, T]):
-    """The journal of a run of episodes.
-
-    Attributes:
-        label: name of the run beside others.
-        header: header of the journal.
-        records: records of all episodes.
-    """
+    """The journal of a run of episodes; `label` names it beside other runs."""
 
     label: str
     header: RunHeader

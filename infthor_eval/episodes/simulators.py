@@ -28,7 +28,6 @@ class Simulators:
             name: "embedded", "unity", or the path of a Unity executable.
             scenes: folder of recorded floor plans, for the embedded one.
             trajectories: trajectories whose objects complete the recorded floor plans.
-            options: options of each simulator, see `Simulator`.
         """
         self._options = options
         self._open = ExitStack()

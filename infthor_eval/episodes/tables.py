@@ -34,8 +34,6 @@ def endings_table(
     """Return the table of how episodes ended.
 
     Args:
-        title: title of the table.
-        tasks: tasks, see `named_tasks`.
         column: heading of a further column; empty for none.
         value: value of a task in it.
     """

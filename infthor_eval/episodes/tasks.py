@@ -24,10 +24,7 @@ class EpisodeTask(ABC, Generic[S, T]):
     """A task file that was read, with its trajectories.
 
     Attributes:
-        file: the task file.
-        name: name of the task.
         settings: its `dataset_kwargs`, with what the command line gives instead.
-        trajectories: all its trajectories.
     """
 
     def __init__(

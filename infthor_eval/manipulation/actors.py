@@ -26,11 +26,9 @@ _MAX_TURN = 0.17  # radians of a random turn about each axis: 10 degrees
 
 @dataclass(frozen=True)
 class ArmSituation:
-    """An episode that begins.
+    """An episode that begins in an environment that was reset to it.
 
     Attributes:
-        environment: the environment, reset to the episode.
-        instruction: the instruction.
         seed: seed of everything random.
         max_step: length of the longest movement, metres.
     """
@@ -71,12 +69,7 @@ class PolicyActor:
     """A vision-language-action policy."""
 
     def __init__(self, policy: Policy, *, blank: bool) -> None:
-        """Take a policy.
-
-        Args:
-            policy: the policy.
-            blank: whether it is shown grey frames instead of the actual ones.
-        """
+        """Take a policy; `blank` shows it grey frames instead of the actual ones."""
         self._policy, self._blank = policy, blank
 
     def begin(self, situation: ArmSituation) -> None:
@@ -96,11 +89,7 @@ class PolicyActor:
 
 
 def _check_step(step: object) -> None:
-    """Check a step of a policy, which is code of others.
-
-    Raises:
-        ModelError: it is not three lengths, three angles and a gripper, all finite numbers.
-    """
+    """Check that a policy, which is code of others, gives three lengths, three angles and a gripper, all finite."""
     if not isinstance(step, ArmDelta):
         raise ModelError(f"the policy gives {step!r:.60} for a step; it must be an ArmDelta")
     numbers = (*step.translation, *step.rotation, step.gripper)

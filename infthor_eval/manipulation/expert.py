@@ -59,7 +59,6 @@ def replay_expert(trajectory: Trajectory, simulator: Simulator) -> ExpertStates:
     """Replay the expert's actions, and keep the state before each pick-up and put that succeeds.
 
     Args:
-        trajectory: the trajectory.
         simulator: simulator with AI2-THOR's default agent; it is left in the trajectory's last state.
 
     Raises:

@@ -89,7 +89,6 @@ class Linkage:
         """Measure an arm and the object that it holds.
 
         Args:
-            arm: state of the arm.
             held: the held object; its box is along the world's axes, so it grows when the hand is tilted.
             before: measurements in another pose, whose shapes are taken over. Those of the first pose are the best: the
                 arm is bent, which tells the side of the elbow, and the hand is level, so the object's box is tight.

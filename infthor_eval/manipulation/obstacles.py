@@ -149,9 +149,6 @@ def cavity(item: ThorObject, places: Places, entry: Entry, hinge: int) -> list[C
     """Return boxes of a receptacle that is entered from the front: sides, back, top, boards, and its open door.
 
     Args:
-        item: the receptacle.
-        places: places in it.
-        entry: its opening.
         hinge: edge of the opening that the door hangs on: -1 for the one of lower coordinate, 1 for the other, 0 for no
             door.
     """

@@ -12,12 +12,7 @@ RADII = (0.04, 0.5)  # of the hand's sphere, metres, as AI2-THOR allows
 
 @dataclass(frozen=True, kw_only=True)
 class ManipulationOptions(SimulatorOptions):
-    """Options of the suite, with their help texts.
-
-    Attributes:
-        radius: radius of the hand's sphere in metres, as typed; None for the task's own.
-        instruction: instruction of a policy; None for the task's own.
-    """
+    """Options of the suite, with their help texts; None is the task's own."""
 
     radius: str | None = field(
         default=None,

@@ -143,7 +143,6 @@ def support(held: Parts, places: Places) -> Array:
 
     Args:
         held: box of the held object in some poses (n, 1).
-        places: places of the receptacle.
     """
     corners = held.axes[:, 0].transpose(0, 2, 1)[:, None] @ (_CORNERS * held.half)[..., None]
     spots = (held.center + _SHRUNK * corners[..., 0])[:, :, [0, 2]]
@@ -169,7 +168,6 @@ def occupancy(held: Parts, places: Places, others: Sequence[Corners]) -> Array:
 
     Args:
         held: box of the held object in some poses (n, 1).
-        places: places of the receptacle.
         others: boxes of objects that may stand there, or be over it; one that begins below the places is not on them.
     """
     if not others:

@@ -59,12 +59,10 @@ class RecordedEpisodes(RecordedTrajectory[ArmRun, ArmRecord]):
 
 
 def recorded_episodes(run: ArmRun, task: str | None, trajectory: str | None) -> RecordedEpisodes:
-    """Find a run's records of a trajectory.
+    """Find a run's records of a trajectory; None for the only one.
 
     Args:
-        run: the run.
         task: name of the task; None for all of them, if they are of different kinds.
-        trajectory: name of the trajectory; None for the only one.
 
     Raises:
         UsageError: there is no such task or trajectory, or none is given where there are several.

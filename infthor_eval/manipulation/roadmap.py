@@ -60,12 +60,7 @@ class MoveKind(IntEnum):
 
 @dataclass(frozen=True)
 class ArmMove:
-    """One movement of an arm.
-
-    Attributes:
-        kind: kind of the movement.
-        pose: pose after it (1).
-    """
+    """One movement of an arm, and the pose (1) after it."""
 
     kind: MoveKind
     pose: Poses
@@ -88,9 +83,6 @@ class Terrain:
         """Measure how near obstacles are in the present pose.
 
         Args:
-            linkage: the arm in its present pose.
-            obstacles: obstacles.
-            contacts: collisions so far.
             escapes: whether a part that is deep in a thing may leave it through other parts of that thing, as the
                 embedded simulator allows; in Unity it is stuck.
         """
@@ -247,14 +239,7 @@ class Roadmap:
     """Free poses, and the costs of moving from one to another."""
 
     def __init__(self, terrain: Terrain, others: Poses, ends: Poses, costs: Array) -> None:
-        """Collect poses.
-
-        Args:
-            terrain: tells which movements are free.
-            others: poses that may be passed (n).
-            ends: poses to reach (m).
-            costs: costs of these (m,).
-        """
+        """Collect the poses that may be passed (n), and those to reach (m) with their costs (m,)."""
         self._terrain, self._costs = terrain, costs
         self._poses = Poses.join([terrain.linkage.now, ends, others])
         self._n_ends = len(ends)

@@ -90,12 +90,7 @@ class ArmTaskSettings:
 
 
 class ManipulationTask(EpisodeTask[ArmTaskSettings, ArmTrajectory]):
-    """A task file that was read, with its episodes.
-
-    Attributes:
-        kind: kind of its episodes.
-        episodes: its episodes, each with its trajectory.
-    """
+    """A task file that was read, with its episodes, each with its trajectory."""
 
     def __init__(self, file: TaskFile, request: TaskRequest[ManipulationOptions]) -> None:
         """Check the file and find its episodes.

@@ -21,7 +21,6 @@ class ArmEpisode:
 
     Attributes:
         index: index of the expert's low-level action.
-        kind: kind of the episode.
         object_type: type of the object that is picked up or put.
         receptacle_type: type of the receptacle that it is put into; None for pick-ups.
     """
@@ -34,11 +33,7 @@ class ArmEpisode:
 
 @dataclass(frozen=True)
 class ArmTrajectory(TaskTrajectory):
-    """A trajectory with its episodes.
-
-    Attributes:
-        episodes: its episodes, in time order.
-    """
+    """A trajectory with its episodes, in time order."""
 
     episodes: Sequence[ArmEpisode]
 

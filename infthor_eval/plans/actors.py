@@ -14,12 +14,7 @@ __all__ = ["Act", "PlanActor", "PlanBaseline", "PlanSituation"]
 
 @dataclass(frozen=True)
 class Act:
-    """An action that an actor chose.
-
-    Attributes:
-        action: text of the action, or a call of AI2-THOR's.
-        reply: reply of the model; None for baselines.
-    """
+    """An action that an actor chose, as a text or a call of AI2-THOR's, and the model's reply (None for baselines)."""
 
     action: str | Mapping[str, Any]
     reply: Reply | None = None
@@ -27,14 +22,7 @@ class Act:
 
 @dataclass(frozen=True)
 class PlanSituation:
-    """A plan that begins.
-
-    Attributes:
-        environment: the environment, reset to the plan.
-        plan: the plan.
-        seed: seed of everything random.
-        observation: the first observation.
-    """
+    """A plan that begins: the environment reset to it, its first observation, and the seed of everything random."""
 
     environment: PlanEnvironment
     plan: Plan

@@ -34,8 +34,6 @@ class ExpertAction:
     """An action of the expert.
 
     Attributes:
-        call: call of the simulator.
-        text: the action in words.
         pose: pose of the agent after it.
         completes: whether the goal of the plan's task holds after it, and did not at the plan's start.
     """
@@ -51,7 +49,6 @@ class PlanStart:
     """The true state before a plan.
 
     Attributes:
-        mark: mark of the simulator.
         frame: frame that the agent sees; None if frames are not kept.
         treatments: what was done to objects so far in the plan's task.
     """

@@ -29,14 +29,7 @@ class PlanKind(StrEnum):
 
 @dataclass(frozen=True)
 class TrajectoryTask:
-    """One task of a trajectory.
-
-    Attributes:
-        text: its goal in words.
-        task: its goal condition.
-        first_high: index of its first sub-goal.
-        end_high: index after its last sub-goal.
-    """
+    """One task of a trajectory: its goal in words and as a condition, and its sub-goals [first_high, end_high)."""
 
     text: str
     task: Task
@@ -50,7 +43,6 @@ class Plan:
 
     Attributes:
         index: place among the trajectory's plans.
-        kind: kind of the plan.
         text: the plan in words ("pick up the mug").
         task: index of the task that it belongs to; the earlier one if it is between two tasks.
         low: indices of the expert's low-level actions, [first, end).

@@ -33,11 +33,7 @@ class PlansRun(RecordedRun[PlanRecord, PlanTaskConfig]):
 
 
 def shared_plans(runs: Sequence[PlansRun], task: str | None) -> SharedUnits[PlanRecord]:
-    """Find the plans of one task that all runs have, in trajectories that each of them has in full.
-
-    Args:
-        runs: at least one run.
-        task: name of the task; None for the only one that they share.
+    """Find the plans of a task (None: the only one shared) in trajectories that all runs (at least one) have in full.
 
     Raises:
         UsageError: they share no task or several, or their reward rules differ.

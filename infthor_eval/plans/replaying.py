@@ -63,12 +63,7 @@ class RecordedPlans(RecordedTrajectory[PlansRun, PlanRecord]):
 
 
 def recorded_plans(run: PlansRun, task: str | None, trajectory: str | None) -> RecordedPlans:
-    """Find a run's records of a trajectory.
-
-    Args:
-        run: the run.
-        task: name of the task; None for the only one.
-        trajectory: name of the trajectory; None for the only one.
+    """Find a run's records of a trajectory in a task; None for the only one.
 
     Raises:
         UsageError: there is no such task or trajectory, or none is given and there are several.

@@ -69,13 +69,7 @@ class RewardRules(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 @dataclass(frozen=True)
 class StepReward:
-    """The reward of one action.
-
-    Attributes:
-        reward: reward for the plan and for the task.
-        done: whether the plan was completed with it.
-        failed: whether the plan failed with it.
-    """
+    """The reward of one action, and whether the plan was completed or failed with it."""
 
     reward: float = 0.0
     done: bool = False
@@ -113,9 +107,6 @@ class PlanReward:
         """Begin a plan.
 
         Args:
-            rules: reward rules.
-            target: target of the plan.
-            task: task that the plan is part of.
             start: the world at the plan's start.
             treatments: what was washed, heated and cooled in this task before.
             grid: reachable cells; GotoLocation needs it.
@@ -142,12 +133,7 @@ class PlanReward:
         return self._goal_reached
 
     def after(self, call: Mapping[str, Any], before: SimulatorView, after: SimulatorView) -> StepReward:
-        """Return the reward of an action.
-
-        Args:
-            call: the action, as `Simulator.step(**call)` takes it.
-            before: the world before it.
-            after: the world after it.
+        """Return the reward of an action, given as `Simulator.step(**call)` takes it, and the world before and after.
 
         Raises:
             ValueError: the plan is over.
@@ -278,9 +264,6 @@ def max_reward(
     end. Then too the reward of the shortest path is returned.
 
     Args:
-        rules: reward rules.
-        target: target of the plan.
-        start: the world at the plan's start.
         grid: reachable cells; GotoLocation needs it.
         completes: the task if its goal can be reached in the plan; None if it cannot, or holds already.
     """
@@ -309,7 +292,6 @@ def count_actions_to_goal(
     """Return how many of some actions a plan takes: GotoLocation is done some steps before the end of a path.
 
     Args:
-        rules: reward rules.
         target: target of the plan; plans of other kinds than GotoLocation take all actions.
         poses: poses after each of the actions.
         grid: reachable cells; GotoLocation needs it.

@@ -33,12 +33,7 @@ class PlanTarget:
 
 
 def target_of(plan: Plan, grounding: Grounding, view: SimulatorView) -> PlanTarget:
-    """Return the target of a recorded plan; GotoLocation's needs a grid, see `PlanEnvironment`.
-
-    Args:
-        plan: the plan.
-        grounding: ids of the trajectory's objects.
-        view: the world at the plan's start.
+    """Return the target of a recorded plan at its start; GotoLocation's needs a grid, see `PlanEnvironment`.
 
     Raises:
         InfeasibleError: the scene has no object for an id.
@@ -47,16 +42,9 @@ def target_of(plan: Plan, grounding: Grounding, view: SimulatorView) -> PlanTarg
 
 
 def subject_of(target: PlanTarget, start: SimulatorView) -> str | None:
-    """Return the id of the object that a plan changes.
+    """Return the id of the object that a plan changes; None if no object is named and none is held at its start.
 
     ALFRED's plans of washing, heating and cooling name the appliance; their object is the one held at the start.
-
-    Args:
-        target: target of the plan.
-        start: the world at its start.
-
-    Returns:
-        The id; None if no object is named and none is held.
     """
     if target.kind in _TREATMENTS:
         named = start.objects.get(target.object_id or "")

@@ -50,8 +50,6 @@ class PlansTask(EpisodeTask[PlanTaskSettings, PlanTrajectory]):
     """A task file that was read, with its trajectories.
 
     Attributes:
-        rules: reward rules.
-        decoding: decoding of each action.
         memory: the part of the history that a model is given.
         evaluated_trajectories: trajectories that are evaluated.
     """

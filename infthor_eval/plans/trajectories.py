@@ -14,12 +14,7 @@ __all__ = ["PlanTrajectory", "read_plan_trajectory"]
 
 @dataclass(frozen=True)
 class PlanTrajectory(TaskTrajectory):
-    """A trajectory with its plans.
-
-    Attributes:
-        plans: its plans, in time order.
-        tasks: the tasks that these belong to.
-    """
+    """A trajectory with its plans, in time order, and the tasks that these belong to."""
 
     plans: Sequence[Plan]
     tasks: Sequence[TrajectoryTask]

@@ -47,11 +47,7 @@ class Misuse(StrEnum):
 
 
 class UngroundedError(ValueError):
-    """A text has no known action, lacks an argument, or matches no visible object; the message says which.
-
-    Attributes:
-        misuse: kind of the error.
-    """
+    """A text has no known action, lacks an argument, or matches no visible object; the message says which."""
 
     def __init__(self, misuse: Misuse, message: str) -> None:
         super().__init__(message)
@@ -91,7 +87,6 @@ def text_of(action: str, object_id: str | None = None, receptacle_id: str | None
     """Return the text of a call.
 
     Args:
-        action: name of the action.
         object_id: id of the object acted on; for PutObject, of the object that is put.
         receptacle_id: id of the receptacle, for PutObject.
     """
@@ -105,8 +100,6 @@ def ground(
     """Turn an action text into a call.
 
     Args:
-        text: the action.
-        view: the current state of the simulator.
         degrees: angle by which LookUp and LookDown turn the camera.
         preferred: ids of objects that take precedence over nearer ones of their type.
 
@@ -137,7 +130,6 @@ def applicable_calls(view: SimulatorView, degrees: float = _LOOK_DEGREES) -> lis
     """Return all calls that are possible now, in a fixed order: each action with each visible object it applies to.
 
     Args:
-        view: the current state of the simulator.
         degrees: angle by which LookUp and LookDown turn the camera.
     """
     calls = [ground(ActionText(name), view, degrees) for name in sorted(_PLAIN)]

@@ -25,7 +25,6 @@ class SafeController(ai2thor.controller.Controller):
         """Start the simulator and load a scene.
 
         Args:
-            launch: the simulator to start.
             scene: name of the scene, or a house description.
             options: options of ai2thor's Controller (`width`, `renderInstanceSegmentation`, ...).
 

@@ -31,22 +31,13 @@ class Grounding:
     """
 
     def __init__(self, view: SimulatorView) -> None:
-        """Store the initial positions of all objects.
-
-        Args:
-            view: state at the start of the episode, after the scene was restored.
-        """
+        """Store the positions of all objects at the start of the episode, after the scene was restored."""
         self._initial_positions = {key: _position(item) for key, item in view.objects.items()}
         self._chosen: dict[str, str] = {}
         self.distances: dict[str, float] = {}
 
     def ground(self, object_id: str, view: SimulatorView) -> str | None:
-        """Return the simulator's id for a recorded one, or None if the scene has no object of the type.
-
-        Args:
-            object_id: the recorded id.
-            view: the current state.
-        """
+        """Return the simulator's id for a recorded one, or None if the scene has no object of the type."""
         chosen = self._chosen.get(object_id)
         if chosen in view.objects:
             return chosen

@@ -31,8 +31,6 @@ def dump_scene(simulator: Simulator, scene: str, folder: Path, overwrite: bool =
 
     Args:
         simulator: the simulator that has the scene, usually Unity.
-        scene: name of the scene.
-        folder: the folder (`--data`).
         overwrite: True to replace a different recording of the scene.
 
     Returns:

@@ -20,13 +20,7 @@ _ROUNDS = 3  # passes over all objects: moving a receptacle also moves what is i
 
 
 class _State(NamedTuple):
-    """A state of objects that calls can change.
-
-    Attributes:
-        read: returns the state of an object.
-        on: call that sets it; empty if there is none.
-        off: call that unsets it; empty if there is none.
-    """
+    """A state of objects that calls can change; `on` and `off` set and unset it, empty if no call does."""
 
     read: Callable[[ThorObject], Any]
     on: dict[str, Any]
@@ -53,7 +47,6 @@ def transfer(simulator: Simulator, target: SimulatorView) -> list[str]:
 
     Args:
         simulator: simulator in the same scene, restored to the same initial state.
-        target: state of the other simulator.
 
     Returns:
         Sorted ids of the objects that are missing, or could not be moved to their position.

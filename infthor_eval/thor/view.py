@@ -78,7 +78,6 @@ class AgentPose(msgspec.Struct, frozen=True):
     """The agent's pose.
 
     Attributes:
-        position: position in metres.
         rotation: rotation about the vertical, degrees.
         horizon: angle of the camera below the horizon, degrees.
         standing: False if the agent crouches, None if it cannot crouch.
