@@ -20,8 +20,7 @@ class SimulatorOptions:
     """
 
     simulator: str = field(
-        default="embedded",
-        metadata={"help": "embedded, unity, or the path of a Unity executable.", "metavar": "NAME"},
+        default="embedded", metadata={"help": "embedded, unity, or the path of a Unity executable.", "metavar": "NAME"}
     )
     scenes: str | None = field(
         default=None,

@@ -111,7 +111,6 @@ class EpisodeInReplay(Protocol):
         Returns:
             How the result differs from the record; empty if it does not.
         """
-        ...
 
     def observe(self) -> Any:
         """Return the present observation.
@@ -119,7 +118,6 @@ class EpisodeInReplay(Protocol):
         Raises:
             DataError: the simulator sent no frame.
         """
-        ...
 
 
 class EpisodeReplay(ABC, Generic[P, F]):

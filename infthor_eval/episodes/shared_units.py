@@ -63,7 +63,10 @@ def shared_units(
     units = [run.by_trajectory(tasks) for run in runs]
     digests = [run.digests(tasks) for run in runs]
     names = sorted({*(name for known in digests for name in known), *(name for item in units for name in item)})
-    left_out = {name: _excluded_places(item[name] for item in units if name in item) for name in names}
+    left_out = {
+        name: {place for item in units for place, record in item.get(name, {}).items() if record.excluded is not None}
+        for name in names
+    }
     shared = [name for name in names if _is_shared(name, digests, units) and units[0][name].keys() - left_out[name]]
     if not shared:
         which = " and ".join(tasks)
@@ -108,11 +111,6 @@ def only_name(what: str, option: str, name: str | None, known: Sequence[str]) ->
     if name is not None and name not in known:
         raise unknown_name(f"{what} of this run", name, known)
     return name or known[0]
-
-
-def _excluded_places(trajectory: Iterable[Mapping[Any, UnitRecord[P]]]) -> set[Any]:
-    """Return the places in a trajectory of the episodes that some run excludes."""
-    return {place for units in trajectory for place, record in units.items() if record.excluded is not None}
 
 
 def _is_shared(name: str, digests: Sequence[Mapping[str, str]], units: Sequence[Units[P]]) -> bool:

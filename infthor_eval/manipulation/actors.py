@@ -4,7 +4,7 @@ import math
 import random
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import ClassVar, Protocol, runtime_checkable
 
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.blank import blank_like
@@ -44,7 +44,6 @@ class ArmActor(Protocol):
 
     def begin(self, situation: ArmSituation) -> None:
         """Begin an episode."""
-        ...
 
     def act(self, frame: FrameRef | None) -> Sequence[Step]:
         """Choose the next steps, to be executed in order; an empty sequence gives up.
@@ -53,7 +52,6 @@ class ArmActor(Protocol):
             ModelError: a policy fails, or its result is no movement.
             DataError: the frame cannot be read.
         """
-        ...
 
 
 @runtime_checkable
@@ -62,7 +60,6 @@ class ArmBaseline(Subject, Protocol):
 
     def arm_actor(self) -> ArmActor:
         """Create the actor of a trajectory."""
-        ...
 
 
 class PolicyActor:
@@ -105,6 +102,11 @@ def _check_step(step: object) -> None:
 
 class _ArmBaseline(BaselineSubject):
     capabilities = Capabilities(counts_tokens=False, token_ids=False, max_in_flight=_IN_FLIGHT)
+    _actor: ClassVar[type[ArmActor]]
+
+    def arm_actor(self) -> ArmActor:
+        """See `ArmBaseline`."""
+        return self._actor()
 
 
 class _StillActor:
@@ -141,30 +143,21 @@ class StillArm(_ArmBaseline):
     """Closes its hand, or opens it, where it is: what succeeds without a movement."""
 
     name = "still"
-
-    def arm_actor(self) -> ArmActor:
-        """See `ArmBaseline`."""
-        return _StillActor()
+    _actor = _StillActor
 
 
 class RandomArm(_ArmBaseline):
     """Moves, turns, closes and opens its hand at random."""
 
     name = "random-arm"
-
-    def arm_actor(self) -> ArmActor:
-        """See `ArmBaseline`."""
-        return _RandomArmActor()
+    _actor = _RandomArmActor
 
 
 class PlannerArm(_ArmBaseline):
     """Knows where everything is, and moves there by inverse kinematics: the upper bound."""
 
     name = "planner-arm"
-
-    def arm_actor(self) -> ArmActor:
-        """See `ArmBaseline`."""
-        return _PlannerActor()
+    _actor = _PlannerActor
 
 
 BASELINES: Mapping[str, Callable[[int], ArmBaseline]] = {

@@ -178,13 +178,11 @@ class Terrain:
         if not self.contacts:
             return np.zeros((len(poses), 0))
         wrists, held = poses.world(), self.linkage.held_box(poses).center[:, 0]
-        return np.stack(
-            [
-                np.maximum(np.linalg.norm(wrists - c.wrist, axis=1), np.linalg.norm(held - c.held, axis=1))
-                for c in self.contacts
-            ],
-            axis=1,
-        )
+        apart = [
+            np.maximum(np.linalg.norm(wrists - c.wrist, axis=1), np.linalg.norm(held - c.held, axis=1))
+            for c in self.contacts
+        ]
+        return np.stack(apart, axis=1)
 
 
 def _tolerance(clearance: Array) -> Array:

@@ -71,12 +71,7 @@ class ArmTaskSettings:
     @property
     def grasp(self) -> Grasp:
         """How the hand closes and opens."""
-        return Grasp(
-            radius=self.radius,
-            takes_all=self.grasps == "all",
-            at_palm=self.hold == "palm",
-            threshold=self.gripper_threshold,
-        )
+        return Grasp(self.radius, self.grasps == "all", self.hold == "palm", self.gripper_threshold)
 
     @property
     def camera(self) -> tuple[int, float]:

@@ -40,7 +40,6 @@ class PlanActor(Protocol):
             DataError: a frame cannot be read.
             ModelError: the model cannot take the history.
         """
-        ...
 
     def act(self) -> Act:
         """Choose the next action.
@@ -49,11 +48,9 @@ class PlanActor(Protocol):
             DataError: a frame cannot be read.
             ModelError: the model cannot reply.
         """
-        ...
 
     def observe(self, outcome: StepOutcome) -> None:
         """Take the outcome of the last action, if the plan goes on."""
-        ...
 
 
 @runtime_checkable
@@ -62,8 +59,6 @@ class PlanBaseline(Subject, Protocol):
 
     def fit(self, trajectories: Sequence[Trajectory]) -> None:
         """Take all trajectories of the run; called once, before the first plan."""
-        ...
 
     def actor(self, trajectory: Trajectory) -> PlanActor:
         """Create the actor of a trajectory."""
-        ...

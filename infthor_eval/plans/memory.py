@@ -65,7 +65,6 @@ class Memory(Protocol):
             DataError: a frame cannot be read.
             ModelError: the required parts do not fit.
         """
-        ...
 
 
 class FullHistory:

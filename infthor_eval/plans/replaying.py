@@ -114,9 +114,17 @@ class PlanReplay(EpisodeReplay[PlanRecord, PlanFrame]):
 
     def _frame(self, record: Record, number: int, observation: PlanObservation | None, note: str) -> PlanFrame:
         payload, step = record.payload, record.payload.steps[number - 1] if number else StepRecord()
-        is_end = 0 < number == len(payload.steps)
+        n_steps = len(payload.steps)
+        is_end = 0 < number == n_steps
         return PlanFrame(
-            title=self._title(payload),
+            title=PlanTitle(
+                payload.index + 1,
+                self.n_episodes,
+                payload.plan,
+                payload.goal,
+                payload.n_expert_steps,
+                n_actions=n_steps,
+            ),
             observation=observation,
             number=number,
             ending=ending_of(record, number),
@@ -124,14 +132,9 @@ class PlanReplay(EpisodeReplay[PlanRecord, PlanFrame]):
             note=note,
             rewards=self._rewards(payload, number),
             action=_action_text(step),
-            reply=_reply_text(step),
+            reply=step.reply if step.reply and step.reply.strip() != step.action else "",
             wrong=step.message,
             goal_reached=is_end and payload.goal_reached,
-        )
-
-    def _title(self, plan: PlanRecord) -> PlanTitle:
-        return PlanTitle(
-            plan.index + 1, self.n_episodes, plan.plan, plan.goal, plan.n_expert_steps, n_actions=len(plan.steps)
         )
 
     def _rewards(self, plan: PlanRecord, number: int) -> PlanRewards:
@@ -219,11 +222,6 @@ def _action_text(step: StepRecord) -> str:
     if isinstance(object_id, str) and step.call is not None and step.action == step.call["action"]:
         return str(text_of(step.action, object_id))
     return step.action
-
-
-def _reply_text(step: StepRecord) -> str:
-    reply = step.reply or ""
-    return "" if reply.strip() == step.action else reply
 
 
 def _point(pose: AgentPose) -> Point:

@@ -8,9 +8,9 @@ from infthor_eval.plans.plan import Plan, PlanKind
 from infthor_eval.thor.grounding import Grounding
 from infthor_eval.thor.view import SimulatorView
 
-__all__ = ["PlanTarget", "in_hand", "subject_of", "target_of"]
+__all__ = ["TREATMENTS", "PlanTarget", "in_hand", "subject_of", "target_of"]
 
-_TREATMENTS = {PlanKind.CLEAN, PlanKind.HEAT, PlanKind.COOL}
+TREATMENTS = {PlanKind.CLEAN, PlanKind.HEAT, PlanKind.COOL}
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ def subject_of(target: PlanTarget, start: SimulatorView) -> str | None:
 
     ALFRED's plans of washing, heating and cooling name the appliance; their object is the one held at the start.
     """
-    if target.kind in _TREATMENTS:
+    if target.kind in TREATMENTS:
         named = start.objects.get(target.object_id or "")
         if named is None or not named.pickupable:
             return next(iter(start.inventory), None)

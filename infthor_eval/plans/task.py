@@ -72,10 +72,8 @@ class PlansTask(EpisodeTask[PlanTaskSettings, PlanTrajectory]):
         self.decoding = decoding_of(kwargs, request.seed, file.name)
         self.memory = memory_named(settings.history, self._options.retriever)
         super().__init__(file, request, settings, read_plan_trajectory)
-        having_plans = [trajectory for trajectory in self.trajectories.trajectories if self.plans(trajectory)]
-        self.evaluated_trajectories = limit_items(
-            having_plans, lambda trajectory: trajectory.traj_id, request.seed, request.limit
-        )
+        having_plans = [item for item in self.trajectories.trajectories if self.plans(item)]
+        self.evaluated_trajectories = limit_items(having_plans, lambda item: item.traj_id, request.seed, request.limit)
         if not self.evaluated_trajectories:
             raise UsageError(f"{self.name}: no trajectory there has a final task; make some with --test-set")
 

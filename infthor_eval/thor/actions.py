@@ -115,7 +115,10 @@ def ground(
         return {"action": text.action, "degrees": degrees}
     if text.action in _PLAIN:
         return {"action": text.action}
-    _refuse_unknown(text, view)
+    known = {item.object_type for item in view.objects.values()}
+    for name in text.types:
+        if name not in known:
+            raise UngroundedError(Misuse.UNKNOWN_OBJECT, f"{text}: {name}: none in this scene")
     if text.action == "PutObject" and text.types[0] not in map(object_type_of, view.inventory):
         raise UngroundedError(Misuse.NOT_POSSIBLE, f"{text}: no {text.types[0]} in the hand")
     return {"action": text.action, "objectId": _choose_object(text, view, preferred).object_id}
@@ -160,13 +163,6 @@ def object_type_of(object_id: str) -> str:
     """
     parts = object_id.split("|")
     return parts[4].split("_")[0] if len(parts) > 4 else parts[0]
-
-
-def _refuse_unknown(text: ActionText, view: SimulatorView) -> None:
-    known = {item.object_type for item in view.objects.values()}
-    for name in text.types:
-        if name not in known:
-            raise UngroundedError(Misuse.UNKNOWN_OBJECT, f"{text}: {name}: none in this scene")
 
 
 def _choose_object(text: ActionText, view: SimulatorView, preferred: Container[str]) -> ThorObject:

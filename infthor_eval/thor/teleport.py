@@ -2,6 +2,8 @@
 
 from typing import Any
 
+from msgspec.structs import asdict
+
 from infthor_eval.thor.view import AgentPose
 
 __all__ = ["teleport_call"]
@@ -17,10 +19,9 @@ def teleport_call(pose: AgentPose, *, force: bool = True) -> dict[str, Any]:
     Returns:
         `{"action": ..., arguments}` for `Simulator.step(**call)`.
     """
-    at = pose.position
     call: dict[str, Any] = {
         "action": "TeleportFull",
-        "position": {"x": at.x, "y": at.y, "z": at.z},
+        "position": asdict(pose.position),
         "rotation": {"x": 0.0, "y": pose.rotation, "z": 0.0},
         "horizon": pose.horizon,
         "forceAction": force,
