@@ -32,10 +32,6 @@ class SimulatorOptions:
     )
 
     def __post_init__(self) -> None:
-        """Check the options.
-
-        Raises:
-            UsageError: an unknown kind of frames.
-        """
+        """Check the options; raises UsageError for an unknown kind of frames."""
         if self.frames not in _FRAMES:
             raise UsageError(f"--frames {self.frames}: tasks in a simulator have {', '.join(_FRAMES)}")

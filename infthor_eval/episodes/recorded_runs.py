@@ -18,11 +18,7 @@ _EMBEDDED = "embedded"  # as the option --simulator names it
 
 
 class TaskConfig(msgspec.Struct, frozen=True, kw_only=True):
-    """The part of a task's run config that curves and replays need.
-
-    Attributes:
-        trajectories: digests of the trajectories, by name.
-    """
+    """The part of a task's run config that curves and replays need: digests of trajectories by name, and settings."""
 
     trajectories: dict[str, str]
     config: dict[str, Any] = {}
@@ -60,21 +56,13 @@ class RecordedRun(Generic[P, T]):
 
     @classmethod
     def read(cls, folder: Path, label: str | None = None) -> Self:
-        """Read the run in a folder; its own name is the label if none is given.
-
-        Raises:
-            DataError: the journal is missing or damaged.
-        """
+        """Read the run in a folder, by default labelled by its own name; DataError for a missing or damaged journal."""
         header, records = read_run(folder, cls.record_types)
         return cls(label or header.name, header, records)
 
     @cached_property
     def config(self) -> RunConfig[T]:
-        """The run's config.
-
-        Raises:
-            DataError: it is not the config of a run of this suite.
-        """
+        """The run's config; raises DataError if it is not that of a run of this suite."""
         problem = f"{self.label}: not the config of a run of {self.suite}"
         with wrap_errors(problem, "start the run again with --fresh", catch=msgspec.ValidationError):
             config: RunConfig[T] = msgspec.convert(self.header.config, RunConfig[self.task_config])  # type: ignore[name-defined]

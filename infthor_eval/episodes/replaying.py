@@ -106,18 +106,10 @@ class EpisodeInReplay(Protocol):
     """An episode that is being replayed."""
 
     def repeat(self, step: Any, *, is_last: bool) -> str:
-        """Repeat a recorded step; do nothing if the episode is over already.
-
-        Returns:
-            How the result differs from the record; empty if it does not.
-        """
+        """Repeat a recorded step unless the episode is over; return how its result differs, empty if it does not."""
 
     def observe(self) -> Any:
-        """Return the present observation.
-
-        Raises:
-            DataError: the simulator sent no frame.
-        """
+        """Return the present observation; raises DataError if the simulator sent no frame."""
 
 
 class EpisodeReplay(ABC, Generic[P, F]):

@@ -57,11 +57,7 @@ class EpisodeRunner(Generic[E, P]):
     def record(
         self, unit: Unit[P], fingerprint: str, run: Callable[[], EpisodeResult[P]], session: Session[P]
     ) -> UnitRecord[P]:
-        """Run an episode and return its record; errors become a record too.
-
-        Args:
-            run: runs the episode in `environment`; called again if the simulator fails for good.
-        """
+        """Run an episode and return its record, also of an error; `run` is repeated if the simulator fails for good."""
         self.begun, self.usage = None, NOTHING
         start = time.perf_counter()
         try:

@@ -97,11 +97,7 @@ def difference_notes(setting: str, runs: Sequence[RecordedRun[Any, Any]], values
 
 
 def only_name(what: str, option: str, name: str | None, known: Sequence[str]) -> str:
-    """Return the given name, or the only one that a run has.
-
-    Args:
-        what: kind of thing that is named ("trajectory").
-        option: command-line option that names it.
+    """Return the given name, or the only one that a run has; `what` is its kind, `option` the option that gives it.
 
     Raises:
         UsageError: the run has nothing of that name, or no name is given and there are several.

@@ -21,11 +21,7 @@ T = TypeVar("T", bound=TaskTrajectory)
 
 
 class EpisodeTask(ABC, Generic[S, T]):
-    """A task file that was read, with its trajectories.
-
-    Attributes:
-        settings: its `dataset_kwargs`, with what the command line gives instead.
-    """
+    """A task file that was read, its trajectories, and its settings with what the command line gives instead."""
 
     def __init__(
         self, file: TaskFile, request: TaskRequest[Any], settings: S, read: Callable[[TrajectorySource], T]

@@ -26,12 +26,7 @@ _MAX_TURN = 0.17  # radians of a random turn about each axis: 10 degrees
 
 @dataclass(frozen=True)
 class ArmSituation:
-    """An episode that begins in an environment that was reset to it.
-
-    Attributes:
-        seed: seed of everything random.
-        max_step: length of the longest movement, metres.
-    """
+    """An episode that begins in an environment reset to it; `max_step` is the longest movement, metres."""
 
     environment: ArmEnvironment
     instruction: str

@@ -223,11 +223,7 @@ class ArmEnvironment:
 
 
 def arm_of(view: SimulatorView) -> ArmState:
-    """Return the arm of the agent.
-
-    Raises:
-        InfeasibleError: it has none; the simulator was not started with `agentMode="arm"`.
-    """
+    """Return the arm of the agent; raises InfeasibleError if the simulator was not started with agentMode "arm"."""
     if view.arm is None:
         raise InfeasibleError("the simulator reports no arm; start it with agentMode arm")
     return view.arm

@@ -41,11 +41,7 @@ class ManipulationEvaluation(EpisodeEvaluation[ManipulationOptions, Manipulation
         ]
 
     def bind(self, subject: Subject) -> "BoundManipulation":
-        """See `infthor_eval.runs.Evaluation.bind`.
-
-        Raises:
-            TypeError: the subject is neither a policy nor a baseline of manipulation; runs refuse that before.
-        """
+        """See `infthor_eval.runs.Evaluation.bind`; TypeError for neither a policy nor a baseline of manipulation."""
         if isinstance(subject, ArmBaseline):
             create_actor: Callable[[], ArmActor] = subject.arm_actor
         elif isinstance(subject, Policy):

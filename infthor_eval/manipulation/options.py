@@ -27,11 +27,7 @@ class ManipulationOptions(SimulatorOptions):
     )
 
     def __post_init__(self) -> None:
-        """Check the options.
-
-        Raises:
-            UsageError: an unknown kind of frames, or a radius that AI2-THOR does not allow.
-        """
+        """Check the options; raises UsageError for unknown frames, or a radius that AI2-THOR does not allow."""
         super().__post_init__()
         if self.radius_metres is not None and not RADII[0] <= self.radius_metres <= RADII[1]:
             raise UsageError(f"--radius {self.radius}: is a length of {RADII[0]} to {RADII[1]} metres")

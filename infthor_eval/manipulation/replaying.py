@@ -45,11 +45,7 @@ class RecordedEpisodes(RecordedTrajectory[ArmRun, ArmRecord]):
     """What a run recorded of an arm's episodes in one trajectory."""
 
     def at_actions(self, actions: Sequence[int]) -> list[Record]:
-        """Return the records of the episodes that replace some of the expert's low-level actions, in time order.
-
-        Raises:
-            UsageError: the run has no episode for one of them.
-        """
+        """Return the records of the episodes for some of the expert's actions; UsageError if the run lacks one."""
         known = [record.payload.index for record in self.records]
         for action in actions:
             if action not in known:

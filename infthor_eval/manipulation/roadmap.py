@@ -70,12 +70,7 @@ _Stretch = tuple[MoveKind, Poses]  # the kind of a movement and the poses (n) on
 
 
 class Terrain:
-    """Which movements are free for an arm.
-
-    Attributes:
-        linkage: the arm, measured in its present pose.
-        contacts: collisions so far.
-    """
+    """Which movements are free for an arm (`linkage`, in its present pose), given its collisions so far."""
 
     def __init__(
         self, linkage: Linkage, obstacles: Obstacles, contacts: Sequence[Contact], *, escapes: bool = False

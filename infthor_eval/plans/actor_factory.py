@@ -21,11 +21,7 @@ class ActorFactory:
 
 
 def actor_factory(subject: Subject, trajectories: Sequence[Trajectory]) -> ActorFactory:
-    """Return the factory of a model, or of a baseline, which is fitted to all trajectories of the run.
-
-    Raises:
-        TypeError: it is neither a model nor a baseline; runs refuse that before.
-    """
+    """Return the factory of a model, or of a baseline, which is fitted to all trajectories; TypeError for others."""
     if isinstance(subject, PlanBaseline):
         subject.fit(trajectories)
         return ActorFactory(False, lambda _, trajectory: subject.actor(trajectory))

@@ -190,19 +190,11 @@ class PlanEnvironment:
         return self._execute(text, call, before)
 
     def past(self, plan: int) -> Past:
-        """Return the history before a plan; only if frames are kept.
-
-        Raises:
-            ExpertRefusedError: as `reset`.
-        """
+        """Return the history before a plan, only if frames are kept; raises ExpertRefusedError as `reset` does."""
         return self._expert.past(plan)
 
     def expert_actions(self, plan: int) -> Sequence[ExpertAction]:
-        """Return the expert's actions of a plan.
-
-        Raises:
-            ExpertRefusedError: as `reset`.
-        """
+        """Return the expert's actions of a plan; raises ExpertRefusedError as `reset` does."""
         return self._expert.actions(plan)
 
     def named_objects(self, plan: int) -> Sequence[str]:

@@ -47,11 +47,7 @@ class Past:
 
 
 class Memory(Protocol):
-    """Selects what a model is given.
-
-    Attributes:
-        needs_state: whether it needs the state in words.
-    """
+    """Selects what a model is given; `needs_state` tells whether it needs the state in words."""
 
     needs_state: ClassVar[bool]
 
@@ -134,10 +130,7 @@ class TopFrames:
     needs_state: ClassVar[bool] = False
 
     def __init__(self, n_frames: int, retriever: str) -> None:
-        """Load the retriever, to show some frames (the paper: 20) beside the present one.
-
-        Args:
-            retriever: CLIP model, a hub id or a folder.
+        """Load a CLIP model, a hub id or a folder, to show some frames (the paper: 20) beside the present one.
 
         Raises:
             UsageError: there is no such model.

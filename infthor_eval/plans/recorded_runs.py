@@ -12,12 +12,7 @@ __all__ = ["PlanTaskConfig", "PlansRun", "shared_plans"]
 
 
 class PlanTaskConfig(TaskConfig, frozen=True, kw_only=True):
-    """The part of a task's run config that curves and replays need.
-
-    Attributes:
-        rewards: reward rules, as `RewardRules` decodes them.
-        after_failure: what follows a failed plan, "continue" or "stop".
-    """
+    """The part of a task's run config that curves and replays need; `rewards` is as `RewardRules` decodes it."""
 
     rewards: Any
     after_failure: str

@@ -48,11 +48,7 @@ class RecordedPlans(RecordedTrajectory[PlansRun, PlanRecord]):
     """What a run recorded of the plans of one trajectory."""
 
     def between(self, first: int, last: int) -> list[Record]:
-        """Return the records of plans by their number, from 1 on, both ends included.
-
-        Raises:
-            UsageError: the run does not have all of them.
-        """
+        """Return the records of plans by number, from 1 on, ends included; UsageError if the run lacks some of them."""
         lowest, highest = (self.records[place].payload.index + 1 for place in (0, -1))
         if not lowest <= first <= last <= highest:
             chosen = f"{first}" if first == last else f"{first}-{last}"

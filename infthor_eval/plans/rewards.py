@@ -76,11 +76,7 @@ class StepReward:
 
 
 def reward_rules(name: str) -> RewardRules:
-    """Return the rules of a name: "default", or "published-compat", which has the published faults.
-
-    Raises:
-        UsageError: there are no rules of this name.
-    """
+    """Return the rules "default", or "published-compat" with the published faults; UsageError for other names."""
     by_name = read_yaml(_FILE, "install the package again")
     if name not in by_name:
         raise unknown_name("reward rules", name, by_name)
@@ -128,11 +124,7 @@ class PlanReward:
         self.goal_reached = self._is_over = False
 
     def after(self, call: Mapping[str, Any], before: SimulatorView, after: SimulatorView) -> StepReward:
-        """Return the reward of an action, given as `Simulator.step(**call)` takes it, and the world before and after.
-
-        Raises:
-            ValueError: the plan is over.
-        """
+        """Return the reward of an action, as `Simulator.step(**call)` takes it; ValueError if the plan is over."""
         if self._is_over:
             raise ValueError("the plan is over; begin the next one")
         action, object_id = call["action"], call.get("objectId")

@@ -21,11 +21,7 @@ class PlanTrajectory(TaskTrajectory):
 
 
 def read_plan_trajectory(source: TrajectorySource) -> PlanTrajectory:
-    """Read a trajectory and its plans.
-
-    Raises:
-        DataError: it cannot be used.
-    """
+    """Read a trajectory and its plans; raises DataError if it cannot be used."""
     trajectory = source.read()
     plans = plans_of(trajectory)
     if not plans:

@@ -84,12 +84,7 @@ def parse_action(text: str) -> ActionText:
 
 
 def text_of(action: str, object_id: str | None = None, receptacle_id: str | None = None) -> ActionText:
-    """Return the text of a call.
-
-    Args:
-        object_id: id of the object acted on; for PutObject, of the object that is put.
-        receptacle_id: id of the receptacle, for PutObject.
-    """
+    """Return the text of a call; the object of PutObject is the one that is put into the receptacle."""
     ids = [item for item in (object_id, receptacle_id) if item is not None]
     return ActionText(action, tuple(object_type_of(item) for item in ids))
 
@@ -130,11 +125,7 @@ def applicable_actions(view: SimulatorView) -> list[ActionText]:
 
 
 def applicable_calls(view: SimulatorView, degrees: float = _LOOK_DEGREES) -> list[dict[str, Any]]:
-    """Return all calls that are possible now, in a fixed order: each action with each visible object it applies to.
-
-    Args:
-        degrees: angle by which LookUp and LookDown turn the camera.
-    """
+    """Return all calls possible now, in a fixed order: each action with each visible object, looks by `degrees`."""
     calls = [ground(ActionText(name), view, degrees) for name in sorted(_PLAIN)]
     visible = sorted((item.object_type, item.object_id) for item in view.objects.values() if item.visible)
     for action, applies in _APPLIES.items():

@@ -26,11 +26,7 @@ def id_position(object_id: str) -> tuple[float, float, float] | None:
 
 
 class Grounding:
-    """The id mapping of one episode.
-
-    Attributes:
-        distances: distance of each chosen object from the position in the recorded id, metres, by recorded id.
-    """
+    """The id mapping of one episode; `distances` has the metres from recorded positions, by recorded id."""
 
     def __init__(self, view: SimulatorView) -> None:
         """Store the positions of all objects at the start of the episode, after the scene was restored."""

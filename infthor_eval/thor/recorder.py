@@ -15,11 +15,7 @@ _PNG_LEVEL = 4  # higher levels take several times as long and hardly shrink ren
 
 
 class Recorder:
-    """Turns simulator states into log entries, and into image files if a folder is given.
-
-    Attributes:
-        steps: log entries so far, one per frame.
-    """
+    """Turns simulator states into log entries (`steps`, one per frame), and into images if a folder is given."""
 
     def __init__(self, images: Path | None = None) -> None:
         """Start without a frame; `images` is an existing folder for the frames, None keeps only the log."""

@@ -10,15 +10,7 @@ __all__ = ["teleport_call"]
 
 
 def teleport_call(pose: AgentPose, *, force: bool = True) -> dict[str, Any]:
-    """Return the 5.x call that teleports the agent to a pose.
-
-    Args:
-        pose: the pose; without `standing` if the agent cannot crouch.
-        force: True to place the agent even where it collides; otherwise the simulator may refuse.
-
-    Returns:
-        `{"action": ..., arguments}` for `Simulator.step(**call)`.
-    """
+    """Return the 5.x call that teleports the agent to a pose; unless forced, it may be refused for a collision."""
     call: dict[str, Any] = {
         "action": "TeleportFull",
         "position": asdict(pose.position),

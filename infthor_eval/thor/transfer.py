@@ -47,9 +47,6 @@ def transfer(simulator: Simulator, target: SimulatorView) -> list[str]:
 
     An object held by the other agent floats where that agent holds it.
 
-    Args:
-        simulator: simulator in the same scene, restored to the same initial state.
-
     Returns:
         Sorted ids of the objects that are missing, or could not be moved to their position.
 

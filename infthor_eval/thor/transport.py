@@ -80,11 +80,7 @@ class SafeFifoServer(FifoServer):
             raise self._fail("garbage", f"sent what is not its protocol ({detail})") from error
 
     def send(self, action: dict[str, Any]) -> None:
-        """Send one action.
-
-        Raises:
-            PeerFault: the simulator died or does not read.
-        """
+        """Send one action; raises PeerFault if the simulator died or does not read."""
         self.current_action = str(action.get("action"))
         super().send(action)
 
