@@ -21,7 +21,7 @@ class ArmObserver:
     """Observes one episode; all its pictures have the same bounds."""
 
     def __init__(self, begun: SimulatorView, hands: Iterable[Point], named: Sequence[str]) -> None:
-        """Set the bounds by the world at the start, the hand's places after each step, and the ids of named objects."""
+        """Set the bounds by the world at the start, the hand's sphere centres in the world, and named objects' ids."""
         self._agent, self._named = begun.agent, frozenset(named)
         self._path = [self._hand(begun)]
         points = [*self._path, *map(self._place, hands), *self._joints(begun), (0.0, 0.0, self._path[0][2])]
