@@ -106,7 +106,6 @@ class RunCurves:
     """The curves of one run.
 
     Attributes:
-        label: name of the run.
         is_bound: whether it is the upper bound: a planner, or the highest possible reward.
         is_embedded: whether its numbers are from the embedded simulator alone.
         curves: curves by facet; the first facet is always there.
@@ -125,11 +124,9 @@ class RewardCurves:
     """The curves of several runs on the same trajectories.
 
     Attributes:
-        task: name of the task, or of the tasks.
         facets: facets by name; the table is about the first one.
         runs: runs in the order given; the bound is last, so that it is drawn on top.
         n_trajectories: trajectories that every curve is the mean of.
-        notes: notes, a line each.
     """
 
     task: str
@@ -164,13 +161,13 @@ def compute_curves(
     planners (of other settings) are runs like the others, as none of them bounds them all.
 
     Args:
-        runs: at least one run.
-        shared: the episodes that they share.
-        facets: facets by name.
         functions_of: returns the step functions of a run's trajectories, by facet.
         count: returns the counts of some episodes by description, the number of all first.
     """
-    functions = [functions_of([[(r, _reward(r)) for r in records] for records in run]) for run in shared.records]
+    functions = [
+        functions_of([[(r, 0.0 if r.failure is not None else r.payload.reward) for r in records] for records in run])
+        for run in shared.records
+    ]
     grids = {name: _grid([by_facet[name] for by_facet in functions if name in by_facet]) for name in facets}
     planners = [run for run in runs if run.is_planner]
     bound = planners[0] if len(planners) == 1 else None
@@ -179,7 +176,7 @@ def compute_curves(
             label=run.label,
             is_bound=run is bound,
             is_embedded=run.is_embedded,
-            curves={name: _mean_curve(found, grids[name]) for name, found in by_facet.items()},
+            curves={name: _mean_curve(of_facet, grids[name]) for name, of_facet in by_facet.items()},
             counts=count([record for trajectory in records for record in trajectory]),
         )
         for run, records, by_facet in zip(runs, shared.records, functions, strict=True)
@@ -209,13 +206,7 @@ def compute_curves(
     )
 
 
-def _reward(record: UnitRecord[P]) -> float:
-    return 0.0 if record.failure is not None else record.payload.reward
-
-
-def _highest_rewards(
-    of_runs: Sequence[Sequence[UnitRecord[P]]],
-) -> Iterator[tuple[UnitRecord[P], float | None]]:
+def _highest_rewards(of_runs: Sequence[Sequence[UnitRecord[P]]]) -> Iterator[tuple[UnitRecord[P], float | None]]:
     """Yield the episodes of a trajectory with the highest possible reward that any run recorded; None if none did."""
     for same in zip(*of_runs, strict=True):
         recorded = [record.payload.max_reward for record in same if record.payload.max_reward is not None]
@@ -224,8 +215,7 @@ def _highest_rewards(
 
 def _missing_notes(runs: Sequence[RunCurves], facets: Mapping[str, Facet]) -> Iterator[str]:
     for name, facet in facets.items():
-        missing = [run.label for run in runs if name not in run.curves]
-        if missing:
+        if missing := [run.label for run in runs if name not in run.curves]:
             yield f"{facet.missing}: {', '.join(missing)}"
 
 

@@ -30,12 +30,7 @@ _OF_ALL_TRAJECTORIES = ("trajectories", "broken")  # parts of a task's config th
 
 @dataclass(frozen=True)
 class EpisodeUnit(Unit[P], Generic[P, T, E]):
-    """A unit that is an episode.
-
-    Attributes:
-        trajectory: its trajectory.
-        episode: the episode.
-    """
+    """A unit that is an episode of a trajectory."""
 
     trajectory: T
     episode: E
@@ -54,9 +49,6 @@ class EpisodeEvaluation(ABC, Generic[Options, K, U]):
     """A suite of episodes set up for a run; see `infthor_eval.runs.Evaluation`.
 
     Attributes:
-        seed: seed of the run.
-        options: options of the suite.
-        tasks: tasks by name.
         trajectories: all trajectories that were found, used or not, so that neither what baselines learn nor the floor
             plans of the simulators depend on --limit.
     """
@@ -106,12 +98,7 @@ class EpisodeEvaluation(ABC, Generic[Options, K, U]):
 
 
 class BoundEpisodes(Generic[U, P]):
-    """Episodes for one subject; see `infthor_eval.runs.BoundEvaluation`.
-
-    Attributes:
-        workload: all the work.
-        seed: seed of the run.
-    """
+    """Episodes for one subject; see `infthor_eval.runs.BoundEvaluation`."""
 
     def __init__(
         self, evaluation: EpisodeEvaluation[Any, Any, U], workload: Workload[U], simulators: Iterable[Simulators]

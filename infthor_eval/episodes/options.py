@@ -20,8 +20,7 @@ class SimulatorOptions:
     """
 
     simulator: str = field(
-        default="embedded",
-        metadata={"help": "embedded, unity, or the path of a Unity executable.", "metavar": "NAME"},
+        default="embedded", metadata={"help": "embedded, unity, or the path of a Unity executable.", "metavar": "NAME"}
     )
     scenes: str | None = field(
         default=None,
@@ -33,10 +32,6 @@ class SimulatorOptions:
     )
 
     def __post_init__(self) -> None:
-        """Check the options.
-
-        Raises:
-            UsageError: an unknown kind of frames.
-        """
+        """Check the options; raises UsageError for an unknown kind of frames."""
         if self.frames not in _FRAMES:
             raise UsageError(f"--frames {self.frames}: tasks in a simulator have {', '.join(_FRAMES)}")

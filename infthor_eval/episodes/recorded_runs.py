@@ -18,12 +18,7 @@ _EMBEDDED = "embedded"  # as the option --simulator names it
 
 
 class TaskConfig(msgspec.Struct, frozen=True, kw_only=True):
-    """The part of a task's run config that curves and replays need.
-
-    Attributes:
-        trajectories: digests of the trajectories, by name.
-        config: settings of the task file.
-    """
+    """The part of a task's run config that curves and replays need: digests of trajectories by name, and settings."""
 
     trajectories: dict[str, str]
     config: dict[str, Any] = {}
@@ -39,13 +34,7 @@ T = TypeVar("T", bound=TaskConfig)
 
 
 class RunConfig(msgspec.Struct, Generic[T], frozen=True):
-    """The part of a run's config that curves and replays need.
-
-    Attributes:
-        model: name and options of the subject.
-        simulator: simulator that it acted in.
-        tasks: configs of the tasks, by name.
-    """
+    """The part of a run's config that curves and replays need; `model` has the subject's name and options."""
 
     model: dict[str, Any]
     simulator: str
@@ -54,13 +43,7 @@ class RunConfig(msgspec.Struct, Generic[T], frozen=True):
 
 @dataclass(frozen=True)
 class RecordedRun(Generic[P, T]):
-    """The journal of a run of episodes.
-
-    Attributes:
-        label: name of the run beside others.
-        header: header of the journal.
-        records: records of all episodes.
-    """
+    """The journal of a run of episodes; `label` names it beside other runs."""
 
     label: str
     header: RunHeader
@@ -73,21 +56,13 @@ class RecordedRun(Generic[P, T]):
 
     @classmethod
     def read(cls, folder: Path, label: str | None = None) -> Self:
-        """Read the run in a folder; its own name is the label if none is given.
-
-        Raises:
-            DataError: the journal is missing or damaged.
-        """
+        """Read the run in a folder, by default labelled by its own name; DataError for a missing or damaged journal."""
         header, records = read_run(folder, cls.record_types)
         return cls(label or header.name, header, records)
 
     @cached_property
     def config(self) -> RunConfig[T]:
-        """The run's config.
-
-        Raises:
-            DataError: it is not the config of a run of this suite.
-        """
+        """The run's config; raises DataError if it is not that of a run of this suite."""
         problem = f"{self.label}: not the config of a run of {self.suite}"
         with wrap_errors(problem, "start the run again with --fresh", catch=msgspec.ValidationError):
             config: RunConfig[T] = msgspec.convert(self.header.config, RunConfig[self.task_config])  # type: ignore[name-defined]

@@ -14,8 +14,6 @@ class EpisodeRecord(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=Tru
 
     Attributes:
         index: place in the trajectory.
-        kind: kind of the episode.
-        steps: steps of the subject.
         reward: reward of all steps.
         max_reward: highest possible reward; None if it is not known.
         ended: how it ended; "not attempted" if an earlier one ended the trajectory, and empty if the subject failed or

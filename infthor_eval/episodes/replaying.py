@@ -39,13 +39,7 @@ F = TypeVar("F", bound=EpisodeFrame[Any, Any])
 
 @dataclass(frozen=True)
 class RecordedTrajectory(Generic[R, P]):
-    """What a run recorded of one trajectory.
-
-    Attributes:
-        run: the run.
-        trajectory: name of the trajectory.
-        records: records of its episodes, in time order.
-    """
+    """What a run recorded of one trajectory: its name, and the records of its episodes in time order."""
 
     run: R
     trajectory: str
@@ -60,15 +54,7 @@ class RecordedTrajectory(Generic[R, P]):
 def records_of_trajectory(
     run: RecordedRun[P, Any], tasks: Collection[str], trajectory: str | None
 ) -> tuple[str, tuple[UnitRecord[P], ...]]:
-    """Find a run's records of a trajectory.
-
-    Args:
-        run: the run.
-        tasks: names of the tasks whose records are looked at.
-        trajectory: name of the trajectory; None for the only one.
-
-    Returns:
-        The name and the records in time order.
+    """Return the name of a trajectory (None: the only one), and a run's records of it in some tasks, in time order.
 
     Raises:
         UsageError: there is no such trajectory, or none is given and there are several.
@@ -93,8 +79,6 @@ def restore_trajectory(
     The function takes the options of `Simulator`. Simulators are stopped at the end of the context.
 
     Args:
-        recorded: the records.
-        read: reads a trajectory of the suite.
         data: file or folder of the trajectories; None for the set in the package.
         scenes: folder of recorded floor plans, for the embedded simulator.
 
@@ -122,20 +106,10 @@ class EpisodeInReplay(Protocol):
     """An episode that is being replayed."""
 
     def repeat(self, step: Any, *, is_last: bool) -> str:
-        """Repeat a recorded step; do nothing if the episode is over already.
-
-        Returns:
-            How the result differs from the record; empty if it does not.
-        """
-        ...
+        """Repeat a recorded step unless the episode is over; return how its result differs, empty if it does not."""
 
     def observe(self) -> Any:
-        """Return what is to be seen now.
-
-        Raises:
-            DataError: the simulator sent no frame.
-        """
-        ...
+        """Return the present observation; raises DataError if the simulator sent no frame."""
 
 
 class EpisodeReplay(ABC, Generic[P, F]):

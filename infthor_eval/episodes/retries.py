@@ -19,8 +19,6 @@ def with_retries(simulator: Simulator, do: Callable[[], T], reset: Callable[[], 
     these end otherwise than before, or if it is lost again and again; then only the whole work can be done again.
 
     Args:
-        simulator: simulator that the work is done in.
-        do: the work.
         reset: drops everything that was built in the failed process.
 
     Returns:

@@ -22,7 +22,6 @@ class EpisodeResult(Generic[P]):
     """The result of an episode.
 
     Attributes:
-        payload: payload of its record.
         tokens: tokens of its requests; None if there were none, which is not recorded.
         faults: faults of the model that were retried.
     """
@@ -44,12 +43,7 @@ class EpisodeRunner(Generic[E, P]):
     usage: Usage
 
     def __init__(self, simulator: Simulator, build: Callable[[], E]) -> None:
-        """Take a simulator.
-
-        Args:
-            simulator: simulator of the trajectory.
-            build: builds the environment, which restores the scene.
-        """
+        """Take the trajectory's simulator, and what builds the environment, which restores the scene."""
         self._simulator, self._build = simulator, build
         self._environment: E | None = None
 
@@ -63,14 +57,7 @@ class EpisodeRunner(Generic[E, P]):
     def record(
         self, unit: Unit[P], fingerprint: str, run: Callable[[], EpisodeResult[P]], session: Session[P]
     ) -> UnitRecord[P]:
-        """Run an episode and return its record; errors become a record too.
-
-        Args:
-            unit: unit of the episode.
-            fingerprint: fingerprint of its inputs.
-            run: runs the episode in `environment`; called again if the simulator fails for good.
-            session: session of the run.
-        """
+        """Run an episode and return its record, also of an error; `run` is repeated if the simulator fails for good."""
         self.begun, self.usage = None, NOTHING
         start = time.perf_counter()
         try:

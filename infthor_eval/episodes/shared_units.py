@@ -20,7 +20,6 @@ class SharedUnits(Generic[P]):
     """What runs have in common.
 
     Attributes:
-        tasks: names of the tasks.
         trajectories: names of the trajectories that all runs have in full.
         records: by run, then by trajectory: records of the episodes that count in every run, in time order.
         notes: what was left out, and how the runs differ, a line each.
@@ -33,11 +32,7 @@ class SharedUnits(Generic[P]):
 
 
 def shared_tasks(runs: Sequence[RecordedRun[Any, Any]], chosen: Sequence[str] | None) -> list[str]:
-    """Return the names of the tasks that all runs have, or the chosen ones of them.
-
-    Args:
-        runs: at least one run.
-        chosen: task names as typed; None for all shared tasks, in the order of the first run.
+    """Return the names of the tasks that all runs (at least one) have, or the chosen ones; in the first run's order.
 
     Raises:
         UsageError: there is no shared task, or a chosen one is not shared.
@@ -56,11 +51,9 @@ def shared_tasks(runs: Sequence[RecordedRun[Any, Any]], chosen: Sequence[str] | 
 def shared_units(
     runs: Sequence[RecordedRun[P, T]], tasks: Sequence[str], excluded: str, differences: Iterable[str] = ()
 ) -> SharedUnits[P]:
-    """Find the episodes of trajectories that all runs have in full.
+    """Find the episodes of trajectories that all runs (at least one) have in full, in tasks that all have.
 
     Args:
-        runs: at least one run.
-        tasks: names of tasks that all runs have.
         excluded: description of episodes that some run excludes, for a note.
         differences: notes on how the runs differ; whether the simulators do is added.
 
@@ -70,7 +63,10 @@ def shared_units(
     units = [run.by_trajectory(tasks) for run in runs]
     digests = [run.digests(tasks) for run in runs]
     names = sorted({*(name for known in digests for name in known), *(name for item in units for name in item)})
-    left_out = {name: _excluded_places(item[name] for item in units if name in item) for name in names}
+    left_out = {
+        name: {place for item in units for place, record in item.get(name, {}).items() if record.excluded is not None}
+        for name in names
+    }
     shared = [name for name in names if _is_shared(name, digests, units) and units[0][name].keys() - left_out[name]]
     if not shared:
         which = " and ".join(tasks)
@@ -101,13 +97,7 @@ def difference_notes(setting: str, runs: Sequence[RecordedRun[Any, Any]], values
 
 
 def only_name(what: str, option: str, name: str | None, known: Sequence[str]) -> str:
-    """Return the given name, or the only one that a run has.
-
-    Args:
-        what: kind of thing that is named ("trajectory").
-        option: command-line option that names it.
-        name: the name as typed; None if it was not given.
-        known: names that the run has.
+    """Return the given name, or the only one that a run has; `what` is its kind, `option` the option that gives it.
 
     Raises:
         UsageError: the run has nothing of that name, or no name is given and there are several.
@@ -117,11 +107,6 @@ def only_name(what: str, option: str, name: str | None, known: Sequence[str]) ->
     if name is not None and name not in known:
         raise unknown_name(f"{what} of this run", name, known)
     return name or known[0]
-
-
-def _excluded_places(trajectory: Iterable[Mapping[Any, UnitRecord[P]]]) -> set[Any]:
-    """Return the places in a trajectory of the episodes that some run excludes."""
-    return {place for units in trajectory for place, record in units.items() if record.excluded is not None}
 
 
 def _is_shared(name: str, digests: Sequence[Mapping[str, str]], units: Sequence[Units[P]]) -> bool:

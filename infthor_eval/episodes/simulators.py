@@ -9,7 +9,6 @@ from typing import Any
 
 from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.thor import launch
-from infthor_eval.thor.launch import Launch
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.supplement import supplement_file
 
@@ -28,14 +27,16 @@ class Simulators:
             name: "embedded", "unity", or the path of a Unity executable.
             scenes: folder of recorded floor plans, for the embedded one.
             trajectories: trajectories whose objects complete the recorded floor plans.
-            options: options of each simulator, see `Simulator`.
         """
         self._options = options
         self._open = ExitStack()
         weakref.finalize(self, self._open.close)
         self._idle: SimpleQueue[Simulator] = SimpleQueue()
         supplement = self._open.enter_context(supplement_file(trajectories)) if scenes is not None else None
-        self._launch = _launch_of(name, scenes, supplement)
+        if name == "embedded":
+            self._launch = launch.embedded_launch(scenes, supplement)
+        else:
+            self._launch = launch.unity_launch(None if name == "unity" else Path(name))
 
     @contextmanager
     def one(self) -> Iterator[Simulator]:
@@ -53,9 +54,3 @@ class Simulators:
     def close(self) -> None:
         """Stop them all; safe to call again."""
         self._open.close()
-
-
-def _launch_of(name: str, scenes: Path | None, supplement: Path | None) -> Launch:
-    if name == "embedded":
-        return launch.embedded_launch(scenes, supplement)
-    return launch.unity_launch(None if name == "unity" else Path(name))

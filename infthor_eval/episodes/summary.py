@@ -42,12 +42,7 @@ T = TypeVar("T", bound=EpisodeTaskSummary)
 
 
 class EpisodesSummary(msgspec.Struct, Generic[T], frozen=True):
-    """Results of a run.
-
-    Attributes:
-        simulator: simulator of the run.
-        tasks: results of the tasks, by name.
-    """
+    """Results of a run."""
 
     simulator: str
     tasks: dict[str, T]
@@ -58,13 +53,7 @@ def summarise_episodes(
     records: Sequence[UnitRecord[P]],
     summarise_task: Callable[[Mapping[str, Any], list[UnitRecord[P]]], T],
 ) -> EpisodesSummary[T]:
-    """Summarise a run.
-
-    Args:
-        config: config of the run.
-        records: records of all its episodes.
-        summarise_task: returns the results of a task, given its config and its records in order.
-    """
+    """Summarise a run; `summarise_task` returns a task's results, given its config and its records in order."""
     ordered = sorted(records, key=lambda record: record.key)
     tasks = {
         name: summarise_task(of_task, [record for record in ordered if record.task == name])

@@ -31,14 +31,7 @@ def named_tasks(runs: Sequence[RunSummary]) -> Iterator[tuple[str, str, Any]]:
 def endings_table(
     title: str, tasks: Sequence[tuple[str, str, T]], column: str = "", value: Callable[[T], Any] = str
 ) -> Table:
-    """Return the table of how episodes ended.
-
-    Args:
-        title: title of the table.
-        tasks: tasks, see `named_tasks`.
-        column: heading of a further column; empty for none.
-        value: value of a task in it.
-    """
+    """Return the table of how episodes ended, with a further column for a value of each task if it has a heading."""
     endings = list(dict.fromkeys(ending for _, _, task in tasks for ending in task.endings))
     further = [column] if column else []
     rows = [

@@ -21,14 +21,7 @@ T = TypeVar("T", bound=TaskTrajectory)
 
 
 class EpisodeTask(ABC, Generic[S, T]):
-    """A task file that was read, with its trajectories.
-
-    Attributes:
-        file: the task file.
-        name: name of the task.
-        settings: its `dataset_kwargs`, with what the command line gives instead.
-        trajectories: all its trajectories.
-    """
+    """A task file that was read, its trajectories, and its settings with what the command line gives instead."""
 
     def __init__(
         self, file: TaskFile, request: TaskRequest[Any], settings: S, read: Callable[[TrajectorySource], T]

@@ -16,12 +16,7 @@ _Broken = list[tuple[str, str]]
 
 @dataclass(frozen=True)
 class TaskTrajectory:
-    """A trajectory of a task.
-
-    Attributes:
-        data: the trajectory.
-        digest: digest of its file.
-    """
+    """A trajectory of a task, and the digest of its file."""
 
     data: Trajectory
     digest: str
@@ -96,12 +91,9 @@ def find_recorded_trajectory(
     """Find the trajectories that a run used, and one of them.
 
     Args:
-        task: name of the run's task.
-        name: name of the trajectory.
         digest: digest of its file, as the run recorded it.
         data: file or folder of the trajectories; None for the set in the package.
         bundled: name of that set in the task's settings, if there is one.
-        read: see `find_trajectories`.
 
     Raises:
         UsageError: there is no set in the package, and `data` is not given or does not exist.

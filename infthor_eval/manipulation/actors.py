@@ -4,7 +4,7 @@ import math
 import random
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import ClassVar, Protocol, runtime_checkable
 
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.blank import blank_like
@@ -26,14 +26,7 @@ _MAX_TURN = 0.17  # radians of a random turn about each axis: 10 degrees
 
 @dataclass(frozen=True)
 class ArmSituation:
-    """An episode that begins.
-
-    Attributes:
-        environment: the environment, reset to the episode.
-        instruction: the instruction.
-        seed: seed of everything random.
-        max_step: length of the longest movement, metres.
-    """
+    """An episode that begins in an environment reset to it; `max_step` is the longest movement, metres."""
 
     environment: ArmEnvironment
     instruction: str
@@ -46,7 +39,6 @@ class ArmActor(Protocol):
 
     def begin(self, situation: ArmSituation) -> None:
         """Begin an episode."""
-        ...
 
     def act(self, frame: FrameRef | None) -> Sequence[Step]:
         """Choose the next steps, to be executed in order; an empty sequence gives up.
@@ -55,7 +47,6 @@ class ArmActor(Protocol):
             ModelError: a policy fails, or its result is no movement.
             DataError: the frame cannot be read.
         """
-        ...
 
 
 @runtime_checkable
@@ -64,19 +55,13 @@ class ArmBaseline(Subject, Protocol):
 
     def arm_actor(self) -> ArmActor:
         """Create the actor of a trajectory."""
-        ...
 
 
 class PolicyActor:
     """A vision-language-action policy."""
 
     def __init__(self, policy: Policy, *, blank: bool) -> None:
-        """Take a policy.
-
-        Args:
-            policy: the policy.
-            blank: whether it is shown grey frames instead of the actual ones.
-        """
+        """Take a policy; `blank` shows it grey frames instead of the actual ones."""
         self._policy, self._blank = policy, blank
 
     def begin(self, situation: ArmSituation) -> None:
@@ -96,11 +81,7 @@ class PolicyActor:
 
 
 def _check_step(step: object) -> None:
-    """Check a step of a policy, which is code of others.
-
-    Raises:
-        ModelError: it is not three lengths, three angles and a gripper, all finite numbers.
-    """
+    """Check that a policy, which is code of others, gives three lengths, three angles and a gripper, all finite."""
     if not isinstance(step, ArmDelta):
         raise ModelError(f"the policy gives {step!r:.60} for a step; it must be an ArmDelta")
     numbers = (*step.translation, *step.rotation, step.gripper)
@@ -116,6 +97,11 @@ def _check_step(step: object) -> None:
 
 class _ArmBaseline(BaselineSubject):
     capabilities = Capabilities(counts_tokens=False, token_ids=False, max_in_flight=_IN_FLIGHT)
+    _actor: ClassVar[type[ArmActor]]
+
+    def arm_actor(self) -> ArmActor:
+        """See `ArmBaseline`."""
+        return self._actor()
 
 
 class _StillActor:
@@ -152,30 +138,21 @@ class StillArm(_ArmBaseline):
     """Closes its hand, or opens it, where it is: what succeeds without a movement."""
 
     name = "still"
-
-    def arm_actor(self) -> ArmActor:
-        """See `ArmBaseline`."""
-        return _StillActor()
+    _actor = _StillActor
 
 
 class RandomArm(_ArmBaseline):
     """Moves, turns, closes and opens its hand at random."""
 
     name = "random-arm"
-
-    def arm_actor(self) -> ArmActor:
-        """See `ArmBaseline`."""
-        return _RandomArmActor()
+    _actor = _RandomArmActor
 
 
 class PlannerArm(_ArmBaseline):
     """Knows where everything is, and moves there by inverse kinematics: the upper bound."""
 
     name = "planner-arm"
-
-    def arm_actor(self) -> ArmActor:
-        """See `ArmBaseline`."""
-        return _PlannerActor()
+    _actor = _PlannerActor
 
 
 BASELINES: Mapping[str, Callable[[int], ArmBaseline]] = {

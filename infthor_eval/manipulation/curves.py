@@ -20,14 +20,10 @@ _END = "at step"
 
 
 def arm_curves(runs: Sequence[ArmRun], tasks: str | None = None) -> RewardCurves:
-    """Compute the curves of some runs, on the trajectories and episodes that all of them have; see `compute_curves`.
+    """Compute the curves of runs (at least one) in tasks, separated by commas (None: all shared); see `compute_curves`.
 
     The mean is over the same trajectories in every facet, so that the curves of the kinds add up to that of both.
     Episodes that a run excludes are left out of all of them.
-
-    Args:
-        runs: at least one run.
-        tasks: names of the tasks, separated by commas; None for all that they share.
 
     Raises:
         UsageError: they share no task or several of a kind, or their successes earn differently.

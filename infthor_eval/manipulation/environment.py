@@ -83,11 +83,7 @@ class ArmEnvironment:
     starts_inside: bool
 
     def __init__(self, trajectory: Trajectory, simulator: Simulator) -> None:
-        """Restore the scene.
-
-        Args:
-            trajectory: trajectory that the episodes are from.
-            simulator: simulator of an agent with an arm.
+        """Restore the scene of a trajectory in a simulator of an agent with an arm.
 
         Raises:
             SceneError: the simulator has no such scene.
@@ -102,13 +98,6 @@ class ArmEnvironment:
         self, episode: ArmEpisode, start: EpisodeStart, conversion: Conversion, grasp: Grasp, frames: FrameKeeper
     ) -> ArmOutcome:
         """Bring the world to the true state before an episode, with the arm at rest; for a put, with the object in it.
-
-        Args:
-            episode: the episode.
-            start: the true state before it.
-            conversion: conversion of a policy's steps to calls.
-            grasp: how the hand closes.
-            frames: keeps the frames.
 
         Raises:
             InfeasibleError: the episode's objects cannot be brought to where they were, or not into the hand.
@@ -234,11 +223,7 @@ class ArmEnvironment:
 
 
 def arm_of(view: SimulatorView) -> ArmState:
-    """Return the arm of the agent.
-
-    Raises:
-        InfeasibleError: it has none; the simulator was not started with `agentMode="arm"`.
-    """
+    """Return the arm of the agent; raises InfeasibleError if the simulator was not started with agentMode "arm"."""
     if view.arm is None:
         raise InfeasibleError("the simulator reports no arm; start it with agentMode arm")
     return view.arm

@@ -41,11 +41,7 @@ class ManipulationEvaluation(EpisodeEvaluation[ManipulationOptions, Manipulation
         ]
 
     def bind(self, subject: Subject) -> "BoundManipulation":
-        """See `infthor_eval.runs.Evaluation.bind`.
-
-        Raises:
-            TypeError: the subject is neither a policy nor a baseline of manipulation; runs refuse that before.
-        """
+        """See `infthor_eval.runs.Evaluation.bind`; TypeError for neither a policy nor a baseline of manipulation."""
         if isinstance(subject, ArmBaseline):
             create_actor: Callable[[], ArmActor] = subject.arm_actor
         elif isinstance(subject, Policy):
@@ -59,13 +55,7 @@ class BoundManipulation(BoundEpisodes[ArmUnit, ArmRecord]):
     """Manipulation for one subject; see `infthor_eval.runs.BoundEvaluation`."""
 
     def __init__(self, evaluation: ManipulationEvaluation, create_actor: Callable[[], ArmActor], *, sees: bool) -> None:
-        """Take the work.
-
-        Args:
-            evaluation: the prepared evaluation.
-            create_actor: creates the actor of a trajectory.
-            sees: whether actors look at frames.
-        """
+        """Take the work, what creates the actor of a trajectory, and whether actors look at frames."""
         self._tasks, self._create_actor, self._sees = evaluation.tasks, create_actor, sees
         self._experts = evaluation.simulators(image=False, instances=False)
         by_camera = {task.settings.camera: task.settings.camera_options for task in self._tasks.values()}

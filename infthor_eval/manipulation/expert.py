@@ -44,11 +44,7 @@ class ExpertStates:
     refusal: str = ""
 
     def before(self, episode: ArmEpisode) -> EpisodeStart:
-        """Return the state before an episode.
-
-        Raises:
-            InfeasibleError: this simulator refuses an action of the expert up to its end.
-        """
+        """Return the state before an episode; raises InfeasibleError if the expert is refused up to its end."""
         start = self.starts.get(episode.index)
         if start is None:
             raise InfeasibleError(self.refusal)
@@ -56,11 +52,7 @@ class ExpertStates:
 
 
 def replay_expert(trajectory: Trajectory, simulator: Simulator) -> ExpertStates:
-    """Replay the expert's actions, and keep the state before each pick-up and put that succeeds.
-
-    Args:
-        trajectory: the trajectory.
-        simulator: simulator with AI2-THOR's default agent; it is left in the trajectory's last state.
+    """Replay the expert with AI2-THOR's default agent; keep the state before each pick-up and put that succeeds.
 
     Raises:
         SceneError: the simulator has no such scene.

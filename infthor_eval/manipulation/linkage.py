@@ -75,6 +75,7 @@ class Linkage:
 
     Attributes:
         now: the pose that it was measured in (1).
+        shoulder: position of the shoulder in the world, with the height above the base, metres (3,).
         lever: vector from the wrist to the middle of the held object, in the frame of the hand, metres (3,).
     """
 
@@ -89,13 +90,12 @@ class Linkage:
         """Measure an arm and the object that it holds.
 
         Args:
-            arm: state of the arm.
             held: the held object; its box is along the world's axes, so it grows when the hand is tilted.
             before: measurements in another pose, whose shapes are taken over. Those of the first pose are the best: the
                 arm is bent, which tells the side of the elbow, and the hand is level, so the object's box is tight.
         """
         base, shoulder, elbow, wrist = (np.array(point_of(joint.position)) for joint in arm.joints)
-        self._shoulder: Array = shoulder - base[1] * _UP
+        self.shoulder: Array = shoulder - base[1] * _UP
         self._foot: Array = base - base[1] * _UP
         turn = _matrix(arm.joints[-1].rotation)
         self.now = Poses((wrist - base[1] * _UP)[None], np.array([base[1]]), turn[None])
@@ -111,18 +111,13 @@ class Linkage:
 
     def can_reach(self, poses: Poses) -> NDArray[np.bool_]:
         """Return whether the arm reaches the wrist of each pose (n,)."""
-        near: NDArray[np.bool_] = np.linalg.norm(poses.wrists - self._shoulder, axis=1) <= self.reach
+        near: NDArray[np.bool_] = np.linalg.norm(poses.wrists - self.shoulder, axis=1) <= self.reach
         return near
 
     @property
     def reach(self) -> float:
         """Maximum distance of the wrist from the shoulder, metres."""
         return sum(self._lengths) * _STRETCHED
-
-    @property
-    def shoulder(self) -> Array:
-        """Position of the shoulder in the world, with the height above the base, metres (3,)."""
-        return self._shoulder
 
     def held_box(self, poses: Poses) -> Parts:
         """Return the box of the held object (n, 1)."""
@@ -133,26 +128,24 @@ class Linkage:
     def parts(self, poses: Poses) -> Parts:
         """Return all boxes (n, 5): base, upper arm, forearm, palm, and the held object."""
         elbows = self._elbows(poses.wrists)
-        foot, shoulder = (np.broadcast_to(point, elbows.shape) for point in (self._foot, self._shoulder))
+        foot, shoulder = (np.broadcast_to(point, elbows.shape) for point in (self._foot, self.shoulder))
         rods = [_rod(foot, shoulder), _rod(shoulder, elbows), _rod(elbows, poses.wrists)]
-        palm = Parts(
-            poses.wrists[:, None], poses.turns.transpose(0, 2, 1)[:, None], np.full((len(poses), 1, 3), _THICK)
-        )
+        palm_axes = poses.turns.transpose(0, 2, 1)[:, None]
+        palm = Parts(poses.wrists[:, None], palm_axes, np.full((len(poses), 1, 3), _THICK))
         lifted = [Parts(p.center + (poses.bases[:, None] * _UP)[:, None], p.axes, p.half) for p in (*rods, palm)]
         parts = [*lifted, self.held_box(poses)]
-        return Parts(
-            *(np.concatenate([getattr(p, name) for p in parts], axis=1) for name in ("center", "axes", "half"))
-        )
+        joined = (np.concatenate([getattr(p, name) for p in parts], axis=1) for name in ("center", "axes", "half"))
+        return Parts(*joined)
 
     def _elbows(self, wrists: Array) -> Array:
         """Return the elbows (n, 3) of wrists (n, 3): the circle on which both links meet, on the measured side."""
-        line = wrists - self._shoulder
+        line = wrists - self.shoulder
         far = np.clip(np.linalg.norm(line, axis=1), _TINY, sum(self._lengths))
         upper, fore = self._lengths
         along = np.clip((far**2 + upper**2 - fore**2) / (2 * far), -upper, upper)
         over, aside = _normals(line)
         out = self._side[0] * over + self._side[1] * aside
-        elbows: Array = self._shoulder + (along / far)[:, None] * line + np.sqrt(upper**2 - along**2)[:, None] * out
+        elbows: Array = self.shoulder + (along / far)[:, None] * line + np.sqrt(upper**2 - along**2)[:, None] * out
         return elbows
 
 

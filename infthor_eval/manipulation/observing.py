@@ -21,13 +21,7 @@ class ArmObserver:
     """Observes one episode; all its pictures have the same bounds."""
 
     def __init__(self, begun: SimulatorView, hands: Iterable[Point], named: Sequence[str]) -> None:
-        """Set the bounds.
-
-        Args:
-            begun: the world at the start.
-            hands: centres of the hand's sphere after each step, in the world.
-            named: ids of the objects that the instruction names.
-        """
+        """Set the bounds by the world at the start, the hand's sphere centres in the world, and named objects' ids."""
         self._agent, self._named = begun.agent, frozenset(named)
         self._path = [self._hand(begun)]
         points = [*self._path, *map(self._place, hands), *self._joints(begun), (0.0, 0.0, self._path[0][2])]
@@ -40,11 +34,7 @@ class ArmObserver:
         self._low, self._high = _corner(points, min, -_MARGIN), _corner(points, max, _MARGIN)
 
     def observe(self, view: SimulatorView) -> ArmObservation:
-        """Return what is to be seen in a view of the episode; views come in time order.
-
-        Raises:
-            DataError: the simulator sent no frame.
-        """
+        """Return what is seen in the next view of the episode; raises DataError if the simulator sent no frame."""
         if view.frame is None:
             raise DataError("the simulator sent no frame; use one that renders")
         arm, hand = arm_of(view), self._hand(view)

@@ -62,9 +62,8 @@ def clearances(parts: Parts, obstacles: Obstacles) -> Array:
     clearance = np.full((*parts.center.shape[:2], int(things[-1]) + 1 if len(things) else 0), np.inf)
     extent = (np.abs(parts.axes) * parts.half[..., None]).sum(axis=-2)
     low, high = (parts.center - extent).min(axis=(0, 1)), (parts.center + extent).max(axis=(0, 1))
-    near = ((obstacles.center - obstacles.half < high + _FAR) & (obstacles.center + obstacles.half > low - _FAR)).all(
-        axis=1
-    )
+    near = (obstacles.center - obstacles.half < high + _FAR) & (obstacles.center + obstacles.half > low - _FAR)
+    near = near.all(axis=1)
     if near.any():
         owners, firsts = np.unique(things[near], return_index=True)
         to_boxes = _separations(parts, extent, obstacles.center[near], obstacles.half[near])
@@ -149,9 +148,6 @@ def cavity(item: ThorObject, places: Places, entry: Entry, hinge: int) -> list[C
     """Return boxes of a receptacle that is entered from the front: sides, back, top, boards, and its open door.
 
     Args:
-        item: the receptacle.
-        places: places in it.
-        entry: its opening.
         hinge: edge of the opening that the door hangs on: -1 for the one of lower coordinate, 1 for the other, 0 for no
             door.
     """

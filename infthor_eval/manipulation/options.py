@@ -12,12 +12,7 @@ RADII = (0.04, 0.5)  # of the hand's sphere, metres, as AI2-THOR allows
 
 @dataclass(frozen=True, kw_only=True)
 class ManipulationOptions(SimulatorOptions):
-    """Options of the suite, with their help texts.
-
-    Attributes:
-        radius: radius of the hand's sphere in metres, as typed; None for the task's own.
-        instruction: instruction of a policy; None for the task's own.
-    """
+    """Options of the suite, with their help texts; None is the task's own."""
 
     radius: str | None = field(
         default=None,
@@ -32,11 +27,7 @@ class ManipulationOptions(SimulatorOptions):
     )
 
     def __post_init__(self) -> None:
-        """Check the options.
-
-        Raises:
-            UsageError: an unknown kind of frames, or a radius that AI2-THOR does not allow.
-        """
+        """Check the options; raises UsageError for unknown frames, or a radius that AI2-THOR does not allow."""
         super().__post_init__()
         if self.radius_metres is not None and not RADII[0] <= self.radius_metres <= RADII[1]:
             raise UsageError(f"--radius {self.radius}: is a length of {RADII[0]} to {RADII[1]} metres")

@@ -139,12 +139,7 @@ def others_on(view: SimulatorView, item: ThorObject, held: str) -> list[ThorObje
 
 
 def support(held: Parts, places: Places) -> Array:
-    """Return the share (n,) of the held object that would be over a board below it; 0 if its middle would not.
-
-    Args:
-        held: box of the held object in some poses (n, 1).
-        places: places of the receptacle.
-    """
+    """Return the share (n,) of held boxes (n, 1) that would be over a board below; 0 if the middle would not."""
     corners = held.axes[:, 0].transpose(0, 2, 1)[:, None] @ (_CORNERS * held.half)[..., None]
     spots = (held.center + _SHRUNK * corners[..., 0])[:, :, [0, 2]]
     bottom = held.center[:, 0, 1] - (np.abs(held.axes[:, 0, :, 1]) * held.half[:, 0]).sum(axis=1)
@@ -169,7 +164,6 @@ def occupancy(held: Parts, places: Places, others: Sequence[Corners]) -> Array:
 
     Args:
         held: box of the held object in some poses (n, 1).
-        places: places of the receptacle.
         others: boxes of objects that may stand there, or be over it; one that begins below the places is not on them.
     """
     if not others:

@@ -22,8 +22,6 @@ class RadiusLine:
     """One model in episodes of one kind.
 
     Attributes:
-        label: name of the model.
-        kind: kind of the episodes.
         is_bound: whether it is the planner, which bounds the others.
         is_embedded: whether its numbers are from the embedded simulator.
         points: share of successes by radius in metres, ascending.
@@ -43,12 +41,9 @@ class SuccessByRadius:
     """Success of several models.
 
     Attributes:
-        task: names of the tasks.
         lines: lines by kind, then in the order of the runs, the planner's last.
         floor: share of pick-ups whose object is in the sphere at the start, by radius: successes without a movement.
             Empty if there are no pick-ups.
-        n_trajectories: trajectories of the episodes.
-        notes: notes, a line each.
     """
 
     task: str

@@ -39,10 +39,12 @@ def _approach(environment: ArmEnvironment, target: str) -> Iterator[Call]:
     """
     for shift in _SHIFTS:
         goal = middle_of(environment.view.objects[target])
-        yield _lift(environment.view, goal[1] + shift)
+        share = ArmStand.of(environment.view.agent).share(goal[1] + shift)
+        yield {"action": "MoveArmBase", "y": share, "returnToStart": False}
         for _ in range(2):
             yield _aim(environment.view, goal)
-            yield _move(_wrist_before(environment.view, goal))
+            place = xyz(_wrist_before(environment.view, goal))
+            yield {"action": "MoveArm", "position": place, "coordinateSpace": "world", "returnToStart": False}
         yield {"action": "Pass"}
 
 
@@ -67,12 +69,3 @@ def _wrist_before(view: SimulatorView, goal: Point) -> Point:
     length = math.dist(wrist, point_of(arm.sphere_center))
     distance = math.dist(wrist, goal)
     return interpolate(wrist, goal, max(0.0, distance - length) / distance) if distance else wrist
-
-
-def _lift(view: SimulatorView, height: float) -> Call:
-    """Bring the arm's base to a height of the world, or as near to it as it goes."""
-    return {"action": "MoveArmBase", "y": ArmStand.of(view.agent).share(height), "returnToStart": False}
-
-
-def _move(wrist: Point) -> Call:
-    return {"action": "MoveArm", "position": xyz(wrist), "coordinateSpace": "world", "returnToStart": False}

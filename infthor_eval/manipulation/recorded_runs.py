@@ -19,7 +19,6 @@ class ArmTaskConfig(TaskConfig, frozen=True, kw_only=True):
     """The part of a task's run config that curves and replays need.
 
     Attributes:
-        kind: kind of its episodes.
         radius: radius of the hand's sphere, metres.
         instruction: instruction of a policy; None for the default.
     """

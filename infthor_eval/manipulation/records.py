@@ -52,10 +52,8 @@ class ArmRecord(EpisodeRecord, frozen=True, kw_only=True, omit_defaults=True, ta
     """One pick-up or put, and what an arm did in it; `index` is that of the expert's low-level action it replaces.
 
     Attributes:
-        instruction: instruction of a policy.
         object_id: id of the object that is picked up or put, in this simulator.
         receptacle_id: id of the receptacle that it is put into; None for pick-ups.
-        steps: steps of the arm.
         starts_inside: whether the object is in the hand's sphere at the start; for pick-ups alone.
         start_distance: metres from the centre of the hand's sphere to the target's box at the start.
         closest: smallest such distance.

@@ -17,7 +17,6 @@ class NearbyObject:
     """An object near the arm.
 
     Attributes:
-        name: type of the object.
         corners: corners of its box from above, in order: metres to the right and ahead.
         low: height of its lowest point.
         high: height of its highest point.
@@ -77,9 +76,6 @@ class EpisodeTitle:
         number: place among the run's episodes of the trajectory, from 1 on.
         n_episodes: number of these.
         action: index of the expert's low-level action that the episode replaces.
-        kind: "Pick-up" or "Put".
-        instruction: the instruction.
-        n_steps: steps that the arm took.
         radius: radius of the hand's sphere, metres.
     """
 

@@ -45,11 +45,7 @@ class RecordedEpisodes(RecordedTrajectory[ArmRun, ArmRecord]):
     """What a run recorded of an arm's episodes in one trajectory."""
 
     def at_actions(self, actions: Sequence[int]) -> list[Record]:
-        """Return the records of the episodes that replace some of the expert's low-level actions, in time order.
-
-        Raises:
-            UsageError: the run has no episode for one of them.
-        """
+        """Return the records of the episodes for some of the expert's actions; UsageError if the run lacks one."""
         known = [record.payload.index for record in self.records]
         for action in actions:
             if action not in known:
@@ -59,12 +55,10 @@ class RecordedEpisodes(RecordedTrajectory[ArmRun, ArmRecord]):
 
 
 def recorded_episodes(run: ArmRun, task: str | None, trajectory: str | None) -> RecordedEpisodes:
-    """Find a run's records of a trajectory.
+    """Find a run's records of a trajectory; None for the only one.
 
     Args:
-        run: the run.
         task: name of the task; None for all of them, if they are of different kinds.
-        trajectory: name of the trajectory; None for the only one.
 
     Raises:
         UsageError: there is no such task or trajectory, or none is given where there are several.

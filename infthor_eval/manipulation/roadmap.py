@@ -60,12 +60,7 @@ class MoveKind(IntEnum):
 
 @dataclass(frozen=True)
 class ArmMove:
-    """One movement of an arm.
-
-    Attributes:
-        kind: kind of the movement.
-        pose: pose after it (1).
-    """
+    """One movement of an arm, and the pose (1) after it."""
 
     kind: MoveKind
     pose: Poses
@@ -75,12 +70,7 @@ _Stretch = tuple[MoveKind, Poses]  # the kind of a movement and the poses (n) on
 
 
 class Terrain:
-    """Which movements are free for an arm.
-
-    Attributes:
-        linkage: the arm, measured in its present pose.
-        contacts: collisions so far.
-    """
+    """Which movements are free for an arm (`linkage`, in its present pose), given its collisions so far."""
 
     def __init__(
         self, linkage: Linkage, obstacles: Obstacles, contacts: Sequence[Contact], *, escapes: bool = False
@@ -88,9 +78,6 @@ class Terrain:
         """Measure how near obstacles are in the present pose.
 
         Args:
-            linkage: the arm in its present pose.
-            obstacles: obstacles.
-            contacts: collisions so far.
             escapes: whether a part that is deep in a thing may leave it through other parts of that thing, as the
                 embedded simulator allows; in Unity it is stuck.
         """
@@ -186,13 +173,11 @@ class Terrain:
         if not self.contacts:
             return np.zeros((len(poses), 0))
         wrists, held = poses.world(), self.linkage.held_box(poses).center[:, 0]
-        return np.stack(
-            [
-                np.maximum(np.linalg.norm(wrists - c.wrist, axis=1), np.linalg.norm(held - c.held, axis=1))
-                for c in self.contacts
-            ],
-            axis=1,
-        )
+        apart = [
+            np.maximum(np.linalg.norm(wrists - c.wrist, axis=1), np.linalg.norm(held - c.held, axis=1))
+            for c in self.contacts
+        ]
+        return np.stack(apart, axis=1)
 
 
 def _tolerance(clearance: Array) -> Array:
@@ -247,14 +232,7 @@ class Roadmap:
     """Free poses, and the costs of moving from one to another."""
 
     def __init__(self, terrain: Terrain, others: Poses, ends: Poses, costs: Array) -> None:
-        """Collect poses.
-
-        Args:
-            terrain: tells which movements are free.
-            others: poses that may be passed (n).
-            ends: poses to reach (m).
-            costs: costs of these (m,).
-        """
+        """Collect the poses that may be passed (n), and those to reach (m) with their costs (m,)."""
         self._terrain, self._costs = terrain, costs
         self._poses = Poses.join([terrain.linkage.now, ends, others])
         self._n_ends = len(ends)

@@ -47,16 +47,7 @@ class ArmRunner(EpisodeRunner[ArmEnvironment, ArmRecord]):
         sees: bool,
         seed: int,
     ) -> None:
-        """Take a trajectory.
-
-        Args:
-            trajectory: the trajectory.
-            states: the true states that its episodes begin in.
-            simulator: simulator of an agent with an arm.
-            actor: actor that drives the arm.
-            sees: whether the actor looks at frames.
-            seed: seed of the run.
-        """
+        """Take a trajectory, the true states that its episodes begin in, and a simulator of an agent with an arm."""
         super().__init__(simulator, lambda: ArmEnvironment(trajectory, simulator))
         self._states, self._actor, self._sees = states, actor, sees
         self._seed = f"{seed}/{trajectory.traj_id}"

@@ -13,13 +13,7 @@ _RANGE = 0.451, 1.801  # metres: heights of the arm's base above the floor
 
 @dataclass(frozen=True)
 class ArmStand:
-    """Where an agent stands, and the range of its arm's base.
-
-    Attributes:
-        low: lowest height of the arm's base in the world, metres.
-        high: highest height of the arm's base.
-        heading: direction that the agent faces, radians.
-    """
+    """Where an agent stands: the range of heights of its arm's base, metres, and its direction, radians."""
 
     low: float
     high: float

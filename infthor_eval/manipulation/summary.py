@@ -47,12 +47,7 @@ ManipulationSummary = EpisodesSummary[ArmTaskSummary]
 
 
 def summarise_manipulation(config: Mapping[str, Any], records: Sequence[Record]) -> ManipulationSummary:
-    """Summarise a run.
-
-    Args:
-        config: config of the run.
-        records: records of all its episodes.
-    """
+    """Summarise a run, given its config and the records of all its episodes."""
     return summarise_episodes(config, records, _summarise_task)
 
 

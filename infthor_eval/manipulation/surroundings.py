@@ -43,13 +43,7 @@ class Surroundings:
     """
 
     def __init__(self, environment: ArmEnvironment, linkage: Linkage, floor: float) -> None:
-        """Collect the boxes.
-
-        Args:
-            environment: environment that was reset to an episode.
-            linkage: the arm in its present pose.
-            floor: height of the floor, metres.
-        """
+        """Collect the boxes around an environment that was reset to an episode; `floor` is a height in metres."""
         self._environment, self._linkage = environment, linkage
         self._item = environment.view.objects[str(environment.start.receptacle_id)]
         self.places = places_of(environment, self._item)
@@ -83,7 +77,6 @@ class Surroundings:
 
         Args:
             parts: parts of the arm in the colliding pose (1).
-            error: message of the simulator.
 
         Returns:
             Whether the arm collided with the receptacle.

@@ -71,12 +71,7 @@ class ArmTaskSettings:
     @property
     def grasp(self) -> Grasp:
         """How the hand closes and opens."""
-        return Grasp(
-            radius=self.radius,
-            takes_all=self.grasps == "all",
-            at_palm=self.hold == "palm",
-            threshold=self.gripper_threshold,
-        )
+        return Grasp(self.radius, self.grasps == "all", self.hold == "palm", self.gripper_threshold)
 
     @property
     def camera(self) -> tuple[int, float]:
@@ -90,12 +85,7 @@ class ArmTaskSettings:
 
 
 class ManipulationTask(EpisodeTask[ArmTaskSettings, ArmTrajectory]):
-    """A task file that was read, with its episodes.
-
-    Attributes:
-        kind: kind of its episodes.
-        episodes: its episodes, each with its trajectory.
-    """
+    """A task file that was read, with its episodes, each with its trajectory."""
 
     def __init__(self, file: TaskFile, request: TaskRequest[ManipulationOptions]) -> None:
         """Check the file and find its episodes.

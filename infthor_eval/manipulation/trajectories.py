@@ -21,7 +21,6 @@ class ArmEpisode:
 
     Attributes:
         index: index of the expert's low-level action.
-        kind: kind of the episode.
         object_type: type of the object that is picked up or put.
         receptacle_type: type of the receptacle that it is put into; None for pick-ups.
     """
@@ -34,31 +33,19 @@ class ArmEpisode:
 
 @dataclass(frozen=True)
 class ArmTrajectory(TaskTrajectory):
-    """A trajectory with its episodes.
-
-    Attributes:
-        episodes: its episodes, in time order.
-    """
+    """A trajectory with its episodes, in time order."""
 
     episodes: Sequence[ArmEpisode]
 
 
 def arm_episodes(trajectory: Trajectory) -> list[ArmEpisode]:
-    """Return the pick-ups and puts of a trajectory, in time order.
-
-    Raises:
-        DataError: one of them names no object.
-    """
+    """Return the pick-ups and puts of a trajectory, in time order; raises DataError if one names no object."""
     numbered = enumerate(trajectory.plan.low_actions)
     return [_episode(number, low) for number, low in numbered if low.api_action.action in EXPERT_ACTIONS]
 
 
 def read_arm_trajectory(source: TrajectorySource) -> ArmTrajectory:
-    """Read a trajectory and its episodes.
-
-    Raises:
-        DataError: it cannot be used.
-    """
+    """Read a trajectory and its episodes; raises DataError if it cannot be used."""
     trajectory = source.read()
     try:
         episodes = arm_episodes(trajectory)

@@ -14,27 +14,14 @@ __all__ = ["ActorFactory", "actor_factory"]
 
 @dataclass(frozen=True)
 class ActorFactory:
-    """Creates the actors of a subject.
-
-    Attributes:
-        sees: whether they look at frames.
-        create: creates the actor of a task's trajectory.
-    """
+    """Creates the actors of a subject; `sees` tells whether they look at frames."""
 
     sees: bool
     create: Callable[[PlansTask, Trajectory], PlanActor]
 
 
 def actor_factory(subject: Subject, trajectories: Sequence[Trajectory]) -> ActorFactory:
-    """Return the factory of a subject.
-
-    Args:
-        subject: a model, or a baseline, which is fitted to the trajectories.
-        trajectories: all trajectories of the run.
-
-    Raises:
-        TypeError: it is neither a model nor a baseline; runs refuse that before.
-    """
+    """Return the factory of a model, or of a baseline, which is fitted to all trajectories; TypeError for others."""
     if isinstance(subject, PlanBaseline):
         subject.fit(trajectories)
         return ActorFactory(False, lambda _, trajectory: subject.actor(trajectory))

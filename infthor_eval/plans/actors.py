@@ -14,12 +14,7 @@ __all__ = ["Act", "PlanActor", "PlanBaseline", "PlanSituation"]
 
 @dataclass(frozen=True)
 class Act:
-    """An action that an actor chose.
-
-    Attributes:
-        action: text of the action, or a call of AI2-THOR's.
-        reply: reply of the model; None for baselines.
-    """
+    """An action that an actor chose, as a text or a call of AI2-THOR's, and the model's reply (None for baselines)."""
 
     action: str | Mapping[str, Any]
     reply: Reply | None = None
@@ -27,14 +22,7 @@ class Act:
 
 @dataclass(frozen=True)
 class PlanSituation:
-    """A plan that begins.
-
-    Attributes:
-        environment: the environment, reset to the plan.
-        plan: the plan.
-        seed: seed of everything random.
-        observation: the first observation.
-    """
+    """A plan that begins: the environment reset to it, its first observation, and the seed of everything random."""
 
     environment: PlanEnvironment
     plan: Plan
@@ -52,7 +40,6 @@ class PlanActor(Protocol):
             DataError: a frame cannot be read.
             ModelError: the model cannot take the history.
         """
-        ...
 
     def act(self) -> Act:
         """Choose the next action.
@@ -61,11 +48,9 @@ class PlanActor(Protocol):
             DataError: a frame cannot be read.
             ModelError: the model cannot reply.
         """
-        ...
 
     def observe(self, outcome: StepOutcome) -> None:
         """Take the outcome of the last action, if the plan goes on."""
-        ...
 
 
 @runtime_checkable
@@ -74,8 +59,6 @@ class PlanBaseline(Subject, Protocol):
 
     def fit(self, trajectories: Sequence[Trajectory]) -> None:
         """Take all trajectories of the run; called once, before the first plan."""
-        ...
 
     def actor(self, trajectory: Trajectory) -> PlanActor:
         """Create the actor of a trajectory."""
-        ...

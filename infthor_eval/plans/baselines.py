@@ -2,9 +2,10 @@
 
 import random
 from collections.abc import Callable, Mapping, Sequence
+from typing import ClassVar
 
 from infthor_eval.formats.trajectory import Trajectory
-from infthor_eval.plans.actors import Act, PlanBaseline, PlanSituation
+from infthor_eval.plans.actors import Act, PlanActor, PlanBaseline, PlanSituation
 from infthor_eval.plans.environment import StepOutcome
 from infthor_eval.plans.habits import Habits
 from infthor_eval.plans.script import scripted_action
@@ -19,9 +20,14 @@ _IN_FLIGHT = 4  # trajectories at a time; each has its own simulator
 
 class _PlanBaseline(BaselineSubject):
     capabilities = Capabilities(counts_tokens=False, token_ids=False, max_in_flight=_IN_FLIGHT)
+    _actor: ClassVar[type[PlanActor]]
 
     def fit(self, trajectories: Sequence[Trajectory]) -> None:
         """See `PlanBaseline`; there is nothing to learn."""
+
+    def actor(self, trajectory: Trajectory) -> PlanActor:
+        """See `PlanBaseline`."""
+        return self._actor()
 
 
 class _BlindActor:
@@ -69,30 +75,21 @@ class PlannerAgent(_PlanBaseline):
     """Repeats the expert's actions: the upper bound."""
 
     name = "planner"
-
-    def actor(self, trajectory: Trajectory) -> _ExpertActor:
-        """See `PlanBaseline`."""
-        return _ExpertActor()
+    _actor = _ExpertActor
 
 
 class RandomAgent(_PlanBaseline):
-    """Draws uniformly from the calls that are possible in view, each action with each of its objects."""
+    """Draws uniformly, by the situation's seed alone, from the calls possible in view: each action with each object."""
 
     name = "random"
-
-    def actor(self, trajectory: Trajectory) -> _RandomPlanActor:
-        """See `PlanBaseline`; the draws depend on the situation's seed alone."""
-        return _RandomPlanActor()
+    _actor = _RandomPlanActor
 
 
 class ScriptedAgent(_PlanBaseline):
     """Does what the plan's words say, and nothing else; see `script`."""
 
     name = "scripted"
-
-    def actor(self, trajectory: Trajectory) -> _ScriptedActor:
-        """See `PlanBaseline`."""
-        return _ScriptedActor()
+    _actor = _ScriptedActor
 
 
 class HabitualAgent(_PlanBaseline):

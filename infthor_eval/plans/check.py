@@ -15,7 +15,6 @@ from infthor_eval.plans.environment import Ended, Observation, StepOutcome
 from infthor_eval.plans.expert import ExpertAction, ExpertRefusedError
 from infthor_eval.plans.plan import Plan
 from infthor_eval.thor.actions import object_type_of
-from infthor_eval.thor.view import SimulatorView
 from model_adapters import ContractError
 
 __all__ = ["Environment", "check_env"]
@@ -33,19 +32,15 @@ class Environment(Protocol):
     @property
     def plans(self) -> Sequence[Plan]:
         """Plans that can be reset to."""
-        ...
 
     def reset(self, plan: int = 0) -> tuple[Observation, Mapping[str, Any]]:
         """Bring the world to the true state before a plan."""
-        ...
 
     def step(self, action: str | Mapping[str, Any]) -> StepOutcome:
         """Execute one action of the present plan."""
-        ...
 
     def expert_actions(self, plan: int) -> Sequence[ExpertAction]:
         """Return the expert's actions of a plan."""
-        ...
 
 
 def check_env(environment: Environment, plans: Sequence[int] | None = None) -> None:
@@ -118,9 +113,8 @@ def _check_expert(environment: Environment, plan: int) -> None:
         over = outcome.terminated or outcome.truncated
         if over:
             break
-    _require(
-        over and outcome.info.ended == Ended.DONE, f"the expert's actions do not complete plan {plan}: {outcome.info}"
-    )
+    done = over and outcome.info.ended == Ended.DONE
+    _require(done, f"the expert's actions do not complete plan {plan}: {outcome.info}")
     most = info["max_reward"]
     _require(abs(earned - most) < _SMALL, f"the expert earns {earned:g} in plan {plan}, and max_reward says {most:g}")
     _check_nothing_under_way(environment, "after a plan's end")
@@ -132,7 +126,8 @@ def _check_state_is_the_plans_own(environment: Environment, plans: Sequence[int]
     for plan in (*reversed(plans), *plans):
         observation, info = environment.reset(plan)
         before, before_info = first[plan]
-        _require(_is_same(observation.view, before.view), f"plan {plan} begins in another state the second time")
+        states = [(view.agent, view.inventory, view.objects) for view in (observation.view, before.view)]
+        _require(states[0] == states[1], f"plan {plan} begins in another state the second time")
         _require(_same_picture(observation, before), f"plan {plan} begins with another picture the second time")
         _require(dict(info) == dict(before_info), f"the information of reset({plan}) differs the second time")
         for action in ("RotateLeft", "LookUp"):
@@ -173,9 +168,8 @@ def _check_outcome(outcome: StepOutcome) -> None:
     _require(isinstance(terminated, bool) and isinstance(truncated, bool), "terminated and truncated are no booleans")
     _require(not (terminated and truncated), "a plan is terminated and truncated at once")
     _require(isinstance(reward, int | float) and math.isfinite(reward), f"a reward is {reward!r}")
-    _require(
-        (info.ended is None) == (not terminated and not truncated), f"info.ended is {info.ended} at the wrong time"
-    )
+    goes_on = not terminated and not truncated
+    _require((info.ended is None) == goes_on, f"info.ended is {info.ended} at the wrong time")
     _require((info.ended == Ended.LIMIT) == truncated, f"truncated is {truncated}, and info.ended is {info.ended}")
     _check_observation(observation)
 
@@ -196,10 +190,6 @@ def _check_observation(observation: Observation) -> None:
     if observation.frame is not None and view.frame is not None:
         kept = np.asarray(observation.frame.load())
         _require(np.array_equal(kept, view.frame), f"{observation.frame.path} is another picture than the view's")
-
-
-def _is_same(one: SimulatorView, other: SimulatorView) -> bool:
-    return (one.agent, one.inventory, one.objects) == (other.agent, other.inventory, other.objects)
 
 
 def _same_picture(one: Observation, other: Observation) -> bool:

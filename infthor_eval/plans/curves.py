@@ -34,13 +34,9 @@ FACETS: Mapping[str, Facet] = {
 
 
 def plan_curves(runs: Sequence[PlansRun], task: str | None = None) -> RewardCurves:
-    """Compute the curves of some runs, on the trajectories and plans that all of them have; see `compute_curves`.
+    """Compute the curves of runs (at least one) of a task (None: the only one they share); see `compute_curves`.
 
     Plans that a run excludes are left out of all of them.
-
-    Args:
-        runs: at least one run.
-        task: name of the task; None for the only one that they share.
 
     Raises:
         UsageError: they share no task or several, or their reward rules differ.

@@ -23,7 +23,7 @@ from infthor_eval.plans.rewards import (
     reward_rules,
 )
 from infthor_eval.plans.targets import PlanTarget, target_of
-from infthor_eval.thor.actions import ActionText, UngroundedError, ground, parse_action, text_of_call
+from infthor_eval.thor.actions import UngroundedError, ground, parse_action, text_of_call
 from infthor_eval.thor.frames import FrameKeeper, NoFrames
 from infthor_eval.thor.recorded import degrees_of
 from infthor_eval.thor.simulator import Simulator
@@ -190,19 +190,11 @@ class PlanEnvironment:
         return self._execute(text, call, before)
 
     def past(self, plan: int) -> Past:
-        """Return the history before a plan; only if frames are kept.
-
-        Raises:
-            ExpertRefusedError: as `reset`.
-        """
+        """Return the history before a plan, only if frames are kept; raises ExpertRefusedError as `reset` does."""
         return self._expert.past(plan)
 
     def expert_actions(self, plan: int) -> Sequence[ExpertAction]:
-        """Return the expert's actions of a plan.
-
-        Raises:
-            ExpertRefusedError: as `reset`.
-        """
+        """Return the expert's actions of a plan; raises ExpertRefusedError as `reset` does."""
         return self._expert.actions(plan)
 
     def named_objects(self, plan: int) -> Sequence[str]:
@@ -219,7 +211,7 @@ class PlanEnvironment:
     def _ground(self, action: str | Mapping[str, Any], view: SimulatorView) -> tuple[str, Mapping[str, Any]]:
         if not isinstance(action, str):
             return str(text_of_call(action, view)), action
-        text: ActionText = parse_action(action)
+        text = parse_action(action)
         return str(text), ground(text, view, self.look_degrees, self._preferred)
 
     def _execute(self, text: str, call: Mapping[str, Any], before: SimulatorView) -> StepOutcome:

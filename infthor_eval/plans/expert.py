@@ -34,8 +34,6 @@ class ExpertAction:
     """An action of the expert.
 
     Attributes:
-        call: call of the simulator.
-        text: the action in words.
         pose: pose of the agent after it.
         completes: whether the goal of the plan's task holds after it, and did not at the plan's start.
     """
@@ -51,7 +49,6 @@ class PlanStart:
     """The true state before a plan.
 
     Attributes:
-        mark: mark of the simulator.
         frame: frame that the agent sees; None if frames are not kept.
         treatments: what was done to objects so far in the plan's task.
     """
@@ -69,11 +66,7 @@ class _Step(NamedTuple):
 
 
 class Expert:
-    """Replays the expert of a trajectory, plan by plan.
-
-    Attributes:
-        grounding: ids of the trajectory's objects in this simulator.
-    """
+    """Replays the expert of a trajectory, plan by plan; `grounding` has the ids of its objects in this simulator."""
 
     def __init__(
         self,
@@ -84,11 +77,7 @@ class Expert:
         frames: FrameKeeper,
         in_words: bool = False,
     ) -> None:
-        """Restore the scene.
-
-        Raises:
-            SimulatorError: the simulator has no such scene or fails.
-        """
+        """Restore the scene; raises SimulatorError if the simulator has no such scene or fails."""
         self._trajectory, self._plans, self._tasks = trajectory, plans, tasks
         self._simulator, self._frames = simulator, frames
         restore(simulator, trajectory.scene)
@@ -117,20 +106,12 @@ class Expert:
         return self._starts[plan]
 
     def actions(self, plan: int) -> Sequence[ExpertAction]:
-        """Return the expert's actions of a plan.
-
-        Raises:
-            ExpertRefusedError: as `start` of the next one.
-        """
+        """Return the expert's actions of a plan; raises ExpertRefusedError as `start` of the next plan does."""
         self.start(plan + 1)
         return self._actions[plan]
 
     def past(self, plan: int) -> Past:
-        """Return the history before a plan; only if frames are kept.
-
-        Raises:
-            ExpertRefusedError: as `start`.
-        """
+        """Return the history before a plan, only if frames are kept; raises ExpertRefusedError as `start` does."""
         segment = self._open_segment(plan)
         return Past(self._segments[:plan], segment, self._state(self._plans[plan].low[0]) if self._log else "")
 

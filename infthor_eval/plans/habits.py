@@ -29,12 +29,7 @@ class Habits:
                 self._learn(plan.text, expert_texts(trajectory, plan))
 
     def next_action(self, plan: str, done: Sequence[str]) -> str:
-        """Return the next action.
-
-        Args:
-            plan: text of the plan.
-            done: actions so far.
-        """
+        """Return the next action in a plan, after the actions done so far."""
         for key in _situations(plan, done):
             if key in self._seen:
                 counts = self._seen[key]

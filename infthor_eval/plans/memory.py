@@ -47,11 +47,7 @@ class Past:
 
 
 class Memory(Protocol):
-    """Selects what a model is given.
-
-    Attributes:
-        needs_state: whether it needs the state in words.
-    """
+    """Selects what a model is given; `needs_state` tells whether it needs the state in words."""
 
     needs_state: ClassVar[bool]
 
@@ -59,14 +55,12 @@ class Memory(Protocol):
         """Return what the model is given before the first action of a plan.
 
         Args:
-            past: the history.
             count: counts the tokens of some parts; returns None if the model does not count.
 
         Raises:
             DataError: a frame cannot be read.
             ModelError: the required parts do not fit.
         """
-        ...
 
 
 class FullHistory:
@@ -89,11 +83,7 @@ class LastTokens:
     needs_state: ClassVar[bool] = False
 
     def __init__(self, n_tokens: int) -> None:
-        """Set the limit.
-
-        Args:
-            n_tokens: maximum number of tokens before the model's first action; the plan's own steps come on top.
-        """
+        """Set the maximum number of tokens before the model's first action; the plan's own steps come on top."""
         self._n_tokens = n_tokens
 
     def recall(self, past: Past, count: CountTokens) -> list[Part]:
@@ -140,11 +130,7 @@ class TopFrames:
     needs_state: ClassVar[bool] = False
 
     def __init__(self, n_frames: int, retriever: str) -> None:
-        """Load the retriever.
-
-        Args:
-            n_frames: number of frames beside the present one; the paper shows 20.
-            retriever: CLIP model, a hub id or a folder.
+        """Load a CLIP model, a hub id or a folder, to show some frames (the paper: 20) beside the present one.
 
         Raises:
             UsageError: there is no such model.
@@ -167,11 +153,10 @@ class TopFrames:
 
 
 def memory_named(text: str, retriever: str | None = None) -> Memory:
-    """Return the memory of a value of `--history`.
+    """Return the memory of a value of `--history`; `retriever` is a CLIP model, None the published one.
 
     Args:
         text: "full", "last:N" (N tokens), "text", or "frames:K" (K frames).
-        retriever: CLIP model for memories that retrieve frames; None for the published one.
 
     Raises:
         UsageError: there is no such memory, or a retriever is given that it does not use.

@@ -22,10 +22,9 @@ _MAX_ACTION_TOKENS = 64  # if replies are restricted to texts of actions, which 
 
 @dataclass(frozen=True)
 class AgentConfig:
-    """How a model is prompted.
+    """How a model is prompted, and how its actions are decoded, each draw with its own seed.
 
     Attributes:
-        decoding: decoding of each action; each draw has its own seed.
         memory: the part of the history that it is given.
         preamble: text before everything else; empty as published.
         constrained: whether its replies are restricted to the actions that are possible in view.

@@ -9,16 +9,7 @@ __all__ = ["PlansOptions"]
 
 @dataclass(frozen=True, kw_only=True)
 class PlansOptions(SimulatorOptions):
-    """Options of the suite, with their help texts.
-
-    Attributes:
-        rewards: name of the reward rules; None for the task's own.
-        history: how much of the history a model is given; None for the task's own.
-        after_failure: whether a trajectory continues after a failed plan; None for the task's own.
-        constrained: whether a model's replies are restricted to the actions that are possible.
-        greedy: whether to decode greedily instead of sampling as published.
-        retriever: CLIP model for histories that retrieve frames, a hub id or a folder.
-    """
+    """Options of the suite, with their help texts; None is the task's own."""
 
     rewards: str | None = field(
         default=None,

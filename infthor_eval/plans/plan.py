@@ -29,14 +29,7 @@ class PlanKind(StrEnum):
 
 @dataclass(frozen=True)
 class TrajectoryTask:
-    """One task of a trajectory.
-
-    Attributes:
-        text: its goal in words.
-        task: its goal condition.
-        first_high: index of its first sub-goal.
-        end_high: index after its last sub-goal.
-    """
+    """One task of a trajectory: its goal in words and as a condition, and its sub-goals [first_high, end_high)."""
 
     text: str
     task: Task
@@ -50,7 +43,6 @@ class Plan:
 
     Attributes:
         index: place among the trajectory's plans.
-        kind: kind of the plan.
         text: the plan in words ("pick up the mug").
         task: index of the task that it belongs to; the earlier one if it is between two tasks.
         low: indices of the expert's low-level actions, [first, end).
@@ -84,9 +76,7 @@ def tasks_of(trajectory: Trajectory) -> list[TrajectoryTask]:
     for sub_task, span in zip(_sub_tasks(trajectory), trajectory.sub_trajs, strict=True):
         first, end = span.high_pddl_idx
         if not 0 <= first <= end <= n_high:
-            raise DataError(
-                f"trajectory {trajectory.traj_id}: task {span.sub_traj_idx} has sub-goals {first} to {end} of {n_high}"
-            )
+            raise _error(trajectory, f"task {span.sub_traj_idx} has sub-goals {first} to {end} of {n_high}")
         task = _task(trajectory, span.sub_traj_idx, sub_task)
         tasks.append(TrajectoryTask(goal_text(trajectory, sub_task), task, first, end))
     return tasks
@@ -129,7 +119,7 @@ def _sub_tasks(trajectory: Trajectory) -> Sequence[SubTask]:
     if len(parts) == len(tasks) + 1 and final is not None:
         return [*tasks, final]
     if len(parts) != len(tasks):
-        raise DataError(f"trajectory {trajectory.traj_id}: {len(parts)} parts for {len(tasks)} tasks; restore the file")
+        raise _error(trajectory, f"{len(parts)} parts for {len(tasks)} tasks; restore the file")
     return tasks
 
 
@@ -158,25 +148,23 @@ def _spans(trajectory: Trajectory) -> dict[int, tuple[int, int]]:
     previous = -1
     for number, low in enumerate(trajectory.plan.low_actions):
         if low.high_idx < previous:
-            raise DataError(
-                f"trajectory {trajectory.traj_id}: action {number} belongs to sub-goal {low.high_idx}, out of order"
-            )
+            raise _error(trajectory, f"action {number} belongs to sub-goal {low.high_idx}, out of order")
         first, _ = spans.get(low.high_idx, (number, number))
         spans[low.high_idx] = (first, number + 1)
         previous = low.high_idx
-    unknown = spans.keys() - {high.high_idx for high in trajectory.plan.high_pddl}
-    if unknown:
-        raise DataError(
-            f"trajectory {trajectory.traj_id}: there is no sub-goal {min(unknown)}, which actions belong to"
-        )
+    if unknown := spans.keys() - {high.high_idx for high in trajectory.plan.high_pddl}:
+        raise _error(trajectory, f"there is no sub-goal {min(unknown)}, which actions belong to")
     return spans
 
 
 def _kind(trajectory: Trajectory, high: HighAction) -> PlanKind:
+    kind = high.discrete_action.action
     try:
-        return PlanKind(high.discrete_action.action)
+        return PlanKind(kind)
     except ValueError as error:
-        raise DataError(
-            f"trajectory {trajectory.traj_id}: sub-goal {high.high_idx} is {high.discrete_action.action!r:.60}; "
-            f"there are {', '.join(PlanKind)}"
-        ) from error
+        problem = f"sub-goal {high.high_idx} is {kind!r:.60}; there are {', '.join(PlanKind)}"
+        raise _error(trajectory, problem) from error
+
+
+def _error(trajectory: Trajectory, problem: str) -> DataError:
+    return DataError(f"trajectory {trajectory.traj_id}: {problem}")

@@ -12,12 +12,7 @@ __all__ = ["PlanTaskConfig", "PlansRun", "shared_plans"]
 
 
 class PlanTaskConfig(TaskConfig, frozen=True, kw_only=True):
-    """The part of a task's run config that curves and replays need.
-
-    Attributes:
-        rewards: reward rules, as `RewardRules` decodes them.
-        after_failure: what follows a failed plan, "continue" or "stop".
-    """
+    """The part of a task's run config that curves and replays need; `rewards` is as `RewardRules` decodes it."""
 
     rewards: Any
     after_failure: str
@@ -33,11 +28,7 @@ class PlansRun(RecordedRun[PlanRecord, PlanTaskConfig]):
 
 
 def shared_plans(runs: Sequence[PlansRun], task: str | None) -> SharedUnits[PlanRecord]:
-    """Find the plans of one task that all runs have, in trajectories that each of them has in full.
-
-    Args:
-        runs: at least one run.
-        task: name of the task; None for the only one that they share.
+    """Find the plans of a task (None: the only one shared) in trajectories that all runs (at least one) have in full.
 
     Raises:
         UsageError: they share no task or several, or their reward rules differ.

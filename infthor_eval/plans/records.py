@@ -16,7 +16,6 @@ class StepRecord(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
         action: the action in words; empty if the reply could not be executed.
         call: call of the simulator, as JSON values; None if the reply could not be executed.
         message: what was wrong with it; empty if nothing was.
-        reward: reward of the action.
         n_context_tokens: tokens of the request; None if the model does not count.
     """
 
@@ -32,13 +31,11 @@ class PlanRecord(EpisodeRecord, frozen=True, kw_only=True, omit_defaults=True, t
     """One plan, and what an agent did in it; `kind` is that of the plan ("PickupObject"), `ended` see `Ended`.
 
     Attributes:
-        plan: the plan in words.
         goal: goal of its task, in words.
         task: index of its task in the trajectory.
         first_step: index of the expert's first low-level action of it.
         n_expert_steps: number of the expert's actions.
         is_final: whether its task is the final long-horizon task.
-        steps: actions of the agent.
         goal_reached: whether the task's goal was reached in it.
     """
 

@@ -22,14 +22,7 @@ class FloorPose:
 
 @dataclass(frozen=True)
 class MapObject:
-    """An object from above.
-
-    Attributes:
-        name: type of the object.
-        low: corner of its box with the lowest x and z.
-        high: the opposite corner.
-        is_named: whether the plan names it.
-    """
+    """An object from above: its type, its box's corners of lowest and highest x and z, whether the plan names it."""
 
     name: str
     low: Point
@@ -58,8 +51,6 @@ class PlanObservation:
 
     Attributes:
         frame: frame that the agent sees: RGB, uint8, [height, width, 3].
-        room: map of the room.
-        agent: pose of the agent.
         walked: positions of the agent in this plan, from its start on.
         held: types of the objects in its hand.
     """
@@ -73,16 +64,7 @@ class PlanObservation:
 
 @dataclass(frozen=True)
 class PlanTitle:
-    """What a plan asks for.
-
-    Attributes:
-        number: place in the trajectory, from 1 on.
-        n_plans: plans of the trajectory.
-        text: the plan in words.
-        goal: goal of its task, in words.
-        n_expert: actions that the expert took.
-        n_actions: actions that the agent took.
-    """
+    """What a plan asks for, its number from 1 on, and the numbers of the expert's and of the agent's actions."""
 
     number: int
     n_plans: int
@@ -116,7 +98,6 @@ class PlanFrame(EpisodeFrame[PlanTitle, PlanObservation]):
     """The start of a plan, or an action of it.
 
     Attributes:
-        rewards: rewards so far.
         action: the action in words; empty if the reply could not be executed.
         reply: reply of the model if it is not the action; else empty.
         wrong: what was wrong with the action; empty if nothing was.

@@ -48,11 +48,7 @@ class RecordedPlans(RecordedTrajectory[PlansRun, PlanRecord]):
     """What a run recorded of the plans of one trajectory."""
 
     def between(self, first: int, last: int) -> list[Record]:
-        """Return the records of plans by their number, from 1 on, both ends included.
-
-        Raises:
-            UsageError: the run does not have all of them.
-        """
+        """Return the records of plans by number, from 1 on, ends included; UsageError if the run lacks some of them."""
         lowest, highest = (self.records[place].payload.index + 1 for place in (0, -1))
         if not lowest <= first <= last <= highest:
             chosen = f"{first}" if first == last else f"{first}-{last}"
@@ -63,12 +59,7 @@ class RecordedPlans(RecordedTrajectory[PlansRun, PlanRecord]):
 
 
 def recorded_plans(run: PlansRun, task: str | None, trajectory: str | None) -> RecordedPlans:
-    """Find a run's records of a trajectory.
-
-    Args:
-        run: the run.
-        task: name of the task; None for the only one.
-        trajectory: name of the trajectory; None for the only one.
+    """Find a run's records of a trajectory in a task; None for the only one.
 
     Raises:
         UsageError: there is no such task or trajectory, or none is given and there are several.
@@ -119,9 +110,17 @@ class PlanReplay(EpisodeReplay[PlanRecord, PlanFrame]):
 
     def _frame(self, record: Record, number: int, observation: PlanObservation | None, note: str) -> PlanFrame:
         payload, step = record.payload, record.payload.steps[number - 1] if number else StepRecord()
-        is_end = 0 < number == len(payload.steps)
+        n_steps = len(payload.steps)
+        is_end = 0 < number == n_steps
         return PlanFrame(
-            title=self._title(payload),
+            title=PlanTitle(
+                payload.index + 1,
+                self.n_episodes,
+                payload.plan,
+                payload.goal,
+                payload.n_expert_steps,
+                n_actions=n_steps,
+            ),
             observation=observation,
             number=number,
             ending=ending_of(record, number),
@@ -129,14 +128,9 @@ class PlanReplay(EpisodeReplay[PlanRecord, PlanFrame]):
             note=note,
             rewards=self._rewards(payload, number),
             action=_action_text(step),
-            reply=_reply_text(step),
+            reply=step.reply if step.reply and step.reply.strip() != step.action else "",
             wrong=step.message,
             goal_reached=is_end and payload.goal_reached,
-        )
-
-    def _title(self, plan: PlanRecord) -> PlanTitle:
-        return PlanTitle(
-            plan.index + 1, self.n_episodes, plan.plan, plan.goal, plan.n_expert_steps, n_actions=len(plan.steps)
         )
 
     def _rewards(self, plan: PlanRecord, number: int) -> PlanRewards:
@@ -224,11 +218,6 @@ def _action_text(step: StepRecord) -> str:
     if isinstance(object_id, str) and step.call is not None and step.action == step.call["action"]:
         return str(text_of(step.action, object_id))
     return step.action
-
-
-def _reply_text(step: StepRecord) -> str:
-    reply = step.reply or ""
-    return "" if reply.strip() == step.action else reply
 
 
 def _point(pose: AgentPose) -> Point:

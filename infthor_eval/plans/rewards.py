@@ -23,14 +23,13 @@ from infthor_eval.household.scout import grid_pose_of
 from infthor_eval.household.tasks import Task
 from infthor_eval.household.treatments import Treatments
 from infthor_eval.plans.plan import PlanKind
-from infthor_eval.plans.targets import PlanTarget, in_hand, subject_of
+from infthor_eval.plans.targets import TREATMENTS, PlanTarget, in_hand, subject_of
 from infthor_eval.thor.view import AgentPose, SimulatorView, ThorObject
 
 __all__ = ["PlanReward", "RewardRules", "StepReward", "count_actions_to_goal", "max_reward", "reward_rules"]
 
 _FILE = Path(__file__).with_name("rewards.yaml")
 _SMALL_LOOK = 0.01  # share of a look below which the camera's angle is right: simulators report rounded angles
-_TREATMENTS = {PlanKind.CLEAN, PlanKind.HEAT, PlanKind.COOL}
 _COOLING_STAGES = 3  # cooled, opened again, picked up again
 _NOTHING = Treatments()
 
@@ -69,13 +68,7 @@ class RewardRules(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 @dataclass(frozen=True)
 class StepReward:
-    """The reward of one action.
-
-    Attributes:
-        reward: reward for the plan and for the task.
-        done: whether the plan was completed with it.
-        failed: whether the plan failed with it.
-    """
+    """The reward of one action, and whether the plan was completed or failed with it."""
 
     reward: float = 0.0
     done: bool = False
@@ -83,11 +76,7 @@ class StepReward:
 
 
 def reward_rules(name: str) -> RewardRules:
-    """Return the rules of a name: "default", or "published-compat", which has the published faults.
-
-    Raises:
-        UsageError: there are no rules of this name.
-    """
+    """Return the rules "default", or "published-compat" with the published faults; UsageError for other names."""
     by_name = read_yaml(_FILE, "install the package again")
     if name not in by_name:
         raise unknown_name("reward rules", name, by_name)
@@ -99,6 +88,7 @@ class PlanReward:
 
     Attributes:
         treatments: what was washed, heated and cooled in the task so far; nothing if the rules do not notice it.
+        goal_reached: whether the task's goal has been reached in this plan.
     """
 
     def __init__(
@@ -113,9 +103,6 @@ class PlanReward:
         """Begin a plan.
 
         Args:
-            rules: reward rules.
-            target: target of the plan.
-            task: task that the plan is part of.
             start: the world at the plan's start.
             treatments: what was washed, heated and cooled in this task before.
             grid: reachable cells; GotoLocation needs it.
@@ -134,24 +121,10 @@ class PlanReward:
         self._closest = math.inf if self._paths is None else self._paths.remaining(start.agent)
         self._stages: set[str] = set()
         self._task_open = not goal_holds(task, start, self.treatments)
-        self._goal_reached = self._is_over = False
-
-    @property
-    def goal_reached(self) -> bool:
-        """Whether the task's goal has been reached in this plan."""
-        return self._goal_reached
+        self.goal_reached = self._is_over = False
 
     def after(self, call: Mapping[str, Any], before: SimulatorView, after: SimulatorView) -> StepReward:
-        """Return the reward of an action.
-
-        Args:
-            call: the action, as `Simulator.step(**call)` takes it.
-            before: the world before it.
-            after: the world after it.
-
-        Raises:
-            ValueError: the plan is over.
-        """
+        """Return the reward of an action, as `Simulator.step(**call)` takes it; ValueError if the plan is over."""
         if self._is_over:
             raise ValueError("the plan is over; begin the next one")
         action, object_id = call["action"], call.get("objectId")
@@ -174,7 +147,7 @@ class PlanReward:
         """Add the task's reward if its goal holds for the first time."""
         if not self._task_open or not goal_holds(self._task, after, self.treatments):
             return step
-        self._task_open, self._goal_reached = False, True
+        self._task_open, self.goal_reached = False, True
         return StepReward(step.reward + self._rules.task_done, step.done, step.failed)
 
     # -- the kinds; what each rewards follows the published functions, the rules' departures are in `rewards.yaml`
@@ -194,7 +167,7 @@ class PlanReward:
             return StepReward()
         return self._success() if in_hand(self._object_id, after) else StepReward(failed=True)
 
-    def _put(self, action: str, object_id: str | None, before: SimulatorView, after: SimulatorView) -> StepReward:
+    def _put_down(self, action: str, object_id: str | None, before: SimulatorView, after: SimulatorView) -> StepReward:
         receptacle = self._target.receptacle_id or ""
         is_there = is_in(self._object_id, receptacle, after)
         if action == "PutObject" and not is_there:
@@ -209,12 +182,10 @@ class PlanReward:
             return self._complete_stage("open")
         return self._complete_stage("close", last=True) if is_there and "put" in self._stages else StepReward()
 
-    def _open(self, action: str, object_id: str | None, before: SimulatorView, after: SimulatorView) -> StepReward:
-        return self._success() if object_id == self._object_id and after.objects[object_id].is_open else StepReward()
-
-    def _close(self, action: str, object_id: str | None, before: SimulatorView, after: SimulatorView) -> StepReward:
-        is_closed = object_id == self._object_id and not after.objects[object_id].is_open
-        return self._success() if is_closed else StepReward()
+    def _open_or_close(self, _: str, object_id: str | None, before: SimulatorView, after: SimulatorView) -> StepReward:
+        wanted = self._target.kind == PlanKind.OPEN
+        is_done = object_id == self._object_id and after.objects[object_id].is_open == wanted
+        return self._success() if is_done else StepReward()
 
     def _toggle(self, action: str, object_id: str | None, before: SimulatorView, after: SimulatorView) -> StepReward:
         if object_id != self._object_id:
@@ -225,11 +196,9 @@ class PlanReward:
     def _slice(self, action: str, object_id: str | None, before: SimulatorView, after: SimulatorView) -> StepReward:
         return self._success() if action == "SliceObject" and object_id == self._object_id else StepReward()
 
-    def _clean(self, action: str, object_id: str | None, before: SimulatorView, after: SimulatorView) -> StepReward:
-        return self._success() if self._subject in self._in_plan.clean else StepReward()
-
-    def _heat(self, action: str, object_id: str | None, before: SimulatorView, after: SimulatorView) -> StepReward:
-        return self._success() if self._subject in self._in_plan.hot else StepReward()
+    def _wash_or_heat(self, _: str, object_id: str | None, before: SimulatorView, after: SimulatorView) -> StepReward:
+        treated = self._in_plan.clean if self._target.kind == PlanKind.CLEAN else self._in_plan.hot
+        return self._success() if self._subject in treated else StepReward()
 
     def _cool(self, action: str, object_id: str | None, before: SimulatorView, after: SimulatorView) -> StepReward:
         """Reward three stages in their order: an object in the closed fridge is cold, but still to be taken out."""
@@ -278,18 +247,14 @@ def max_reward(
     end. Then too the reward of the shortest path is returned.
 
     Args:
-        rules: reward rules.
-        target: target of the plan.
-        start: the world at the plan's start.
         grid: reachable cells; GotoLocation needs it.
         completes: the task if its goal can be reached in the plan; None if it cannot, or holds already.
     """
     kind, per_success = target.kind, rules.rewards[target.kind]
-    puts, treats = kind == PlanKind.PUT, kind in _TREATMENTS
-    most = per_success
+    puts, most = kind == PlanKind.PUT, per_success
     if kind == PlanKind.GOTO:
         most = _max_path_reward(rules, target, start, grid)
-    elif treats:
+    elif kind in TREATMENTS:
         stages = _COOLING_STAGES if kind == PlanKind.COOL else 1
         # An object is put into the appliance, which ends the plan if every put fails.
         most = 0.0 if rules.treatments_unnoticed or rules.puts_fail else per_success * stages
@@ -309,7 +274,6 @@ def count_actions_to_goal(
     """Return how many of some actions a plan takes: GotoLocation is done some steps before the end of a path.
 
     Args:
-        rules: reward rules.
         target: target of the plan; plans of other kinds than GotoLocation take all actions.
         poses: poses after each of the actions.
         grid: reachable cells; GotoLocation needs it.
@@ -379,12 +343,12 @@ def _require_feasible(target: PlanTarget, start: SimulatorView) -> None:
 _BY_KIND: dict[PlanKind, Callable[[PlanReward, str, str | None, SimulatorView, SimulatorView], StepReward]] = {
     PlanKind.GOTO: PlanReward._goto,
     PlanKind.PICKUP: PlanReward._pickup,
-    PlanKind.PUT: PlanReward._put,
-    PlanKind.OPEN: PlanReward._open,
-    PlanKind.CLOSE: PlanReward._close,
+    PlanKind.PUT: PlanReward._put_down,
+    PlanKind.OPEN: PlanReward._open_or_close,
+    PlanKind.CLOSE: PlanReward._open_or_close,
     PlanKind.TOGGLE: PlanReward._toggle,
     PlanKind.SLICE: PlanReward._slice,
-    PlanKind.CLEAN: PlanReward._clean,
-    PlanKind.HEAT: PlanReward._heat,
+    PlanKind.CLEAN: PlanReward._wash_or_heat,
+    PlanKind.HEAT: PlanReward._wash_or_heat,
     PlanKind.COOL: PlanReward._cool,
 }

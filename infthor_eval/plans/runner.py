@@ -51,16 +51,7 @@ class PlanRunner(EpisodeRunner[PlanEnvironment, PlanRecord]):
         folder: Path,
         seed: int,
     ) -> None:
-        """Take a trajectory.
-
-        Args:
-            task: the task.
-            trajectory: its trajectory.
-            factory: creates the actor.
-            simulator: simulator of the trajectory.
-            folder: empty folder for frames.
-            seed: seed of the run.
-        """
+        """Take a trajectory, its simulator, what creates the actor, and an empty folder for frames."""
         frames = FrameFolder(folder) if factory.sees else NoFrames()
         super().__init__(
             simulator,

@@ -32,12 +32,7 @@ def read_plan(plan: str) -> tuple[str, tuple[str, ...]]:
 
 
 def replace_objects(plan: str, types: Sequence[str]) -> str:
-    """Return the same plan with other objects.
-
-    Args:
-        plan: text of the plan, of the usual form.
-        types: object types instead of those that it names, in their order.
-    """
+    """Return a plan of the usual form with other object types, in the order in which it names them."""
     match = _PLAN.fullmatch(plan)
     assert match is not None
     for group, name in reversed([*enumerate(types, start=2)]):  # from the end, so that earlier spans stay valid
@@ -47,12 +42,7 @@ def replace_objects(plan: str, types: Sequence[str]) -> str:
 
 
 def scripted_action(plan: str, done: Sequence[str]) -> str:
-    """Return the next action of a plan's script; its last action is repeated.
-
-    Args:
-        plan: text of the plan.
-        done: actions so far.
-    """
+    """Return the next action of a plan's script, after the actions done so far; its last action is repeated."""
     actions = _script(*read_plan(plan))
     return actions[min(len(done), len(actions) - 1)]
 

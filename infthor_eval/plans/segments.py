@@ -53,12 +53,6 @@ def goal_of_last(segments: Sequence[PlanSegment]) -> str:
 
 
 def restart_at(segments: Sequence[PlanSegment], first: int, end: int | None = None) -> list[PlanSegment]:
-    """Return some segments in the form of a history's beginning: the first one has its goal and its frame.
-
-    Args:
-        segments: the history from its beginning on.
-        first: index of the first one to return.
-        end: index after the last one; None for all that follow.
-    """
+    """Return `segments[first:end]` in the form of a history's beginning: the first one has its goal and its frame."""
     opening = replace(segments[first], goal=goal_of_last(segments[: first + 1]))
     return [opening, *segments[first + 1 : end]]

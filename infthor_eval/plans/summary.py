@@ -56,12 +56,7 @@ PlansSummary = EpisodesSummary[PlanTaskSummary]
 
 
 def summarise_plans(config: Mapping[str, Any], records: Sequence[Record]) -> PlansSummary:
-    """Summarise a run.
-
-    Args:
-        config: config of the run.
-        records: records of all its plans.
-    """
+    """Summarise a run, given its config and the records of all its plans."""
     return summarise_episodes(config, records, _summarise_task)
 
 

@@ -8,9 +8,9 @@ from infthor_eval.plans.plan import Plan, PlanKind
 from infthor_eval.thor.grounding import Grounding
 from infthor_eval.thor.view import SimulatorView
 
-__all__ = ["PlanTarget", "in_hand", "subject_of", "target_of"]
+__all__ = ["TREATMENTS", "PlanTarget", "in_hand", "subject_of", "target_of"]
 
-_TREATMENTS = {PlanKind.CLEAN, PlanKind.HEAT, PlanKind.COOL}
+TREATMENTS = {PlanKind.CLEAN, PlanKind.HEAT, PlanKind.COOL}
 
 
 @dataclass(frozen=True)
@@ -33,12 +33,7 @@ class PlanTarget:
 
 
 def target_of(plan: Plan, grounding: Grounding, view: SimulatorView) -> PlanTarget:
-    """Return the target of a recorded plan; GotoLocation's needs a grid, see `PlanEnvironment`.
-
-    Args:
-        plan: the plan.
-        grounding: ids of the trajectory's objects.
-        view: the world at the plan's start.
+    """Return the target of a recorded plan at its start; GotoLocation's needs a grid, see `PlanEnvironment`.
 
     Raises:
         InfeasibleError: the scene has no object for an id.
@@ -47,18 +42,11 @@ def target_of(plan: Plan, grounding: Grounding, view: SimulatorView) -> PlanTarg
 
 
 def subject_of(target: PlanTarget, start: SimulatorView) -> str | None:
-    """Return the id of the object that a plan changes.
+    """Return the id of the object that a plan changes; None if no object is named and none is held at its start.
 
     ALFRED's plans of washing, heating and cooling name the appliance; their object is the one held at the start.
-
-    Args:
-        target: target of the plan.
-        start: the world at its start.
-
-    Returns:
-        The id; None if no object is named and none is held.
     """
-    if target.kind in _TREATMENTS:
+    if target.kind in TREATMENTS:
         named = start.objects.get(target.object_id or "")
         if named is None or not named.pickupable:
             return next(iter(start.inventory), None)

@@ -50,8 +50,6 @@ class PlansTask(EpisodeTask[PlanTaskSettings, PlanTrajectory]):
     """A task file that was read, with its trajectories.
 
     Attributes:
-        rules: reward rules.
-        decoding: decoding of each action.
         memory: the part of the history that a model is given.
         evaluated_trajectories: trajectories that are evaluated.
     """
@@ -74,10 +72,8 @@ class PlansTask(EpisodeTask[PlanTaskSettings, PlanTrajectory]):
         self.decoding = decoding_of(kwargs, request.seed, file.name)
         self.memory = memory_named(settings.history, self._options.retriever)
         super().__init__(file, request, settings, read_plan_trajectory)
-        having_plans = [trajectory for trajectory in self.trajectories.trajectories if self.plans(trajectory)]
-        self.evaluated_trajectories = limit_items(
-            having_plans, lambda trajectory: trajectory.traj_id, request.seed, request.limit
-        )
+        having_plans = [item for item in self.trajectories.trajectories if self.plans(item)]
+        self.evaluated_trajectories = limit_items(having_plans, lambda item: item.traj_id, request.seed, request.limit)
         if not self.evaluated_trajectories:
             raise UsageError(f"{self.name}: no trajectory there has a final task; make some with --test-set")
 

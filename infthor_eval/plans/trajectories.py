@@ -14,23 +14,14 @@ __all__ = ["PlanTrajectory", "read_plan_trajectory"]
 
 @dataclass(frozen=True)
 class PlanTrajectory(TaskTrajectory):
-    """A trajectory with its plans.
-
-    Attributes:
-        plans: its plans, in time order.
-        tasks: the tasks that these belong to.
-    """
+    """A trajectory with its plans, in time order, and the tasks that these belong to."""
 
     plans: Sequence[Plan]
     tasks: Sequence[TrajectoryTask]
 
 
 def read_plan_trajectory(source: TrajectorySource) -> PlanTrajectory:
-    """Read a trajectory and its plans.
-
-    Raises:
-        DataError: it cannot be used.
-    """
+    """Read a trajectory and its plans; raises DataError if it cannot be used."""
     trajectory = source.read()
     plans = plans_of(trajectory)
     if not plans:

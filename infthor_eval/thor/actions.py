@@ -47,11 +47,7 @@ class Misuse(StrEnum):
 
 
 class UngroundedError(ValueError):
-    """A text has no known action, lacks an argument, or matches no visible object; the message says which.
-
-    Attributes:
-        misuse: kind of the error.
-    """
+    """A text has no known action, lacks an argument, or matches no visible object; the message says which."""
 
     def __init__(self, misuse: Misuse, message: str) -> None:
         super().__init__(message)
@@ -88,13 +84,7 @@ def parse_action(text: str) -> ActionText:
 
 
 def text_of(action: str, object_id: str | None = None, receptacle_id: str | None = None) -> ActionText:
-    """Return the text of a call.
-
-    Args:
-        action: name of the action.
-        object_id: id of the object acted on; for PutObject, of the object that is put.
-        receptacle_id: id of the receptacle, for PutObject.
-    """
+    """Return the text of a call; the object of PutObject is the one that is put into the receptacle."""
     ids = [item for item in (object_id, receptacle_id) if item is not None]
     return ActionText(action, tuple(object_type_of(item) for item in ids))
 
@@ -105,8 +95,6 @@ def ground(
     """Turn an action text into a call.
 
     Args:
-        text: the action.
-        view: the current state of the simulator.
         degrees: angle by which LookUp and LookDown turn the camera.
         preferred: ids of objects that take precedence over nearer ones of their type.
 
@@ -122,7 +110,10 @@ def ground(
         return {"action": text.action, "degrees": degrees}
     if text.action in _PLAIN:
         return {"action": text.action}
-    _refuse_unknown(text, view)
+    known = {item.object_type for item in view.objects.values()}
+    for name in text.types:
+        if name not in known:
+            raise UngroundedError(Misuse.UNKNOWN_OBJECT, f"{text}: {name}: none in this scene")
     if text.action == "PutObject" and text.types[0] not in map(object_type_of, view.inventory):
         raise UngroundedError(Misuse.NOT_POSSIBLE, f"{text}: no {text.types[0]} in the hand")
     return {"action": text.action, "objectId": _choose_object(text, view, preferred).object_id}
@@ -134,12 +125,7 @@ def applicable_actions(view: SimulatorView) -> list[ActionText]:
 
 
 def applicable_calls(view: SimulatorView, degrees: float = _LOOK_DEGREES) -> list[dict[str, Any]]:
-    """Return all calls that are possible now, in a fixed order: each action with each visible object it applies to.
-
-    Args:
-        view: the current state of the simulator.
-        degrees: angle by which LookUp and LookDown turn the camera.
-    """
+    """Return all calls possible now, in a fixed order: each action with each visible object, looks by `degrees`."""
     calls = [ground(ActionText(name), view, degrees) for name in sorted(_PLAIN)]
     visible = sorted((item.object_type, item.object_id) for item in view.objects.values() if item.visible)
     for action, applies in _APPLIES.items():
@@ -168,13 +154,6 @@ def object_type_of(object_id: str) -> str:
     """
     parts = object_id.split("|")
     return parts[4].split("_")[0] if len(parts) > 4 else parts[0]
-
-
-def _refuse_unknown(text: ActionText, view: SimulatorView) -> None:
-    known = {item.object_type for item in view.objects.values()}
-    for name in text.types:
-        if name not in known:
-            raise UngroundedError(Misuse.UNKNOWN_OBJECT, f"{text}: {name}: none in this scene")
 
 
 def _choose_object(text: ActionText, view: SimulatorView, preferred: Container[str]) -> ThorObject:

@@ -17,12 +17,7 @@ _TURNS = {**dict.fromkeys(_ACROSS, 90.0), "Spatula": 270.0}  # degrees
 
 
 def modern_rotation(object_type: str, rotation: Mapping[str, float]) -> dict[str, float]:
-    """Convert a rotation recorded in 2.1.0 to one with which the 5.x object looks the same.
-
-    Args:
-        object_type: AI2-THOR object type.
-        rotation: Unity's Euler angles x, y, z in degrees.
-    """
+    """Convert Euler angles of 2.1.0 (Unity's x, y, z, degrees) to those with which the 5.x object looks the same."""
     turn = _TURNS.get(object_type, 0.0)
     if not turn:
         return dict(rotation)

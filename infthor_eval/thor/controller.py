@@ -25,7 +25,6 @@ class SafeController(ai2thor.controller.Controller):
         """Start the simulator and load a scene.
 
         Args:
-            launch: the simulator to start.
             scene: name of the scene, or a house description.
             options: options of ai2thor's Controller (`width`, `renderInstanceSegmentation`, ...).
 
@@ -61,7 +60,8 @@ class SafeController(ai2thor.controller.Controller):
                     "AI2-THOR's Unity build is not installed and cannot be downloaded; go online once, "
                     "or name an executable"
                 ) from error
-            raise SceneError(f"scene {_scene_name(scene)}: {message}") from error
+            name = scene if isinstance(scene, str) else "(a house)"
+            raise SceneError(f"scene {name}: {message}") from error
         except BaseException:
             self.stop()
             raise
@@ -125,7 +125,3 @@ class SafeController(ai2thor.controller.Controller):
             return ""
         lines = log.read_text(errors="replace").split("\n")
         return next((line.strip()[:200] for line in reversed(lines) if line.strip()), "")
-
-
-def _scene_name(scene: str | dict[str, Any]) -> str:
-    return scene if isinstance(scene, str) else "(a house)"

@@ -22,7 +22,6 @@ class FrameKeeper(Protocol):
             SimulatorError: the simulator sent no frame.
             DataError: the frame cannot be written.
         """
-        ...
 
 
 class NoFrames:

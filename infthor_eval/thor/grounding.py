@@ -7,6 +7,8 @@ nearest to this position when the episode began. The choice is made once per epi
 import math
 from collections.abc import Iterable
 
+from msgspec.structs import astuple
+
 from infthor_eval.thor.actions import object_type_of
 from infthor_eval.thor.view import SimulatorView, ThorObject
 
@@ -24,29 +26,16 @@ def id_position(object_id: str) -> tuple[float, float, float] | None:
 
 
 class Grounding:
-    """The id mapping of one episode.
-
-    Attributes:
-        distances: distance of each chosen object from the position in the recorded id, metres, by recorded id.
-    """
+    """The id mapping of one episode; `distances` has the metres from recorded positions, by recorded id."""
 
     def __init__(self, view: SimulatorView) -> None:
-        """Store the initial positions of all objects.
-
-        Args:
-            view: state at the start of the episode, after the scene was restored.
-        """
-        self._initial_positions = {key: _position(item) for key, item in view.objects.items()}
+        """Store the positions of all objects at the start of the episode, after the scene was restored."""
+        self._initial_positions = {key: astuple(item.position) for key, item in view.objects.items()}
         self._chosen: dict[str, str] = {}
         self.distances: dict[str, float] = {}
 
     def ground(self, object_id: str, view: SimulatorView) -> str | None:
-        """Return the simulator's id for a recorded one, or None if the scene has no object of the type.
-
-        Args:
-            object_id: the recorded id.
-            view: the current state.
-        """
+        """Return the simulator's id for a recorded one, or None if the scene has no object of the type."""
         chosen = self._chosen.get(object_id)
         if chosen in view.objects:
             return chosen
@@ -74,9 +63,5 @@ class Grounding:
         if target is None:
             return 0.0
         # The id has the position at which the scene file has the object; restoring the scene may have moved it.
-        positions = [self._initial_positions.get(item.object_id, _position(item)), id_position(item.object_id)]
+        positions = [self._initial_positions.get(item.object_id, astuple(item.position)), id_position(item.object_id)]
         return min(math.dist(target, position) for position in positions if position is not None)
-
-
-def _position(item: ThorObject) -> tuple[float, float, float]:
-    return item.position.x, item.position.y, item.position.z

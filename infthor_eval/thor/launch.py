@@ -28,11 +28,7 @@ class Launch:
 
 
 def embedded_launch(
-    data: Path | None = None,
-    supplement: Path | None = None,
-    *,
-    timeout: float = 60.0,
-    start_timeout: float = 300.0,
+    data: Path | None = None, supplement: Path | None = None, *, timeout: float = 60.0, start_timeout: float = 300.0
 ) -> Launch:
     """Return the launch of the simulator in this package.
 

@@ -18,11 +18,6 @@ class MissingObjectError(LookupError):
 def translate(low: LowAction, grounding: Grounding, view: SimulatorView) -> dict[str, Any]:
     """Return the 5.x call with the effect of a recorded action.
 
-    Args:
-        low: the recorded action.
-        grounding: id mapping of the episode.
-        view: the current state.
-
     Returns:
         `{"action": ..., arguments}` for `Simulator.step(**call)`.
 

@@ -15,18 +15,10 @@ _PNG_LEVEL = 4  # higher levels take several times as long and hardly shrink ren
 
 
 class Recorder:
-    """Turns simulator states into log entries, and into image files if a folder is given.
-
-    Attributes:
-        steps: log entries so far, one per frame.
-    """
+    """Turns simulator states into log entries (`steps`, one per frame), and into images if a folder is given."""
 
     def __init__(self, images: Path | None = None) -> None:
-        """Start without a frame.
-
-        Args:
-            images: existing folder for the frames, or None to keep only the log.
-        """
+        """Start without a frame; `images` is an existing folder for the frames, None keeps only the log."""
         self._images = images
         self._states: dict[str, ObjectState] = {}
         self.steps: list[Step] = []
@@ -44,7 +36,6 @@ class Recorder:
         """Add one frame.
 
         Args:
-            view: state after the action.
             step: index of the action; 0 also for the first frame.
             action: text of the action; None for the first frame.
             high_idx: index of the action's sub-goal.

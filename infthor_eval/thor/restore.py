@@ -31,11 +31,7 @@ class RestoreReport:
 
 
 def restore(simulator: Simulator, scene: Scene) -> RestoreReport:
-    """Load the scene of a trajectory and restore its initial state.
-
-    Args:
-        simulator: the simulator, which is reset; its `view` is the first frame afterwards.
-        scene: the recorded initial state.
+    """Reset a simulator to the scene of a trajectory, and restore the recorded initial state.
 
     Raises:
         SimulatorError: the simulator has no such scene, or fails.

@@ -27,16 +27,10 @@ def scene_pictures(simulator: Simulator, scene: str) -> tuple[NDArray[np.uint8],
 
 
 def dump_scene(simulator: Simulator, scene: str, folder: Path, overwrite: bool = False) -> int:
-    """Record a scene's objects and reachable positions in a folder of floor plans.
+    """Record a scene's objects and reachable positions in a folder of floor plans; return the number of objects.
 
     Args:
-        simulator: the simulator that has the scene, usually Unity.
-        scene: name of the scene.
-        folder: the folder (`--data`).
         overwrite: True to replace a different recording of the scene.
-
-    Returns:
-        The number of objects.
 
     Raises:
         SimulatorError: the simulator does not have the scene.

@@ -35,12 +35,7 @@ class SimulatorMark:
 
 
 class Simulator:
-    """One simulator process, which is restarted if it fails. Use it as a context manager.
-
-    Attributes:
-        view: state after the last action.
-        restarts: number of restarts so far.
-    """
+    """One simulator process, which is restarted if it fails (`restarts` so far). Use it as a context manager."""
 
     def __init__(
         self,
@@ -58,12 +53,10 @@ class Simulator:
         """Configure the simulator; the process starts with the first `reset`.
 
         Args:
-            launch: the simulator to start.
             width: width of the frames, pixels.
             height: height of the frames, pixels.
             image: True to render a frame after each action, which takes half of an action's time.
             instances: True to render which object each pixel shows.
-            depth: True to render depth.
             max_restarts: maximum number of restarts from one mark to the next.
             max_copies: number of marks whose state the embedded simulator stores (0.2 MB each).
             options: further initialisation parameters of AI2-THOR (`fieldOfView`, `agentMode`, ...).
@@ -104,22 +97,14 @@ class Simulator:
 
     @property
     def view(self) -> SimulatorView:
-        """State after the last action.
-
-        Raises:
-            SimulatorError: no scene is loaded.
-        """
+        """State after the last action; raises SimulatorError if no scene is loaded."""
         if self._view is None:
             raise SimulatorError("no scene is loaded; reset the simulator to one first")
         return self._view
 
     @property
     def metadata(self) -> dict[str, Any]:
-        """Raw metadata of the simulator's last reply; `view` is its typed part.
-
-        Raises:
-            SimulatorError: no scene is loaded.
-        """
+        """Raw metadata of the last reply, which `view` has typed; raises SimulatorError if no scene is loaded."""
         if self._controller is None or self._controller.last_event is None:
             raise SimulatorError("no scene is loaded; reset the simulator to one first")
         return dict(self._controller.last_event.metadata)
@@ -165,11 +150,7 @@ class Simulator:
                 return view
 
     def query(self, action: str, **arguments: Any) -> SimulatorView:
-        """Run an action without a lasting effect (`GetReachablePositions`), which is not part of the episode.
-
-        Raises:
-            SimulatorError: as `step`.
-        """
+        """Run an action without lasting effect (`GetReachablePositions`) outside the episode; raises as `step` does."""
         view, length = self._view, len(self._episode)
         reply = self.step(action, **arguments)
         del self._episode[length:]

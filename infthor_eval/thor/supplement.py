@@ -35,10 +35,6 @@ def write_supplement(trajectories: Iterable[Trajectory], path: Path) -> None:
 
     The content is `{floor plan: {"cells": [[x, z], ...], "floor_y": y, "objects": [id, ...]}}`: positions (metres)
     where the agent stood, the agent's height, and ids of the fixed objects that it acted on.
-
-    Args:
-        trajectories: trajectories in any number of floor plans.
-        path: the file.
     """
     plans: dict[str, _FloorPlan] = {}
     for trajectory in trajectories:

@@ -2,25 +2,18 @@
 
 from typing import Any
 
+from msgspec.structs import asdict
+
 from infthor_eval.thor.view import AgentPose
 
 __all__ = ["teleport_call"]
 
 
 def teleport_call(pose: AgentPose, *, force: bool = True) -> dict[str, Any]:
-    """Return the 5.x call that teleports the agent to a pose.
-
-    Args:
-        pose: the pose; without `standing` if the agent cannot crouch.
-        force: True to place the agent even where it collides; otherwise the simulator may refuse.
-
-    Returns:
-        `{"action": ..., arguments}` for `Simulator.step(**call)`.
-    """
-    at = pose.position
+    """Return the 5.x call that teleports the agent to a pose; unless forced, it may be refused for a collision."""
     call: dict[str, Any] = {
         "action": "TeleportFull",
-        "position": {"x": at.x, "y": at.y, "z": at.z},
+        "position": asdict(pose.position),
         "rotation": {"x": 0.0, "y": pose.rotation, "z": 0.0},
         "horizon": pose.horizon,
         "forceAction": force,

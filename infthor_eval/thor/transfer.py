@@ -9,8 +9,10 @@ import math
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
+from msgspec.structs import asdict, astuple
+
 from infthor_eval.thor.simulator import Simulator
-from infthor_eval.thor.view import SimulatorView, ThorObject, Vector
+from infthor_eval.thor.view import SimulatorView, ThorObject
 
 __all__ = ["transfer"]
 
@@ -20,13 +22,7 @@ _ROUNDS = 3  # passes over all objects: moving a receptacle also moves what is i
 
 
 class _State(NamedTuple):
-    """A state of objects that calls can change.
-
-    Attributes:
-        read: returns the state of an object.
-        on: call that sets it; empty if there is none.
-        off: call that unsets it; empty if there is none.
-    """
+    """A state of objects that calls can change; `on` and `off` set and unset it, empty if no call does."""
 
     read: Callable[[ThorObject], Any]
     on: dict[str, Any]
@@ -50,10 +46,6 @@ def transfer(simulator: Simulator, target: SimulatorView) -> list[str]:
     """Give all objects the states and poses that they have in another simulator; the agent stays where it is.
 
     An object held by the other agent floats where that agent holds it.
-
-    Args:
-        simulator: simulator in the same scene, restored to the same initial state.
-        target: state of the other simulator.
 
     Returns:
         Sorted ids of the objects that are missing, or could not be moved to their position.
@@ -112,8 +104,8 @@ def _move_calls(current: SimulatorView, target: SimulatorView) -> Iterator[dict[
         yield {
             "action": "TeleportObject",
             "objectId": key,
-            "position": _xyz(goal.position),
-            "rotation": _xyz(goal.rotation),
+            "position": asdict(goal.position),
+            "rotation": asdict(goal.rotation),
             "forceAction": True,
             "forceKinematic": True,
         }
@@ -127,17 +119,9 @@ def _misplaced_objects(current: SimulatorView, target: SimulatorView) -> Iterato
 
 
 def _is_at(item: ThorObject, goal: ThorObject) -> bool:
-    return math.dist(_tuple(item.position), _tuple(goal.position)) <= _NEAR
+    return math.dist(astuple(item.position), astuple(goal.position)) <= _NEAR
 
 
 def _is_turned_like(item: ThorObject, goal: ThorObject) -> bool:
-    turns = zip(_tuple(item.rotation), _tuple(goal.rotation), strict=True)
+    turns = zip(astuple(item.rotation), astuple(goal.rotation), strict=True)
     return all(abs((a - b + 180.0) % 360.0 - 180.0) <= _ALIKE for a, b in turns)
-
-
-def _tuple(vector: Vector) -> tuple[float, float, float]:
-    return vector.x, vector.y, vector.z
-
-
-def _xyz(vector: Vector) -> dict[str, float]:
-    return {"x": vector.x, "y": vector.y, "z": vector.z}

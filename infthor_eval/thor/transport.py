@@ -25,14 +25,7 @@ __all__ = ["PeerFault", "SafeFifoServer"]
 _WATCH_SECONDS = 0.1  # interval at which a waiting read or write checks the child process
 _PIPE_BYTES = 1 << 20  # a frame with ids and depth has 0.9 MB; the default of 64 KiB would cost many wake-ups
 _LARGEST_BODY = 1 << 30
-_NOT_PROTOCOL = (
-    KeyError,
-    TypeError,
-    ValueError,
-    AttributeError,
-    IndexError,
-    msgpack.exceptions.UnpackException,
-)
+_NOT_PROTOCOL = (KeyError, TypeError, ValueError, AttributeError, IndexError, msgpack.exceptions.UnpackException)
 
 
 class PeerFault(SimulatorError):
@@ -83,14 +76,11 @@ class SafeFifoServer(FifoServer):
         except PeerFault:
             raise
         except _NOT_PROTOCOL as error:
-            raise self._fail("garbage", f"sent what is not its protocol ({_one_line(error)})") from error
+            detail = " ".join(f"{type(error).__name__}: {error}".split())[:200]
+            raise self._fail("garbage", f"sent what is not its protocol ({detail})") from error
 
     def send(self, action: dict[str, Any]) -> None:
-        """Send one action.
-
-        Raises:
-            PeerFault: the simulator died or does not read.
-        """
+        """Send one action; raises PeerFault if the simulator died or does not read."""
         self.current_action = str(action.get("action"))
         super().send(action)
 
@@ -205,7 +195,3 @@ def _open_pipe(path: str, mode: int) -> io.FileIO:
     with contextlib.suppress(OSError):  # systems may limit the size; a smaller pipe only costs time
         fcntl.fcntl(descriptor, fcntl.F_SETPIPE_SZ, _PIPE_BYTES)
     return io.FileIO(descriptor, "rb" if mode == os.O_RDONLY else "wb")
-
-
-def _one_line(error: BaseException) -> str:
-    return " ".join(f"{type(error).__name__}: {error}".split())[:200]

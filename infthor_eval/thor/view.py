@@ -78,7 +78,6 @@ class AgentPose(msgspec.Struct, frozen=True):
     """The agent's pose.
 
     Attributes:
-        position: position in metres.
         rotation: rotation about the vertical, degrees.
         horizon: angle of the camera below the horizon, degrees.
         standing: False if the agent crouches, None if it cannot crouch.
@@ -162,13 +161,11 @@ class SimulatorView:
         frame: RGB, uint8, [height, width, 3], contiguous; None if frames are not rendered.
         depth: metres, float32, [height, width]; None if depth is not rendered.
         objects: objects by id.
-        agent: pose of the agent.
         inventory: ids of the objects that the agent holds, in its hand or with its arm.
         success: True if the action was accepted.
         error: the simulator's message if the action was refused.
         error_code: the simulator's code of this error.
         result: `actionReturn`.
-        scene: name of the scene.
         instances: objects in the frame by id; None if instance segmentation is not rendered.
         arm: arm of the agent; None if it has none.
     """
@@ -188,11 +185,7 @@ class SimulatorView:
 
 
 def view_of(event: Any) -> SimulatorView:
-    """Convert an `ai2thor.server.Event`.
-
-    Raises:
-        SimulatorError: a field of the metadata is missing or has another form.
-    """
+    """Convert an `ai2thor.server.Event`; raises SimulatorError if a field of the metadata is missing or malformed."""
     metadata = event.metadata
     try:
         objects = msgspec.convert(metadata["objects"], list[ThorObject])
@@ -219,11 +212,7 @@ def view_of(event: Any) -> SimulatorView:
 
 
 def instances_of(codes: NDArray[np.uint32]) -> dict[int, Instance]:
-    """Return the number of pixels and the box of each code.
-
-    Args:
-        codes: one code per pixel, [height, width].
-    """
+    """Return the number of pixels and the box of each code, given one code per pixel [height, width]."""
     width = codes.shape[1]
     # This works on runs of equal pixels within a row, of which there are a few thousand instead of 90,000 pixels.
     starts = np.empty(codes.shape, dtype=bool)
