@@ -27,12 +27,7 @@ __all__ = ["command"]
     "--tolerance", type=FiniteFloat(min=0), default=1e-6, show_default=True, help="Largest difference of equal actions."
 )
 def command(
-    model: str,
-    reference_url: str,
-    frames: Path | None,
-    instruction: tuple[str, ...],
-    model_args: str,
-    tolerance: float,
+    model: str, reference_url: str, frames: Path | None, instruction: tuple[str, ...], model_args: str, tolerance: float
 ) -> int:
     """Compare the actions of MODEL (openvla, spatialvla) with those of a reference server on the same frames.
 

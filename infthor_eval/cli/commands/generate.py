@@ -110,6 +110,6 @@ def _print(summary: GenerationSummary, out: Path, output: Console) -> None:
     from infthor_eval.report.terminal import print_table
 
     output.print(
-        f"{summary.trajectories} trajectories ({summary.resumed} generated earlier), {summary.steps} steps: {out}",
+        f"{summary.trajectories} trajectories ({summary.resumed} generated earlier), {summary.steps} steps: {out}"
     )
     print_table(tasks_table(summary), output)

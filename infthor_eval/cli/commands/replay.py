@@ -85,7 +85,7 @@ def _print(summary: ReplaySummary, output: Console) -> None:
 
     output.print(
         f"{summary.trajectories} trajectories on {summary.floor_plans} floor plans ({summary.resumed} replayed "
-        f"earlier, {summary.failed} failed), {summary.complete} complete, {summary.seconds} s",
+        f"earlier, {summary.failed} failed), {summary.complete} complete, {summary.seconds} s"
     )
     for table in (refusals_table(summary), overlaps_table(summary)):
         if table is not None:

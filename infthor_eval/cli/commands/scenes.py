@@ -54,10 +54,7 @@ def show(name: str, data: Path | None, out: Path | None, size: int, overwrite: b
     sheet.save(picture, format=Image.registered_extensions()[path.suffix.lower()])
     if not overwrite:
         refuse_overwrite(path, picture.getvalue())
-    with (
-        wrap_errors(f"{path}: cannot be written", "give another place with --out"),
-        write_atomically(path) as partial,
-    ):
+    with wrap_errors(f"{path}: cannot be written", "give another place with --out"), write_atomically(path) as partial:
         partial.write_bytes(picture.getvalue())
     print_line(f"{name}: {path} (from above; first view)")
 

@@ -101,7 +101,7 @@ def validate(
     print_table(clues_table([_summarise_kept(outcome, verdicts) for outcome in outcomes]), console)
     console.print(
         f"{len(questions)} questions: {len(verdicts.kept)} kept, {len(verdicts.rejected)} rejected, "
-        f"{len(verdicts.to_inspect)} to inspect: {out}",
+        f"{len(verdicts.to_inspect)} to inspect: {out}"
     )
     return int(any(record.failure is not None for outcome in outcomes for record in outcome.records))
 

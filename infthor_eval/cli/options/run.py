@@ -9,12 +9,7 @@ from typing import Any
 import click
 
 from infthor_eval.cli.options.config import comes_from_file, config_option
-from infthor_eval.cli.options.suites import (
-    expand_suite_options,
-    refuse_duplicate_options,
-    suite_options,
-    suite_values,
-)
+from infthor_eval.cli.options.suites import expand_suite_options, refuse_duplicate_options, suite_options, suite_values
 from infthor_eval.cli.options.values import (
     FiniteFloat,
     ModelArgs,
@@ -59,9 +54,7 @@ _OPTIONS = (
         help="Options of the model, or of all of them (see `ls models`).",
     ),
     click.option(
-        "--rope",
-        metavar="TYPE:FACTOR",
-        help="Extend the model's context: yarn:4, linear:2, dynamic:4, longrope:8.",
+        "--rope", metavar="TYPE:FACTOR", help="Extend the model's context: yarn:4, linear:2, dynamic:4, longrope:8."
     ),
     click.option(
         "--max-tokens-total",
@@ -84,11 +77,7 @@ _OPTIONS = (
         "trajectories, drawn by --seed; a larger N includes these. lm-eval's own command takes the first N instead.",
     ),
     click.option(
-        "--output",
-        type=click.Path(path_type=Path),
-        default=Path("results"),
-        show_default=True,
-        help="Results folder.",
+        "--output", type=click.Path(path_type=Path), default=Path("results"), show_default=True, help="Results folder."
     ),
     click.option("--seed", type=WholeNumber(), default=0, show_default=True, help="Seed of everything random."),
     click.option("--fresh", is_flag=True, help="Restart; the journal of an earlier run is kept under another name."),

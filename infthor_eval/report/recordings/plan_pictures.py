@@ -82,10 +82,7 @@ def draw_plan_frame(frame: PlanFrame, heading: str) -> Image.Image:
 
 def _lines(frame: PlanFrame) -> list[Line]:
     title = frame.title
-    lines = [
-        Line("goal", title.goal, 17, most=2),
-        Line(_place(title), title.text, 22, "-Bold"),
-    ]
+    lines = [Line("goal", title.goal, 17, most=2), Line(_place(title), title.text, 22, "-Bold")]
     if frame.number:
         action = Line("", frame.action, 20, "Mono") if frame.action else Line("", "no valid action", 18)
         lines.append(action._replace(label=f"action {frame.number} of {title.n_actions}"))
