@@ -78,12 +78,7 @@ class ReportRun:
 def read_report_runs(
     folders: Sequence[Path], find_suite: Callable[[str], Suite], find_presenter: Callable[[str], "Presenter"]
 ) -> list[ReportRun]:
-    """Read runs from their folders.
-
-    Args:
-        folders: folders of the runs, at least one.
-        find_suite: returns a suite by name.
-        find_presenter: returns the presenter of a suite by the suite's name.
+    """Read runs from their folders, at least one; suites and their presenters are looked up by the suite's name.
 
     Raises:
         UsageError: a folder is given twice.

@@ -22,19 +22,7 @@ _PANEL, _MARGIN, _LINE = (4.4, 2.9), 1.1, 0.2  # inches
 
 
 def draw_radii(success: SuccessByRadius, folder: Path, name: str) -> list[Path]:
-    """Draw a panel per kind.
-
-    Args:
-        success: success rates to draw.
-        folder: folder of the files.
-        name: name of the files, without suffix.
-
-    Returns:
-        Paths of the files.
-
-    Raises:
-        DataError: a file cannot be written.
-    """
+    """Write `radii_figure` into files; see `save_figure`."""
     return save_figure(lambda: radii_figure(success), folder, name)
 
 
@@ -62,7 +50,7 @@ def _row(
 
 
 def radii_figure(success: SuccessByRadius) -> Figure:
-    """Return the figure that `draw_radii` writes."""
+    """Return a figure with a panel per kind."""
     kinds = [kind for kind in ManipulationKind if any(line.kind == kind for line in success.lines)]
     labels = list(dict.fromkeys(line.label for line in success.lines if not line.is_bound))
     looks = looks_of(labels) | {line.label: BOUND for line in success.lines if line.is_bound}

@@ -24,11 +24,10 @@ def shown_steps(n_steps: int) -> list[int]:
 
 
 def draw_sheet(episodes: Sequence[Sequence[ArmFrame]], heading: str) -> Image.Image:
-    """Draw the sheet.
+    """Draw the sheet, with the run and the trajectory as its heading.
 
     Args:
         episodes: the frames of each episode that are shown (`shown_steps`), at most `COLUMNS`, in time order.
-        heading: text above them: run and trajectory.
     """
     row = _CELL + _CAPTION + _GAP
     picture = Image.new("RGB", (_WIDTH, _TOP + len(episodes) * row), "white")

@@ -39,11 +39,9 @@ class ReplayProgress(Protocol):
 
     def begin(self, n_episodes: int) -> None:
         """Start to count; called once, before the first episode."""
-        ...
 
     def advance(self, run: str, trajectory: str) -> None:
         """Count an episode of a run."""
-        ...
 
 
 class EpisodeReplays:
@@ -74,11 +72,7 @@ class EpisodeReplays:
             progress.begin(n_episodes)
 
     def replay(self, run: ReportRun) -> tuple[Mapping[UnitKey, EpisodePictures], list[str]]:
-        """Replay the chosen episodes of a run.
-
-        Returns:
-            Their pictures, and the reasons why a trajectory could not be replayed.
-        """
+        """Replay the chosen episodes of a run; return their pictures, and why a trajectory could not be replayed."""
         pictures: dict[UnitKey, EpisodePictures] = {}
         notes: list[str] = []
         replay = run.presenter.replay

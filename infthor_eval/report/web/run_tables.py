@@ -31,16 +31,8 @@ def _cells(rate: Rate) -> tuple[str, str]:
 
 def costs_table(runs: Sequence[ReportRun]) -> Table:
     """Return speed and cost, with a row per run."""
-    columns = (
-        "units",
-        "seconds",
-        "units / s",
-        "requests",
-        "tokens read",
-        "of them cached, %",
-        "tokens written",
-        "cost",
-    )
+    tokens = ("tokens read", "of them cached, %", "tokens written")
+    columns = ("units", "seconds", "units / s", "requests", *tokens, "cost")
     note = "Seconds are the units' own, added up: several workers take less by the clock. Cost is in US dollars."
     return Table("", (Column("run", False), *map(Column, columns)), tuple(map(_cost_row, runs)), (note,))
 
