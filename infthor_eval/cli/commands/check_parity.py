@@ -6,7 +6,7 @@ from pathlib import Path
 import click
 
 from infthor_eval.cli.help import ExampleCommand
-from infthor_eval.cli.options.values import FiniteFloat, parse_model_args
+from infthor_eval.cli.options.values import PATH, FiniteFloat, parse_model_args
 
 __all__ = ["command"]
 
@@ -18,7 +18,7 @@ __all__ = ["command"]
 @click.option(
     "--reference-url", required=True, metavar="URL", help="Server with the reference policy (/act convention)."
 )
-@click.option("--frames", type=click.Path(path_type=Path), help="Folder of images; default: black, white and noise.")
+@click.option("--frames", type=PATH, help="Folder of images; default: black, white and noise.")
 @click.option("--instruction", multiple=True, help="Instruction to the policy; may be repeated. Default: a few.")
 @click.option(
     "--model-args", default="", metavar="K=V,...", help="Options of MODEL; unnorm_key is sent to the server too."

@@ -54,11 +54,8 @@ def left_out_table(runs: Sequence[ReportRun]) -> Table | None:
         for run in runs
         for (task, what), reason, n in count_reasons(_left_out(run))
     ]
-    rows += [
-        Row((run.label, "", "not attempted", str(run.n_missing), "the run was stopped; the same command continues it"))
-        for run in runs
-        if run.n_missing
-    ]
+    why = "the run was stopped; the same command continues it"
+    rows += [Row((run.label, "", "not attempted", str(run.n_missing), why)) for run in runs if run.n_missing]
     if not rows:
         return None
     columns = (*_NAMES, Column("what", False), Column("units"), Column("reason", False))
