@@ -45,11 +45,12 @@ def compare(suite: Suite, presenter: Presenter, first: Iterable[Record], second:
         DataError: they share no unit.
     """
     ours, theirs = ({record.key: record for record in records} for records in (first, second))
-    if not ours.keys() & theirs.keys():
+    shared = ours.keys() & theirs.keys()
+    if not shared:
         raise DataError("the two runs share no unit of the same task; compare runs on the same data")
     comparisons: list[Comparison] = []
-    for task in sorted({key.task for key in ours.keys() & theirs.keys()}):
-        pairs = [(ours[key], theirs[key]) for key in ours if key in theirs and key.task == task]
+    for task in sorted({key.task for key in shared}):
+        pairs = [(ours[key], theirs[key]) for key in ours if key in shared and key.task == task]
         n_unshared = sum(key.task == task for key in ours.keys() ^ theirs.keys())
         comparisons += _compare_task(suite, presenter, task, pairs, n_unshared)
     return comparisons

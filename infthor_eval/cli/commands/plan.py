@@ -45,8 +45,6 @@ def plan(request: RunRequest, suite: Suite, measure: int, price_per_hour: float 
     """Print the estimate of one run.
 
     Args:
-        request: the run.
-        suite: its suite.
         measure: units of each task to measure.
         price_per_hour: price of a worker's machine in US dollars; None for no such cost.
 

@@ -4,11 +4,13 @@ import contextlib
 import signal
 import threading
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from types import FrameType
 
 __all__ = ["Stop", "handle_signal", "stop_on_sigint"]
 
 
+@dataclass
 class Stop:
     """Whether a run is to stop; the driver calls it before each unit.
 
@@ -17,9 +19,8 @@ class Stop:
         has_begun: whether units are being done; before that there is nothing to finish.
     """
 
-    def __init__(self) -> None:
-        self.is_requested = False
-        self.has_begun = False
+    is_requested: bool = False
+    has_begun: bool = False
 
     def __call__(self) -> bool:
         """Return whether to stop."""

@@ -26,13 +26,14 @@ def draw_curves(curves: RewardCurves, panels: Sequence[Panel], folder: Path, nam
 
 def curves_figure(curves: RewardCurves, panels: Sequence[Panel]) -> Figure:
     """Return a figure with a row per panel, with the bound in each, and a column for each facet that some run has."""
-    facets = {name: it for name, it in curves.facets.items() if any(name in run.curves for run in curves.runs)}
+    facets = {name: facet for name, facet in curves.facets.items() if any(name in run.curves for run in curves.runs)}
     width = len(facets) * (_PANEL[0] if len(facets) < 3 else _NARROW) + LEGEND
     height = max(_PANEL[1], _LINE * (len(curves.runs) + 1))
     figure = Figure(figsize=(width, len(panels) * height + _MARGIN), layout="constrained")
     # One scale of reward for all panels, so that they can be compared.
     grid = figure.subplots(len(panels), len(facets), sharex="col", sharey=True, squeeze=False)
-    looks = _looks(curves.runs)
+    bounds = {run.label: BOUND for run in curves.runs if run.is_bound}
+    looks = bounds | looks_of(run.label for run in curves.runs if not run.is_bound)
     for row, panel in zip(grid, panels, strict=True):
         runs = [run for run in curves.runs if run.is_bound or run.label in panel.labels]
         for axes, (name, facet) in zip(row, facets.items(), strict=True):
@@ -48,12 +49,6 @@ def curves_figure(curves: RewardCurves, panels: Sequence[Panel]) -> Figure:
             top.set_title(facet.title)
     add_words(figure, _heading(curves), curves.notes, width)
     return figure
-
-
-def _looks(runs: Sequence[RunCurves]) -> dict[str, Look]:
-    """Return a look per run, the same in all panels."""
-    bounds = {run.label: BOUND for run in runs if run.is_bound}
-    return bounds | looks_of(run.label for run in runs if not run.is_bound)
 
 
 def _draw_panel(axes: Axes, name: str, facet: Facet, runs: Sequence[RunCurves], looks: Mapping[str, Look]) -> None:

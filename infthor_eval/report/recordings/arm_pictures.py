@@ -34,11 +34,11 @@ def draw_arm_title(frame: ArmFrame, heading: str) -> Image.Image:
     """Draw the card before an episode; for an episode in which nobody acted it has the reason."""
     title = frame.title
     place = f"{title.kind}, episode {title.number} of {title.n_episodes} (the expert's action {title.action})"
-    told = f"radius of the hand's sphere {title.radius:g} m; a success earns {frame.max_reward:g} points"
+    settings = f"radius of the hand's sphere {title.radius:g} m; a success earns {frame.max_reward:g} points"
     lines = [
         Line("", place, 26, colour=FAINT),
         Line("", one_line(title.instruction), 46, "-Bold", most=2),
-        Line("", told, 20, colour=FAINT),
+        Line("", settings, 20, colour=FAINT),
         Line("", one_line(frame.ending) if frame.observation is None else "", 24, "-Bold", BAD, most=3),
     ]
     return title_card(heading, lines)

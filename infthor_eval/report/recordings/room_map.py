@@ -32,11 +32,13 @@ def draw_map(observation: PlanObservation, size: int) -> Image.Image:
     if observation.room.goal is not None:
         _draw_arrow(pen, observation.room.goal, scale, fill=None, edge=_GOAL, width=3)
     _draw_agent(pen, observation.agent, scale)
-    _draw_legend(pen, observation, size)
+    legend = list(_legend(observation))
+    _draw_legend(pen, legend, size)
     picture = large.resize((size, size), Image.Resampling.BOX)
     words = ImageDraw.Draw(picture)
     _write_names(words, observation, scale, size)
-    _write_legend(words, observation, size)
+    for x, text, _ in legend:
+        words.text((x + 18, size - _LEGEND / 2), text, font=font(13), fill=_INK, anchor="lm")
     return picture
 
 
@@ -194,30 +196,20 @@ def _middle(item: MapObject) -> Point:
     return (item.low[0] + item.high[0]) / 2, (item.low[1] + item.high[1]) / 2
 
 
-def _legend(observation: PlanObservation) -> list[tuple[str, str]]:
-    """Return the entries of the legend: text and colour."""
-    entries = [("agent", _AGENT), ("path in this plan", _PATH)]
-    entries += [("where the expert ended", _GOAL)] if observation.room.goal is not None else []
-    entries += [("what the plan names", NAMED_EDGE)] if any(item.is_named for item in observation.room.objects) else []
-    return entries
-
-
-def _draw_legend(pen: ImageDraw.ImageDraw, observation: PlanObservation, size: int) -> None:
+def _draw_legend(pen: ImageDraw.ImageDraw, legend: Sequence[tuple[float, str, str]], size: int) -> None:
     """Draw the dots of the legend; its text is written into the final picture, as letters need no oversampling."""
     fine, radius, y = size * OVERSAMPLING, 6 * OVERSAMPLING, (size - _LEGEND / 2) * OVERSAMPLING
     pen.rectangle((0, fine - _LEGEND * OVERSAMPLING, fine, fine), fill="white")
-    for left, _, colour in _places(_legend(observation)):
+    for left, _, colour in legend:
         x = left * OVERSAMPLING
         pen.ellipse((x, y - radius, x + 2 * radius, y + radius), fill=colour)
 
 
-def _write_legend(pen: ImageDraw.ImageDraw, observation: PlanObservation, size: int) -> None:
-    for x, text, _ in _places(_legend(observation)):
-        pen.text((x + 18, size - _LEGEND / 2), text, font=font(13), fill=_INK, anchor="lm")
-
-
-def _places(entries: Sequence[tuple[str, str]]) -> Iterator[tuple[float, str, str]]:
-    """Yield left edge, text and colour of each entry, from left to right."""
+def _legend(observation: PlanObservation) -> Iterator[tuple[float, str, str]]:
+    """Yield left edge, text and colour of each entry of the legend, from left to right."""
+    entries = [("agent", _AGENT), ("path in this plan", _PATH)]
+    entries += [("where the expert ended", _GOAL)] if observation.room.goal is not None else []
+    entries += [("what the plan names", NAMED_EDGE)] if any(item.is_named for item in observation.room.objects) else []
     x = 6.0
     for text, colour in entries:
         yield x, text, colour

@@ -1,4 +1,4 @@
-"""The page itself: a file that needs nothing beside it."""
+"""The page itself: a file that needs no others."""
 
 import base64
 import hashlib
