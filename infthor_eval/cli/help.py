@@ -9,18 +9,11 @@ __all__ = ["ExampleCommand", "ExampleGroup"]
 
 class _WithExample(click.Command):
     def __init__(self, *arguments: Any, example: str, **settings: Any) -> None:
-        """Create a command.
-
-        Args:
-            arguments: as for `click.Command`.
-            example: a command line as a user types it, or several lines.
-            settings: as for `click.Command`.
-        """
+        """Create a command; the example is a command line as a user types it, or several lines."""
         super().__init__(*arguments, **settings)
         self.example = example
 
     def format_help(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """See `click.Command.format_help`."""
         with formatter.section("Example"):
             for line in self.example.splitlines():
                 formatter.write(f"{'':{formatter.current_indent}}{line}\n")  # not wrapped: it is to be copied

@@ -1,14 +1,11 @@
 """Entry point: the commands, and how errors are printed."""
 
-import contextlib
 import difflib
 import importlib
 import io
 import os
 import signal
 import sys
-import threading
-from collections.abc import Iterator
 from types import FrameType
 
 import click
@@ -16,6 +13,7 @@ import click
 import infthor_eval
 from infthor_eval.cli.help import ExampleGroup
 from infthor_eval.cli.options.repeated import refuse_repeated_options
+from infthor_eval.cli.progress.stopping import handle_signal
 from infthor_eval.errors import InfthorError, in_one_line, unknown_name
 from infthor_eval.terminal import print_error
 
@@ -118,7 +116,7 @@ def main(args: list[str] | None = None) -> None:
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # no name in the data may end a run, whatever the encoding
     try:
-        with _raise_on_sigterm():
+        with handle_signal(signal.SIGTERM, _raise_terminated):
             code = _infthor_eval.main(args, prog_name="infthor-eval", standalone_mode=False)
         sys.stdout.flush()  # here and not at Python's exit, so that a full disk is an error like any other
     except click.exceptions.NoArgsIsHelpError as error:
@@ -150,21 +148,9 @@ class _Terminated(BaseException):
     """SIGTERM arrived."""
 
 
-@contextlib.contextmanager
-def _raise_on_sigterm() -> Iterator[None]:
-    """Raise `_Terminated` on SIGTERM, so that temporary folders and simulator processes are removed as on Ctrl-C."""
-
-    def stop(_number: int, _frame: FrameType | None) -> None:
-        raise _Terminated
-
-    if threading.current_thread() is not threading.main_thread():  # only the main thread may set signal handlers
-        yield
-        return
-    before = signal.signal(signal.SIGTERM, stop)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
+def _raise_terminated(_number: int, _frame: FrameType | None) -> None:
+    """Handle SIGTERM, so that temporary folders and simulator processes are removed as on Ctrl-C."""
+    raise _Terminated
 
 
 def _discard_output() -> None:

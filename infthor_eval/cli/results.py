@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
+from operator import attrgetter
 from pathlib import Path
 
 import click
@@ -72,7 +73,8 @@ def _with_labels(runs: Sequence[RunResults]) -> list[RunResults]:
 
 def _print_tables(runs: Sequence[RunResults], options: ShowOptions) -> None:
     tables: list[Table] = []
-    for _, group in groupby(sorted(runs, key=_suite_name), key=_suite_name):
+    suite_name = attrgetter("suite.name")
+    for _, group in groupby(sorted(runs, key=suite_name), key=suite_name):
         same_suite = list(group)
         suite = same_suite[0].suite
         tables += (suite.tables if options.full else suite.overview)([run.summary for run in same_suite])
@@ -90,7 +92,3 @@ def _print_folders(runs: Sequence[RunResults], quiet: bool) -> None:
         if not quiet and run.usage.requests:
             print_line(f"{name}: {run.usage.description}")
         print_line(str(run.folder) if quiet else f"{name}: {run.folder}")
-
-
-def _suite_name(run: RunResults) -> str:
-    return run.suite.name

@@ -1,1 +1,1 @@
-"""What people see of results: tables on the terminal, comparisons, pages; pure functions of typed summaries."""
+"""Results for people: tables on the terminal, comparisons, pages; pure functions of typed summaries."""

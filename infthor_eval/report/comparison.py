@@ -39,23 +39,18 @@ class Comparison:
 
 
 def compare(suite: Suite, presenter: Presenter, first: Iterable[Record], second: Iterable[Record]) -> list[Comparison]:
-    """Compare two runs on the units that both evaluated.
-
-    Args:
-        suite: suite of the runs.
-        presenter: presenter of the suite.
-        first: records of the first run.
-        second: records of the second run.
+    """Compare the records of two runs of a suite on the units that both evaluated.
 
     Raises:
         DataError: they share no unit.
     """
     ours, theirs = ({record.key: record for record in records} for records in (first, second))
-    if not ours.keys() & theirs.keys():
+    shared = ours.keys() & theirs.keys()
+    if not shared:
         raise DataError("the two runs share no unit of the same task; compare runs on the same data")
     comparisons: list[Comparison] = []
-    for task in sorted({key.task for key in ours.keys() & theirs.keys()}):
-        pairs = [(ours[key], theirs[key]) for key in ours if key in theirs and key.task == task]
+    for task in sorted({key.task for key in shared}):
+        pairs = [(ours[key], theirs[key]) for key in ours if key in shared and key.task == task]
         n_unshared = sum(key.task == task for key in ours.keys() ^ theirs.keys())
         comparisons += _compare_task(suite, presenter, task, pairs, n_unshared)
     return comparisons
@@ -74,13 +69,7 @@ def _compare_task(
 
 
 def comparison_table(comparisons: Sequence[Comparison], first: str, second: str) -> Table:
-    """Return a table with a row per task and metric, each in its own unit.
-
-    Args:
-        comparisons: result of `compare`.
-        first: name of the first run.
-        second: name of the second run.
-    """
+    """Return a table with a row per task and metric, each in its own unit; `first` and `second` name the runs."""
     numbers = ("first", "second", "difference", "95 % interval", "p", "units", "only in one")
     columns = (Column("task", False), Column("metric", False), Column("unit", False), *map(Column, numbers))
     return Table(f"{second} against {first}", columns, tuple(map(_row, comparisons)))

@@ -10,18 +10,18 @@ from infthor_eval.terminal import printable
 
 __all__ = ["export_tables"]
 
-_LATEX = {
-    "\\": r"\textbackslash{}",
-    "~": r"\textasciitilde{}",
-    "^": r"\textasciicircum{}",
-    "<": r"\textless{}",
-    ">": r"\textgreater{}",
-    "|": r"\textbar{}",
-    **{letter: f"\\{letter}" for letter in "&%$#_{}"},
-}
+_LATEX = str.maketrans(
+    {
+        "\\": r"\textbackslash{}",
+        "~": r"\textasciitilde{}",
+        "^": r"\textasciicircum{}",
+        "<": r"\textless{}",
+        ">": r"\textgreater{}",
+        "|": r"\textbar{}",
+        **{letter: f"\\{letter}" for letter in "&%$#_{}"},
+    }
+)
 _MARKDOWN = re.compile(r"([\\`*_\[\]<>|~#])")
-
-
 _THOUSANDS = re.compile(r"(?<=\d),(?=\d{3}(?!\d))")
 
 
@@ -88,7 +88,7 @@ def _rows(table: Table, escape: Callable[[str], str]) -> list[list[str]]:
 
 
 def _latex(table: Table) -> str:
-    heading, *rows = _rows(table, _latex_text)
+    heading, *rows = _rows(table, lambda text: text.translate(_LATEX))
     aligned = "".join("r" if column.is_number else "l" for column in table.columns)
     lines = [rf"\begin{{tabular}}{{{aligned}}}", r"\toprule", _latex_row(heading), r"\midrule"]
     for cells, row in zip(rows, table.rows, strict=True):
@@ -100,10 +100,6 @@ def _latex(table: Table) -> str:
 
 def _latex_row(cells: Sequence[str]) -> str:
     return " & ".join(cells) + r" \\"
-
-
-def _latex_text(text: str) -> str:
-    return "".join(_LATEX.get(letter, letter) for letter in text)
 
 
 def _markdown(table: Table) -> str:

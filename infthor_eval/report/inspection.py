@@ -16,12 +16,9 @@ __all__ = ["write_inspection_page"]
 
 
 def write_inspection_page(path: Path, items: Sequence[JudgedQuestion], data: NiehSet) -> None:
-    """Write the questions with their clue frames, gold answers and every reply; frames are linked, not copied.
+    """Write an HTML file with the questions, their clue frames, gold answers and every reply.
 
-    Args:
-        path: the HTML file; open it in a browser, decide, and save the decisions as CSV.
-        items: the questions.
-        data: the set that their frames lie in.
+    In a browser a person decides about them and saves the decisions as CSV. Frames are linked from the set, not copied.
 
     Raises:
         DataError: it cannot be written.

@@ -1,7 +1,6 @@
 """How the results of a suite are presented: on the report's page, as figures and as recordings.
 
-`Presenter` is what a suite offers; `infthor_eval.report.plain.PlainPresenter` implements all of it for suites that have
-none. `infthor_eval.suites.find_presenter` finds the presenter of a suite.
+`infthor_eval.suites.find_presenter` finds the presenter of a suite; `PlainPresenter` serves suites that have none.
 """
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
@@ -132,12 +131,10 @@ class ReplayFrame(Protocol):
     @property
     def observation(self) -> Any:
         """The world at that state, with an image `frame` (uint8 RGB array); None if nobody acted in the episode."""
-        ...
 
     @property
     def note(self) -> str:
         """How the replay differs from the recorded episode; empty if it does not."""
-        ...
 
 
 class OpenReplay(Protocol):
@@ -146,7 +143,6 @@ class OpenReplay(Protocol):
     @property
     def n_episodes(self) -> int:
         """Number of episodes of the trajectory."""
-        ...
 
     def frames(self, records: Sequence[Record], /) -> Iterator[Any]:
         """Replay some episodes and yield their frames (`ReplayFrame`): the start of each, then a frame per step.
@@ -154,7 +150,6 @@ class OpenReplay(Protocol):
         Raises:
             InfthorError: an episode cannot be replayed.
         """
-        ...
 
 
 @dataclass(frozen=True)
@@ -197,19 +192,15 @@ class Replay(Protocol):
             UsageError: the run has no such episodes, or the selection is ambiguous.
             DataError: the run has no episodes, or its header is not one of this suite.
         """
-        ...
 
     def draw_map(self, observation: Any, size: int) -> Image.Image:
         """Draw an observation from above, as a square of `size` pixels."""
-        ...
 
     def pictures(self, frames: Iterable[Any], heading: str) -> Iterator[Image.Image]:
         """Draw the frames as pictures of a film, all of one size, with a heading."""
-        ...
 
     def draw_sheet(self, frames: Iterable[Any], heading: str) -> Image.Image:
         """Draw the frames as one picture with a row per episode."""
-        ...
 
 
 class Presenter(Protocol):
@@ -236,44 +227,25 @@ class Presenter(Protocol):
     figures: Mapping[str, Figure]
 
     def is_share(self, metric: str, scores: Sequence[float]) -> bool:
-        """Whether a metric is a share, which is shown in percent; others are shown as they are.
-
-        Args:
-            metric: name of the metric.
-            scores: its values in the runs that are shown.
-        """
-        ...
+        """Whether a metric with these scores is a share, which is shown in percent; others are shown as they are."""
 
     def charts(self, runs: Sequence[ReportRun]) -> Sequence[Chart]:
         """Draw the charts of the suite's section; its tables are `Suite.tables`."""
-        ...
 
     def sections(self, runs: Sequence[ReportRun]) -> Iterable[Section]:
         """Build further sections, which follow the suite's own."""
-        ...
 
     def describe(self, record: Record) -> Description:
         """Describe the sample of a record."""
-        ...
 
     def reply(self, record: Record) -> str:
         """Return the reply of a record; empty if there is none."""
-        ...
 
     def details(self, record: Record) -> Mapping[str, str]:
         """Return further facts about a record, by name."""
-        ...
 
     def steps(self, record: Record) -> Sequence[StepRow]:
         """Return the steps of a recorded episode; empty if it has none."""
-        ...
 
     def timelines(self, runs: Sequence[ReportRun], data: Path | None, thumbnails: ThumbnailStore) -> Timelines:
-        """Find the frames that the samples of some runs are about.
-
-        Args:
-            runs: runs of the suite.
-            data: folder of the data set; None for the one that each run names.
-            thumbnails: collects the pictures.
-        """
-        ...
+        """Find the frames that the samples are about; `data` is the set's folder, None for the one a run names."""

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import msgspec
 
@@ -18,7 +18,9 @@ from infthor_eval.runs.stored_command import read_stored_command
 if TYPE_CHECKING:
     from infthor_eval.report.presenter import Presenter
 
-__all__ = ["ReportRun", "label_report_runs", "read_report_runs", "records_by_unit"]
+__all__ = ["ReportRun", "choose_evenly", "label_report_runs", "read_report_runs", "records_by_unit"]
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -78,12 +80,7 @@ class ReportRun:
 def read_report_runs(
     folders: Sequence[Path], find_suite: Callable[[str], Suite], find_presenter: Callable[[str], "Presenter"]
 ) -> list[ReportRun]:
-    """Read runs from their folders.
-
-    Args:
-        folders: folders of the runs, at least one.
-        find_suite: returns a suite by name.
-        find_presenter: returns the presenter of a suite by the suite's name.
+    """Read runs from their folders, at least one; suites and their presenters are looked up by the suite's name.
 
     Raises:
         UsageError: a folder is given twice.
@@ -138,6 +135,13 @@ def _distinct_names(folders: Sequence[Path], headers: Sequence[RunHeader]) -> li
 def _with_frames(name: str, header: RunHeader) -> str:
     frames = header.config.get("frames", "shown")
     return name if frames == "shown" else f"{name}, {frames} frames"
+
+
+def choose_evenly(items: Sequence[T], n: int) -> list[T]:
+    """Return n items, evenly spaced from the first to the last; all of them if there are no more."""
+    if len(items) <= n:
+        return list(items)
+    return [items[round(number * (len(items) - 1) / max(n - 1, 1))] for number in range(n)]
 
 
 def records_by_unit(runs: Sequence[ReportRun]) -> Mapping[UnitKey, list[UnitRecord[Any] | None]]:

@@ -7,7 +7,7 @@ from rich.console import Console
 from rich.table import Table as RichTable
 from rich.text import Text
 
-from infthor_eval.tables import Column, Row, Table
+from infthor_eval.tables import Table
 from infthor_eval.terminal import console, printable
 
 __all__ = ["print_table", "table_console"]
@@ -30,22 +30,15 @@ def print_table(table: Table, on: Console) -> None:
         caption_justify="left",
     )
     for column in table.columns:
-        _add_column(rich_table, column)
+        rich_table.add_column(
+            Text(printable(column.name)),
+            justify="right" if column.is_number else "left",
+            no_wrap=not column.is_number,
+            overflow="fold",
+        )
     for row in table.rows:
-        _add_row(rich_table, row)
+        cells, style = (Text(printable(cell)) for cell in row.cells), "dim" if row.is_published else ""
+        rich_table.add_row(*cells, style=style, end_section=row.ends_section)
     if table.notes:
         rich_table.caption = Text("\n".join(textwrap.fill(printable(note), _LINE) for note in table.notes))
     on.print(rich_table)
-
-
-def _add_column(rich_table: RichTable, column: Column) -> None:
-    if column.is_number:
-        rich_table.add_column(Text(printable(column.name)), justify="right", overflow="fold")
-    else:
-        rich_table.add_column(Text(printable(column.name)), no_wrap=True, overflow="fold")
-
-
-def _add_row(rich_table: RichTable, row: Row) -> None:
-    rich_table.add_row(*(Text(printable(cell)) for cell in row.cells), style="dim" if row.is_published else "")
-    if row.ends_section:
-        rich_table.add_section()

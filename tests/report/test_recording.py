@@ -14,15 +14,9 @@ from infthor_eval.plans.replay_frames import (
     PlanTitle,
     RoomMap,
 )
+from infthor_eval.report.recordings.canvas import END_REPEATS, SIZE, TITLE_REPEATS
 from infthor_eval.report.recordings.fonts import break_lines, fit_line, font, one_line
-from infthor_eval.report.recordings.plan_pictures import (
-    END_REPEATS,
-    SIZE,
-    TITLE_REPEATS,
-    draw_plan_frame,
-    draw_plan_title,
-    plan_pictures,
-)
+from infthor_eval.report.recordings.plan_pictures import draw_plan_frame, draw_plan_title, plan_pictures
 from infthor_eval.report.recordings.room_map import draw_map
 
 FLOOR = tuple((x * 0.25, z * 0.25) for x in range(8) for z in range(8))

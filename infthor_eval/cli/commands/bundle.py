@@ -5,6 +5,7 @@ from pathlib import Path
 import click
 
 from infthor_eval.cli.help import ExampleCommand
+from infthor_eval.cli.options.values import PATH
 
 __all__ = ["command"]
 
@@ -14,8 +15,8 @@ __all__ = ["command"]
     cls=ExampleCommand,
     example="infthor-eval bundle infthor_eval/sets/nieh_mini/manifest.json --out build/nieh_mini",
 )
-@click.argument("manifest", type=click.Path(path_type=Path))
-@click.option("--out", type=click.Path(path_type=Path), required=True, help="Folder of the set, new or empty.")
+@click.argument("manifest", type=PATH)
+@click.option("--out", type=PATH, required=True, help="Folder of the set, new or empty.")
 def command(manifest: Path, out: Path) -> int:
     """Build the question set that MANIFEST describes: trajectories, frames, questions.
 

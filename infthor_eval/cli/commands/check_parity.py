@@ -6,7 +6,7 @@ from pathlib import Path
 import click
 
 from infthor_eval.cli.help import ExampleCommand
-from infthor_eval.cli.options.values import FiniteFloat, parse_model_args
+from infthor_eval.cli.options.values import PATH, FiniteFloat, parse_model_args
 
 __all__ = ["command"]
 
@@ -18,7 +18,7 @@ __all__ = ["command"]
 @click.option(
     "--reference-url", required=True, metavar="URL", help="Server with the reference policy (/act convention)."
 )
-@click.option("--frames", type=click.Path(path_type=Path), help="Folder of images; default: black, white and noise.")
+@click.option("--frames", type=PATH, help="Folder of images; default: black, white and noise.")
 @click.option("--instruction", multiple=True, help="Instruction to the policy; may be repeated. Default: a few.")
 @click.option(
     "--model-args", default="", metavar="K=V,...", help="Options of MODEL; unnorm_key is sent to the server too."
@@ -27,12 +27,7 @@ __all__ = ["command"]
     "--tolerance", type=FiniteFloat(min=0), default=1e-6, show_default=True, help="Largest difference of equal actions."
 )
 def command(
-    model: str,
-    reference_url: str,
-    frames: Path | None,
-    instruction: tuple[str, ...],
-    model_args: str,
-    tolerance: float,
+    model: str, reference_url: str, frames: Path | None, instruction: tuple[str, ...], model_args: str, tolerance: float
 ) -> int:
     """Compare the actions of MODEL (openvla, spatialvla) with those of a reference server on the same frames.
 

@@ -5,13 +5,14 @@ from pathlib import Path
 import click
 
 from infthor_eval.cli.help import ExampleCommand
+from infthor_eval.cli.options.values import PATH
 
 __all__ = ["command"]
 
 
 @click.command("compare", cls=ExampleCommand, example="infthor-eval compare results/oracle/RUN results/blind/RUN")
-@click.argument("first", type=click.Path(path_type=Path))
-@click.argument("second", type=click.Path(path_type=Path))
+@click.argument("first", type=PATH)
+@click.argument("second", type=PATH)
 def command(first: Path, second: Path) -> None:
     """Print by how much the run in folder SECOND is better than that in FIRST.
 

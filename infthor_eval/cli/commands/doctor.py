@@ -66,9 +66,8 @@ def command(as_json: bool) -> int:
     for check in checks():
         results.append(check)
         if not as_json:
-            on.print(
-                Text.assemble((f"{check.state:9}", _STYLES[check.state]), printable(f"{check.name}: {check.detail}"))
-            )
+            state = (f"{check.state:9}", _STYLES[check.state])
+            on.print(Text.assemble(state, printable(f"{check.name}: {check.detail}")))
             if check.hint:
                 print_line(f"{'':9}{check.hint}")
     if as_json:
@@ -80,8 +79,9 @@ def checks() -> Iterator[Check]:
     """Run all checks, one after the other; the hub has two seconds to answer."""
     yield Check("Python", "ok", f"{platform.python_version()}, {sys.executable}")
     yield _torch()
-    yield _memory()
-    yield _embedded()
+    total = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    yield Check("memory", "ok", f"{total / _GB:.0f} GB")
+    yield _embedded_simulator()
     yield _unity()
     yield _display()
     yield _token()
@@ -104,12 +104,7 @@ def _torch() -> Check:
     return Check("torch", "optional", f"{torch.__version__}, no GPU: models run on {os.cpu_count()} processors", hint)
 
 
-def _memory() -> Check:
-    total = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / _GB
-    return Check("memory", "ok", f"{total:.0f} GB")
-
-
-def _embedded() -> Check:
+def _embedded_simulator() -> Check:
     missing = [name for name in ("infthor_eval.sim", "numba") if importlib.util.find_spec(name) is None]
     if missing:
         return Check("embedded simulator", "wrong", f"no {missing[0]}", "install the package again: pip install .")

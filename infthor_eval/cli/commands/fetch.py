@@ -5,13 +5,14 @@ from pathlib import Path
 import click
 
 from infthor_eval.cli.help import ExampleCommand
+from infthor_eval.cli.options.values import PATH
 
 __all__ = ["command"]
 
 
 @click.command("fetch", cls=ExampleCommand, example="infthor-eval fetch nieh")
 @click.argument("what", type=click.Choice(["nieh"]))
-@click.option("--dir", "folder", type=click.Path(path_type=Path), help="Folder for the data, instead of the cache.")
+@click.option("--dir", "folder", type=PATH, help="Folder for the data, instead of the cache.")
 @click.option("--token", help="Access token; default: the one that `hf auth login` stored.")
 @click.option("--endpoint", hidden=True, help="Another hub.")
 def command(what: str, folder: Path | None, token: str | None, endpoint: str | None) -> None:

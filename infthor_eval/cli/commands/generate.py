@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from infthor_eval.cli.help import ExampleCommand
-from infthor_eval.cli.options.values import SceneName, WholeNumber, floor_plans_option
+from infthor_eval.cli.options.values import PATH, SceneName, WholeNumber, floor_plans_option
 from infthor_eval.cli.options.workers import parse_worker_settings, worker_options
 
 if TYPE_CHECKING:
@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from infthor_eval.generation.generate_set import GenerationSummary
 
 __all__ = ["command"]
-
-_PATH = click.Path(path_type=Path)
 
 
 @click.command(
@@ -45,7 +43,7 @@ _PATH = click.Path(path_type=Path)
 @click.option(
     "--test-set", is_flag=True, help="Generate a test set as published: with a final task, without bathrooms."
 )
-@click.option("--out", required=True, type=_PATH, help="Folder for the trajectory files.")
+@click.option("--out", required=True, type=PATH, help="Folder for the trajectory files.")
 @floor_plans_option
 @worker_options
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as one JSON object.")
@@ -110,6 +108,6 @@ def _print(summary: GenerationSummary, out: Path, output: Console) -> None:
     from infthor_eval.report.terminal import print_table
 
     output.print(
-        f"{summary.trajectories} trajectories ({summary.resumed} generated earlier), {summary.steps} steps: {out}",
+        f"{summary.trajectories} trajectories ({summary.resumed} generated earlier), {summary.steps} steps: {out}"
     )
     print_table(tasks_table(summary), output)

@@ -5,20 +5,18 @@ from pathlib import Path
 import click
 
 from infthor_eval.cli.help import ExampleCommand
-from infthor_eval.cli.options.values import parse_model_args
+from infthor_eval.cli.options.values import PATH, parse_model_args
 
 __all__ = ["command"]
-
-_PATH = click.Path(path_type=Path)
 
 
 @click.command(
     "import-checkpoint", cls=ExampleCommand, example="infthor-eval import-checkpoint global_step_1000 --out checkpoint"
 )
-@click.argument("folder", type=_PATH)
+@click.argument("folder", type=PATH)
 @click.option("--model", default="llava-onevision", show_default=True, help="Model that the training started from.")
 @click.option("--model-args", default="", metavar="K=V,...", help="Its options (pretrained, dtype, ...).")
-@click.option("--out", required=True, type=_PATH, help="Folder of the new checkpoint.")
+@click.option("--out", required=True, type=PATH, help="Folder of the new checkpoint.")
 def command(folder: Path, model: str, model_args: str, out: Path) -> int:
     """Convert FOLDER, a distributed checkpoint of the published trainer, into one that models load.
 

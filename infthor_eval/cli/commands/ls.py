@@ -8,7 +8,7 @@ from rich import box
 from rich.table import Table as RichTable
 
 from infthor_eval.cli.help import ExampleCommand, ExampleGroup
-from infthor_eval.cli.options.values import SCENE_KINDS, floor_plans_option, include_option
+from infthor_eval.cli.options.values import PATH, SCENE_KINDS, floor_plans_option, include_option
 from infthor_eval.cli.progress.notes import print_note
 from infthor_eval.errors import ModelError
 from infthor_eval.report.terminal import print_table, table_console
@@ -86,7 +86,7 @@ def _scenes(data: Path | None) -> None:
 
 
 @command.command("runs", cls=ExampleCommand, example="infthor-eval ls runs results")
-@click.argument("folder", metavar="[DIR]", type=click.Path(path_type=Path), default=Path("results"))
+@click.argument("folder", metavar="[DIR]", type=PATH, default=Path("results"))
 def _runs(folder: Path) -> None:
     """Runs below DIR (default: results): units done, missing and failed, and the primary metric of each task."""
     runs = list(find_runs(folder))

@@ -45,8 +45,6 @@ def plan(request: RunRequest, suite: Suite, measure: int, price_per_hour: float 
     """Print the estimate of one run.
 
     Args:
-        request: the run.
-        suite: its suite.
         measure: units of each task to measure.
         price_per_hour: price of a worker's machine in US dollars; None for no such cost.
 
@@ -72,9 +70,8 @@ def plan(request: RunRequest, suite: Suite, measure: int, price_per_hour: float 
 
 
 def _table(request: RunRequest, tasks: Sequence[TaskEstimate]) -> Table:
-    rows = [_row(item) for item in tasks]
     title = f"Estimate for {request.label}, from {sum(item.n_measured for item in tasks)} measured units"
-    return Table(title, (Column("task", False), *map(Column, _COLUMNS)), tuple(rows))
+    return Table(title, (Column("task", False), *map(Column, _COLUMNS)), tuple(map(_row, tasks)))
 
 
 def _row(item: TaskEstimate) -> Row:
@@ -92,9 +89,8 @@ def _totals(request: RunRequest, tasks: Sequence[TaskEstimate], price_per_hour: 
     if cost:
         lines.append(f"money: {cost:.2f} US dollars, by the prices of the model")
     if price_per_hour is not None:
-        lines.append(
-            f"money: {seconds / 3600 * price_per_hour:.2f} US dollars of machines at {price_per_hour:g} an hour"
-        )
+        price = seconds / 3600 * price_per_hour
+        lines.append(f"money: {price:.2f} US dollars of machines at {price_per_hour:g} an hour")
     return lines
 
 

@@ -8,17 +8,15 @@ from typing import Any
 import click
 
 from infthor_eval.cli.help import ExampleCommand
-from infthor_eval.cli.options.values import FiniteFloat, WholeNumber
+from infthor_eval.cli.options.values import PATH, FiniteFloat, WholeNumber
 from infthor_eval.cli.options.workers import parse_worker_settings, worker_options
 
 __all__ = ["command"]
 
-_PATH = click.Path(path_type=Path)
-
 
 @click.command("questions", cls=ExampleCommand, example="infthor-eval questions SET --out SET/qa_set_mine.csv")
-@click.argument("folder", metavar="SET", type=_PATH)
-@click.option("--out", required=True, type=_PATH, help="CSV file to write.")
+@click.argument("folder", metavar="SET", type=PATH)
+@click.option("--out", required=True, type=PATH, help="CSV file to write.")
 @click.option("--seed", type=WholeNumber(0), default=0, show_default=True, help="Seed of every choice.")
 @click.option(
     "--per-trajectory", type=click.IntRange(1), default=25, show_default=True, help="Questions per trajectory, at most."

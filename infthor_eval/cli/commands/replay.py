@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from infthor_eval.cli.help import ExampleCommand
-from infthor_eval.cli.options.values import floor_plans_option
+from infthor_eval.cli.options.values import PATH, floor_plans_option
 from infthor_eval.cli.options.workers import parse_worker_settings, worker_options
 
 if TYPE_CHECKING:
@@ -18,13 +18,12 @@ if TYPE_CHECKING:
 
 __all__ = ["command"]
 
-_PATH = click.Path(path_type=Path)
 _MAX_SHOWN = 20  # failures and divergences printed one by one; all are in the JSON summary
 
 
 @click.command("replay", cls=ExampleCommand, example="infthor-eval replay trajectories --out SET")
-@click.argument("trajectories", nargs=-1, required=True, type=_PATH)
-@click.option("--out", required=True, type=_PATH, help="Folder of the set, new or to be continued.")
+@click.argument("trajectories", nargs=-1, required=True, type=PATH)
+@click.option("--out", required=True, type=PATH, help="Folder of the set, new or to be continued.")
 @floor_plans_option
 @click.option("--limit", type=click.IntRange(1), help="Trajectories, at most.")
 @click.option("--per-floor-plan", type=click.IntRange(1), help="Trajectories of one floor plan, at most.")
@@ -85,7 +84,7 @@ def _print(summary: ReplaySummary, output: Console) -> None:
 
     output.print(
         f"{summary.trajectories} trajectories on {summary.floor_plans} floor plans ({summary.resumed} replayed "
-        f"earlier, {summary.failed} failed), {summary.complete} complete, {summary.seconds} s",
+        f"earlier, {summary.failed} failed), {summary.complete} complete, {summary.seconds} s"
     )
     for table in (refusals_table(summary), overlaps_table(summary)):
         if table is not None:

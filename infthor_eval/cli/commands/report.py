@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from infthor_eval.cli.help import ExampleCommand
-from infthor_eval.cli.options.values import WholeNumber
+from infthor_eval.cli.options.values import PATH, WholeNumber
 
 if TYPE_CHECKING:
     from rich.progress import Progress
@@ -20,19 +20,18 @@ if TYPE_CHECKING:
 
 __all__ = ["command"]
 
-_PATH = click.Path(path_type=Path)
 _PAGE, _FOLDER = Path("results/report.html"), Path("results/figures")
 
 
 @click.command("report", cls=ExampleCommand, example="infthor-eval report results/*/nieh_mini-* --out report.html")
-@click.argument("runs", metavar="RUN...", nargs=-1, required=True, type=_PATH)
+@click.argument("runs", metavar="RUN...", nargs=-1, required=True, type=PATH)
 @click.option(
     "--out",
-    type=_PATH,
+    type=PATH,
     help=f"The page, an .html file, or the folder of a figure's files.  [default: {_PAGE}, {_FOLDER}]",
 )
-@click.option("--data", type=_PATH, help="Folder of the question set or the trajectories, if the runs do not name it.")
-@click.option("--scenes", type=_PATH, help="Folder with recorded floor plans (thor_scenes/), as for the run.")
+@click.option("--data", type=PATH, help="Folder of the question set or the trajectories, if the runs do not name it.")
+@click.option("--scenes", type=PATH, help="Folder with recorded floor plans (thor_scenes/), as for the run.")
 @click.option(
     "--episodes",
     type=WholeNumber(0),
@@ -47,7 +46,7 @@ _PAGE, _FOLDER = Path("results/report.html"), Path("results/figures")
     help="Draw a figure instead: 6 (reward of arms along trajectories), 7 (reward of plans over steps and context "
     "tokens), radius (success of arms by the hand's radius).",
 )
-@click.option("--panels", type=_PATH, metavar="FILE.yaml", help="Runs of each panel of a figure; else all in one.")
+@click.option("--panels", type=PATH, metavar="FILE.yaml", help="Runs of each panel of a figure; else all in one.")
 @click.option("--task", help="The task to draw if the runs share several; for arms, one of each kind: A,B.")
 def command(
     runs: tuple[Path, ...],
@@ -103,13 +102,11 @@ class _ReplayBar:
         self._progress = progress
 
     def begin(self, n_episodes: int) -> None:
-        """See `ReplayProgress.begin`."""
         from infthor_eval.cli.progress.bar import PacedBar
 
         self._bar = PacedBar(self._progress, "episodes replayed", n_episodes)
 
     def advance(self, run: str, trajectory: str) -> None:
-        """See `ReplayProgress.advance`."""
         self._bar.advance(detail=f"{run}, {trajectory}")
 
 
@@ -138,11 +135,7 @@ def _draw(folders: tuple[Path, ...], name: str, request: FigureRequest, out: Pat
 
 
 def _require_figure(runs: Sequence[ReportRun], name: str, owners: Mapping[str, Mapping[str, Figure]]) -> Figure:
-    """Return the figure of a name; two packages may offer different ones, so the first run decides.
-
-    Raises:
-        UsageError: a run is of a suite that does not have the figure, or of another suite than the first.
-    """
+    """Return the figure of a name; two packages may offer different ones, so the first run decides."""
     from infthor_eval.errors import UsageError
 
     first = runs[0].suite.name

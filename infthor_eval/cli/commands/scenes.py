@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from infthor_eval.cli.help import ExampleCommand, ExampleGroup
-from infthor_eval.cli.options.values import SceneName, floor_plans_option
+from infthor_eval.cli.options.values import PATH, SceneName, floor_plans_option
 
 __all__ = ["command"]
 
@@ -20,7 +20,7 @@ def command() -> None:
 @command.command("show", cls=ExampleCommand, example="infthor-eval scenes show kitchen-3 --out kitchen.png")
 @click.argument("name", type=SceneName())
 @floor_plans_option
-@click.option("--out", type=click.Path(path_type=Path), help="Image to write; default: NAME.png.")
+@click.option("--out", type=PATH, help="Image to write; default: NAME.png.")
 @click.option(
     "--size",
     type=click.IntRange(64, 2048),
@@ -54,22 +54,15 @@ def show(name: str, data: Path | None, out: Path | None, size: int, overwrite: b
     sheet.save(picture, format=Image.registered_extensions()[path.suffix.lower()])
     if not overwrite:
         refuse_overwrite(path, picture.getvalue())
-    with (
-        wrap_errors(f"{path}: cannot be written", "give another place with --out"),
-        write_atomically(path) as partial,
-    ):
+    with wrap_errors(f"{path}: cannot be written", "give another place with --out"), write_atomically(path) as partial:
         partial.write_bytes(picture.getvalue())
     print_line(f"{name}: {path} (from above; first view)")
 
 
 @command.command("dump", cls=ExampleCommand, example="infthor-eval scenes dump FloorPlan1 FloorPlan201 --out scenes")
 @click.argument("names", nargs=-1, required=True)
-@click.option("--out", type=click.Path(path_type=Path), required=True, help="Folder of floor plans, new or existing.")
-@click.option(
-    "--unity",
-    type=click.Path(path_type=Path),
-    help="Unity executable to use instead of the build that ai2thor downloads.",
-)
+@click.option("--out", type=PATH, required=True, help="Folder of floor plans, new or existing.")
+@click.option("--unity", type=PATH, help="Unity executable to use instead of the build that ai2thor downloads.")
 @click.option("--embedded", "is_embedded", is_flag=True, help="Export scenes of the embedded simulator instead.")
 @click.option("--overwrite", is_flag=True, help="Replace other recordings of these scenes.")
 @floor_plans_option

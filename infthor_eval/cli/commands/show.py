@@ -7,6 +7,7 @@ import click
 
 from infthor_eval.cli.help import ExampleCommand
 from infthor_eval.cli.options.show import ShowOptions, show_options
+from infthor_eval.cli.options.values import PATH
 from infthor_eval.cli.results import RunResults, print_results
 from infthor_eval.runs import RunSummary, read_header
 from infthor_eval.runs.run_search import read_results
@@ -17,7 +18,7 @@ __all__ = ["command", "read_run_results"]
 
 
 @click.command("show", cls=ExampleCommand, example="infthor-eval show results/oracle/RUN results/blind/RUN --full")
-@click.argument("folders", metavar="RUN...", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.argument("folders", metavar="RUN...", nargs=-1, required=True, type=PATH)
 @show_options
 def command(folders: tuple[Path, ...], **given: Any) -> None:
     """Print the results of the runs in the folders RUN..., made from their journals, as `run` prints them at its end.

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from infthor_eval.cli.help import ExampleCommand
-from infthor_eval.cli.options.values import FiniteFloat, parse_model_args, parse_pairs
+from infthor_eval.cli.options.values import PATH, FiniteFloat, parse_model_args, parse_pairs
 from infthor_eval.cli.options.workers import parse_worker_settings, worker_options
 from infthor_eval.cli.progress.bar import PacedBar, StepBars
 from infthor_eval.cli.progress.notes import NOTES, print_note
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
 __all__ = ["command"]
 
-_PATH = click.Path(path_type=Path)
 _GPUS, _TFLOPS = 8, 400.0
 _PER_TRAJECTORY = 500  # more than there are questions on a trajectory
 _STAGES = {"vision": "recognising objects", "text": "reading plans", "joint": "answering and acting"}
@@ -39,7 +38,7 @@ _STAGES = {"vision": "recognising objects", "text": "reading plans", "joint": "a
     "--data",
     "folders",
     multiple=True,
-    type=_PATH,
+    type=PATH,
     metavar="SET",
     help="Replayed set (`replay`) to train on, with a question file if the recipe needs questions; may be repeated. "
     "The recipe tiny generates its own by default.",
@@ -52,7 +51,7 @@ _STAGES = {"vision": "recognising objects", "text": "reading plans", "joint": "a
     "--set", "changes", multiple=True, metavar="KEY=VALUE", help="Change a setting of the recipe; may be repeated."
 )
 @click.option(
-    "--out", required=True, type=_PATH, help="Folder of the run; the checkpoint is written to checkpoint/ in it."
+    "--out", required=True, type=PATH, help="Folder of the run; the checkpoint is written to checkpoint/ in it."
 )
 @click.option(
     "--dry-run", is_flag=True, help="Print the size of the data and an estimate of time and memory; do not train."
@@ -161,13 +160,8 @@ def _print_estimate(run: TrainingRun, n_gpus: int, tflops: float) -> None:
         f"work: {cost.flop:.2e} FLOP, {cost.hours(n_gpus * tflops):,.1f} hours of {n_gpus} GPUs at {tflops:g} "
         "TFLOP/s each"
     )
-    parts = {
-        "weights": cost.weights,
-        "gradients": cost.gradients,
-        "optimizer": cost.optimizer,
-        "activations": cost.activations,
-    }
-    sizes = ", ".join(f"{name} {size / 1e9:,.1f}" for name, size in parts.items())
+    parts = ("weights", "gradients", "optimizer", "activations")
+    sizes = ", ".join(f"{name} {getattr(cost, name) / 1e9:,.1f}" for name in parts)
     console().print(f"memory of a process: {cost.memory / 1e9:,.1f} GB ({sizes})")
 
 

@@ -8,7 +8,7 @@ import click
 
 from infthor_eval.cli.help import ExampleCommand
 from infthor_eval.cli.options.run import RunOptions
-from infthor_eval.cli.options.values import ModelList, ModelSpec, WholeNumber
+from infthor_eval.cli.options.values import PATH, ModelList, ModelSpec, WholeNumber
 from infthor_eval.cli.options.workers import parse_worker_settings, worker_options
 from infthor_eval.cli.progress.notes import print_note
 from infthor_eval.cli.progress.runs import execute_with_progress
@@ -26,7 +26,7 @@ __all__ = ["command", "validate"]
 
 
 @click.command("validate", cls=ExampleCommand, example="infthor-eval validate SET --models A,B,C,D --out VALIDATED")
-@click.argument("set_folder", metavar="SET", type=click.Path(path_type=Path))
+@click.argument("set_folder", metavar="SET", type=PATH)
 @click.option(
     "--models",
     type=ModelList(),
@@ -34,8 +34,8 @@ __all__ = ["command", "validate"]
     metavar="MODEL,...",
     help="Model names with commas; the paper uses four. MODEL:K=V,... gives a model its own options.",
 )
-@click.option("--out", type=click.Path(path_type=Path), required=True, help="Folder of the validated set.")
-@click.option("--decisions", type=click.Path(path_type=Path), help="inspection.csv with keep or drop filled in.")
+@click.option("--out", type=PATH, required=True, help="Folder of the validated set.")
+@click.option("--decisions", type=PATH, help="inspection.csv with keep or drop filled in.")
 @click.option("--scorer", type=click.Choice(["strict", "reference"]), default="strict", show_default=True)
 @click.option("--seed", type=WholeNumber(), default=0, show_default=True, help="Seed of everything random.")
 @worker_options
@@ -101,7 +101,7 @@ def validate(
     print_table(clues_table([_summarise_kept(outcome, verdicts) for outcome in outcomes]), console)
     console.print(
         f"{len(questions)} questions: {len(verdicts.kept)} kept, {len(verdicts.rejected)} rejected, "
-        f"{len(verdicts.to_inspect)} to inspect: {out}",
+        f"{len(verdicts.to_inspect)} to inspect: {out}"
     )
     return int(any(record.failure is not None for outcome in outcomes for record in outcome.records))
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from infthor_eval.cli.help import ExampleCommand
-from infthor_eval.cli.options.values import FiniteFloat
+from infthor_eval.cli.options.values import PATH, FiniteFloat
 
 if TYPE_CHECKING:
     from PIL import Image
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
 __all__ = ["command"]
 
-_PATH = click.Path(path_type=Path)
 _FOLDER = Path("results/recordings")
 
 
@@ -30,15 +29,15 @@ _FOLDER = Path("results/recordings")
     cls=ExampleCommand,
     example="infthor-eval watch results/scripted/RUN --trajectory kitchen-4-seed0 --out scripted.mp4",
 )
-@click.argument("run", type=_PATH)
+@click.argument("run", type=PATH)
 @click.option("--trajectory", metavar="NAME", help="A trajectory of the run, if it has several.")
 @click.option("--task", metavar="NAME", help="A task of the run, if it has several.")
 @click.option("--plans", metavar="N or N-M", help="Only these plans, counted from 1; else all.")
 @click.option("--episode", metavar="N,...", help="For arms: only the episodes of these expert actions; else all.")
-@click.option("--sheet", type=_PATH, metavar="FILE.png", help="For arms: frames of a few episodes on one page instead.")
-@click.option("--out", type=_PATH, metavar="FILE", help=f"The file to write, .mp4 or .gif.  [default: in {_FOLDER}]")
-@click.option("--data", type=_PATH, help="File or folder of the trajectories, if they do not come with the package.")
-@click.option("--scenes", type=_PATH, help="Folder with recorded floor plans (thor_scenes/), as for the run.")
+@click.option("--sheet", type=PATH, metavar="FILE.png", help="For arms: frames of a few episodes on one page instead.")
+@click.option("--out", type=PATH, metavar="FILE", help=f"The file to write, .mp4 or .gif.  [default: in {_FOLDER}]")
+@click.option("--data", type=PATH, help="File or folder of the trajectories, if they do not come with the package.")
+@click.option("--scenes", type=PATH, help="Folder with recorded floor plans (thor_scenes/), as for the run.")
 @click.option(
     "--fps", type=FiniteFloat(0, 30, min_open=True), default=2.0, show_default=True, help="Actions shown in a second."
 )
@@ -84,11 +83,6 @@ def command(
 
 
 def _require_replay(run: ReportRun) -> Replay:
-    """Return the replay of a run's suite.
-
-    Raises:
-        UsageError: the suite has none.
-    """
     from infthor_eval.errors import UsageError
     from infthor_eval.suites import find_presenter, suite_names
 
@@ -101,11 +95,7 @@ def _require_replay(run: ReportRun) -> Replay:
 
 
 def _refuse_options(run: ReportRun, replay: Replay, options: Mapping[str, object]) -> None:
-    """Refuse options that the suite of a run does not have.
-
-    Raises:
-        UsageError: one is given.
-    """
+    """Refuse options that are given and that the suite of a run does not have."""
     from infthor_eval.errors import UsageError
 
     for option, value in options.items():

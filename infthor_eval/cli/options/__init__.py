@@ -1,1 +1,1 @@
-"""What several commands share: options, and how their values are written."""
+"""Options that several commands share, and the types of their values."""

@@ -7,14 +7,13 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
-from infthor_eval.cli.options.values import ModelArgs
+from infthor_eval.cli.options.values import PATH, ModelArgs
 from infthor_eval.errors import UsageError, unknown_name
 
 __all__ = ["comes_from_file", "config_option"]
 
 
 def _read_file(context: click.Context, option: click.Parameter, path: Path | None) -> None:
-    """Use the options in the file as defaults of the command."""
     if path is None:
         return
     from infthor_eval.runs.stored_command import read_options
@@ -32,7 +31,7 @@ def _read_file(context: click.Context, option: click.Parameter, path: Path | Non
 
 config_option = click.option(
     "--config",
-    type=click.Path(path_type=Path),
+    type=PATH,
     is_eager=True,  # before the options whose defaults it changes
     expose_value=False,
     callback=_read_file,

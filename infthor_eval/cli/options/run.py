@@ -9,13 +9,9 @@ from typing import Any
 import click
 
 from infthor_eval.cli.options.config import comes_from_file, config_option
-from infthor_eval.cli.options.suites import (
-    expand_suite_options,
-    refuse_duplicate_options,
-    suite_options,
-    suite_values,
-)
+from infthor_eval.cli.options.suites import expand_suite_options, refuse_duplicate_options, suite_options, suite_values
 from infthor_eval.cli.options.values import (
+    PATH,
     FiniteFloat,
     ModelArgs,
     ModelList,
@@ -50,7 +46,7 @@ _OPTIONS = (
     ),
     click.option("--tasks", required=True, help="Task or group names with commas (see `ls tasks`)."),
     include_option,
-    click.option("--data", type=click.Path(path_type=Path), help="Folder of the data set."),
+    click.option("--data", type=PATH, help="Folder of the data set."),
     click.option(
         "--model-args",
         type=ModelArgs(),
@@ -59,9 +55,7 @@ _OPTIONS = (
         help="Options of the model, or of all of them (see `ls models`).",
     ),
     click.option(
-        "--rope",
-        metavar="TYPE:FACTOR",
-        help="Extend the model's context: yarn:4, linear:2, dynamic:4, longrope:8.",
+        "--rope", metavar="TYPE:FACTOR", help="Extend the model's context: yarn:4, linear:2, dynamic:4, longrope:8."
     ),
     click.option(
         "--max-tokens-total",
@@ -83,13 +77,7 @@ _OPTIONS = (
         help="Evaluate only N of each task (questions, trajectories of plans, episodes of arms), evenly from all "
         "trajectories, drawn by --seed; a larger N includes these. lm-eval's own command takes the first N instead.",
     ),
-    click.option(
-        "--output",
-        type=click.Path(path_type=Path),
-        default=Path("results"),
-        show_default=True,
-        help="Results folder.",
-    ),
+    click.option("--output", type=PATH, default=Path("results"), show_default=True, help="Results folder."),
     click.option("--seed", type=WholeNumber(), default=0, show_default=True, help="Seed of everything random."),
     click.option("--fresh", is_flag=True, help="Restart; the journal of an earlier run is kept under another name."),
     click.option("--recover", is_flag=True, help="Resume without the bad lines of a damaged journal."),
@@ -163,9 +151,7 @@ class RunOptions:
             tasks=split_names(given["tasks"], "--tasks"),
             worker_settings=workers,
             suite_options=suite_values(given),
-            **{
-                name: given[name] for name in ("data", "output", "limit", "seed", "name", "fresh", "recover", "include")
-            },
+            **{name: given[name] for name in _AS_GIVEN},
         )
 
     def requests(self) -> list[tuple[RunRequest, Suite]]:

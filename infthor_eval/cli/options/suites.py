@@ -66,10 +66,7 @@ def expand_suite_options(suite: str, given: Mapping[str, Any], used: Collection[
 
 
 def refuse_duplicate_options(command: Callable[..., Any]) -> None:
-    """Refuse options of another package's suite that the command has already.
-
-    Args:
-        command: a command with its own options and those of all suites.
+    """Refuse options of another package's suite that the command, which has those of all suites, has already.
 
     Raises:
         UsageError: an option is there twice.

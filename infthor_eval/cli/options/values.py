@@ -11,6 +11,7 @@ import click
 from infthor_eval.errors import unknown_name
 
 __all__ = [
+    "PATH",
     "SCENE_KINDS",
     "FiniteFloat",
     "ModelArgs",
@@ -25,6 +26,7 @@ __all__ = [
     "split_names",
 ]
 
+PATH = click.Path(path_type=Path)
 SCENE_KINDS = ("kitchen", "living-room", "bedroom", "bathroom", "house")  # procedural scenes, KIND-SEED
 _LARGEST = 2**63 - 1  # the largest integer of a run's JSON
 
@@ -163,11 +165,7 @@ def parse_model_args(text: str) -> dict[str, str]:
 
 
 def parse_pairs(items: Iterable[str], option: str) -> dict[str, str]:
-    """Return keys and values written as `k=v`.
-
-    Args:
-        items: the pairs, as typed.
-        option: the option that they belong to, for messages.
+    """Return keys and values written as `k=v`; messages name the option that they belong to.
 
     Raises:
         click.UsageError: an item is not `k=v`, or a key is given twice.

@@ -1,1 +1,1 @@
-"""What people see of work while it goes on."""
+"""Progress of long work, and notes on it, on standard error."""

@@ -51,11 +51,6 @@ class StepBars:
     """A bar for each part of a training, started at its first step, when the number of steps is known."""
 
     def __init__(self, progress: Progress) -> None:
-        """Start without bars.
-
-        Args:
-            progress: draws the bars.
-        """
         self._progress = progress
         self._bars: dict[str, PacedBar] = {}
 

@@ -23,7 +23,6 @@ class _ProgressObserver:
         self._stop = stop
 
     def begin(self, workload: Workload, n_recovered: int) -> None:
-        """See `Observer`."""
         if n_recovered:
             print_note(f"{self._name}: {n_recovered} bad line(s) of the journal set aside; those units are tried again")
         print_workload(workload)
@@ -31,11 +30,9 @@ class _ProgressObserver:
         self._stop.has_begun = True
 
     def done(self, record: UnitRecord[Any], resumed: bool) -> None:
-        """See `Observer`."""
         self.bar.advance(resumed, context=record.usage.context, cached=record.usage.cached)
 
     def note(self, text: str) -> None:
-        """See `Observer`."""
         print_note(f"{self._name}: {text}", "yellow")
 
 

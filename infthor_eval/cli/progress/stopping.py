@@ -4,11 +4,13 @@ import contextlib
 import signal
 import threading
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from types import FrameType
 
-__all__ = ["Stop", "stop_on_sigint"]
+__all__ = ["Stop", "handle_signal", "stop_on_sigint"]
 
 
+@dataclass
 class Stop:
     """Whether a run is to stop; the driver calls it before each unit.
 
@@ -17,9 +19,8 @@ class Stop:
         has_begun: whether units are being done; before that there is nothing to finish.
     """
 
-    def __init__(self) -> None:
-        self.is_requested = False
-        self.has_begun = False
+    is_requested: bool = False
+    has_begun: bool = False
 
     def __call__(self) -> bool:
         """Return whether to stop."""
@@ -27,12 +28,21 @@ class Stop:
 
 
 @contextlib.contextmanager
-def stop_on_sigint(print_note: Callable[[str], None]) -> Iterator[Stop]:
-    """Request a stop at the first SIGINT of a run; raise KeyboardInterrupt at the second, or before the first unit.
+def handle_signal(number: int, handler: Callable[[int, FrameType | None], None]) -> Iterator[None]:
+    """Handle a signal within the context, if this is the main thread: only that one may set signal handlers."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(number, handler)
+    try:
+        yield
+    finally:
+        signal.signal(number, before)
 
-    Args:
-        print_note: prints a line for the user.
-    """
+
+@contextlib.contextmanager
+def stop_on_sigint(print_note: Callable[[str], None]) -> Iterator[Stop]:
+    """Request a stop at the first SIGINT of a run; raise KeyboardInterrupt at the second, or before the first unit."""
     stop = Stop()
 
     def request_stop(_number: int, _frame: FrameType | None) -> None:
@@ -41,11 +51,5 @@ def stop_on_sigint(print_note: Callable[[str], None]) -> Iterator[Stop]:
         stop.is_requested = True
         print_note("stopping after the present unit; press Ctrl-C again to stop at once")
 
-    if threading.current_thread() is not threading.main_thread():  # only the main thread may set signal handlers
+    with handle_signal(signal.SIGINT, request_stop):
         yield stop
-        return
-    before = signal.signal(signal.SIGINT, request_stop)
-    try:
-        yield stop
-    finally:
-        signal.signal(signal.SIGINT, before)

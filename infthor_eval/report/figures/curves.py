@@ -14,44 +14,31 @@ from infthor_eval.terminal import printable
 
 __all__ = ["curves_figure", "draw_curves"]
 
-_REWARD = "reward so far (points)"
 _PANEL, _NARROW = (4.6, 2.7), 3.5  # inches; the width of one of many
 _MARGIN = 1.1  # inches around the panels
 _LINE = 0.2  # inches of a line of the legend
 
 
 def draw_curves(curves: RewardCurves, panels: Sequence[Panel], folder: Path, name: str) -> list[Path]:
-    """Draw a row per panel, with a column for each facet that some run has.
-
-    Args:
-        curves: curves to draw.
-        panels: runs of each panel; the bound is in all of them.
-        folder: folder of the files.
-        name: name of the files, without suffix.
-
-    Returns:
-        Paths of the files.
-
-    Raises:
-        DataError: a file cannot be written.
-    """
+    """Write `curves_figure` into files; see `save_figure`."""
     return save_figure(lambda: curves_figure(curves, panels), folder, name)
 
 
 def curves_figure(curves: RewardCurves, panels: Sequence[Panel]) -> Figure:
-    """Return the figure that `draw_curves` writes."""
-    facets = {name: it for name, it in curves.facets.items() if any(name in run.curves for run in curves.runs)}
+    """Return a figure with a row per panel, with the bound in each, and a column for each facet that some run has."""
+    facets = {name: facet for name, facet in curves.facets.items() if any(name in run.curves for run in curves.runs)}
     width = len(facets) * (_PANEL[0] if len(facets) < 3 else _NARROW) + LEGEND
     height = max(_PANEL[1], _LINE * (len(curves.runs) + 1))
     figure = Figure(figsize=(width, len(panels) * height + _MARGIN), layout="constrained")
     # One scale of reward for all panels, so that they can be compared.
     grid = figure.subplots(len(panels), len(facets), sharex="col", sharey=True, squeeze=False)
-    looks = _looks(curves.runs)
+    bounds = {run.label: BOUND for run in curves.runs if run.is_bound}
+    looks = bounds | looks_of(run.label for run in curves.runs if not run.is_bound)
     for row, panel in zip(grid, panels, strict=True):
         runs = [run for run in curves.runs if run.is_bound or run.label in panel.labels]
         for axes, (name, facet) in zip(row, facets.items(), strict=True):
             _draw_panel(axes, name, facet, runs, looks)
-        row[0].set_ylabel(_REWARD)
+        row[0].set_ylabel("reward so far (points)")
         row[0].set_title(printable(panel.title), loc="left", fontweight="bold")
         # The bound comes first: its line is drawn last and lies on top.
         labels = [run.label for run in reversed(runs) if run.is_bound] + [run.label for run in runs if not run.is_bound]
@@ -62,12 +49,6 @@ def curves_figure(curves: RewardCurves, panels: Sequence[Panel]) -> Figure:
             top.set_title(facet.title)
     add_words(figure, _heading(curves), curves.notes, width)
     return figure
-
-
-def _looks(runs: Sequence[RunCurves]) -> dict[str, Look]:
-    """Return a look per run, the same in all panels."""
-    bounds = {run.label: BOUND for run in runs if run.is_bound}
-    return bounds | looks_of(run.label for run in runs if not run.is_bound)
 
 
 def _draw_panel(axes: Axes, name: str, facet: Facet, runs: Sequence[RunCurves], looks: Mapping[str, Look]) -> None:

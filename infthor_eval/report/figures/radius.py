@@ -22,27 +22,14 @@ _PANEL, _MARGIN, _LINE = (4.4, 2.9), 1.1, 0.2  # inches
 
 
 def draw_radii(success: SuccessByRadius, folder: Path, name: str) -> list[Path]:
-    """Draw a panel per kind.
-
-    Args:
-        success: success rates to draw.
-        folder: folder of the files.
-        name: name of the files, without suffix.
-
-    Returns:
-        Paths of the files.
-
-    Raises:
-        DataError: a file cannot be written.
-    """
+    """Write `radii_figure` into files; see `save_figure`."""
     return save_figure(lambda: radii_figure(success), folder, name)
 
 
 def radii_table(success: SuccessByRadius) -> Table:
     """Return a table with a row per model and kind and a column per radius."""
-    radii = sorted(
-        {radius for points in (success.floor, *(line.points for line in success.lines)) for radius, _ in points}
-    )
+    all_points = (success.floor, *(line.points for line in success.lines))
+    radii = sorted({radius for points in all_points for radius, _ in points})
     rows = [_row(line.label, line.kind, line.points, radii, str(line.n_failed)) for line in success.lines]
     if success.floor:
         rows.append(_row(f"({_FLOOR})", ManipulationKind.PICKUP, success.floor, radii, "-"))
@@ -56,13 +43,12 @@ def _row(
     label: str, kind: ManipulationKind, points: Sequence[tuple[float, Rate]], radii: Sequence[float], end: str
 ) -> Row:
     rates = dict(points)
-    return Row(
-        (label, KIND_NAMES[kind], *(format_percent(rates.get(radius)) for radius in radii), str(points[0][1].n), end)
-    )
+    cells = (format_percent(rates.get(radius)) for radius in radii)
+    return Row((label, KIND_NAMES[kind], *cells, str(points[0][1].n), end))
 
 
 def radii_figure(success: SuccessByRadius) -> Figure:
-    """Return the figure that `draw_radii` writes."""
+    """Return a figure with a panel per kind."""
     kinds = [kind for kind in ManipulationKind if any(line.kind == kind for line in success.lines)]
     labels = list(dict.fromkeys(line.label for line in success.lines if not line.is_bound))
     looks = looks_of(labels) | {line.label: BOUND for line in success.lines if line.is_bound}
@@ -107,14 +93,12 @@ def _draw_panel(axes: Axes, lines: Sequence[RadiusLine], looks: Mapping[str, Loo
 
 def _heading(success: SuccessByRadius) -> list[str]:
     intervals = ", 95 % intervals beside the points" if success.n_trajectories > 1 else ""
-    return [
-        f"Success by radius on {success.task}: episodes of {trajectories_text(success.n_trajectories)}{intervals}",
-        *_label(success),
-    ]
+    title = f"Success by radius on {success.task}: episodes of {trajectories_text(success.n_trajectories)}{intervals}"
+    return [title, *_label(success)]
 
 
 def _label(success: SuccessByRadius) -> tuple[str, ...]:
     """Return the note on numbers of the embedded simulator."""
-    embedded = {line.label: line.is_embedded for line in success.lines}
-    label = embedded_note([name for name, it in embedded.items() if it], len(embedded), "results")
+    by_label = {line.label: line.is_embedded for line in success.lines}
+    label = embedded_note([name for name, is_embedded in by_label.items() if is_embedded], len(by_label), "results")
     return () if label is None else (label,)

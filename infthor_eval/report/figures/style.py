@@ -1,6 +1,7 @@
 """The style of all figures: colours and lines of runs, texts around panels, files in PNG and SVG."""
 
 import io
+import itertools
 import re
 import textwrap
 import warnings
@@ -45,9 +46,8 @@ _PAGE_SETTINGS: dict[Any, Any] = {
 }
 _PAGE_COLOURS = {_INK: "currentColor", _GRID: "var(--grid)", "#000000": "currentColor", "#444444": "currentColor"}
 _PER_INCH = 108  # pixels; letters are then as large as the page's
-_SIZE = re.compile(
-    r' (?:width|height)="[^"]*"(?: (?:width|height)="[^"]*")?'
-)  # of the svg element, which has a viewBox too
+# The size of the svg element, which has a viewBox too.
+_SIZE = re.compile(r' (?:width|height)="[^"]*"(?: (?:width|height)="[^"]*")?')
 LEGEND = 2.3  # inches, beside the panels
 _NAME = 30  # letters in a line of the legend
 _LETTERS = 15  # letters of a note per inch
@@ -66,23 +66,18 @@ BOUND = Look("black", "dashed", 1.4)
 
 def looks_of(labels: Iterable[str]) -> dict[str, Look]:
     """Return a look for each label of a run that is not the bound."""
-    looks = {}
-    for number, label in enumerate(labels):
-        style = _STYLES[number // len(_COLOURS) % len(_STYLES)]
-        looks[label] = Look(_COLOURS[number % len(_COLOURS)], style, 1.5)
-    return looks
+    # The colours of one style of line, then those of the next.
+    looks = itertools.cycle(Look(colour, style, 1.5) for style in _STYLES for colour in _COLOURS)
+    return dict(zip(labels, looks, strict=False))
 
 
 def save_figure(draw: Callable[[], Figure], folder: Path, name: str) -> list[Path]:
-    """Write a figure as PNG and SVG; the same figure gives the same bytes of SVG.
+    """Write a figure as PNG and SVG and return the files' paths; the same figure gives the same bytes of SVG.
 
     Args:
         draw: draws the figure; called with the style in effect.
         folder: folder of the files.
         name: name of the files, without suffix.
-
-    Returns:
-        Paths of the files.
 
     Raises:
         DataError: a file cannot be written.
@@ -93,11 +88,7 @@ def save_figure(draw: Callable[[], Figure], folder: Path, name: str) -> list[Pat
 
 
 def inline_svg(draw: Callable[[], Figure]) -> str:
-    """Return a figure as an element of a page, in the page's colours (light or dark) and no wider than its column.
-
-    Args:
-        draw: draws the figure; called with the style in effect.
-    """
+    """Return a figure as an element of a page, in the page's colours (light or dark) and no wider than its column."""
     with _in_style(_PAGE_SETTINGS):
         text, figure = io.StringIO(), draw()
         figure.savefig(text, format="svg", transparent=True, metadata=_SVG_METADATA)
@@ -136,14 +127,7 @@ def add_legend(axes: Axes, entries: Sequence[tuple[str, Look]]) -> None:
 
 
 def add_words(figure: Figure, heading: Sequence[str], notes: Sequence[str], width: float) -> None:
-    """Write the heading above the panels and the notes below them.
-
-    Args:
-        figure: the figure.
-        heading: lines of the heading.
-        notes: notes, a line each.
-        width: width of the figure in inches.
-    """
+    """Write the lines of the heading above the panels, and the notes below them; `width` is the figure's, in inches."""
     settings: dict[str, Any] = {"x": 0.01, "ha": "left"}
     wrapped = [part for line in heading for part in textwrap.wrap(printable(line), round(width * 12))]
     figure.suptitle("\n".join(wrapped), fontsize=10, **settings)

@@ -1,6 +1,7 @@
 """Frames of an arm's replayed episodes as pictures: the view beside the arm's reach, and the request below."""
 
 from collections.abc import Iterable, Iterator
+from functools import partial
 
 from PIL import Image
 
@@ -9,11 +10,10 @@ from infthor_eval.report.recordings.canvas import (
     BAD,
     FAINT,
     PANE,
-    TITLE_REPEATS,
     WARN,
     Line,
     draw_panes,
-    repeat_end,
+    film_pictures,
     title_card,
     write_in_hand,
     write_lines,
@@ -26,28 +26,19 @@ __all__ = ["arm_pictures", "draw_arm_frame", "draw_arm_title"]
 
 
 def arm_pictures(frames: Iterable[ArmFrame], heading: str) -> Iterator[Image.Image]:
-    """Draw all pictures of some frames: before each episode its title, and its end several times.
-
-    Args:
-        frames: frames in time order.
-        heading: text above each picture: run and trajectory.
-    """
-    for frame in frames:
-        if frame.number == 0:
-            yield from [draw_arm_title(frame, heading)] * TITLE_REPEATS
-        if frame.observation is not None:
-            yield from repeat_end(draw_arm_frame(frame, heading), is_end=bool(frame.ending))
+    """Draw frames with a heading, the run and the trajectory; see `film_pictures`."""
+    return film_pictures(frames, partial(draw_arm_title, heading=heading), partial(draw_arm_frame, heading=heading))
 
 
 def draw_arm_title(frame: ArmFrame, heading: str) -> Image.Image:
     """Draw the card before an episode; for an episode in which nobody acted it has the reason."""
     title = frame.title
     place = f"{title.kind}, episode {title.number} of {title.n_episodes} (the expert's action {title.action})"
-    told = f"radius of the hand's sphere {title.radius:g} m; a success earns {frame.max_reward:g} points"
+    settings = f"radius of the hand's sphere {title.radius:g} m; a success earns {frame.max_reward:g} points"
     lines = [
         Line("", place, 26, colour=FAINT),
         Line("", one_line(title.instruction), 46, "-Bold", most=2),
-        Line("", told, 20, colour=FAINT),
+        Line("", settings, 20, colour=FAINT),
         Line("", one_line(frame.ending) if frame.observation is None else "", 24, "-Bold", BAD, most=3),
     ]
     return title_card(heading, lines)
@@ -59,9 +50,9 @@ def draw_arm_frame(frame: ArmFrame, heading: str) -> Image.Image:
     Raises:
         ValueError: it has no observation.
     """
-    if frame.observation is None:
-        raise ValueError("the frame has no observation")
     seen = frame.observation
+    if seen is None:
+        raise ValueError("the frame has no observation")
     picture, pen = draw_panes(heading, Image.fromarray(seen.frame), draw_reach(seen.reach, PANE))
     write_lines(pen, _lines(frame))
     numbers = [

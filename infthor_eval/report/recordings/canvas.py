@@ -1,7 +1,7 @@
 """The layout of a recording's pictures: two panes side by side, with text and numbers below them."""
 
-from collections.abc import Iterable, Iterator, Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Any, NamedTuple
 
 from PIL import Image, ImageDraw
 
@@ -24,7 +24,7 @@ __all__ = [
     "WARN",
     "Line",
     "draw_panes",
-    "repeat_end",
+    "film_pictures",
     "title_card",
     "write_bar",
     "write_in_hand",
@@ -66,9 +66,15 @@ class Line(NamedTuple):
     most: int = 1
 
 
-def repeat_end(picture: Image.Image, *, is_end: bool) -> Iterator[Image.Image]:
-    """Yield a picture as often as it is shown: the end of an episode several times."""
-    yield from [picture] * (END_REPEATS if is_end else 1)
+def film_pictures(
+    frames: Iterable[Any], draw_title: Callable[[Any], Image.Image], draw: Callable[[Any], Image.Image]
+) -> Iterator[Image.Image]:
+    """Draw the frames of episodes in time order: before each episode its title, and its end several times."""
+    for frame in frames:
+        if frame.number == 0:
+            yield from [draw_title(frame)] * TITLE_REPEATS
+        if frame.observation is not None:
+            yield from [draw(frame)] * (END_REPEATS if frame.ending else 1)
 
 
 def title_card(heading: str, lines: Iterable[Line]) -> Image.Image:

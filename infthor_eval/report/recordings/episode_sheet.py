@@ -8,6 +8,7 @@ from PIL import Image, ImageDraw
 from infthor_eval.manipulation.replay_frames import ArmFrame
 from infthor_eval.report.recordings.canvas import BAD, FAINT, GOOD, INK, WARN
 from infthor_eval.report.recordings.fonts import break_lines, fit_line, font, one_line
+from infthor_eval.report.runs import choose_evenly
 
 __all__ = ["COLUMNS", "MOST_ROWS", "draw_sheet", "sheet_rows", "shown_steps"]
 
@@ -19,16 +20,14 @@ _WIDTH = 2 * _EDGE + _SIDE + COLUMNS * (_CELL + _GAP) - _GAP
 
 def shown_steps(n_steps: int) -> list[int]:
     """Return the steps of an episode that are shown: its start (0), its last step, and some between, evenly spaced."""
-    last = COLUMNS - 1
-    return sorted({round(number * n_steps / last) for number in range(COLUMNS)})
+    return choose_evenly(range(n_steps + 1), COLUMNS)
 
 
 def draw_sheet(episodes: Sequence[Sequence[ArmFrame]], heading: str) -> Image.Image:
-    """Draw the sheet.
+    """Draw the sheet, with the run and the trajectory as its heading.
 
     Args:
         episodes: the frames of each episode that are shown (`shown_steps`), at most `COLUMNS`, in time order.
-        heading: text above them: run and trajectory.
     """
     row = _CELL + _CAPTION + _GAP
     picture = Image.new("RGB", (_WIDTH, _TOP + len(episodes) * row), "white")

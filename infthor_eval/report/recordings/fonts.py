@@ -1,5 +1,6 @@
 """Text on pictures: a font that is the same on every machine, and texts that fit into a width."""
 
+from bisect import bisect_right
 from functools import cache
 from pathlib import Path
 
@@ -50,11 +51,6 @@ def break_lines(text: str, face: Font, width: float, most: int) -> list[str]:
 
 def _longest_beginning(text: str, face: Font, width: float) -> str:
     """Return the longest beginning that leaves room for the ellipsis."""
-    low, high = 0, len(text)
-    while low < high:
-        middle = (low + high + 1) // 2
-        if face.getlength(text[:middle].rstrip() + _MORE) <= width:
-            low = middle
-        else:
-            high = middle - 1
-    return text[:low].rstrip()
+    lengths = range(1, len(text) + 1)
+    n = bisect_right(lengths, width, key=lambda n: face.getlength(text[:n].rstrip() + _MORE))
+    return text[:n].rstrip()

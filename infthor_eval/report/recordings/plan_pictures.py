@@ -1,21 +1,19 @@
 """Frames of replayed plans as pictures: the agent's view beside a map, and the action below."""
 
 from collections.abc import Iterable, Iterator
+from functools import partial
 
 from PIL import Image
 
 from infthor_eval.plans.replay_frames import PlanFrame, PlanTitle
 from infthor_eval.report.recordings.canvas import (
     BAD,
-    END_REPEATS,
     FAINT,
     PANE,
-    SIZE,
-    TITLE_REPEATS,
     WARN,
     Line,
     draw_panes,
-    repeat_end,
+    film_pictures,
     title_card,
     write_bar,
     write_in_hand,
@@ -25,22 +23,12 @@ from infthor_eval.report.recordings.canvas import (
 from infthor_eval.report.recordings.fonts import one_line
 from infthor_eval.report.recordings.room_map import draw_map
 
-__all__ = ["END_REPEATS", "SIZE", "TITLE_REPEATS", "draw_plan_frame", "draw_plan_title", "plan_pictures"]
+__all__ = ["draw_plan_frame", "draw_plan_title", "plan_pictures"]
 
 
 def plan_pictures(frames: Iterable[PlanFrame], heading: str) -> Iterator[Image.Image]:
-    """Draw all pictures of some frames: before each plan its title, and its end several times.
-
-    Args:
-        frames: frames in time order.
-        heading: text above each picture: run and trajectory.
-    """
-    for frame in frames:
-        if frame.number == 0:
-            title = draw_plan_title(frame, heading)
-            yield from [title] * TITLE_REPEATS
-        if frame.observation is not None:
-            yield from repeat_end(draw_plan_frame(frame, heading), is_end=bool(frame.ending))
+    """Draw frames with a heading, the run and the trajectory; see `film_pictures`."""
+    return film_pictures(frames, partial(draw_plan_title, heading=heading), partial(draw_plan_frame, heading=heading))
 
 
 def draw_plan_title(frame: PlanFrame, heading: str) -> Image.Image:
@@ -71,9 +59,8 @@ def draw_plan_frame(frame: PlanFrame, heading: str) -> Image.Image:
     rewards = frame.rewards
     step = "-" if rewards.step is None else f"{rewards.step:+.1f}"
     plan = _share(rewards.plan, rewards.max_of_plan)
-    write_numbers(
-        pen, [("this action", step), ("this plan", plan), ("so far", _share(rewards.so_far, rewards.max_so_far))]
-    )
+    so_far = _share(rewards.so_far, rewards.max_so_far)
+    write_numbers(pen, [("this action", step), ("this plan", plan), ("so far", so_far)])
     write_bar(pen, min(max(rewards.so_far / rewards.max_so_far, 0.0), 1.0) if rewards.max_so_far > 0 else 0.0)
     ending = one_line(frame.ending) + (", and the goal is reached" if frame.goal_reached else "")
     write_in_hand(pen, frame.observation.held, ending if frame.ending else "", is_good=frame.done)
@@ -82,10 +69,7 @@ def draw_plan_frame(frame: PlanFrame, heading: str) -> Image.Image:
 
 def _lines(frame: PlanFrame) -> list[Line]:
     title = frame.title
-    lines = [
-        Line("goal", title.goal, 17, most=2),
-        Line(_place(title), title.text, 22, "-Bold"),
-    ]
+    lines = [Line("goal", title.goal, 17, most=2), Line(_place(title), title.text, 22, "-Bold")]
     if frame.number:
         action = Line("", frame.action, 20, "Mono") if frame.action else Line("", "no valid action", 18)
         lines.append(action._replace(label=f"action {frame.number} of {title.n_actions}"))

@@ -1,7 +1,5 @@
 """An arm and the objects near it, from above and from the side; the agent looks to the right in both views."""
 
-from collections.abc import Sequence
-
 from PIL import Image, ImageDraw
 
 from infthor_eval.manipulation.replay_frames import NearbyObject, Place, Reach
@@ -43,10 +41,10 @@ class _Pane:
         self._middle = (left + right) / 2, (bottom + top) / 2
 
     def draw(self, title: str) -> Image.Image:
-        """Draw the view with its title."""
         large = Image.new("RGB", (self._size[0] * OVERSAMPLING, self._size[1] * OVERSAMPLING), _PAPER)
         pen = ImageDraw.Draw(large, "RGBA")
-        for item in _in_order(self._items):
+        # Large objects first, those that the instruction names last, on top.
+        for item in sorted(self._items, key=lambda item: (item.is_named, -_size(item))):
             fill, edge, width = (NAMED, NAMED_EDGE, 3) if item.is_named else (FURNITURE, FURNITURE_EDGE, 1)
             pen.polygon(self._outline(item), fill=fill, outline=edge, width=width * OVERSAMPLING)
         self._draw_arm(pen)
@@ -124,11 +122,6 @@ def _is_in_view(item: NearbyObject, reach: Reach, *, is_above: bool) -> bool:
 def _draw_dot(pen: ImageDraw.ImageDraw, place: tuple[float, float], half: float, colour: str) -> None:
     x, y = place
     pen.ellipse((x - half, y - half, x + half, y + half), fill=colour)
-
-
-def _in_order(items: Sequence[NearbyObject]) -> list[NearbyObject]:
-    """Return the objects from the bottom to the top: large ones first, those that the instruction names last."""
-    return sorted(items, key=lambda item: (item.is_named, -_size(item)))
 
 
 def _size(item: NearbyObject) -> float:

@@ -32,11 +32,13 @@ def draw_map(observation: PlanObservation, size: int) -> Image.Image:
     if observation.room.goal is not None:
         _draw_arrow(pen, observation.room.goal, scale, fill=None, edge=_GOAL, width=3)
     _draw_agent(pen, observation.agent, scale)
-    _draw_legend(pen, observation, size)
+    legend = list(_legend(observation))
+    _draw_legend(pen, legend, size)
     picture = large.resize((size, size), Image.Resampling.BOX)
     words = ImageDraw.Draw(picture)
     _write_names(words, observation, scale, size)
-    _write_legend(words, observation, size)
+    for x, text, _ in legend:
+        words.text((x + 18, size - _LEGEND / 2), text, font=font(13), fill=_INK, anchor="lm")
     return picture
 
 
@@ -73,16 +75,12 @@ def _draw_room(pen: ImageDraw.ImageDraw, room: RoomMap, scale: _Scale) -> None:
     for x, z in room.floor:
         corners = (x - _CELL / 2, z - _CELL / 2), (x + _CELL / 2, z + _CELL / 2)
         pen.rectangle(scale.box(*corners), fill=_FLOOR, outline=_GRID)
-    for item in _in_order(room.objects):
+    # Large objects first, those that the plan names last, on top.
+    for item in sorted(room.objects, key=lambda item: (item.is_named, -_area(item))):
         fill, edge, width = (NAMED, NAMED_EDGE, 3) if item.is_named else (FURNITURE, FURNITURE_EDGE, 1)
         pen.rectangle(scale.box(item.low, item.high), fill=fill, outline=edge, width=width * OVERSAMPLING)
         if item.is_named:
             _draw_ring(pen, item, scale)
-
-
-def _in_order(items: Sequence[MapObject]) -> list[MapObject]:
-    """Return the objects from the bottom to the top: large ones first, those that the plan names last."""
-    return sorted(items, key=lambda item: (item.is_named, -_area(item)))
 
 
 def _area(item: MapObject) -> float:
@@ -111,24 +109,20 @@ def _draw_agent(pen: ImageDraw.ImageDraw, agent: FloorPose, scale: _Scale) -> No
     x, y = scale.fine(agent.at)
     reach = _REACH * scale.per_metre * OVERSAMPLING
     ahead = agent.facing - 90  # Pillow measures angles clockwise from the right
-    pen.pieslice(
-        (x - reach, y - reach, x + reach, y + reach), ahead - _HALF_FIELD, ahead + _HALF_FIELD, fill=_SEEN, outline=None
-    )
+    box = (x - reach, y - reach, x + reach, y + reach)
+    pen.pieslice(box, ahead - _HALF_FIELD, ahead + _HALF_FIELD, fill=_SEEN, outline=None)
     _draw_arrow(pen, agent, scale, fill=_AGENT, edge="white", width=1)
 
 
 def _draw_arrow(
     pen: ImageDraw.ImageDraw, pose: FloorPose, scale: _Scale, fill: str | None, edge: str, width: int
 ) -> None:
+    """Draw an arrow head that points where a pose faces."""
     x, y = scale.fine(pose.at)
-    pen.polygon(_arrow(x, y, pose.facing, 17 * OVERSAMPLING), fill=fill, outline=edge, width=width * OVERSAMPLING)
-
-
-def _arrow(x: float, y: float, facing: float, size: float) -> list[Point]:
-    """Return the corners of an arrow head that points in a direction."""
     parts = ((0, 1.0), (140, 1.0), (180, 0.5), (220, 1.0))
-    turned = [(math.radians(facing + angle), length * size) for angle, length in parts]
-    return [(x + length * math.sin(angle), y - length * math.cos(angle)) for angle, length in turned]
+    turned = [(math.radians(pose.facing + angle), length * (17 * OVERSAMPLING)) for angle, length in parts]
+    corners = [(x + length * math.sin(angle), y - length * math.cos(angle)) for angle, length in turned]
+    pen.polygon(corners, fill=fill, outline=edge, width=width * OVERSAMPLING)
 
 
 def _write_names(pen: ImageDraw.ImageDraw, observation: PlanObservation, scale: _Scale, size: int) -> None:
@@ -202,31 +196,20 @@ def _middle(item: MapObject) -> Point:
     return (item.low[0] + item.high[0]) / 2, (item.low[1] + item.high[1]) / 2
 
 
-def _legend(observation: PlanObservation) -> list[tuple[str, str]]:
-    """Return the entries of the legend: text and colour."""
-    entries = [("agent", _AGENT), ("path in this plan", _PATH)]
-    entries += [("where the expert ended", _GOAL)] if observation.room.goal is not None else []
-    return entries + (
-        [("what the plan names", NAMED_EDGE)] if any(item.is_named for item in observation.room.objects) else []
-    )
-
-
-def _draw_legend(pen: ImageDraw.ImageDraw, observation: PlanObservation, size: int) -> None:
+def _draw_legend(pen: ImageDraw.ImageDraw, legend: Sequence[tuple[float, str, str]], size: int) -> None:
     """Draw the dots of the legend; its text is written into the final picture, as letters need no oversampling."""
     fine, radius, y = size * OVERSAMPLING, 6 * OVERSAMPLING, (size - _LEGEND / 2) * OVERSAMPLING
     pen.rectangle((0, fine - _LEGEND * OVERSAMPLING, fine, fine), fill="white")
-    for left, _, colour in _places(_legend(observation)):
+    for left, _, colour in legend:
         x = left * OVERSAMPLING
         pen.ellipse((x, y - radius, x + 2 * radius, y + radius), fill=colour)
 
 
-def _write_legend(pen: ImageDraw.ImageDraw, observation: PlanObservation, size: int) -> None:
-    for x, text, _ in _places(_legend(observation)):
-        pen.text((x + 18, size - _LEGEND / 2), text, font=font(13), fill=_INK, anchor="lm")
-
-
-def _places(entries: Sequence[tuple[str, str]]) -> Iterator[tuple[float, str, str]]:
-    """Yield left edge, text and colour of each entry, from left to right."""
+def _legend(observation: PlanObservation) -> Iterator[tuple[float, str, str]]:
+    """Yield left edge, text and colour of each entry of the legend, from left to right."""
+    entries = [("agent", _AGENT), ("path in this plan", _PATH)]
+    entries += [("where the expert ended", _GOAL)] if observation.room.goal is not None else []
+    entries += [("what the plan names", NAMED_EDGE)] if any(item.is_named for item in observation.room.objects) else []
     x = 6.0
     for text, colour in entries:
         yield x, text, colour

@@ -17,7 +17,7 @@ from infthor_eval.report.presenter import Description, EpisodeSelection, Figure,
 from infthor_eval.report.recordings.arm_pictures import arm_pictures
 from infthor_eval.report.recordings.episode_sheet import MOST_ROWS, draw_sheet, sheet_rows
 from infthor_eval.report.recordings.reach_view import draw_reach
-from infthor_eval.report.runs import ReportRun
+from infthor_eval.report.runs import ReportRun, choose_evenly
 from infthor_eval.report.web.samples import StepRow
 from infthor_eval.report.web.sections import Section
 from infthor_eval.runs import UnitRecord
@@ -67,10 +67,7 @@ class ArmEpisodesReplay:
 def _select_episodes(recorded: "RecordedEpisodes", selection: EpisodeSelection) -> Sequence[Record]:
     most = selection.most
     if selection.episode is None:
-        every = recorded.records
-        if most is None or len(every) <= most:
-            return every
-        return [every[round(number * (len(every) - 1) / (most - 1))] for number in range(most)]
+        return recorded.records if most is None else choose_evenly(recorded.records, most)
     if re.fullmatch(r"\s*\d{1,9}\s*(,\s*\d{1,9}\s*)*", selection.episode, re.ASCII) is None:
         raise UsageError(f"--episode {selection.episode!r:.60}: is no number of an action; write 17, or 17,75")
     chosen = recorded.at_actions([int(number) for number in selection.episode.split(",")])
@@ -143,9 +140,7 @@ class ManipulationPresenter(PlainPresenter):
     def describe(self, record: Record) -> Description:
         """See `Presenter.describe`."""
         payload = record.payload
-        target = payload.object_id
-        if payload.receptacle_id is not None:
-            target = f"{target} → {payload.receptacle_id}"
+        target = " → ".join(name for name in (payload.object_id, payload.receptacle_id) if name is not None)
         return Description(payload.instruction, target, payload.kind)
 
     def reply(self, record: Record) -> str:

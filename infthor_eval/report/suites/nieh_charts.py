@@ -34,7 +34,6 @@ class _Line(NamedTuple):
 
     @property
     def metric(self) -> str:
-        """The task's primary metric."""
         return main_metric(self.task)
 
 

@@ -11,7 +11,7 @@ from infthor_eval.formats.question import Question
 from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.nieh.samples import find_set
 from infthor_eval.report.presenter import Timelines
-from infthor_eval.report.runs import ReportRun, records_by_unit
+from infthor_eval.report.runs import ReportRun, choose_evenly, records_by_unit
 from infthor_eval.report.web.samples import Timeline, TimelineFrame
 from infthor_eval.report.web.thumbnails import ThumbnailStore
 from infthor_eval.runs import UnitKey, UnitRecord
@@ -37,18 +37,12 @@ def find_timelines(runs: Sequence[ReportRun], data: Path | None, thumbnails: Thu
         for index in sorted(choice.clues):
             _picture(choice.frames[index], thumbnails)
     timelines = {key: _timeline(choice, thumbnails) for key, choice in chosen.items()}
-    return Timelines(timelines, sets.problems)
+    return Timelines(timelines, list(sets.problems))
 
 
 @dataclass(frozen=True)
 class _FrameChoice:
-    """Frames to show for a question.
-
-    Attributes:
-        frames: all frames of the trajectory.
-        clues: indices of the clues.
-        others: indices of further frames.
-    """
+    """Frames to show for a question: all frames of its trajectory, the indices of the clues and of further frames."""
 
     frames: Sequence[FrameRef]
     clues: frozenset[int]
@@ -59,24 +53,19 @@ class _Sets:
     """The question sets of the tasks, as far as they are there and unchanged."""
 
     def __init__(self, runs: Sequence[ReportRun], data: Path | None) -> None:
-        self._problems: dict[str, None] = {}
+        self.problems: dict[str, None] = {}  # reasons why frames are missing, each once
         self._sets: dict[str, tuple[NiehSet, Mapping[str, Question]] | None] = {}
         for run in runs:
             for task in run.tasks:
                 if task not in self._sets:
                     self._sets[task] = self._read(run, task, data)
 
-    @property
-    def problems(self) -> list[str]:
-        """Reasons why frames are missing, each once."""
-        return list(self._problems)
-
     def choose_frames(self, key: UnitKey, record: Record) -> _FrameChoice | None:
         """Choose frames of a record's question; None if its set is missing or has another question there."""
-        known = self._sets[key.task]
-        if known is None:
+        question_set = self._sets[key.task]
+        if question_set is None:
             return None
-        data, questions = known
+        data, questions = question_set
         question = questions.get(key.id)
         if question is None or question.text != record.payload.question:
             return None
@@ -87,11 +76,11 @@ class _Sets:
         try:
             questions = find_set(str(folder) if folder else None, run.dataset(task).get("bundled"))
         except (UsageError, DataError) as error:
-            self._problems[f"{task}: no frames are shown: {error}; give the set's folder with --data"] = None
+            self.problems[f"{task}: no frames are shown: {error}; give the set's folder with --data"] = None
             return None
         if questions.fingerprint != run.tasks[task].get("data"):
             problem = f"{task}: no frames are shown: {questions.root} has changed since {run.label} was run"
-            self._problems[problem] = None
+            self.problems[problem] = None
             return None
         return questions, {question.id: question for question in questions.questions}
 
@@ -106,7 +95,7 @@ def _choose_frames(data: NiehSet, question: Question) -> _FrameChoice | None:
     last = len(frames) - 1
     others = {near for index in clues for near in (index - 1, index + 1) if 0 <= near <= last}
     if not clues:
-        others = {round(number * last / (_OVERVIEW - 1)) for number in range(_OVERVIEW)}
+        others = set(choose_evenly(range(len(frames)), _OVERVIEW))
     return _FrameChoice(frames, clues, frozenset(others - clues))
 
 

@@ -90,9 +90,7 @@ class PlansPresenter(PlainPresenter):
     reply_label = "ended"
     main_metric = "success"
     replay = PlansReplay()
-    figures: Mapping[str, Figure] = {
-        "7": Figure("reward of plans over steps and over context tokens", _build_figure_7),
-    }
+    figures: Mapping[str, Figure] = {"7": Figure("reward of plans over steps and over context tokens", _build_figure_7)}
 
     def is_share(self, metric: str, scores: Sequence[float]) -> bool:
         """See `Presenter.is_share`."""

@@ -19,13 +19,7 @@ __all__ = ["DrawnFigure", "curves_on_page", "curves_result", "figure_section"]
 
 
 class DrawnFigure(NamedTuple):
-    """A figure for the page.
-
-    Attributes:
-        draw: draws it.
-        table: its numbers.
-        description: its contents in words.
-    """
+    """A figure for the page: a function that draws it, its numbers, and its contents in words."""
 
     draw: Callable[[], Figure]
     table: Table

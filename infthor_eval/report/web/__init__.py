@@ -1,1 +1,1 @@
-"""Runs as one page that works from a file: what was found, and every sample with what was seen and said."""
+"""Runs as one page that works offline: their results, and every sample with its frames and replies."""

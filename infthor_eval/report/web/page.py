@@ -1,4 +1,4 @@
-"""The page itself: a file that needs nothing beside it."""
+"""The page itself: a file that needs no others."""
 
 import base64
 import hashlib
@@ -85,14 +85,7 @@ class Page:
 
 
 def write_page(page: Page, path: Path) -> int:
-    """Write the page; equal pages are equal bytes.
-
-    Args:
-        page: contents of the page.
-        path: path of the file.
-
-    Returns:
-        Size of the file in bytes.
+    """Write the page into a file and return its size in bytes; equal pages are equal bytes.
 
     Raises:
         DataError: it cannot be written.

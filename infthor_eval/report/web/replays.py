@@ -9,7 +9,7 @@ from PIL import Image
 
 from infthor_eval.errors import InfthorError
 from infthor_eval.report.presenter import EpisodeSelection, OpenReplay, Replay
-from infthor_eval.report.runs import ReportRun
+from infthor_eval.report.runs import ReportRun, choose_evenly
 from infthor_eval.report.web.thumbnails import ThumbnailStore
 from infthor_eval.runs import UnitKey, UnitRecord
 
@@ -39,11 +39,9 @@ class ReplayProgress(Protocol):
 
     def begin(self, n_episodes: int) -> None:
         """Start to count; called once, before the first episode."""
-        ...
 
     def advance(self, run: str, trajectory: str) -> None:
         """Count an episode of a run."""
-        ...
 
 
 class EpisodeReplays:
@@ -74,11 +72,7 @@ class EpisodeReplays:
             progress.begin(n_episodes)
 
     def replay(self, run: ReportRun) -> tuple[Mapping[UnitKey, EpisodePictures], list[str]]:
-        """Replay the chosen episodes of a run.
-
-        Returns:
-            Their pictures, and the reasons why a trajectory could not be replayed.
-        """
+        """Replay the chosen episodes of a run; return their pictures, and why a trajectory could not be replayed."""
         pictures: dict[UnitKey, EpisodePictures] = {}
         notes: list[str] = []
         replay = run.presenter.replay
@@ -124,11 +118,5 @@ def _choose(run: ReportRun, most: int) -> list[Record]:
     acted = [record for record in run.records if run.presenter.steps(record)]
     wrong = [record for record in acted if run.main_score(record) < 1]
     right = [record for record in acted if run.main_score(record) >= 1]
-    first = _choose_evenly(wrong, max(most - len(right), (2 * most + 2) // 3))
-    return first + _choose_evenly(right, most - len(first))
-
-
-def _choose_evenly(records: Sequence[Record], n: int) -> list[Record]:
-    if len(records) <= n:
-        return list(records)
-    return [records[round(number * (len(records) - 1) / max(n - 1, 1))] for number in range(n)]
+    first = choose_evenly(wrong, max(most - len(right), (2 * most + 2) // 3))
+    return first + choose_evenly(right, most - len(first))

@@ -31,16 +31,8 @@ def _cells(rate: Rate) -> tuple[str, str]:
 
 def costs_table(runs: Sequence[ReportRun]) -> Table:
     """Return speed and cost, with a row per run."""
-    columns = (
-        "units",
-        "seconds",
-        "units / s",
-        "requests",
-        "tokens read",
-        "of them cached, %",
-        "tokens written",
-        "cost",
-    )
+    tokens = ("tokens read", "of them cached, %", "tokens written")
+    columns = ("units", "seconds", "units / s", "requests", *tokens, "cost")
     note = "Seconds are the units' own, added up: several workers take less by the clock. Cost is in US dollars."
     return Table("", (Column("run", False), *map(Column, columns)), tuple(map(_cost_row, runs)), (note,))
 
@@ -62,11 +54,8 @@ def left_out_table(runs: Sequence[ReportRun]) -> Table | None:
         for run in runs
         for (task, what), reason, n in count_reasons(_left_out(run))
     ]
-    rows += [
-        Row((run.label, "", "not attempted", str(run.n_missing), "the run was stopped; the same command continues it"))
-        for run in runs
-        if run.n_missing
-    ]
+    why = "the run was stopped; the same command continues it"
+    rows += [Row((run.label, "", "not attempted", str(run.n_missing), why)) for run in runs if run.n_missing]
     if not rows:
         return None
     columns = (*_NAMES, Column("what", False), Column("units"), Column("reason", False))

@@ -20,16 +20,13 @@ Record = UnitRecord[Any]
 def build_samples(
     runs: Sequence[ReportRun], data: Path | None, replays: EpisodeReplays, thumbnails: ThumbnailStore
 ) -> tuple[list[PageSample], list[str]]:
-    """Build the samples of all units that have a record, in the order of their keys.
+    """Build the samples of all units that have a record, in the order of their keys, and notes on missing pictures.
 
     Args:
         runs: runs of one suite.
         data: folder of the data set; None for the one that each run names.
         replays: replays some of the episodes.
         thumbnails: collects the pictures.
-
-    Returns:
-        The samples, and notes on missing pictures.
     """
     timelines = runs[0].presenter.timelines(runs, data, thumbnails)
     replayed = [replays.replay(run) for run in runs]

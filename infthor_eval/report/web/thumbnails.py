@@ -12,7 +12,11 @@ _QUALITY = 55  # of WebP: about 3 kB for a frame of 132 pixels, so that thousand
 
 
 class ThumbnailStore:
-    """Thumbnails by number; pictures that come first get the room."""
+    """Thumbnails by number; pictures that come first get the room.
+
+    Attributes:
+        encoded: all pictures as WebP in base64, in the order of their numbers.
+    """
 
     def __init__(self, budget: int, side: int = 132) -> None:
         """Start without pictures.
@@ -23,13 +27,8 @@ class ThumbnailStore:
         """
         self._left = budget
         self._side = side
-        self._encoded: list[str] = []
+        self.encoded: list[str] = []
         self._numbers: dict[str, int | None] = {}
-
-    @property
-    def encoded(self) -> list[str]:
-        """All pictures as WebP in base64, in the order of their numbers."""
-        return self._encoded
 
     @property
     def n_left_out(self) -> int:
@@ -37,15 +36,12 @@ class ThumbnailStore:
         return sum(number is None for number in self._numbers.values())
 
     def add(self, key: str, load: Callable[[], Image.Image], side: int | None = None) -> int | None:
-        """Add a picture, unless it was added before.
+        """Add a picture, unless it was added before, and return its number; None if there is no room for it.
 
         Args:
             key: name of the picture; the same name is the same picture.
             load: loads the picture.
             side: length of its longer side, if it differs from that of the others.
-
-        Returns:
-            Its number, or None if there is no room for it.
         """
         if key not in self._numbers:
             self._numbers[key] = self._add(load, side or self._side) if self._left > 0 else None
@@ -56,8 +52,8 @@ class ThumbnailStore:
         self._left -= len(encoded)
         if self._left < 0:
             return None
-        self._encoded.append(encoded)
-        return len(self._encoded) - 1
+        self.encoded.append(encoded)
+        return len(self.encoded) - 1
 
 
 def _encode(picture: Image.Image, side: int) -> str:

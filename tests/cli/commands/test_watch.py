@@ -9,7 +9,7 @@ from PIL import Image
 
 from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.plans.records import RECORDS
-from infthor_eval.report.recordings.plan_pictures import END_REPEATS, SIZE, TITLE_REPEATS
+from infthor_eval.report.recordings.canvas import END_REPEATS, SIZE, TITLE_REPEATS
 from infthor_eval.runs import read_run
 from infthor_eval.runs.journal import Journal
 
