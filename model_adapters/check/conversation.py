@@ -18,10 +18,7 @@ def check_parts(model: Model, frame: FrameRef) -> None:
     split = start_conversation(model, frame, "\nWhat do", " you see?")
     whole = start_conversation(model, frame, "\nWhat do you see?")
     require(_alike(model, split, whole), "a text appended in two pieces differs from the same text in one")
-    require(
-        raises(TypeError, split.append, 3),
-        "append() of neither text nor frame does not raise TypeError",
-    )
+    require(raises(TypeError, split.append, 3), "append() of neither text nor frame does not raise TypeError")
     require(raises(ValueError, split.append, "x", role="narrator"), "append() in an unknown role does not raise")
     require(_alike(model, split, whole), "a refused append() changes the conversation")
 

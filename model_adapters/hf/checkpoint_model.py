@@ -106,10 +106,7 @@ class HfModel(CheckpointModel):
             "share_prefix": options.share_prefix,
             "chunk_tokens": options.chunk_tokens,
             "batch_size": options.batch_size,
-            "generation": {
-                "repetition_penalty": generation.repetition_penalty,
-                "end_ids": sorted(generation.end_ids),
-            },
+            "generation": {"repetition_penalty": generation.repetition_penalty, "end_ids": sorted(generation.end_ids)},
         }
 
     def close(self) -> None:

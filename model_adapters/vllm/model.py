@@ -89,10 +89,7 @@ class VllmModel(CheckpointModel):
             "prefix_caching": options.prefix_caching,
             "batch_invariant": self._engine.batch_invariant,
             "seed": options.seed,
-            "generation": {
-                "repetition_penalty": loaded.generation.repetition_penalty,
-                "end_ids": sorted(self._ends),
-            },
+            "generation": {"repetition_penalty": loaded.generation.repetition_penalty, "end_ids": sorted(self._ends)},
         }
 
     def close(self) -> None:

@@ -46,10 +46,7 @@ def load_spatialvla(name: str, checkpoint: PolicyCheckpoint, options: SpatialVLA
     network = SpatialVLANetwork(
         weights.eval(), tokenizer, bins, processor.action_chunk_size, config.image_token_index, view
     )
-    identity = checkpoint.identity(device, dtype, options) | {
-        "unnorm_key": key,
-        "intrinsics": options.intrinsics,
-    }
+    identity = checkpoint.identity(device, dtype, options) | {"unnorm_key": key, "intrinsics": options.intrinsics}
     return VlaPolicy(name, network, statistics, options, identity, options.threads)
 
 
