@@ -60,8 +60,7 @@ def image_token(processor: Any) -> str:
 def expand_image_token(processor: Any, image: Image.Image) -> list[int]:
     """Return the ids that the processor expands the token of one image to."""
     inputs = processor(text=[image_token(processor)], images=[image], add_special_tokens=False, return_tensors="pt")
-    ids: list[int] = inputs["input_ids"][0].tolist()
-    return ids
+    return list(inputs["input_ids"][0].tolist())
 
 
 class _ForceReplyTokens(LogitsProcessor):

@@ -32,7 +32,6 @@ class Network(Protocol):
         Raises:
             ModelError: the scores are not finite.
         """
-        ...
 
 
 def arm_deltas(name: str, actions: Actions) -> tuple[ArmDelta, ...]:
