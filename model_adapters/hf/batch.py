@@ -74,15 +74,9 @@ def answer_together(
     n_shared: int,
     replies: Sequence[ReplyState],
 ) -> None:
-    """Decode the replies to prompts that begin with the same pieces.
+    """Decode the replies to prompts that begin with the same `n_shared` pieces, each prompt with more behind them.
 
-    Args:
-        model: a transformers model.
-        embed: embeds spans of prompts.
-        prefix: encoded sequence of the shared pieces and nothing more.
-        prompts: prompts to answer, each longer than the shared pieces.
-        n_shared: pieces that all prompts begin with.
-        replies: empty replies, one for each prompt.
+    `prefix` has encoded the shared pieces and nothing more; `replies` are empty, one for each prompt.
     """
     rows = _Rows(model, embed, prefix)
     reserve = max(reply.decoding.max_new_tokens for reply in replies)

@@ -87,14 +87,7 @@ class _StopWithReply(StoppingCriteria):
 
 
 class UncachedModel(HfModel):
-    """A loaded checkpoint behind the `Model` protocol, without a shared prefix.
-
-    Args:
-        name: name in the registry.
-        loaded: the checkpoint.
-        processor: processor of the checkpoint.
-        options: inference options.
-    """
+    """A loaded checkpoint behind the `Model` protocol, without a shared prefix."""
 
     def __init__(self, name: str, loaded: LoadedCheckpoint, processor: Any, options: HfOptions) -> None:
         super().__init__(name, loaded, options)

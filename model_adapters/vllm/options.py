@@ -71,7 +71,7 @@ class EngineOptions:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        """Refuse values that vLLM would refuse only after minutes of loading."""
+        """Raise `ValueError` for values that vLLM would refuse only after minutes of loading."""
         if self.dtype not in _DTYPES:
             raise ValueError(f"dtype={self.dtype} is not {', '.join(_DTYPES)}")
         if not 0 < self.gpu_memory_utilization <= 1:

@@ -16,13 +16,7 @@ __all__ = ["Qwen25VL", "Qwen25VLFamily"]
 
 
 class Qwen25VLFamily(PlainFamily):
-    """The family of Qwen2.5-VL.
-
-    Args:
-        model: a `Qwen2_5_VLForConditionalGeneration`.
-        image_processor: a `Qwen2VLImageProcessor`.
-        tokenizer: tokenizer of the model.
-    """
+    """The family of Qwen2.5-VL."""
 
     def __init__(self, model: Any, image_processor: Any, tokenizer: Any) -> None:
         super().__init__(model, image_processor, tokenizer)
