@@ -21,13 +21,7 @@ MODEL_TYPE = "spatialvla"
 
 
 def load_spatialvla(name: str, checkpoint: PolicyCheckpoint, options: SpatialVLAOptions) -> VlaPolicy:
-    """Load a SpatialVLA; see `PolicyAdapter.build`.
-
-    Args:
-        name: name in the registry.
-        checkpoint: the checkpoint.
-        options: options of the policy.
-    """
+    """Load a SpatialVLA; see `PolicyAdapter.build`."""
     checkpoint.require_model_type(MODEL_TYPE)
     config = checkpoint.read("config.json", SpatialVLAConfig)
     processor = checkpoint.read("processor_config.json", ProcessorConfig)
