@@ -190,7 +190,8 @@ def origin(folder: Path, commit: str | None, pretrained: str) -> dict[str, Any]:
     if commit is not None:
         return {"checkpoint": pretrained, "revision": commit}
     # The folder's name, not its path: a moved checkpoint is the same checkpoint.
-    return {"checkpoint": folder.resolve().name, "fingerprint": _fingerprint(folder)}
+    files = (path for path in sorted(folder.iterdir()) if path.suffix in _FINGERPRINTED and path.is_file())
+    return {"checkpoint": folder.resolve().name, "fingerprint": digest_of_files(files)}
 
 
 def versions() -> dict[str, str]:
@@ -288,10 +289,3 @@ def _quantization_method(model: Any) -> str | None:
     settings = getattr(model.config, "quantization_config", None)
     method = settings.get("quant_method") if isinstance(settings, dict) else getattr(settings, "quant_method", None)
     return None if method is None else str(getattr(method, "value", method))
-
-
-def _fingerprint(folder: Path) -> str:
-    """Return a hash of names and contents of the checkpoint's files (hex, 32 characters)."""
-    return digest_of_files(
-        path for path in sorted(folder.iterdir()) if path.suffix in _FINGERPRINTED and path.is_file()
-    )

@@ -55,12 +55,6 @@ class PolicyTwin:
         self.tokenizer().save(str(folder / "tokenizer.json"))
         save_file(_draw_weights(self.layout().all_shapes(), seed), folder / "model.safetensors")
 
-    def build(self, name: str, options: PolicyOptions, seed: int) -> VlaPolicy:
-        """Return the policy with random weights of this seed, loaded from a temporary checkpoint."""
-        with ScratchFolder() as folder:
-            self.save(folder, seed)
-            return self.load(name, PolicyCheckpoint(folder, name, {"checkpoint": name, "seed": seed}), options)
-
 
 class TinyPolicyAdapter:
     """Base of the adapters of tiny policies."""
@@ -70,8 +64,10 @@ class TinyPolicyAdapter:
 
     @classmethod
     def build(cls, name: str, options: PolicyOptions, seed: int) -> VlaPolicy:
-        """Build a policy with random weights of this seed."""
-        return cls.twin.build(name, options, seed)
+        """Build a policy with random weights of this seed, loaded from a temporary checkpoint."""
+        with ScratchFolder() as folder:
+            cls.twin.save(folder, seed)
+            return cls.twin.load(name, PolicyCheckpoint(folder, name, {"checkpoint": name, "seed": seed}), options)
 
 
 def _draw_weights(shapes: Mapping[str, Shape], seed: int) -> dict[str, torch.Tensor]:
