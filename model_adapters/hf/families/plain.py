@@ -12,7 +12,7 @@ __all__ = ["PlainFamily"]
 
 
 class PlainFamily:
-    """Base of families whose positions are consecutive and whose frames consist of equal slots, `image_token_id`.
+    """Base of families with consecutive positions, whose frames consist of equal slots, `config.image_token_id`.
 
     Subclasses compute features. The slots of a frame are counted on a blank image of its size, so the count is always
     that of the model.

@@ -41,7 +41,7 @@ class Qwen25VLFamily(PlainFamily):
         """Return temporal, height and width positions, (3, 1, tokens).
 
         The model's own rule counts from the first token, and all positions shift with it. So a span that cuts no frame
-        is numbered by itself and shifted, which makes chunked prefill equal to one pass.
+        is numbered alone and shifted, which makes chunked prefill equal to one pass.
         """
         if not sizes:
             return torch.arange(start, start + len(ids), device=ids.device).expand(3, 1, -1)

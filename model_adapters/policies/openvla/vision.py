@@ -102,7 +102,7 @@ class _PatchEmbedding(nn.Module):
 
 
 class Tower(nn.Module):
-    """A tower up to its second-to-last block, whose features OpenVLA uses without a final norm; sizes are in pixels."""
+    """A tower up to its second-to-last block, whose features OpenVLA uses without a final norm."""
 
     def __init__(self, shape: TowerShape, image_size: int) -> None:
         super().__init__()
