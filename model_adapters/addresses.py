@@ -7,11 +7,7 @@ __all__ = ["act_url", "is_local", "server_address"]
 
 
 def server_address(option: str, url: str) -> SplitResult:
-    """Return the parts of a server's address.
-
-    Args:
-        option: name of the option that gives the address, for the message.
-        url: the address as typed.
+    """Return the parts of an address; the message names the option that gives it.
 
     Raises:
         ValueError: the address is neither http nor https, or holds a password or a query, which would be recorded.

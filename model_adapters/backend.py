@@ -19,24 +19,19 @@ class Backend(Protocol):
     @property
     def name(self) -> str:
         """Name of the model, for messages."""
-        ...
 
     @property
     def capabilities(self) -> Capabilities:
         """Capabilities of the model."""
-        ...
 
     def count(self, turns: Sequence[Turn]) -> int | None:
         """Return the context size of a reply to these turns, in tokens, or None if the model does not count them."""
-        ...
 
     def answer(self, turns: Sequence[Turn], decoding: Decoding) -> Reply:
         """Answer a conversation; see `Conversation.reply`."""
-        ...
 
     def answer_each(self, conversations: Sequence[Sequence[Turn]], decoding: Decoding) -> list[Reply]:
         """Answer several conversations independently; see `Conversation.replies`."""
-        ...
 
 
 class BackendConversation(Transcript):

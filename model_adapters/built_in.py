@@ -28,62 +28,31 @@ class BuiltIn(NamedTuple):
         return self.description if self.description == _RANDOM else ""
 
 
+def _locate(adapter: str, options: str, description: str = "") -> BuiltIn:
+    """Return a model's classes, which are given by their places in this package."""
+    return BuiltIn(f"model_adapters.{adapter}", f"model_adapters.{options}", description)
+
+
 BUILT_IN = {
-    "deepseek-vl": BuiltIn(
-        "model_adapters.hf.families.deepseek_vl:DeepseekVL", "model_adapters.options.families:DeepseekVLOptions"
-    ),
-    "deepseek-vl-tiny": BuiltIn(
-        "model_adapters.tiny.deepseek_vl:DeepseekVLTiny", "model_adapters.options.tiny:TinyOptions", _RANDOM
-    ),
-    "hf-vlm": BuiltIn("model_adapters.hf.families.hf_vlm:HfVlm", "model_adapters.options.families:HfVlmOptions"),
-    "hf-vlm@vllm": BuiltIn("model_adapters.vllm.adapter:HfVlmOnVllm", "model_adapters.vllm.options:HfVlmOnVllmOptions"),
-    "llava-onevision": BuiltIn(
-        "model_adapters.hf.families.llava_onevision:LlavaOnevision",
-        "model_adapters.options.families:LlavaOnevisionOptions",
-    ),
-    "llava-onevision@vllm": BuiltIn(
-        "model_adapters.vllm.adapter:LlavaOnevisionOnVllm", "model_adapters.vllm.options:LlavaOnevisionOnVllmOptions"
-    ),
-    "llava-onevision-tiny": BuiltIn(
-        "model_adapters.tiny.llava_onevision:LlavaOnevisionTiny", "model_adapters.options.tiny:TinyOptions", _RANDOM
-    ),
-    "openai": BuiltIn("model_adapters.openai.adapter:OpenAI", "model_adapters.openai.options:OpenAIOptions"),
-    "openvla": BuiltIn(
-        "model_adapters.policies.openvla.adapter:OpenVLA", "model_adapters.options.policies:OpenVLAOptions"
-    ),
-    "openvla@vllm": BuiltIn(
-        "model_adapters.vllm.openvla:OpenVLAOnVllm", "model_adapters.vllm.options:OpenVLAOnVllmOptions"
-    ),
-    "openvla-tiny": BuiltIn(
-        "model_adapters.tiny.openvla:OpenVLATiny", "model_adapters.options.tiny:OpenVLATinyOptions", _RANDOM
-    ),
-    "pixtral": BuiltIn("model_adapters.hf.families.pixtral:Pixtral", "model_adapters.options.families:PixtralOptions"),
-    "pixtral@vllm": BuiltIn(
-        "model_adapters.vllm.adapter:PixtralOnVllm", "model_adapters.vllm.options:PixtralOnVllmOptions"
-    ),
-    "pixtral-tiny": BuiltIn(
-        "model_adapters.tiny.pixtral:PixtralTiny", "model_adapters.options.tiny:TinyOptions", _RANDOM
-    ),
-    "qwen2.5-vl": BuiltIn(
-        "model_adapters.hf.families.qwen2_5_vl:Qwen25VL", "model_adapters.options.families:Qwen25VLOptions"
-    ),
-    "qwen2.5-vl@vllm": BuiltIn(
-        "model_adapters.vllm.adapter:Qwen25VLOnVllm", "model_adapters.vllm.options:Qwen25VLOnVllmOptions"
-    ),
-    "qwen2.5-vl-nano": BuiltIn(
-        "model_adapters.tiny.qwen2_5_vl_nano:Qwen25VLNano", "model_adapters.options.families:Qwen25VLNanoOptions", _NANO
-    ),
-    "qwen2.5-vl-tiny": BuiltIn(
-        "model_adapters.tiny.qwen2_5_vl:Qwen25VLTiny", "model_adapters.options.tiny:Qwen25VLTinyOptions", _RANDOM
-    ),
-    "spatialvla": BuiltIn(
-        "model_adapters.policies.spatialvla.adapter:SpatialVLA",
-        "model_adapters.options.policies:SpatialVLACheckpointOptions",
-    ),
-    "spatialvla-tiny": BuiltIn(
-        "model_adapters.tiny.spatialvla:SpatialVLATiny", "model_adapters.options.tiny:SpatialVLATinyOptions", _RANDOM
-    ),
-    "vla-http": BuiltIn(
-        "model_adapters.policies.http.adapter:VlaHttp", "model_adapters.options.policies:VlaHttpOptions"
-    ),
+    "deepseek-vl": _locate("hf.families.deepseek_vl:DeepseekVL", "options.families:DeepseekVLOptions"),
+    "deepseek-vl-tiny": _locate("tiny.deepseek_vl:DeepseekVLTiny", "options.tiny:TinyOptions", _RANDOM),
+    "hf-vlm": _locate("hf.families.hf_vlm:HfVlm", "options.families:HfVlmOptions"),
+    "hf-vlm@vllm": _locate("vllm.adapter:HfVlmOnVllm", "vllm.options:HfVlmOnVllmOptions"),
+    "llava-onevision": _locate("hf.families.llava_onevision:LlavaOnevision", "options.families:LlavaOnevisionOptions"),
+    "llava-onevision@vllm": _locate("vllm.adapter:LlavaOnevisionOnVllm", "vllm.options:LlavaOnevisionOnVllmOptions"),
+    "llava-onevision-tiny": _locate("tiny.llava_onevision:LlavaOnevisionTiny", "options.tiny:TinyOptions", _RANDOM),
+    "openai": _locate("openai.adapter:OpenAI", "openai.options:OpenAIOptions"),
+    "openvla": _locate("policies.openvla.adapter:OpenVLA", "options.policies:OpenVLAOptions"),
+    "openvla@vllm": _locate("vllm.openvla:OpenVLAOnVllm", "vllm.options:OpenVLAOnVllmOptions"),
+    "openvla-tiny": _locate("tiny.openvla:OpenVLATiny", "options.tiny:OpenVLATinyOptions", _RANDOM),
+    "pixtral": _locate("hf.families.pixtral:Pixtral", "options.families:PixtralOptions"),
+    "pixtral@vllm": _locate("vllm.adapter:PixtralOnVllm", "vllm.options:PixtralOnVllmOptions"),
+    "pixtral-tiny": _locate("tiny.pixtral:PixtralTiny", "options.tiny:TinyOptions", _RANDOM),
+    "qwen2.5-vl": _locate("hf.families.qwen2_5_vl:Qwen25VL", "options.families:Qwen25VLOptions"),
+    "qwen2.5-vl@vllm": _locate("vllm.adapter:Qwen25VLOnVllm", "vllm.options:Qwen25VLOnVllmOptions"),
+    "qwen2.5-vl-nano": _locate("tiny.qwen2_5_vl_nano:Qwen25VLNano", "options.families:Qwen25VLNanoOptions", _NANO),
+    "qwen2.5-vl-tiny": _locate("tiny.qwen2_5_vl:Qwen25VLTiny", "options.tiny:Qwen25VLTinyOptions", _RANDOM),
+    "spatialvla": _locate("policies.spatialvla.adapter:SpatialVLA", "options.policies:SpatialVLACheckpointOptions"),
+    "spatialvla-tiny": _locate("tiny.spatialvla:SpatialVLATiny", "options.tiny:SpatialVLATinyOptions", _RANDOM),
+    "vla-http": _locate("policies.http.adapter:VlaHttp", "options.policies:VlaHttpOptions"),
 }

@@ -68,11 +68,7 @@ class Decoding:
     choices: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        """Check the ranges of all values.
-
-        Raises:
-            UsageError: a value is out of its range.
-        """
+        """Check the ranges of all values; raise `UsageError` for one that is out of its range."""
         if self.max_new_tokens < 1:
             raise UsageError(f"max_new_tokens must be at least 1, not {self.max_new_tokens}")
         if not 0 <= self.temperature < float("inf"):
@@ -166,7 +162,6 @@ class Conversation(Protocol):
             DataError: a frame cannot be read.
             ModelError: the model does not support these turns.
         """
-        ...
 
     def append(self, *parts: Part, role: Role = "user") -> None:
         """Add parts at the end: to the last turn if it has the same role, else as a new turn.
@@ -177,11 +172,9 @@ class Conversation(Protocol):
             TypeError: a part is neither text nor a frame reference.
             ValueError: the role is unknown.
         """
-        ...
 
     def mark(self) -> Mark:
         """Return a mark at the current end of the conversation."""
-        ...
 
     def rewind(self, mark: Mark) -> None:
         """Drop everything that was appended after the mark; later marks become invalid, the mark itself stays valid.
@@ -189,7 +182,6 @@ class Conversation(Protocol):
         Raises:
             ValueError: the mark belongs to another conversation, or to a part that was dropped by a rewind.
         """
-        ...
 
     def reply(self, decoding: Decoding) -> Reply:
         """Return the assistant's next turn without adding it to the conversation.
@@ -199,7 +191,6 @@ class Conversation(Protocol):
                 model does not support these turns or this decoding.
             DataError: a frame cannot be read.
         """
-        ...
 
     def replies(self, continuations: Sequence[Sequence[Part]], decoding: Decoding) -> list[Reply]:
         """Return the reply to each continuation, as append (as user), reply and rewind would; nothing is added.
@@ -212,7 +203,6 @@ class Conversation(Protocol):
             ModelError: as `reply`; no reply is returned then.
             DataError: as `reply`; no reply is returned then.
         """
-        ...
 
 
 class Subject(Protocol):
@@ -221,20 +211,16 @@ class Subject(Protocol):
     @property
     def name(self) -> str:
         """Name on the command line."""
-        ...
 
     @property
     def capabilities(self) -> Capabilities:
         """Capabilities; of a policy's only `deterministic` and `max_in_flight` are used."""
-        ...
 
     def identity(self) -> dict[str, Any]:
         """Return everything that can change a result, as JSON values; equal identities give equal results."""
-        ...
 
     def close(self) -> None:
         """Free all memory; the subject cannot be used afterwards."""
-        ...
 
 
 @runtime_checkable
@@ -247,11 +233,9 @@ class Model(Subject, Protocol):
         Raises:
             DataError: the frame cannot be read.
         """
-        ...
 
     def conversation(self) -> Conversation:
         """Return a new, empty conversation."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -277,7 +261,6 @@ class Policy(Subject, Protocol):
 
     def reset(self) -> None:
         """Start a new episode: drop all state of the last one."""
-        ...
 
     def act(self, frame: FrameRef, instruction: str) -> tuple[ArmDelta, ...]:
         """Return the next steps of the arm, at least one, in order.
@@ -290,7 +273,6 @@ class Policy(Subject, Protocol):
             ModelError: the policy cannot act, or memory ran out.
             DataError: the frame cannot be read.
         """
-        ...
 
 
 class Adapter(Protocol):
@@ -307,4 +289,3 @@ class Adapter(Protocol):
             options: an instance of `Options`.
             seed: seed of whatever is random in the model.
         """
-        ...

@@ -10,12 +10,7 @@ __all__ = ["check_decoding", "check_turns", "wrap_adapter_errors", "wrap_request
 
 
 def check_decoding(name: str, capabilities: Capabilities, decoding: Decoding) -> None:
-    """Check that the model supports this way of decoding.
-
-    Args:
-        name: name of the model, for the message.
-        capabilities: capabilities of the model.
-        decoding: the requested decoding.
+    """Check that the model of this name supports this way of decoding.
 
     Raises:
         ModelError: the model does not sample, or cannot be restricted to choices.
@@ -29,11 +24,7 @@ def check_decoding(name: str, capabilities: Capabilities, decoding: Decoding) ->
 
 
 def check_turns(name: str, turns: Sequence[Turn]) -> None:
-    """Check that it is the model's turn.
-
-    Args:
-        name: name of the model, for the message.
-        turns: turns of the conversation.
+    """Check that it is the turn of the model of this name.
 
     Raises:
         ModelError: the conversation is empty, or its last turn is not the user's.

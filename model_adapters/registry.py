@@ -213,8 +213,7 @@ def _options(name: str) -> type:
     """Return the dataclass of a model's options, without importing a built-in adapter, which may import torch."""
     if name not in BUILT_IN:
         return _adapter(name).Options
-    options_class: type = _import_target(BUILT_IN[name].options)
-    return options_class
+    return cast(type, _import_target(BUILT_IN[name].options))
 
 
 def _adapter(name: str) -> type[Adapter]:

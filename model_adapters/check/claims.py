@@ -1,4 +1,7 @@
-"""Checks that a model does what its capabilities claim, and refuses what they do not."""
+"""Checks that a model does what its capabilities claim, and refuses what they do not.
+
+Each check raises `ContractError`, which names the clause that does not hold.
+"""
 
 from concurrent.futures import ThreadPoolExecutor
 
@@ -15,11 +18,7 @@ _CHOICES = ("bright", "dark", "dark and bright")  # one is a prefix of another
 
 
 def check_sampling(model: Model, frame: FrameRef) -> None:
-    """Check that replies are sampled if the model claims to, and depend on the seed alone if it is deterministic.
-
-    Raises:
-        ContractError: a clause does not hold; the message names it.
-    """
+    """Check that replies are sampled if the model claims to, and depend on the seed alone if it is deterministic."""
     decodings = [Decoding(max_new_tokens=NEW_TOKENS, temperature=2.0, seed=seed) for seed in range(4)]
     talk = start_conversation(model, frame, "\nDescribe the picture.")
     if not model.capabilities.sampling:
@@ -34,11 +33,7 @@ def check_sampling(model: Model, frame: FrameRef) -> None:
 
 
 def check_choices(model: Model, frame: FrameRef) -> None:
-    """Check that replies are restricted to choices if the model claims to support them.
-
-    Raises:
-        ContractError: a clause does not hold; the message names it.
-    """
+    """Check that replies are restricted to choices if the model claims to support them."""
     decoding = Decoding(max_new_tokens=64, choices=_CHOICES)
     talk = start_conversation(model, frame, QUESTION)
     if not model.capabilities.choices:
@@ -51,11 +46,7 @@ def check_choices(model: Model, frame: FrameRef) -> None:
 
 
 def check_flight(model: Model, black: FrameRef, white: FrameRef) -> None:
-    """Check that several conversations can be answered at the same time if the model claims so.
-
-    Raises:
-        ContractError: a reply differs from the one to the same question asked alone.
-    """
+    """Check that several conversations can be answered at the same time if the model claims so."""
     n_threads = min(model.capabilities.max_in_flight, _MOST_THREADS)
     if n_threads == 1:
         return

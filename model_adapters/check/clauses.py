@@ -50,11 +50,7 @@ def check_members(adapter: Any) -> None:
 
 
 def check_identity(adapter: Model | Policy) -> None:
-    """Check name, identity and capabilities.
-
-    Raises:
-        ContractError: a clause does not hold; the message names it.
-    """
+    """Check name, identity and capabilities; raise `ContractError` for a clause that does not hold."""
     identity = adapter.identity()
     try:
         again = json.loads(json.dumps(identity))

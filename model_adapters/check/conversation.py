@@ -1,4 +1,7 @@
-"""Checks of conversations: parts, turns, marks and token counts."""
+"""Checks of conversations: parts, turns, marks and token counts.
+
+Each check raises `ContractError`, which names the clause that does not hold.
+"""
 
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
@@ -10,28 +13,17 @@ __all__ = ["check_counts", "check_marks", "check_parts", "check_turns"]
 
 
 def check_parts(model: Model, frame: FrameRef) -> None:
-    """Check that texts and frames can be appended, and nothing else.
-
-    Raises:
-        ContractError: a clause does not hold; the message names it.
-    """
+    """Check that texts and frames can be appended, and nothing else."""
     split = start_conversation(model, frame, "\nWhat do", " you see?")
     whole = start_conversation(model, frame, "\nWhat do you see?")
     require(_alike(model, split, whole), "a text appended in two pieces differs from the same text in one")
-    require(
-        raises(TypeError, split.append, 3),
-        "append() of neither text nor frame does not raise TypeError",
-    )
+    require(raises(TypeError, split.append, 3), "append() of neither text nor frame does not raise TypeError")
     require(raises(ValueError, split.append, "x", role="narrator"), "append() in an unknown role does not raise")
     require(_alike(model, split, whole), "a refused append() changes the conversation")
 
 
 def check_counts(model: Model, frame: FrameRef) -> None:
-    """Check that token counts are exact if the model claims so, and None if it does not.
-
-    Raises:
-        ContractError: a clause does not hold; the message names it.
-    """
+    """Check that token counts are exact if the model claims so, and None if it does not."""
     if not model.capabilities.counts_tokens:
         n_tokens = start_conversation(model, frame, QUESTION).n_tokens
         require(n_tokens is None, "n_tokens is not None though counts_tokens is false")
@@ -47,11 +39,7 @@ def check_counts(model: Model, frame: FrameRef) -> None:
 
 
 def check_turns(model: Model, frame: FrameRef) -> None:
-    """Check that turns are kept apart, and that the model replies to a user turn only.
-
-    Raises:
-        ContractError: a clause does not hold; the message names it.
-    """
+    """Check that turns are kept apart, and that the model replies to a user turn only."""
     _check_nothing_to_reply_to(model.conversation(), "an empty conversation")
     talk = start_conversation(model, frame, QUESTION)
     one_turn = talk.n_tokens
@@ -64,11 +52,7 @@ def check_turns(model: Model, frame: FrameRef) -> None:
 
 
 def check_marks(model: Model, frame: FrameRef) -> None:
-    """Check marks and rewinding.
-
-    Raises:
-        ContractError: a clause does not hold; the message names it.
-    """
+    """Check marks and rewinding."""
     talk, unchanged = start_conversation(model, frame, QUESTION), start_conversation(model, frame, QUESTION)
     early = talk.mark()
     talk.append(" More.")

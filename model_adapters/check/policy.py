@@ -14,13 +14,7 @@ _INSTRUCTION = "pick up the mug"
 
 
 def policy_checks(policy: Policy, black: FrameRef, white: FrameRef) -> dict[str, Callable[[], None]]:
-    """Return all checks of a policy by name; each raises `ContractError` if a clause does not hold.
-
-    Args:
-        policy: the adapter to check.
-        black: a black frame.
-        white: a white frame.
-    """
+    """Return all checks of a policy by name; each raises `ContractError` if a clause does not hold."""
     return {
         "members": partial(check_members, policy),
         "identity": partial(check_identity, policy),

@@ -1,4 +1,7 @@
-"""Checks of replies that hold for every model."""
+"""Checks of replies that hold for every model.
+
+Each check raises `ContractError`, which names the clause that does not hold.
+"""
 
 from infthor_eval.formats.frames import FrameRef
 from model_adapters.check.clauses import require
@@ -9,11 +12,7 @@ __all__ = ["check_continuations", "check_frames", "check_reply", "check_sharing"
 
 
 def check_reply(model: Model, frame: FrameRef) -> None:
-    """Check one reply: its counts and ids, its length, its stop strings.
-
-    Raises:
-        ContractError: a clause does not hold; the message names it.
-    """
+    """Check one reply: its counts and ids, its length, its stop strings."""
     talk = start_conversation(model, frame, QUESTION)
     size = talk.n_tokens
     first = talk.reply(GREEDY)
@@ -29,11 +28,7 @@ def check_reply(model: Model, frame: FrameRef) -> None:
 
 
 def check_frames(model: Model, black: FrameRef, white: FrameRef) -> None:
-    """Check that the model sees the frames.
-
-    Raises:
-        ContractError: its replies do not depend on them.
-    """
+    """Check that the model sees the frames."""
     # Equal replies to one question may be chance, so one of several replies has to differ.
     questions = [QUESTION, "\nIs it bright or dark?", "\nWhat colour is it?", "\nDescribe the picture."]
     differ = any(not same_reply(ask(model, black, text), ask(model, white, text)) for text in questions)
@@ -41,11 +36,7 @@ def check_frames(model: Model, black: FrameRef, white: FrameRef) -> None:
 
 
 def check_sharing(model: Model, black: FrameRef, white: FrameRef) -> None:
-    """Check that a reply does not depend on what was asked before.
-
-    Raises:
-        ContractError: a reply after a rewind differs from that of a new conversation.
-    """
+    """Check that a reply does not depend on what was asked before."""
     talk = start_conversation(model, black, white)
     start = talk.mark()
     shared = []
@@ -60,11 +51,7 @@ def check_sharing(model: Model, black: FrameRef, white: FrameRef) -> None:
 
 
 def check_continuations(model: Model, black: FrameRef, white: FrameRef) -> None:
-    """Check that several continuations get the replies that each of them gets alone.
-
-    Raises:
-        ContractError: a clause does not hold; the message names it.
-    """
+    """Check that several continuations get the replies that each of them gets alone."""
     talk = start_conversation(model, black)
     continuations: list[list[Part]] = [[QUESTION], [white, "\nWhat colours are the frames?"], ["\nWhy?"]]
     size, together = talk.n_tokens, talk.replies(continuations, GREEDY)

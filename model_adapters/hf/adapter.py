@@ -61,11 +61,6 @@ class CheckpointAdapter:
 def load_model(name: str, located: LocatedCheckpoint[CheckpointOptions], family: MakeFamily) -> TransformersModel:
     """Load a checkpoint of a known family and test it on one frame.
 
-    Args:
-        name: name in the registry.
-        located: the checkpoint.
-        family: builds the family of the model.
-
     Raises:
         ModelError: the checkpoint cannot be loaded, or processor and model disagree on a frame's tokens.
     """

@@ -35,10 +35,7 @@ class _Rows:
         self._cache = self._prefix.expand(len(spans), width + reserve)
         gaps = [width - len(span.embeds) for span in spans]
         embeds = torch.stack([pad(span.embeds, (0, 0, gap, 0)) for span, gap in zip(spans, gaps, strict=True)])
-        positions = torch.cat(
-            [pad(span.positions, (gap, 0)) for span, gap in zip(spans, gaps, strict=True)],
-            dim=-2,
-        )
+        positions = torch.cat([pad(span.positions, (gap, 0)) for span, gap in zip(spans, gaps, strict=True)], dim=-2)
         n_prefix = self._prefix.n_tokens
         self._mask = torch.ones(len(spans), n_prefix + width, dtype=torch.long, device=embeds.device)
         for row, gap in enumerate(gaps):
@@ -52,8 +49,7 @@ class _Rows:
         self._ends = [span.end for span in spans]
         self._mask = pad(self._mask, (0, 1), value=1)
         return self._forward(
-            torch.stack([span.embeds for span in spans]),
-            torch.cat([span.positions for span in spans], dim=-2),
+            torch.stack([span.embeds for span in spans]), torch.cat([span.positions for span in spans], dim=-2)
         )
 
     def _forward(self, embeds: torch.Tensor, positions: torch.Tensor) -> torch.Tensor:
@@ -78,15 +74,9 @@ def answer_together(
     n_shared: int,
     replies: Sequence[ReplyState],
 ) -> None:
-    """Decode the replies to prompts that begin with the same pieces.
+    """Decode the replies to prompts that begin with the same `n_shared` pieces, each prompt with more behind them.
 
-    Args:
-        model: a transformers model.
-        embed: embeds spans of prompts.
-        prefix: encoded sequence of the shared pieces and nothing more.
-        prompts: prompts to answer, each longer than the shared pieces.
-        n_shared: pieces that all prompts begin with.
-        replies: empty replies, one for each prompt.
+    `prefix` has encoded the shared pieces and nothing more; `replies` are empty, one for each prompt.
     """
     rows = _Rows(model, embed, prefix)
     reserve = max(reply.decoding.max_new_tokens for reply in replies)

@@ -84,10 +84,6 @@ def locate(options: R) -> LocatedCheckpoint[R]:
 def load_checkpoint(located: LocatedCheckpoint[CheckpointOptions], family: MakeFamily) -> LoadedCheckpoint:
     """Load everything that a conversation needs, including the weights.
 
-    Args:
-        located: the checkpoint.
-        family: builds the family of the model.
-
     Raises:
         ModelError: the checkpoint is incomplete or damaged.
         UsageError: the dtype or the device is unknown.
@@ -100,10 +96,7 @@ def read_checkpoint(
 ) -> LoadedCheckpoint:
     """Load everything that a conversation needs.
 
-    Args:
-        located: the checkpoint; a context extension is written into its config.
-        make_family: builds the family of the model.
-        build_model: builds the model of the config; `build_meta_model` does so without weights.
+    A context extension is written into the config; `build_model` builds its model, `build_meta_model` without weights.
 
     Raises:
         ModelError: the checkpoint is incomplete or damaged.
@@ -155,16 +148,7 @@ def assemble(
     max_tokens: int | None,
     origin: Mapping[str, Any],
 ) -> LoadedCheckpoint:
-    """Combine loaded parts and derive their identity.
-
-    Args:
-        model: the transformers model.
-        tokenizer: tokenizer of the model.
-        image_processor: image processor of the model.
-        template: template of conversations (Jinja).
-        family: family of the model.
-        max_tokens: context limit of the model.
-        origin: source of the weights, for the identity.
+    """Combine loaded parts and derive their identity, which begins with `origin`, the source of the weights.
 
     Raises:
         ModelError: the generation settings are not supported, or min_pixels exceeds max_pixels.
@@ -202,17 +186,12 @@ def _check_pixels(image_processor: Any) -> None:
 
 
 def origin(folder: Path, commit: str | None, pretrained: str) -> dict[str, Any]:
-    """Return the source of weights, for an identity.
-
-    Args:
-        folder: folder of the checkpoint.
-        commit: commit of the hub's repository, or None for a folder of the user's.
-        pretrained: name of the checkpoint as the user gave it.
-    """
+    """Return the source of weights, for an identity; the commit is None for a folder of the user's."""
     if commit is not None:
         return {"checkpoint": pretrained, "revision": commit}
     # The folder's name, not its path: a moved checkpoint is the same checkpoint.
-    return {"checkpoint": folder.resolve().name, "fingerprint": _fingerprint(folder)}
+    files = (path for path in sorted(folder.iterdir()) if path.suffix in _FINGERPRINTED and path.is_file())
+    return {"checkpoint": folder.resolve().name, "fingerprint": digest_of_files(files)}
 
 
 def versions() -> dict[str, str]:
@@ -269,9 +248,6 @@ def wrap_loading_errors(pretrained: str) -> Iterator[None]:
 
     What its warnings say is either an error here (missing weights) or of no concern to users.
 
-    Args:
-        pretrained: name of the checkpoint, for the message.
-
     Raises:
         ModelError: a part of the checkpoint cannot be loaded.
     """
@@ -313,10 +289,3 @@ def _quantization_method(model: Any) -> str | None:
     settings = getattr(model.config, "quantization_config", None)
     method = settings.get("quant_method") if isinstance(settings, dict) else getattr(settings, "quant_method", None)
     return None if method is None else str(getattr(method, "value", method))
-
-
-def _fingerprint(folder: Path) -> str:
-    """Return a hash of names and contents of the checkpoint's files (hex, 32 characters)."""
-    return digest_of_files(
-        path for path in sorted(folder.iterdir()) if path.suffix in _FINGERPRINTED and path.is_file()
-    )

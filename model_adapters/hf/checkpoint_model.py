@@ -21,10 +21,7 @@ __all__ = ["CheckpointModel", "HfModel"]
 class CheckpointModel(ABC):
     """A model whose prompts are written here, by the checkpoint's tokenizer and template.
 
-    Args:
-        name: name in the registry.
-        loaded: the checkpoint.
-        threads: torch threads of its computations; torch's default where None.
+    `threads` are the torch threads of its computations; torch's default where None.
     """
 
     def __init__(self, name: str, loaded: LoadedCheckpoint, threads: int | None = None) -> None:
@@ -72,13 +69,7 @@ class CheckpointModel(ABC):
 
 
 class HfModel(CheckpointModel):
-    """A model whose weights transformers runs in this process.
-
-    Args:
-        name: name in the registry.
-        loaded: the checkpoint.
-        options: inference options.
-    """
+    """A model whose weights transformers runs in this process."""
 
     def __init__(self, name: str, loaded: LoadedCheckpoint, options: HfOptions) -> None:
         super().__init__(name, loaded, options.threads)
@@ -106,10 +97,7 @@ class HfModel(CheckpointModel):
             "share_prefix": options.share_prefix,
             "chunk_tokens": options.chunk_tokens,
             "batch_size": options.batch_size,
-            "generation": {
-                "repetition_penalty": generation.repetition_penalty,
-                "end_ids": sorted(generation.end_ids),
-            },
+            "generation": {"repetition_penalty": generation.repetition_penalty, "end_ids": sorted(generation.end_ids)},
         }
 
     def close(self) -> None:

@@ -34,10 +34,6 @@ def read_choices(tokenizer: Any, decoding: Decoding) -> Choices | None:
 
     Each text has one spelling, the tokenizer's own: other sequences of tokens with the same text are not allowed.
 
-    Args:
-        tokenizer: tokenizer of the checkpoint.
-        decoding: decoding with the texts.
-
     Raises:
         ModelError: a text has more tokens than the reply may have.
     """

@@ -9,12 +9,7 @@ from dataclasses import dataclass
 from typing import Any, cast
 
 import torch
-from transformers import (
-    GenerationConfig,
-    RepetitionPenaltyLogitsProcessor,
-    TemperatureLogitsWarper,
-    TopPLogitsWarper,
-)
+from transformers import GenerationConfig, RepetitionPenaltyLogitsProcessor, TemperatureLogitsWarper, TopPLogitsWarper
 
 from infthor_eval.errors import ModelError
 from model_adapters.hf.choices import Choices

@@ -32,13 +32,7 @@ class EmbeddedSpan:
 
 
 class Embedder:
-    """Embeds spans of prompts for one model.
-
-    Args:
-        model: a transformers model.
-        family: family of the model.
-        features: cache of the frames' features.
-    """
+    """Embeds spans of prompts for one model of a family, with a cache of the frames' features."""
 
     def __init__(self, model: Any, family: Family, features: FeatureCache) -> None:
         self._family = family

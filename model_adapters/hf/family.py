@@ -24,18 +24,15 @@ class Family(Protocol):
 
     def frame_ids(self, size: Size) -> tuple[int, ...]:
         """Return the ids that the placeholder of a frame of this size expands to."""
-        ...
 
     def template_ids(self) -> tuple[int, ...]:
         """Return the ids of a frame in a template: the placeholder and, in some families, markers around it."""
-        ...
 
     def features(self, images: Sequence[Image.Image]) -> list[torch.Tensor]:
         """Return the embeddings for the slots of each image, (slots, hidden), on the embedding layer's device.
 
         They carry gradients, for training; inference calls this under `torch.inference_mode`.
         """
-        ...
 
     def positions(self, ids: torch.Tensor, sizes: Sequence[Size], start: int) -> torch.Tensor:
         """Return the position ids of a span of a sequence that cuts no frame.
@@ -48,7 +45,6 @@ class Family(Protocol):
         Returns:
             Positions, (1, tokens), or (3, 1, tokens) for positions with three axes, on the CPU.
         """
-        ...
 
 
 class MakeFamily(Protocol):
@@ -56,4 +52,3 @@ class MakeFamily(Protocol):
 
     def __call__(self, model: Any, image_processor: Any, tokenizer: Any) -> Family:
         """Build the family of these loaded parts."""
-        ...

@@ -14,9 +14,7 @@ __all__ = ["FeatureCache"]
 class FeatureCache:
     """Features by the digest of the frame's file; the least recently used are dropped first.
 
-    Args:
-        family: family that computes missing features.
-        max_bytes: limit of the cached features; 0 caches none.
+    The family computes missing ones. At most `max_bytes` are cached; 0 caches none.
     """
 
     def __init__(self, family: Family, max_bytes: int) -> None:

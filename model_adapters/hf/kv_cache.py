@@ -22,37 +22,26 @@ class _Allocation:
 
     Layers do not refer to the cache itself: in a reference cycle, unused buffers would stay in memory beside their
     successors until Python's cyclic garbage collector runs.
-
-    Attributes:
-        storage: device of the buffers; the device of the layers' weights where None.
-        capacity: tokens that a buffer holds when it is next allocated.
     """
 
-    storage: torch.device | None
-    capacity: int = 0
+    storage: torch.device | None  # device of the buffers; the device of the layers' weights where None
+    capacity: int = 0  # tokens that a buffer holds when it is next allocated
 
 
 class BufferedCache(Cache):
     """A cache of `BufferedLayer`s, which are created as the model reaches its layers."""
 
     def __init__(self, storage: torch.device | None = None) -> None:
-        """Create an empty cache.
+        """Create an empty cache with buffers on the `storage` device; on that of the layers' weights where None.
 
-        Args:
-            storage: device of the buffers; the device of the layers' weights where None. With the CPU as storage, only
-                the computing layer's keys and values are on the weights' device: a context that does not fit on the
-                device runs, at the speed of the connection.
+        With the CPU as storage, only the computing layer's keys and values are on the weights' device: a context that
+        does not fit on the device runs, at the speed of the connection.
         """
         self._allocation = _Allocation(storage)
         super().__init__(layers=[])
 
     def update(
-        self,
-        key_states: torch.Tensor,
-        value_states: torch.Tensor,
-        layer_idx: int,
-        *args: Any,
-        **kwargs: Any,
+        self, key_states: torch.Tensor, value_states: torch.Tensor, layer_idx: int, *args: Any, **kwargs: Any
     ) -> tuple[torch.Tensor, torch.Tensor]:
         """Append one layer's new states to its old ones and return all."""
         while len(self.layers) <= layer_idx:
@@ -91,11 +80,7 @@ class BufferedLayer(DynamicLayer):
         self._buffers: tuple[torch.Tensor, torch.Tensor] | None = None
 
     def update(
-        self,
-        key_states: torch.Tensor,
-        value_states: torch.Tensor,
-        *args: Any,
-        **kwargs: Any,
+        self, key_states: torch.Tensor, value_states: torch.Tensor, *args: Any, **kwargs: Any
     ) -> tuple[torch.Tensor, torch.Tensor]:
         """Append the new states to the old ones and return all, on the states' device."""
         if not self.is_initialized:

@@ -15,14 +15,9 @@ _FAILURES = (RuntimeError, ValueError, IndexError, ArithmeticError, MemoryError)
 
 
 def check_limit(name: str, n_context: int, max_new_tokens: int, limit: int | None, option: str = "max_tokens") -> None:
-    """Check that context and reply fit.
+    """Check that context and reply, in tokens, are within the limit of both together; None for none.
 
-    Args:
-        name: name of the model, for the message.
-        n_context: tokens of the context.
-        max_new_tokens: most tokens of the reply.
-        limit: limit of both together; None for none.
-        option: the model's option that sets the limit, for the message.
+    `option` is the model's option that sets the limit, for the message.
 
     Raises:
         ModelError: context and reply exceed the limit.

@@ -28,11 +28,6 @@ class TransformersModel(HfModel):
 
     All conversations of a model share one encoded sequence. A reply reuses what its prompt has in common with the
     previous prompt, whichever conversation that was of, so conversations over the same frames encode them once.
-
-    Args:
-        name: name in the registry.
-        loaded: the checkpoint.
-        options: inference options.
     """
 
     def __init__(self, name: str, loaded: LoadedCheckpoint, options: HfOptions) -> None:

@@ -26,7 +26,7 @@ class Prefix:
         model: a transformers model that takes `inputs_embeds`, `position_ids` and `past_key_values`.
         family: family of the model.
         embed: embeds spans of prompts.
-        chunk_tokens: most tokens of one forward pass (a larger frame is a chunk by itself).
+        chunk_tokens: most tokens of one forward pass (a larger frame is a chunk alone).
         rope: rotary embeddings of the model if their frequencies depend on the prompt's length, else None.
         storage: device of keys and values; the device of the weights where None.
     """

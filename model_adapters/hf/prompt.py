@@ -62,13 +62,7 @@ def token_ids(pieces: Iterable[Piece]) -> Iterator[int]:
 
 
 class Prompter:
-    """Renders and tokenises conversations for one model.
-
-    Args:
-        tokenizer: tokenizer of the checkpoint.
-        template: template of conversations (Jinja).
-        family: family that expands frames.
-    """
+    """Renders and tokenises conversations for one model, by a template (Jinja)."""
 
     def __init__(self, tokenizer: Any, template: str, family: Family) -> None:
         self._tokenizer = tokenizer

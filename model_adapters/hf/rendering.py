@@ -36,12 +36,6 @@ def render(tokenizer: Any, template: str, turns: Sequence[Turn], image_token: st
     the texts, the turn is passed as one text that contains the image tokens. Some templates (Pixtral's) accept a system
     turn only as a string instead of a list of texts.
 
-    Args:
-        tokenizer: tokenizer of the checkpoint.
-        template: chat template (Jinja).
-        turns: turns of the conversation.
-        image_token: the template's token for an image.
-
     Raises:
         ModelError: the template refuses the turns, or drops a text.
     """
@@ -120,11 +114,7 @@ def _apply(tokenizer: Any, template: str, turns: Sequence[Turn], messages: Seque
 
 
 def _check_texts(text: str, turns: Sequence[Turn]) -> None:
-    """Check that a rendered text contains every text of every turn.
-
-    Raises:
-        ModelError: a text is missing.
-    """
+    """Raise `ModelError` unless a rendered text contains every text of every turn."""
     parts = [(turn.role, part.strip()) for turn in turns for part in turn.parts if isinstance(part, str)]
     # Counting scans the whole text for every part, so it is done only if the parts do not appear in order.
     counts = {} if _in_order(text, (part for _, part in parts)) else Counter(part for _, part in parts)

@@ -13,12 +13,7 @@ __all__ = ["begin_reply", "end_reply", "reply_text", "stop_ids"]
 
 
 def begin_reply(loaded: LoadedCheckpoint, decoding: Decoding, context: Iterable[int]) -> ReplyState:
-    """Return an empty reply.
-
-    Args:
-        loaded: the checkpoint.
-        decoding: decoding of the reply.
-        context: all ids before the reply.
+    """Return an empty reply; the context has all ids before it.
 
     Raises:
         ModelError: one of the choices has more tokens than the reply may have.
@@ -35,14 +30,7 @@ def begin_reply(loaded: LoadedCheckpoint, decoding: Decoding, context: Iterable[
 
 
 def end_reply(loaded: LoadedCheckpoint, state: ReplyState, n_context: int, n_cached: int) -> Reply:
-    """Return a finished reply.
-
-    Args:
-        loaded: the checkpoint.
-        state: the finished reply.
-        n_context: tokens of the context.
-        n_cached: tokens of the context that were not encoded again.
-    """
+    """Return a finished reply; `n_cached` tokens of its context were not encoded again."""
     return Reply(
         state.choice or reply_text(loaded.tokenizer, state.ids, state.decoding),
         n_reply_tokens=len(state.ids),
@@ -53,13 +41,7 @@ def end_reply(loaded: LoadedCheckpoint, state: ReplyState, n_context: int, n_cac
 
 
 def reply_text(tokenizer: Any, ids: Sequence[int], decoding: Decoding) -> str:
-    """Return the text of a free reply before its first stop string.
-
-    Args:
-        tokenizer: tokenizer of the checkpoint.
-        ids: ids of the reply, without the end token.
-        decoding: decoding with the stop strings.
-    """
+    """Return the text of a free reply before its first stop string; the ids have no end token."""
     text = _text(tokenizer, ids)
     before_stop = cut_at_stop(text, decoding.stop)
     return text if before_stop is None else before_stop

@@ -33,11 +33,7 @@ class Retriever:
     """A CLIP model in float32, on a GPU if there is one; its vectors have length 1, so dot products are cosines."""
 
     def __init__(self, name: str, revision: str | None = None) -> None:
-        """Load a checkpoint.
-
-        Args:
-            name: hub id or folder.
-            revision: branch, tag or commit on the hub; the default branch where None.
+        """Load a checkpoint from a folder or the hub; the hub's default branch where the revision is None.
 
         Raises:
             UsageError: the checkpoint cannot be found or loaded, or is not one of CLIP.

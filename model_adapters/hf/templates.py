@@ -22,10 +22,6 @@ _PLAIN = """\
 def chat_template(folder: Path, tokenizer: Any) -> str:
     """Return the processor's chat template if the checkpoint has one, else the tokenizer's.
 
-    Args:
-        folder: folder of the checkpoint.
-        tokenizer: tokenizer of the checkpoint.
-
     Raises:
         ModelError: the checkpoint has no chat template.
     """
@@ -42,11 +38,6 @@ def chat_template(folder: Path, tokenizer: Any) -> str:
 
 
 def plain_template(tokenizer: Any, family: Family) -> str:
-    """Return a template that concatenates the texts and frames of all turns.
-
-    Args:
-        tokenizer: tokenizer of the checkpoint.
-        family: family of the model, which knows the tokens of a frame in a text.
-    """
+    """Return a template that concatenates the texts and frames of all turns; the family knows the tokens of a frame."""
     image = "".join(tokenizer.convert_ids_to_tokens(list(family.template_ids())))
     return _PLAIN.replace("IMAGE", json.dumps(image, ensure_ascii=False))

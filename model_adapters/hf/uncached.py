@@ -60,8 +60,7 @@ def image_token(processor: Any) -> str:
 def expand_image_token(processor: Any, image: Image.Image) -> list[int]:
     """Return the ids that the processor expands the token of one image to."""
     inputs = processor(text=[image_token(processor)], images=[image], add_special_tokens=False, return_tensors="pt")
-    ids: list[int] = inputs["input_ids"][0].tolist()
-    return ids
+    return list(inputs["input_ids"][0].tolist())
 
 
 class _ForceReplyTokens(LogitsProcessor):
@@ -88,14 +87,7 @@ class _StopWithReply(StoppingCriteria):
 
 
 class UncachedModel(HfModel):
-    """A loaded checkpoint behind the `Model` protocol, without a shared prefix.
-
-    Args:
-        name: name in the registry.
-        loaded: the checkpoint.
-        processor: processor of the checkpoint.
-        options: inference options.
-    """
+    """A loaded checkpoint behind the `Model` protocol, without a shared prefix."""
 
     def __init__(self, name: str, loaded: LoadedCheckpoint, processor: Any, options: HfOptions) -> None:
         super().__init__(name, loaded, options)

@@ -18,11 +18,7 @@ class VectorFile:
     """An append-only file of float32 vectors; only the keys are in memory, so millions of vectors cost little."""
 
     def __init__(self, path: Path, width: int) -> None:
-        """Open the file, or create it.
-
-        Args:
-            path: the file; its folder is created.
-            width: dimensions of a vector.
+        """Open the file, or create it and its folder; `width` is the dimensions of a vector.
 
         Raises:
             DataError: the file cannot be written.
@@ -83,12 +79,9 @@ class VectorFile:
 
 
 def nearest(vectors: np.ndarray, query: np.ndarray, top_k: int) -> tuple[int, ...]:
-    """Return the rows with the largest cosine, in ascending order of their numbers.
+    """Return the `top_k` rows with the largest cosine, in ascending order of their numbers.
 
-    Args:
-        vectors: unit vectors, (rows, dimensions).
-        query: a unit vector, (dimensions,).
-        top_k: number of rows.
+    Both vectors, (rows, dimensions), and the query, (dimensions,), have length 1.
     """
     similarity = np.round(vectors.astype(np.float64) @ query.astype(np.float64), _DIGITS)
     order = np.argsort(-similarity, kind="stable")

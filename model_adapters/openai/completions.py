@@ -70,10 +70,7 @@ class Completion(msgspec.Struct, frozen=True):
     usage: TokenUsage | None = None
 
     def text(self, where: str) -> str:
-        """Return the text of the reply; a refusal in words counts as a reply.
-
-        Args:
-            where: address of the server, for the message.
+        """Return the text of the reply; a refusal in words counts as a reply. The message names the server by `where`.
 
         Raises:
             ModelError: the reply has no text.
@@ -91,10 +88,6 @@ class Completion(msgspec.Struct, frozen=True):
 
 def read_completion(where: str, content: bytes) -> Completion:
     """Parse a server's reply.
-
-    Args:
-        where: address of the server, for the message.
-        content: body of the reply.
 
     Raises:
         ModelError: the body is not a chat completion.

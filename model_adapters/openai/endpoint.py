@@ -58,10 +58,6 @@ class Endpoint:
 
     After a request has failed in all its attempts, later requests get one attempt each until one succeeds: otherwise
     every sample of a run would wait through all retries of a server that is down.
-
-    Args:
-        options: options of the requests.
-        secret: the key.
     """
 
     def __init__(self, options: OpenAIOptions, secret: Secret) -> None:
@@ -73,10 +69,7 @@ class Endpoint:
         self._is_down = Event()
 
     def ask(self, request: Mapping[str, Any]) -> tuple[bytes, tuple[str, ...]]:
-        """Return the body of the server's reply, and the faults that retries recovered from, a line each.
-
-        Args:
-            request: fields of a chat completion request.
+        """Return the reply's body to a chat completion request, and a line for each fault that a retry recovered from.
 
         Raises:
             ModelError: the server does not answer, or answers with an error.
@@ -141,10 +134,7 @@ class Endpoint:
 
 
 def _pause_s(n_faults: int, fault: _TransientError) -> float:
-    """Return the pause before the next attempt: the server's, or one that doubles.
-
-    A random part keeps threads that failed together from retrying together.
-    """
+    """Return the server's pause, or one that doubles; a random part spreads threads that failed together."""
     pause = min(_FIRST_WAIT_S * 2 ** (n_faults - 1), _LONGEST_WAIT_S) * (1 + random.random() / 4)
     return pause if fault.wait_s is None else fault.wait_s + random.random() * _FIRST_WAIT_S
 
@@ -155,10 +145,8 @@ def _retry_after_s(headers: Mapping[str, str]) -> float | None:
         if "retry-after-ms" in headers:
             return max(0.0, float(headers["retry-after-ms"]) / 1000)
         value = headers.get("retry-after", "")
-        return max(0.0, float(value)) if value.replace(".", "", 1).isdecimal() else _seconds_until(value)
+        if value.replace(".", "", 1).isdecimal():
+            return max(0.0, float(value))
+        return max(0.0, email.utils.parsedate_to_datetime(value).timestamp() - time.time())
     except (ValueError, OverflowError):
         return None
-
-
-def _seconds_until(date: str) -> float:
-    return max(0.0, email.utils.parsedate_to_datetime(date).timestamp() - time.time())

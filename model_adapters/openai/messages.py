@@ -20,9 +20,7 @@ _SETTINGS: dict[str, dict[str, Any]] = {"png": {"compress_level": 6}, "jpeg": {"
 class EncodedFrames:
     """A cache of frames as `data:` URLs by the digest of their content, for several threads.
 
-    Args:
-        image_format: "png" or "jpeg".
-        max_bytes: limit of the cache; the least recently used frames are dropped first.
+    The format is "png" or "jpeg". Beyond `max_bytes`, the least recently used frames are dropped.
     """
 
     def __init__(self, image_format: str, max_bytes: int = _CACHE_BYTES) -> None:
@@ -58,13 +56,7 @@ class EncodedFrames:
 
 
 def to_messages(name: str, turns: Sequence[Turn], frames: EncodedFrames, detail: str | None) -> list[dict[str, Any]]:
-    """Return the messages of a conversation, with texts and frames in order.
-
-    Args:
-        name: name of the model, for the message.
-        turns: turns of the conversation.
-        frames: cache of encoded frames.
-        detail: value of `detail` for every frame, or None to send none.
+    """Return a conversation's messages, with texts and frames in order; each frame has this `detail` unless it is None.
 
     Raises:
         DataError: a frame cannot be read.

@@ -24,13 +24,7 @@ _SEEDS = 2**31  # servers accept seeds of few more bits
 
 
 class ServedModel:
-    """A model behind a server. Every request has the whole conversation; the server may cache common prefixes.
-
-    Args:
-        name: name in the registry.
-        options: options of the requests.
-        secret: the key.
-    """
+    """A model behind a server. Every request has the whole conversation; the server may cache common prefixes."""
 
     def __init__(self, name: str, options: OpenAIOptions, secret: Secret) -> None:
         self.name = name

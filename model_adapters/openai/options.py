@@ -81,11 +81,7 @@ class OpenAIOptions:
     max_cost: float | None = None
 
     def __post_init__(self) -> None:
-        """Check all values; messages never repeat what may be a secret.
-
-        Raises:
-            ValueError: a value is not valid; the message names the option.
-        """
+        """Raise `ValueError` for a value that is not valid; the message names the option and repeats no secret."""
         if not self.model:
             raise ValueError("it needs model=..., the server's name of the model")
         if not _NAME.fullmatch(self.api_key_env):

@@ -10,10 +10,7 @@ class RateLimiter:
     """Grants a number of units per minute, evenly: after each grant, the next one waits until its time has passed.
 
     Servers count in their own windows, often shorter than a minute, so unused units are not saved up for a burst.
-    Several threads may use it at once.
-
-    Args:
-        per_minute: units per minute; None for no limit.
+    Several threads may use it at once. A rate of None sets no limit.
     """
 
     def __init__(self, per_minute: float | None) -> None:

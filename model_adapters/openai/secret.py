@@ -10,11 +10,7 @@ _LEAST = 8  # characters; a shorter value ("EMPTY") is not secret and may be par
 
 
 class Secret:
-    """A key that cannot be shown by accident.
-
-    Attributes:
-        value: the key, or None.
-    """
+    """A key that cannot be shown by accident, or None."""
 
     def __init__(self, value: str | None) -> None:
         self.value = value
@@ -30,13 +26,9 @@ class Secret:
 
 
 def read_key(variable: str, *, needed: bool) -> Secret:
-    """Return the key in an environment variable.
+    """Return the key in an environment variable; `needed` says that the server requires one.
 
     Messages do not repeat the name of the variable: it may be the key, given by mistake.
-
-    Args:
-        variable: name of the variable.
-        needed: true if the server requires a key.
 
     Raises:
         ModelError: a required key is missing, or the value cannot be a key.

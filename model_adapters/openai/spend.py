@@ -33,12 +33,7 @@ class Prices:
 
 @dataclass(frozen=True)
 class Caps:
-    """Caps on a run; None for no cap.
-
-    Attributes:
-        tokens: most tokens of requests and replies.
-        cost: highest cost in US dollars.
-    """
+    """Caps on the tokens of a run's requests and replies, and on its cost in US dollars; None for no cap."""
 
     tokens: int | None = None
     cost: float | None = None
@@ -66,10 +61,6 @@ class Spend:
     and cost so far, and a new request waits for them if they may use up the rest. So a cap is exceeded by at most one
     request, not by one per thread, as long as no request costs more than all before. A reply without usage counts as
     the largest so far; before the first usage is reported, caps cannot be enforced.
-
-    Args:
-        name: name of the model, for messages.
-        caps: the caps.
     """
 
     def __init__(self, name: str, caps: Caps) -> None:
@@ -123,7 +114,7 @@ class Spend:
             return False
         tokens = self._tokens + self._in_flight * self._most_tokens
         cost = self._cost + self._in_flight * self._most_cost
-        return not self._most_tokens or _reached(tokens, self._caps.tokens) or _reached(cost, self._caps.cost)
+        return not self._most_tokens or _is_reached(tokens, self._caps.tokens) or _is_reached(cost, self._caps.cost)
 
     def _refusal(self) -> str | None:
         """Return why no more requests may be sent, or None if they may."""
@@ -133,12 +124,12 @@ class Spend:
                 "leave out max_tokens_total and max_cost"
             )
         hint = "raise it and run the same command again, which resumes"
-        if _reached(self._tokens, self._caps.tokens):
+        if _is_reached(self._tokens, self._caps.tokens):
             return f"not asked: {self._tokens} tokens reach max_tokens_total={self._caps.tokens}; {hint}"
-        if _reached(self._cost, self._caps.cost):
+        if _is_reached(self._cost, self._caps.cost):
             return f"not asked: {self._cost:.4f} US dollars reach max_cost={self._caps.cost:g}; {hint}"
         return None
 
 
-def _reached(used: float, cap: float | None) -> bool:
+def _is_reached(used: float, cap: float | None) -> bool:
     return cap is not None and used >= cap

@@ -31,10 +31,6 @@ class Wire:
 
     All requests run in the event loop of one background thread. There a request can be cancelled at any moment, also
     during a name lookup or while headers or body arrive slowly; timeouts of sockets cover only single reads.
-
-    Args:
-        options: address and time limit.
-        secret: the key.
     """
 
     def __init__(self, options: OpenAIOptions, secret: Secret) -> None:
@@ -51,10 +47,7 @@ class Wire:
             self._headers["Authorization"] = openai.Omit()
 
     def post(self, request: Mapping[str, Any]) -> bytes:
-        """Return the body of the server's reply.
-
-        Args:
-            request: fields of a chat completion request.
+        """Return the body of the server's reply to a chat completion request.
 
         Raises:
             openai.OpenAIError: no connection, or an error status.

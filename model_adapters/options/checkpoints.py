@@ -4,8 +4,7 @@ import importlib.util
 from dataclasses import dataclass
 from typing import Any
 
-__all__ = ["CheckpointOptions", "CheckpointReading", "HfOptions", "Placement", "Reading", "parse_rope"]
-
+__all__ = ["CheckpointOptions", "CheckpointReading", "CheckpointSource", "HfOptions", "Placement", "parse_rope"]
 
 _ATTENTION = ("eager", "sdpa", "flex_attention", "flash_attention_2", "flash_attention_3")
 # Implementation to the module that has it, and the package to install for it.
@@ -90,17 +89,26 @@ class Reading:
 
 
 @dataclass(frozen=True, kw_only=True)
-class CheckpointReading(Reading):
+class CheckpointSource:
     """Source of a checkpoint, on any engine.
 
     Attributes:
         pretrained: hub id or folder.
         revision: branch, tag or commit on the hub; the default branch where None.
-        trust_remote_code: run code that comes with the checkpoint.
     """
 
     pretrained: str
     revision: str | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class CheckpointReading(CheckpointSource, Reading):
+    """A checkpoint and the prompts for it, on any engine.
+
+    Attributes:
+        trust_remote_code: run code that comes with the checkpoint.
+    """
+
     trust_remote_code: bool = False
 
 

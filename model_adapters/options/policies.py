@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from model_adapters.addresses import act_url
-from model_adapters.options.checkpoints import Placement
+from model_adapters.options.checkpoints import CheckpointSource, Placement
 
 __all__ = [
     "DEFAULT_INTRINSICS",
@@ -60,7 +60,6 @@ class ActionOptions:
     execute: int | None = None
 
     def __post_init__(self) -> None:
-        """Refuse contradicting values."""
         if self.ensemble not in _ENSEMBLES:
             raise ValueError(f"ensemble={self.ensemble} is not {' or '.join(_ENSEMBLES)}")
         if self.execute is not None and self.execute < 1:
@@ -79,16 +78,8 @@ class PolicyOptions(ActionOptions, Placement):
 
 
 @dataclass(frozen=True, kw_only=True)
-class CheckpointPolicyOptions(PolicyOptions):
-    """Source of a policy's checkpoint.
-
-    Attributes:
-        pretrained: hub id or folder.
-        revision: branch, tag or commit on the hub; the default branch where None.
-    """
-
-    pretrained: str
-    revision: str | None = None
+class CheckpointPolicyOptions(CheckpointSource, PolicyOptions):
+    """Options of a policy with a checkpoint, whose network runs in this process."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,14 +10,14 @@ __all__ = ["OpenVLATinyOptions", "Qwen25VLTinyOptions", "SpatialVLATinyOptions",
 
 
 @dataclass(frozen=True, kw_only=True)
-class TinyOptions(HfOptions):
-    """Options of tiny models.
+class _TinyPlacement:
+    """Defaults of tiny models.
 
     Attributes:
-        dtype: float32 by default, so that replies do not depend on rounding.
-        device: cpu by default.
-        threads: 1 by default: tiny tensors gain nothing from more, and on a busy machine waiting for the slowest thread
-            makes each operation many times slower.
+        dtype: float32, so that replies do not depend on rounding.
+        device: cpu.
+        threads: 1: tiny tensors gain nothing from more, and on a busy machine waiting for the slowest thread makes each
+            operation many times slower.
     """
 
     dtype: str = "float32"
@@ -26,23 +26,20 @@ class TinyOptions(HfOptions):
 
 
 @dataclass(frozen=True, kw_only=True)
+class TinyOptions(_TinyPlacement, HfOptions):
+    """Options of tiny models."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class Qwen25VLTinyOptions(PixelLimits, TinyOptions):
     """Options of `qwen2.5-vl-tiny`."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class OpenVLATinyOptions(PolicyOptions):
+class OpenVLATinyOptions(_TinyPlacement, PolicyOptions):
     """Options of `openvla-tiny`."""
-
-    dtype: str = "float32"
-    device: str = "cpu"
-    threads: int | None = 1
 
 
 @dataclass(frozen=True, kw_only=True)
-class SpatialVLATinyOptions(SpatialVLAOptions):
+class SpatialVLATinyOptions(_TinyPlacement, SpatialVLAOptions):
     """Options of `spatialvla-tiny`."""
-
-    dtype: str = "float32"
-    device: str = "cpu"
-    threads: int | None = 1

@@ -110,10 +110,6 @@ class PolicyCheckpoint:
 def find_policy_checkpoint(pretrained: str, revision: str | None) -> PolicyCheckpoint:
     """Find or download a checkpoint.
 
-    Args:
-        pretrained: hub id or folder.
-        revision: branch, tag or commit on the hub.
-
     Raises:
         ModelError: the checkpoint does not exist, or cannot be downloaded.
     """

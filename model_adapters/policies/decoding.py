@@ -1,7 +1,7 @@
 """Greedy decoding of action tokens."""
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, cast
 
 import torch
 
@@ -13,8 +13,7 @@ __all__ = ["decode_greedily", "embed_ids"]
 def embed_ids(model: Any, ids: Sequence[int]) -> torch.Tensor:
     """Return the embeddings of ids, (1, ids, hidden), as input of a transformers model's first layer."""
     layer = model.get_input_embeddings()
-    embeds: torch.Tensor = layer(torch.tensor([ids], device=layer.weight.device))
-    return embeds
+    return cast(torch.Tensor, layer(torch.tensor([ids], device=layer.weight.device)))
 
 
 def decode_greedily(

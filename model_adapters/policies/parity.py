@@ -91,11 +91,7 @@ def load_policy(name: str, options: Mapping[str, str]) -> Policy:
 
 
 def reference_policy(url: str, unnorm_key: str | None) -> HttpPolicy:
-    """Return the other implementation as a policy.
-
-    Args:
-        url: address of a server with the `/act` convention.
-        unnorm_key: dataset whose statistics scale its actions.
+    """Return the other implementation, a server with the `/act` convention, as a policy.
 
     Raises:
         UsageError: the address is not valid.

@@ -32,15 +32,12 @@ class Network(Protocol):
         Raises:
             ModelError: the scores are not finite.
         """
-        ...
 
 
 def arm_deltas(name: str, actions: Actions) -> tuple[ArmDelta, ...]:
     """Return actions as steps of an arm, with the gripper clipped to 0 (closed) to 1 (open).
 
-    Args:
-        name: name of the policy, for the message.
-        actions: actions, (steps, 7): x, y, z, roll, pitch, yaw, gripper.
+    Actions are (steps, 7): x, y, z, roll, pitch, yaw, gripper.
 
     Raises:
         ModelError: there are no actions, they have another shape, or one is not finite.

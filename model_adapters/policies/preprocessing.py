@@ -8,12 +8,7 @@ __all__ = ["normalise", "resize"]
 
 
 def resize(image: Image.Image, size: int) -> torch.Tensor:
-    """Return a frame, squashed to a square by PIL's bicubic filter, as (3, size, size) with values from 0 to 1.
-
-    Args:
-        image: the frame, RGB.
-        size: width and height in pixels.
-    """
+    """Return an RGB frame, squashed to a square of pixels by PIL's bicubic filter, (3, size, size), from 0 to 1."""
     pixels = np.asarray(image.resize((size, size), Image.Resampling.BICUBIC), dtype=np.float32)
     return torch.from_numpy(pixels / 255).permute(2, 0, 1).contiguous()
 

@@ -72,11 +72,7 @@ class Layout:
         return {**self.shapes, **self.unused}
 
     def check(self, actual: Mapping[str, Shape], pretrained: str) -> None:
-        """Check that files have exactly these keys.
-
-        Args:
-            actual: shapes of the files' keys.
-            pretrained: name of the checkpoint, for the message.
+        """Check that files have exactly these keys, in these shapes.
 
         Raises:
             ModelError: keys are missing, unknown or of another shape; the message has the first ones and their number.

@@ -1,6 +1,5 @@
 """An OpenVLA of two layers with random weights and the vocabulary of the real one."""
 
-from collections.abc import Mapping
 from typing import Any
 
 import msgspec
@@ -21,35 +20,30 @@ _TOWERS = (TowerShape("dinov2", 32, 3, 2, 64), TowerShape("siglip", 48, 3, 2, 80
 _IMAGE_SIZE = 56
 
 
-def _config() -> dict[str, Any]:
-    return {
-        "model_type": MODEL_TYPE,
-        "architectures": ["OpenVLAForActionPrediction"],
-        "torch_dtype": "float32",
-        "timm_model_ids": list(TOWERS),
-        "timm_override_act_layers": [None, None],
-        "image_sizes": [_IMAGE_SIZE, _IMAGE_SIZE],
-        "image_resize_strategy": "resize-naive",
-        "use_fused_vision_backbone": True,
-        "n_action_bins": 256,
-        "pad_to_multiple_of": 64,
-        "norm_stats": {"bridge_orig": BRIDGE},
-        "vision_towers": [msgspec.to_builtins(tower) for tower in _TOWERS],
-        "text_config": {
-            "model_type": "llama",
-            "vocab_size": 32_064,  # gives action ids and Llama's token of a space their published numbers
-            "hidden_size": 64,
-            "intermediate_size": 128,
-            "num_hidden_layers": 2,
-            "num_attention_heads": 4,
-            "num_key_value_heads": 4,
-            "pad_token_id": 32_000,
-        },
-    }
-
-
-def _files() -> Mapping[str, Mapping[str, Any]]:
-    return {"config.json": _config()}
+_CONFIG: dict[str, Any] = {
+    "model_type": MODEL_TYPE,
+    "architectures": ["OpenVLAForActionPrediction"],
+    "torch_dtype": "float32",
+    "timm_model_ids": list(TOWERS),
+    "timm_override_act_layers": [None, None],
+    "image_sizes": [_IMAGE_SIZE, _IMAGE_SIZE],
+    "image_resize_strategy": "resize-naive",
+    "use_fused_vision_backbone": True,
+    "n_action_bins": 256,
+    "pad_to_multiple_of": 64,
+    "norm_stats": {"bridge_orig": BRIDGE},
+    "vision_towers": [msgspec.to_builtins(tower) for tower in _TOWERS],
+    "text_config": {
+        "model_type": "llama",
+        "vocab_size": 32_064,  # gives action ids and Llama's token of a space their published numbers
+        "hidden_size": 64,
+        "intermediate_size": 128,
+        "num_hidden_layers": 2,
+        "num_attention_heads": 4,
+        "num_key_value_heads": 4,
+        "pad_token_id": 32_000,
+    },
+}
 
 
 def _tokenizer() -> Tokenizer:
@@ -58,7 +52,7 @@ def _tokenizer() -> Tokenizer:
 
 
 def _layout() -> Layout:
-    config = msgspec.convert(_config(), OpenVLAConfig)
+    config = msgspec.convert(_CONFIG, OpenVLAConfig)
     with empty_parameters():
         weights = OpenVLAWeights(_TOWERS, _IMAGE_SIZE, config.language("sdpa"))
     return weights_layout(weights, _TOWERS)
@@ -68,4 +62,4 @@ class OpenVLATiny(TinyPolicyAdapter):
     """The adapter `openvla-tiny`."""
 
     Options = OpenVLATinyOptions
-    twin = PolicyTwin(files=_files, tokenizer=_tokenizer, layout=_layout, load=load_openvla)
+    twin = PolicyTwin(files={"config.json": _CONFIG}, tokenizer=_tokenizer, layout=_layout, load=load_openvla)

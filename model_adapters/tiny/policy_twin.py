@@ -36,52 +36,38 @@ class PolicyTwin:
     """Description of a tiny policy of a family.
 
     Attributes:
-        files: builds the JSON files beside the weights, by name.
+        files: JSON files beside the weights, by name.
         tokenizer: builds the tokenizer.
         layout: builds the layout of the weights.
         load: loader of the family.
     """
 
-    files: Callable[[], Mapping[str, Mapping[str, Any]]]
+    files: Mapping[str, Mapping[str, Any]]
     tokenizer: Callable[[], Tokenizer]
     layout: Callable[[], Layout]
     load: Callable[[str, PolicyCheckpoint, Any], VlaPolicy]
 
     def save(self, folder: Path, seed: int) -> None:
-        """Write a checkpoint that the family's adapter loads.
-
-        Args:
-            folder: folder of the checkpoint; it is created.
-            seed: seed of the weights.
-        """
+        """Write a checkpoint with weights of this seed, which the family's adapter loads; the folder is created."""
         folder.mkdir(parents=True, exist_ok=True)
-        for name, content in self.files().items():
+        for name, content in self.files.items():
             (folder / name).write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
         self.tokenizer().save(str(folder / "tokenizer.json"))
         save_file(_draw_weights(self.layout().all_shapes(), seed), folder / "model.safetensors")
 
-    def build(self, name: str, options: PolicyOptions, seed: int) -> VlaPolicy:
-        """Return the policy with random weights of this seed, loaded from a temporary checkpoint."""
-        with ScratchFolder() as folder:
-            self.save(folder, seed)
-            return self.load(name, PolicyCheckpoint(folder, name, {"checkpoint": name, "seed": seed}), options)
-
 
 class TinyPolicyAdapter:
-    """Base of the adapters of tiny policies.
-
-    Attributes:
-        Options: options of the adapter.
-        twin: description of the policy.
-    """
+    """Base of the adapters of tiny policies."""
 
     Options: ClassVar[type]
     twin: ClassVar[PolicyTwin]
 
     @classmethod
     def build(cls, name: str, options: PolicyOptions, seed: int) -> VlaPolicy:
-        """Build a policy with random weights of this seed."""
-        return cls.twin.build(name, options, seed)
+        """Build a policy with random weights of this seed, loaded from a temporary checkpoint."""
+        with ScratchFolder() as folder:
+            cls.twin.save(folder, seed)
+            return cls.twin.load(name, PolicyCheckpoint(folder, name, {"checkpoint": name, "seed": seed}), options)
 
 
 def _draw_weights(shapes: Mapping[str, Shape], seed: int) -> dict[str, torch.Tensor]:

@@ -101,10 +101,5 @@ class Qwen25VLTiny(TinyAdapter):
 
 
 def save_tiny_checkpoint(folder: Path, seed: int) -> None:
-    """Write the tiny Qwen2.5-VL as a checkpoint that `qwen2.5-vl` and transformers' auto classes load.
-
-    Args:
-        folder: folder of the checkpoint; it is created.
-        seed: seed of the weights.
-    """
+    """Write the tiny Qwen2.5-VL as a checkpoint, which `qwen2.5-vl` and transformers' auto classes load."""
     Qwen25VLTiny.twin.save(folder, seed)

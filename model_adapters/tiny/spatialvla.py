@@ -1,7 +1,7 @@
 """A SpatialVLA of two layers with random weights and the action tokens of the real one."""
 
 import math
-from collections.abc import Mapping
+from copy import deepcopy
 from typing import Any
 
 import msgspec
@@ -37,86 +37,82 @@ _TRANSLATION, _ROTATION = ("theta_bins", "phi_bins", "r_bins"), ("roll_bins", "p
 def _borders(n_bins: int, low: float, high: float, mean: float, deviation: float) -> list[float]:
     gaussian = norm(mean, deviation)
     likelihood = np.linspace(float(gaussian.cdf(low)), float(gaussian.cdf(high)), n_bins + 1)
-    borders: list[float] = np.clip(gaussian.ppf(likelihood), low, high).tolist()
-    return borders
+    return list(np.clip(gaussian.ppf(likelihood), low, high).tolist())
 
 
-def _text() -> dict[str, Any]:
-    return {
-        "model_type": "gemma2",
-        "vocab_size": _BEGIN + _N_ACTIONS,
-        "hidden_size": 64,
-        "intermediate_size": 128,
+_TEXT: dict[str, Any] = {
+    "model_type": "gemma2",
+    "vocab_size": _BEGIN + _N_ACTIONS,
+    "hidden_size": 64,
+    "intermediate_size": 128,
+    "num_hidden_layers": 2,
+    "num_attention_heads": 4,
+    "num_key_value_heads": 2,
+    "head_dim": 16,
+    "query_pre_attn_scalar": 16,
+    "tie_word_embeddings": False,
+    "hidden_act": "gelu_pytorch_tanh",
+}
+
+
+_ZOE: dict[str, Any] = {
+    "model_type": "zoedepth",
+    "backbone": None,
+    "backbone_config": {
+        "model_type": "beit",
+        "image_size": 96,
+        "patch_size": 16,
+        "hidden_size": 32,
+        "intermediate_size": 64,
+        "num_hidden_layers": 4,
+        "num_attention_heads": 2,
+        "out_features": ["stage1", "stage2", "stage3", "stage4"],
+        "reshape_hidden_states": False,
+        "use_relative_position_bias": True,
+    },
+    "backbone_hidden_size": 32,
+    "neck_hidden_sizes": [8, 8, 16, 16],
+    "fusion_hidden_size": 16,
+    "bottleneck_features": 16,
+    "num_relative_features": 8,
+    "bin_embedding_dim": 16,
+    "num_attractors": [4, 2, 2, 1],
+    "num_patch_transformer_layers": 4,  # transformers ignores this and runs four
+    "patch_transformer_hidden_size": 128,
+    "patch_transformer_intermediate_size": 32,
+    "patch_transformer_num_attention_heads": 4,
+    "bin_configurations": [
+        {"name": "nyu", "n_bins": 16, "min_depth": 1e-3, "max_depth": 10.0},
+        {"name": "kitti", "n_bins": 16, "min_depth": 1e-3, "max_depth": 80.0},
+    ],
+}
+
+
+_CONFIG: dict[str, Any] = {
+    "model_type": MODEL_TYPE,
+    "architectures": ["SpatialVLAForConditionalGeneration"],
+    "torch_dtype": "float32",
+    "image_token_index": _BEGIN - 1,
+    "action_token_begin_idx": _BEGIN,
+    "spatial_token_num": _N_ACTIONS,
+    "ego3d_patch_reso": 2,
+    "n_freqs": 8,
+    "projection_dim": 64,
+    "use_spatial_token": True,
+    "use_vision_zoe": True,
+    "text_config": _TEXT,
+    "vision_config": {
+        "model_type": "siglip_vision_model",
+        "hidden_size": 32,
+        "intermediate_size": 64,
         "num_hidden_layers": 2,
-        "num_attention_heads": 4,
-        "num_key_value_heads": 2,
-        "head_dim": 16,
-        "query_pre_attn_scalar": 16,
-        "tie_word_embeddings": False,
-        "hidden_act": "gelu_pytorch_tanh",
-    }
-
-
-def _zoe() -> dict[str, Any]:
-    return {
-        "model_type": "zoedepth",
-        "backbone": None,
-        "backbone_config": {
-            "model_type": "beit",
-            "image_size": 96,
-            "patch_size": 16,
-            "hidden_size": 32,
-            "intermediate_size": 64,
-            "num_hidden_layers": 4,
-            "num_attention_heads": 2,
-            "out_features": ["stage1", "stage2", "stage3", "stage4"],
-            "reshape_hidden_states": False,
-            "use_relative_position_bias": True,
-        },
-        "backbone_hidden_size": 32,
-        "neck_hidden_sizes": [8, 8, 16, 16],
-        "fusion_hidden_size": 16,
-        "bottleneck_features": 16,
-        "num_relative_features": 8,
-        "bin_embedding_dim": 16,
-        "num_attractors": [4, 2, 2, 1],
-        "num_patch_transformer_layers": 4,  # transformers ignores this and runs four
-        "patch_transformer_hidden_size": 128,
-        "patch_transformer_intermediate_size": 32,
-        "patch_transformer_num_attention_heads": 4,
-        "bin_configurations": [
-            {"name": "nyu", "n_bins": 16, "min_depth": 1e-3, "max_depth": 10.0},
-            {"name": "kitti", "n_bins": 16, "min_depth": 1e-3, "max_depth": 80.0},
-        ],
-    }
-
-
-def _config() -> dict[str, Any]:
-    return {
-        "model_type": MODEL_TYPE,
-        "architectures": ["SpatialVLAForConditionalGeneration"],
-        "torch_dtype": "float32",
-        "image_token_index": _BEGIN - 1,
-        "action_token_begin_idx": _BEGIN,
-        "spatial_token_num": _N_ACTIONS,
-        "ego3d_patch_reso": 2,
-        "n_freqs": 8,
-        "projection_dim": 64,
-        "use_spatial_token": True,
-        "use_vision_zoe": True,
-        "text_config": _text(),
-        "vision_config": {
-            "model_type": "siglip_vision_model",
-            "hidden_size": 32,
-            "intermediate_size": 64,
-            "num_hidden_layers": 2,
-            "num_attention_heads": 2,
-            "image_size": 56,
-            "patch_size": 14,
-            "vision_use_head": False,
-        },
-        "vision_zoe_config": _zoe(),
-    }
+        "num_attention_heads": 2,
+        "image_size": 56,
+        "patch_size": 14,
+        "vision_use_head": False,
+    },
+    "vision_zoe_config": _ZOE,
+}
 
 
 def _processor() -> dict[str, Any]:
@@ -145,10 +141,6 @@ def _processor() -> dict[str, Any]:
     }
 
 
-def _files() -> Mapping[str, Mapping[str, Any]]:
-    return {"config.json": _config(), "processor_config.json": _processor()}
-
-
 def _tokenizer() -> Tokenizer:
     actions = tuple(f"<ACTION{number:05d}>" for number in range(_N_ACTIONS))
     return train_tokenizer(
@@ -157,12 +149,18 @@ def _tokenizer() -> Tokenizer:
 
 
 def _layout() -> Layout:
+    config = msgspec.convert(deepcopy(_CONFIG), SpatialVLAConfig)  # transformers' configs may change nested ones
     with empty_parameters():
-        return SpatialVLAWeights(msgspec.convert(_config(), SpatialVLAConfig), "eager").layout()
+        return SpatialVLAWeights(config, "eager").layout()
 
 
 class SpatialVLATiny(TinyPolicyAdapter):
     """The adapter `spatialvla-tiny`."""
 
     Options = SpatialVLATinyOptions
-    twin = PolicyTwin(files=_files, tokenizer=_tokenizer, layout=_layout, load=load_spatialvla)
+    twin = PolicyTwin(
+        files={"config.json": _CONFIG, "processor_config.json": _processor()},
+        tokenizer=_tokenizer,
+        layout=_layout,
+        load=load_spatialvla,
+    )

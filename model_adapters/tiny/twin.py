@@ -72,11 +72,9 @@ class Twin:
         return draw_model(config, seed, ids[self.end], ids[self.pad], attn_implementation)
 
     def save(self, folder: Path, seed: int) -> None:
-        """Write a checkpoint that the family's adapter and transformers' auto classes load.
+        """Write a checkpoint that the family's adapter and transformers' auto classes load, with weights of this seed.
 
-        Args:
-            folder: folder of the checkpoint; it is created.
-            seed: seed of the weights.
+        The folder is created.
         """
         folder.mkdir(parents=True, exist_ok=True)
         tokenizer = self.tokenizer()
@@ -114,14 +112,7 @@ def draw_model(config: Any, seed: int, end_id: int, pad_id: int, attn_implementa
 
 
 def text_config(vocab_size: int, end_id: int, pad_id: int, **settings: Any) -> dict[str, Any]:
-    """Return the config of a tiny language model of two layers.
-
-    Args:
-        vocab_size: size of the vocabulary.
-        end_id: token that ends a turn.
-        pad_id: padding token.
-        settings: further settings, or others than the usual ones.
-    """
+    """Return the config of a tiny language model of two layers; settings add to the usual ones or replace them."""
     return {
         "vocab_size": vocab_size,
         "hidden_size": 64,
@@ -152,12 +143,7 @@ def siglip_config(patch_size: int) -> dict[str, Any]:
 
 
 class TinyAdapter:
-    """Base of the adapters of tiny models.
-
-    Attributes:
-        Options: options of the adapter.
-        twin: description of the model.
-    """
+    """Base of the adapters of tiny models."""
 
     Options: ClassVar[type] = TinyOptions
     twin: ClassVar[Twin]

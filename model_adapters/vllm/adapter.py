@@ -26,12 +26,7 @@ __all__ = ["HfVlmOnVllm", "LlavaOnevisionOnVllm", "PixtralOnVllm", "Qwen25VLOnVl
 
 
 class _FamilyOnVllm:
-    """Base of the adapters of one family.
-
-    Attributes:
-        Options: options of the family.
-        hf_adapter: adapter of the same family in transformers.
-    """
+    """Base of the adapters of one family, each with the adapter of the family in transformers."""
 
     Options: ClassVar[type] = VllmOptions
     hf_adapter: ClassVar[type[CheckpointAdapter]]

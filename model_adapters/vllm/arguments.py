@@ -15,11 +15,9 @@ _NO_VIDEO = 0  # otherwise vLLM reserves memory for the longest possible video
 
 
 def engine_arguments(folder: Path, options: EngineOptions) -> dict[str, Any]:
-    """Return the arguments of every model.
+    """Return the arguments of every model; the choice is vLLM's where an option is None.
 
-    Args:
-        folder: folder of the checkpoint, found or downloaded here, so that both engines run the same files.
-        options: options of the model; None leaves the choice to vLLM.
+    The checkpoint's folder is found or downloaded here, so that both engines run the same files.
     """
     optional = {
         "max_model_len": options.max_model_len,
@@ -46,12 +44,7 @@ def model_arguments(
 ) -> dict[str, Any]:
     """Return the arguments of a model that answers in conversations.
 
-    Args:
-        folder: folder of the checkpoint.
-        config: config of the checkpoint, including a context extension.
-        options: options of the model.
-        max_tokens: most tokens of context and reply together.
-        max_frames: most frames of a request.
+    A context extension is in the config already. `max_tokens` limits context and reply together.
 
     Raises:
         ModelError: vLLM does not support the context extension for this model.
@@ -70,12 +63,7 @@ def model_arguments(
 
 
 def token_limit(pretrained: str, limit: int | None, options: VllmOptions) -> int:
-    """Return the most tokens of context and reply together.
-
-    Args:
-        pretrained: name of the checkpoint, for the message.
-        limit: limit of the checkpoint, extended, or None if its config has none.
-        options: options of the model.
+    """Return the most tokens of context and reply together: the options' or the checkpoint's limit, which is extended.
 
     Raises:
         ModelError: neither the options nor the config has a limit.
@@ -92,13 +80,9 @@ def frame_limit(max_tokens: int, tokens_per_frame: int, options: VllmOptions) ->
 
 
 def rope_overrides(config: Any, rope: str) -> dict[str, Any]:
-    """Return a context extension as overrides of the language model's config, in vLLM's form.
+    """Return a context extension `TYPE:FACTOR` as overrides of the language model's config, in vLLM's form.
 
-    vLLM replaces `rope_parameters` as a whole, so all of them are given.
-
-    Args:
-        config: config of the model, with the extension written by `apply_rope`.
-        rope: `TYPE:FACTOR`.
+    vLLM replaces `rope_parameters` as a whole, so all of them are given, as `apply_rope` has written them.
 
     Raises:
         ModelError: vLLM would silently drop the model's three-axis positions.

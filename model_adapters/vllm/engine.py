@@ -13,7 +13,7 @@ from PIL import Image
 
 from infthor_eval.errors import ModelError, wrap_errors
 
-__all__ = ["Engine", "EngineOutput", "EngineRequest", "SamplingSettings", "import_vllm"]
+__all__ = ["Engine", "EngineOutput", "EngineRequest", "import_vllm"]
 
 
 @dataclass(frozen=True)
@@ -40,19 +40,6 @@ class EngineRequest:
         return prompt
 
 
-@dataclass(frozen=True, kw_only=True)
-class SamplingSettings:
-    """Decoding of requests.
-
-    Attributes:
-        settings: arguments of `vllm.SamplingParams`.
-        choices: allowed replies; if there are any, the reply is one of them.
-    """
-
-    settings: Mapping[str, Any]
-    choices: Sequence[str] = ()
-
-
 @dataclass(frozen=True)
 class EngineOutput:
     """vLLM's output for one request.
@@ -72,9 +59,6 @@ class EngineOutput:
 
 def import_vllm(name: str) -> Any:
     """Return the package vllm.
-
-    Args:
-        name: name of the model, for the message.
 
     Raises:
         ModelError: the package is not installed, or cannot be imported.
@@ -113,8 +97,12 @@ class Engine:
         with self._wrap_errors("does not start", hint):
             self._llm = self._vllm.LLM(**arguments)
 
-    def generate(self, requests: Sequence[EngineRequest], sampling: SamplingSettings) -> list[EngineOutput]:
-        """Continue all requests independently.
+    def generate(
+        self, requests: Sequence[EngineRequest], settings: Mapping[str, Any], choices: Sequence[str] = ()
+    ) -> list[EngineOutput]:
+        """Continue all requests independently, with these arguments of `vllm.SamplingParams`.
+
+        If there are choices, each reply is one of them.
 
         Raises:
             ModelError: vLLM refuses one, memory ran out, or it died; no output is returned then.
@@ -123,7 +111,9 @@ class Engine:
             return []
         with self._wrap_errors("fails on the request", "use fewer frames, or run the command again, which resumes"):
             outputs = self._llm.generate(
-                [request.prompt() for request in requests], sampling_params=self._params(sampling), use_tqdm=False
+                [request.prompt() for request in requests],
+                sampling_params=self._params(settings, choices),
+                use_tqdm=False,
             )
             return [_engine_output(output) for output in outputs]
 
@@ -132,11 +122,10 @@ class Engine:
         del self._llm
         gc.collect()
 
-    def _params(self, sampling: SamplingSettings) -> Any:
-        settings = dict(sampling.settings)
-        if sampling.choices:
+    def _params(self, settings: Mapping[str, Any], choices: Sequence[str]) -> Any:
+        if choices:
             params = importlib.import_module("vllm.sampling_params")
-            settings["structured_outputs"] = params.StructuredOutputsParams(choice=list(sampling.choices))
+            settings = {**settings, "structured_outputs": params.StructuredOutputsParams(choice=list(choices))}
         return self._vllm.SamplingParams(**settings)
 
     def _wrap_errors(self, problem: str, hint: str) -> AbstractContextManager[None]:

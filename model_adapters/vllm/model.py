@@ -13,7 +13,7 @@ from model_adapters.hf.loaded import LoadedCheckpoint
 from model_adapters.hf.prompt import Frame, Piece, n_common, n_tokens
 from model_adapters.hf.replies import reply_text, stop_ids
 from model_adapters.protocols import Capabilities, Decoding, Reply, Turn
-from model_adapters.vllm.engine import Engine, EngineOutput, EngineRequest, SamplingSettings
+from model_adapters.vllm.engine import Engine, EngineOutput, EngineRequest
 from model_adapters.vllm.options import VllmOptions
 
 __all__ = ["VllmModel"]
@@ -27,15 +27,7 @@ class VllmModel(CheckpointModel):
     """A checkpoint in vLLM behind the `Model` protocol.
 
     Prompts are written here, as for transformers, and go to vLLM as token ids with one placeholder per frame. vLLM's
-    prefix cache finds what requests share.
-
-    Args:
-        name: name in the registry.
-        loaded: the checkpoint without weights.
-        engine: vLLM with the weights.
-        options: options of the model.
-        max_tokens: most tokens of context and reply together.
-        max_frames: most frames of a request.
+    prefix cache finds what requests share. `loaded` is the checkpoint without weights, which the engine has.
     """
 
     def __init__(
@@ -89,10 +81,7 @@ class VllmModel(CheckpointModel):
             "prefix_caching": options.prefix_caching,
             "batch_invariant": self._engine.batch_invariant,
             "seed": options.seed,
-            "generation": {
-                "repetition_penalty": loaded.generation.repetition_penalty,
-                "end_ids": sorted(self._ends),
-            },
+            "generation": {"repetition_penalty": loaded.generation.repetition_penalty, "end_ids": sorted(self._ends)},
         }
 
     def close(self) -> None:
@@ -110,12 +99,11 @@ class VllmModel(CheckpointModel):
             prompts = [self.pieces(turns) for turns in conversations]
         for prompt in prompts:
             self._check_size(prompt, decoding)
-        sampling = self._sampling(decoding)
-        requests = self._requests(prompts)
+        settings, requests = self._settings(decoding), self._requests(prompts)
         n_first = 1 if self._share_uncached_prefix(prompts) else 0
         outputs = [
-            *self._engine.generate(requests[:n_first], sampling),
-            *self._engine.generate(requests[n_first:], sampling),
+            *self._engine.generate(requests[:n_first], settings, decoding.choices),
+            *self._engine.generate(requests[n_first:], settings, decoding.choices),
         ]
         self._last_prompt = prompts[-1] if prompts else self._last_prompt
         return [self._reply(prompt, output, decoding) for prompt, output in zip(prompts, outputs, strict=True)]
@@ -132,7 +120,7 @@ class VllmModel(CheckpointModel):
         if n_frames > self._max_frames:
             raise ModelError(f"{n_frames} frames are more than max_frames={self._max_frames} of {self.name}; raise it")
 
-    def _sampling(self, decoding: Decoding) -> SamplingSettings:
+    def _settings(self, decoding: Decoding) -> dict[str, Any]:
         read_choices(self._loaded.tokenizer, decoding)  # refuses choices that are longer than the reply may be
         settings: dict[str, Any] = {
             "max_tokens": decoding.max_new_tokens,
@@ -146,7 +134,7 @@ class VllmModel(CheckpointModel):
             # vLLM searches the text for stop strings, in which special tokens do not appear: these stop by their id.
             ends = self._ends | stop_ids(self._loaded.tokenizer, decoding)
             settings |= {"stop": list(decoding.stop), "stop_token_ids": sorted(ends)}
-        return SamplingSettings(settings=settings, choices=decoding.choices)
+        return settings
 
     def _requests(self, prompts: Sequence[Sequence[Piece]]) -> list[EngineRequest]:
         frames = {piece.digest: piece.ref for prompt in prompts for piece in prompt if isinstance(piece, Frame)}

@@ -14,7 +14,7 @@ from model_adapters.policies.policy import VlaPolicy
 from model_adapters.policies.statistics import ACTION_SIZE, Actions
 from model_adapters.protocols import Capabilities
 from model_adapters.vllm.arguments import engine_arguments
-from model_adapters.vllm.engine import Engine, EngineRequest, SamplingSettings, import_vllm
+from model_adapters.vllm.engine import Engine, EngineRequest, import_vllm
 from model_adapters.vllm.options import OpenVLAOnVllmOptions, VllmPolicyOptions
 
 __all__ = ["OpenVLAOnVllm", "VllmPolicy"]
@@ -52,13 +52,7 @@ class OpenVLAOnVllm:
 
 
 class _VllmNetwork:
-    """A network that lets vLLM decode the action tokens.
-
-    Args:
-        name: name of the policy, for messages.
-        engine: vLLM with the weights.
-        description: the checkpoint without weights.
-    """
+    """A network that lets vLLM decode the action tokens."""
 
     def __init__(self, name: str, engine: Engine, description: OpenVLADescription) -> None:
         self.engine = engine
@@ -72,22 +66,14 @@ class _VllmNetwork:
         if constrained:
             settings["allowed_token_ids"] = list(action_ids)
         request = EngineRequest(prompt_ids(self._description.tokenizer, instruction), [image])
-        (output,) = self.engine.generate([request], SamplingSettings(settings=settings))
+        (output,) = self.engine.generate([request], settings)
         if len(output.ids) != ACTION_SIZE:
             raise ModelError(f"{self._name}: vLLM wrote {len(output.ids)} action tokens, not {ACTION_SIZE}; report it")
         return self._description.bins.decode(np.clip(output.ids, action_ids.start, action_ids.stop - 1).tolist())
 
 
 class VllmPolicy(VlaPolicy):
-    """A policy whose weights are in vLLM.
-
-    Args:
-        name: name in the registry.
-        network: network that uses vLLM.
-        description: the checkpoint without weights.
-        options: options of the policy.
-        identity: identity of checkpoint, dataset and engine, as JSON values.
-    """
+    """A policy whose weights are in vLLM."""
 
     def __init__(
         self,

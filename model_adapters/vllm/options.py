@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from model_adapters.options.checkpoints import CheckpointReading
+from model_adapters.options.checkpoints import CheckpointReading, CheckpointSource
 from model_adapters.options.families import (
     HfVlmOptions,
     LlavaOnevisionOptions,
@@ -71,11 +71,7 @@ class EngineOptions:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        """Refuse values that vLLM would refuse only after minutes of loading.
-
-        Raises:
-            ValueError: a value is not valid; the message names the option.
-        """
+        """Raise `ValueError` for values that vLLM would refuse only after minutes of loading."""
         if self.dtype not in _DTYPES:
             raise ValueError(f"dtype={self.dtype} is not {', '.join(_DTYPES)}")
         if not 0 < self.gpu_memory_utilization <= 1:
@@ -109,16 +105,8 @@ class VllmOptions(EngineOptions, CheckpointReading):
 
 
 @dataclass(frozen=True, kw_only=True)
-class VllmPolicyOptions(EngineOptions, ActionOptions):
-    """Options of a policy.
-
-    Attributes:
-        pretrained: hub id or folder.
-        revision: branch, tag or commit on the hub; the default branch where None.
-    """
-
-    pretrained: str
-    revision: str | None = None
+class VllmPolicyOptions(CheckpointSource, EngineOptions, ActionOptions):
+    """Options of a policy."""
 
     def __post_init__(self) -> None:
         super().__post_init__()

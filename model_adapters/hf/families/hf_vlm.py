@@ -48,13 +48,7 @@ R = TypeVar("R", bound=CheckpointReading)
 
 
 class ProcessorFamily(PlainFamily):
-    """A family whose processor expands frames.
-
-    Args:
-        model: a transformers model with `get_image_features`.
-        image_processor: image processor of the model.
-        tokenizer: tokenizer of the model.
-        processor: processor of the model.
+    """A family whose processor expands frames and whose model has `get_image_features`.
 
     Raises:
         ModelError: the processor names no image token.
@@ -178,11 +172,7 @@ def load_processor(located: LocatedCheckpoint[Any]) -> Any:
 def _compare_with_plain_model(
     model: TransformersModel | UncachedModel, loaded: LoadedCheckpoint, processor: Any, pretrained: str
 ) -> None:
-    """Check that the shared prefix gives the token ids and logits of the processor and the plain model on a sample.
-
-    Raises:
-        ModelError: model and processor do not fit, or token ids or logits differ.
-    """
+    """Raise `ModelError` unless a sample has the processor's token ids and the plain model's logits."""
     hint = f"{loaded.model.config.model_type} cannot be run with shared prefixes; use share_prefix=false"
     shared = None
     with tempfile.TemporaryDirectory() as folder, wrap_mismatch_errors(pretrained):

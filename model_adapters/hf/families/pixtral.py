@@ -18,11 +18,6 @@ __all__ = ["Pixtral", "PixtralFamily"]
 class PixtralFamily(PlainFamily):
     """The family of LLaVA models with Pixtral's vision tower.
 
-    Args:
-        model: a `LlavaForConditionalGeneration`.
-        image_processor: a `PixtralImageProcessor`.
-        tokenizer: tokenizer with the tokens that end rows and frames.
-
     Raises:
         ModelError: the checkpoint is another LLaVA, or its tokenizer lacks these tokens.
     """

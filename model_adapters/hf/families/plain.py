@@ -12,15 +12,10 @@ __all__ = ["PlainFamily"]
 
 
 class PlainFamily:
-    """Base of families whose positions are consecutive and whose frames consist of equal slots.
+    """Base of families with consecutive positions, whose frames consist of equal slots, `config.image_token_id`.
 
     Subclasses compute features. The slots of a frame are counted on a blank image of its size, so the count is always
     that of the model.
-
-    Args:
-        model: a transformers model with `config.image_token_id`.
-        image_processor: image processor of the model.
-        tokenizer: tokenizer of the model.
     """
 
     def __init__(self, model: Any, image_processor: Any, tokenizer: Any) -> None:

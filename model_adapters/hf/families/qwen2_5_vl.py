@@ -16,13 +16,7 @@ __all__ = ["Qwen25VL", "Qwen25VLFamily"]
 
 
 class Qwen25VLFamily(PlainFamily):
-    """The family of Qwen2.5-VL.
-
-    Args:
-        model: a `Qwen2_5_VLForConditionalGeneration`.
-        image_processor: a `Qwen2VLImageProcessor`.
-        tokenizer: tokenizer of the model.
-    """
+    """The family of Qwen2.5-VL."""
 
     def __init__(self, model: Any, image_processor: Any, tokenizer: Any) -> None:
         super().__init__(model, image_processor, tokenizer)
@@ -47,7 +41,7 @@ class Qwen25VLFamily(PlainFamily):
         """Return temporal, height and width positions, (3, 1, tokens).
 
         The model's own rule counts from the first token, and all positions shift with it. So a span that cuts no frame
-        is numbered by itself and shifted, which makes chunked prefill equal to one pass.
+        is numbered alone and shifted, which makes chunked prefill equal to one pass.
         """
         if not sizes:
             return torch.arange(start, start + len(ids), device=ids.device).expand(3, 1, -1)

@@ -17,12 +17,7 @@ __all__ = ["HttpPolicy", "VlaHttp"]
 
 
 class HttpPolicy:
-    """A policy behind a server.
-
-    Args:
-        name: name in the registry.
-        options: options of the requests.
-    """
+    """A policy behind a server."""
 
     def __init__(self, name: str, options: VlaHttpOptions) -> None:
         self.name = name

@@ -25,12 +25,9 @@ class _NoRedirect(urllib.request.HTTPRedirectHandler):
 
 
 class JsonClient:
-    """Posts JSON to one address.
+    """Posts JSON to one address, http or https.
 
-    Args:
-        url: address, http or https.
-        timeout_s: limit for a whole reply, in seconds.
-        retries: repetitions of a request after a failed connection.
+    A whole reply may take `timeout_s` seconds; a failed connection is tried again `retries` times.
     """
 
     def __init__(self, url: str, *, timeout_s: float, retries: int) -> None:

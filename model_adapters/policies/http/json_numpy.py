@@ -25,10 +25,7 @@ def encode_array(array: npt.NDArray[Any]) -> dict[str, Any]:
 
 
 def decode_numbers(value: Any) -> npt.NDArray[np.float64]:
-    """Return the numbers in a reply: lists, arrays of json_numpy, lists of either, or a text with such JSON.
-
-    Args:
-        value: the decoded JSON.
+    """Return the numbers in a reply's JSON: lists, arrays of json_numpy, lists of either, or a text with such JSON.
 
     Raises:
         ValueError: the value is anything else, or ragged.

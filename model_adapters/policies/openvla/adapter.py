@@ -43,11 +43,7 @@ class OpenVLADescription:
 
 
 def describe_openvla(checkpoint: PolicyCheckpoint, unnorm_key: str | None) -> OpenVLADescription:
-    """Read the files beside the weights of an OpenVLA.
-
-    Args:
-        checkpoint: the checkpoint.
-        unnorm_key: dataset whose statistics are used, or None if there is only one.
+    """Read the files beside the weights of an OpenVLA; without an unnorm_key, there must be one dataset only.
 
     Raises:
         ModelError: the checkpoint is of another family, or damaged.
@@ -67,13 +63,7 @@ def describe_openvla(checkpoint: PolicyCheckpoint, unnorm_key: str | None) -> Op
 
 
 def load_openvla(name: str, checkpoint: PolicyCheckpoint, options: PolicyOptions) -> VlaPolicy:
-    """Load an OpenVLA; see `PolicyAdapter.build`.
-
-    Args:
-        name: name in the registry.
-        checkpoint: the checkpoint.
-        options: options of the policy.
-    """
+    """Load an OpenVLA; see `PolicyAdapter.build`."""
     description = describe_openvla(checkpoint, options.unnorm_key)
     config = description.config
     device, dtype = checkpoint.resolve_placement(options)

@@ -29,12 +29,7 @@ def prompt(instruction: str) -> str:
 
 
 def prompt_ids(tokenizer: Tokenizer, instruction: str) -> list[int]:
-    """Return the ids of the prompt, ending with the space that precedes actions.
-
-    Args:
-        tokenizer: tokenizer of the language model, which adds the begin token.
-        instruction: instruction of the task.
-    """
+    """Return the ids of the prompt, from the tokenizer's begin token to the space that precedes actions."""
     ids: list[int] = tokenizer.encode(prompt(instruction)).ids
     return ids if ids[-1] == _SPACE else [*ids, _SPACE]
 
@@ -67,13 +62,7 @@ class _OpenVLAProjector(nn.Module):
 
 
 class OpenVLAWeights(nn.Module):
-    """All modules with weights, under the names of the published checkpoint.
-
-    Args:
-        towers: sizes of DINOv2 and SigLIP.
-        image_size: image size of both towers, in pixels.
-        language: config of the language model.
-    """
+    """All modules with weights, under the names of the published checkpoint; the image size is in pixels."""
 
     def __init__(self, towers: tuple[TowerShape, TowerShape], image_size: int, language: LlamaConfig) -> None:
         super().__init__()
@@ -83,12 +72,7 @@ class OpenVLAWeights(nn.Module):
 
 
 def weights_layout(weights: OpenVLAWeights, towers: tuple[TowerShape, TowerShape]) -> Layout:
-    """Return the layout of the checkpoint: the key of every parameter is its name.
-
-    Args:
-        weights: modules created within `empty_parameters()`.
-        towers: sizes of DINOv2 and SigLIP.
-    """
+    """Return the layout of the checkpoint, of modules without memory; the key of every parameter is its name."""
     parts = zip(("featurizer", "fused_featurizer"), towers, strict=True)
     unused = {
         f"vision_backbone.{part}.{key}": shape for part, tower in parts for key, shape in unused_keys(tower).items()

@@ -63,9 +63,8 @@ class _Mlp(nn.Module):
         self.fc2 = nn.Linear(shape.mlp_width, shape.width)
 
     def forward(self, tokens: torch.Tensor) -> torch.Tensor:
-        return self.fc2(
-            gelu(self.fc1(tokens))
-        )  # timm uses the exact GELU, also for SigLIP, which was trained with the tanh approximation
+        # timm uses the exact GELU, also for SigLIP, which was trained with the tanh approximation.
+        return self.fc2(gelu(self.fc1(tokens)))
 
 
 class _LayerScale(nn.Module):
@@ -103,12 +102,7 @@ class _PatchEmbedding(nn.Module):
 
 
 class Tower(nn.Module):
-    """A tower up to its second-to-last block, whose features OpenVLA uses without a final norm.
-
-    Args:
-        shape: sizes of the tower.
-        image_size: width and height of its images in pixels.
-    """
+    """A tower up to its second-to-last block, whose features OpenVLA uses without a final norm."""
 
     def __init__(self, shape: TowerShape, image_size: int) -> None:
         super().__init__()

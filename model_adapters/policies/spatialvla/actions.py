@@ -89,13 +89,7 @@ class SpatialBins:
 
     @classmethod
     def of(cls, config: ProcessorConfig, begin: int, n_tokens: int, pretrained: str) -> "SpatialBins":
-        """Return the bins of a checkpoint.
-
-        Args:
-            config: config of its processor.
-            begin: id of its first action token.
-            n_tokens: number of its action tokens.
-            pretrained: name of the checkpoint, for messages.
+        """Return the bins of a checkpoint, by its first action token, their number and the config of its processor.
 
         Raises:
             ModelError: the numbers of bins and tokens contradict each other, or translations are not spherical.

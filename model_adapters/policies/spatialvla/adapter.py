@@ -21,13 +21,7 @@ MODEL_TYPE = "spatialvla"
 
 
 def load_spatialvla(name: str, checkpoint: PolicyCheckpoint, options: SpatialVLAOptions) -> VlaPolicy:
-    """Load a SpatialVLA; see `PolicyAdapter.build`.
-
-    Args:
-        name: name in the registry.
-        checkpoint: the checkpoint.
-        options: options of the policy.
-    """
+    """Load a SpatialVLA; see `PolicyAdapter.build`."""
     checkpoint.require_model_type(MODEL_TYPE)
     config = checkpoint.read("config.json", SpatialVLAConfig)
     processor = checkpoint.read("processor_config.json", ProcessorConfig)
@@ -46,10 +40,7 @@ def load_spatialvla(name: str, checkpoint: PolicyCheckpoint, options: SpatialVLA
     network = SpatialVLANetwork(
         weights.eval(), tokenizer, bins, processor.action_chunk_size, config.image_token_index, view
     )
-    identity = checkpoint.identity(device, dtype, options) | {
-        "unnorm_key": key,
-        "intrinsics": options.intrinsics,
-    }
+    identity = checkpoint.identity(device, dtype, options) | {"unnorm_key": key, "intrinsics": options.intrinsics}
     return VlaPolicy(name, network, statistics, options, identity, options.threads)
 
 

@@ -39,12 +39,7 @@ class _SpatialVLAProjector(nn.Module):
 
 
 class SpatialVLAWeights(nn.Module):
-    """All modules with weights.
-
-    Args:
-        config: config of the checkpoint.
-        attn_implementation: attention kernel of all transformers in it.
-    """
+    """All modules with weights."""
 
     def __init__(self, config: SpatialVLAConfig, attn_implementation: str) -> None:
         super().__init__()
@@ -172,9 +167,8 @@ class SpatialVLANetwork:
             output = model(
                 inputs_embeds=embeds,
                 attention_mask={"full_attention": mask, "sliding_attention": mask},
-                position_ids=torch.arange(past + 1, past + new + 1, device=mask.device)[
-                    None
-                ],  # PaliGemma counts from 1
+                # PaliGemma counts from 1.
+                position_ids=torch.arange(past + 1, past + new + 1, device=mask.device)[None],
                 past_key_values=cache,
                 use_cache=True,
                 logits_to_keep=1,
