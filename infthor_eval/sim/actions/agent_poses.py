@@ -12,8 +12,6 @@ from infthor_eval.sim.geometry import level_gaps, to_array
 from infthor_eval.sim.objects import SimObject
 from infthor_eval.sim.simulation import Simulation
 
-__all__: list[str] = []
-
 _FINEST = 0.01  # metres; finer grids have millions of points
 _TILT = 30.0  # degrees between the horizons that are tried
 

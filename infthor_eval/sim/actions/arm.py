@@ -17,8 +17,6 @@ from infthor_eval.sim.geometry import Array, euler_matrix, to_array, wrap_degree
 from infthor_eval.sim.settings import ARM_MODES
 from infthor_eval.sim.simulation import Simulation
 
-__all__: list[str] = []
-
 _KINOVA = ("arm",)
 _SMALLEST, _LARGEST = 0.04, 0.5  # radii of the hand's sphere, metres
 _TURN_STEP, _ELBOW_STEP = 3.0, 2.0  # degrees between two collision checks

@@ -12,8 +12,6 @@ from infthor_eval.sim.errors import ActionError
 from infthor_eval.sim.geometry import Array, to_array
 from infthor_eval.sim.simulation import Simulation
 
-__all__: list[str] = []
-
 
 @action("TeleportArm", modes=("arm",))
 def teleport_arm(

@@ -12,8 +12,6 @@ from infthor_eval.sim.geometry import Array, to_array
 from infthor_eval.sim.settings import SMOOTH_QUALITIES
 from infthor_eval.sim.simulation import Simulation
 
-__all__: list[str] = []
-
 _LARGEST = 4096  # pixels
 _DEFAULT_SIZE = 5.0  # metres from the middle of an orthographic picture to its upper edge
 

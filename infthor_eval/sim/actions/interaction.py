@@ -13,8 +13,6 @@ from infthor_eval.sim.receptacles import drawer_offset, find_place
 from infthor_eval.sim.simulation import Simulation
 from infthor_eval.sim.unfolding import unfold
 
-__all__: list[str] = []
-
 _CROWDED = (0.12, 0.24, 0.35)  # overlaps that `forceAction` tolerates in a full receptacle, smallest first
 
 

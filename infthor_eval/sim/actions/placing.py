@@ -14,8 +14,6 @@ from infthor_eval.sim.receptacles import Surface, surfaces
 from infthor_eval.sim.simulation import Simulation
 from infthor_eval.sim.world import World
 
-__all__: list[str] = []
-
 _SPACING = 0.05  # metres between the points of a surface
 
 

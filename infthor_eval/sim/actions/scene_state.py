@@ -12,8 +12,6 @@ from infthor_eval.sim.errors import ActionError
 from infthor_eval.sim.rearrange import NamedPose, set_poses, spawn_randomly
 from infthor_eval.sim.simulation import Simulation
 
-__all__: list[str] = []
-
 
 @action("SetObjectPoses")
 def set_object_poses(

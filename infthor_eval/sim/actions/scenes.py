@@ -9,8 +9,6 @@ from infthor_eval.sim.render.camera import FAR, NEAR
 from infthor_eval.sim.settings import AGENT_MODES, SimulatorSettings
 from infthor_eval.sim.simulation import Simulation
 
-__all__: list[str] = []
-
 
 @action("Reset")
 def reset(sim: Simulation, sceneName: str) -> None:

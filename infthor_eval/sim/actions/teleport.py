@@ -10,8 +10,6 @@ from infthor_eval.sim.obstacles import blocking_object, nearest_name
 from infthor_eval.sim.simulation import Simulation
 from infthor_eval.sim.world import World
 
-__all__: list[str] = []
-
 _STEP_HEIGHT = 0.05  # metres that a teleport's y may be off the floor
 
 
