@@ -8,22 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
-    "Array",
-    "aabb_gap",
-    "aabb_overlap",
-    "convex_hull",
-    "corners",
-    "cross",
-    "euler_matrix",
-    "level_gaps",
-    "matrix_euler",
-    "object_id",
-    "round_vector",
-    "to_array",
-    "to_xyz",
-    "wrap_degrees",
-    "yaw_matrix",
-]
+    "Array", "aabb_gap", "aabb_overlap", "convex_hull", "corners", "cross", "euler_matrix", "level_gaps",
+    "matrix_euler", "object_id", "round_vector", "to_array", "to_xyz", "wrap_degrees", "yaw_matrix",
+]  # fmt: skip
 
 Array = NDArray[np.float64]
 

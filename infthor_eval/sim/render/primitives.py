@@ -17,23 +17,9 @@ import numpy as np
 from infthor_eval.sim.geometry import Array
 
 __all__ = [
-    "AXES",
-    "BOTTOM",
-    "CENTER",
-    "COLOR",
-    "COLUMNS",
-    "EMISSION",
-    "FORM",
-    "HALF",
-    "INSTANCE",
-    "MATERIAL",
-    "TOP",
-    "Color",
-    "Form",
-    "Material",
-    "ShapePart",
-    "rows",
-]
+    "AXES", "BOTTOM", "CENTER", "COLOR", "COLUMNS", "EMISSION", "FORM", "HALF", "INSTANCE", "MATERIAL", "TOP", "Color",
+    "Form", "Material", "ShapePart", "rows",
+]  # fmt: skip
 
 FORM, CENTER, HALF, AXES, BOTTOM, TOP, COLOR, MATERIAL, EMISSION, INSTANCE = 0, 1, 4, 7, 16, 17, 18, 21, 22, 23
 COLUMNS = 24
