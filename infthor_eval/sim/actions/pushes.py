@@ -1,4 +1,4 @@
-"""Pushing and pulling loose things: each slides till friction stops it, something is in its way, or it falls."""
+"""Pushing and pulling loose things: each slides until friction stops it, something is in its way, or it falls."""
 
 from functools import partial
 
