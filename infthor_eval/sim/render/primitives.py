@@ -58,14 +58,12 @@ class ShapePart:
     """One primitive of an object, in the object's frame.
 
     Attributes:
-        form: form.
         center: centre, metres (3,).
         half: half extents, metres (3,).
         color: red, green and blue, 0 to 1.
         material: surface pattern.
         matrix: rotation (3, 3); None for none.
-        bottom: radius at the bottom of a cylinder, relative to its half extents.
-        top: radius at its top, likewise.
+        bottom, top: radii at the ends of a cylinder, relative to its half extents.
         emission: share of light of its own, from 0 (lit by the lights only) to 1.
     """
 

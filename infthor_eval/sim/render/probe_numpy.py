@@ -28,7 +28,7 @@ def is_visible(
             break
         x0, x1, y0, y1 = projection.box[k]
         within = np.nonzero((xs >= x0) & (xs <= x1) & (ys >= y0) & (ys <= y1))[0]
-        t = hit(prims, projection, k, (us[xs[within]], vs[ys[within]]), camera.near)
+        t = hit(prims, projection, int(k), (us[xs[within]], vs[ys[within]]), camera.near)
         hidden = (t > camera.near) & ((t < depth[within]) | ((t == depth[within]) & (k < first[within])))
         left = np.delete(np.arange(len(ys)), within[hidden])
         ys, xs, depth, first = ys[left], xs[left], depth[left], first[left]
