@@ -18,6 +18,7 @@ import statistics
 import sys
 import tempfile
 import time
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -67,7 +68,7 @@ def echo(scene: str, full: bool) -> None:
     marker = b"\xaasequenceId\x01"
     assert bytes(metadata).count(marker) == 1
     server, client = (Path(os.environ[f"AI2THOR_FIFO_{side}_PIPE_PATH"]) for side in ("SERVER", "CLIENT"))
-    with FifoPipes(server, client) as pipes:
+    with closing(FifoPipes(server, client)) as pipes:
         pipes.send(replies[0])
         while (message := pipes.receive()) is not None:
             if message["action"] in {"GetScenesInBuild", "Initialize"}:

@@ -14,5 +14,3 @@ It differs from Unity on purpose in these points (docs/simulator.md lists all of
 - In a recorded floor plan a pick-up may reach what only the coarse box of its open receptacle hides. `visible` stays
   false then.
 """
-
-__all__: list[str] = []

@@ -7,6 +7,7 @@ arguments only the screen's size and the quality have an effect.
 import os
 import sys
 from argparse import ArgumentParser
+from contextlib import closing
 from pathlib import Path
 
 __all__ = ["main"]
@@ -38,8 +39,8 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("-screen-quality", dest="quality", type=int, default=max(SMOOTH_LEVELS))
     options, _ = parser.parse_known_args(arguments)
     try:
-        pipes = FifoPipes(_pipe("AI2THOR_FIFO_SERVER_PIPE_PATH"), _pipe("AI2THOR_FIFO_CLIENT_PIPE_PATH"))
-        with pipes:
+        paths = _pipe("AI2THOR_FIFO_SERVER_PIPE_PATH"), _pipe("AI2THOR_FIFO_CLIENT_PIPE_PATH")
+        with closing(FifoPipes(*paths)) as pipes:
             display = Display(options.width, options.height, antialias=options.quality in SMOOTH_LEVELS)
             sim = Simulation(Catalogue(options.data, options.supplement), display)
             SimulatorServer(sim).serve(pipes)

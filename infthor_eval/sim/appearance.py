@@ -36,8 +36,3 @@ class Appearance:
     finishes: Mapping[str, Finish] = field(default_factory=dict)
     brightness: float = 1.0
     light: Array = field(default_factory=lambda: np.ones(3))
-
-    @property
-    def is_default(self) -> bool:
-        """Whether all surfaces look as usual; brightness does not count, as it changes the lights and not a surface."""
-        return not self.finishes and bool(np.all(self.light == 1.0))

@@ -11,7 +11,7 @@ from infthor_eval.sim.objects import SimObject
 from infthor_eval.sim.receptacles import Surface, find_parent, surfaces
 from infthor_eval.sim.world import World
 
-__all__ = ["assign_parent", "let_fall"]
+__all__ = ["assign_parent", "is_over", "let_fall"]
 
 _BREAKING = 0.9  # metres of fall that break a breakable thing
 _SUNK = 0.03  # metres that an object may already be below what it falls on: it was pushed along it, or lay in it
@@ -60,7 +60,7 @@ def assign_parent(world: World, item: SimObject) -> None:
 
 
 def _floor(world: World, point: Array) -> _Landing:
-    below = (o for o in world.objects.values() if o.object_type == "Floor" and _is_over(o, point))
+    below = (o for o in world.objects.values() if o.object_type == "Floor" and is_over(o, point))
     return _Landing(0.0, next(below, None))
 
 
@@ -89,15 +89,9 @@ def _rank(landing: _Landing) -> float:
 def _landings_on(
     world: World, item: SimObject, other: SimObject, point: Array, bottom: float, *, has_top: bool
 ) -> Iterator[_Landing]:
-    """Yield the places on and in another object.
+    """Yield the places on and in `other` for an object that falls above `point` (3,), its underside at height `bottom`.
 
-    Args:
-        world: the world.
-        item: the falling object.
-        other: the object below it.
-        point: point above which it falls (3,).
-        bottom: height of its underside, metres.
-        has_top: `other` has an upper side at `point`, and not the hole for a basin.
+    `has_top`: `other` has an upper side at `point`, and not the hole for a basin.
     """
     if not has_top and not other.type.encloses:
         return
@@ -110,7 +104,7 @@ def _landings_on(
     ]  # fmt: skip
     yield from (_Landing(float(surface.center[1]), other) for surface in reached)
     has_top = has_top and other.type.encloses and not other.type.slides
-    if not reached and (has_top or other.type.pickupable) and _is_over(other, point):
+    if not reached and (has_top or other.type.pickupable) and is_over(other, point):
         # It lies on top: of what is closed or full of shelves, or across a loose object and so where that one lies.
         parent = world.objects[other.parent] if other.type.pickupable and other.parent is not None else None
         yield _Landing(float(other.bounds()[1][1]), parent)
@@ -138,7 +132,7 @@ def _fits(item: SimObject, vessel: SimObject, surface: Surface) -> bool:
     return bool(min(high[0] - low[0], high[2] - low[2]) <= 2 * max(surface.half))
 
 
-def _is_over(other: SimObject, point: Array) -> bool:
+def is_over(other: SimObject, point: Array) -> bool:
     """Return whether a point is within an object's outline from above, at any height."""
     low, high = other.bounds()
     return bool(low[0] <= point[0] <= high[0] and low[2] <= point[2] <= high[2])

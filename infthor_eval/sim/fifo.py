@@ -12,7 +12,6 @@ import time
 from collections.abc import Sequence
 from enum import IntEnum
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 from infthor_eval.errors import SimulatorError
@@ -60,12 +59,8 @@ class FifoPipes:
         self._out = self._open_out(server_pipe)
         self._in: int | None = None
 
-    def __enter__(self) -> "FifoPipes":
-        return self
-
-    def __exit__(
-        self, error_type: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def close(self) -> None:
+        """Close both pipes."""
         os.close(self._out)
         if self._in is not None:
             os.close(self._in)

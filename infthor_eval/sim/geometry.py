@@ -8,22 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
-    "Array",
-    "aabb_gap",
-    "aabb_overlap",
-    "convex_hull",
-    "corners",
-    "cross",
-    "euler_matrix",
-    "level_gaps",
-    "matrix_euler",
-    "object_id",
-    "round_vector",
-    "to_array",
-    "to_xyz",
-    "wrap_degrees",
-    "yaw_matrix",
-]
+    "Array", "aabb_gap", "aabb_overlap", "convex_hull", "corners", "cross", "euler_matrix", "level_gaps",
+    "matrix_euler", "object_id", "round_vector", "round_xyz", "to_array", "to_xyz", "wrap_degrees", "yaw_matrix",
+]  # fmt: skip
 
 Array = NDArray[np.float64]
 
@@ -115,6 +102,11 @@ def to_array(value: Mapping[str, float] | Sequence[float]) -> Array:
 def round_vector(vector: Array, digits: int = 4) -> list[float]:
     """Return a vector as plain floats, rounded so that equal states serialise to equal bytes."""
     return [round(float(v), digits) + 0.0 for v in vector]  # + 0.0 turns -0.0 into 0.0
+
+
+def round_xyz(vector: Array) -> dict[str, float]:
+    """Return a position or angles (3,) as the metadata has them: `{"x", "y", "z"}` with 6 digits."""
+    return to_xyz(round_vector(vector, 6))
 
 
 def object_id(object_type: str, position: Sequence[float] | Array) -> str:

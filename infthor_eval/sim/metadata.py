@@ -7,7 +7,7 @@ import numpy as np
 
 from infthor_eval.sim.arm.metadata import arm_metadata
 from infthor_eval.sim.cameras import ThirdPartyCamera
-from infthor_eval.sim.geometry import corners, matrix_euler, round_vector, to_xyz
+from infthor_eval.sim.geometry import corners, matrix_euler, round_vector, round_xyz
 from infthor_eval.sim.objects import SimObject
 from infthor_eval.sim.obstacles import door_leaf
 from infthor_eval.sim.simulation import Simulation
@@ -15,7 +15,6 @@ from infthor_eval.sim.world import World
 
 __all__ = ["Outcome", "agent_metadata", "object_metadata", "third_party_metadata"]
 
-_DIGITS = 6  # of positions and angles; corners of boxes have 4
 _ITHOR = re.compile(r"FloorPlan\d+")
 _LEGACY: dict[str, Any] = {
     "colorBounds": None, "visibleRange": None, "flatSurfacesOnGrid": [], "distances": [], "normals": [],
@@ -55,8 +54,8 @@ def object_metadata(item: SimObject) -> dict[str, Any]:
     movable = abilities.pickupable or abilities.moveable
     return {
         "name": item.name,
-        "position": _xyz(item.position),
-        "rotation": _xyz(item.rotation),
+        "position": round_xyz(item.position),
+        "rotation": round_xyz(item.rotation),
         "receptacle": abilities.receptacle,
         "toggleable": abilities.toggleable,
         "isToggled": abilities.toggleable and state.toggled,
@@ -111,7 +110,7 @@ def agent_metadata(sim: Simulation, outcome: Outcome) -> dict[str, Any]:
         "isSceneAtRest": True,
         "agent": {
             "name": "agent",
-            "position": _xyz(agent.position),
+            "position": round_xyz(agent.position),
             "rotation": {"x": 0.0, "y": agent.yaw, "z": 0.0},
             "cameraHorizon": agent.horizon,
             "isStanding": agent.standing,
@@ -121,7 +120,7 @@ def agent_metadata(sim: Simulation, outcome: Outcome) -> dict[str, Any]:
         "hand": pose,
         "arm": None if world.arm is None else arm_metadata(world, world.arm),
         "fov": sim.settings.field_of_view,
-        "cameraPosition": _xyz(agent.camera_position()),
+        "cameraPosition": round_xyz(agent.camera_position()),
         "cameraOrthSize": 0.0,
         "thirdPartyCameras": [third_party_metadata(index, camera) for index, camera in enumerate(sim.cameras)],
         "collided": False,
@@ -142,8 +141,8 @@ def third_party_metadata(index: int, camera: ThirdPartyCamera) -> dict[str, Any]
     """Return the pose of one third-party camera."""
     return {
         "thirdPartyCameraId": index,
-        "position": _xyz(camera.position),
-        "rotation": _xyz(camera.rotation),
+        "position": round_xyz(camera.position),
+        "rotation": round_xyz(camera.rotation),
         "fieldOfView": camera.field_of_view,
     }
 
@@ -151,14 +150,14 @@ def third_party_metadata(index: int, camera: ThirdPartyCamera) -> dict[str, Any]
 def _held_pose(world: World) -> dict[str, Any]:
     """Return the held object's pose in the world and in the camera's frame; all zeros where nothing is held."""
     if world.held is None:
-        return dict.fromkeys(("position", "rotation", "localPosition", "localRotation"), _xyz(np.zeros(3)))
+        return dict.fromkeys(("position", "rotation", "localPosition", "localRotation"), round_xyz(np.zeros(3)))
     item, agent = world.objects[world.held], world.agent
     camera = agent.camera_matrix()
     return {
-        "position": _xyz(item.position),
-        "rotation": _xyz(item.rotation),
-        "localPosition": _xyz(camera.T @ (item.position - agent.camera_position())),
-        "localRotation": _xyz(matrix_euler(camera.T @ item.matrix)),
+        "position": round_xyz(item.position),
+        "rotation": round_xyz(item.rotation),
+        "localPosition": round_xyz(camera.T @ (item.position - agent.camera_position())),
+        "localRotation": round_xyz(matrix_euler(camera.T @ item.matrix)),
     }
 
 
@@ -173,8 +172,4 @@ def _axis_aligned(item: SimObject) -> dict[str, Any]:
 
 def _box(center: Any, size: Any) -> dict[str, Any]:
     points = [round_vector(point) for point in corners(center, size)]
-    return {"cornerPoints": points, "center": _xyz(center), "size": _xyz(size)}
-
-
-def _xyz(vector: Any) -> dict[str, float]:
-    return to_xyz(round_vector(vector, _DIGITS))
+    return {"cornerPoints": points, "center": round_xyz(center), "size": round_xyz(size)}

@@ -16,7 +16,7 @@ DRAWER_SLIDE = 0.8  # share of its depth that a drawer comes out
 
 @dataclass
 class SimObjectState:
-    """What actions change of an object beside its pose; the names follow AI2-THOR's metadata."""
+    """What actions change about an object, besides its pose; the names follow AI2-THOR's metadata."""
 
     openness: float = 0.0
     toggled: bool = False

@@ -1,14 +1,13 @@
 """Rearranging a scene's loose objects, to recorded poses or at random."""
 
 from collections import defaultdict
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from infthor_eval.sim.default_objects import default_object
-from infthor_eval.sim.geometry import Array, object_id, to_array
+from infthor_eval.sim.geometry import Array, object_id
 from infthor_eval.sim.object_types import ObjectType, allowed_in, type_named
 from infthor_eval.sim.objects import SimObject
 from infthor_eval.sim.receptacles import find_parent, find_place
@@ -33,13 +32,6 @@ class NamedPose:
     name: str
     position: Array
     rotation: Array
-
-    @classmethod
-    def from_wire(cls, entry: Mapping[str, Any]) -> "NamedPose":
-        """Read a pose from `{"objectName", "position", "rotation"}`."""
-        rotation = entry.get("rotation") or {}
-        # Unity appends "(Clone)" to the names of copies.
-        return cls(entry["objectName"].removesuffix("(Clone)"), to_array(entry["position"]), to_array(rotation))
 
 
 def set_poses(world: World, poses: Iterable[NamedPose], keep_moveable: bool = False) -> None:
@@ -145,7 +137,7 @@ def spawn_randomly(
     """Put every loose object into or onto a random receptacle that takes its type and has room.
 
     Args:
-        world: the scene.
+        world: the scene, changed in place.
         random: random numbers that choose the order of the objects and their receptacles.
         excluded_types: types of receptacles that get nothing.
         kept: ids of objects that stay where they are.

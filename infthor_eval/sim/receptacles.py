@@ -52,7 +52,7 @@ def surfaces(receptacle: SimObject) -> list[Surface]:
     low, high = receptacle.bounds()
     middle, half = (low + high) / 2, (receptacle.box_size[0] / 2, receptacle.box_size[2] / 2)
     yaw, overhang = float(receptacle.rotation[1]), math.inf if receptacle.type.overhang else 0.03
-    if receptacle.type.open_top:  # a vessel, whose only surface is its bottom
+    if receptacle.type.open_top:  # a vessel: its only surface is its bottom
         base = float(low[1]) + min(_WALL, (high[1] - low[1]) * 0.3)
         if receptacle.support is not None:
             base = max(base, float(low[1]) + receptacle.support)
@@ -114,13 +114,11 @@ def find_place(
     """Return a copy of `item` at the first free place of `receptacle`; None if it is full.
 
     Args:
-        world: the world; not changed.
-        item: object to place, e.g. the held one.
-        receptacle: receptacle to place it in or on.
+        item: object to place, e.g. the held one; it and the world are not changed.
         overlap: share of their size by which neighbours may overlap.
         random: random numbers that choose among the free places; None for the nearest.
         point_filter: function that marks which of some points (n, 3) may be used; None: all.
-        among_fixed: allow places within lamps, appliances and taps, whose recorded boxes are larger than they are.
+        among_fixed: allow places within lamps, appliances and taps: their recorded boxes are too large.
     """
     boxes = [o.bounds() for o in _neighbours(world, item, receptacle)]
     ghost = item.duplicate(item.object_id)

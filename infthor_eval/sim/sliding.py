@@ -1,7 +1,7 @@
 """Objects that slide over what they stand on."""
 
 from infthor_eval.sim.clearance import obstacle_at
-from infthor_eval.sim.falling import assign_parent, let_fall
+from infthor_eval.sim.falling import assign_parent, is_over, let_fall
 from infthor_eval.sim.geometry import Array
 from infthor_eval.sim.objects import SimObject
 from infthor_eval.sim.world import World
@@ -19,18 +19,14 @@ def slide(world: World, item: SimObject, direction: Array, distance: float) -> N
     on, it falls.
     """
     support = None if item.parent is None else world.objects[item.parent]
+    step = direction * _STEP
     for _ in range(int(min(distance, _FARTHEST) / _STEP)):
-        at_wall = support is not None and world.is_hidden(item) and _is_beyond(support, item.center + direction * _STEP)
-        if at_wall or obstacle_at(world, item, direction * _STEP) is not None:
+        at_wall = support is not None and world.is_hidden(item) and not is_over(support, item.center + step)
+        if at_wall or obstacle_at(world, item, step) is not None:
             break
-        world.shift([item], direction * _STEP)
-        if support is not None and _is_beyond(support, item.center):
+        world.shift([item], step)
+        if support is not None and not is_over(support, item.center):
             let_fall(world, item, item.center)
             return
     if item.type.pickupable:
         assign_parent(world, item)
-
-
-def _is_beyond(support: SimObject, point: Array) -> bool:
-    low, high = support.bounds()
-    return not (low[0] <= point[0] <= high[0] and low[2] <= point[2] <= high[2])

@@ -23,8 +23,7 @@ class Display:
     """How pictures are drawn.
 
     Attributes:
-        width: width of all pictures, pixels.
-        height: height of all pictures, pixels.
+        width, height: size of all pictures, pixels.
         antialias: smooth edges; the player's quality level sets it, and a Reset keeps it.
         map_view: the agent's frame shows the scene from above.
         rasterizer: implementation of the renderer.
@@ -43,7 +42,7 @@ class Views:
     Args:
         world: the world.
         display: size and quality of the pictures; may change at any time.
-        settings: settings of the agent, of which the field of view matters here.
+        settings: the agent's, for its field of view.
     """
 
     def __init__(self, world: World, display: Display, settings: SimulatorSettings) -> None:
@@ -76,7 +75,7 @@ class Views:
         return self._view
 
     def agent_frame(self) -> Picture:
-        """Return what the agent's frame is_visible: its view with held object or arm, or the map in map view."""
+        """Return what the agent's frame shows: its view with held object or arm, or the map in map view."""
         return self.third_party(map_camera(self._world)) if self._display.map_view else self._view_with_hand()
 
     def _view_with_hand(self) -> Picture:
@@ -84,7 +83,7 @@ class Views:
         # The arm has a version of its own: bending it changes the frame, but not what the agent sees.
         arm_version = -1 if self._world.arm is None else self._world.arm.version
         if self._frame is None or self._frame_arm_version != arm_version:
-            rows, names = self._held()
+            rows, names = self._list_held()
             if not len(rows):
                 return view
             if self._world.held is not None:
@@ -93,7 +92,7 @@ class Views:
             self._frame_arm_version = arm_version
         return self._frame
 
-    def _held(self) -> tuple[Array, tuple[str, ...]]:
+    def _list_held(self) -> tuple[Array, tuple[str, ...]]:
         """Return the primitives of the agent's arm, or of what its hand holds, and the names of all instances."""
         _, held, names = self.primitives()
         if self._world.arm is None:
@@ -102,7 +101,7 @@ class Views:
 
     def third_party(self, camera: ThirdPartyCamera) -> Picture:
         """Return what a third-party camera sees."""
-        held, names = self._held()
+        held, names = self._list_held()
         pinhole = pinhole_camera(camera, self._display.width, self._display.height)
         return cast_picture(np.concatenate([self.primitives()[0], held]), names, pinhole, self._display.rasterizer)
 

@@ -29,7 +29,7 @@ class AgentVision:
         world: the world.
         views: pictures of the world.
         display: size of the pictures and the renderer.
-        settings: settings of the agent: its field of view and visibility distance.
+        settings: the agent's, for its field of view and visibility distance.
     """
 
     def __init__(self, world: World, views: Views, display: Display, settings: SimulatorSettings) -> None:

@@ -37,10 +37,8 @@ class RoomShell:
     """The shell of one room: a rectangular floor, ceiling and walls, metres.
 
     Attributes:
-        x_min: west edge of the floor.
-        x_max: east edge.
-        z_min: south edge.
-        z_max: north edge.
+        x_min, x_max: west and east edge of the floor.
+        z_min, z_max: south and north edge.
         height: height of the ceiling.
         floor: height of the floor.
         floor_style: one of `FLOOR_STYLES`.
@@ -68,9 +66,7 @@ class World:
     Attributes:
         scene: name of the scene.
         objects: objects by id, in the order of the metadata.
-        rooms: the rooms.
         nav: cells where the agent can stand.
-        agent: the agent.
         seed: seed of the scene's random numbers.
         held: id of the object in the agent's hand; None for an empty hand.
         version: number that grows with every change; cached views compare it.

@@ -12,8 +12,6 @@ from infthor_eval.sim.geometry import level_gaps, to_array
 from infthor_eval.sim.objects import SimObject
 from infthor_eval.sim.simulation import Simulation
 
-__all__: list[str] = []
-
 _FINEST = 0.01  # metres; finer grids have millions of points
 _TILT = 30.0  # degrees between the horizons that are tried
 
@@ -40,15 +38,10 @@ def get_reachable_positions(
 
 @action("GetInteractablePoses", query=True)
 def get_interactable_poses(
-    sim: Simulation,
-    objectId: str,
-    positions: list[Vector3] | None = None,
-    rotations: list[float] | None = None,
-    horizons: list[float] | None = None,
-    standings: list[bool] | None = None,
-    maxDistance: float | None = None,
+    sim: Simulation, objectId: str, positions: list[Vector3] | None = None, rotations: list[float] | None = None,
+    horizons: list[float] | None = None, standings: list[bool] | None = None, maxDistance: float | None = None,
     maxPoses: int = 2**31 - 1,
-) -> list[dict[str, Any]]:
+) -> list[dict[str, Any]]:  # fmt: skip
     """Return poses, as TeleportFull takes them, from which the agent sees an object within its reach."""
     if maxPoses <= 0:
         raise ActionError("maxPoses must be greater than 0")

@@ -15,8 +15,6 @@ from infthor_eval.sim.render.finishes import RANDOM_PATTERNS
 from infthor_eval.sim.render.shell import SHELL_NAMES
 from infthor_eval.sim.simulation import Simulation
 
-__all__: list[str] = []
-
 _DARKEST, _BRIGHTEST = 0.45, 1.55  # factors of a surface's colour
 _ITHOR = re.compile(r"FloorPlan\d*(\d\d)|FloorPlan(\d)")
 _ROOMS = {"0": "Kitchen", "2": "LivingRoom", "3": "Bedroom", "4": "Bathroom"}  # by the hundreds of the floor plan

@@ -17,8 +17,6 @@ from infthor_eval.sim.geometry import Array, euler_matrix, to_array, wrap_degree
 from infthor_eval.sim.settings import ARM_MODES
 from infthor_eval.sim.simulation import Simulation
 
-__all__: list[str] = []
-
 _KINOVA = ("arm",)
 _SMALLEST, _LARGEST = 0.04, 0.5  # radii of the hand's sphere, metres
 _TURN_STEP, _ELBOW_STEP = 3.0, 2.0  # degrees between two collision checks
@@ -26,14 +24,9 @@ _TURN_STEP, _ELBOW_STEP = 3.0, 2.0  # degrees between two collision checks
 
 @action("MoveArm", modes=ARM_MODES)
 def move_arm(
-    sim: Simulation,
-    position: Vector3,
-    coordinateSpace: str = "armBase",
-    restrictMovement: bool = False,
-    speed: float = 1.0,
-    returnToStart: bool = True,
-    disableRendering: bool = True,
-) -> None:
+    sim: Simulation, position: Vector3, coordinateSpace: str = "armBase", restrictMovement: bool = False,
+    speed: float = 1.0, returnToStart: bool = True, disableRendering: bool = True,
+) -> None:  # fmt: skip
     """Bring the wrist to a position, or as near as the arm reaches."""
     agent, arm = sim.world.agent, agent_arm(sim)
     point = to_array(position)
@@ -48,14 +41,9 @@ def move_arm(
 
 @action("MoveArmRelative", modes=ARM_MODES)
 def move_arm_relative(
-    sim: Simulation,
-    offset: Vector3,
-    coordinateSpace: str = "armBase",
-    restrictMovement: bool = False,
-    speed: float = 1.0,
-    returnToStart: bool = True,
-    disableRendering: bool = True,
-) -> None:
+    sim: Simulation, offset: Vector3, coordinateSpace: str = "armBase", restrictMovement: bool = False,
+    speed: float = 1.0, returnToStart: bool = True, disableRendering: bool = True,
+) -> None:  # fmt: skip
     """Move the wrist by an offset along the axes of a space."""
     agent, arm = sim.world.agent, agent_arm(sim)
     turns = {"armBase": arm.base(agent).turn, "wrist": arm.wrist(agent).turn, "world": np.eye(3)}
@@ -68,15 +56,10 @@ def move_arm_relative(
 def _reach(
     sim: Simulation, arm: Arm, point: Array, requested: tuple[Array, str], restricted: bool, return_to_start: bool
 ) -> None:
-    """Move the wrist straight towards a point of the world; beyond its reach the arm is stretched out towards it.
+    """Move the wrist straight towards a point (3,) of the world; beyond its reach the arm is stretched out towards it.
 
-    Args:
-        sim: the simulation.
-        arm: the agent's arm.
-        point: target of the wrist in the world, metres (3,).
-        requested: the same target as the message names it, and its coordinate space.
-        restricted: refuse targets behind the shoulder or out of reach.
-        return_to_start: go back after a collision.
+    `requested` is that point as the message names it, and its space; `restricted` refuses points that are behind the
+    shoulder or out of reach.
     """
     base = arm.base(sim.world.agent)
     target = base.local(point)
@@ -145,14 +128,9 @@ def _lift(sim: Simulation, height: float, return_to_start: bool) -> None:
 
 @action("RotateWristRelative", modes=ARM_MODES)
 def rotate_wrist_relative(
-    sim: Simulation,
-    pitch: float = 0.0,
-    yaw: float = 0.0,
-    roll: float = 0.0,
-    speed: float = 10.0,
-    returnToStart: bool = True,
-    disableRendering: bool = True,
-) -> None:
+    sim: Simulation, pitch: float = 0.0, yaw: float = 0.0, roll: float = 0.0, speed: float = 10.0,
+    returnToStart: bool = True, disableRendering: bool = True,
+) -> None:  # fmt: skip
     """Turn the wrist about its own axes, degrees, the shortest way; the stretch robot's about the vertical alone."""
     if sim.settings.agent_mode == "stretch" and (pitch or roll):
         raise ActionError("Pitch and roll are not supported for the stretch agent.")
@@ -164,14 +142,9 @@ def rotate_wrist_relative(
 
 @action("RotateWristAroundHeldObject", modes=_KINOVA)
 def rotate_wrist_around_held_object(
-    sim: Simulation,
-    pitch: float = 0.0,
-    yaw: float = 0.0,
-    roll: float = 0.0,
-    speed: float = 10.0,
-    returnToStart: bool = True,
-    disableRendering: bool = True,
-) -> None:
+    sim: Simulation, pitch: float = 0.0, yaw: float = 0.0, roll: float = 0.0, speed: float = 10.0,
+    returnToStart: bool = True, disableRendering: bool = True,
+) -> None:  # fmt: skip
     """Turn the one held object about its origin, moving the wrist around it."""
     held = list(agent_arm(sim).held)
     if len(held) != 1:
@@ -183,15 +156,9 @@ def rotate_wrist_around_held_object(
 
 @action("RotateWristAroundPoint", modes=_KINOVA)
 def rotate_wrist_around_point(
-    sim: Simulation,
-    point: Vector3,
-    pitch: float = 0.0,
-    yaw: float = 0.0,
-    roll: float = 0.0,
-    speed: float = 10.0,
-    returnToStart: bool = True,
-    disableRendering: bool = True,
-) -> None:
+    sim: Simulation, point: Vector3, pitch: float = 0.0, yaw: float = 0.0, roll: float = 0.0, speed: float = 10.0,
+    returnToStart: bool = True, disableRendering: bool = True,
+) -> None:  # fmt: skip
     """Turn the wrist and move it, as if a point of the world were fixed to it."""
     _turn_around(sim, to_array(point), _wrist_turn(pitch, yaw, roll), returnToStart)
 
@@ -238,14 +205,9 @@ def _bend(sim: Simulation, arm: Arm, poses: list[ArmPose], target: str, return_t
 
 @action("PickupObject", modes=ARM_MODES)
 def pick_up_in_sphere(
-    sim: Simulation,
-    objectIdCandidates: list[str] | None = None,
-    objectId: str | None = None,
-    x: float | None = None,
-    y: float | None = None,
-    forceAction: bool = False,
-    manualInteract: bool = False,
-) -> None:
+    sim: Simulation, objectIdCandidates: list[str] | None = None, objectId: str | None = None, x: float | None = None,
+    y: float | None = None, forceAction: bool = False, manualInteract: bool = False,
+) -> None:  # fmt: skip
     """Hold everything within the hand's sphere that can be picked up, or those candidates that are."""
     given = "objectId" if objectId is not None else "x, y" if x is not None or y is not None else ""
     if given:

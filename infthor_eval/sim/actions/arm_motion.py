@@ -34,7 +34,6 @@ def follow(
     """Take the stances of a path, as far as nothing is in the way.
 
     Args:
-        sim: the simulation.
         path: the stances, without the present one.
         target: end of the path, as the message names it.
         return_to_start: go back after a collision; else agent and arm stay at the last free stance.

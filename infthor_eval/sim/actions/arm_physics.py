@@ -6,8 +6,6 @@ from infthor_eval.sim.errors import ActionError
 from infthor_eval.sim.settings import ARM_MODES
 from infthor_eval.sim.simulation import Simulation
 
-__all__: list[str] = []
-
 _LONGEST = 0.05  # seconds of one step of Unity's physics
 
 

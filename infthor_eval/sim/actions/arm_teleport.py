@@ -12,23 +12,16 @@ from infthor_eval.sim.errors import ActionError
 from infthor_eval.sim.geometry import Array, to_array
 from infthor_eval.sim.simulation import Simulation
 
-__all__: list[str] = []
-
 
 @action("TeleportArm", modes=("arm",))
 def teleport_arm(
-    sim: Simulation,
-    position: Vector3 | None = None,
-    rotation: dict[str, float] | None = None,
-    armHeight: float | None = None,
-    elbowOrientation: float | None = None,
-    worldRelative: bool = False,
+    sim: Simulation, position: Vector3 | None = None, rotation: dict[str, float] | None = None,
+    armHeight: float | None = None, elbowOrientation: float | None = None, worldRelative: bool = False,
     forceAction: bool = False,
-) -> None:
+) -> None:  # fmt: skip
     """Put the arm into a pose at once; what is not given is as in the resting pose.
 
     Args:
-        sim: the simulation.
         position: position of the wrist, metres, from the base or in the world.
         rotation: rotation of the wrist, likewise: an axis `x, y, z` and the angle `w` in degrees.
         armHeight: height of the base above the agent's position, metres.

@@ -1,7 +1,7 @@
 # ruff: noqa: ARG001 - the wire's arguments are accepted even where nothing depends on them
 """Walking and turning of the arm agents: in small steps, with their arm, until something is in the way."""
 
-from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -16,8 +16,6 @@ from infthor_eval.sim.settings import ARM_MODES
 from infthor_eval.sim.simulation import Simulation
 from infthor_eval.sim.world import World
 
-__all__: list[str] = []
-
 _TURN_STEP = 1.15  # degrees: Unity turns by a radian a second, in frames of a fiftieth of a second
 _MAX_STEPS = 2000  # of one walk, 40 m; the collision check holds all stances of a path in memory
 _DIRECTIONS = {"Ahead": (1.0, 0.0), "Back": (-1.0, 0.0), "Right": (0.0, 1.0), "Left": (0.0, -1.0)}  # ahead, right
@@ -25,13 +23,9 @@ _DIRECTIONS = {"Ahead": (1.0, 0.0), "Back": (-1.0, 0.0), "Right": (0.0, 1.0), "L
 
 @action("MoveAgent", modes=ARM_MODES)
 def move_agent(
-    sim: Simulation,
-    ahead: float = 0.0,
-    right: float = 0.0,
-    speed: float = 1.0,
-    returnToStart: bool = True,
+    sim: Simulation, ahead: float = 0.0, right: float = 0.0, speed: float = 1.0, returnToStart: bool = True,
     disableRendering: bool = True,
-) -> None:
+) -> None:  # fmt: skip
     """Walk, metres ahead and to the right at once."""
     if ahead == 0 and right == 0:
         raise ActionError("Must specify ahead or right!")
@@ -59,38 +53,25 @@ def _body_contact(world: World, places: list[Array]) -> Contact | None:
     return None
 
 
-def _walker(direction: tuple[float, float]) -> Callable[..., None]:
-    def walk(
-        sim: Simulation,
-        moveMagnitude: float | None = None,
-        objectId: str | None = None,
-        maxAgentsDistance: float = -1.0,
-        forceAction: bool = False,
-        manualInteract: bool = False,
-        allowAgentsToIntersect: bool = False,
-        speed: float = 1.0,
-        returnToStart: bool = True,
-        disableRendering: bool = True,
-    ) -> None:
-        size = sim.settings.grid_size if moveMagnitude is None else moveMagnitude
-        move_agent(sim, direction[0] * size, direction[1] * size, speed, returnToStart, disableRendering)
-
-    return walk
+def _walk(
+    direction: tuple[float, float],
+    sim: Simulation, moveMagnitude: float | None = None, objectId: str | None = None, maxAgentsDistance: float = -1.0,
+    forceAction: bool = False, manualInteract: bool = False, allowAgentsToIntersect: bool = False, speed: float = 1.0,
+    returnToStart: bool = True, disableRendering: bool = True,
+) -> None:  # fmt: skip
+    size = sim.settings.grid_size if moveMagnitude is None else moveMagnitude
+    move_agent(sim, direction[0] * size, direction[1] * size, speed, returnToStart, disableRendering)
 
 
 for _name, _direction in _DIRECTIONS.items():
-    action(f"Move{_name}", modes=ARM_MODES)(_walker(_direction))
+    action(f"Move{_name}", modes=ARM_MODES)(partial(_walk, _direction))
 
 
 @action("RotateAgent", modes=ARM_MODES)
 def rotate_agent(
-    sim: Simulation,
-    degrees: float,
-    speed: float = 1.0,
-    waitForFixedUpdate: bool = False,
-    returnToStart: bool = True,
+    sim: Simulation, degrees: float, speed: float = 1.0, waitForFixedUpdate: bool = False, returnToStart: bool = True,
     disableRendering: bool = True,
-) -> None:
+) -> None:  # fmt: skip
     """Turn clockwise, degrees, the shortest way."""
     now = stance(sim.world, agent_arm(sim))
     turn = wrap_degrees(degrees)
@@ -100,22 +81,14 @@ def rotate_agent(
     follow(sim, path, quaternion_text(yaw_matrix(end)), returnToStart)
 
 
-def _turner(sign: float) -> Callable[..., None]:
-    def turn(
-        sim: Simulation,
-        degrees: float | None = None,
-        manualInteract: bool = False,
-        forceAction: bool = False,
-        speed: float = 1.0,
-        waitForFixedUpdate: bool = False,
-        returnToStart: bool = True,
-        disableRendering: bool = True,
-    ) -> None:
-        amount = sim.settings.rotate_step if degrees is None else degrees
-        rotate_agent(sim, sign * amount, speed, waitForFixedUpdate, returnToStart, disableRendering)
-
-    return turn
+def _turn(
+    sign: float,
+    sim: Simulation, degrees: float | None = None, manualInteract: bool = False, forceAction: bool = False,
+    speed: float = 1.0, waitForFixedUpdate: bool = False, returnToStart: bool = True, disableRendering: bool = True,
+) -> None:  # fmt: skip
+    amount = sim.settings.rotate_step if degrees is None else degrees
+    rotate_agent(sim, sign * amount, speed, waitForFixedUpdate, returnToStart, disableRendering)
 
 
 for _name, _sign in (("RotateRight", 1.0), ("RotateLeft", -1.0)):
-    action(_name, modes=ARM_MODES)(_turner(_sign))
+    action(_name, modes=ARM_MODES)(partial(_turn, _sign))

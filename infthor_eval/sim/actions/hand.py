@@ -1,7 +1,7 @@
 # ruff: noqa: ARG001 - the wire's arguments are accepted even where nothing depends on them
 """Moving, turning, dropping and throwing the object in the hand."""
 
-from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -13,17 +13,11 @@ from infthor_eval.sim.falling import let_fall
 from infthor_eval.sim.geometry import Array, euler_matrix, to_array
 from infthor_eval.sim.simulation import Simulation
 
-__all__: list[str] = []
-
 _THROW_REACH = 0.9  # metres in front of the agent at which a thrown thing lands
 _DIRECTIONS = {
-    "Ahead": (0.0, 0.0, 1.0),
-    "Back": (0.0, 0.0, -1.0),
-    "Right": (1.0, 0.0, 0.0),
-    "Left": (-1.0, 0.0, 0.0),
-    "Up": (0.0, 1.0, 0.0),
-    "Down": (0.0, -1.0, 0.0),
-}
+    "Ahead": (0.0, 0.0, 1.0), "Right": (1.0, 0.0, 0.0), "Up": (0.0, 1.0, 0.0),
+    "Back": (0.0, 0.0, -1.0), "Left": (-1.0, 0.0, 0.0), "Down": (0.0, -1.0, 0.0),
+}  # fmt: skip
 
 
 @action("DropHandObject", "DropHeldObject")
@@ -53,15 +47,12 @@ def move_held_object(
     _move_held(sim, np.array([right, up, ahead]), forceVisible)
 
 
-def _mover(direction: Array) -> Callable[..., None]:
-    def move(sim: Simulation, moveMagnitude: float, forceVisible: bool = False) -> None:
-        _move_held(sim, direction * moveMagnitude, forceVisible)
-
-    return move
+def _move_along(direction: Array, sim: Simulation, moveMagnitude: float, forceVisible: bool = False) -> None:
+    _move_held(sim, direction * moveMagnitude, forceVisible)
 
 
 for _name, _direction in _DIRECTIONS.items():
-    action(f"MoveHeldObject{_name}", f"MoveHand{_name}")(_mover(np.array(_direction)))
+    action(f"MoveHeldObject{_name}", f"MoveHand{_name}")(partial(_move_along, np.array(_direction)))
 
 
 @action("RotateHeldObject", forms=((), ("rotation",)))

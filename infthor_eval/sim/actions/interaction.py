@@ -13,8 +13,6 @@ from infthor_eval.sim.receptacles import drawer_offset, find_place
 from infthor_eval.sim.simulation import Simulation
 from infthor_eval.sim.unfolding import unfold
 
-__all__: list[str] = []
-
 _CROWDED = (0.12, 0.24, 0.35)  # overlaps that `forceAction` tolerates in a full receptacle, smallest first
 
 
@@ -47,15 +45,9 @@ def pick_up(
 
 @action("PutObject", forms=BY_ID_OR_PIXEL)
 def put(
-    sim: Simulation,
-    objectId: str | None = None,
-    x: float | None = None,
-    y: float | None = None,
-    forceAction: bool = False,
-    placeStationary: bool = True,
-    randomSeed: int = 0,
-    putNearXY: bool = False,
-) -> None:
+    sim: Simulation, objectId: str | None = None, x: float | None = None, y: float | None = None,
+    forceAction: bool = False, placeStationary: bool = True, randomSeed: int = 0, putNearXY: bool = False,
+) -> None:  # fmt: skip
     """Put the held object into or onto the receptacle `objectId`."""
     held = held_object(sim, "Can't place an object if Agent isn't holding anything in their hand.")
     target = interactable(sim, objectId, forceAction, x, y)
@@ -96,17 +88,12 @@ def _check_receptacle(held: SimObject, target: SimObject) -> None:
 
 @action("OpenObject", forms=BY_ID_OR_PIXEL)
 def open_object(
-    sim: Simulation,
-    objectId: str | None = None,
-    x: float | None = None,
-    y: float | None = None,
-    forceAction: bool = False,
-    openness: float = 1.0,
-    moveMagnitude: float | None = None,
-) -> None:
+    sim: Simulation, objectId: str | None = None, x: float | None = None, y: float | None = None,
+    forceAction: bool = False, openness: float = 1.0, moveMagnitude: float | None = None,
+) -> None:  # fmt: skip
     """Open a door, drawer or lid to `openness`, 0 (closed) to 1."""
     if moveMagnitude is not None:
-        openness = moveMagnitude or 1.0  # the old name of `openness`, of which 0 meant wide open
+        openness = moveMagnitude or 1.0  # the old name of `openness`; its 0 meant wide open
     if not 0 <= openness <= 1:
         raise ActionError(f"openness must be in [0:1], not {openness}")
     target = interactable(sim, objectId, forceAction, x, y)

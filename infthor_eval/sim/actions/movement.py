@@ -2,8 +2,7 @@
 """Moving, turning and looking."""
 
 import math
-from collections.abc import Callable
-from typing import NamedTuple
+from functools import partial
 
 import numpy as np
 
@@ -14,51 +13,17 @@ from infthor_eval.sim.geometry import Array
 from infthor_eval.sim.obstacles import blocking_object, held_object_blocks, nearest_name
 from infthor_eval.sim.simulation import Simulation
 
-__all__: list[str] = []
-
 _DIRECTIONS = {"Ahead": 0.0, "Back": 180.0, "Left": -90.0, "Right": 90.0}  # degrees from the agent's own
 
 
-class _MoveOptions(NamedTuple):
-    """What restricts a move.
-
-    Attributes:
-        force: ignore collisions of what the agent holds.
-        keep_grip: leave the held object as it was moved in the hand.
-        leash: id of an object that the agent must stay near; None for none.
-        leash_length: metres; zero or less for any distance.
-    """
-
-    force: bool
-    keep_grip: bool
-    leash: str | None
-    leash_length: float
-
-
-def _mover(turn: float) -> Callable[..., None]:
-    def move(
-        sim: Simulation,
-        moveMagnitude: float | None = None,
-        objectId: str | None = None,
-        maxAgentsDistance: float = -1.0,
-        forceAction: bool = False,
-        manualInteract: bool = False,
-        allowAgentsToIntersect: bool = False,
-        speed: float = 1.0,
-        returnToStart: bool = True,
-        disableRendering: bool = True,
-    ) -> None:
-        _move(sim, turn, moveMagnitude, _MoveOptions(forceAction, manualInteract, objectId, maxAgentsDistance))
-
-    return move
-
-
-for _name, _turn in _DIRECTIONS.items():
-    action(f"Move{_name}")(_mover(_turn))
-
-
-def _move(sim: Simulation, turn: float, magnitude: float | None, options: _MoveOptions) -> None:
-    size = sim.settings.grid_size if magnitude is None else magnitude
+def _move(
+    turn: float,
+    sim: Simulation, moveMagnitude: float | None = None, objectId: str | None = None, maxAgentsDistance: float = -1.0,
+    forceAction: bool = False, manualInteract: bool = False, allowAgentsToIntersect: bool = False, speed: float = 1.0,
+    returnToStart: bool = True, disableRendering: bool = True,
+) -> None:  # fmt: skip
+    """Walk, keeping within `maxAgentsDistance` metres of the object `objectId` if both are given."""
+    size = sim.settings.grid_size if moveMagnitude is None else moveMagnitude
     if size <= 0:
         raise ActionError("moveMagnitude must be > 0")
     agent = sim.world.agent
@@ -68,18 +33,17 @@ def _move(sim: Simulation, turn: float, magnitude: float | None, options: _MoveO
     if sim.settings.snap_to_grid and abs(size / sim.settings.grid_size - round(size / sim.settings.grid_size)) < 1e-6:
         # Rounding takes off the noise of sine and cosine, which would add up over a long walk on the grid.
         target = np.array([round(float(target[0]), 5), float(target[1]), round(float(target[2]), 5)])
-    _check_leash(sim, target, options)
-    _check_path(sim, target, offset, options.force)
+    if objectId and maxAgentsDistance > 0:
+        away = float(np.linalg.norm(sim.world.get(objectId).position - target))
+        if away > maxAgentsDistance:
+            raise ActionError(f"Agent movement would bring it beyond the max distance of {objectId}: {away:.4f}")
+    _check_path(sim, target, offset, forceAction)
     agent.position = target
-    _carry(sim, options.keep_grip)
+    _carry(sim, manualInteract)
 
 
-def _check_leash(sim: Simulation, target: Array, options: _MoveOptions) -> None:
-    if not options.leash or options.leash_length <= 0:
-        return
-    away = float(np.linalg.norm(sim.world.get(options.leash).position - target))
-    if away > options.leash_length:
-        raise ActionError(f"Agent movement would bring it beyond the max distance of {options.leash}: {away:.4f}")
+for _name, _angle in _DIRECTIONS.items():
+    action(f"Move{_name}")(partial(_move, _angle))
 
 
 def _check_path(sim: Simulation, target: Array, offset: Array, force: bool) -> None:
@@ -94,53 +58,42 @@ def _check_path(sim: Simulation, target: Array, offset: Array, force: bool) -> N
         raise ActionError(f"{sim.world.held} is blocking Agent 0 from moving by {by}.")
 
 
-def _rotator(sign: float) -> Callable[..., None]:
-    def rotate(
-        sim: Simulation,
-        degrees: float | None = None,
-        speed: float = 1.0,
-        waitForFixedUpdate: bool = False,
-        returnToStart: bool = True,
-        disableRendering: bool = True,
-        manualInteract: bool = False,
-        forceAction: bool = False,
-    ) -> None:
-        # Unity takes 0 degrees, its default, for `rotateStepDegrees`.
-        amount = sim.settings.rotate_step if degrees is None or degrees == 0 else degrees
-        agent = sim.world.agent
-        # The second modulus turns a 360.0 that rounding produced into 0.
-        agent.yaw = round((agent.yaw + sign * amount) % 360.0, 6) % 360.0
-        _carry(sim, manualInteract)
-
-    return rotate
+def _rotate(
+    sign: float,
+    sim: Simulation, degrees: float | None = None, speed: float = 1.0, waitForFixedUpdate: bool = False,
+    returnToStart: bool = True, disableRendering: bool = True, manualInteract: bool = False, forceAction: bool = False,
+) -> None:  # fmt: skip
+    # Unity takes 0 degrees, its default, for `rotateStepDegrees`.
+    amount = sim.settings.rotate_step if degrees is None or degrees == 0 else degrees
+    agent = sim.world.agent
+    # The second modulus turns a 360.0 that rounding produced into 0.
+    agent.yaw = round((agent.yaw + sign * amount) % 360.0, 6) % 360.0
+    _carry(sim, manualInteract)
 
 
 for _name, _sign in (("RotateRight", 1.0), ("RotateLeft", -1.0)):
-    action(_name)(_rotator(_sign))
+    action(_name)(partial(_rotate, _sign))
 
 
-def _looker(name: str, sign: float) -> Callable[..., None]:
-    def look(sim: Simulation, degrees: float = 30.0, forceAction: bool = False, manualInteract: bool = False) -> None:
-        if degrees < 0:
-            raise ActionError(f"{name} action requires positive degree value. Invalid value used: {degrees}")
-        agent = sim.world.agent
-        target = round(agent.horizon + sign * degrees, 4)
-        if target > MAX_DOWN:
-            raise ActionError(
-                f"can't look down beyond {MAX_DOWN:g} degrees below the forward horizon", ErrorCode.LOOK_DOWN_LIMIT
-            )
-        if target < -MAX_UP:
-            raise ActionError(
-                f"can't look up beyond {MAX_UP:g} degrees above the forward horizon", ErrorCode.LOOK_UP_LIMIT
-            )
-        agent.horizon = target
-        _carry(sim, manualInteract)
-
-    return look
+def _look(
+    name: str, sign: float, sim: Simulation, degrees: float = 30.0, forceAction: bool = False,
+    manualInteract: bool = False,
+) -> None:  # fmt: skip
+    if degrees < 0:
+        raise ActionError(f"{name} action requires positive degree value. Invalid value used: {degrees}")
+    agent = sim.world.agent
+    target = round(agent.horizon + sign * degrees, 4)
+    if target > MAX_DOWN:
+        text = f"can't look down beyond {MAX_DOWN:g} degrees below the forward horizon"
+        raise ActionError(text, ErrorCode.LOOK_DOWN_LIMIT)
+    if target < -MAX_UP:
+        raise ActionError(f"can't look up beyond {MAX_UP:g} degrees above the forward horizon", ErrorCode.LOOK_UP_LIMIT)
+    agent.horizon = target
+    _carry(sim, manualInteract)
 
 
 for _name, _sign in (("LookDown", 1.0), ("LookUp", -1.0)):
-    action(_name)(_looker(_name, _sign))
+    action(_name)(partial(_look, _name, _sign))
 
 
 @action("RotateLook")

@@ -3,8 +3,6 @@
 from infthor_eval.sim.actions.registry import action
 from infthor_eval.sim.simulation import Simulation
 
-__all__: list[str] = []
-
 
 @action("SetObjectFilter")
 def set_object_filter(sim: Simulation, objectIds: list[str]) -> None:

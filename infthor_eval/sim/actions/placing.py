@@ -14,26 +14,15 @@ from infthor_eval.sim.receptacles import Surface, surfaces
 from infthor_eval.sim.simulation import Simulation
 from infthor_eval.sim.world import World
 
-__all__: list[str] = []
-
 _SPACING = 0.05  # metres between the points of a surface
 
 
 @action("TeleportObject", forms=(("position",), ("x", "y", "z"), ("positions",)))
 def teleport_object(
-    sim: Simulation,
-    objectId: str,
-    rotation: Vector3,
-    position: Vector3 | None = None,
-    x: float | None = None,
-    y: float | None = None,
-    z: float | None = None,
-    positions: list[Vector3] | None = None,
-    forceAction: bool = False,
-    forceKinematic: bool = False,
-    allowTeleportOutOfHand: bool = False,
-    makeUnbreakable: bool = False,
-) -> None:
+    sim: Simulation, objectId: str, rotation: Vector3, position: Vector3 | None = None, x: float | None = None,
+    y: float | None = None, z: float | None = None, positions: list[Vector3] | None = None, forceAction: bool = False,
+    forceKinematic: bool = False, allowTeleportOutOfHand: bool = False, makeUnbreakable: bool = False,
+) -> None:  # fmt: skip
     """Give an object a pose, the first of several positions at which there is room; then it falls.
 
     With `forceAction` it goes where there is no room too, with `forceKinematic` it stays in the air.

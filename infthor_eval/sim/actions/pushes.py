@@ -1,6 +1,6 @@
-"""Pushing and pulling loose things: each slides till friction stops it, something is in its way, or it falls."""
+"""Pushing and pulling loose things: each slides until friction stops it, something is in its way, or it falls."""
 
-from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -8,11 +8,8 @@ from infthor_eval.sim.actions.registry import action
 from infthor_eval.sim.actions.targets import BY_ID_OR_PIXEL, interactable
 from infthor_eval.sim.errors import ActionError
 from infthor_eval.sim.geometry import Array, yaw_matrix
-from infthor_eval.sim.objects import SimObject
 from infthor_eval.sim.simulation import Simulation
 from infthor_eval.sim.sliding import slide
-
-__all__: list[str] = []
 
 _FRAME = 0.02  # seconds that Unity applies the force
 _FRICTION = 0.5
@@ -21,47 +18,33 @@ _LIGHTEST = 0.05  # kilograms; some recorded objects have a mass of 0
 _DEFAULT_FORCE = 200.0  # newtons
 
 
-def _pusher(angle: float) -> Callable[..., None]:
-    def push(
-        sim: Simulation,
-        objectId: str | None = None,
-        x: float | None = None,
-        y: float | None = None,
-        moveMagnitude: float = _DEFAULT_FORCE,
-        forceAction: bool = False,
-    ) -> None:
-        _push(sim, interactable(sim, objectId, forceAction, x, y), moveMagnitude, angle)
-
-    return push
+def _push(
+    angle: float,
+    sim: Simulation, objectId: str | None = None, x: float | None = None, y: float | None = None,
+    moveMagnitude: float = _DEFAULT_FORCE, forceAction: bool = False,
+) -> None:  # fmt: skip
+    directional_push(sim, moveMagnitude, angle, objectId, x, y, forceAction)
 
 
 for _name, _angle in (("PushObject", 0.0), ("PullObject", 180.0)):
-    action(_name, forms=BY_ID_OR_PIXEL)(_pusher(_angle))
+    action(_name, forms=BY_ID_OR_PIXEL)(partial(_push, _angle))
 
 
 @action("DirectionalPush", forms=BY_ID_OR_PIXEL)
 def directional_push(
-    sim: Simulation,
-    moveMagnitude: float,
-    pushAngle: float,
-    objectId: str | None = None,
-    x: float | None = None,
-    y: float | None = None,
-    forceAction: bool = False,
-) -> None:
+    sim: Simulation, moveMagnitude: float, pushAngle: float, objectId: str | None = None, x: float | None = None,
+    y: float | None = None, forceAction: bool = False,
+) -> None:  # fmt: skip
     """Push an object in a direction, degrees clockwise from the agent's own."""
-    _push(sim, interactable(sim, objectId, forceAction, x, y), moveMagnitude, pushAngle)
-
-
-def _push(sim: Simulation, target: SimObject, force: float, angle: float) -> None:
+    target = interactable(sim, objectId, forceAction, x, y)
     if target.object_id in sim.world.held_ids():
         raise ActionError("Please use Throw for an item in the Agent's Hand")
     if not (target.type.pickupable or target.type.moveable):
         raise ActionError("Target object must be either Pickupable or Moveable to have force applied to it!")
-    if force <= 0:
-        raise ActionError(f"moveMagnitude must be > 0, not {force}")
-    direction: Array = yaw_matrix(sim.world.agent.yaw + angle)[:, 2]
+    if moveMagnitude <= 0:
+        raise ActionError(f"moveMagnitude must be > 0, not {moveMagnitude}")
+    direction: Array = yaw_matrix(sim.world.agent.yaw + pushAngle)[:, 2]
     # The force acts for one frame; the speed it gives is then lost to friction: v^2 = 2 * friction * g * distance.
-    speed = force * _FRAME / max(target.type.mass, _LIGHTEST)
+    speed = moveMagnitude * _FRAME / max(target.type.mass, _LIGHTEST)
     slide(sim.world, target, direction, float(np.square(speed) / (2 * _FRICTION * _GRAVITY)))
     sim.world.mark_changed()

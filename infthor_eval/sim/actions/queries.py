@@ -11,8 +11,6 @@ from infthor_eval.sim.geometry import convex_hull, round_vector, to_array, to_xy
 from infthor_eval.sim.objects import SimObject
 from infthor_eval.sim.simulation import Simulation
 
-__all__: list[str] = []
-
 
 @action("GetScenesInBuild", query=True)
 def get_scenes_in_build(sim: Simulation) -> list[str]:

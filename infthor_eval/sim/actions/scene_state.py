@@ -9,10 +9,9 @@ import numpy as np
 from infthor_eval.sim.actions.interaction import set_openness
 from infthor_eval.sim.actions.registry import action
 from infthor_eval.sim.errors import ActionError
+from infthor_eval.sim.geometry import to_array
 from infthor_eval.sim.rearrange import NamedPose, set_poses, spawn_randomly
 from infthor_eval.sim.simulation import Simulation
-
-__all__: list[str] = []
 
 
 @action("SetObjectPoses")
@@ -28,7 +27,9 @@ def _named_pose(entry: Any) -> NamedPose:
     if not isinstance(entry, Mapping) or not isinstance(entry.get("objectName"), str):
         raise ActionError(f"objectPoses needs entries with objectName, position and rotation, not {entry!r}")
     try:
-        return NamedPose.from_wire(entry)
+        # Unity appends "(Clone)" to the names of copies.
+        name, rotation = entry["objectName"].removesuffix("(Clone)"), entry.get("rotation") or {}
+        return NamedPose(name, to_array(entry["position"]), to_array(rotation))
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise ActionError(f"objectPoses: {entry['objectName']} has no usable position or rotation ({error})") from error
 
@@ -123,17 +124,11 @@ def remove_from_scene(sim: Simulation, objectId: str) -> None:
 
 @action("InitialRandomSpawn")
 def initial_random_spawn(
-    sim: Simulation,
-    randomSeed: int | None = None,
-    forceVisible: bool = False,
-    numPlacementAttempts: int = 5,
-    placeStationary: bool = True,
-    excludedReceptacles: list[str] | None = None,
-    excludedObjectIds: list[str] | None = None,
-    numDuplicatesOfType: list[Any] | None = None,
-    allowFloor: bool = False,
+    sim: Simulation, randomSeed: int | None = None, forceVisible: bool = False, numPlacementAttempts: int = 5,
+    placeStationary: bool = True, excludedReceptacles: list[str] | None = None,
+    excludedObjectIds: list[str] | None = None, numDuplicatesOfType: list[Any] | None = None, allowFloor: bool = False,
     allowMoveable: bool = False,
-) -> None:
+) -> None:  # fmt: skip
     """Spread the pickupable objects over the receptacles, the same way for the same seed.
 
     Without `randomSeed` it continues the random numbers that SetRandomSeed started.

@@ -4,8 +4,6 @@ from infthor_eval.sim.actions.registry import action
 from infthor_eval.sim.errors import ActionError
 from infthor_eval.sim.simulation import Simulation
 
-__all__: list[str] = []
-
 
 @action("SaveState", query=True)
 def save_state(sim: Simulation, slot: int = 0) -> None:

@@ -10,8 +10,6 @@ from infthor_eval.sim.errors import ActionError
 from infthor_eval.sim.objects import SimObject
 from infthor_eval.sim.simulation import Simulation
 
-__all__: list[str] = []
-
 _LIQUIDS = ("coffee", "wine", "water")
 _ABILITIES = {  # attribute of `ObjectType`, by AI2-THOR's name of the property
     "CanBeCooked": "cookable",

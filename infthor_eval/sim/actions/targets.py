@@ -16,7 +16,7 @@ ObjectFunction = Callable[[Simulation, SimObject], None]
 
 
 def object_action(*names: str) -> Callable[[ObjectFunction], ObjectFunction]:
-    """Register a function of one object as an action whose only arguments say which object it is."""
+    """Register a function of one object as an action; its only arguments say which object it is."""
 
     def register(function: ObjectFunction) -> ObjectFunction:
         def run(

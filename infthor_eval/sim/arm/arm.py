@@ -40,7 +40,7 @@ def base_transforms(rig: Rig, positions: Array, yaws: Array, poses: Sequence[Arm
     """Return origins (n, 3) and rotations (n, 3, 3) of the arm's base in the world.
 
     Args:
-        rig: geometry of the arm.
+        rig: its geometry.
         positions: positions of the agent, metres (n, 3).
         yaws: directions of the agent, degrees (n,).
         poses: poses of the arm (n).
@@ -78,11 +78,6 @@ class Arm:
     held: dict[str, Grip] = field(default_factory=dict)
     held_contents: dict[str, Grip] = field(default_factory=dict)
     version: int = 0
-
-    @classmethod
-    def at_rest(cls, rig: Rig) -> "Arm":
-        """Return an arm in its resting pose that holds nothing."""
-        return cls(rig, rig.rest())
 
     def base(self, agent: Agent) -> Transform:
         """Return the frame of the base in the world."""

@@ -58,14 +58,10 @@ def join(parts: Sequence[Boxes], axis: int = 0) -> Boxes:
 
 
 def separations(first: Boxes, second: Boxes) -> Array:
-    """Return gaps (n, m) in metres between each of n boxes and each of m others; negative: depth of the overlap.
+    """Return gaps (n, m) in metres between n boxes and m others, without groups; negative: depth of the overlap.
 
     A gap is measured along the best separating direction. It is at most the true distance, and negative exactly where
     the boxes overlap. Pairs that are far apart have infinity.
-
-    Args:
-        first: n boxes without groups.
-        second: m boxes without groups.
     """
     # Spheres around the boxes sort out most pairs cheaply.
     gaps = np.full((len(first.center), len(second.center)), np.inf)

@@ -24,7 +24,7 @@ def equip(world: World, agent_mode: str) -> None:
         held = world.objects[world.held]
         world.let_go(held)
         let_fall(world, held, held.center)
-    world.arm = None if rig is None else Arm.at_rest(rig)
+    world.arm = None if rig is None else Arm(rig, rig.rest())
     world.agent.eye = _EYES.get(agent_mode, (0.0, CAMERA_HEIGHT, 0.0))
     world.agent.crouch = 0.0 if agent_mode in _EYES else CROUCH
     world.mark_changed()

@@ -7,7 +7,7 @@ import numpy as np
 from infthor_eval.sim.arm.arm import Arm
 from infthor_eval.sim.arm.holding import touched_objects
 from infthor_eval.sim.arm.rotations import axis_angle
-from infthor_eval.sim.geometry import Array, round_vector, to_xyz
+from infthor_eval.sim.geometry import Array, round_xyz
 from infthor_eval.sim.world import World
 
 __all__ = ["arm_metadata"]
@@ -23,7 +23,7 @@ def arm_metadata(world: World, arm: Arm) -> dict[str, Any]:
         "heldObjects": list(arm.held),
         "pickupableObjects": [o.object_id for o in near.pickupable],
         "touchedNotHeldObjects": [o.object_id for o in near.loose],
-        "handSphereCenter": _xyz(arm.sphere(world.agent)),
+        "handSphereCenter": round_xyz(arm.sphere(world.agent)),
         "handSphereRadius": arm.radius,
     }
 
@@ -35,8 +35,8 @@ def _joints(world: World, arm: Arm) -> list[dict[str, Any]]:
     for name, position, turn in zip(arm.rig.joint_names, joints.positions[0], joints.turns[0], strict=True):
         listed.append({
             "name": name,
-            "position": _xyz(base.point(position)),
-            "rootRelativePosition": _xyz(position),
+            "position": round_xyz(base.point(position)),
+            "rootRelativePosition": round_xyz(position),
             "rotation": _axis_angle(base.turn @ turn),
             "rootRelativeRotation": _axis_angle(turn),
             "localRotation": _axis_angle(parent.T @ turn),
@@ -54,8 +54,4 @@ def _joints(world: World, arm: Arm) -> list[dict[str, Any]]:
 
 def _axis_angle(turn: Array) -> dict[str, float]:
     axis, degrees = axis_angle(turn)
-    return {**_xyz(axis), "w": round(degrees, _DIGITS)}
-
-
-def _xyz(vector: Array) -> dict[str, float]:
-    return to_xyz(round_vector(vector, _DIGITS))
+    return {**round_xyz(axis), "w": round(degrees, _DIGITS)}

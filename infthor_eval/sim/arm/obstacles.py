@@ -43,8 +43,7 @@ def arm_obstacles(world: World, rows: Array, names: tuple[str, ...], mass_thresh
     """Return what stops an arm in a world.
 
     Args:
-        world: the world.
-        rows: its primitives (n, COLUMNS), without those of what is held.
+        rows: the world's primitives (n, COLUMNS), without those of what is held.
         names: ids of objects and names of the parts of the shell, by instance.
         mass_threshold: mass above which a loose object stops the arm, kilograms; None: none does.
     """

@@ -51,14 +51,7 @@ def first_contact(world: World, arm: Arm, path: list[Stance], around: ArmObstacl
     What the arm touches already is in the way only where the same part of the arm gets deeper into it. A part that is
     stuck in an object, as after a teleport, may leave it any way: there only the end of the path counts.
 
-    Args:
-        world: the world.
-        arm: the agent's arm.
-        path: stances (n) that follow the present one.
-        around: obstacles.
-
-    Returns:
-        None if the whole path is free.
+    None if the whole path is free; it begins after the present stance.
     """
     moving = moving_boxes(world, arm, [stance(world, arm), *path])
     low, high = moving.bounds()

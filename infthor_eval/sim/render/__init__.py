@@ -1,3 +1,1 @@
 """The renderer: primitives, a ray caster with a depth buffer, shading, and the shapes of object types."""
-
-__all__: list[str] = []

@@ -19,12 +19,9 @@ _ALONG = euler_matrix((90.0, 0.0, 0.0))  # turns a cylinder, whose axis is y, al
 
 
 def arm_rows(arm: Arm, agent: Agent, instance: int) -> Array:
-    """Return the primitives (n, COLUMNS) of the arm in the world, without the hand's sphere.
+    """Return the primitives (n, COLUMNS) of the agent's arm in the world, without the hand's sphere.
 
-    Args:
-        arm: the arm.
-        agent: the agent, at whose pose it is drawn.
-        instance: index of the arm in the picture's table of instances.
+    `instance` is the arm's index in the picture's table of instances.
     """
     boxes, base = arm.rig.boxes([arm.pose]).flat(), arm.base(agent)
     parts = []

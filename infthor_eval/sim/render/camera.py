@@ -28,10 +28,8 @@ class PinholeCamera:
         position: position in the world, metres (3,).
         matrix: rotation (3, 3).
         field_of_view: vertical, degrees.
-        width: width of its pictures, pixels.
-        height: height of its pictures, pixels.
-        near: depth of the near clipping plane, metres.
-        far: depth of the far clipping plane, metres.
+        width, height: size of its pictures, pixels.
+        near, far: depths of the clipping planes, metres.
     """
 
     position: Array

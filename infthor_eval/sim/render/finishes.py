@@ -16,7 +16,8 @@ RANDOM_PATTERNS = tuple(int(m) for m in Material if m not in (Material.GLASS, Ma
 
 def apply_finishes(prims: Array, names: Sequence[str], look: Appearance) -> Array:
     """Return the primitives (n, COLUMNS) with the looks of `look`; `names` are those of the instances."""
-    if look.is_default:
+    # Brightness does not count: it changes the lights and not a surface.
+    if not look.finishes and np.all(look.light == 1.0):
         return prims
     tints, patterns = np.tile(look.light, (len(names), 1)), np.full(len(names), -1)
     for index, name in enumerate(names):

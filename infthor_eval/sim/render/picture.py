@@ -94,8 +94,6 @@ def cast_picture(
     Args:
         prims: the primitives (n, COLUMNS).
         names: ids of objects and names of the parts of the shell, by instance.
-        camera: the camera.
-        rasterizer: implementation of the renderer.
         base: picture of the same camera to draw over; its pixels that are nearer stay. None for an empty one.
     """
     projection = project(prims, camera)

@@ -17,23 +17,9 @@ import numpy as np
 from infthor_eval.sim.geometry import Array
 
 __all__ = [
-    "AXES",
-    "BOTTOM",
-    "CENTER",
-    "COLOR",
-    "COLUMNS",
-    "EMISSION",
-    "FORM",
-    "HALF",
-    "INSTANCE",
-    "MATERIAL",
-    "TOP",
-    "Color",
-    "Form",
-    "Material",
-    "ShapePart",
-    "rows",
-]
+    "AXES", "BOTTOM", "CENTER", "COLOR", "COLUMNS", "EMISSION", "FORM", "HALF", "INSTANCE", "MATERIAL", "TOP", "Color",
+    "Form", "Material", "ShapePart", "rows",
+]  # fmt: skip
 
 FORM, CENTER, HALF, AXES, BOTTOM, TOP, COLOR, MATERIAL, EMISSION, INSTANCE = 0, 1, 4, 7, 16, 17, 18, 21, 22, 23
 COLUMNS = 24
@@ -72,14 +58,12 @@ class ShapePart:
     """One primitive of an object, in the object's frame.
 
     Attributes:
-        form: form.
         center: centre, metres (3,).
         half: half extents, metres (3,).
         color: red, green and blue, 0 to 1.
         material: surface pattern.
         matrix: rotation (3, 3); None for none.
-        bottom: radius at the bottom of a cylinder, relative to its half extents.
-        top: radius at its top, likewise.
+        bottom, top: radii at the ends of a cylinder, relative to its half extents.
         emission: share of light of its own, from 0 (lit by the lights only) to 1.
     """
 

@@ -28,9 +28,7 @@ def is_visible(
             break
         x0, x1, y0, y1 = projection.box[k]
         within = np.nonzero((xs >= x0) & (xs <= x1) & (ys >= y0) & (ys <= y1))[0]
-        step, u, v = projection.steps[k], us[xs[within]], vs[ys[within]]
-        d = [(step[0, i] + u * step[1, i]) + v * step[2, i] for i in range(3)]
-        t = hit(prims[projection.index[k]], projection.origin[k], d, camera.near)
+        t = hit(prims, projection, int(k), (us[xs[within]], vs[ys[within]]), camera.near)
         hidden = (t > camera.near) & ((t < depth[within]) | ((t == depth[within]) & (k < first[within])))
         left = np.delete(np.arange(len(ys)), within[hidden])
         ys, xs, depth, first = ys[left], xs[left], depth[left], first[left]

@@ -28,18 +28,9 @@ def cast(prims: Array, projection: Projection, camera: PinholeCamera) -> tuple[A
     nearest = np.empty((len(vs), len(us)), dtype=np.int32)
     profiles = prims[projection.index][:, [FORM, BOTTOM, TOP]]
     _cast(
-        profiles,
-        projection.origin,
-        projection.steps,
-        projection.box,
-        projection.near,
-        us,
-        vs,
-        camera.near,
-        camera.far,
-        depth,
-        nearest,
-    )
+        profiles, projection.origin, projection.steps, projection.box, projection.near, us, vs, camera.near, camera.far,
+        depth, nearest,
+    )  # fmt: skip
     return depth, nearest
 
 
@@ -93,17 +84,9 @@ def _hit_bowl(ox: float, oy: float, oz: float, dx: float, dy: float, dz: float, 
 
 @njit(cache=True)
 def _hit_cylinder(
-    ox: float,
-    oy: float,
-    oz: float,
-    dx: float,
-    dy: float,
-    dz: float,
-    bottom: float,
-    top: float,
-    is_open: bool,
+    ox: float, oy: float, oz: float, dx: float, dy: float, dz: float, bottom: float, top: float, is_open: bool,
     clip: float,
-) -> float:
+) -> float:  # fmt: skip
     # The side is x^2 + z^2 = (m + k * y)^2, of which m + k * y >= 0 excludes the mirrored cone beyond the apex.
     m, k = (bottom + top) * 0.5, (top - bottom) * 0.5
     radius = m + k * oy
@@ -134,17 +117,9 @@ def _hit_cylinder(
 
 @njit(cache=True, inline="always")
 def hit(
-    form: float,
-    bottom: float,
-    top: float,
-    ox: float,
-    oy: float,
-    oz: float,
-    dx: float,
-    dy: float,
-    dz: float,
+    form: float, bottom: float, top: float, ox: float, oy: float, oz: float, dx: float, dy: float, dz: float,
     clip: float,
-) -> float:
+) -> float:  # fmt: skip
     """Return the depth at which a ray from o along d meets a primitive, in its scaled frame; infinity for a miss."""
     if form == _BOX:
         return _hit_box(ox, oy, oz, dx, dy, dz)
@@ -157,18 +132,9 @@ def hit(
 
 @njit(cache=True, parallel=True)
 def _cast(
-    profiles: Array,
-    origin: Array,
-    steps: Array,
-    box: NDArray[np.int64],
-    near: Array,
-    us: Array,
-    vs: Array,
-    clip: float,
-    far: float,
-    depth: Array,
-    nearest: NDArray[np.int32],
-) -> None:
+    profiles: Array, origin: Array, steps: Array, box: NDArray[np.int64], near: Array, us: Array, vs: Array,
+    clip: float, far: float, depth: Array, nearest: NDArray[np.int32],
+) -> None:  # fmt: skip
     height = len(vs)
     # Threads share out rows and not primitives: each pixel has one writer, so their number does not change the picture.
     for band in prange(_BANDS):

@@ -20,12 +20,10 @@ def cast(prims: Array, projection: Projection, camera: PinholeCamera) -> tuple[A
     us, vs = camera.rays()
     depth = np.full((len(vs), len(us)), camera.far)
     nearest = np.full((len(vs), len(us)), -1, dtype=np.int32)
-    for order, (row, box) in enumerate(zip(projection.index, projection.box, strict=True)):
+    for order, box in enumerate(projection.box):
         x0, x1, y0, y1 = box[0], box[1] + 1, box[2], box[3] + 1
         u, v = us[None, x0:x1], vs[y0:y1, None]
-        steps = projection.steps[order]
-        d = [(steps[0, i] + u * steps[1, i]) + v * steps[2, i] for i in range(3)]
-        t = hit(prims[row], projection.origin[order], d, camera.near)
+        t = hit(prims, projection, order, (u, v), camera.near)
         window = depth[y0:y1, x0:x1]
         closer = (t > camera.near) & (t < window)
         window[closer] = t[closer]
@@ -33,8 +31,11 @@ def cast(prims: Array, projection: Projection, camera: PinholeCamera) -> tuple[A
     return depth, nearest
 
 
-def hit(prim: Array, o: Array, d: list[Array], near: float) -> Array:
-    """Return depths at which rays from `o` along `d` meet a primitive, in its scaled frame; infinity if they do not."""
+def hit(prims: Array, projection: Projection, order: int, rays: tuple[Array, Array], near: float) -> Array:
+    """Return depths at which rays (u, v) meet primitive `order` of the projection; infinity where they do not."""
+    prim, o, steps = prims[projection.index[order]], projection.origin[order], projection.steps[order]
+    u, v = rays
+    d = [(steps[0, i] + u * steps[1, i]) + v * steps[2, i] for i in range(3)]
     form = prim[FORM]
     if form == Form.BOX:
         return _hit_box(o, d)

@@ -82,11 +82,7 @@ def _thresholds(room: RoomShell, color: Color, material: Material) -> list[Shape
     for side, low, high in room.openings:
         middle, half = (low + high) / 2, (high - low) / 2
         at = {"x-": room.x_min, "x+": room.x_max, "z-": room.z_min, "z+": room.z_max}[side]
-        if side[0] == "z":
-            part = ShapePart(Form.BOX, (middle, level, at), (half, _THICK, 2 * _THICK), color, material)
-        else:
-            part = ShapePart(Form.BOX, (at, level, middle), (2 * _THICK, _THICK, half), color, material)
-        parts.append(part)
+        parts.append(_slab(side[0] == "z", middle, at, half, level, _THICK, 2 * _THICK, color, material))
     return parts
 
 
@@ -102,8 +98,9 @@ def _pieces(
 
 
 def _slab(
-    along_x: bool, middle: float, at: float, half: float, level: float, rise: float, thick: float, color: Color
-) -> ShapePart:
+    along_x: bool, middle: float, at: float, half: float, level: float, rise: float, thick: float, color: Color,
+    material: Material = Material.PLAIN,
+) -> ShapePart:  # fmt: skip
     if along_x:
-        return ShapePart(Form.BOX, (middle, level, at), (half, rise, thick), color)
-    return ShapePart(Form.BOX, (at, level, middle), (thick, rise, half), color)
+        return ShapePart(Form.BOX, (middle, level, at), (half, rise, thick), color, material)
+    return ShapePart(Form.BOX, (at, level, middle), (thick, rise, half), color, material)

@@ -17,15 +17,9 @@ _NEIGHBOURS, _SUBPIXELS = np.array(NEIGHBOURS), np.array(SUBPIXELS)
 
 
 def smooth(
-    prims: Array,
-    projection: Projection,
-    camera: PinholeCamera,
-    nearest: NDArray[np.int32],
-    factors: Array,
-    lights: Lights,
-    places: tuple[NDArray[np.int64], NDArray[np.int64]],
-    rgb: NDArray[np.uint8],
-) -> None:
+    prims: Array, projection: Projection, camera: PinholeCamera, nearest: NDArray[np.int32], factors: Array,
+    lights: Lights, places: tuple[NDArray[np.int64], NDArray[np.int64]], rgb: NDArray[np.uint8],
+) -> None:  # fmt: skip
     """Give the pixels at `places` (rows, columns) of `rgb` the mean colour of their rays, in place."""
     ys, xs = places
     if not len(ys):
@@ -62,8 +56,6 @@ def _depths(
     depths = np.full(orders.shape, np.inf)
     for order in np.unique(orders[orders >= 0]):
         rows, columns = np.nonzero(orders == order)
-        steps = projection.steps[order]
-        d = [(steps[0, i] + u[rows] * steps[1, i]) + v[rows] * steps[2, i] for i in range(3)]
-        t = hit(prims[projection.index[order]], projection.origin[order], d, camera.near)
+        t = hit(prims, projection, order, (u[rows], v[rows]), camera.near)
         depths[rows, columns] = np.where((t > camera.near) & (t < camera.far), t, np.inf)
     return depths

@@ -23,11 +23,7 @@ _KEY = '{"scene":"'  # the usual start of a line
 
 
 class FloorPlanData:
-    """Reads floor plans from a data folder.
-
-    Args:
-        root: the folder.
-    """
+    """Reads floor plans from a data folder."""
 
     def __init__(self, root: Path) -> None:
         self._root = root

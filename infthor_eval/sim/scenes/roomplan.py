@@ -71,7 +71,6 @@ class RoomPlan:
 
         Args:
             side: the wall: `x-`, `x+`, `z-` or `z+`.
-            object_type: type of the object.
             at: position along the wall, metres (x for z walls, z for x walls).
             y: height of its underside, metres.
             size: width, height and depth, metres; None for the type's usual size.
@@ -150,20 +149,13 @@ class RoomPlan:
 def build_world(name: str, seed: int, plans: list[RoomPlan], doors: list[tuple[float, float]] | None = None) -> World:
     """Return the world of furnished rooms, with the agent on the free floor and loose objects in the furniture.
 
-    Args:
-        name: name of the scene.
-        seed: seed of the scene.
-        plans: the rooms.
-        doors: cells (x, z) in doorways.
+    `doors` are the cells (x, z) in doorways.
     """
     # Of floor that furniture cuts off from the rest, only the largest part can be walked on.
     grid = NavGrid([cell for plan in plans for cell in plan.free_cells()] + (doors or []))
     largest = max(_connected_parts(grid), key=len)
     nav = NavGrid(largest)
-    objects: dict[str, SimObject] = {}
-    for plan in plans:
-        for item in plan.objects:
-            objects[item.object_id] = item
+    objects = {item.object_id: item for plan in plans for item in plan.objects}
     room = plans[0].room
     start = nav.nearest((room.x_min + room.x_max) / 2, (room.z_min + room.z_max) / 2)
     yaw = nav.freest_yaw(*start, reach=3.0)

@@ -5,8 +5,6 @@ from infthor_eval.sim.render.shapes.builder import Builder, shade_of
 from infthor_eval.sim.render.shapes.palette import BLACK, BRASS, CHROME, DARK, STEEL, WHITE, pick
 from infthor_eval.sim.render.shapes.register import draws
 
-__all__: list[str] = []
-
 _SCREEN: Color = (0.35, 0.6, 0.9)
 _WARM: Color = (1.0, 0.93, 0.7)
 _SHADES: tuple[Color, ...] = ((0.9, 0.85, 0.72), (0.75, 0.35, 0.3), (0.5, 0.6, 0.68))

@@ -1,7 +1,7 @@
 """Building the shape of one object: coordinates run from -1 to 1 across the object's box, front towards +z."""
 
 from collections.abc import Sequence
-from typing import TypedDict, Unpack
+from functools import partialmethod
 
 import numpy as np
 
@@ -19,15 +19,6 @@ def shade_of(color: Color, factor: float) -> Color:
     return (min(color[0] * factor, 1.0), min(color[1] * factor, 1.0), min(color[2] * factor, 1.0))
 
 
-class Details(TypedDict, total=False):
-    """Optional properties of a part; see `ShapePart`."""
-
-    tilt: Vector
-    bottom: float
-    top: float
-    glow: float
-
-
 class Builder:
     """Collects the parts of one object.
 
@@ -35,10 +26,7 @@ class Builder:
     middle of the front. Half extents are fractions too, so (1, 1, 1) fills the box. Shapes so fit objects of any size.
 
     Attributes:
-        item: the object.
-        state: its state, which may change its looks.
         parts: primitives so far.
-        style: index that varies colours.
         half: half extents of the object's box seen from its front, metres (3,).
     """
 
@@ -86,29 +74,11 @@ class Builder:
         metres = np.asarray(half, dtype=float) * self.half
         self.parts.append(ShapePart(form, self.metric(at), metres, color, material, matrix, bottom, top, glow))
 
-    def box(
-        self, at: Vector, half: Vector, color: Color, material: Material = Material.PLAIN, **more: Unpack[Details]
-    ) -> None:
-        """Add a box."""
-        self.add(Form.BOX, at, half, color, material, **more)
-
-    def ball(
-        self, at: Vector, half: Vector, color: Color, material: Material = Material.PLAIN, **more: Unpack[Details]
-    ) -> None:
-        """Add an ellipsoid."""
-        self.add(Form.ELLIPSOID, at, half, color, material, **more)
-
-    def tube(
-        self, at: Vector, half: Vector, color: Color, material: Material = Material.PLAIN, **more: Unpack[Details]
-    ) -> None:
-        """Add an upright cylinder; `bottom` and `top` are its relative radii."""
-        self.add(Form.CYLINDER, at, half, color, material, **more)
-
-    def cup(
-        self, at: Vector, half: Vector, color: Color, material: Material = Material.PLAIN, **more: Unpack[Details]
-    ) -> None:
-        """Add a cylinder that is open at the top."""
-        self.add(Form.CUP, at, half, color, material, **more)
+    box = partialmethod(add, Form.BOX)
+    ball = partialmethod(add, Form.ELLIPSOID)
+    tube = partialmethod(add, Form.CYLINDER)  # upright; `bottom` and `top` are its relative radii
+    cup = partialmethod(add, Form.CUP)
+    bowl = partialmethod(add, Form.BOWL)
 
     def open_front(self, color: Color, material: Material, wall: float, glow: float = 0.0) -> None:
         """Add a box without its front: five boards `wall` metres thick; `glow` lights its inside."""
@@ -126,12 +96,6 @@ class Builder:
         for side in (-1, 1):
             self.box((side * (1 - x), y, 0), (x, 1 - y, 1), color, material, glow=glow)
             self.box((0, y, side * (1 - z)), (1 - 2 * x, 1 - y, z), color, material, glow=glow)
-
-    def bowl(
-        self, at: Vector, half: Vector, color: Color, material: Material = Material.PLAIN, **more: Unpack[Details]
-    ) -> None:
-        """Add the lower half of an ellipsoid, open at the top."""
-        self.add(Form.BOWL, at, half, color, material, **more)
 
     @property
     def longest(self) -> int:
@@ -171,16 +135,9 @@ class Builder:
         self, hinge: Vector, offset: Vector, metres: Vector, angle: float, color: Color, material: Material,
         glow: float = 0.0,
     ) -> None:  # fmt: skip
-        """Add a box that is turned about an upright hinge.
+        """Add a box turned by `angle` degrees about an upright hinge, which is at a position in fractions.
 
-        Args:
-            hinge: position of the hinge, in fractions.
-            offset: the box's middle from the hinge before turning, metres.
-            metres: half extents, metres.
-            angle: turn, degrees.
-            color: colour.
-            material: surface pattern.
-            glow: share of light of its own, 0 to 1.
+        The box's middle before turning, from the hinge, and its half extents are given in metres.
         """
         turn = self._turn @ yaw_matrix(angle)
         center = self.metric(hinge) + turn @ np.asarray(offset, dtype=float)

@@ -4,21 +4,6 @@ from dataclasses import replace
 
 from infthor_eval.sim.objects import SimObject
 from infthor_eval.sim.render.primitives import Color, ShapePart
-from infthor_eval.sim.render.shapes import (  # noqa: F401 - imported to be registered
-    appliances,
-    cutlery,
-    fixtures,
-    food,
-    household,
-    kitchenware,
-    seats,
-    slices,
-    soft,
-    sport,
-    stationery,
-    storage,
-    tables,
-)
 from infthor_eval.sim.render.shapes.builder import Builder, shade_of
 from infthor_eval.sim.render.shapes.register import SHAPES, draws
 

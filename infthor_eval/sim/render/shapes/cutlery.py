@@ -5,8 +5,6 @@ from infthor_eval.sim.render.shapes.builder import Builder, shade_of
 from infthor_eval.sim.render.shapes.palette import CHROME, DARK, STEEL
 from infthor_eval.sim.render.shapes.register import draws
 
-__all__: list[str] = []
-
 _BRIGHT: Color = (0.9, 0.92, 0.95)
 _GRIP: Color = (0.15, 0.13, 0.12)
 

@@ -8,8 +8,6 @@ from infthor_eval.sim.render.shapes.tables import cut_slab
 from infthor_eval.sim.render.shell import FLOORS
 from infthor_eval.sim.world import FLOOR_STYLES
 
-__all__: list[str] = []
-
 _CERAMIC: Color = (0.95, 0.95, 0.93)
 _SKY: Color = (0.66, 0.83, 0.97)
 _WATER: Color = (0.55, 0.75, 0.9)

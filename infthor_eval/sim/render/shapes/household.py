@@ -5,8 +5,6 @@ from infthor_eval.sim.render.shapes.builder import Builder, shade_of
 from infthor_eval.sim.render.shapes.palette import BLACK, BRASS, CERAMICS, DARK, LEAF, PAPER, STEEL, WHITE, WOODS, pick
 from infthor_eval.sim.render.shapes.register import draws
 
-__all__: list[str] = []
-
 _COVERS: tuple[Color, ...] = ((0.6, 0.18, 0.15), (0.18, 0.3, 0.5), (0.2, 0.42, 0.3), (0.55, 0.42, 0.2))
 
 

@@ -5,8 +5,6 @@ from infthor_eval.sim.render.shapes.builder import Builder, shade_of
 from infthor_eval.sim.render.shapes.palette import BLACK, CERAMICS, CHROME, DARK, GLASS, STEEL, WHITE, WOODS, pick
 from infthor_eval.sim.render.shapes.register import draws
 
-__all__: list[str] = []
-
 _LIQUIDS: dict[str, Color] = {"water": (0.5, 0.72, 0.88), "coffee": (0.25, 0.14, 0.07), "wine": (0.45, 0.05, 0.12)}
 
 

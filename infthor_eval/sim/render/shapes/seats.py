@@ -5,8 +5,6 @@ from infthor_eval.sim.render.shapes.builder import Builder, shade_of
 from infthor_eval.sim.render.shapes.palette import CLOTHS, WHITE, WOODS, pick
 from infthor_eval.sim.render.shapes.register import draws
 
-__all__: list[str] = []
-
 
 def _seat_level(b: Builder, usual: float) -> float:
     """Return the height of the seat as a fraction of the half box: the object's surface height if it is known."""

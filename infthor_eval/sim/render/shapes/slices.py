@@ -6,8 +6,6 @@ from infthor_eval.sim.render.shapes.builder import Builder, shade_of
 from infthor_eval.sim.render.shapes.food import APPLES, CRUST, LETTUCE, POTATO, TOMATO, loaf
 from infthor_eval.sim.render.shapes.register import draws
 
-__all__: list[str] = []
-
 # Number of slices, by the type of slice.
 _COUNTS = {whole.slice_type: whole.slices for whole in OBJECT_TYPES.values() if whole.slices}
 _RUFFLES = ((0.42, 0.42), (0.42, -0.42), (-0.42, 0.42), (-0.42, -0.42))

@@ -5,8 +5,6 @@ from infthor_eval.sim.render.shapes.builder import Builder, shade_of
 from infthor_eval.sim.render.shapes.palette import CLOTHS, WHITE, pick
 from infthor_eval.sim.render.shapes.register import draws
 
-__all__: list[str] = []
-
 
 @draws
 def pillow(b: Builder) -> None:

@@ -5,8 +5,6 @@ from infthor_eval.sim.render.shapes.builder import Builder, shade_of
 from infthor_eval.sim.render.shapes.palette import BLACK, CHROME, DARK
 from infthor_eval.sim.render.shapes.register import draws
 
-__all__: list[str] = []
-
 
 @draws
 def ball(b: Builder) -> None:

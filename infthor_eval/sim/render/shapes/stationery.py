@@ -7,8 +7,6 @@ from infthor_eval.sim.render.shapes.builder import Builder, shade_of
 from infthor_eval.sim.render.shapes.palette import BLACK, BRASS, CHROME, STEEL, pick
 from infthor_eval.sim.render.shapes.register import draws
 
-__all__: list[str] = []
-
 
 @draws
 def card(b: Builder) -> None:

@@ -6,10 +6,8 @@ from infthor_eval.sim.render.shapes.builder import Builder, shade_of
 from infthor_eval.sim.render.shapes.palette import BLACK, CHROME, DARK, STEEL, WHITE, WOODS, pick
 from infthor_eval.sim.render.shapes.register import draws
 
-__all__: list[str] = []
-
 _LEAF = 0.02  # thickness of a door, metres
-_LIT = 0.2  # light of their own of the insides of open things, whose contents would be hard to see otherwise
+_LIT = 0.2  # glow of the insides of open things: their contents would be hard to see otherwise
 _BODY = 0.82  # of a wide open cardboard box's width; the rest is its flaps. The type's `unfolds` has the same share.
 _COLD: Color = (0.93, 0.97, 1.0)
 
