@@ -38,10 +38,15 @@ def get_reachable_positions(
 
 @action("GetInteractablePoses", query=True)
 def get_interactable_poses(
-    sim: Simulation, objectId: str, positions: list[Vector3] | None = None, rotations: list[float] | None = None,
-    horizons: list[float] | None = None, standings: list[bool] | None = None, maxDistance: float | None = None,
+    sim: Simulation,
+    objectId: str,
+    positions: list[Vector3] | None = None,
+    rotations: list[float] | None = None,
+    horizons: list[float] | None = None,
+    standings: list[bool] | None = None,
+    maxDistance: float | None = None,
     maxPoses: int = 2**31 - 1,
-) -> list[dict[str, Any]]:  # fmt: skip
+) -> list[dict[str, Any]]:
     """Return poses, as TeleportFull takes them, from which the agent sees an object within its reach."""
     if maxPoses <= 0:
         raise ActionError("maxPoses must be greater than 0")

@@ -24,9 +24,14 @@ _TURN_STEP, _ELBOW_STEP = 3.0, 2.0  # degrees between two collision checks
 
 @action("MoveArm", modes=ARM_MODES)
 def move_arm(
-    sim: Simulation, position: Vector3, coordinateSpace: str = "armBase", restrictMovement: bool = False,
-    speed: float = 1.0, returnToStart: bool = True, disableRendering: bool = True,
-) -> None:  # fmt: skip
+    sim: Simulation,
+    position: Vector3,
+    coordinateSpace: str = "armBase",
+    restrictMovement: bool = False,
+    speed: float = 1.0,
+    returnToStart: bool = True,
+    disableRendering: bool = True,
+) -> None:
     """Bring the wrist to a position, or as near as the arm reaches."""
     agent, arm = sim.world.agent, agent_arm(sim)
     point = to_array(position)
@@ -41,9 +46,14 @@ def move_arm(
 
 @action("MoveArmRelative", modes=ARM_MODES)
 def move_arm_relative(
-    sim: Simulation, offset: Vector3, coordinateSpace: str = "armBase", restrictMovement: bool = False,
-    speed: float = 1.0, returnToStart: bool = True, disableRendering: bool = True,
-) -> None:  # fmt: skip
+    sim: Simulation,
+    offset: Vector3,
+    coordinateSpace: str = "armBase",
+    restrictMovement: bool = False,
+    speed: float = 1.0,
+    returnToStart: bool = True,
+    disableRendering: bool = True,
+) -> None:
     """Move the wrist by an offset along the axes of a space."""
     agent, arm = sim.world.agent, agent_arm(sim)
     turns = {"armBase": arm.base(agent).turn, "wrist": arm.wrist(agent).turn, "world": np.eye(3)}
@@ -128,9 +138,14 @@ def _lift(sim: Simulation, height: float, return_to_start: bool) -> None:
 
 @action("RotateWristRelative", modes=ARM_MODES)
 def rotate_wrist_relative(
-    sim: Simulation, pitch: float = 0.0, yaw: float = 0.0, roll: float = 0.0, speed: float = 10.0,
-    returnToStart: bool = True, disableRendering: bool = True,
-) -> None:  # fmt: skip
+    sim: Simulation,
+    pitch: float = 0.0,
+    yaw: float = 0.0,
+    roll: float = 0.0,
+    speed: float = 10.0,
+    returnToStart: bool = True,
+    disableRendering: bool = True,
+) -> None:
     """Turn the wrist about its own axes, degrees, the shortest way; the stretch robot's about the vertical alone."""
     if sim.settings.agent_mode == "stretch" and (pitch or roll):
         raise ActionError("Pitch and roll are not supported for the stretch agent.")
@@ -142,9 +157,14 @@ def rotate_wrist_relative(
 
 @action("RotateWristAroundHeldObject", modes=_KINOVA)
 def rotate_wrist_around_held_object(
-    sim: Simulation, pitch: float = 0.0, yaw: float = 0.0, roll: float = 0.0, speed: float = 10.0,
-    returnToStart: bool = True, disableRendering: bool = True,
-) -> None:  # fmt: skip
+    sim: Simulation,
+    pitch: float = 0.0,
+    yaw: float = 0.0,
+    roll: float = 0.0,
+    speed: float = 10.0,
+    returnToStart: bool = True,
+    disableRendering: bool = True,
+) -> None:
     """Turn the one held object about its origin, moving the wrist around it."""
     held = list(agent_arm(sim).held)
     if len(held) != 1:
@@ -156,9 +176,15 @@ def rotate_wrist_around_held_object(
 
 @action("RotateWristAroundPoint", modes=_KINOVA)
 def rotate_wrist_around_point(
-    sim: Simulation, point: Vector3, pitch: float = 0.0, yaw: float = 0.0, roll: float = 0.0, speed: float = 10.0,
-    returnToStart: bool = True, disableRendering: bool = True,
-) -> None:  # fmt: skip
+    sim: Simulation,
+    point: Vector3,
+    pitch: float = 0.0,
+    yaw: float = 0.0,
+    roll: float = 0.0,
+    speed: float = 10.0,
+    returnToStart: bool = True,
+    disableRendering: bool = True,
+) -> None:
     """Turn the wrist and move it, as if a point of the world were fixed to it."""
     _turn_around(sim, to_array(point), _wrist_turn(pitch, yaw, roll), returnToStart)
 
@@ -205,9 +231,14 @@ def _bend(sim: Simulation, arm: Arm, poses: list[ArmPose], target: str, return_t
 
 @action("PickupObject", modes=ARM_MODES)
 def pick_up_in_sphere(
-    sim: Simulation, objectIdCandidates: list[str] | None = None, objectId: str | None = None, x: float | None = None,
-    y: float | None = None, forceAction: bool = False, manualInteract: bool = False,
-) -> None:  # fmt: skip
+    sim: Simulation,
+    objectIdCandidates: list[str] | None = None,
+    objectId: str | None = None,
+    x: float | None = None,
+    y: float | None = None,
+    forceAction: bool = False,
+    manualInteract: bool = False,
+) -> None:
     """Hold everything within the hand's sphere that can be picked up, or those candidates that are."""
     given = "objectId" if objectId is not None else "x, y" if x is not None or y is not None else ""
     if given:

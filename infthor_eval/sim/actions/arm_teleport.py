@@ -15,10 +15,14 @@ from infthor_eval.sim.simulation import Simulation
 
 @action("TeleportArm", modes=("arm",))
 def teleport_arm(
-    sim: Simulation, position: Vector3 | None = None, rotation: dict[str, float] | None = None,
-    armHeight: float | None = None, elbowOrientation: float | None = None, worldRelative: bool = False,
+    sim: Simulation,
+    position: Vector3 | None = None,
+    rotation: dict[str, float] | None = None,
+    armHeight: float | None = None,
+    elbowOrientation: float | None = None,
+    worldRelative: bool = False,
     forceAction: bool = False,
-) -> None:  # fmt: skip
+) -> None:
     """Put the arm into a pose at once; what is not given is as in the resting pose.
 
     Args:

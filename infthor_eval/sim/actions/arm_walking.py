@@ -23,9 +23,13 @@ _DIRECTIONS = {"Ahead": (1.0, 0.0), "Back": (-1.0, 0.0), "Right": (0.0, 1.0), "L
 
 @action("MoveAgent", modes=ARM_MODES)
 def move_agent(
-    sim: Simulation, ahead: float = 0.0, right: float = 0.0, speed: float = 1.0, returnToStart: bool = True,
+    sim: Simulation,
+    ahead: float = 0.0,
+    right: float = 0.0,
+    speed: float = 1.0,
+    returnToStart: bool = True,
     disableRendering: bool = True,
-) -> None:  # fmt: skip
+) -> None:
     """Walk, metres ahead and to the right at once."""
     if ahead == 0 and right == 0:
         raise ActionError("Must specify ahead or right!")
@@ -55,10 +59,17 @@ def _body_contact(world: World, places: list[Array]) -> Contact | None:
 
 def _walk(
     direction: tuple[float, float],
-    sim: Simulation, moveMagnitude: float | None = None, objectId: str | None = None, maxAgentsDistance: float = -1.0,
-    forceAction: bool = False, manualInteract: bool = False, allowAgentsToIntersect: bool = False, speed: float = 1.0,
-    returnToStart: bool = True, disableRendering: bool = True,
-) -> None:  # fmt: skip
+    sim: Simulation,
+    moveMagnitude: float | None = None,
+    objectId: str | None = None,
+    maxAgentsDistance: float = -1.0,
+    forceAction: bool = False,
+    manualInteract: bool = False,
+    allowAgentsToIntersect: bool = False,
+    speed: float = 1.0,
+    returnToStart: bool = True,
+    disableRendering: bool = True,
+) -> None:
     size = sim.settings.grid_size if moveMagnitude is None else moveMagnitude
     move_agent(sim, direction[0] * size, direction[1] * size, speed, returnToStart, disableRendering)
 
@@ -69,9 +80,13 @@ for _name, _direction in _DIRECTIONS.items():
 
 @action("RotateAgent", modes=ARM_MODES)
 def rotate_agent(
-    sim: Simulation, degrees: float, speed: float = 1.0, waitForFixedUpdate: bool = False, returnToStart: bool = True,
+    sim: Simulation,
+    degrees: float,
+    speed: float = 1.0,
+    waitForFixedUpdate: bool = False,
+    returnToStart: bool = True,
     disableRendering: bool = True,
-) -> None:  # fmt: skip
+) -> None:
     """Turn clockwise, degrees, the shortest way."""
     now = stance(sim.world, agent_arm(sim))
     turn = wrap_degrees(degrees)
@@ -83,9 +98,15 @@ def rotate_agent(
 
 def _turn(
     sign: float,
-    sim: Simulation, degrees: float | None = None, manualInteract: bool = False, forceAction: bool = False,
-    speed: float = 1.0, waitForFixedUpdate: bool = False, returnToStart: bool = True, disableRendering: bool = True,
-) -> None:  # fmt: skip
+    sim: Simulation,
+    degrees: float | None = None,
+    manualInteract: bool = False,
+    forceAction: bool = False,
+    speed: float = 1.0,
+    waitForFixedUpdate: bool = False,
+    returnToStart: bool = True,
+    disableRendering: bool = True,
+) -> None:
     amount = sim.settings.rotate_step if degrees is None else degrees
     rotate_agent(sim, sign * amount, speed, waitForFixedUpdate, returnToStart, disableRendering)
 

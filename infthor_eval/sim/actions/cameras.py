@@ -32,9 +32,14 @@ def change_quality(sim: Simulation, quality: str) -> None:
 
 @action("AddThirdPartyCamera")
 def add_third_party_camera(
-    sim: Simulation, position: Vector3 | None = None, rotation: Vector3 | None = None, fieldOfView: float = 90.0,
-    orthographic: bool = False, orthographicSize: float = _DEFAULT_SIZE, skyboxColor: Any = None,
-) -> None:  # fmt: skip
+    sim: Simulation,
+    position: Vector3 | None = None,
+    rotation: Vector3 | None = None,
+    fieldOfView: float = 90.0,
+    orthographic: bool = False,
+    orthographicSize: float = _DEFAULT_SIZE,
+    skyboxColor: Any = None,
+) -> None:
     """Add a camera; its frames come with every reply from now on."""
     size = orthographicSize if orthographic else None
     sim.cameras.append(_camera(to_array(position or {}), to_array(rotation or {}), fieldOfView, size))
@@ -42,10 +47,15 @@ def add_third_party_camera(
 
 @action("UpdateThirdPartyCamera")
 def update_third_party_camera(
-    sim: Simulation, thirdPartyCameraId: int = 0, position: Vector3 | None = None, rotation: Vector3 | None = None,
-    fieldOfView: float | None = None, skyboxColor: Any = None, orthographic: bool | None = None,
+    sim: Simulation,
+    thirdPartyCameraId: int = 0,
+    position: Vector3 | None = None,
+    rotation: Vector3 | None = None,
+    fieldOfView: float | None = None,
+    skyboxColor: Any = None,
+    orthographic: bool | None = None,
     orthographicSize: float | None = None,
-) -> None:  # fmt: skip
+) -> None:
     """Move a third-party camera or change its lens; what is not given, even one component, stays."""
     if not 0 <= thirdPartyCameraId < len(sim.cameras):
         raise ActionError(f"There is no third party camera with id {thirdPartyCameraId}")

@@ -45,9 +45,15 @@ def pick_up(
 
 @action("PutObject", forms=BY_ID_OR_PIXEL)
 def put(
-    sim: Simulation, objectId: str | None = None, x: float | None = None, y: float | None = None,
-    forceAction: bool = False, placeStationary: bool = True, randomSeed: int = 0, putNearXY: bool = False,
-) -> None:  # fmt: skip
+    sim: Simulation,
+    objectId: str | None = None,
+    x: float | None = None,
+    y: float | None = None,
+    forceAction: bool = False,
+    placeStationary: bool = True,
+    randomSeed: int = 0,
+    putNearXY: bool = False,
+) -> None:
     """Put the held object into or onto the receptacle `objectId`."""
     held = held_object(sim, "Can't place an object if Agent isn't holding anything in their hand.")
     target = interactable(sim, objectId, forceAction, x, y)
@@ -88,9 +94,14 @@ def _check_receptacle(held: SimObject, target: SimObject) -> None:
 
 @action("OpenObject", forms=BY_ID_OR_PIXEL)
 def open_object(
-    sim: Simulation, objectId: str | None = None, x: float | None = None, y: float | None = None,
-    forceAction: bool = False, openness: float = 1.0, moveMagnitude: float | None = None,
-) -> None:  # fmt: skip
+    sim: Simulation,
+    objectId: str | None = None,
+    x: float | None = None,
+    y: float | None = None,
+    forceAction: bool = False,
+    openness: float = 1.0,
+    moveMagnitude: float | None = None,
+) -> None:
     """Open a door, drawer or lid to `openness`, 0 (closed) to 1."""
     if moveMagnitude is not None:
         openness = moveMagnitude or 1.0  # the old name of `openness`; its 0 meant wide open

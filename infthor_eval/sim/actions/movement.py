@@ -18,10 +18,17 @@ _DIRECTIONS = {"Ahead": 0.0, "Back": 180.0, "Left": -90.0, "Right": 90.0}  # deg
 
 def _move(
     turn: float,
-    sim: Simulation, moveMagnitude: float | None = None, objectId: str | None = None, maxAgentsDistance: float = -1.0,
-    forceAction: bool = False, manualInteract: bool = False, allowAgentsToIntersect: bool = False, speed: float = 1.0,
-    returnToStart: bool = True, disableRendering: bool = True,
-) -> None:  # fmt: skip
+    sim: Simulation,
+    moveMagnitude: float | None = None,
+    objectId: str | None = None,
+    maxAgentsDistance: float = -1.0,
+    forceAction: bool = False,
+    manualInteract: bool = False,
+    allowAgentsToIntersect: bool = False,
+    speed: float = 1.0,
+    returnToStart: bool = True,
+    disableRendering: bool = True,
+) -> None:
     """Walk, keeping within `maxAgentsDistance` metres of the object `objectId` if both are given."""
     size = sim.settings.grid_size if moveMagnitude is None else moveMagnitude
     if size <= 0:
@@ -60,9 +67,15 @@ def _check_path(sim: Simulation, target: Array, offset: Array, force: bool) -> N
 
 def _rotate(
     sign: float,
-    sim: Simulation, degrees: float | None = None, speed: float = 1.0, waitForFixedUpdate: bool = False,
-    returnToStart: bool = True, disableRendering: bool = True, manualInteract: bool = False, forceAction: bool = False,
-) -> None:  # fmt: skip
+    sim: Simulation,
+    degrees: float | None = None,
+    speed: float = 1.0,
+    waitForFixedUpdate: bool = False,
+    returnToStart: bool = True,
+    disableRendering: bool = True,
+    manualInteract: bool = False,
+    forceAction: bool = False,
+) -> None:
     # Unity takes 0 degrees, its default, for `rotateStepDegrees`.
     amount = sim.settings.rotate_step if degrees is None or degrees == 0 else degrees
     agent = sim.world.agent
@@ -76,9 +89,13 @@ for _name, _sign in (("RotateRight", 1.0), ("RotateLeft", -1.0)):
 
 
 def _look(
-    name: str, sign: float, sim: Simulation, degrees: float = 30.0, forceAction: bool = False,
+    name: str,
+    sign: float,
+    sim: Simulation,
+    degrees: float = 30.0,
+    forceAction: bool = False,
     manualInteract: bool = False,
-) -> None:  # fmt: skip
+) -> None:
     if degrees < 0:
         raise ActionError(f"{name} action requires positive degree value. Invalid value used: {degrees}")
     agent = sim.world.agent

@@ -19,10 +19,19 @@ _SPACING = 0.05  # metres between the points of a surface
 
 @action("TeleportObject", forms=(("position",), ("x", "y", "z"), ("positions",)))
 def teleport_object(
-    sim: Simulation, objectId: str, rotation: Vector3, position: Vector3 | None = None, x: float | None = None,
-    y: float | None = None, z: float | None = None, positions: list[Vector3] | None = None, forceAction: bool = False,
-    forceKinematic: bool = False, allowTeleportOutOfHand: bool = False, makeUnbreakable: bool = False,
-) -> None:  # fmt: skip
+    sim: Simulation,
+    objectId: str,
+    rotation: Vector3,
+    position: Vector3 | None = None,
+    x: float | None = None,
+    y: float | None = None,
+    z: float | None = None,
+    positions: list[Vector3] | None = None,
+    forceAction: bool = False,
+    forceKinematic: bool = False,
+    allowTeleportOutOfHand: bool = False,
+    makeUnbreakable: bool = False,
+) -> None:
     """Give an object a pose, the first of several positions at which there is room; then it falls.
 
     With `forceAction` it goes where there is no room too, with `forceKinematic` it stays in the air.

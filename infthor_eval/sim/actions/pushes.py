@@ -20,9 +20,13 @@ _DEFAULT_FORCE = 200.0  # newtons
 
 def _push(
     angle: float,
-    sim: Simulation, objectId: str | None = None, x: float | None = None, y: float | None = None,
-    moveMagnitude: float = _DEFAULT_FORCE, forceAction: bool = False,
-) -> None:  # fmt: skip
+    sim: Simulation,
+    objectId: str | None = None,
+    x: float | None = None,
+    y: float | None = None,
+    moveMagnitude: float = _DEFAULT_FORCE,
+    forceAction: bool = False,
+) -> None:
     directional_push(sim, moveMagnitude, angle, objectId, x, y, forceAction)
 
 
@@ -32,9 +36,14 @@ for _name, _angle in (("PushObject", 0.0), ("PullObject", 180.0)):
 
 @action("DirectionalPush", forms=BY_ID_OR_PIXEL)
 def directional_push(
-    sim: Simulation, moveMagnitude: float, pushAngle: float, objectId: str | None = None, x: float | None = None,
-    y: float | None = None, forceAction: bool = False,
-) -> None:  # fmt: skip
+    sim: Simulation,
+    moveMagnitude: float,
+    pushAngle: float,
+    objectId: str | None = None,
+    x: float | None = None,
+    y: float | None = None,
+    forceAction: bool = False,
+) -> None:
     """Push an object in a direction, degrees clockwise from the agent's own."""
     target = interactable(sim, objectId, forceAction, x, y)
     if target.object_id in sim.world.held_ids():

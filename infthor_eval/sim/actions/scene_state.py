@@ -16,9 +16,13 @@ from infthor_eval.sim.simulation import Simulation
 
 @action("SetObjectPoses")
 def set_object_poses(
-    sim: Simulation, objectPoses: list[Any], placeStationary: bool = True, enablePhysicsJitter: bool = True,
-    forceRigidbodySleep: bool = True, skipMoveable: bool = False,
-) -> None:  # fmt: skip
+    sim: Simulation,
+    objectPoses: list[Any],
+    placeStationary: bool = True,
+    enablePhysicsJitter: bool = True,
+    forceRigidbodySleep: bool = True,
+    skipMoveable: bool = False,
+) -> None:
     """Place the listed objects by name; a name listed twice is copied, pickupable objects not listed vanish."""
     set_poses(sim.world, [_named_pose(entry) for entry in objectPoses], keep_moveable=skipMoveable)
 
@@ -124,11 +128,17 @@ def remove_from_scene(sim: Simulation, objectId: str) -> None:
 
 @action("InitialRandomSpawn")
 def initial_random_spawn(
-    sim: Simulation, randomSeed: int | None = None, forceVisible: bool = False, numPlacementAttempts: int = 5,
-    placeStationary: bool = True, excludedReceptacles: list[str] | None = None,
-    excludedObjectIds: list[str] | None = None, numDuplicatesOfType: list[Any] | None = None, allowFloor: bool = False,
+    sim: Simulation,
+    randomSeed: int | None = None,
+    forceVisible: bool = False,
+    numPlacementAttempts: int = 5,
+    placeStationary: bool = True,
+    excludedReceptacles: list[str] | None = None,
+    excludedObjectIds: list[str] | None = None,
+    numDuplicatesOfType: list[Any] | None = None,
+    allowFloor: bool = False,
     allowMoveable: bool = False,
-) -> None:  # fmt: skip
+) -> None:
     """Spread the pickupable objects over the receptacles, the same way for the same seed.
 
     Without `randomSeed` it continues the random numbers that SetRandomSeed started.

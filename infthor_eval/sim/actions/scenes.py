@@ -26,12 +26,23 @@ def reset(sim: Simulation, sceneName: str) -> None:
 
 @action("Initialize", lenient=True)
 def initialize(
-    sim: Simulation, agentMode: str = "default", gridSize: float = 0.25, snapToGrid: bool = True,
-    rotateStepDegrees: float = 90.0, visibilityDistance: float = 1.5, fieldOfView: float = 90.0,
-    renderDepthImage: bool = False, renderNormalsImage: bool = False, renderInstanceSegmentation: bool = False,
-    renderObjectImage: bool = False, renderSemanticSegmentation: bool = False, renderClassImage: bool = False,
-    fastActionEmit: bool = True, agentCount: int = 1, massThreshold: float | None = None,
-) -> dict[str, float]:  # fmt: skip
+    sim: Simulation,
+    agentMode: str = "default",
+    gridSize: float = 0.25,
+    snapToGrid: bool = True,
+    rotateStepDegrees: float = 90.0,
+    visibilityDistance: float = 1.5,
+    fieldOfView: float = 90.0,
+    renderDepthImage: bool = False,
+    renderNormalsImage: bool = False,
+    renderInstanceSegmentation: bool = False,
+    renderObjectImage: bool = False,
+    renderSemanticSegmentation: bool = False,
+    renderClassImage: bool = False,
+    fastActionEmit: bool = True,
+    agentCount: int = 1,
+    massThreshold: float | None = None,
+) -> dict[str, float]:
     """Set up the agent; arguments that only Unity knows are ignored, as Unity ignores unknown ones here."""
     # The client does not look at the reply to Reset, but raises on the reply to Initialize that it sends next.
     if sim.failed_reset:

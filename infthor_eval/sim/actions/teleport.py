@@ -15,10 +15,16 @@ _STEP_HEIGHT = 0.05  # metres that a teleport's y may be off the floor
 
 @action("Teleport", forms=((), ("x", "y", "z")))
 def teleport(
-    sim: Simulation, position: Vector3 | None = None, x: float | None = None, y: float | None = None,
-    z: float | None = None, rotation: Vector3 | None = None, horizon: float | None = None, standing: bool | None = None,
+    sim: Simulation,
+    position: Vector3 | None = None,
+    x: float | None = None,
+    y: float | None = None,
+    z: float | None = None,
+    rotation: Vector3 | None = None,
+    horizon: float | None = None,
+    standing: bool | None = None,
     forceAction: bool = False,
-) -> None:  # fmt: skip
+) -> None:
     """Put the agent elsewhere; what is not given stays as it is."""
     agent = sim.world.agent
     given = position or {axis: value for axis, value in (("x", x), ("y", y), ("z", z)) if value is not None}
@@ -35,9 +41,16 @@ def teleport(
 
 @action("TeleportFull", forms=(("position",), ("x", "y", "z")))
 def teleport_full(
-    sim: Simulation, rotation: Vector3, horizon: float, standing: bool, position: Vector3 | None = None,
-    x: float | None = None, y: float | None = None, z: float | None = None, forceAction: bool = False,
-) -> None:  # fmt: skip
+    sim: Simulation,
+    rotation: Vector3,
+    horizon: float,
+    standing: bool,
+    position: Vector3 | None = None,
+    x: float | None = None,
+    y: float | None = None,
+    z: float | None = None,
+    forceAction: bool = False,
+) -> None:
     """Put the agent elsewhere; everything must be given."""
     teleport(sim, position, x, y, z, rotation, horizon, standing, forceAction)
 

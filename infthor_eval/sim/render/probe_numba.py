@@ -43,9 +43,19 @@ def _covers(box: NDArray[np.int64], k: int, x: int, y: int) -> bool:
 
 @njit(cache=True)
 def _is_visible(
-    profiles: Array, origin: Array, steps: Array, box: NDArray[np.int64], near: Array, us: Array, vs: Array,
-    clip: float, far: float, own: NDArray[np.int64], others: NDArray[np.int64], min_pixels: int,
-) -> bool:  # fmt: skip
+    profiles: Array,
+    origin: Array,
+    steps: Array,
+    box: NDArray[np.int64],
+    near: Array,
+    us: Array,
+    vs: Array,
+    clip: float,
+    far: float,
+    own: NDArray[np.int64],
+    others: NDArray[np.int64],
+    min_pixels: int,
+) -> bool:
     hider = -1  # what hid the last pixel is tried first, as it mostly hides the next one too
     for every in (_COARSE, 1):
         count = 0  # the fine pass counts all pixels afresh, those of the coarse one among them

@@ -84,9 +84,17 @@ def _hit_bowl(ox: float, oy: float, oz: float, dx: float, dy: float, dz: float, 
 
 @njit(cache=True)
 def _hit_cylinder(
-    ox: float, oy: float, oz: float, dx: float, dy: float, dz: float, bottom: float, top: float, is_open: bool,
+    ox: float,
+    oy: float,
+    oz: float,
+    dx: float,
+    dy: float,
+    dz: float,
+    bottom: float,
+    top: float,
+    is_open: bool,
     clip: float,
-) -> float:  # fmt: skip
+) -> float:
     # The side is x^2 + z^2 = (m + k * y)^2, of which m + k * y >= 0 excludes the mirrored cone beyond the apex.
     m, k = (bottom + top) * 0.5, (top - bottom) * 0.5
     radius = m + k * oy
@@ -117,9 +125,17 @@ def _hit_cylinder(
 
 @njit(cache=True, inline="always")
 def hit(
-    form: float, bottom: float, top: float, ox: float, oy: float, oz: float, dx: float, dy: float, dz: float,
+    form: float,
+    bottom: float,
+    top: float,
+    ox: float,
+    oy: float,
+    oz: float,
+    dx: float,
+    dy: float,
+    dz: float,
     clip: float,
-) -> float:  # fmt: skip
+) -> float:
     """Return the depth at which a ray from o along d meets a primitive, in its scaled frame; infinity for a miss."""
     if form == _BOX:
         return _hit_box(ox, oy, oz, dx, dy, dz)
@@ -132,9 +148,18 @@ def hit(
 
 @njit(cache=True, parallel=True)
 def _cast(
-    profiles: Array, origin: Array, steps: Array, box: NDArray[np.int64], near: Array, us: Array, vs: Array,
-    clip: float, far: float, depth: Array, nearest: NDArray[np.int32],
-) -> None:  # fmt: skip
+    profiles: Array,
+    origin: Array,
+    steps: Array,
+    box: NDArray[np.int64],
+    near: Array,
+    us: Array,
+    vs: Array,
+    clip: float,
+    far: float,
+    depth: Array,
+    nearest: NDArray[np.int32],
+) -> None:
     height = len(vs)
     # Threads share out rows and not primitives: each pixel has one writer, so their number does not change the picture.
     for band in prange(_BANDS):

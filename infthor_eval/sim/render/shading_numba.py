@@ -29,9 +29,14 @@ _glass, _paper, _carpet = (njit(cache=True)(f) for f in (patterns.glass, pattern
 
 
 def shade(
-    prims: Array, projection: Projection, camera: PinholeCamera, depth: Array, nearest: NDArray[np.int32],
-    factors: Array, lights: Lights,
-) -> NDArray[np.uint8]:  # fmt: skip
+    prims: Array,
+    projection: Projection,
+    camera: PinholeCamera,
+    depth: Array,
+    nearest: NDArray[np.int32],
+    factors: Array,
+    lights: Lights,
+) -> NDArray[np.uint8]:
     """Return RGB (h, w, 3), bottom row first, of the pixels that `cast` hit, each brightness times its factor."""
     us, vs = camera.rays()
     rgb = np.zeros((*nearest.shape, 3), dtype=np.uint8)
@@ -138,9 +143,20 @@ def brightness_at(
 
 @njit(cache=True, parallel=True)
 def _shade(
-    prims: Array, origin: Array, steps: Array, eye: Array, view: Array, us: Array, vs: Array, depth: Array,
-    nearest: NDArray[np.int32], factors: Array, lamps: Array, daylight: float, rgb: NDArray[np.uint8],
-) -> None:  # fmt: skip
+    prims: Array,
+    origin: Array,
+    steps: Array,
+    eye: Array,
+    view: Array,
+    us: Array,
+    vs: Array,
+    depth: Array,
+    nearest: NDArray[np.int32],
+    factors: Array,
+    lamps: Array,
+    daylight: float,
+    rgb: NDArray[np.uint8],
+) -> None:
     height = len(vs)
     for band in prange(_BANDS):
         for y in range(band * height // _BANDS, (band + 1) * height // _BANDS):

@@ -15,9 +15,14 @@ _RIM = 1.0 - 1e-6
 
 
 def shade(
-    prims: Array, projection: Projection, camera: PinholeCamera, depth: Array, nearest: NDArray[np.int32],
-    factors: Array, lights: Lights,
-) -> NDArray[np.uint8]:  # fmt: skip
+    prims: Array,
+    projection: Projection,
+    camera: PinholeCamera,
+    depth: Array,
+    nearest: NDArray[np.int32],
+    factors: Array,
+    lights: Lights,
+) -> NDArray[np.uint8]:
     """Return RGB (h, w, 3), bottom row first, of the pixels that `cast` hit, each brightness times its factor."""
     us, vs = camera.rays()
     rgb = np.zeros((*nearest.shape, 3), dtype=np.uint8)

@@ -98,9 +98,16 @@ def _pieces(
 
 
 def _slab(
-    along_x: bool, middle: float, at: float, half: float, level: float, rise: float, thick: float, color: Color,
+    along_x: bool,
+    middle: float,
+    at: float,
+    half: float,
+    level: float,
+    rise: float,
+    thick: float,
+    color: Color,
     material: Material = Material.PLAIN,
-) -> ShapePart:  # fmt: skip
+) -> ShapePart:
     if along_x:
         return ShapePart(Form.BOX, (middle, level, at), (half, rise, thick), color, material)
     return ShapePart(Form.BOX, (at, level, middle), (thick, rise, half), color, material)

@@ -21,9 +21,15 @@ _NEIGHBOURS, _SUBPIXELS = np.array(NEIGHBOURS), np.array(SUBPIXELS)
 
 
 def smooth(
-    prims: Array, projection: Projection, camera: PinholeCamera, nearest: NDArray[np.int32], factors: Array,
-    lights: Lights, places: tuple[NDArray[np.int64], NDArray[np.int64]], rgb: NDArray[np.uint8],
-) -> None:  # fmt: skip
+    prims: Array,
+    projection: Projection,
+    camera: PinholeCamera,
+    nearest: NDArray[np.int32],
+    factors: Array,
+    lights: Lights,
+    places: tuple[NDArray[np.int64], NDArray[np.int64]],
+    rgb: NDArray[np.uint8],
+) -> None:
     """Give the pixels at `places` (rows, columns) of `rgb` the mean colour of their rays, in place."""
     us, vs = camera.rays()
     _smooth(
@@ -61,10 +67,23 @@ def _depth(prims: Array, origin: Array, steps: Array, k: int, u: float, v: float
 
 @njit(cache=True, parallel=True)
 def _smooth(
-    prims: Array, origin: Array, steps: Array, eye: Array, view: Array, us: Array, vs: Array, clip: float, far: float,
-    nearest: NDArray[np.int32], factors: Array, lamps: Array, daylight: float, ys: NDArray[np.int64],
-    xs: NDArray[np.int64], rgb: NDArray[np.uint8],
-) -> None:  # fmt: skip
+    prims: Array,
+    origin: Array,
+    steps: Array,
+    eye: Array,
+    view: Array,
+    us: Array,
+    vs: Array,
+    clip: float,
+    far: float,
+    nearest: NDArray[np.int32],
+    factors: Array,
+    lamps: Array,
+    daylight: float,
+    ys: NDArray[np.int64],
+    xs: NDArray[np.int64],
+    rgb: NDArray[np.uint8],
+) -> None:
     pixel = vs[1] - vs[0] if len(vs) > 1 else 0.0
     # Each pixel reads and writes only its own colour: smoothing in place, in parallel, needs no copy.
     for band in prange(_BANDS):

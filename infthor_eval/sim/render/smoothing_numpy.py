@@ -17,9 +17,15 @@ _NEIGHBOURS, _SUBPIXELS = np.array(NEIGHBOURS), np.array(SUBPIXELS)
 
 
 def smooth(
-    prims: Array, projection: Projection, camera: PinholeCamera, nearest: NDArray[np.int32], factors: Array,
-    lights: Lights, places: tuple[NDArray[np.int64], NDArray[np.int64]], rgb: NDArray[np.uint8],
-) -> None:  # fmt: skip
+    prims: Array,
+    projection: Projection,
+    camera: PinholeCamera,
+    nearest: NDArray[np.int32],
+    factors: Array,
+    lights: Lights,
+    places: tuple[NDArray[np.int64], NDArray[np.int64]],
+    rgb: NDArray[np.uint8],
+) -> None:
     """Give the pixels at `places` (rows, columns) of `rgb` the mean colour of their rays, in place."""
     ys, xs = places
     if not len(ys):

@@ -107,9 +107,16 @@ class Builder:
         return (at if axis == 0 else 0.0, at if axis == 1 else 0.0, at if axis == 2 else 0.0)
 
     def bar(
-        self, axis: int, start: float, end: float, radii: tuple[float, float], color: Color,
-        material: Material = Material.PLAIN, *, glow: float = 0.0,
-    ) -> None:  # fmt: skip
+        self,
+        axis: int,
+        start: float,
+        end: float,
+        radii: tuple[float, float],
+        color: Color,
+        material: Material = Material.PLAIN,
+        *,
+        glow: float = 0.0,
+    ) -> None:
         """Add a round bar on the middle line of `axis` from `start` to `end`, with its radii in metres there."""
         tilt = {0: (0.0, 0.0, -90.0), 1: (0.0, 0.0, 0.0), 2: (90.0, 0.0, 0.0)}[axis]
         matrix = self._turn @ euler_matrix(tilt)
@@ -132,9 +139,15 @@ class Builder:
         self.parts.append(ShapePart(Form.BOX, self.metric(at), tuple(metres), color, material, self._turn))
 
     def hinged_box(
-        self, hinge: Vector, offset: Vector, metres: Vector, angle: float, color: Color, material: Material,
+        self,
+        hinge: Vector,
+        offset: Vector,
+        metres: Vector,
+        angle: float,
+        color: Color,
+        material: Material,
         glow: float = 0.0,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Add a box turned by `angle` degrees about an upright hinge, which is at a position in fractions.
 
         The box's middle before turning, from the hinge, and its half extents are given in metres.
