@@ -13,17 +13,7 @@ from infthor_eval.nieh.options import NiehOptions
 from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.nieh.samples import TaskSamples, open_set
 from infthor_eval.nieh.task import NiehTask, PreparedTask
-from infthor_eval.runs import (
-    Cost,
-    Group,
-    Session,
-    Skipped,
-    TaskRequest,
-    UnitKey,
-    UnitRecord,
-    UnitSample,
-    Workload,
-)
+from infthor_eval.runs import Cost, Group, Session, Skipped, TaskRequest, UnitKey, UnitRecord, UnitSample, Workload
 from model_adapters import Subject
 
 __all__ = ["BoundNieh", "NiehEvaluation", "PreparedEvaluation"]

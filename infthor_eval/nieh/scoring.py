@@ -136,10 +136,7 @@ def _normalise(text: Answer) -> str:
     text = text.lower().strip()
     try:
         return str(w2n.word_to_num(text))
-    except (
-        ValueError,
-        IndexError,
-    ):  # the library's own ways to say "not a number" ("thousand one": IndexError)
+    except (ValueError, IndexError):  # the library's own ways to say "not a number" ("thousand one": IndexError)
         return _plain(text)
 
 
