@@ -4,7 +4,7 @@ from collections.abc import Hashable, Sequence
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from lm_eval.api.instance import Instance
 from lm_eval.api.model import LM
@@ -13,9 +13,10 @@ from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.formats.scratch import ScratchFolder
 from infthor_eval.harness.registration import NAME, say_model_takes_references
 from infthor_eval.harness.requests import RequestAdapter
-from infthor_eval.runs import RunHeader, Suite, Unit, UnitRecord
+from infthor_eval.runs import RunHeader, Suite, UnitRecord
 from infthor_eval.runs.binding import require_capability
 from infthor_eval.runs.journal import Journal
+from infthor_eval.runs.records import P, U
 from infthor_eval.runs.run_config import run_config
 from infthor_eval.runs.session import JournalSession
 from infthor_eval.suites import baseline_suites, find_request_adapter, find_suite
@@ -23,8 +24,6 @@ from model_adapters import adapter_identity, has_option, label, load
 
 __all__ = ["InfthorLM"]
 
-P = TypeVar("P")
-U = TypeVar("U", bound=Unit[Any])
 
 _DEFAULT_DEVICE = "cuda:0"  # what lm-eval says where nobody said anything
 

@@ -5,14 +5,13 @@ which looks up the suite's `RequestAdapter` by that name (`infthor_eval.suites.f
 """
 
 from collections.abc import Hashable, Mapping, Sequence
-from typing import Any, Protocol, TypeVar
+from typing import Any, Protocol
 
-from infthor_eval.runs import Evaluation, Unit, UnitKey, UnitRecord
+from infthor_eval.runs import Evaluation, UnitKey, UnitRecord
+from infthor_eval.runs.records import P, U
 
 __all__ = ["Doc", "RequestAdapter"]
 
-P = TypeVar("P")
-U = TypeVar("U", bound=Unit[Any])
 
 Doc = dict[str, Any]
 
@@ -31,16 +30,12 @@ class RequestAdapter(Protocol[U, P]):
             generation_kwargs: decoding settings in lm-eval's words.
             seed: seed of the run.
         """
-        ...
 
     def doc_id(self, doc: Doc) -> Hashable:
         """Return what a doc is told apart by among those of its task."""
-        ...
 
     def doc_id_of_unit(self, key: UnitKey, cluster: str) -> Hashable:
         """Return the `doc_id` of the doc that a unit belongs to."""
-        ...
 
     def response(self, records: Sequence[UnitRecord[P]]) -> str:
         """Return the response to a doc, given the records of its units."""
-        ...

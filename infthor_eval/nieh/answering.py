@@ -114,7 +114,6 @@ class Answerer(Protocol):
     @property
     def batch_size(self) -> int:
         """How many units are worth handing over at once."""
-        ...
 
     def read(self, context: Sequence[ContextPart]) -> tuple[str | FrameRef, ...]:
         """A context as it is shown: with the model's notes, which it takes now if it has not yet, as text.
@@ -123,7 +122,6 @@ class Answerer(Protocol):
             DataError: a frame cannot be read.
             ModelError: the model cannot take notes on so many frames.
         """
-        ...
 
     def answer(self, asked: Sequence[_Asked]) -> list[Reply]:
         """The replies to units that share their context and decoding.
@@ -132,11 +130,9 @@ class Answerer(Protocol):
             DataError: a frame cannot be read; nothing is answered then.
             ModelError: the model cannot take one of the requests; nothing is answered then.
         """
-        ...
 
     def usage(self, reply: Reply) -> Usage:
         """What a reply took."""
-        ...
 
 
 class ModelAnswerer:

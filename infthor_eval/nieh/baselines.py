@@ -34,7 +34,6 @@ class Baseline(Subject, Protocol):
 
     def fit(self, samples: Sequence[Sample]) -> Predict:
         """Read the whole answer key of one task; what comes of it answers that task's samples."""
-        ...
 
 
 class Oracle(BaselineSubject):

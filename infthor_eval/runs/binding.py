@@ -2,10 +2,10 @@
 
 from contextlib import ExitStack
 from dataclasses import dataclass
-from typing import Any, Generic, TypeVar
+from typing import Generic
 
 from infthor_eval.errors import UsageError
-from infthor_eval.runs.records import RunHeader, Unit
+from infthor_eval.runs.records import P, RunHeader, U
 from infthor_eval.runs.request import PreparedRun
 from infthor_eval.runs.run_config import header_of
 from infthor_eval.runs.suite import BoundEvaluation, Need, Suite
@@ -13,8 +13,6 @@ from model_adapters import Model, Policy, Subject, load
 
 __all__ = ["BoundRun", "bind_run", "require_capability"]
 
-P = TypeVar("P")
-U = TypeVar("U", bound=Unit[Any])
 
 _NEEDED: dict[Need, tuple[type, str]] = {
     "conversation": (Model, "a model that answers in words"),

@@ -4,12 +4,12 @@ from collections.abc import Callable, Iterable
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Generic, Protocol
 
 from infthor_eval.runs import journal as journals
 from infthor_eval.runs.executor import Executor, LocalExecutor
 from infthor_eval.runs.journal import Journal
-from infthor_eval.runs.records import Unit, UnitRecord
+from infthor_eval.runs.records import P, U, Unit, UnitRecord
 from infthor_eval.runs.request import PreparedRun
 from infthor_eval.runs.results import results_document, write_results, write_scores, write_usage
 from infthor_eval.runs.samples import StoredSamples
@@ -20,24 +20,18 @@ from infthor_eval.runs.worker_executor import WorkerPoolExecutor
 
 __all__ = ["Observer", "RunOutcome", "Silent", "execute"]
 
-P = TypeVar("P")
-U = TypeVar("U", bound=Unit[Any])
-
 
 class Observer(Protocol):
     """Follows a run."""
 
     def begin(self, workload: Workload[Unit[Any]], n_recovered: int) -> None:
         """Called before the first unit, with all the work and the number of bad lines taken out of the journal."""
-        ...
 
     def done(self, record: UnitRecord[Any], resumed: bool) -> None:
         """Called for each unit; `resumed` if its record is that of an earlier, stopped run."""
-        ...
 
     def note(self, text: str) -> None:
         """Called with a line when a worker is lost or cannot be started."""
-        ...
 
 
 class Silent:

@@ -11,20 +11,17 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, fields, replace
-from typing import Any, TypeVar
+from typing import Any
 
 from infthor_eval.runs.binding import bind_run
 from infthor_eval.runs.groups import group_records
-from infthor_eval.runs.records import Unit, UnitRecord, describe_failure
+from infthor_eval.runs.records import A, P, U, Unit, UnitRecord, describe_failure
 from infthor_eval.runs.request import RunRequest, prepare
 from infthor_eval.runs.suite import BoundEvaluation, Group, Suite, Workload
 from infthor_eval.runs.usage import NOTHING, Usage
 
 __all__ = ["Estimate", "Quantities", "TaskEstimate", "estimate_run", "estimate_tasks"]
 
-A = TypeVar("A")
-P = TypeVar("P")
-U = TypeVar("U", bound=Unit[Any])
 
 _UNITS_OF_A_GROUP = 3  # measured units of a group: the first, the middle and the last
 

@@ -1,18 +1,14 @@
 """The records of a group: whatever its suite raises fails the group alone, and is recorded."""
 
 from collections.abc import Iterator
-from typing import Any, TypeVar
 
 import msgspec
 
 from infthor_eval.errors import ModelError
-from infthor_eval.runs.records import Unit, UnitRecord
+from infthor_eval.runs.records import P, U, UnitRecord
 from infthor_eval.runs.suite import BoundEvaluation, Group, Session
 
 __all__ = ["group_records"]
-
-P = TypeVar("P")
-U = TypeVar("U", bound=Unit[Any])
 
 
 def group_records(evaluation: BoundEvaluation[U, P], group: Group[U], session: Session[P]) -> Iterator[UnitRecord[P]]:

@@ -20,7 +20,7 @@ from io import FileIO
 from pathlib import Path
 from threading import Lock
 from types import TracebackType
-from typing import Any, BinaryIO, Generic, Self, TypeVar
+from typing import Any, BinaryIO, Generic, Self
 
 import msgspec
 
@@ -28,7 +28,7 @@ from infthor_eval.errors import DataError, UsageError, in_one_line, wrap_errors
 from infthor_eval.formats.digests import canonical_json
 from infthor_eval.formats.files import write_atomically
 from infthor_eval.formats.reading import require_file
-from infthor_eval.runs.records import ArtifactRecord, RecordTypes, RunHeader, UnitKey, UnitRecord
+from infthor_eval.runs.records import ArtifactRecord, P, RecordTypes, RunHeader, UnitKey, UnitRecord
 from infthor_eval.runs.shards import (
     BAD,
     FOLDER,
@@ -44,7 +44,6 @@ from infthor_eval.runs.usage import NOTHING, Usage
 
 __all__ = ["Journal", "recover", "set_aside"]
 
-P = TypeVar("P")
 
 _SHARD = "worker-{:d}.jsonl"
 _RETRY_S = 0.1  # between two attempts to lock

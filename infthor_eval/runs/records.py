@@ -26,8 +26,10 @@ __all__ = [
 
 FORMAT = 3
 
-P = TypeVar("P")
+A = TypeVar("A")  # an artifact
+P = TypeVar("P")  # the payload of a suite's records
 P_co = TypeVar("P_co", covariant=True)
+U = TypeVar("U", bound="Unit[Any]")  # a suite's unit
 
 
 class UnitKey(NamedTuple):

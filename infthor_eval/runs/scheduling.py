@@ -3,15 +3,11 @@
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from queue import Empty, SimpleQueue
 from threading import Event, Thread
-from typing import Any, TypeVar
 
-from infthor_eval.runs.records import Unit, UnitRecord
+from infthor_eval.runs.records import P, U, UnitRecord
 from infthor_eval.runs.suite import Group
 
 __all__ = ["run_groups"]
-
-P = TypeVar("P")
-U = TypeVar("U", bound=Unit[Any])
 
 
 def run_groups(

@@ -2,14 +2,14 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic
 
 import msgspec
 
 from infthor_eval.errors import DataError
 from infthor_eval.formats.digests import canonical_json
 from infthor_eval.formats.reading import read_bytes, require_file
-from infthor_eval.runs.records import FORMAT, ArtifactRecord, RecordTypes, RunHeader, UnitKey, UnitRecord
+from infthor_eval.runs.records import FORMAT, ArtifactRecord, P, RecordTypes, RunHeader, UnitKey, UnitRecord
 from infthor_eval.runs.usage import Usage
 
 __all__ = [
@@ -27,7 +27,6 @@ __all__ = [
     "read_shards",
 ]
 
-P = TypeVar("P")
 
 FOLDER = "journal"  # within the run's folder
 Decoder = msgspec.json.Decoder[Any]

@@ -7,14 +7,14 @@ number, each with the records that earlier runs or a lost worker left of it. So 
 from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic
 
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.digests import canonical_json
 from infthor_eval.runs.binding import bind_run
 from infthor_eval.runs.groups import group_records
 from infthor_eval.runs.journal import Journal
-from infthor_eval.runs.records import RunHeader, Unit, UnitKey, UnitRecord
+from infthor_eval.runs.records import P, RunHeader, U, Unit, UnitKey, UnitRecord
 from infthor_eval.runs.request import PreparedRun
 from infthor_eval.runs.session import JournalSession
 from infthor_eval.runs.suite import Group, UnitSample, Workload
@@ -22,8 +22,6 @@ from infthor_eval.workers import Event, JobFailed, JobResult, Pool, WorkerLost, 
 
 __all__ = ["WorkerPoolExecutor"]
 
-P = TypeVar("P")
-U = TypeVar("U", bound=Unit[Any])
 
 _SHARD_WAIT_S = 20.0
 # A unit that kills its worker (out of memory, say) must not fail the others of its group: after so many losses in a
