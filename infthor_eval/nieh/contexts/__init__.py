@@ -41,7 +41,7 @@ CONTEXTS = {
 
 
 def context_named(name: str) -> Context:
-    """The context of that name.
+    """Return the context of a name.
 
     Raises:
         UsageError: there is none.
