@@ -1,4 +1,4 @@
-"""How lm-eval's requests reach a suite, whoever's package it is in.
+"""The way of lm-eval's requests to a suite of any package.
 
 The functions of a task file make docs, each with the name of its suite under "suite". lm-eval hands them to our model,
 which looks up the suite's `RequestAdapter` by that name (`infthor_eval.suites.find_request_adapter`).
@@ -22,17 +22,10 @@ class RequestAdapter(Protocol[U, P]):
     def prepare(
         self, task: str, docs: Sequence[Doc], generation_kwargs: Mapping[str, Any], seed: int
     ) -> Evaluation[U, P]:
-        """Set up the evaluation of a task's docs; units that belong to none of them are not done.
-
-        Args:
-            task: name of the task.
-            docs: at least one doc.
-            generation_kwargs: decoding settings in lm-eval's words.
-            seed: seed of the run.
-        """
+        """Set up the evaluation of a task's docs (at least one); units that belong to none of them are not done."""
 
     def doc_id(self, doc: Doc) -> Hashable:
-        """Return what a doc is told apart by among those of its task."""
+        """Return the id of a doc, unique among those of its task."""
 
     def doc_id_of_unit(self, key: UnitKey, cluster: str) -> Hashable:
         """Return the `doc_id` of the doc that a unit belongs to."""

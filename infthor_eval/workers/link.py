@@ -32,11 +32,7 @@ class OpenWorker(Protocol):
     """Creates a worker in the process where it works; it is pickled and sent there."""
 
     def __call__(self, number: int) -> Worker:
-        """Create the worker.
-
-        Args:
-            number: number of the worker, from 1.
-        """
+        """Create the worker of this number, from 1."""
 
 
 class Link(Protocol):
