@@ -192,7 +192,7 @@ def answer_units(
         try:
             requests.append(_UnitRequest.of(unit, prepared))
         except DataError as error:
-            yield unit.failed(session.describe_failure(unit, error))
+            yield unit.record_failure(session.describe_failure(unit, error))
     for _, in_one_context in groupby(sorted(requests, key=_names), key=_names):
         yield from _in_context(list(in_one_context), answerer, session)
 
@@ -213,7 +213,7 @@ def _in_context(
     try:
         context = answerer.read(requests[0].context)
     except (DataError, ModelError) as error:
-        yield from [item.unit.failed(session.describe_failure(item.unit, error)) for item in requests]
+        yield from [item.unit.record_failure(session.describe_failure(item.unit, error)) for item in requests]
         return
     waiting = []
     for item in [replace(item, context=context) for item in requests]:
@@ -231,7 +231,7 @@ def _find_record(request: _UnitRequest, session: Session[NiehAnswer]) -> UnitRec
     try:
         return session.find_record(request.unit, request.fingerprint)
     except DataError as error:
-        return request.unit.failed(session.describe_failure(request.unit, error))
+        return request.unit.record_failure(session.describe_failure(request.unit, error))
 
 
 def _answer(
@@ -243,7 +243,7 @@ def _answer(
     except (DataError, ModelError) as error:
         if len(requests) == 1:
             (item,) = requests
-            yield item.unit.failed(session.describe_failure(item.unit, error), item.fingerprint, faults=faults)
+            yield item.unit.record_failure(session.describe_failure(item.unit, error), item.fingerprint, faults=faults)
             return
         for item in requests:  # one of them may be to blame; the others are answered
             yield from _answer([item], answerer, session, (f"asked with {len(requests) - 1} others: {error}",))

@@ -102,7 +102,7 @@ def _by_question(data: NiehSet, context: Context, settings: ContextSettings, lim
     problems: dict[FrameRef, str | None] = {}
 
     def skip_unreadable(sample: Sample) -> Sample | SkippedQuestion:
-        problem = _find_problem(context.shown(data, sample), problems)
+        problem = _find_problem(context.select_frames(data, sample), problems)
         return SkippedQuestion(sample.question, problem, sample.variant) if problem else sample
 
     trajectories = [row.traj_id if isinstance(row, Question) else row.question.traj_id for row in data.rows]

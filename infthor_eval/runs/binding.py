@@ -22,13 +22,7 @@ _NEEDED: dict[Need, tuple[type, str]] = {
 
 @dataclass(frozen=True)
 class BoundRun(Generic[U, P]):
-    """A run whose subject is loaded.
-
-    Attributes:
-        subject: what is evaluated.
-        evaluation: the evaluation of the subject.
-        header: header of the run's journal.
-    """
+    """A run whose subject is loaded, and the header of its journal."""
 
     subject: Subject
     evaluation: BoundEvaluation[U, P]
@@ -73,16 +67,7 @@ def _load_subject(run: PreparedRun[U, P]) -> Subject:
 
 
 def require_capability(subject: Subject, name: str, suite: Suite[U, P]) -> None:
-    """Refuse a subject that a suite cannot evaluate.
-
-    Args:
-        subject: a model or a policy.
-        name: the name that it was asked for.
-        suite: the suite.
-
-    Raises:
-        UsageError: the subject lacks what the suite needs.
-    """
+    """Refuse a subject, by the name that it was requested by, that lacks what a suite needs (UsageError)."""
     kind, description = _NEEDED[suite.needs]
     if not isinstance(subject, kind):
         raise UsageError(f"{name} cannot be evaluated on {suite.name}, which needs {description}")

@@ -52,12 +52,9 @@ class RunOutcome(Generic[U, P]):
     """A run that has ended.
 
     Attributes:
-        folder: the run's folder.
-        run: what it was executed from.
-        summary: header and summary of the run.
-        records: the records of all units that were attempted.
+        records: records of all units that were attempted.
         n_missing: number of units that were not attempted, as the run was stopped.
-        usage: what all its requests took, those for cached artifacts included.
+        usage: usage of all requests, those for cached artifacts included.
         samples: the records in their order, converted for other readers.
     """
 
@@ -80,9 +77,9 @@ def execute(
 
     Args:
         run: the prepared run.
-        observer: follows the run; None for nobody.
-        should_stop: asked after each unit; once it returns True, the units in hand are finished, and the results of
-            what is there are written.
+        observer: follows the run.
+        should_stop: called after each unit; once it returns True, the units in hand are finished, and the results so
+            far are written.
 
     Raises:
         UsageError: another process at the same run, a subject that the suite cannot evaluate, or nothing to do.

@@ -33,13 +33,7 @@ class Executor(Protocol[P]):
     def evaluate(
         self, folder: Path, journal: Journal[P], should_stop: Callable[[], bool]
     ) -> Iterator[tuple[UnitRecord[P], bool]]:
-        """Do all groups; yield every record as soon as it is on disk.
-
-        Args:
-            folder: the run's folder.
-            journal: the driver's shard.
-            should_stop: returns True once the units in hand are to be the last.
-        """
+        """Do all groups, or stop after the units in hand; yield every record as soon as it is on disk."""
 
     def samples(self, records: Sequence[UnitRecord[P]]) -> Iterator[UnitSample]:
         """Convert records for other readers, in their order; not after `close`."""

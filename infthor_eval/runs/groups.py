@@ -28,4 +28,4 @@ def group_records(evaluation: BoundEvaluation[U, P], group: Group[U], session: S
         raise
     except Exception as error:  # noqa: BLE001 - a suite is anybody's code, and may raise anything
         fault = error
-    yield from (unit.failed(session.describe_failure(unit, fault)) for unit in waiting.values())
+    yield from (unit.record_failure(session.describe_failure(unit, fault)) for unit in waiting.values())

@@ -58,13 +58,7 @@ class RunRequest:
 
 @dataclass(frozen=True)
 class PreparedRun(Generic[U, P]):
-    """A request whose names, files and data are in order; it is pickled and sent to workers.
-
-    Attributes:
-        request: the request.
-        suite: its suite.
-        evaluation: the suite set up for it.
-    """
+    """A request whose names, files and data are in order, with its suite set up; it is pickled and sent to workers."""
 
     request: RunRequest
     suite: Suite[U, P]

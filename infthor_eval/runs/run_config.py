@@ -30,7 +30,7 @@ def run_config(
 
     Args:
         suite: name of the suite.
-        subject: what is evaluated.
+        subject: the evaluated model, policy or baseline.
         code: identity of a model adapter that is not this package's (`model_adapters.adapter_identity`).
         workload: config of the workload.
         limit: number of items of each task; None for all.

@@ -47,12 +47,12 @@ U_co = TypeVar("U_co", bound=Unit[Any], covariant=True)
 
 @dataclass(frozen=True)
 class TaskRequest(Generic[O_co]):
-    """What a run asks of a suite.
+    """The request of a run to a suite.
 
     Attributes:
-        tasks: the task files, all of this suite.
-        options: an instance of the suite's `Options`.
-        data: folder of the data set for tasks that do not bring their own.
+        tasks: task files, all of this suite.
+        options: instance of the suite's `options`.
+        data: folder of the data set for tasks without their own.
         limit: number of items to evaluate of each task, chosen by `infthor_eval.runs.limiting`; None for all.
         seed: seed of everything random.
     """
@@ -87,12 +87,7 @@ class Skipped:
 
 @dataclass(frozen=True)
 class Cost:
-    """The cost of a task, known before its first unit.
-
-    Attributes:
-        task: name of the task.
-        description: the cost in words, for people.
-    """
+    """The cost of a task in words, known before its first unit."""
 
     task: str
     description: str
@@ -237,12 +232,7 @@ class Suite(Protocol[U, P]):
 
 @dataclass(frozen=True)
 class RunSummary:
-    """A run, summed up.
-
-    Attributes:
-        header: header of the run's journal.
-        summary: what the suite makes of the records (`Suite.summarise`).
-    """
+    """The header of a run's journal, and its summary by its suite (`Suite.summarise`)."""
 
     header: RunHeader
     summary: Any

@@ -153,15 +153,15 @@ class Context:
     frames: Callable[[NiehSet, str], Sequence[FrameRef]] = field(default=NiehSet.frames)
     sources: Callable[[NiehSet, ContextSettings], dict[str, Any]] = field(default=_no_sources)
 
-    def shown(self, data: NiehSet, sample: Sample) -> list[FrameRef]:
+    def select_frames(self, data: NiehSet, sample: Sample) -> list[FrameRef]:
         """Return the frames of a sample."""
         frames = self.frames(data, sample.question.traj_id)
         return [frames[position] for position in sample.frames]
 
     def request(self, data: NiehSet, sample: Sample) -> tuple[list[ContextPart], str]:
         """Return the request of a sample: the context, and the text with the question that follows it."""
-        shown = self.parts(data, sample, self.shown(data, sample))
-        return shown, question_text(self.intro, sample.question)
+        parts = self.parts(data, sample, self.select_frames(data, sample))
+        return parts, question_text(self.intro, sample.question)
 
 
 def clue_positions(data: NiehSet, question: Question) -> tuple[int, ...]:
