@@ -91,7 +91,7 @@ def test_notes_are_taken_on_what_stands_in(requests, frames):
 
 
 def test_what_cannot_be_is_refused(requests, make_nieh_set):
-    with pytest.raises(UsageError, match="frames is .none.; it is one of shown, blank, shuffled, other"):
+    with pytest.raises(UsageError, match=r"frames is .none.; it is one of shown, blank, shuffled, other"):
         requests("none")
     root = make_nieh_set(QUESTIONS[:2], name="one")
     with pytest.raises(UsageError, match="on one trajectory only"):
